@@ -1,0 +1,50 @@
+"""gfimu: a gyro-free inertial measurement unit in software.
+
+Glossary
+--------
+specific force, f = a − g
+    What an accelerometer reads: at rest +g along "up". Never called acceleration here. m/s².
+p
+    Specific force of the body origin, in body axes, m/s².
+alpha, α
+    Angular acceleration of the body, in body axes, rad/s².
+omega, ω
+    Angular rate of the body against the world, in body axes, rad/s.
+J, Q
+    Regression matrix (c × 6) and centripetal matrix (c × 6): reading = J [α; p] + Q s, s the six products of ω.
+GDOP
+    √tr((JᵀJ)⁻¹) with lengths in the array's length unit (half the cube's edge).
+bias, scale factor, misalignment, cross-axis
+    Constant offset, gain error, wrong direction of a sensing axis, pick-up of a neighbouring axis.
+velocity random walk N, bias instability B, acceleration random walk K
+    Coefficients of the Allan deviation of an accelerometer.
+
+Frames: world with z up; table frame turned by θ about the table's axis; body (cube) frame with its origin at the
+cube's centre. Attitude quaternions (w, x, y, z) turn body axes into world axes.
+Units: SI inside, everywhere; angles in rad, rates in rad/s. Units stand in every column name and file key.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+__version__ = "0.1.0"
+
+_PUBLIC = {
+    "AccelerometerArray": "gfimu.array",
+    "Chip": "gfimu.array",
+    "GfimuError": "gfimu.errors",
+    "InputError": "gfimu.errors",
+    "Recording": "gfimu.recording",
+    "specific_force": "gfimu.kinematics",
+}
+
+__all__ = [*_PUBLIC, "__version__"]
+
+
+def __getattr__(name: str) -> Any:
+    # Public names load on first use, so that `gfimu --help` does not wait for numba and scipy.
+    if name in _PUBLIC:
+        return getattr(importlib.import_module(_PUBLIC[name]), name)
+    raise AttributeError(f"module 'gfimu' has no attribute {name!r}")
