@@ -1,0 +1,1 @@
+"""The wire: chips at register level, the LPC1768, serial frames, recording from a port."""

@@ -119,7 +119,14 @@ class AccelerometerArray:
         x, y, z = self.positions.T
         a, b, c = self.axes.T
         return np.column_stack(
-            [-(b * y + c * z), -(a * x + c * z), -(a * x + b * y), a * y + b * x, a * z + c * x, b * z + c * y]
+            [
+                -(b * y + c * z),
+                -(a * x + c * z),
+                -(a * x + b * y),
+                a * y + b * x,
+                a * z + c * x,
+                b * z + c * y,
+            ]
         )
 
     def index(self, channel: str) -> int:
@@ -142,9 +149,7 @@ class AccelerometerArray:
 
     def relative_to(self, origin: ArrayLike) -> AccelerometerArray:
         """Return the same array with its body origin moved to ``origin``, shape (3,), m."""
-        return self.with_geometry(
-            self.chip_positions - np.asarray(origin, dtype=float), [c.axes for c in self.chips]
-        )
+        return self.with_geometry(self.chip_positions - np.asarray(origin, dtype=float), [c.axes for c in self.chips])
 
     @classmethod
     def load(cls, name: str | Path, *, beside: Path | None = None) -> AccelerometerArray:

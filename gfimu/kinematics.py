@@ -31,9 +31,7 @@ def omega_products(omega: ArrayLike) -> NDArray[np.float64]:
     return np.stack([x * x, y * y, z * z, x * y, x * z, y * z], axis=-1)
 
 
-def specific_force(
-    array: AccelerometerArray, p: ArrayLike, alpha: ArrayLike, omega: ArrayLike
-) -> NDArray[np.float64]:
+def specific_force(array: AccelerometerArray, p: ArrayLike, alpha: ArrayLike, omega: ArrayLike) -> NDArray[np.float64]:
     """Specific force along each sensing axis of a moving array.
 
     Parameters

@@ -265,7 +265,7 @@ class _CsvTable:
                         self.metadata[key.strip()] = _metadata_value(value.strip())
                 if "\x00" in header:
                     raise InputError(f"{file}: binary data, not a recording; give a .csv or .parquet file")
-                self.names = [name.strip() for name in header.strip().split(",")]
+                self.names = [name.strip().strip('"') for name in header.strip().split(",")]
         except UnicodeDecodeError:
             raise InputError(f"{file}: binary data, not a recording; give a .csv or .parquet file") from None
         if not header:
@@ -490,7 +490,5 @@ def _extra_columns(file: Path, table: _ParquetTable | _CsvTable, names: list[str
         columns = table.parquet.read(columns=names)
     else:
         read = pa_csv.ReadOptions(column_names=table.names, skip_rows=table.skip + 1)
-        columns = pa_csv.read_csv(
-            file, read_options=read, convert_options=pa_csv.ConvertOptions(include_columns=names)
-        )
+        columns = pa_csv.read_csv(file, read_options=read, convert_options=pa_csv.ConvertOptions(include_columns=names))
     return {name: columns.column(name).to_numpy(zero_copy_only=False) for name in names}

@@ -1,0 +1,1 @@
+"""Calibration: one error model, one result class, one method per file."""

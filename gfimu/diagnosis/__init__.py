@@ -1,0 +1,1 @@
+"""Diagnosis: what a simulation gets wrong against measured data, and why."""

@@ -1,0 +1,155 @@
+"""The world as data: geometry, mounting, gravity, motion, sampling, sensing, reference.
+
+Channels = sensing(effects(rigid body(motion, geometry))). A `World` holds what each stage needs; an effect
+(`sim.effects`) returns a changed world; the analytic forward model (`sim.forward`) and the MuJoCo rig
+(`sim.turntable`) both read the same world, so every effect is carried by both.
+
+Frames: the world has z up. The axis frame is the world turned by ``axis_rotvec`` (the table's axis not vertical)
+and by the nod; the table frame is the axis frame turned by the angle θ about its z; the cube frame is the table
+frame turned by ``mount_rotvec``, with its origin at ``cube_offset`` (table frame).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gfimu.array import AccelerometerArray
+from gfimu.units import STANDARD_GRAVITY
+from sim.motion import SpinMotion, SpinState
+
+__all__ = ["DataStep", "MotionStep", "Nod", "ReferenceStep", "SampleContext", "SensingStep", "World"]
+
+
+@dataclass(frozen=True)
+class SampleContext:
+    """What a sensing step may look at besides the readings.
+
+    Parameters
+    ----------
+    t : ndarray, shape (n,)
+        Time on the board's clock, s.
+    spin : SpinState
+        Spin of the cube at these times; NaN-filled for a free body.
+    temperature : ndarray, shape (n,)
+        Board temperature, °C (25 where not recorded).
+    """
+
+    t: NDArray[np.float64]
+    spin: SpinState
+    temperature: NDArray[np.float64]
+
+
+class MotionStep(Protocol):
+    """A change of the table's motion before it reaches the cube (cogging, resonance)."""
+
+    def __call__(self, motion: SpinMotion, t: NDArray[np.float64]) -> SpinMotion:
+        """Return the changed motion; ``t`` is the time span that will be asked for, s."""
+        ...
+
+
+class SensingStep(Protocol):
+    """A change of the readings inside the sensing chain, in order of application."""
+
+    def __call__(self, readings: NDArray[np.float64], context: SampleContext) -> NDArray[np.float64]:
+        """Return changed readings, shape (n, c), m/s²."""
+        ...
+
+
+class ReferenceStep(Protocol):
+    """A change of the reference (tachometer) between the table and the file."""
+
+    def __call__(self, motion: SpinMotion, t: NDArray[np.float64], reading: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the changed reference reading, shape (n,), rad/s."""
+        ...
+
+
+class DataStep(Protocol):
+    """A change of the digital samples (wiring, wrong range, stuck channel, lost frames); may need chance."""
+
+    def __call__(
+        self, t: NDArray[np.float64], readings: NDArray[np.float64], rng: np.random.Generator
+    ) -> NDArray[np.float64]:
+        """Return changed readings, shape (n, c); rows that are all NaN are lost frames."""
+        ...
+
+
+@dataclass(frozen=True)
+class Nod:
+    """Nod of the table's axis once per revolution about a horizontal direction of the world.
+
+    The rotation vector is amplitude·cos(θ + phase) along (cos direction, sin direction, 0).
+    """
+
+    amplitude: float = 0.0
+    phase: float = 0.0
+    direction: float = 0.0
+
+
+@dataclass(frozen=True)
+class World:
+    """Everything that decides what twelve channels and a tachometer read, except the drive and the noise.
+
+    Parameters
+    ----------
+    array : AccelerometerArray
+        True geometry of the chips in the cube frame.
+    gravity : float
+        Local gravity, m/s².
+    cube_offset : ndarray, shape (3,)
+        Cube centre from the point of the axis at table height, table frame, m.
+    mount_rotvec : ndarray, shape (3,)
+        Rotation vector of the cube in the table frame, rad.
+    axis_rotvec : ndarray, shape (3,)
+        Rotation vector of the table's axis in the world, rad.
+    nod : Nod
+        Nod of the axis.
+    stretch : float
+        Relative stretch of the arms per rate squared, s²/rad²: arm × (1 + stretch·ω²).
+    chip_delay : ndarray, shape (k,)
+        How late each chip is sampled after the time stamp, s.
+    clock_ratio : float
+        The board's clock shows (1 + ratio) of the reference's time.
+    motion_steps, sensing_steps, reference_steps, data_steps : tuple
+        Changes at their places in the chain, in order.
+    temperature : float
+        Board temperature where none is recorded, °C.
+    notes : mapping
+        Free metadata an effect wants to pass on.
+    """
+
+    array: AccelerometerArray
+    gravity: float = STANDARD_GRAVITY
+    cube_offset: NDArray[np.float64] = field(default_factory=lambda: np.array([0.0, 0.0, 0.06]))
+    mount_rotvec: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
+    axis_rotvec: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
+    nod: Nod = Nod()
+    stretch: float = 0.0
+    chip_delay: NDArray[np.float64] | None = None
+    clock_ratio: float = 0.0
+    motion_steps: tuple[MotionStep, ...] = ()
+    sensing_steps: tuple[SensingStep, ...] = ()
+    reference_steps: tuple[ReferenceStep, ...] = ()
+    data_steps: tuple[DataStep, ...] = ()
+    temperature: float = 25.0
+    notes: Mapping[str, Any] = field(default_factory=dict)
+
+    def chip_times(self, t: NDArray[np.float64]) -> NDArray[np.float64]:
+        """True (reference) times at which each chip is sampled, shape (n, k), for board times ``t``, s."""
+        true = t / (1.0 + self.clock_ratio)
+        delay = np.zeros(len(self.array.chips)) if self.chip_delay is None else self.chip_delay
+        return true[:, None] + delay
+
+    def sense(self, readings: NDArray[np.float64], context: SampleContext) -> NDArray[np.float64]:
+        """Apply the sensing steps to ideal readings, shape (n, c), m/s²."""
+        for step in self.sensing_steps:
+            readings = step(readings, context)
+        return readings
+
+    def changed(self, **fields: Any) -> World:
+        """Return this world with some fields replaced."""
+        return replace(self, **fields)
