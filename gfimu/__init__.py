@@ -37,10 +37,13 @@ _PUBLIC = {
     "GfimuError": "gfimu.errors",
     "InputError": "gfimu.errors",
     "Recording": "gfimu.recording",
+    "integrate_attitude": "gfimu.attitude",
+    "integrate_rate": "gfimu.rate.integration",
     "specific_force": "gfimu.kinematics",
 }
 
-__all__ = [*_PUBLIC, "__version__"]
+__all__ = ["__version__"]
+__all__ += list(_PUBLIC)
 
 
 def __getattr__(name: str) -> Any:

@@ -1,0 +1,1 @@
+"""Angular rate from an accelerometer array: integration of the angular acceleration."""
