@@ -39,6 +39,8 @@ _PUBLIC = {
     "Recording": "gfimu.recording",
     "integrate_attitude": "gfimu.attitude",
     "integrate_rate": "gfimu.rate.integration",
+    "level": "gfimu.navigation",
+    "navigate": "gfimu.navigation",
     "specific_force": "gfimu.kinematics",
 }
 
