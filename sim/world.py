@@ -63,8 +63,8 @@ class SensingStep(Protocol):
 class ReferenceStep(Protocol):
     """A change of the reference (tachometer) between the table and the file."""
 
-    def __call__(self, motion: SpinMotion, t: NDArray[np.float64], reading: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the changed reference reading, shape (n,), rad/s."""
+    def __call__(self, reading: NDArray[np.float64], spin: SpinState) -> NDArray[np.float64]:
+        """Return the changed reference reading, shape (n,), rad/s; ``spin`` is the table's at these times."""
         ...
 
 
@@ -114,8 +114,18 @@ class World:
         How late each chip is sampled after the time stamp, s.
     clock_ratio : float
         The board's clock shows (1 + ratio) of the reference's time.
-    motion_steps, sensing_steps, reference_steps, data_steps : tuple
+    tacho_delay : float
+        How late the reference is, s.
+    motion_steps : tuple
+        Changes of the table's motion, seen by the cube and the tachometer.
+    mount_steps : tuple
+        Changes of the cube's motion against the table's, seen by the cube alone.
+    sensing_steps, reference_steps, data_steps : tuple
         Changes at their places in the chain, in order.
+    noise_factor : float
+        White noise of the chips against the part's figure.
+    bias_walk : float
+        Random walk of every channel's bias, m/s² per √s.
     temperature : float
         Board temperature where none is recorded, °C.
     notes : mapping
@@ -131,15 +141,19 @@ class World:
     stretch: float = 0.0
     chip_delay: NDArray[np.float64] | None = None
     clock_ratio: float = 0.0
+    tacho_delay: float = 0.0
     motion_steps: tuple[MotionStep, ...] = ()
+    mount_steps: tuple[MotionStep, ...] = ()
     sensing_steps: tuple[SensingStep, ...] = ()
     reference_steps: tuple[ReferenceStep, ...] = ()
     data_steps: tuple[DataStep, ...] = ()
+    noise_factor: float = 1.0
+    bias_walk: float = 0.0
     temperature: float = 25.0
     notes: Mapping[str, Any] = field(default_factory=dict)
 
     def chip_times(self, t: NDArray[np.float64]) -> NDArray[np.float64]:
-        """True (reference) times at which each chip is sampled, shape (n, k), for board times ``t``, s."""
+        """Return the true (reference) times at which each chip is sampled, shape (n, k), for board times ``t``, s."""
         true = t / (1.0 + self.clock_ratio)
         delay = np.zeros(len(self.array.chips)) if self.chip_delay is None else self.chip_delay
         return true[:, None] + delay

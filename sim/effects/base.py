@@ -1,0 +1,166 @@
+"""What an effect is: a field name, SI parameters with physical priors, and one method that changes the world."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gfimu.array import AccelerometerArray
+from gfimu.errors import InputError
+from sim.world import World
+
+__all__ = ["Effect", "Pattern", "Size", "channel_patterns", "chip_patterns"]
+
+
+@dataclass(frozen=True)
+class Size:
+    """One linear coordinate of an effect; the effect vanishes when all its sizes are zero.
+
+    Parameters
+    ----------
+    key : str
+        Name of the coordinate, ending in its unit.
+    prior_std : float
+        Size that would surprise nobody in the field, in that unit.
+    positive : bool
+        True where physics allows one sign only.
+    step : float
+        Finite-difference step as a share of ``prior_std``; large for effects that are not smooth in their size.
+    """
+
+    key: str
+    prior_std: float
+    positive: bool = False
+    step: float = 1e-3
+
+
+@dataclass(frozen=True)
+class Pattern:
+    """Sizes that move together: one place or structure in which an effect can occur.
+
+    Parameters
+    ----------
+    name : str
+        For people, such as ``"channel a13"``, ``"chip a2"``, ``"all channels alike"``.
+    mixing : ndarray, shape (m, k)
+        The m sizes from k free ones.
+    """
+
+    name: str
+    mixing: NDArray[np.float64]
+
+
+class Effect(ABC):
+    """One thing that is so in the world and missing in the simulation.
+
+    Parameters
+    ----------
+    parameters : mapping
+        Values by contract key (units at the end of each key); what is left out is zero.
+    """
+
+    name: ClassVar[str]
+    """Name in the contract."""
+    summary: ClassVar[str]
+    """What is wrong, in one line."""
+    place: ClassVar[str]
+    """Where it changes the chain: geometry, motion, timing, sensing, reference, noise or data."""
+    separated_by: ClassVar[str] = "a run at two or more speeds in both directions"
+    """Excitation that separates it from its usual rivals."""
+    per_run: ClassVar[bool] = False
+    """True where another mounting or another day has its own value."""
+
+    def __init__(self, parameters: Mapping[str, Any]) -> None:
+        self.parameters: dict[str, Any] = dict(parameters)
+
+    @classmethod
+    @abstractmethod
+    def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
+        """Return the linear coordinates for an array."""
+
+    @classmethod
+    def patterns(cls, array: AccelerometerArray) -> tuple[Pattern, ...]:
+        """Return the places and structures it can take, the freest first."""
+        return (Pattern("", np.eye(len(cls.sizes(array)))),)
+
+    @classmethod
+    def shapes(cls, duration: float, sample_rate: float) -> tuple[dict[str, float], ...]:
+        """Return the grid of shape parameters (frequency, order, time constant) to screen over."""
+        return ({},)
+
+    @classmethod
+    def from_sizes(
+        cls, array: AccelerometerArray, values: Sequence[float] | NDArray[np.float64], shape: Mapping[str, float]
+    ) -> Effect:
+        """Build the effect from its linear coordinates and shape parameters."""
+        keys = [size.key for size in cls.sizes(array)]
+        return cls({**{key: float(value) for key, value in zip(keys, values, strict=True)}, **shape})
+
+    def size_values(self, array: AccelerometerArray) -> NDArray[np.float64]:
+        """Return the linear coordinates of this effect, the inverse of `from_sizes`."""
+        return np.array([float(self.parameters.get(size.key, 0.0)) for size in self.sizes(array)])
+
+    def shape_values(self) -> dict[str, float]:
+        """Return the shape parameters of this effect."""
+        keys = self.shapes(60.0, 100.0)[0].keys()
+        return {key: float(self.parameters[key]) for key in keys if key in self.parameters}
+
+    @abstractmethod
+    def apply(self, world: World) -> World:
+        """Return the world with this effect in it."""
+
+    def value(self, key: str, default: float = 0.0) -> float:
+        """Return one parameter as a number; raises `InputError` naming effect and key."""
+        try:
+            return float(self.parameters.get(key, default))
+        except (TypeError, ValueError):
+            raise InputError(f"effect {self.name!r}: parameter {key} is not a number") from None
+
+    def vector(self, keys: Sequence[str]) -> NDArray[np.float64]:
+        """Return several parameters as an array; missing ones are zero."""
+        return np.array([self.value(key) for key in keys])
+
+    @classmethod
+    def parameter_keys(cls, array: AccelerometerArray) -> tuple[str, ...]:
+        """Return the keys a parameter table may have."""
+        grid = cls.shapes(60.0, 100.0)
+        return (*(size.key for size in cls.sizes(array)), *(grid[0] if grid else ()))
+
+    def check(self, array: AccelerometerArray) -> None:
+        """Raise `InputError` if a parameter key does not belong to this effect."""
+        valid = self.parameter_keys(array)
+        for key in self.parameters:
+            if key not in valid:
+                raise InputError(f"effect {self.name!r}: unknown parameter {key!r}; valid: {', '.join(valid)}")
+
+
+def channel_patterns(array: AccelerometerArray) -> tuple[Pattern, ...]:
+    """Patterns of one size per channel: all free, all alike, per chip, per sensing axis, single channels."""
+    n = array.n_channels
+    unit = np.eye(n)
+    axis = np.concatenate([np.arange(len(chip.axes)) for chip in array.chips])
+    patterns = [Pattern("all channels", unit)]
+    patterns += [
+        Pattern(f"chip {chip.name}", unit[:, array.chip_of_channel == k])
+        for k, chip in enumerate(array.chips)
+        if len(chip.axes) > 1
+    ]
+    if len(set(axis)) > 1:
+        patterns += [Pattern(f"sensing axis {j + 1} of every chip", unit[:, axis == j]) for j in sorted(set(axis))]
+    patterns += [Pattern(f"channel {name}", unit[:, [k]]) for k, name in enumerate(array.channels)]
+    return tuple(patterns)
+
+
+def chip_patterns(array: AccelerometerArray, per_chip: int) -> tuple[Pattern, ...]:
+    """Patterns of ``per_chip`` sizes per chip: all free, or one chip."""
+    unit = np.eye(per_chip * len(array.chips))
+    patterns = [Pattern("all chips", unit)]
+    patterns += [
+        Pattern(f"chip {chip.name}", unit[:, per_chip * k : per_chip * (k + 1)]) for k, chip in enumerate(array.chips)
+    ]
+    return tuple(patterns)

@@ -1,0 +1,204 @@
+"""Effects on the digital side: noise level, ranges, wiring, stuck channels and lost frames."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gfimu.array import AccelerometerArray
+from gfimu.errors import InputError
+from sim.effects.base import Effect, Size
+from sim.world import World
+
+__all__ = [
+    "AxisSwap",
+    "BiasRandomWalk",
+    "CoarseResolution",
+    "DroppedFrames",
+    "Noise",
+    "Saturation",
+    "SignFlip",
+    "StuckChannel",
+    "WrongRange",
+]
+
+
+class _Discrete(Effect):
+    """An effect found by looking at the samples themselves: it has keys, but no small sizes."""
+
+    place = "data"
+    keys: tuple[str, ...] = ()
+
+    @classmethod
+    def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
+        return ()
+
+    @classmethod
+    def parameter_keys(cls, array: AccelerometerArray) -> tuple[str, ...]:
+        return cls.keys
+
+    def names(self, key: str) -> list[str]:
+        """Return one or several channel names."""
+        value = self.parameters.get(key, [])
+        return [value] if isinstance(value, str) else [str(item) for item in value]
+
+
+class Noise(_Discrete):
+    """More white noise than the part should have."""
+
+    name = "noise"
+    summary = "more white noise than the part should have"
+    place = "noise"
+    keys = ("factor",)
+    separated_by = "a longer rest"
+
+    def apply(self, world: World) -> World:
+        """Multiply the white noise."""
+        return world.changed(noise_factor=world.noise_factor * self.value("factor", 1.0))
+
+
+class BiasRandomWalk(_Discrete):
+    """Offsets that wander."""
+
+    name = "bias_random_walk"
+    summary = "offsets wander as a random walk"
+    place = "noise"
+    keys = ("strength_m_s2_rts",)
+    separated_by = "a long rest at constant temperature"
+
+    def apply(self, world: World) -> World:
+        """Add a random walk of this strength (m/s² per √s) to every channel."""
+        return world.changed(bias_walk=float(np.hypot(world.bias_walk, self.value("strength_m_s2_rts"))))
+
+
+class Saturation(_Discrete):
+    """Clipping below the assumed range."""
+
+    name = "saturation"
+    summary = "readings clip below the assumed range"
+    keys = ("limit_m_s2",)
+    separated_by = "a run at lower rates, which must agree"
+
+    def apply(self, world: World) -> World:
+        """Clip the readings."""
+        limit = self.value("limit_m_s2", np.inf)
+        return _with_data_step(world, lambda t, readings, rng: np.clip(readings, -limit, limit))
+
+
+class CoarseResolution(_Discrete):
+    """A larger LSB than assumed."""
+
+    name = "coarse_resolution"
+    summary = "a larger LSB than assumed (10-bit mode)"
+    keys = ("step_m_s2",)
+
+    def apply(self, world: World) -> World:
+        """Round the readings to the step."""
+        step = self.value("step_m_s2")
+        return _with_data_step(world, lambda t, readings, rng: np.round(readings / step) * step) if step else world
+
+
+class WrongRange(_Discrete):
+    """A chip configured for another range: its readings are off by a power of two."""
+
+    name = "wrong_range"
+    summary = "a chip is configured for another range: its readings are off by a power of two"
+    keys = ("chip", "factor")
+
+    def apply(self, world: World) -> World:
+        """Multiply the chip's readings by the factor."""
+        names = [chip.name for chip in world.array.chips]
+        chip = str(self.parameters.get("chip", ""))
+        if chip not in names:
+            raise InputError(f"effect 'wrong_range': unknown chip {chip!r}; valid: {', '.join(names)}")
+        gain = np.where(world.array.chip_of_channel == names.index(chip), self.value("factor", 1.0), 1.0)
+        return _with_data_step(world, lambda t, readings, rng: readings * gain)
+
+
+class AxisSwap(_Discrete):
+    """Channels exchanged by wiring."""
+
+    name = "axis_swap"
+    summary = "channels are exchanged by wiring"
+    keys = ("channels",)
+
+    def apply(self, world: World) -> World:
+        """Exchange the two channels."""
+        names = self.names("channels")
+        if len(names) != 2:
+            raise InputError("effect 'axis_swap': channels must hold two channel names")
+        first, second = (world.array.index(name) for name in names)
+        order = np.arange(world.array.n_channels)
+        order[[first, second]] = order[[second, first]]
+        return _with_data_step(world, lambda t, readings, rng: readings[:, order])
+
+
+class SignFlip(_Discrete):
+    """A channel inverted by wiring."""
+
+    name = "sign_flip"
+    summary = "a channel is inverted"
+    keys = ("channel",)
+
+    def apply(self, world: World) -> World:
+        """Invert the channel or channels."""
+        sign = np.ones(world.array.n_channels)
+        for name in self.names("channel"):
+            sign[world.array.index(name)] = -1.0
+        return _with_data_step(world, lambda t, readings, rng: readings * sign)
+
+
+class StuckChannel(_Discrete):
+    """A channel frozen for a while."""
+
+    name = "stuck_channel"
+    summary = "a channel is frozen for a while"
+    keys = ("channel", "start_s", "stop_s")
+
+    def apply(self, world: World) -> World:
+        """Hold the channel at its last value before the start until the stop."""
+        places = [world.array.index(name) for name in self.names("channel")]
+        start, stop = self.value("start_s", -np.inf), self.value("stop_s", np.inf)
+
+        def step(
+            t: NDArray[np.float64], readings: NDArray[np.float64], rng: np.random.Generator
+        ) -> NDArray[np.float64]:
+            frozen = (t >= start) & (t < stop)
+            if not frozen.any():
+                return readings
+            held = readings.copy()
+            for place in places:
+                held[frozen, place] = readings[max(int(np.argmax(frozen)) - 1, 0), place]
+            return held
+
+        return _with_data_step(world, step)
+
+
+class DroppedFrames(_Discrete):
+    """Lost samples."""
+
+    name = "dropped_frames"
+    summary = "samples are lost"
+    keys = ("share", "count", "longest_s")
+
+    def apply(self, world: World) -> World:
+        """Lose a share of the frames at random (rows become NaN; the writer leaves them out)."""
+        share = self.value("share")
+
+        def step(
+            t: NDArray[np.float64], readings: NDArray[np.float64], rng: np.random.Generator
+        ) -> NDArray[np.float64]:
+            kept = readings.copy()
+            lost = rng.random(len(t)) < share
+            lost[[0, -1]] = False
+            kept[lost] = np.nan
+            return kept
+
+        return _with_data_step(world, step)
+
+
+def _with_data_step(world: World, step: Any) -> World:
+    return world.changed(data_steps=(*world.data_steps, step))

@@ -1,0 +1,375 @@
+"""Mechanical effects: geometry of the cube, its mounting, the table, gravity, and the motion itself."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import cont2discrete, lfilter
+from scipy.spatial.transform import Rotation
+
+from gfimu.array import AccelerometerArray
+from sim.effects.base import Effect, Pattern, Size, chip_patterns
+from sim.motion import SpinMotion, SpinState
+from sim.world import Nod, World
+
+__all__ = [
+    "AxisWobble",
+    "CentrifugalFlex",
+    "Cogging",
+    "Eccentricity",
+    "Gravity",
+    "Misalignment",
+    "MountTilt",
+    "Resonance",
+    "SensorPosition",
+    "TableTilt",
+]
+
+_DEGREE = np.pi / 180.0
+_FINE_STEP = 2e-3
+_SPEED_LOOP_TIME = 0.5
+_REST_RATE = 0.3
+
+
+class Misalignment(Effect):
+    """A chip's sensing axes turned against the body."""
+
+    name = "misalignment"
+    summary = "a chip's sensing axes are turned against the body"
+    place = "geometry"
+    separated_by = "the cube remounted on its side, or static poses on several sides"
+
+    @classmethod
+    def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
+        """Rotation vector of each chip in the body frame."""
+        return tuple(Size(f"{chip.name}_{axis}_rad", 0.5 * _DEGREE) for chip in array.chips for axis in "xyz")
+
+    @classmethod
+    def patterns(cls, array: AccelerometerArray) -> tuple[Pattern, ...]:
+        """Return all chips free, or one chip."""
+        return chip_patterns(array, 3)
+
+    def apply(self, world: World) -> World:
+        """Turn each chip's axes by its rotation vector."""
+        chips = []
+        for chip in world.array.chips:
+            turn = Rotation.from_rotvec(self.vector([f"{chip.name}_{axis}_rad" for axis in "xyz"]))
+            chips.append(replace(chip, axes=turn.apply(chip.axes)))
+        return world.changed(array=replace(world.array, chips=tuple(chips)))
+
+
+class SensorPosition(Effect):
+    """A chip that is not where the drawing says."""
+
+    name = "sensor_position"
+    summary = "a chip is not where the drawing says"
+    place = "geometry"
+    separated_by = "the cube remounted on its side: an eccentric mounting changes with it, a chip's place does not"
+
+    @classmethod
+    def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
+        """Displacement of each chip in the body frame."""
+        return tuple(Size(f"{chip.name}_{axis}_m", 1e-3) for chip in array.chips for axis in "xyz")
+
+    @classmethod
+    def patterns(cls, array: AccelerometerArray) -> tuple[Pattern, ...]:
+        """Return all chips free, or one chip."""
+        return chip_patterns(array, 3)
+
+    def apply(self, world: World) -> World:
+        """Move each chip by its displacement."""
+        chips = tuple(
+            replace(chip, position=chip.position + self.vector([f"{chip.name}_{axis}_m" for axis in "xyz"]))
+            for chip in world.array.chips
+        )
+        return world.changed(array=replace(world.array, chips=chips))
+
+
+class _TwoAxes(Effect):
+    """Two sizes across the axis."""
+
+    suffix = "_rad"
+    prior_std = 0.5 * _DEGREE
+
+    @classmethod
+    def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
+        return tuple(Size(f"{axis}{cls.suffix}", cls.prior_std) for axis in "xy")
+
+    def across(self) -> NDArray[np.float64]:
+        return np.array([self.value(f"x{self.suffix}"), self.value(f"y{self.suffix}"), 0.0])
+
+
+class Eccentricity(_TwoAxes):
+    """The whole cube off the table's axis."""
+
+    name = "eccentricity"
+    summary = "the whole cube is off the table's axis"
+    place = "geometry"
+    suffix = "_m"
+    prior_std = 1e-3
+    per_run = True
+    separated_by = "the cube remounted on its side: an eccentric mounting changes with it, a chip's place does not"
+
+    def apply(self, world: World) -> World:
+        """Move the cube across the axis."""
+        return world.changed(cube_offset=world.cube_offset + self.across())
+
+
+class MountTilt(_TwoAxes):
+    """The cube not square to the table's axis."""
+
+    name = "mount_tilt"
+    summary = "the cube is not square to the table's axis"
+    place = "geometry"
+    per_run = True
+    separated_by = "the cube remounted on its side: a tilted mounting changes with it, a chip's misalignment does not"
+
+    def apply(self, world: World) -> World:
+        """Turn the cube in the table frame."""
+        turn = Rotation.from_rotvec(self.across()) * Rotation.from_rotvec(world.mount_rotvec)
+        return world.changed(mount_rotvec=turn.as_rotvec())
+
+
+class TableTilt(_TwoAxes):
+    """The table's axis not vertical: gravity turns once per revolution in x and y."""
+
+    name = "table_tilt"
+    summary = "the table's axis is not vertical: gravity turns once per revolution in x and y"
+    place = "geometry"
+    prior_std = 0.3 * _DEGREE
+    per_run = True
+    separated_by = "slow rotation through several turns"
+
+    def apply(self, world: World) -> World:
+        """Turn the table's axis in the world."""
+        turn = Rotation.from_rotvec(self.across()) * Rotation.from_rotvec(world.axis_rotvec)
+        return world.changed(axis_rotvec=turn.as_rotvec())
+
+
+class AxisWobble(Effect):
+    """The axis nods once per revolution (bearing runout)."""
+
+    name = "axis_wobble"
+    summary = "the axis nods once per revolution (bearing runout)"
+    place = "geometry"
+    separated_by = "rotation at two or more speeds"
+
+    @classmethod
+    def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
+        """Cosine and sine amplitudes of the nod."""
+        return (Size("cosine_rad", 0.1 * _DEGREE), Size("sine_rad", 0.1 * _DEGREE))
+
+    @classmethod
+    def shapes(cls, duration: float, sample_rate: float) -> tuple[dict[str, float], ...]:
+        """Return horizontal directions of the nod axis (the world's x, or a quarter turn from it)."""
+        return tuple({"direction_rad": float(psi)} for psi in (0.0, 0.25 * np.pi, 0.5 * np.pi, 0.75 * np.pi))
+
+    @classmethod
+    def from_sizes(cls, array, values, shape) -> Effect:  # type: ignore[no-untyped-def]
+        """Turn cosine and sine into amplitude and phase: A cos(θ + φ)."""
+        cosine, sine = (float(v) for v in values)
+        return cls(
+            {"amplitude_rad": float(np.hypot(cosine, sine)), "phase_rad": float(np.arctan2(-sine, cosine)), **shape}
+        )
+
+    def size_values(self, array: AccelerometerArray) -> NDArray[np.float64]:
+        """Return cosine and sine amplitudes."""
+        amplitude, phase = self.value("amplitude_rad"), self.value("phase_rad")
+        return amplitude * np.array([np.cos(phase), -np.sin(phase)])
+
+    @classmethod
+    def parameter_keys(cls, array: AccelerometerArray) -> tuple[str, ...]:
+        """Return the contract's keys and the direction of the nod."""
+        return ("amplitude_rad", "phase_rad", "direction_rad")
+
+    def apply(self, world: World) -> World:
+        """Let the axis nod."""
+        nod = Nod(self.value("amplitude_rad"), self.value("phase_rad"), self.value("direction_rad"))
+        return world.changed(nod=nod)
+
+
+class Gravity(Effect):
+    """Local gravity other than assumed."""
+
+    name = "gravity"
+    summary = "local gravity is other than assumed"
+    place = "geometry"
+    separated_by = "the cube remounted on its side, so that other channels see gravity"
+
+    @classmethod
+    def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
+        """One difference."""
+        return (Size("delta_m_s2", 0.015),)
+
+    def apply(self, world: World) -> World:
+        """Change gravity."""
+        return world.changed(gravity=world.gravity + self.value("delta_m_s2"))
+
+
+class CentrifugalFlex(Effect):
+    """Arms that stretch with ω²."""
+
+    name = "centrifugal_flex"
+    summary = "arms stretch with the rate squared"
+    place = "geometry"
+    separated_by = "the cube remounted on its side, and several high speeds"
+
+    @classmethod
+    def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
+        """One stretch, never negative."""
+        return (Size("stretch_s2_rad2", 2.5e-5, positive=True),)
+
+    def apply(self, world: World) -> World:
+        """Stretch the arms."""
+        return world.changed(stretch=world.stretch + self.value("stretch_s2_rad2"))
+
+
+class Cogging(Effect):
+    """Torque ripple locked to the table's angle."""
+
+    name = "cogging"
+    summary = "torque ripple locked to the table's angle (n cycles per revolution)"
+    place = "motion"
+    separated_by = "slow steady rotation at two speeds"
+
+    @classmethod
+    def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
+        """Sine and cosine amplitudes."""
+        return (Size("sine_rad_s2", 1.0), Size("cosine_rad_s2", 1.0))
+
+    @classmethod
+    def shapes(cls, duration: float, sample_rate: float) -> tuple[dict[str, float], ...]:
+        """Return one order; the scan over orders finds it."""
+        return ({"order": 6.0},)
+
+    @classmethod
+    def from_sizes(cls, array, values, shape) -> Effect:  # type: ignore[no-untyped-def]
+        """Turn sine and cosine into amplitude and phase."""
+        sine, cosine = (float(v) for v in values)
+        return cls(
+            {"amplitude_rad_s2": float(np.hypot(sine, cosine)), "phase_rad": float(np.arctan2(cosine, sine)), **shape}
+        )
+
+    def size_values(self, array: AccelerometerArray) -> NDArray[np.float64]:
+        """Return sine and cosine amplitudes."""
+        amplitude, phase = self.value("amplitude_rad_s2"), self.value("phase_rad")
+        return amplitude * np.array([np.cos(phase), np.sin(phase)])
+
+    @classmethod
+    def parameter_keys(cls, array: AccelerometerArray) -> tuple[str, ...]:
+        """Return the contract's keys."""
+        return ("amplitude_rad_s2", "order", "phase_rad")
+
+    def apply(self, world: World) -> World:
+        """Add the ripple to the table's motion."""
+        amplitude, order = self.value("amplitude_rad_s2"), self.value("order", 1.0)
+        phase = self.value("phase_rad")
+
+        def ripple(spin: SpinState) -> NDArray[np.float64]:
+            # At rest the bearing's friction holds the table, so that the ripple turns nothing.
+            turning = spin.rate**2 / (spin.rate**2 + _REST_RATE**2)
+            torque = amplitude * turning * np.sin(order * spin.angle + phase)
+            return np.asarray(torque)
+
+        def step(motion: SpinMotion, t: NDArray[np.float64]) -> SpinMotion:
+            return _Disturbed(motion, t, ripple)
+
+        return world.changed(motion_steps=(*world.motion_steps, step))
+
+
+class _Disturbed:
+    """Spin of a speed-controlled table under a disturbing angular acceleration.
+
+    The rate error obeys δω' = disturbance − δω/τ with the speed loop's time constant τ.
+    """
+
+    def __init__(self, motion, t, disturbance) -> None:  # type: ignore[no-untyped-def]
+        self._motion = motion
+        self._grid = np.arange(t[0], t[-1] + 2 * _FINE_STEP, _FINE_STEP)
+        push = disturbance(motion.at(self._grid))
+        decay = np.exp(-_FINE_STEP / _SPEED_LOOP_TIME)
+        mean = 0.5 * (push[1:] + push[:-1]) * (_SPEED_LOOP_TIME * (1 - decay))
+        rate = np.concatenate([[0.0], lfilter([1.0], [1.0, -decay], mean)])
+        self._rate = rate
+        self._acceleration = push - rate / _SPEED_LOOP_TIME
+        self._angle = np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]))]) * _FINE_STEP
+
+    def at(self, t: NDArray[np.float64]) -> SpinState:
+        """State of the disturbed spin."""
+        spin = self._motion.at(t)
+        return SpinState(
+            spin.angle + np.interp(t, self._grid, self._angle),
+            spin.rate + np.interp(t, self._grid, self._rate),
+            spin.acceleration + np.interp(t, self._grid, self._acceleration),
+        )
+
+
+class Resonance(Effect):
+    """A torsional mode of the mounting, rung by angular acceleration."""
+
+    name = "resonance"
+    summary = "a torsional mode of the mounting, rung by angular acceleration"
+    place = "motion"
+    separated_by = "fast ramps followed by rest, in which the mode rings down alone"
+
+    @classmethod
+    def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
+        """One participation; 1 is the whole inertia behind one spring."""
+        return (Size("gain", 0.3),)
+
+    @classmethod
+    def shapes(cls, duration: float, sample_rate: float) -> tuple[dict[str, float], ...]:
+        """Return frequencies up to the Nyquist frequency and two dampings."""
+        top = 0.45 * sample_rate
+        frequencies = np.geomspace(2.0, max(top, 2.5), 24)
+        return tuple(
+            {"frequency_hz": float(f), "damping_ratio": zeta} for f in frequencies for zeta in (0.01, 0.04, 0.15)
+        )
+
+    def apply(self, world: World) -> World:
+        """Let the cube twist against the table: φ'' + 2ζω₀φ' + ω₀²φ = −gain·α."""
+        gain = self.value("gain")
+        natural = 2 * np.pi * self.value("frequency_hz", 10.0)
+        damping = self.value("damping_ratio", 0.03)
+
+        def step(motion: SpinMotion, t: NDArray[np.float64]) -> SpinMotion:
+            return _Twisting(motion, t, gain, natural, damping)
+
+        return world.changed(mount_steps=(*world.mount_steps, step))
+
+
+class _Twisting:
+    """Spin of a cube on a torsion spring upon a spinning table."""
+
+    def __init__(self, motion, t, gain: float, natural: float, damping: float) -> None:  # type: ignore[no-untyped-def]
+        self._motion = motion
+        step = min(_FINE_STEP, 0.3 / natural)
+        self._grid = np.arange(t[0], t[-1] + 2 * step, step)
+        push = -gain * motion.at(self._grid).acceleration
+        push = push - push[0]  # steady before the first sample
+        system = (np.array([[0.0, 1.0], [-(natural**2), -2 * damping * natural]]), np.array([[0.0], [1.0]]))
+        outputs = (np.eye(2), np.zeros((2, 1)))
+        a, b, c, d, _ = cont2discrete((*system, *outputs), step, method="foh")
+        poles = np.array([1.0, -np.trace(a), np.linalg.det(a)])
+        twist, twist_rate = (lfilter(_numerator(a, b, c[[row]], d[[row]], poles), poles, push) for row in range(2))
+        self._angle, self._rate = twist, twist_rate
+        self._acceleration = push - natural**2 * twist - 2 * damping * natural * twist_rate
+
+    def at(self, t: NDArray[np.float64]) -> SpinState:
+        """State of the cube's spin."""
+        spin = self._motion.at(t)
+        return SpinState(
+            spin.angle + np.interp(t, self._grid, self._angle),
+            spin.rate + np.interp(t, self._grid, self._rate),
+            spin.acceleration + np.interp(t, self._grid, self._acceleration),
+        )
+
+
+def _numerator(a, b, c, d, poles) -> NDArray[np.float64]:  # type: ignore[no-untyped-def]
+    """Numerator of a second-order discrete transfer function from its first Markov parameters."""
+    markov = [d.item(), (c @ b).item(), (c @ a @ b).item()]
+    return np.array(
+        [markov[0], markov[1] + poles[1] * markov[0], markov[2] + poles[1] * markov[1] + poles[2] * markov[0]]
+    )

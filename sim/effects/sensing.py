@@ -1,0 +1,366 @@
+"""Effects inside the sensing chain: what a chip does to the specific force before it becomes a number."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from gfimu.array import AccelerometerArray
+from gfimu.units import STANDARD_GRAVITY
+from sim.effects.base import Effect, Pattern, Size, channel_patterns, chip_patterns
+from sim.world import SampleContext, SensingStep, World
+
+__all__ = [
+    "Bias",
+    "BiasTemperature",
+    "CrossAxis",
+    "GainDrift",
+    "Hysteresis",
+    "InterferenceTone",
+    "Quadratic",
+    "ScaleFactor",
+    "SensorLag",
+    "VibrationRectification",
+    "WarmUp",
+]
+
+_REFERENCE_TEMPERATURE = 25.0
+_MG = STANDARD_GRAVITY / 1000.0
+
+
+def _with_step(world: World, step: SensingStep) -> World:
+    return world.changed(sensing_steps=(*world.sensing_steps, step))
+
+
+class _PerChannel(Effect):
+    """One size per channel, keyed ``channel + suffix``."""
+
+    place = "sensing"
+    suffix = ""
+    prior_std = 1.0
+
+    @classmethod
+    def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
+        return tuple(Size(f"{channel}{cls.suffix}", cls.prior_std) for channel in array.channels)
+
+    @classmethod
+    def patterns(cls, array: AccelerometerArray) -> tuple[Pattern, ...]:
+        return channel_patterns(array)
+
+    def per_channel(self, array: AccelerometerArray) -> NDArray[np.float64]:
+        return self.vector([f"{channel}{self.suffix}" for channel in array.channels])
+
+
+class Bias(_PerChannel):
+    """Constant offset per channel."""
+
+    name = "bias"
+    summary = "a constant offset per channel"
+    suffix = "_m_s2"
+    prior_std = 20 * _MG
+    separated_by = "static poses on several sides (six-position), or the cube remounted on its side"
+
+    def apply(self, world: World) -> World:
+        """Add the offsets to the readings."""
+        offset = self.per_channel(world.array)
+        return _with_step(world, lambda readings, context: readings + offset)
+
+
+class ScaleFactor(_PerChannel):
+    """Gain error per channel."""
+
+    name = "scale_factor"
+    summary = "a gain error per channel (another supply voltage, say)"
+    prior_std = 0.02
+    separated_by = "static poses on several sides, or the cube remounted on its side and several speeds"
+
+    @classmethod
+    def patterns(cls, array: AccelerometerArray) -> tuple[Pattern, ...]:
+        """Add to the usual places: all gains alike."""
+        alike = Pattern("all channels alike", np.ones((array.n_channels, 1)))
+        return (*channel_patterns(array), alike)
+
+    def apply(self, world: World) -> World:
+        """Multiply the readings by 1 + ratio."""
+        gain = 1.0 + self.per_channel(world.array)
+        return _with_step(world, lambda readings, context: readings * gain)
+
+
+class Quadratic(_PerChannel):
+    """Second-order non-linearity per channel."""
+
+    name = "quadratic"
+    summary = "a second-order non-linearity per channel"
+    suffix = "_s2_m"
+    prior_std = 3e-3 / STANDARD_GRAVITY
+    separated_by = "several speeds, so that the reading's square and the reading differ; or static poses on all sides"
+
+    def apply(self, world: World) -> World:
+        """Add coefficient · reading²."""
+        coefficient = self.per_channel(world.array)
+        return _with_step(world, lambda readings, context: readings + coefficient * readings**2)
+
+
+class BiasTemperature(_PerChannel):
+    """Offsets that follow the board's temperature."""
+
+    name = "bias_temperature"
+    summary = "offsets follow the board's temperature"
+    suffix = "_m_s2_K"
+    prior_std = 0.8 * _MG
+    separated_by = "a run in which the temperature changes while the motion does not"
+
+    def apply(self, world: World) -> World:
+        """Add coefficient · (T − 25 °C)."""
+        coefficient = self.per_channel(world.array)
+        return _with_step(
+            world,
+            lambda readings, context: readings + np.outer(context.temperature - _REFERENCE_TEMPERATURE, coefficient),
+        )
+
+
+class WarmUp(_PerChannel):
+    """Offsets that settle exponentially after power-on."""
+
+    name = "warm_up"
+    summary = "offsets settle exponentially after power-on"
+    suffix = "_m_s2"
+    prior_std = 10 * _MG
+    separated_by = "a cold start followed by a long rest, or a longer run"
+
+    @classmethod
+    def shapes(cls, duration: float, sample_rate: float) -> tuple[dict[str, float], ...]:
+        """Return time constants from a fraction of the run to several runs."""
+        return tuple({"time_constant_s": float(tau)} for tau in duration * np.array([0.04, 0.1, 0.25, 0.7, 2.0]))
+
+    def apply(self, world: World) -> World:
+        """Add offset · (1 − exp(−t/τ))."""
+        offset = self.per_channel(world.array)
+        tau = max(self.value("time_constant_s", 20.0), 1e-3)
+        return _with_step(
+            world, lambda readings, context: readings - np.outer(np.expm1(-(context.t - context.t[0]) / tau), offset)
+        )
+
+
+class VibrationRectification(_PerChannel):
+    """Mean readings that shift with vibration, as ω⁴."""
+
+    name = "vibration_rectification"
+    summary = "mean readings shift with vibration, about as ω⁴"
+    suffix = "_m_s2_per_rad4_s4"
+    prior_std = 3 * _MG / 20.0**4
+    separated_by = "several speeds with and without vibration isolation"
+
+    @classmethod
+    def patterns(cls, array: AccelerometerArray) -> tuple[Pattern, ...]:
+        """Add to the usual places: alike on all channels, alike per sensing axis."""
+        axis = np.concatenate([np.arange(len(chip.axes)) for chip in array.chips])
+        alike = np.stack([(axis == j).astype(float) for j in sorted(set(axis))], axis=1)
+        return (
+            *channel_patterns(array),
+            Pattern("alike on every chip, per sensing axis", alike),
+            Pattern("all channels alike", np.ones((array.n_channels, 1))),
+        )
+
+    def apply(self, world: World) -> World:
+        """Add coefficient · ω⁴."""
+        coefficient = self.per_channel(world.array)
+        return _with_step(world, lambda readings, context: readings + np.outer(context.spin.rate**4, coefficient))
+
+
+class CrossAxis(Effect):
+    """A channel that picks up its neighbour on the same chip."""
+
+    name = "cross_axis"
+    summary = "a channel picks up its neighbour on the same chip"
+    place = "sensing"
+    separated_by = "static poses on several sides and several speeds"
+
+    @classmethod
+    def _pairs(cls, array: AccelerometerArray) -> list[tuple[int, int]]:
+        chip = array.chip_of_channel
+        n = array.n_channels
+        return [(i, j) for i in range(n) for j in range(n) if i != j and chip[i] == chip[j]]
+
+    @classmethod
+    def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
+        """One ratio per ordered pair of channels of a chip: ``a11_from_a12``."""
+        names = array.channels
+        return tuple(Size(f"{names[i]}_from_{names[j]}", 0.01) for i, j in cls._pairs(array))
+
+    @classmethod
+    def patterns(cls, array: AccelerometerArray) -> tuple[Pattern, ...]:
+        """Return all pairs, the same pick-up on every chip, one chip, one channel, one pair."""
+        pairs = cls._pairs(array)
+        unit = np.eye(len(pairs))
+        chip = array.chip_of_channel
+        first = [int(np.flatnonzero(chip == k)[0]) for k in range(len(array.chips))]
+        local = [(i - first[chip[i]], j - first[chip[j]]) for i, j in pairs]
+        kinds = sorted(set(local))
+        alike = np.array([[float(pair == kind) for kind in kinds] for pair in local])
+        patterns = [Pattern("all channels", unit), Pattern("the same on every chip", alike)]
+        patterns.append(Pattern("all pairs alike", np.ones((len(pairs), 1))))
+        cyclic = np.array([[float((j - i) % 3 == 1)] for i, j in local])
+        patterns.append(Pattern("every channel from the next, alike", cyclic))
+        patterns.append(Pattern("every channel from the one before, alike", np.ones_like(cyclic) - cyclic))
+        patterns += [
+            Pattern(f"chip {array.chips[k].name}", unit[:, [chip[i] == k for i, _ in pairs]])
+            for k in range(len(array.chips))
+        ]
+        patterns += [
+            Pattern(f"channel {name}", unit[:, [i == c for i, _ in pairs]]) for c, name in enumerate(array.channels)
+        ]
+        patterns += [
+            Pattern(f"channel {array.channels[i]} from {array.channels[j]}", unit[:, [k]])
+            for k, (i, j) in enumerate(pairs)
+        ]
+        return tuple(patterns)
+
+    def apply(self, world: World) -> World:
+        """Add ratio · neighbour to each reading."""
+        mixing = np.eye(world.array.n_channels)
+        for (i, j), size in zip(self._pairs(world.array), self.sizes(world.array), strict=True):
+            mixing[i, j] = self.value(size.key)
+        return _with_step(world, lambda readings, context: readings @ mixing.T)
+
+
+class SensorLag(Effect):
+    """Limited bandwidth of the sensing chain: a first-order lag."""
+
+    name = "sensor_lag"
+    summary = "limited bandwidth of the sensing chain"
+    place = "sensing"
+    separated_by = "a fast chirp of the rate"
+
+    @classmethod
+    def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
+        """One time constant, never negative."""
+        return (Size("time_constant_s", 5e-3, positive=True, step=0.5),)
+
+    def apply(self, world: World) -> World:
+        """Pass the readings through a first-order low pass."""
+        tau = abs(self.value("time_constant_s"))
+        return _with_step(world, lambda readings, context: _low_pass(readings, context.t, tau)) if tau else world
+
+
+def _low_pass(readings: NDArray[np.float64], t: NDArray[np.float64], tau: float) -> NDArray[np.float64]:
+    """First-order low pass of samples joined by straight lines, steady before the first sample."""
+    period = float(np.median(np.diff(t)))
+    x = period / tau
+    decay = np.exp(-x)
+    # (1 − e⁻ˣ)/x loses digits for small x.
+    mean_decay = -np.expm1(-x) / x
+    now, before = 1.0 - mean_decay, mean_decay - decay
+    start = readings[:1] * (1.0 - now)
+    return np.asarray(lfilter([now, before], [1.0, -decay], readings, axis=0, zi=start)[0])
+
+
+@dataclass(frozen=True)
+class _Play:
+    width: float
+
+    def __call__(self, readings: NDArray[np.float64], context: SampleContext) -> NDArray[np.float64]:
+        out = np.empty_like(readings)
+        state = readings[0].copy()
+        for row, value in enumerate(readings):
+            np.clip(state, value - self.width, value + self.width, out=state)
+            out[row] = state
+        return out
+
+
+class Hysteresis(Effect):
+    """Play in the reading: it follows the specific force only after the play is taken up."""
+
+    name = "hysteresis"
+    summary = "play in the reading: it depends on the direction from which it came"
+    place = "sensing"
+    separated_by = "slow reversals of the rate"
+
+    @classmethod
+    def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
+        """One lost motion, common to all channels, never negative."""
+        return (Size("lost_m_s2", 5 * _MG, positive=True, step=0.5),)
+
+    @classmethod
+    def shapes(cls, duration: float, sample_rate: float) -> tuple[dict[str, float], ...]:
+        """Return half-widths of the play."""
+        return tuple({"width_m_s2": width * _MG} for width in (2.0, 10.0, 50.0, 200.0, 600.0))
+
+    def apply(self, world: World) -> World:
+        """Add lost · (play − reading)/width, the play of half-width ``width_m_s2``."""
+        lost = self.value("lost_m_s2")
+        width = max(self.value("width_m_s2", abs(lost)), 1e-9)
+        play = _Play(width)
+        return _with_step(
+            world, lambda readings, context: readings + (lost / width) * (play(readings, context) - readings)
+        )
+
+
+class GainDrift(Effect):
+    """All gains drift with time."""
+
+    name = "gain_drift"
+    summary = "all gains drift with time"
+    place = "sensing"
+    separated_by = "a longer run, with the same rates early and late"
+
+    @classmethod
+    def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
+        """One relative drift per second."""
+        return (Size("slope_1_s", 2e-4),)
+
+    def apply(self, world: World) -> World:
+        """Multiply the readings by 1 + slope · (t − start)."""
+        slope = self.value("slope_1_s")
+        return _with_step(
+            world, lambda readings, context: readings * (1.0 + slope * (context.t - context.t[0]))[:, None]
+        )
+
+
+class InterferenceTone(Effect):
+    """A tone at a fixed frequency on all channels."""
+
+    name = "interference_tone"
+    summary = "a tone at a fixed frequency (mains, aliased or not) on all channels"
+    place = "sensing"
+    separated_by = "a run at rest, where only the tone is left"
+
+    @classmethod
+    def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
+        """Sine and cosine amplitudes."""
+        return (Size("sine_m_s2", 2 * _MG), Size("cosine_m_s2", 2 * _MG))
+
+    @classmethod
+    def shapes(cls, duration: float, sample_rate: float) -> tuple[dict[str, float], ...]:
+        """Return one frequency; the scan over the spectrum finds it."""
+        return ({"frequency_hz": 0.2 * sample_rate},)
+
+    @classmethod
+    def from_sizes(cls, array, values, shape) -> Effect:  # type: ignore[no-untyped-def]
+        """Turn sine and cosine into amplitude and phase."""
+        sine, cosine = (float(v) for v in values)
+        return cls(
+            {"amplitude_m_s2": float(np.hypot(sine, cosine)), "phase_rad": float(np.arctan2(cosine, sine)), **shape}
+        )
+
+    def size_values(self, array: AccelerometerArray) -> NDArray[np.float64]:
+        """Return sine and cosine amplitudes."""
+        amplitude, phase = self.value("amplitude_m_s2"), self.value("phase_rad")
+        return amplitude * np.array([np.cos(phase), np.sin(phase)])
+
+    @classmethod
+    def parameter_keys(cls, array: AccelerometerArray) -> tuple[str, ...]:
+        """Return the contract's keys."""
+        return ("amplitude_m_s2", "frequency_hz", "phase_rad")
+
+    def apply(self, world: World) -> World:
+        """Add amplitude · sin(2π f t + phase)."""
+        amplitude, phase = self.value("amplitude_m_s2"), self.value("phase_rad")
+        omega = 2 * np.pi * self.value("frequency_hz")
+        return _with_step(
+            world,
+            lambda readings, context: readings + amplitude * np.sin(omega * context.t + phase)[:, None],
+        )

@@ -1,0 +1,132 @@
+"""Effects of time and of the reference: skew, clocks, and a tachometer that is late, scaled or modulated."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gfimu.array import AccelerometerArray
+from sim.effects.base import Effect, Size
+from sim.motion import SpinState
+from sim.world import World
+
+__all__ = ["ChannelSkew", "ClockError", "TachoLatency", "TachoRipple", "TachoScale"]
+
+
+class ChannelSkew(Effect):
+    """Chips sampled one after another, not together."""
+
+    name = "channel_skew"
+    summary = "chips are sampled one after another, not together"
+    place = "timing"
+    separated_by = "fast changes of the rate"
+
+    @classmethod
+    def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
+        """One delay from chip to chip."""
+        return (Size("per_chip_s", 1e-3, step=0.1),)
+
+    def apply(self, world: World) -> World:
+        """Sample chip i late by (i − 1) times the delay."""
+        delay = np.zeros(len(world.array.chips)) if world.chip_delay is None else world.chip_delay
+        return world.changed(chip_delay=delay + self.value("per_chip_s") * np.arange(len(delay)))
+
+
+class ClockError(Effect):
+    """The board's clock runs fast or slow against the reference's."""
+
+    name = "clock_error"
+    summary = "the board's clock runs fast or slow against the reference's"
+    place = "timing"
+    separated_by = "a longer run with fast changes of the rate at its end"
+
+    @classmethod
+    def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
+        """One ratio; positive: the board's clock is fast."""
+        return (Size("ratio", 1e-3, step=0.02),)
+
+    def apply(self, world: World) -> World:
+        """Let the board's clock show (1 + ratio) of the true time."""
+        return world.changed(clock_ratio=(1 + world.clock_ratio) * (1 + self.value("ratio")) - 1)
+
+
+class TachoLatency(Effect):
+    """The reference is late."""
+
+    name = "tacho_latency"
+    summary = "the reference is late"
+    place = "reference"
+    separated_by = "a fast chirp of the rate"
+
+    @classmethod
+    def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
+        """One delay, never negative."""
+        return (Size("delay_s", 1e-2, positive=True, step=0.1),)
+
+    def apply(self, world: World) -> World:
+        """Delay the reference."""
+        return world.changed(tacho_delay=world.tacho_delay + self.value("delay_s"))
+
+
+class TachoScale(Effect):
+    """The reference has a wrong gain: it reads (1 + ratio)·ω."""
+
+    name = "tacho_scale"
+    summary = "the reference has a wrong gain"
+    place = "reference"
+    separated_by = "the cube remounted on its side, so that other arms are in play"
+
+    @classmethod
+    def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
+        """One ratio."""
+        return (Size("ratio", 0.01),)
+
+    def apply(self, world: World) -> World:
+        """Multiply the reference by 1 + ratio."""
+        gain = 1 + self.value("ratio")
+        return world.changed(reference_steps=(*world.reference_steps, lambda reading, spin: reading * gain))
+
+
+class TachoRipple(Effect):
+    """The reference is modulated once or n times per revolution."""
+
+    name = "tacho_ripple"
+    summary = "the reference itself is modulated once or n times per revolution"
+    place = "reference"
+    separated_by = "a second reference, or slow steady rotation in both directions"
+
+    @classmethod
+    def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
+        """Relative sine and cosine amplitudes."""
+        return (Size("sine", 0.01), Size("cosine", 0.01))
+
+    @classmethod
+    def shapes(cls, duration: float, sample_rate: float) -> tuple[dict[str, float], ...]:
+        """Return one order; the scan over orders finds it."""
+        return ({"order": 1.0},)
+
+    @classmethod
+    def from_sizes(cls, array, values, shape) -> Effect:  # type: ignore[no-untyped-def]
+        """Turn sine and cosine into amplitude and phase."""
+        sine, cosine = (float(v) for v in values)
+        return cls({"amplitude": float(np.hypot(sine, cosine)), "phase_rad": float(np.arctan2(cosine, sine)), **shape})
+
+    def size_values(self, array: AccelerometerArray) -> NDArray[np.float64]:
+        """Return sine and cosine amplitudes."""
+        amplitude, phase = self.value("amplitude"), self.value("phase_rad")
+        return amplitude * np.array([np.cos(phase), np.sin(phase)])
+
+    @classmethod
+    def parameter_keys(cls, array: AccelerometerArray) -> tuple[str, ...]:
+        """Return amplitude, order and phase."""
+        return ("amplitude", "order", "phase_rad")
+
+    def apply(self, world: World) -> World:
+        """Multiply the reference by 1 + amplitude · sin(order·θ + phase)."""
+        amplitude, order = self.value("amplitude"), self.value("order", 1.0)
+        phase = self.value("phase_rad")
+
+        def step(reading: NDArray[np.float64], spin: SpinState) -> NDArray[np.float64]:
+            return reading * (1 + amplitude * np.sin(order * spin.angle + phase))
+
+        return world.changed(reference_steps=(*world.reference_steps, step))
