@@ -1,0 +1,385 @@
+"""Frame formats: what the boards send, byte by byte, and how it becomes samples (docs/frames.md).
+
+A format is a packet layout and the meaning of its fields. `SampleDecoder` turns a byte stream in one of the formats
+into samples with unwrapped time, the number of samples lost before each, and a segment number that changes whenever
+the board started anew.
+"""
+
+from __future__ import annotations
+
+import enum
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from firmware_bridge.checksum import crc16, crc16_rows, sum16_rows
+from firmware_bridge.packets import PacketLayout, PacketScanner
+from gfimu.errors import unknown_name
+
+__all__ = [
+    "FORMATS",
+    "FrameFormat",
+    "FrameType",
+    "SampleDecoder",
+    "Samples",
+    "Status",
+    "StreamCounts",
+    "encode_message",
+    "encode_samples",
+    "frame_format",
+]
+
+FRAME_VERSION = 1
+NO_TEMPERATURE = -(1 << 15)
+"""Value of the temperature field while no sensor fills it."""
+
+SYNC = (0xA5, 0x5A)
+_HALF_WRAP = 1 << 31  # a time stamp that seems to jump further than this went back: the board started anew
+
+
+class FrameType(enum.IntEnum):
+    """What an `lpc1768` frame carries."""
+
+    SAMPLE = 1
+    IDENTITY = 2
+    REPLY = 3
+
+
+class Status(enum.IntFlag):
+    """Bits of the status field of a sample frame."""
+
+    SENSOR_1_MISSING = 1 << 0
+    SENSOR_2_MISSING = 1 << 1
+    SENSOR_3_MISSING = 1 << 2
+    SENSOR_4_MISSING = 1 << 3
+    SENSOR_1_OVERRUN = 1 << 4
+    SENSOR_2_OVERRUN = 1 << 5
+    SENSOR_3_OVERRUN = 1 << 6
+    SENSOR_4_OVERRUN = 1 << 7
+    LATE = 1 << 8
+    FRAMES_DROPPED = 1 << 9
+    SELF_TEST = 1 << 10
+    RECEIVE_ERROR = 1 << 11
+    FIRST = 1 << 12
+    WATCHDOG_RESET = 1 << 13
+    STALE = 1 << 14
+
+    @property
+    def missing_sensors(self) -> tuple[int, ...]:
+        """Numbers 1…4 of the sensors that did not answer."""
+        return tuple(number + 1 for number in range(4) if self & (1 << number))
+
+
+LPC1768_DTYPE = np.dtype(
+    [
+        ("sync", "u1", 2),
+        ("version", "u1"),
+        ("type", "u1"),
+        ("sequence", "<u2"),
+        ("time_us", "<u4"),
+        ("counts", "<i2", 12),
+        ("status", "<u2"),
+        ("temperature", "<i2"),
+        ("crc", "<u2"),
+    ]
+)
+
+MIMU4444_DTYPE = np.dtype(
+    [
+        ("start", "u1"),
+        ("sequence", ">u2"),
+        ("payload_bytes", "u1"),
+        ("ticks", ">u4"),
+        ("counts", ">i2", 48),
+        ("sum", ">u2"),
+    ]
+)
+
+
+@dataclass(frozen=True)
+class FrameFormat:
+    """One entry of the format registry.
+
+    Parameters
+    ----------
+    name : str
+        Name for ``--format``.
+    layout : PacketLayout
+        The packet on the wire.
+    clock_field : str
+        Field that holds the board's time stamp.
+    clock_hz : float
+        Ticks of the time stamp per second.
+    array : str
+        Array file whose channels the counts belong to.
+    channels : tuple of int
+        Columns of the ``counts`` field that are the array's channels, in order.
+    """
+
+    name: str
+    layout: PacketLayout
+    clock_field: str
+    clock_hz: float
+    array: str
+    channels: tuple[int, ...]
+
+    def is_sample(self, packets: NDArray[Any]) -> NDArray[np.bool_]:
+        """Tell which packets, shape (n,), carry a sample."""
+        if "type" not in (self.layout.dtype.names or ()):
+            return np.ones(len(packets), dtype=bool)
+        return np.asarray(packets["type"] == FrameType.SAMPLE)
+
+    def status(self, packets: NDArray[Any]) -> NDArray[np.uint16]:
+        """Status bits of the packets, shape (n,); zero in formats without them."""
+        if "status" not in (self.layout.dtype.names or ()):
+            return np.zeros(len(packets), dtype=np.uint16)
+        return packets["status"].astype(np.uint16)
+
+
+FORMATS: dict[str, FrameFormat] = {
+    "lpc1768": FrameFormat(
+        "lpc1768",
+        PacketLayout(LPC1768_DTYPE, ((0, SYNC[0]), (1, SYNC[1]), (2, FRAME_VERSION)), crc16_rows),
+        clock_field="time_us",
+        clock_hz=1e6,
+        array="cube12",
+        channels=tuple(range(12)),
+    ),
+    "mimu4444": FrameFormat(
+        "mimu4444",
+        PacketLayout(MIMU4444_DTYPE, ((0, 0xAA), (3, 0x64)), sum16_rows),
+        clock_field="ticks",
+        clock_hz=64e6,
+        array="mimu4444",
+        channels=tuple(6 * chip + axis for chip in range(8) for axis in range(3)),
+    ),
+}
+
+
+def frame_format(name: str) -> FrameFormat:
+    """Look up a frame format; raises `InputError` that lists the formats."""
+    if name not in FORMATS:
+        raise unknown_name("frame format", name, FORMATS)
+    return FORMATS[name]
+
+
+def encode_samples(
+    sequence: ArrayLike,
+    time_us: ArrayLike,
+    counts: ArrayLike,
+    status: ArrayLike = 0,
+    temperature: ArrayLike = NO_TEMPERATURE,
+) -> bytes:
+    """Encode sample frames of the format `lpc1768` as the firmware does.
+
+    Parameters
+    ----------
+    sequence, time_us, status, temperature : array_like, shape (n,)
+        Sequence numbers and time stamps (both taken modulo their width), status bits, temperature field.
+    counts : array_like, shape (n, 12)
+        Raw counts.
+    """
+    readings = np.asarray(counts)
+    frames = np.zeros(len(readings), LPC1768_DTYPE)
+    frames["sync"] = SYNC
+    frames["version"] = FRAME_VERSION
+    frames["type"] = FrameType.SAMPLE
+    frames["sequence"] = np.asarray(sequence, dtype=np.int64) & 0xFFFF
+    frames["time_us"] = np.asarray(time_us, dtype=np.int64) & 0xFFFFFFFF
+    frames["counts"] = readings
+    frames["status"] = status
+    frames["temperature"] = temperature
+    return _sealed(frames)
+
+
+def encode_message(kind: FrameType, sequence: int, time_us: int, payload: bytes, status: int = 0) -> bytes:
+    """Encode one identity or reply frame of the format `lpc1768`; ``payload`` has at most 24 bytes."""
+    body = struct.pack(
+        "<2sBBHI24sHh", bytes(SYNC), FRAME_VERSION, kind, sequence & 0xFFFF, time_us, payload, status, NO_TEMPERATURE
+    )
+    return body + struct.pack("<H", crc16(body))
+
+
+def _sealed(frames: NDArray[Any]) -> bytes:
+    covered = frames.dtype.itemsize - 2
+    rows = frames.view(np.uint8).reshape(len(frames), frames.dtype.itemsize)
+    frames["crc"] = crc16_rows(rows[:, :covered])
+    return frames.tobytes()
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Decoded samples of one format, in the order in which they came.
+
+    Parameters
+    ----------
+    ticks : ndarray, shape (n,)
+        Board time, unwrapped, in ticks since the first sample of the segment's time base.
+    sequence : ndarray, shape (n,)
+        Sequence numbers as sent.
+    counts : ndarray, shape (n, c)
+        Raw counts of the array's channels.
+    status : ndarray, shape (n,)
+        Status bits (`Status`).
+    lost_before : ndarray, shape (n,)
+        Samples lost between the sample before and this one; 0 at a new segment.
+    segment : ndarray, shape (n,)
+        Number that grows by one whenever the board started anew: time and sequence begin again there.
+    """
+
+    ticks: NDArray[np.int64]
+    sequence: NDArray[np.uint16]
+    counts: NDArray[np.int16]
+    status: NDArray[np.uint16]
+    lost_before: NDArray[np.int64]
+    segment: NDArray[np.int64]
+
+    def __len__(self) -> int:
+        return len(self.ticks)
+
+    @classmethod
+    def join(cls, parts: Sequence[Samples]) -> Samples:
+        """Put batches of one stream together."""
+        return cls(
+            *(np.concatenate([getattr(part, name) for part in parts]) for name in (field.name for field in fields(cls)))
+        )
+
+
+@dataclass(frozen=True)
+class StreamCounts:
+    """What a stream held so far."""
+
+    samples: int
+    messages: int
+    lost: int
+    corrupt: int
+    skipped_bytes: int
+    restarts: int
+
+
+class SampleDecoder:
+    """Streaming decoder: bytes of one format in, samples out.
+
+    Parameters
+    ----------
+    name : str
+        Format name in `FORMATS`.
+
+    Attributes
+    ----------
+    messages : list of ndarray
+        Packets that are no samples (identity, replies), since the caller last cleared the list.
+    """
+
+    def __init__(self, name: str = "lpc1768") -> None:
+        self.format = frame_format(name)
+        self.messages: list[NDArray[Any]] = []
+        self._scanner = PacketScanner(self.format.layout)
+        self._last: tuple[int, int, int] | None = None  # sequence, raw clock, unwrapped ticks
+        self._recent: list[int] = []
+        self._segment = 0
+        self._samples = self._messages = self._lost = 0
+
+    @property
+    def counts(self) -> StreamCounts:
+        """Totals since the start."""
+        scanner = self._scanner
+        return StreamCounts(
+            self._samples, self._messages, self._lost, scanner.corrupt, scanner.skipped_bytes, self._segment
+        )
+
+    def feed(self, data: bytes | bytearray | memoryview) -> Samples:
+        """Take the next bytes and return the samples that are now complete."""
+        packets = self._scanner.feed(data)
+        is_sample = self.format.is_sample(packets)
+        if not is_sample.all():
+            others = packets[~is_sample]
+            self.messages.extend(others)
+            self._messages += len(others)
+            packets = packets[is_sample]
+        return self._number(packets)
+
+    def finish(self) -> None:
+        """Count an unfinished frame at the end of the stream as skipped."""
+        self._scanner.finish()
+
+    def break_segment(self) -> None:
+        """Begin a new segment with the next sample: the connection was lost and time may have passed."""
+        self._scanner.finish()
+        self._last = None
+
+    def _number(self, packets: NDArray[Any]) -> Samples:
+        """Unwrap time and sequence, count what is missing, find the places where the board started anew."""
+        n = len(packets)
+        status = self.format.status(packets)
+        lost, fresh, ticks = np.zeros((3, n), dtype=np.int64)
+        if n:
+            sequence = packets["sequence"].astype(np.int64)
+            clock = packets[self.format.clock_field].astype(np.int64)
+            last_sequence, last_clock, last_ticks = self._last or (int(sequence[0]) - 1, int(clock[0]), int(clock[0]))
+            steps = np.diff(sequence, prepend=last_sequence) & 0xFFFF
+            spans = np.diff(clock, prepend=last_clock) & 0xFFFFFFFF
+            fresh[0] = self._last is None and self._samples > 0
+            first = (status & Status.FIRST) != 0
+            odd = (steps != 1) | first | (spans >= _HALF_WRAP)
+            odd[0] &= self._last is not None
+            periods = _RecentPeriods(self._recent if self._last else [], spans, ~odd)
+            for place in np.flatnonzero(odd).tolist():
+                gap = None if first[place] else _samples_in_gap(steps[place], spans[place], periods.before(place))
+                if gap is None:
+                    fresh[place] = 1
+                    periods.start_anew(place)
+                else:
+                    lost[place] = gap - 1
+            self._recent = periods.before(n)
+            ticks = last_ticks + np.cumsum(spans)
+            for place in np.flatnonzero(fresh).tolist():
+                ticks[place:] += clock[place] - ticks[place]  # a new segment counts from the board's own start
+            self._last = int(sequence[-1]), int(clock[-1]), int(ticks[-1])
+        segment = self._segment + np.cumsum(fresh)
+        self._segment += int(fresh.sum())
+        self._samples += n
+        self._lost += int(lost.sum())
+        counts = packets["counts"][:, list(self.format.channels)].astype(np.int16)
+        return Samples(ticks, packets["sequence"].astype(np.uint16), counts, status, lost, segment)
+
+
+class _RecentPeriods:
+    """The last regular sample periods before a place in the stream, wherever the stream was cut into batches."""
+
+    LENGTH = 64
+
+    def __init__(self, earlier: list[int], spans: NDArray[np.int64], regular: NDArray[np.bool_]) -> None:
+        self._places = np.flatnonzero(regular & (spans > 0))
+        self._spans = spans[self._places]
+        self._earlier = earlier
+        self._start = 0
+
+    def start_anew(self, place: int) -> None:
+        """Forget what was before ``place``: the board may run at another rate now."""
+        self._earlier = []
+        self._start = int(np.searchsorted(self._places, place))
+
+    def before(self, place: int) -> list[int]:
+        """At most `LENGTH` regular periods before ``place``, clock ticks."""
+        stop = int(np.searchsorted(self._places, place))
+        here = self._spans[max(self._start, stop - self.LENGTH) : stop].tolist()
+        return (self._earlier + here)[-self.LENGTH :]
+
+
+def _samples_in_gap(step: int, span: int, periods: list[int]) -> int | None:
+    """Sample periods between a sample and the one before it; None if time and sequence contradict each other.
+
+    The sequence number knows the gap modulo 2¹⁶; the time stamp, divided by the sample period, knows the rest.
+    """
+    if span >= _HALF_WRAP or step == 0:
+        return None
+    if not periods:
+        return int(step)
+    by_clock = float(span) / float(np.median(periods))
+    gap = int(step) + 65536 * max(0, round((by_clock - int(step)) / 65536))
+    return gap if abs(gap - by_clock) <= 1.5 + 0.05 * gap else None
