@@ -11,7 +11,6 @@ frame turned by ``mount_rotvec``, with its origin at ``cube_offset`` (table fram
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
@@ -128,8 +127,8 @@ class World:
         Random walk of every channel's bias, m/s² per √s.
     temperature : float
         Board temperature where none is recorded, °C.
-    notes : mapping
-        Free metadata an effect wants to pass on.
+    start : float, optional
+        Board time at which the recording began (power-on), s; by default the first time asked for.
     """
 
     array: AccelerometerArray
@@ -150,7 +149,7 @@ class World:
     noise_factor: float = 1.0
     bias_walk: float = 0.0
     temperature: float = 25.0
-    notes: Mapping[str, Any] = field(default_factory=dict)
+    start: float | None = None
 
     def chip_times(self, t: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the true (reference) times at which each chip is sampled, shape (n, k), for board times ``t``, s."""
@@ -163,6 +162,10 @@ class World:
         for step in self.sensing_steps:
             readings = step(readings, context)
         return readings
+
+    def since_start(self, t: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the time since the recording began, s, shape (n,)."""
+        return t - (t[0] if self.start is None else self.start)
 
     def changed(self, **fields: Any) -> World:
         """Return this world with some fields replaced."""

@@ -141,7 +141,7 @@ class WarmUp(_PerChannel):
         offset = self.per_channel(world.array)
         tau = max(self.value("time_constant_s", 20.0), 1e-3)
         return _with_step(
-            world, lambda readings, context: readings - np.outer(np.expm1(-(context.t - context.t[0]) / tau), offset)
+            world, lambda readings, context: readings - np.outer(np.expm1(-world.since_start(context.t) / tau), offset)
         )
 
 
@@ -316,7 +316,7 @@ class GainDrift(Effect):
         """Multiply the readings by 1 + slope · (t − start)."""
         slope = self.value("slope_1_s")
         return _with_step(
-            world, lambda readings, context: readings * (1.0 + slope * (context.t - context.t[0]))[:, None]
+            world, lambda readings, context: readings * (1.0 + slope * world.since_start(context.t))[:, None]
         )
 
 

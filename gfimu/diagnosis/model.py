@@ -1,0 +1,178 @@
+"""What diagnosis needs of a world model: it can predict channels and list what may be wrong with it.
+
+`sim.twin.Twin` implements `WorldModel`; diagnosis knows no more of the simulation than this.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gfimu.array import AccelerometerArray
+
+__all__ = ["Effect", "EffectFamily", "ExpectedNoise", "Pattern", "Size", "Spin", "SpinState", "WorldModel"]
+
+
+class SpinState(Protocol):
+    """Angle (rad), rate (rad/s) and angular acceleration (rad/s²) of the table, each of shape (n,)."""
+
+    @property
+    def angle(self) -> NDArray[np.float64]: ...  # noqa: D102
+    @property
+    def rate(self) -> NDArray[np.float64]: ...  # noqa: D102
+    @property
+    def acceleration(self) -> NDArray[np.float64]: ...  # noqa: D102
+
+
+class Spin(Protocol):
+    """Spin of the table as a function of time."""
+
+    def at(self, t: ArrayLike) -> SpinState:
+        """Return the state at times (n,), s."""
+        ...
+
+
+class Size(Protocol):
+    """One linear coordinate of an effect: key, physical prior, sign, finite-difference step."""
+
+    @property
+    def key(self) -> str: ...  # noqa: D102
+    @property
+    def prior_std(self) -> float: ...  # noqa: D102
+    @property
+    def positive(self) -> bool: ...  # noqa: D102
+    @property
+    def step(self) -> float: ...  # noqa: D102
+
+
+class Pattern(Protocol):
+    """Sizes that move together: a name and a mixing matrix (m, k)."""
+
+    @property
+    def name(self) -> str: ...  # noqa: D102
+    @property
+    def mixing(self) -> NDArray[np.float64]: ...  # noqa: D102
+
+
+class Effect(Protocol):
+    """One effect with its parameters."""
+
+    name: Any
+    summary: Any
+    place: Any
+    separated_by: Any
+    per_run: Any
+    parameters: dict[str, Any]
+
+    def size_values(self, array: AccelerometerArray) -> NDArray[np.float64]:
+        """Return the linear coordinates."""
+        ...
+
+    def shape_values(self) -> dict[str, float]:
+        """Return the shape parameters."""
+        ...
+
+
+class EffectFamily(Protocol):
+    """A kind of effect: its coordinates, places, shapes and how to build one."""
+
+    name: Any
+    summary: Any
+    place: Any
+    separated_by: Any
+    per_run: Any
+
+    def __call__(self, parameters: Mapping[str, Any]) -> Effect:
+        """Build an effect from its contract parameters."""
+        ...
+
+    def sizes(self, array: AccelerometerArray) -> tuple[Size, ...]:
+        """Return the linear coordinates."""
+        ...
+
+    def patterns(self, array: AccelerometerArray) -> tuple[Pattern, ...]:
+        """Return the places and structures it can take."""
+        ...
+
+    def shapes(self, duration: float, sample_rate: float) -> tuple[dict[str, float], ...]:
+        """Return the grid of shape parameters."""
+        ...
+
+    def from_sizes(self, array: AccelerometerArray, values: NDArray[np.float64], shape: Mapping[str, float]) -> Effect:
+        """Build an effect from its linear coordinates."""
+        ...
+
+
+@dataclass(frozen=True)
+class ExpectedNoise:
+    """Noise that the world model expects of its sensors.
+
+    Parameters
+    ----------
+    white : ndarray, shape (c,)
+        Standard deviation of white noise including quantisation, m/s².
+    quantum : float
+        Size of one count, m/s².
+    full_scale : float
+        Largest reading of the configured range, m/s².
+    """
+
+    white: NDArray[np.float64]
+    quantum: float
+    full_scale: float
+
+
+class WorldModel(Protocol):
+    """A simulation that can be wrong."""
+
+    @property
+    def array(self) -> AccelerometerArray:
+        """The accelerometer array."""
+        ...
+
+    @property
+    def effects(self) -> Sequence[Effect]:
+        """Effects that the model already has."""
+        ...
+
+    @property
+    def drive_source(self) -> str:
+        """What drives it: tacho, angle, command or gyro."""
+        ...
+
+    def families(self) -> Mapping[str, EffectFamily]:
+        """Return all kinds of effects it could have, by name."""
+        ...
+
+    def predict(
+        self,
+        spin: Spin,
+        t: NDArray[np.float64],
+        *,
+        effects: Sequence[Effect] = (),
+        temperature: NDArray[np.float64] | None = None,
+        mounting: NDArray[np.float64] | None = None,
+        start: float | None = None,
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Predict noise-free channels (n, c), m/s², and the reference (n,) for a spin, with more effects added."""
+        ...
+
+    def sample_times(self, t: NDArray[np.float64], effects: Sequence[Effect] = ()) -> NDArray[np.float64]:
+        """Return the true time that each chip's reading and, last, the reference belong to, shape (n, k + 1)."""
+        ...
+
+    def expected_noise(self, sample_rate: float) -> ExpectedNoise:
+        """Return the noise it expects at a sample rate."""
+        ...
+
+    def extended(self, effects: Sequence[Effect]) -> WorldModel:
+        """Return the model with these effects added to its own."""
+        ...
+
+    def to_toml(self) -> str:
+        """Return the twin file."""
+        ...

@@ -1,0 +1,245 @@
+"""The twin: what the simulation believes, and its predictions for a recording."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomli_w
+from numpy.typing import NDArray
+
+from gfimu.array import AccelerometerArray
+from gfimu.diagnosis.model import ExpectedNoise
+from gfimu.errors import InputError
+from gfimu.model_files import find_model, read_toml
+from gfimu.units import STANDARD_GRAVITY
+from sim import forward
+from sim.effects import EFFECTS, Effect, apply_effects, make_effect
+from sim.motion import SpinMotion
+from sim.world import World
+
+__all__ = ["Twin"]
+
+_SOURCES = ("tacho", "angle", "command", "gyro")
+
+
+@dataclass(frozen=True)
+class Twin:
+    """What the simulation believes of the world.
+
+    Parameters
+    ----------
+    array : AccelerometerArray
+        Geometry of the sensors in the body frame.
+    gravity : float
+        Local gravity, m/s².
+    cube_offset : ndarray, shape (3,)
+        Cube centre from the point of the axis at table height, table frame, m.
+    sample_rate : float
+        Nominal sample rate, Hz.
+    drive_source : str
+        What drives the simulated table: ``tacho``, ``angle``, ``command``; ``gyro`` for a free body.
+    part : str
+        Name of the sensor part.
+    range_g : float
+        Configured range, in units of standard gravity.
+    full_resolution : bool
+        Whether the chips run in full resolution.
+    effects : tuple of Effect
+        Extensions of the model; a nominal twin has none.
+    array_name : str
+        Array as named in the file.
+    """
+
+    array: AccelerometerArray
+    gravity: float = STANDARD_GRAVITY
+    cube_offset: NDArray[np.float64] = field(default_factory=lambda: np.array([0.0, 0.0, 0.06]))
+    sample_rate: float = 100.0
+    drive_source: str = "tacho"
+    part: str = "adxl345"
+    range_g: float = 16.0
+    full_resolution: bool = True
+    effects: tuple[Effect, ...] = ()
+    array_name: str = ""
+
+    @classmethod
+    def load(cls, name: str | Path) -> Twin:
+        """Load a twin by name (in ``models/twins``) or from a TOML file.
+
+        Raises
+        ------
+        InputError
+            If the file or a key in it is wrong; the message lists the valid keys.
+        """
+        path = find_model("twins", name)
+        return cls.from_dict(read_toml(path), source=str(path), beside=path.parent)
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any], *, source: str = "twin", beside: Path | None = None) -> Twin:
+        """Build a twin from the keys of a twin file."""
+        _check_keys(
+            data,
+            {
+                "array",
+                "gravity_m_s2",
+                "cube_offset_m",
+                "sample_rate_hz",
+                "drive",
+                "sensor",
+                "effect",
+                "name",
+                "description",
+            },
+            source,
+        )
+        drive, sensor = data.get("drive", {}), data.get("sensor", {})
+        _check_keys(drive, {"source"}, f"{source}: [drive]")
+        _check_keys(sensor, {"part", "range_g", "full_resolution"}, f"{source}: [sensor]")
+        if "array" not in data:
+            raise InputError(f"{source}: key 'array' is missing; name an array, such as array = \"cube12\"")
+        array = AccelerometerArray.load(str(data["array"]), beside=beside)
+        drive_source = str(drive.get("source", "tacho"))
+        if drive_source not in _SOURCES:
+            raise InputError(f"{source}: unknown drive source {drive_source!r}; valid: {', '.join(_SOURCES)}")
+        offset = np.array(data.get("cube_offset_m", [0.0, 0.0, 0.06]), dtype=float)
+        if offset.shape != (3,) or not np.isfinite(offset).all():
+            raise InputError(f"{source}: cube_offset_m needs three finite numbers")
+        part = str(sensor.get("part", array.chips[0].part))
+        find_model("parts", part)
+        return cls(
+            array=array,
+            gravity=_positive(data.get("gravity_m_s2", STANDARD_GRAVITY), f"{source}: gravity_m_s2"),
+            cube_offset=offset,
+            sample_rate=_positive(data.get("sample_rate_hz", 100.0), f"{source}: sample_rate_hz"),
+            drive_source=drive_source,
+            part=part,
+            range_g=_positive(sensor.get("range_g", 16), f"{source}: range_g"),
+            full_resolution=bool(sensor.get("full_resolution", True)),
+            effects=tuple(_effect(entry, array, source) for entry in data.get("effect", [])),
+            array_name=str(data["array"]),
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the content of the twin file."""
+        data: dict[str, Any] = {
+            "array": self.array_name or self.array.name,
+            "gravity_m_s2": self.gravity,
+            "cube_offset_m": [float(value) for value in self.cube_offset],
+            "sample_rate_hz": self.sample_rate,
+            "drive": {"source": self.drive_source},
+            "sensor": {"part": self.part, "range_g": self.range_g, "full_resolution": self.full_resolution},
+        }
+        if self.effects:
+            data["effect"] = [{"name": effect.name, "parameters": effect.parameters} for effect in self.effects]
+        return data
+
+    def to_toml(self) -> str:
+        """Return the text of the twin file."""
+        return tomli_w.dumps(self.to_dict())
+
+    def world(self, effects: Sequence[Effect] = (), mounting: NDArray[np.float64] | None = None) -> World:
+        """Return the world that the twin believes in, with more effects added.
+
+        Parameters
+        ----------
+        effects : sequence of Effect
+            Effects beyond the twin's own.
+        mounting : ndarray, shape (3,), optional
+            Rotation vector by which the cube was turned from upright before the run, rad.
+        """
+        turned = np.zeros(3) if mounting is None else mounting
+        nominal = World(self.array, gravity=self.gravity, cube_offset=self.cube_offset, mount_rotvec=turned)
+        return apply_effects(nominal, (*self.effects, *effects))
+
+    def families(self) -> Mapping[str, type[Effect]]:
+        """Return the library of effects."""
+        return EFFECTS
+
+    def predict(
+        self,
+        spin: SpinMotion,
+        t: NDArray[np.float64],
+        *,
+        effects: Sequence[Effect] = (),
+        temperature: NDArray[np.float64] | None = None,
+        mounting: NDArray[np.float64] | None = None,
+        start: float | None = None,
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Predict noise-free channels (n, c), m/s², and the reference (n,) for a spin of the table.
+
+        Wiring, ranges and clipping are applied to the prediction; noise, quantisation, frozen and lost samples are
+        not, as they have no noise-free form.
+        """
+        world = self.world(effects, mounting).changed(start=start)
+        readings = forward.channels(world, spin, t, temperature)
+        if world.data_steps:
+            readings = self._digital(readings, (*self.effects, *effects), world, t)
+        if self.drive_source == "angle":
+            for step in world.motion_steps:
+                spin = step(spin, t)
+            return readings, spin.at(t - world.tacho_delay).angle
+        return readings, forward.reference(world, spin, t)
+
+    def _digital(
+        self, readings: NDArray[np.float64], effects: Sequence[Effect], world: World, t: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        silent = {"stuck_channel", "dropped_frames", "coarse_resolution"}
+        rng = np.random.default_rng(0)
+        for effect in effects:
+            if effect.place == "data" and effect.name not in silent:
+                for step in effect.apply(world.changed(data_steps=())).data_steps:
+                    readings = step(t, readings, rng)
+        return readings
+
+    def sample_times(self, t: NDArray[np.float64], effects: Sequence[Effect] = ()) -> NDArray[np.float64]:
+        """Return the true time that each chip's reading and, last, the reference belong to, shape (n, k + 1)."""
+        world = self.world(effects)
+        times = world.chip_times(t)
+        lag = sum(e.value("time_constant_s") for e in (*self.effects, *effects) if e.name == "sensor_lag")
+        return np.column_stack([times - lag, t - world.tacho_delay])
+
+    def expected_noise(self, sample_rate: float) -> ExpectedNoise:
+        """Return white noise and quantisation of the part at a sample rate, as the data sheet has them."""
+        part = read_toml(find_model("parts", self.part))
+        quantum = float(part["lsb_m_s2"])
+        if not self.full_resolution:
+            quantum *= max(self.range_g / float(part["range_g"][0]), 1.0)
+        for effect in self.effects:
+            if effect.name == "coarse_resolution":
+                quantum = effect.value("step_m_s2")
+        rms = np.array(part["noise_lsb_rms_100_hz"], dtype=float) * float(part["lsb_m_s2"])
+        rms = rms * math.sqrt(max(sample_rate, 100.0) / 100.0)
+        axis = np.concatenate([np.arange(len(chip.axes)) for chip in self.array.chips])
+        factor = math.prod(effect.value("factor", 1.0) for effect in self.effects if effect.name == "noise")
+        white = np.hypot(rms[axis] * factor, quantum / math.sqrt(12.0))
+        return ExpectedNoise(white, quantum, self.range_g * STANDARD_GRAVITY)
+
+    def extended(self, effects: Sequence[Effect]) -> Twin:
+        """Return the twin with these effects added to its own."""
+        return replace(self, effects=(*self.effects, *effects))
+
+
+def _check_keys(data: Mapping[str, Any], known: set[str], where: str) -> None:
+    if not isinstance(data, Mapping):
+        raise InputError(f"{where}: must be a table of keys")
+    for key in data:
+        if key not in known:
+            raise InputError(f"{where}: unknown key {key!r}; valid: {', '.join(sorted(known))}")
+
+
+def _positive(value: Any, where: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value) or value <= 0:
+        raise InputError(f"{where} must be a positive number, not {value!r}")
+    return float(value)
+
+
+def _effect(entry: Mapping[str, Any], array: AccelerometerArray, source: str) -> Effect:
+    _check_keys(entry, {"name", "parameters"}, f"{source}: [[effect]]")
+    try:
+        return make_effect(str(entry.get("name", "")), entry.get("parameters", {}), array)
+    except InputError as error:
+        raise InputError(f"{source}: {error}") from None
