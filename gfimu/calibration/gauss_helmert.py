@@ -1,0 +1,163 @@
+"""Combined (Gauss–Helmert) adjustment: conditions that join parameters and noisy observations.
+
+f(x, l + v) = 0 is linearised in the parameters x and in the observations, A dx + B v + w = 0, and iterated while the
+observation corrections v of least weighted square are found along the way (Persian calibration paper, figure 6). The
+linearisation point of the observations is moved with them (L. Lenzmann and E. Lenzmann, "Strenge Auswertung des
+nichtlinearen Gauß-Helmert-Modells", AVN 111(2):68-73, 2004): keeping it at the raw observations gives another,
+biased answer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gfimu.errors import InputError
+
+__all__ = ["Adjustment", "Condition", "gauss_helmert"]
+
+Floats = NDArray[np.float64]
+
+Condition = Callable[[Floats, Floats], tuple[Floats, Floats, Floats]]
+"""f(x, l): parameters (u,) and observations (n, d) to the misclosures (n, r), A (n, r, u) and B (n, r, d)."""
+
+_RANK_TOLERANCE = 1e-9
+
+
+@dataclass(frozen=True)
+class Adjustment:
+    """Outcome of a combined adjustment.
+
+    Parameters
+    ----------
+    parameters : ndarray, shape (u,)
+        Adjusted parameters.
+    cofactor : ndarray, shape (u, u)
+        Covariance of the parameters for the given covariance of the observations (variance factor one).
+    corrections : ndarray, shape (n, d)
+        Corrections v to the observations.
+    variance_factor : float
+        vᵀ P v / redundancy; NaN without redundancy.
+    redundancy : int
+        Conditions minus determinable parameters.
+    null_space : ndarray, shape (u, k)
+        Orthonormal directions of the parameters that the conditions do not determine.
+    iterations : int
+        Linearisations done.
+    """
+
+    parameters: Floats
+    cofactor: Floats
+    corrections: Floats
+    variance_factor: float
+    redundancy: int
+    null_space: Floats
+    iterations: int
+
+    @property
+    def covariance(self) -> Floats:
+        """Covariance of the parameters scaled by the variance factor, shape (u, u)."""
+        return self.cofactor * self.variance_factor
+
+
+def gauss_helmert(
+    condition: Condition,
+    parameters: ArrayLike,
+    observations: ArrayLike,
+    covariance: ArrayLike,
+    *,
+    basis: ArrayLike | None = None,
+    minimum_norm: bool = False,
+    move_observations: bool = True,
+    tolerance: float = 1e-10,
+    max_iterations: int = 50,
+) -> Adjustment:
+    """Adjust parameters and observations so that the conditions hold.
+
+    Parameters
+    ----------
+    condition : callable
+        f(x, l) with its two Jacobians; observations come in n independent groups of d with r conditions each.
+    parameters : array_like, shape (u,)
+        Starting values.
+    observations : array_like, shape (n, d)
+        Observations l.
+    covariance : array_like, shape (d, d) or (n, d, d)
+        Covariance of each group.
+    basis : array_like, shape (u, m), optional
+        Columns that span the parameter changes allowed; a linear constraint is the null space of its rows.
+    minimum_norm : bool
+        With undetermined directions, take the step of least norm instead of refusing.
+    move_observations : bool
+        Linearise at the corrected observations; False keeps the raw ones, which is weighted least squares on f.
+    tolerance : float
+        Stop when no parameter changes by more than this share of its standard deviation or of its size.
+    max_iterations : int
+        Refuse after this many linearisations.
+
+    Raises
+    ------
+    InputError
+        If the conditions leave parameters undetermined and ``minimum_norm`` is not set, or the iteration does not
+        settle.
+    """
+    x = np.array(parameters, dtype=float)
+    raw = np.asarray(observations, dtype=float)  # (n, d)
+    n, d = raw.shape
+    q = np.broadcast_to(np.asarray(covariance, dtype=float), (n, d, d))
+    span = np.eye(len(x)) if basis is None else np.asarray(basis, dtype=float)
+    v = np.zeros_like(raw)
+    for iteration in range(1, max_iterations + 1):
+        f, a, b = condition(x, raw + v)  # (n, r), (n, r, u), (n, r, d)
+        w = f - np.einsum("nrd,nd->nr", b, v)
+        bq = b @ q  # (n, r, d)
+        whiten = np.linalg.inv(np.linalg.cholesky(bq @ b.swapaxes(1, 2)))  # (B Q Bᵀ)⁻¹ = Lᵀ L, (n, r, r)
+        design = (whiten @ a @ span).reshape(-1, span.shape[1])
+        closure = (whiten @ w[..., None]).ravel()
+        step, cofactor, null = _solve(design, closure, minimum_norm)
+        dx = span @ step
+        x += dx
+        rest = whiten @ (w + a @ dx)[..., None]  # whitened A dx + w, (n, r, 1)
+        new_v = -(bq.swapaxes(1, 2) @ (whiten.swapaxes(1, 2) @ rest))[..., 0]
+        if not (np.isfinite(x).all() and np.isfinite(new_v).all()):
+            break
+        std = np.sqrt(np.einsum("ij,jk,ik->i", span, cofactor, span))
+        settled = bool(np.all(np.abs(dx) <= np.maximum(tolerance * std, 1e-14 * np.abs(x))))
+        if move_observations:
+            noise = np.sqrt(np.einsum("ndd->nd", q))
+            settled = settled and bool(np.all(np.abs(new_v - v) <= 1e3 * tolerance * noise))
+            v = new_v
+        if settled or (not move_observations and iteration > 1 and np.all(np.abs(dx) <= 1e-9 * std)):
+            redundancy = len(closure) - (design.shape[1] - null.shape[1])
+            factor = float(np.sum(rest**2)) / redundancy if redundancy > 0 else np.nan
+            directions = np.linalg.qr(span @ null)[0]
+            return Adjustment(x, span @ cofactor @ span.T, new_v, factor, redundancy, directions, iteration)
+    raise InputError(
+        f"the adjustment did not settle in {max_iterations} iterations; the starting values are too far off, "
+        "or some observations do not belong: check the poses and the gravity"
+    )
+
+
+def _solve(design: Floats, closure: Floats, minimum_norm: bool) -> tuple[Floats, Floats, Floats]:
+    """Least-squares step −(design)⁺ closure, its cofactor matrix and the undetermined directions."""
+    u = design.shape[1]
+    scale = np.linalg.norm(design, axis=0)
+    scale[scale == 0.0] = 1.0
+    if minimum_norm:  # one common scale: the norm that is least is that of the parameters themselves
+        scale[:] = scale.max()
+    triangle = np.zeros((u + 1, u + 1))
+    reduced = np.linalg.qr(np.column_stack([design / scale, closure]), mode="r")
+    triangle[: len(reduced)] = reduced
+    left, s, vt = np.linalg.svd(triangle[:u, :u])
+    rank = int(np.sum(s > _RANK_TOLERANCE * s[0]))
+    if rank < u and not minimum_norm:
+        raise InputError(
+            f"{u - rank} of {u} parameters are not determined by these observations; "
+            "add poses in other directions or use the model with fewer parameters"
+        )
+    inverse = (vt[:rank].T / s[:rank]) / scale[:, None]  # (u, rank)
+    step = -inverse @ (left[:, :rank].T @ triangle[:u, u])
+    return step, inverse @ inverse.T, vt[rank:].T

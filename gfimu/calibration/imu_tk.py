@@ -1,0 +1,51 @@
+"""Reader of the plain text recordings that calibration data sets such as IMU-TK's come in."""
+
+from __future__ import annotations
+
+import gzip
+from pathlib import Path
+
+import numpy as np
+
+from gfimu.errors import InputError
+from gfimu.recording import Recording
+
+__all__ = ["read_text_triad"]
+
+
+def read_text_triad(path: str | Path, *, channels: tuple[str, str, str] = ("a11", "a12", "a13")) -> Recording:
+    """Read a text file of rows ``time x y z``: seconds and raw counts of one triad.
+
+    Parameters
+    ----------
+    path : str or Path
+        Text file, optionally gzipped, columns separated by blanks; lines that start with # are skipped.
+    channels : tuple of str
+        Names the three columns get.
+
+    Returns
+    -------
+    Recording
+        Readings with ``unit="lsb"``.
+
+    Raises
+    ------
+    InputError
+        If the file is missing or not four columns of numbers, or its time does not increase.
+    """
+    file = Path(path)
+    try:
+        with gzip.open(file, "rt") if file.suffix == ".gz" else file.open() as stream:
+            table = np.loadtxt(stream, ndmin=2)
+    except (OSError, EOFError) as error:
+        raise InputError(f"{file}: {getattr(error, 'strerror', None) or error}; check the path") from None
+    except (ValueError, UnicodeDecodeError) as error:
+        raise InputError(f"{file}: not rows of four numbers ({error}); columns are time, x, y, z") from None
+    if table.shape[1] != 4 or len(table) < 2:
+        raise InputError(f"{file}: {table.shape[0]} rows of {table.shape[1]} columns; needed: time, x, y, z")
+    backwards = np.diff(table[:, 0]) <= 0
+    if backwards.any() or not np.isfinite(table).all():
+        raise InputError(
+            f"{file}: time does not increase at row {int(np.argmax(backwards)) + 2}, or a value is not finite"
+        )
+    return Recording(table[:, 0], table[:, 1:], channels, unit="lsb", metadata={"source": file.name})
