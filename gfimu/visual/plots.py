@@ -1,0 +1,138 @@
+"""Plots over time: a title with its unit, and lines or bands that share the recording's timeline."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+from numpy.typing import NDArray
+
+from gfimu.visual.colours import Colour
+from gfimu.visual.scene import TIMELINE
+
+__all__ = ["Line", "Plot"]
+
+_LONGEST_LEGEND = 12  # lines; a longer legend would cover the plot
+
+
+@dataclass(frozen=True)
+class Line:
+    """One line, or several of one name and colour: the edges of a band, the components of a truth.
+
+    Parameters
+    ----------
+    name : str
+        Name in the legend.
+    t : ndarray, shape (n,)
+        Time, s.
+    values : ndarray, shape (n,) or (n, k)
+        Values; each column is a line of its own.
+    colour : Colour
+        Colour of the line.
+    width : float
+        Width in points of the screen.
+    """
+
+    name: str
+    t: NDArray[np.float64]
+    values: NDArray[np.float64]
+    colour: Colour
+    width: float = 1.5
+
+
+@dataclass(frozen=True)
+class Plot:
+    """Lines that share an axis.
+
+    Parameters
+    ----------
+    title : str
+        What is drawn and in which unit.
+    lines : sequence of Line
+        The lines, the first at the back.
+    legend : bool
+        Whether to name the lines.
+    span : tuple of float, optional
+        Lowest and highest value to show, so that several plots can be compared by eye; all data otherwise.
+    """
+
+    title: str
+    lines: Sequence[Line]
+    legend: bool = True
+    span: tuple[float, float] | None = None
+
+    @property
+    def entity(self) -> str:
+        """Path of the plot in the recording."""
+        return f"plots/{_entity_part(self.title)}"
+
+    def log(self, stream: rr.RecordingStream) -> None:
+        """Write the lines, by columns."""
+        for number, line in enumerate(self.lines):
+            entity = f"{self.entity}/{number:02d}_{_entity_part(line.name)}"
+            t, values = _broken_at_gaps(line.t, line.values.reshape(len(line.t), -1))
+            count = values.shape[1]
+            style = rr.SeriesLines(names=[line.name] * count, colors=[line.colour] * count, widths=[line.width] * count)
+            stream.log(entity, style, static=True)
+            stream.send_columns(
+                entity,
+                [rr.TimeColumn(TIMELINE, duration=t)],
+                rr.Scalars.columns(scalars=values.ravel()).partition(np.full(len(t), count)),
+            )
+
+    def view(self) -> rrb.TimeSeriesView:
+        """Return the view of the plot for a blueprint."""
+        return rrb.TimeSeriesView(
+            origin=f"/{self.entity}",
+            name=self.title,
+            axis_x=rrb.TimeAxis(link=rrb.components.LinkAxis.LinkToGlobal),
+            axis_y=None if self.span is None else rrb.ScalarAxis(range=self.span),
+            plot_legend=rrb.PlotLegend(
+                corner=_emptiest_corner(self.lines), visible=self.legend and len(self.lines) <= _LONGEST_LEGEND
+            ),
+        )
+
+
+def _emptiest_corner(lines: Sequence[Line]) -> rrb.Corner2D:
+    """Return the corner of the plot with the least data, for the legend."""
+    points = np.concatenate([_some_points(line) for line in lines])
+    points = points[np.isfinite(points).all(axis=1)]
+    if not len(points):
+        return rrb.Corner2D.RightTop
+    low, high = points.min(axis=0), points.max(axis=0)
+    across, up = ((points - low) / np.where(high > low, high - low, 1.0)).T
+    left, right, bottom, top = across < 0.25, across > 0.75, up < 0.4, up > 0.6
+    covered = {
+        rrb.Corner2D.RightTop: right & top,
+        rrb.Corner2D.LeftTop: left & top,
+        rrb.Corner2D.RightBottom: right & bottom,
+        rrb.Corner2D.LeftBottom: left & bottom,
+    }
+    return min(covered, key=lambda corner: int(covered[corner].sum()))
+
+
+def _some_points(line: Line) -> NDArray[np.float64]:
+    """About a thousand points (t, value) of a line, shape (m, 2)."""
+    step = max(1, len(line.t) // 1000)
+    values = line.values.reshape(len(line.t), -1)[::step]
+    return np.column_stack([np.repeat(line.t[::step], values.shape[1]), values.ravel()])
+
+
+def _entity_part(text: str) -> str:
+    return re.sub(r"[^\w]+", "_", text).strip("_")
+
+
+def _broken_at_gaps(
+    t: NDArray[np.float64], values: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Insert a NaN into every gap of more than 1.5 sample periods: lost samples show as a break, not as a line."""
+    if len(t) < 3:
+        return t, values
+    steps = np.diff(t)
+    gaps = np.flatnonzero(steps > 1.5 * np.median(steps))
+    middles = t[gaps] + steps[gaps] / 2
+    return np.insert(t, gaps + 1, middles), np.insert(values, gaps + 1, np.nan, axis=0)

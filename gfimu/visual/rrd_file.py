@@ -1,0 +1,82 @@
+"""Writing one .rrd file: a scene, its plots and notes, and the layout in which the viewer opens them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import rerun as rr
+import rerun.blueprint as rrb
+
+from gfimu.atomic_file import atomic_path
+from gfimu.errors import InputError
+from gfimu.visual.plots import Plot
+from gfimu.visual.scene import TIMELINE, Scene
+
+__all__ = ["NOTES", "notes_view", "write_rrd"]
+
+NOTES = "notes"
+"""Entity of the notes."""
+
+
+def write_rrd(
+    path: str | Path,
+    *,
+    title: str,
+    layout: rrb.Container,
+    scene: Scene,
+    plots: Iterable[Plot],
+    notes: str = "",
+    playback_speed: float = 1.0,
+) -> None:
+    """Write a rerun recording with its blueprint, whole or not at all.
+
+    Parameters
+    ----------
+    path : str or Path
+        File to write, ``.rrd``.
+    title : str
+        Name that the viewer shows.
+    layout : rerun.blueprint container
+        Arrangement of the views.
+    scene, plots : Scene, iterable of Plot
+        What to write.
+    notes : str
+        Markdown shown in the notes view.
+    playback_speed : float
+        Speed at which the viewer plays, 1 for real time.
+
+    Raises
+    ------
+    InputError
+        If the file name does not end in ``.rrd`` or its folder can't be written to.
+    """
+    if Path(path).suffix != ".rrd":
+        raise InputError(f"{path}: a rerun recording ends in .rrd; rename it")
+    panel = rrb.TimePanel(
+        state="collapsed", timeline=TIMELINE, playback_speed=playback_speed, play_state="playing", loop_mode="all"
+    )
+    blueprint = rrb.Blueprint(
+        layout,
+        panel,
+        rrb.BlueprintPanel(state="collapsed"),
+        rrb.SelectionPanel(state="collapsed"),
+        auto_views=False,
+        auto_layout=False,
+    )
+    with atomic_path(path) as temporary:
+        stream = rr.RecordingStream("gfimu")
+        stream.save(temporary, default_blueprint=blueprint)
+        stream.send_recording_name(title)
+        if notes:
+            stream.log(NOTES, rr.TextDocument(notes, media_type=rr.MediaType.MARKDOWN), static=True)
+        scene.log(stream)
+        for plot in plots:
+            plot.log(stream)
+        stream.flush()
+        stream.disconnect()
+
+
+def notes_view() -> rrb.TextDocumentView:
+    """Return the view of the notes for a blueprint."""
+    return rrb.TextDocumentView(origin=f"/{NOTES}", name="what you see")

@@ -1,0 +1,148 @@
+"""The plots of a run: raw channels, rate, angular acceleration, specific force, angle, drift."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gfimu.array import AccelerometerArray
+from gfimu.attitude import table_angle, to_rotation
+from gfimu.recording import Recording
+from gfimu.visual.colours import AXES, COMMAND, ESTIMATE, ESTIMATE_BAND, TACHO, TRUTH, chip_colour
+from gfimu.visual.motion import ExpectedDrift, KnownMotion, MotionEstimate, table_axis
+from gfimu.visual.plots import Line, Plot
+
+__all__ = ["angle_plot", "drift_plot", "free_rate_plots", "motion_plots", "raw_plots", "table_rate_plots"]
+
+_NAMES = ("x", "y", "z")
+_BOTH_SIDES = 2 * np.array([-1.0, 1.0])  # ±2σ
+
+
+def raw_plots(t: NDArray[np.float64], readings: NDArray[np.float64], array: AccelerometerArray) -> list[Plot]:
+    """One plot per number of sensing axis on the chip, with one line per chip; readings (n, c), m/s²."""
+    axis_on_chip = np.concatenate([np.arange(len(chip.axes)) for chip in array.chips])
+    return [
+        Plot(
+            f"raw, axis {axis + 1}, m/s²",
+            [
+                Line(
+                    array.channels[column], t, readings[:, column], chip_colour(int(array.chip_of_channel[column])), 1.0
+                )
+                for column in np.flatnonzero(axis_on_chip == axis)
+            ],
+        )
+        for axis in np.unique(axis_on_chip)
+    ]
+
+
+def table_rate_plots(recording: Recording, estimate: MotionEstimate | None, known: KnownMotion | None) -> list[Plot]:
+    """Rate about the table's axis with every reference and its ±2σ band; then its error in the same band."""
+    t = recording.t_s
+    axis = table_axis(recording)
+    lines = [
+        Line(name, t, recording.reference[column], colour, width)
+        for name, column, colour, width in (
+            ("command", "command_rad_s", COMMAND, 2.0),
+            ("tacho", "tacho_rad_s", TACHO, 1.5),
+        )
+        if column in recording.reference
+    ]
+    compared = (lines[-1].name, t, lines[-1].values) if lines else None
+    if known is not None and known.omega is not None:
+        lines.append(Line(known.name, known.t, known.omega @ axis, TRUTH, 2.5))
+        compared = (known.name, known.t, known.omega @ axis)
+    if estimate is not None:
+        rate = estimate.omega @ axis
+        spread = np.sqrt(estimate.omega_std**2 @ axis**2)[:, None] * _BOTH_SIDES
+        lines.insert(0, Line("±2σ", estimate.t_s, rate[:, None] + spread, ESTIMATE_BAND, 1.0))
+        lines.append(Line("estimate", estimate.t_s, rate, ESTIMATE))
+    plots = [Plot("angular rate about the table's axis, rad/s", lines)] if lines else []
+    if estimate is not None and compared is not None:
+        name, reference_t, reference = compared
+        error = rate - np.interp(estimate.t_s, reference_t, reference)
+        plots.append(
+            Plot(
+                "error of the rate, rad/s",
+                [
+                    Line("±2σ", estimate.t_s, spread, ESTIMATE_BAND, 1.5),
+                    Line(f"estimate − {name}", estimate.t_s, error, ESTIMATE, 1.2),
+                ],
+            )
+        )
+    return plots
+
+
+def free_rate_plots(recording: Recording, estimate: MotionEstimate | None, known: KnownMotion | None) -> list[Plot]:
+    """Three components of the rate beside truth or gyro; then their errors with the band of the widest."""
+    lines, errors = [], []
+    for axis, (name, colour) in enumerate(zip(_NAMES, AXES, strict=True)):
+        reference = _rate_reference(recording, known, axis)
+        if reference is not None:
+            lines.append(Line(f"{reference[0]} {name}", reference[1], reference[2], TRUTH, 2.5))
+        if estimate is None:
+            continue
+        lines.append(Line(f"estimate {name}", estimate.t_s, estimate.omega[:, axis], colour))
+        if reference is not None:
+            error = estimate.omega[:, axis] - np.interp(estimate.t_s, reference[1], reference[2])
+            errors.append(Line(f"{name}, estimate − {reference[0]}", estimate.t_s, error, colour, 1.2))
+    plots = [Plot("angular rate ω, rad/s", lines)] if lines else []
+    if estimate is not None and errors:
+        band = Line("±2σ", estimate.t_s, estimate.omega_std.max(axis=1)[:, None] * _BOTH_SIDES, ESTIMATE_BAND)
+        plots.append(Plot("error of the rate, rad/s", [band, *errors]))
+    return plots
+
+
+def motion_plots(estimate: MotionEstimate, known: KnownMotion | None) -> Iterator[Plot]:
+    """Yield angular acceleration, and horizontal and vertical specific force of the body origin."""
+    known_alpha, known_p = (None, None) if known is None else (known.alpha, known.p)
+    for title, symbol, values, truth, axes in (
+        ("angular acceleration α, rad/s²", "α", estimate.alpha, known_alpha, [0, 1, 2]),
+        ("specific force p, body x and y, m/s²", "p", estimate.p, known_p, [0, 1]),
+        ("p, body z, m/s²", "p", estimate.p, known_p, [2]),
+    ):
+        lines = [Line(f"{symbol} {_NAMES[axis]}", estimate.t_s, values[:, axis], AXES[axis], 1.0) for axis in axes]
+        if known is not None and truth is not None:
+            lines.append(Line(known.name, known.t, truth[:, axes], TRUTH))
+        yield Plot(title, lines)
+
+
+def angle_plot(recording: Recording, estimate: MotionEstimate | None, known: KnownMotion | None) -> Plot | None:
+    """Angle of the table; of a free body, the angle between the estimated attitude and the known one."""
+    if known is not None and known.angle is None:
+        if estimate is None:
+            return None
+        nearest = np.clip(np.searchsorted(known.t, estimate.t_s), 0, len(known.t) - 1)
+        complete = np.isfinite(estimate.quaternion).all(axis=1)
+        apart = to_rotation(known.quaternion[nearest][complete]).inv() * to_rotation(estimate.quaternion[complete])
+        return Plot(
+            "error of the attitude, rad",
+            [Line("error", estimate.t_s[complete], np.asarray(apart.magnitude()), ESTIMATE)],
+        )
+    lines = []
+    if known is not None and known.angle is not None:
+        lines.append(Line(known.name, known.t, known.angle, TACHO if known.omega is None else TRUTH, 2.5))
+    if estimate is not None:
+        angle = table_angle(estimate.t_s, estimate.omega, axis=table_axis(recording))
+        lines.append(Line("estimate", estimate.t_s, angle, ESTIMATE))
+    return Plot("angle of the table, rad", lines) if lines else None
+
+
+def drift_plot(drift: ExpectedDrift) -> Plot:
+    """Position error in the world within its expected ±2σ."""
+    band = Line("expected ±2σ", drift.t, drift.std[:, None] * _BOTH_SIDES, ESTIMATE_BAND, 1.5)
+    return Plot(
+        "position drift, m",
+        [band, *[Line(f"error {name}", drift.t, drift.error[:, axis], AXES[axis]) for axis, name in enumerate(_NAMES)]],
+    )
+
+
+def _rate_reference(
+    recording: Recording, known: KnownMotion | None, axis: int
+) -> tuple[str, NDArray[np.float64], NDArray[np.float64]] | None:
+    """Name, times and values of the best reference of one component of the rate: truth, then gyro."""
+    if known is not None and known.omega is not None:
+        return known.name, known.t, known.omega[:, axis]
+    gyro = recording.reference.get(f"gyro_{_NAMES[axis]}_rad_s")
+    return None if gyro is None else ("gyro", recording.t_s, gyro)
