@@ -21,7 +21,7 @@ from scipy.special import ellipj, ellipk
 from gfimu.errors import InputError
 from sim.motion import BodyState, SplineSpin
 
-__all__ = ["Chirp", "Hold", "Ramp", "Segment", "Sine", "Tumble", "paper_run", "spin_profile", "speed_sweep"]
+__all__ = ["Chirp", "Hold", "Ramp", "Segment", "Sine", "Tumble", "paper_run", "speed_sweep", "spin_profile"]
 
 _WINDOW_SHARE = 0.1  # share of an oscillation's duration in which its window opens, and again closes
 _POINTS_PER_PERIOD = 40  # nodes of the quintic spline of an oscillation, per shortest period

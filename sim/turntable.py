@@ -1,0 +1,278 @@
+"""The MuJoCo rig: a turntable (or a free body) with the sensor cube, prescribed or driven.
+
+The rig reads the same `World` as the analytic forward model (`sim.forward`) and computes the rigid-body part of the
+readings on its own: MuJoCo's tree, gravity and accelerometers instead of closed forms. Prescribed motion sets
+position, velocity and acceleration and asks `mj_inverse` for the sensors of exactly that state. Driven motion steps
+the motor and its friction; truth and sensors are logged together from the state before each step, because after it
+MuJoCo's sensors still belong to the old state, position and velocity to the new one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import PPoly
+from scipy.spatial.transform import Rotation
+
+from gfimu.array import AccelerometerArray
+from gfimu.errors import InputError
+from gfimu.model_files import find_model
+from sim.motion import BodyMotion, BodyState, SpinMotion, SpinState, SplineSpin
+from sim.world import Nod, World
+
+__all__ = ["DrivenRun", "drive", "free_model", "prescribed_readings", "turntable_model"]
+
+_NOD_JOINT = "nod"
+_SPIN_JOINT = "spin"
+_LONGEST_STEP = 1e-3  # physics step of a driven run, s
+
+
+@dataclass(frozen=True)
+class DrivenRun:
+    """What a motor-driven table did, logged at every physics step from the state before the step.
+
+    Parameters
+    ----------
+    t : ndarray, shape (n,)
+        Time, s.
+    state : SpinState
+        Angle, rate and angular acceleration at these times.
+    readings : ndarray, shape (n, c)
+        Specific force along each sensing axis at these times, m/s².
+    tacho : ndarray, shape (n,)
+        MuJoCo's rate sensor, rad/s.
+    torque : ndarray, shape (n,)
+        Motor torque after its limit, N·m.
+    """
+
+    t: NDArray[np.float64]
+    state: SpinState
+    readings: NDArray[np.float64]
+    tacho: NDArray[np.float64]
+    torque: NDArray[np.float64]
+
+    @property
+    def motion(self) -> SplineSpin:
+        """The run as a motion: angle, rate and acceleration pass through the logged ones."""
+        step = np.diff(self.t)
+        rate, gain = self.state.rate, step * self.state.acceleration[:-1]
+        # Rate within a step: ω + hα u + c₂u² + c₃u³ + c₄u⁴, u from 0 to 1; its end, end slope and integral are given.
+        conditions = np.array([[1, 1, 1], [2, 3, 4], [1 / 3, 1 / 4, 1 / 5]])
+        missing = np.stack(
+            [
+                np.diff(rate) - gain,
+                step * np.diff(self.state.acceleration),
+                np.diff(self.state.angle) / step - rate[:-1] - gain / 2,
+            ]
+        )  # (3, n - 1)
+        c2, c3, c4 = np.linalg.solve(conditions, missing)
+        coefficients = np.stack([c4 / step**4, c3 / step**3, c2 / step**2, gain / step, rate[:-1]])
+        return SplineSpin(
+            PPoly(coefficients, self.t), start=float(self.t[0]), angle_at_start=float(self.state.angle[0])
+        )
+
+
+def turntable_model(world: World) -> mujoco.MjModel:
+    """Compile the turntable of ``models/mjcf/turntable.xml`` for a world.
+
+    The world decides the chips, the cube's place and attitude on the table, the tilt of the axis and gravity. A
+    nodding axis gets a hinge of its own, and stretching arms a slide for each chip; prescribed motion moves both.
+    """
+    spec = mujoco.MjSpec.from_file(str(find_model("mjcf", "turntable", suffix=".xml")))
+    axis = spec.body("axis")
+    axis.quat = _quaternion(Rotation.from_rotvec(world.axis_rotvec))
+    if world.nod.amplitude:
+        direction = [np.cos(world.nod.direction), np.sin(world.nod.direction), 0.0]
+        axis.add_joint(name=_NOD_JOINT, type=mujoco.mjtJoint.mjJNT_HINGE, axis=direction)
+    mount = Rotation.from_rotvec(world.mount_rotvec)
+    arms = mount.inv().apply(world.cube_offset) + world.array.chip_positions  # from the axis, in cube axes
+    cube = spec.body("cube")
+    cube.pos, cube.quat = world.cube_offset, _quaternion(mount)
+    _fit_chips(spec, world.array, arms if world.stretch else None)
+    spec.option.gravity = [0.0, 0.0, -world.gravity]
+    return spec.compile()
+
+
+def free_model(world: World) -> mujoco.MjModel:
+    """Compile the free cube of ``models/mjcf/free_cube.xml`` with the chips and the gravity of a world."""
+    spec = mujoco.MjSpec.from_file(str(find_model("mjcf", "free_cube", suffix=".xml")))
+    spec.body("cube").pos = np.zeros(3)
+    _fit_chips(spec, world.array, None)
+    spec.option.gravity = [0.0, 0.0, -world.gravity]
+    return spec.compile()
+
+
+def prescribed_readings(world: World, motion: SpinMotion | BodyMotion, t: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Specific force along each sensing axis under prescribed motion, by MuJoCo's inverse dynamics.
+
+    Parameters
+    ----------
+    world : World
+        The world; its clock and chip delays decide at which times each chip is asked.
+    motion : SpinMotion or BodyMotion
+        Motion of the cube: spin of the table, or free motion of the body.
+    t : ndarray, shape (n,)
+        Time on the board's clock, s.
+
+    Returns
+    -------
+    ndarray, shape (n, c)
+        Readings of ideal sensors, m/s², before the sensing chain.
+    """
+    free = isinstance(motion.at(t[:1]), BodyState)
+    model = free_model(world) if free else turntable_model(world)
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT  # motion is given: friction can't change it
+    chip_times = world.chip_times(t)  # (n, k)
+    readings = np.empty((len(t), world.array.n_channels))
+    delays = np.zeros(len(world.array.chips)) if world.chip_delay is None else np.asarray(world.chip_delay)
+    for delay in np.unique(delays):
+        together = delays == delay
+        state = motion.at(chip_times[:, int(np.argmax(together))])
+        imposed = _free_state(state) if isinstance(state, BodyState) else _table_state(world, model, state)
+        channels = together[world.array.chip_of_channel]
+        readings[:, channels] = _inverse(model, *imposed)[:, channels]
+    return readings
+
+
+def drive(world: World, command: SpinMotion, duration: float, *, step: float = _LONGEST_STEP) -> DrivenRun:
+    """Drive the table with its motor after a commanded rate, against inertia and friction.
+
+    The motor's speed controller (proportional and integral, limited torque), dry and viscous friction and inertias
+    stand in ``turntable.xml``; a tilted axis and an eccentric cube load the motor with gravity. The nod of the axis
+    and the stretch of the arms move no mass here.
+
+    Parameters
+    ----------
+    world : World
+        The world.
+    command : SpinMotion
+        The command; its rate is what the controller is given, held over each step.
+    duration : float
+        Length of the run, s.
+    step : float
+        Physics step, s (fourth-order Runge-Kutta).
+
+    Raises
+    ------
+    InputError
+        If the step is not positive or longer than the duration.
+    """
+    if not 0 < step <= duration:
+        raise InputError(f"physics step {step} s: must be positive and at most the duration {duration} s")
+    model = turntable_model(world.changed(nod=Nod(), stretch=0.0))
+    model.opt.timestep = step
+    data = mujoco.MjData(model)
+    t = np.arange(int(np.floor(duration / step * (1 + 1e-12))) + 2) * step
+    wanted = command.at(t)
+    data.qpos[0], data.qvel[0] = wanted.angle[0], wanted.rate[0]
+    data.act[:] = wanted.angle[0]
+    accelerometers, tacho = _accelerometers(model), model.sensor("tachometer").adr[0]
+    log = np.empty((len(t), 4))
+    sensors = np.empty((len(t), model.nsensordata))
+    for row, rate in enumerate(wanted.rate):
+        data.ctrl[:] = rate
+        # After a Runge-Kutta step qacc is the last stage's, sensordata the first's: log both before the step.
+        mujoco.mj_forward(model, data)
+        log[row] = data.qpos[0], data.qvel[0], data.qacc[0], data.qfrc_actuator[0]
+        sensors[row] = data.sensordata
+        mujoco.mj_step(model, data)
+    return DrivenRun(
+        t, SpinState(log[:, 0], log[:, 1], log[:, 2]), sensors[:, accelerometers], sensors[:, tacho], log[:, 3]
+    )
+
+
+def _fit_chips(spec: mujoco.MjSpec, array: AccelerometerArray, arms: NDArray[np.float64] | None) -> None:
+    """Replace the chips drawn in the MJCF by those of the array; with ``arms`` (k, 3) each can slide along its own."""
+    cube = spec.body("cube")
+    for body in list(cube.bodies):
+        spec.delete(body)
+    looks = [spec.find_default("board"), spec.find_default("package")]
+    for place, chip in enumerate(array.chips):
+        body = cube.add_body(name=chip.name, pos=chip.position)
+        if arms is not None and np.any(arms[place]):
+            axis = arms[place] / np.linalg.norm(arms[place])
+            body.add_joint(name=f"stretch_{chip.name}", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
+        for look in looks:
+            body.add_geom(look)
+        for channel, sensing in zip(chip.channels, chip.axes, strict=True):
+            body.add_site(name=channel, quat=_quaternion(_with_x_along(sensing)))
+            spec.add_sensor(
+                name=channel,
+                type=mujoco.mjtSensor.mjSENS_ACCELEROMETER,
+                objtype=mujoco.mjtObj.mjOBJ_SITE,
+                objname=channel,
+            )
+
+
+def _with_x_along(axis: NDArray[np.float64]) -> Rotation:
+    """Rotation of a site whose x axis is the sensing axis."""
+    x = axis / np.linalg.norm(axis)
+    helper = np.eye(3)[np.argmin(np.abs(x))]
+    y = np.cross(helper, x)
+    y /= np.linalg.norm(y)
+    return Rotation.from_matrix(np.column_stack([x, y, np.cross(x, y)]))
+
+
+def _quaternion(rotation: Rotation) -> NDArray[np.float64]:
+    return np.asarray(rotation.as_quat(scalar_first=True))
+
+
+def _accelerometers(model: mujoco.MjModel) -> NDArray[np.intp]:
+    """Places of the accelerometers' x components in the sensor data, in channel order."""
+    return np.asarray(model.sensor_adr[model.sensor_type == mujoco.mjtSensor.mjSENS_ACCELEROMETER], dtype=np.intp)
+
+
+def _table_state(
+    world: World, model: mujoco.MjModel, spin: SpinState
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Positions, velocities and accelerations of the rig's joints, each (n, nv), for a spin of the table."""
+    position, velocity, acceleration = (np.zeros((len(spin.angle), model.nv)) for _ in range(3))
+    place = model.joint(_SPIN_JOINT).dofadr[0]
+    position[:, place], velocity[:, place], acceleration[:, place] = spin.angle, spin.rate, spin.acceleration
+    if world.nod.amplitude:
+        place = model.joint(_NOD_JOINT).dofadr[0]
+        cos, sin = np.cos(spin.angle + world.nod.phase), np.sin(spin.angle + world.nod.phase)
+        position[:, place] = world.nod.amplitude * cos
+        velocity[:, place] = -world.nod.amplitude * sin * spin.rate
+        acceleration[:, place] = -world.nod.amplitude * (cos * spin.rate**2 + sin * spin.acceleration)
+    if world.stretch:
+        # The arms follow the rate quasi-statically: their own velocity is left out, as in the forward model.
+        centre = Rotation.from_rotvec(world.mount_rotvec).inv().apply(world.cube_offset)
+        for chip in world.array.chips:
+            arm = float(np.linalg.norm(centre + chip.position))
+            if arm:
+                position[:, model.joint(f"stretch_{chip.name}").dofadr[0]] = arm * world.stretch * spin.rate**2
+    return position, velocity, acceleration
+
+
+def _free_state(body: BodyState) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Position (n, 7), velocity and acceleration (n, 6) of a free joint: linear in world, angular in body axes."""
+    quaternion = Rotation.from_matrix(body.rotation).as_quat(scalar_first=True)
+    return (
+        np.hstack([body.position, quaternion]),
+        np.hstack([body.velocity, body.omega]),
+        np.hstack([body.acceleration, body.alpha]),
+    )
+
+
+def _inverse(
+    model: mujoco.MjModel,
+    position: NDArray[np.float64],
+    velocity: NDArray[np.float64],
+    acceleration: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Return the readings (n, c) of the accelerometers in imposed states."""
+    data = mujoco.MjData(model)
+    qpos, qvel, qacc, sensors = data.qpos, data.qvel, data.qacc, data.sensordata  # views into the simulation
+    log = np.empty((len(position), model.nsensordata))
+    inverse = mujoco.mj_inverse
+    for row in range(len(position)):
+        qpos[:] = position[row]
+        qvel[:] = velocity[row]
+        qacc[:] = acceleration[row]
+        inverse(model, data)
+        log[row] = sensors
+    return log[:, _accelerometers(model)]
