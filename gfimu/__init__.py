@@ -34,14 +34,24 @@ __version__ = "0.1.0"
 _PUBLIC = {
     "AccelerometerArray": "gfimu.array",
     "Chip": "gfimu.array",
+    "ErrorSources": "gfimu.drift_forms",
+    "Estimate": "gfimu.estimation",
     "GfimuError": "gfimu.errors",
     "InputError": "gfimu.errors",
     "Recording": "gfimu.recording",
+    "centripetal_agreement": "gfimu.estimate_summary",
+    "drift_budget": "gfimu.drift",
+    "equivalent_rate_drift": "gfimu.drift",
+    "estimate": "gfimu.estimation",
     "integrate_attitude": "gfimu.attitude",
     "integrate_rate": "gfimu.rate.integration",
     "level": "gfimu.navigation",
+    "monte_carlo_drift": "gfimu.drift_monte_carlo",
     "navigate": "gfimu.navigation",
+    "open_recording": "gfimu.recording_formats",
+    "read_mimu4444": "gfimu.mimu4444",
     "specific_force": "gfimu.kinematics",
+    "summarise": "gfimu.estimate_summary",
 }
 
 __all__ = ["__version__"]

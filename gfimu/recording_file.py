@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from gfimu.array import AccelerometerArray
 from gfimu.column_file import ColumnFile, open_columns
 from gfimu.errors import InputError, UnitError
-from gfimu.model_files import find_model, read_toml
+from gfimu.part import Part
 from gfimu.units import READING_UNITS, REFERENCE_UNITS, STANDARD_GRAVITY
 
 __all__ = ["RecordingContent", "read_recording_file"]
@@ -166,7 +166,7 @@ def _lsb_size(table: ColumnFile, array: AccelerometerArray | None, channel: str)
         part = next(chip.part for chip in array.chips if channel in chip.channels)
     if part is None:
         return _DEFAULT_LSB
-    return float(read_toml(find_model("parts", str(part)))["lsb_m_s2"])
+    return Part.load(str(part)).lsb
 
 
 def _reference_columns(table: ColumnFile) -> list[_Column]:

@@ -1,0 +1,86 @@
+"""`gfimu estimate`: motion from a recording."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import numpy as np
+import typer
+
+from gfimu.cli.output import JsonOption, print_json, print_paths, print_table
+
+if TYPE_CHECKING:
+    from gfimu.estimate_summary import EstimateSummary
+
+__all__ = ["register"]
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command(name="estimate")(_estimate)
+
+
+def _estimate(
+    run: Annotated[Path, typer.Argument(help="Recording: .csv, .parquet, or a MIMU4444 stream (.bin, .bin.gz).")],
+    out: Annotated[Path, typer.Option("--out", help="Estimate file to write, .parquet or .csv.")],
+    array: Annotated[
+        str | None, typer.Option("--array", help="Array: a name or a TOML file; else the one the recording names.")
+    ] = None,
+    method: Annotated[str, typer.Option("--method", help="Method for the angular rate.")] = "integrate",
+    form: Annotated[
+        str, typer.Option("--form", help="How readings turn into p and α: auto, linear, joint or recursive.")
+    ] = "auto",
+    position: Annotated[bool, typer.Option("--position", help="Integrate to velocity and position too.")] = False,
+    rrd: Annotated[Path | None, typer.Option("--rrd", help="Rerun recording to write.")] = None,
+    json: JsonOption = False,
+) -> None:
+    """Estimate p, α, ω, attitude and table angle from a recording.
+
+    Example: gfimu estimate run.parquet --array cube12 --out estimate.parquet
+    """
+    from gfimu.estimate_summary import summarise
+    from gfimu.estimation import estimate
+    from gfimu.recording_formats import open_run
+
+    recording, geometry = open_run(run, array)
+    found = estimate(recording, geometry, method=method, form=form, with_position=position)
+    found.write(out)
+    written = {"estimate": out}
+    if rrd is not None:
+        from gfimu.visual import write_run
+
+        write_run(rrd, recording, geometry, estimate=found)
+        written["rrd"] = rrd
+    summary = summarise(found, recording, geometry)
+    if json:
+        print_json(summary.to_dict() | {"files": written})
+    else:
+        _print_summary(summary)
+        print_paths(written.items())
+
+
+def _print_summary(summary: EstimateSummary) -> None:
+    def by_axis(values: np.ndarray) -> str:
+        return "  ".join(f"{value:.4g}" for value in values)
+
+    rows: list[tuple[str, object, str]] = [
+        ("samples", summary.samples, ""),
+        ("sample rate", f"{summary.sample_rate_hz:.4g}", "Hz"),
+        ("duration", f"{summary.duration_s:.4g}", "s"),
+        ("gaps", summary.gaps, ""),
+        ("samples without estimate", summary.samples_without_estimate, ""),
+        ("p, rms x y z", by_axis(summary.p_rms_m_s2), "m/s²"),
+        ("α, rms x y z", by_axis(summary.alpha_rms_rad_s2), "rad/s²"),
+        ("ω, rms x y z", by_axis(summary.omega_rms_rad_s), "rad/s"),
+        ("σ of ω at the end, x y z", by_axis(summary.omega_std_rad_s), "rad/s"),
+        ("angle at the end", f"{summary.angle_rad:.5g}", "rad"),
+    ]
+    if summary.tacho_rmse_rad_s is not None:
+        rows.append(("ω against tacho, rmse", f"{summary.tacho_rmse_rad_s:.4g}", "rad/s"))
+    if summary.gyro_rmse_rad_s is not None:
+        rows.append(("ω against gyro, rmse", f"{summary.gyro_rmse_rad_s:.4g}", "rad/s"))
+    if summary.centripetal is not None:
+        rows.append(("centripetal terms against gyro, slope", f"{summary.centripetal.slope:.4f}", ""))
+        rows.append(("centripetal terms against gyro, correlation", f"{summary.centripetal.correlation:.4f}", ""))
+    print_table(f"{summary.array}, method {summary.method}, {summary.form} form", ("quantity", "value", "unit"), rows)

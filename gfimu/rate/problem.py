@@ -1,0 +1,58 @@
+"""What a method for the angular rate is given and what it returns."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gfimu.array import AccelerometerArray
+from gfimu.linear_solution import LinearSolution
+
+__all__ = ["RateMethod", "RateProblem", "RateSolution"]
+
+
+@dataclass(frozen=True)
+class RateProblem:
+    """Readings from which the angular rate is to be found.
+
+    Parameters
+    ----------
+    array : AccelerometerArray
+        The array, with c channels.
+    t_s : ndarray, shape (n,)
+        Sample times, s, strictly increasing.
+    readings : ndarray, shape (n, c)
+        Specific force along the channels, m/s²; NaN where one is missing.
+    noise_std : ndarray, shape (c,)
+        Standard deviation of one sample of each channel, m/s².
+    linear : LinearSolution
+        The part of α and p that is linear in the readings, and what ω adds to it.
+    omega0 : ndarray, shape (3,)
+        Angular rate at the first sample, body axes, rad/s.
+    """
+
+    array: AccelerometerArray
+    t_s: NDArray[np.float64]
+    readings: NDArray[np.float64]
+    noise_std: NDArray[np.float64]
+    linear: LinearSolution
+    omega0: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class RateSolution:
+    """Angular rate in body axes and its standard deviation, rad/s, each of shape (n, 3); NaN where not found."""
+
+    omega: NDArray[np.float64]
+    omega_std: NDArray[np.float64]
+
+
+class RateMethod(Protocol):
+    """A method for the angular rate."""
+
+    def __call__(self, problem: RateProblem) -> RateSolution:
+        """Find the angular rate at every sample."""
+        ...

@@ -1,0 +1,47 @@
+"""Opening a recording whatever wrote it: the project's CSV and Parquet, or a stream that has an importer."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from gfimu.array import AccelerometerArray
+from gfimu.column_file import open_columns
+from gfimu.errors import InputError
+from gfimu.mimu4444 import is_mimu4444, read_mimu4444
+from gfimu.recording import Recording
+
+__all__ = ["open_recording", "open_run"]
+
+
+def open_recording(path: str | Path, *, array: AccelerometerArray | None = None) -> Recording:
+    """Read a recording from a CSV or Parquet file, or a MIMU4444 stream (told apart by content).
+
+    Raises
+    ------
+    InputError
+        As `gfimu.Recording.read` and `gfimu.mimu4444.read_mimu4444`.
+    """
+    return read_mimu4444(path) if is_mimu4444(path) else Recording.read(path, array=array)
+
+
+def open_run(path: str | Path, array: str | Path | None = None) -> tuple[Recording, AccelerometerArray]:
+    """Read a recording together with its array.
+
+    Parameters
+    ----------
+    path : str or Path
+        The recording.
+    array : str or Path, optional
+        Name or file of the array; by default the one that the recording names.
+
+    Raises
+    ------
+    InputError
+        As `open_recording`; also if the array is unknown, or neither given nor named in the recording.
+    """
+    if array is None:
+        array = "mimu4444" if is_mimu4444(path) else open_columns(path).metadata.get("array")
+        if not isinstance(array, str):
+            raise InputError(f"{path}: the recording does not name its array; give it with --array")
+    geometry = AccelerometerArray.load(array)
+    return open_recording(path, array=geometry), geometry
