@@ -26,7 +26,7 @@ from gfimu.navigation import level, navigate
 from gfimu.part import white_noise_std
 from gfimu.rate.integration import integrate_rate
 from gfimu.rate.problem import RateMethod, RateProblem, RateSolution
-from gfimu.rate.recursion import integrate_rate_recursively
+from gfimu.rate.feedback import integrate_rate_recursively
 from gfimu.recording import Recording
 
 __all__ = ["METHODS", "Estimate", "estimate"]
