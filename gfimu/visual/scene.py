@@ -275,12 +275,12 @@ def _log_arrows(stream: rr.RecordingStream, entity: str, arrows: SensingArrows) 
     t = arrows.t[keep]
     lengths = np.nan_to_num(arrows.readings[keep]) * arrows.length_per_m_s2  # (n, c)
     vectors = lengths[:, :, None] * array.axes  # (n, c, 3)
-    colours = [arrows.colour or chip_colour(int(chip)) for chip in array.chip_of_channel]
+    chips = [chip_colour(int(chip)) for chip in array.chip_of_channel]
     axes = np.stack([array.positions - _AXIS_LENGTH * array.axes, array.positions + _AXIS_LENGTH * array.axes], axis=1)
-    stream.log(f"{entity}/lines", rr.LineStrips3D(axes, colors=colours, radii=[0.0005]), static=True)
+    stream.log(f"{entity}/lines", rr.LineStrips3D(axes, colors=chips, radii=[0.0005]), static=True)
     still = rr.Arrows3D.from_fields(
         origins=array.positions,
-        colors=colours,
+        colors=chips if arrows.colour is None else [arrows.colour],
         radii=[0.0022],
         labels=list(array.channels),
         show_labels=False,

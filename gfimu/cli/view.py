@@ -1,0 +1,43 @@
+"""`gfimu view`: a rerun recording, or a recording of readings, in the viewer."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from gfimu.cli.output import print_paths
+
+__all__ = ["register"]
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command(name="view")(_view)
+
+
+def _view(
+    file: Annotated[Path, typer.Argument(help="A .rrd file, or a recording (.csv, .parquet, .bin) to make one from.")],
+    array: Annotated[
+        str | None, typer.Option("--array", help="Array of a recording: a name or a TOML file; else the one it names.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option("--out", help="Write the .rrd here and don't open it.")] = None,
+) -> None:
+    """Open a run in the rerun viewer: the rig in 3-D, raw channels, and the estimate over time.
+
+    A recording of readings is estimated first; its picture goes beside it as FILE.view.rrd.
+
+    Example: gfimu view run.parquet
+    """
+    from gfimu.visual.picture import picture_of, picture_path
+    from gfimu.visual.viewer import open_viewer
+
+    if file.suffix == ".rrd" and out is None:
+        open_viewer(file)
+        return
+    picture = out or picture_path(file)
+    picture_of(file, picture, array=array)
+    print_paths([("rerun recording", picture)])
+    if out is None:
+        open_viewer(picture)

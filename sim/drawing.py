@@ -1,0 +1,76 @@
+"""Shapes of the MuJoCo rig for pictures: boxes, cylinders and meshes of each group of bodies."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from gfimu.visual.scene import Box, Cylinder, Mesh, Shape
+from sim.turntable import turntable_model
+from sim.world import World
+
+__all__ = ["rig_drawing"]
+
+_MOVING = ("cube", "table")  # a body belongs to the first of these among its ancestors, to the base otherwise
+
+
+def rig_drawing(world: World) -> Mapping[str, Sequence[Shape]]:
+    """Shapes of base, table and cube of the turntable for a world, each in the frame it moves with.
+
+    Returns
+    -------
+    mapping
+        ``base`` in the world frame, ``table`` in the table frame, ``cube`` in the cube frame with its chips.
+    """
+    model = turntable_model(world)
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    shapes: dict[str, list[Shape]] = {"base": [], "table": [], "cube": []}
+    for geom in range(model.ngeom):
+        group = _group(model, int(model.geom_bodyid[geom]))
+        position, rotation = data.geom_xpos[geom], Rotation.from_matrix(data.geom_xmat[geom].reshape(3, 3))
+        if group != "base":
+            body = model.body(group).id
+            frame = Rotation.from_quat(data.xquat[body], scalar_first=True).inv()
+            position, rotation = frame.apply(position - data.xpos[body]), frame * rotation
+        shape = _shape(model, geom, position, rotation)
+        if shape is not None:
+            shapes[group].append(shape)
+    return shapes
+
+
+def _group(model: mujoco.MjModel, body: int) -> str:
+    while body:
+        name = model.body(body).name
+        if name in _MOVING:
+            return str(name)
+        body = int(model.body_parentid[body])
+    return "base"
+
+
+def _shape(model: mujoco.MjModel, geom: int, position: NDArray[np.float64], rotation: Rotation) -> Shape | None:
+    """One geom as a shape; kinds a machined rig does not have are left out."""
+    place = (position.tolist(), rotation.as_quat(scalar_first=True).tolist(), _colour(model, geom))
+    size = model.geom_size[geom]
+    match model.geom_type[geom]:
+        case mujoco.mjtGeom.mjGEOM_BOX:
+            return Box(size.tolist(), *place)
+        case mujoco.mjtGeom.mjGEOM_CYLINDER:
+            return Cylinder(float(size[0]), 2 * float(size[1]), *place)
+        case mujoco.mjtGeom.mjGEOM_MESH:
+            mesh = int(model.geom_dataid[geom])
+            vertices = model.mesh_vert[model.mesh_vertadr[mesh] :][: model.mesh_vertnum[mesh]]
+            triangles = model.mesh_face[model.mesh_faceadr[mesh] :][: model.mesh_facenum[mesh]]
+            return Mesh(rotation.apply(vertices) + position, triangles.copy(), place[2])
+    return None
+
+
+def _colour(model: mujoco.MjModel, geom: int) -> tuple[int, int, int, int]:
+    material = int(model.geom_matid[geom])
+    rgba = model.geom_rgba[geom] if material < 0 else model.mat_rgba[material]
+    red, green, blue, opacity = (int(round(255 * float(part))) for part in rgba)
+    return red, green, blue, opacity

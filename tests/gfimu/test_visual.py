@@ -1,0 +1,241 @@
+"""Rerun recordings: what the file holds is what went in, the viewer's own check passes, nothing is half-written."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from rerun.chunk import RrdReader
+from scipy.spatial.transform import Rotation
+
+from gfimu import AccelerometerArray, InputError, Recording, specific_force
+from gfimu.visual import Box, Cylinder, ExpectedDrift, KnownMotion, Line, Mesh, Plot, write_comparison, write_run
+from gfimu.visual.plots import _broken_at_gaps, _emptiest_corner
+from gfimu.visual.scene import _cylinder_mesh
+from gfimu.visual.viewer import open_viewer
+
+
+@dataclass(frozen=True)
+class Motion:
+    t_s: np.ndarray
+    p: np.ndarray
+    alpha: np.ndarray
+    omega: np.ndarray
+    omega_std: np.ndarray
+    quaternion: np.ndarray
+
+
+@dataclass(frozen=True)
+class Run:
+    array: AccelerometerArray
+    recording: Recording
+    estimate: Motion
+    known: KnownMotion
+    drift: ExpectedDrift
+
+
+@pytest.fixture(scope="module")
+def run() -> Run:
+    array = AccelerometerArray.load("cube12")
+    t = np.arange(300) * 0.01
+    rate, acceleration = 2.0 * t, np.full_like(t, 2.0)
+    angle = t**2
+    zero = np.zeros_like(t)
+    up = np.array([0.0, 0.0, 1.0])
+    p, alpha, omega = 9.80665 * up + zero[:, None], acceleration[:, None] * up, rate[:, None] * up
+    readings = specific_force(array, p, alpha, omega)
+    attitude = Rotation.from_rotvec(angle[:, None] * up).as_quat(scalar_first=True)
+    late = Rotation.from_rotvec((angle - 0.1)[:, None] * up).as_quat(scalar_first=True)
+    recording = Recording.from_arrays(
+        t, readings, array, reference={"tacho_rad_s": rate, "command_rad_s": rate + 0.1}, metadata={"scenario": "spin"}
+    )
+    return Run(
+        array,
+        recording,
+        Motion(t, p, alpha, omega + 0.01, np.full((len(t), 3), 0.02), late),
+        KnownMotion("truth", t, attitude, np.array([0.0, 0.0, 0.06]), omega, alpha, p, angle),
+        ExpectedDrift(t, np.zeros((len(t), 3)), t**2),
+    )
+
+
+def contents(path) -> dict[str, dict[str, np.ndarray]]:
+    """Columns of every entity of a rerun recording, by the short name of the component."""
+    found: dict[str, dict[str, np.ndarray]] = {}
+    for chunk in RrdReader(str(path)).stream().to_chunks():
+        batch = chunk.to_record_batch()
+        columns = found.setdefault(chunk.entity_path, {})
+        for name, column in zip(batch.schema.names, batch.columns, strict=True):
+            columns[name.split(":")[-1]] = np.array(column.to_pylist(), dtype=object)
+    return found
+
+
+def verify(path) -> None:
+    command = [sys.executable, "-m", "rerun", "rrd", "verify", str(path)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def numbers(column: np.ndarray) -> np.ndarray:
+    return np.array(column.tolist(), dtype=float).squeeze()
+
+
+def test_a_run_holds_what_went_in(tmp_path, run):
+    path = tmp_path / "run.rrd"
+    write_run(path, run.recording, run.array, estimate=run.estimate, known=run.known, drift=run.drift)
+    verify(path)
+    found = contents(path)
+    rate = next(name for name in found if name.endswith("estimate") and "angular_rate" in name)
+    assert_allclose(numbers(found[rate]["scalars"]), run.estimate.omega[:, 2])
+    band = next(name for name in found if "angular_rate" in name and name.endswith("2σ"))
+    edges = numbers(found[band]["scalars"])
+    assert_allclose(edges, run.estimate.omega[:, 2:] + 0.04 * np.array([-1.0, 1.0]))
+    error = next(name for name in found if name.endswith("estimate_truth"))
+    assert_allclose(numbers(found[error]["scalars"]), 0.01, atol=1e-12)
+    for channel in run.array.channels:
+        entity = next(name for name in found if name.startswith("/plots/raw") and name.endswith(f"_{channel}"))
+        assert_allclose(numbers(found[entity]["scalars"]), run.recording.readings[:, run.array.index(channel)])
+
+
+def test_truth_turns_the_rig_and_the_estimate_its_ghost(tmp_path, run):
+    path = tmp_path / "run.rrd"
+    write_run(path, run.recording, run.array, estimate=run.estimate, known=run.known)
+    found = contents(path)
+    for body, quaternion in (
+        ("cube", run.known.quaternion),
+        ("table", run.known.quaternion),
+        ("estimate", run.estimate.quaternion),
+    ):
+        shown = numbers(found[f"/scene/{body}"]["quaternion"])[:, [3, 0, 1, 2]]
+        assert_allclose(shown, quaternion, atol=1e-6)
+
+
+def test_arrows_start_at_the_chips_and_are_as_long_as_the_reading(tmp_path, run):
+    path = tmp_path / "run.rrd"
+    write_run(path, run.recording, run.array)
+    arrows = contents(path)["/scene/cube/sensing_axes_0"]
+    assert_allclose(numbers(arrows["origins"]), run.array.positions, atol=1e-7)
+    vectors = numbers(arrows["vectors"])  # (n, c, 3)
+    one_g = vectors[:, run.array.index("a13")] @ np.array([0.0, 0.0, 1.0])
+    assert_allclose(one_g, 0.06, rtol=1e-6)
+    lengths = np.einsum("nck,ck->nc", vectors, run.array.axes) * 9.80665 / 0.06
+    assert_allclose(lengths, run.recording.readings, atol=1e-5)
+
+
+def test_without_truth_the_tachometer_turns_the_table(run):
+    known = KnownMotion.from_reference(run.recording)
+    assert known is not None
+    assert_allclose(known.angle, run.known.angle, atol=1e-9)
+    assert_allclose(known.quaternion, run.known.quaternion, atol=1e-9)
+
+
+def test_without_any_reference_nothing_is_known(run):
+    bare = Recording.from_arrays(run.recording.t_s, run.recording.readings, run.array)
+    assert KnownMotion.from_reference(bare) is None
+
+
+def test_a_free_body_has_no_table(tmp_path, run):
+    path = tmp_path / "free.rrd"
+    free = Recording.from_arrays(
+        run.recording.t_s,
+        run.recording.readings,
+        run.array,
+        reference={f"gyro_{axis}_rad_s": run.known.omega[:, i] for i, axis in enumerate("xyz")},
+    )
+    write_run(path, free, run.array, estimate=run.estimate)
+    verify(path)
+    found = contents(path)
+    assert "/scene/table" not in found
+    assert "/scene/cube" in found
+    error = next(name for name in found if name.endswith("z_estimate_gyro"))
+    assert_allclose(numbers(found[error]["scalars"]), 0.01, atol=1e-12)
+
+
+def test_lost_samples_break_the_line_and_leave_out_the_pose(tmp_path, run):
+    t = np.delete(run.recording.t_s, slice(100, 150))
+    broken_t, broken = _broken_at_gaps(t, np.ones((len(t), 1)))
+    assert len(broken_t) == len(t) + 1
+    assert np.flatnonzero(np.isnan(broken[:, 0])).tolist() == [100]
+    assert np.all(np.diff(broken_t) > 0)
+    path = tmp_path / "lost.rrd"
+    estimate = Motion(**(vars(run.estimate) | {"quaternion": run.estimate.quaternion.copy()}))
+    estimate.quaternion[40:60] = np.nan
+    write_run(path, run.recording, run.array, estimate=estimate, known=run.known)
+    verify(path)
+    assert len(contents(path)["/scene/estimate"]["quaternion"]) == len(run.recording) - 20
+
+
+def test_a_comparison_holds_residuals_before_and_after(tmp_path, run):
+    path = tmp_path / "comparison.rrd"
+    before, after = run.recording.readings - 0.2, run.recording.readings - 0.01
+    extra = Plot("rate, rad/s", [Line("rate", run.recording.t_s, run.recording.reference["tacho_rad_s"], (1, 2, 3))])
+    write_comparison(path, run.recording, run.array, before, after, plots=[extra], notes="# Table tilt")
+    verify(path)
+    found = contents(path)
+    assert_allclose(numbers(found["/plots/residual_a21/00_before"]["scalars"]), 0.2)
+    assert_allclose(numbers(found["/plots/residual_a21/01_after"]["scalars"]), 0.01)
+    assert_allclose(
+        numbers(found["/plots/a21/00_measured"]["scalars"]), run.recording.readings[:, run.array.index("a21")]
+    )
+    assert "/plots/rate_rad_s/00_rate" in found
+    assert "# Table tilt" in str(found["/notes"])
+
+
+def test_a_prediction_of_another_shape_is_refused(tmp_path, run):
+    with pytest.raises(InputError, match=r"prediction 'after' has shape \(300, 3\)"):
+        write_comparison(
+            tmp_path / "x.rrd", run.recording, run.array, run.recording.readings, run.recording.readings[:, :3]
+        )
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_another_ending_is_refused_and_nothing_is_left(tmp_path, run):
+    with pytest.raises(InputError, match=r"ends in \.rrd"):
+        write_run(tmp_path / "run.html", run.recording, run.array)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_given_shapes_replace_the_plain_rig(tmp_path, run):
+    path = tmp_path / "shapes.rrd"
+    triangle = Mesh(np.eye(3), np.array([[0, 1, 2]]), (9, 9, 9))
+    shapes = {"base": [], "table": [Cylinder(0.2, 0.01)], "cube": [Box((0.05, 0.05, 0.05)), triangle]}
+    write_run(path, run.recording, run.array, shapes=shapes)
+    found = contents(path)
+    assert numbers(found["/scene/cube/shape_1"]["vertex_positions"]).tolist() == np.eye(3).tolist()
+    assert not [name for name in found if name.startswith("/scene/base/")]
+    assert len([name for name in found if name.startswith("/scene/table/shape")]) == 1
+
+
+def test_a_cylinder_is_closed_and_has_its_volume():
+    shape = Cylinder(
+        0.3, 0.5, centre=(1.0, 2.0, 3.0), quaternion=Rotation.from_euler("y", 0.7).as_quat(scalar_first=True)
+    )
+    vertices, triangles = _cylinder_mesh(shape)
+    corners = vertices[triangles]  # (f, 3, 3)
+    volume = np.einsum("fi,fi->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6  # divergence theorem
+    inscribed = 96 / (2 * np.pi) * np.sin(2 * np.pi / 96)  # 96 sides against the circle
+    assert_allclose(volume, np.pi * 0.3**2 * 0.5 * inscribed, rtol=1e-9)
+    assert_allclose(np.concatenate([vertices.min(axis=0), vertices.max(axis=0)]).reshape(2, 3).mean(axis=0), [1, 2, 3])
+
+
+def test_the_legend_stands_where_the_data_are_not():
+    t = np.linspace(0.0, 1.0, 200)
+    rising = Line("rising", t, t, (0, 0, 0))
+    assert _emptiest_corner([rising]).name in {"LeftTop", "RightBottom"}
+    assert _emptiest_corner([Line("flat", t, np.where(t < 0.5, 1.0, 0.0), (0, 0, 0))]).name in {
+        "RightTop",
+        "LeftBottom",
+    }
+    assert _emptiest_corner([Line("nothing", t, np.full_like(t, np.nan), (0, 0, 0))]).name == "RightTop"
+
+
+def test_the_viewer_refuses_what_is_not_a_rerun_recording(tmp_path):
+    junk = tmp_path / "junk.rrd"
+    junk.write_bytes(b"\x00\x01\x02 junk")
+    with pytest.raises(InputError, match="not a rerun recording"):
+        open_viewer(junk)
+    with pytest.raises(InputError, match="No such file"):
+        open_viewer(tmp_path / "missing.rrd")
