@@ -72,5 +72,5 @@ def _shape(model: mujoco.MjModel, geom: int, position: NDArray[np.float64], rota
 def _colour(model: mujoco.MjModel, geom: int) -> tuple[int, int, int, int]:
     material = int(model.geom_matid[geom])
     rgba = model.geom_rgba[geom] if material < 0 else model.mat_rgba[material]
-    red, green, blue, opacity = (int(round(255 * float(part))) for part in rgba)
+    red, green, blue, opacity = (round(255 * float(part)) for part in rgba)
     return red, green, blue, opacity
