@@ -198,7 +198,7 @@ class _CsvColumns:
             raise self._binary() from None
         if not header:
             raise InputError(f"{file}: no header line; the first line must name the columns, such as t_s,a11_m_s2")
-        self.names = [name.strip() for name in next(csv.reader([header.strip()]))]
+        self.names = [name.strip() for name in next(csv.reader([header.strip()], skipinitialspace=True))]
         if len(self.names) == 1 and any(mark in header for mark in ";\t"):
             raise InputError(f"{file}: columns are not separated by commas; write it with commas")
         self.max_rows = _count_lines(file) - self._header_lines

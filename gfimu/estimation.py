@@ -24,9 +24,9 @@ from gfimu.errors import InputError, unknown_name
 from gfimu.linear_solution import linear_solution
 from gfimu.navigation import level, navigate
 from gfimu.part import white_noise_std
+from gfimu.rate.feedback import integrate_rate_recursively
 from gfimu.rate.integration import integrate_rate
 from gfimu.rate.problem import RateMethod, RateProblem, RateSolution
-from gfimu.rate.feedback import integrate_rate_recursively
 from gfimu.recording import Recording
 
 __all__ = ["METHODS", "Estimate", "estimate"]

@@ -1,0 +1,130 @@
+"""The house rules that no type checker sees: who may import whom, no circles, every module says what it is."""
+
+import ast
+import graphlib
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+import gfimu
+
+ROOT = Path(__file__).resolve().parents[1]
+PACKAGES = ("gfimu", "sim", "firmware_bridge")
+FILES = {
+    ".".join(file.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): file
+    for package in PACKAGES
+    for file in sorted((ROOT / package).rglob("*.py"))
+}
+
+
+def is_type_checking(node: ast.AST) -> bool:
+    return isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test)
+
+
+def imported_names(node: ast.AST):
+    """Dotted names that the code below a node imports, inside functions too, but not for type checkers only."""
+    for child in ast.iter_child_nodes(node):
+        if isinstance(child, ast.Import):
+            yield from (alias.name for alias in child.names)
+        elif isinstance(child, ast.ImportFrom):
+            assert child.level == 0, "relative import: write the full name"
+            yield from (f"{child.module}.{alias.name}" for alias in child.names)
+        elif is_type_checking(child):
+            yield from imported_names(ast.Module(child.orelse, []))
+        else:
+            yield from imported_names(child)
+
+
+def modules_imported(source: str) -> set[str]:
+    """Modules that a source imports; names inside a project module count as that module."""
+    found = set()
+    for name in imported_names(ast.parse(source)):
+        module = name
+        while module not in FILES and "." in module and module.split(".")[0] in PACKAGES:
+            module = module.rpartition(".")[0]
+        found.add(module)
+    return found
+
+
+IMPORTS = {module: modules_imported(file.read_text(encoding="utf-8")) for module, file in FILES.items()}
+
+
+def inside(module: str, *packages: str) -> bool:
+    return any(module == package or module.startswith(f"{package}.") for package in packages)
+
+
+def offences(importers, forbidden) -> list[str]:
+    return [
+        f"{module} imports {name}"
+        for module, names in IMPORTS.items()
+        if importers(module)
+        for name in sorted(names)
+        if forbidden(name)
+    ]
+
+
+def test_gfimu_imports_neither_the_world_nor_the_wire_except_its_command_line():
+    assert not offences(
+        lambda module: inside(module, "gfimu") and not inside(module, "gfimu.cli"),
+        lambda name: inside(name, "sim", "firmware_bridge", "gfimu.cli", "mujoco", "serial", "unicorn"),
+    )
+
+
+def test_sim_imports_neither_the_wire_nor_the_command_line():
+    assert not offences(
+        lambda module: inside(module, "sim"), lambda name: inside(name, "firmware_bridge", "gfimu.cli", "serial")
+    )
+
+
+def test_firmware_bridge_imports_recordings_and_the_chip_only():
+    assert not offences(
+        lambda module: inside(module, "firmware_bridge"),
+        lambda name: (
+            (inside(name, "sim") and not inside(name, "sim.adxl345"))
+            or inside(name, "gfimu.cli", "gfimu.diagnosis", "gfimu.calibration", "gfimu.visual", "mujoco")
+        ),
+    )
+
+
+def test_no_circular_imports():
+    graph = {module: {name for name in names if name in FILES} for module, names in IMPORTS.items()}
+    try:
+        graphlib.TopologicalSorter(graph).prepare()
+    except graphlib.CycleError as error:
+        pytest.fail("circular import: " + " → ".join(error.args[1]))
+
+
+def test_the_reader_of_imports_sees_every_form():
+    source = """
+import sim.world
+from typing import TYPE_CHECKING
+if TYPE_CHECKING:
+    import serial
+else:
+    import json
+def f():
+    from gfimu.array import Chip
+    from gfimu import recording
+"""
+    assert modules_imported(source) == {"sim.world", "typing.TYPE_CHECKING", "json", "gfimu.array", "gfimu.recording"}
+
+
+@pytest.mark.parametrize("module", FILES)
+def test_every_module_says_what_it_is(module):
+    assert ast.get_docstring(ast.parse(FILES[module].read_text(encoding="utf-8")))
+
+
+@pytest.mark.parametrize("name", gfimu.__all__)
+def test_public_names_can_be_imported(name):
+    assert getattr(gfimu, name) is not None
+
+
+def test_unknown_public_name():
+    with pytest.raises(AttributeError, match="no attribute 'nonsense'"):
+        gfimu.nonsense  # noqa: B018
+
+
+def test_test_files_have_names_of_their_own():
+    names = Counter(file.name for file in (ROOT / "tests").rglob("test_*.py"))
+    assert [name for name, count in names.items() if count > 1] == []
