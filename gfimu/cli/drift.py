@@ -127,14 +127,18 @@ def _remarks(budget: DriftBudget, sample: DriftSample | None) -> list[str]:
     if budget.valid:
         until = f"{budget.valid_until:.3g} s" if math.isfinite(budget.valid_until) else "far later"
         lines = [
-            f"The closed forms hold: attitude error {budget.attitude_error:.2g} rad (1 σ); "
-            f"the limit of {TILT_LIMIT} rad comes after {until}."
+            (
+                f"The closed forms hold: attitude error {budget.attitude_error:.2g} rad (1 σ); "
+                f"the limit of {TILT_LIMIT} rad comes after {until}."
+            )
         ]
     else:
         lines = [
-            f"[yellow]The closed forms hold for {budget.valid_until:.3g} s only[/yellow], where the attitude error "
-            f"reaches {TILT_LIMIT} rad (1 σ). The figures above extrapolate them; the true error can't exceed about "
-            f"g t² = {_length(STANDARD_GRAVITY * budget.time**2)}. Calibrate the biases, or see --monte-carlo."
+            (
+                f"[yellow]The closed forms hold for {budget.valid_until:.3g} s only[/yellow], where the attitude error "
+                f"reaches {TILT_LIMIT} rad (1 σ). The figures above extrapolate them; the true error is below "
+                f"g t² = {_length(STANDARD_GRAVITY * budget.time**2)}. Calibrate the biases, or see --monte-carlo."
+            )
         ]
     lines.append(
         f"At rest a bias acts more through alpha and gravity than through p after {budget.alpha_overtakes:.3g} s."

@@ -1,0 +1,77 @@
+"""The drift command: table, JSON, validity, Monte Carlo, bad input."""
+
+import json
+
+import numpy as np
+import pytest
+
+MG = 9.80665e-3
+
+
+def test_table_states_terms_total_and_limit(gfimu_command):
+    result = gfimu_command("drift", "--array", "cube12", "--time", 0.3, "--bias-mg", 35, "--monte-carlo", 50)
+    assert result.code == 0
+    for words in ("bias of p", "bias of alpha", "total", "Monte Carlo / total", "The closed forms hold", "11.1 mm"):
+        assert words in result.stdout
+
+
+def test_table_warns_beyond_the_limit(gfimu_command):
+    result = gfimu_command("drift", "--array", "cube12", "--time", 30, "--bias-mg", 35)
+    assert result.code == 0
+    assert "hold for 0.454 s only" in result.stdout
+
+
+def test_json_is_the_budget_of_the_library(gfimu_command):
+    result = gfimu_command(
+        "drift", "--time", 0.4, "--bias-mg", 35, "--noise-ug", 290, "--rate", 6.28, "--monte-carlo", 200, "--seed", 3,
+        "--json",
+    )  # fmt: skip
+    data = json.loads(result.stdout)
+    assert result.code == 0
+    h = 0.05
+    np.testing.assert_allclose(data["sources"]["bias_m_s2"], 35 * MG)
+    sizes = {term["name"]: term["size"] for term in data["terms"]}
+    assert sizes["bias of p"] == pytest.approx(35 * MG / 2)
+    assert sizes["bias of alpha"] == pytest.approx(35 * MG / (np.sqrt(8) * h))
+    assert data["valid"] is True
+    ratio = np.array(data["monte_carlo"]["std_m"]) / data["total_std_m"]
+    np.testing.assert_allclose(ratio, 1.0, atol=4 * data["monte_carlo"]["relative_sampling_error"])
+
+
+def test_infinite_limit_is_null_in_json(gfimu_command):
+    result = gfimu_command("drift", "--time", 1, "--rate-drift-deg-h", 1e-6, "--json")
+    assert json.loads(result.stdout)["valid_until_s"] is None
+
+
+def test_array_from_a_file(gfimu_command, tmp_path):
+    file = tmp_path / "mine.toml"
+    chips = [([1, 1, 1], "a1"), ([1, -1, -1], "a2"), ([-1, 1, -1], "a3"), ([-1, -1, 1], "a4")]
+    file.write_text(
+        'name = "mine"\n'
+        + "\n".join(
+            f'[[chip]]\nname = "{name}"\nposition_m = {[0.1 * x for x in place]}\naxes = [[1,0,0],[0,1,0],[0,0,1]]'
+            for place, name in chips
+        )
+    )
+    data = json.loads(gfimu_command("drift", "--array", file, "--time", 1, "--bias-mg", 1, "--json").stdout)
+    assert data["array"] == "mine"
+    assert {t["name"]: t["size"] for t in data["terms"]}["bias of alpha"] == pytest.approx(MG / (np.sqrt(8) * 0.1))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ((), "--bias-mg"),
+        (("--bias-mg", "-1"), "zero or above"),
+        (("--bias-mg", "1", "--time", "0"), "above zero"),
+        (("--bias-mg", "1", "--array", "nowhere"), "cube12"),
+        (("--bias-mg", "1", "--monte-carlo", "1"), "2 or more"),
+        (("--bias-mg", "1", "--rate", "nan"), "finite"),
+    ],
+)
+def test_bad_input_is_one_line_and_code_2(gfimu_command, arguments, words):
+    result = gfimu_command("drift", *arguments)
+    assert result.code == 2
+    assert words in result.stderr
+    assert "Traceback" not in result.stderr
+    assert result.stderr.count("\n") == 1
