@@ -361,8 +361,11 @@ def _valid_until(
     while horizon <= _LONGEST_SEARCH * time and abs(rate) * horizon < max(_MOST_RADIANS, abs(rate) * time + 1.0):
         growth = attitude_growth(alpha_covariance, sources, horizon, rate, off_axis=off_axis)
         beyond = np.flatnonzero(growth.deciding >= TILT_LIMIT)
-        if len(beyond):
-            pair = slice(max(int(beyond[0]) - 1, 0), int(beyond[0]) + 1)
+        if len(beyond) == 0:
+            horizon *= 4.0
+        elif beyond[0] < len(growth.t_s) // 2:
+            horizon = float(growth.t_s[max(beyond[0], 1)])  # look closer
+        else:
+            pair = slice(int(beyond[0]) - 1, int(beyond[0]) + 1)
             return float(np.interp(TILT_LIMIT, growth.deciding[pair], growth.t_s[pair]))
-        horizon *= 4.0
     return math.inf
