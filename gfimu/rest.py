@@ -165,7 +165,7 @@ def detect_rest(
     """
     if not (window_s > 0.0 and min_duration_s > 0.0 and (threshold is None or threshold > 0.0)):
         raise InputError("window, shortest rest and threshold must be positive")
-    window = max(int(round(window_s * recording.sample_rate)) | 1, 11)
+    window = max(round(window_s * recording.sample_rate) | 1, 11)
     if len(recording) <= window:
         raise InputError(
             f"the recording has {len(recording)} samples, the rest window {window}; record longer or shorten the window"
@@ -178,7 +178,7 @@ def detect_rest(
         still &= ~(np.abs(_window_mean(recording.reference["tacho_rad_s"], window)) > _STANDING_RATE)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(np.int8)))
     start, stop = edges[::2], edges[1::2]
-    long = stop - start >= max(int(round(min_duration_s * recording.sample_rate)), 2)
+    long = stop - start >= max(round(min_duration_s * recording.sample_rate), 2)
     return Rest(start[long], stop[long], float(limit), threshold is None, window, recording.unit)
 
 

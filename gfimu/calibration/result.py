@@ -362,7 +362,7 @@ def combine(calibrations: Sequence[Calibration]) -> Calibration:
         covariance=covariance,
         null_space=null_space,
         statements=_merged(item.statements for item in calibrations),
-        warnings=_merged(item.warnings for item in calibrations),
+        warnings=_merged(tuple(f"{item.chips[0]}: {text}" for text in item.warnings) for item in calibrations),
         statistics=statistics,
     )
 

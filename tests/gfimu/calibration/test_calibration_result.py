@@ -1,0 +1,141 @@
+"""The result class: file round trip, units, apply and invert."""
+
+import json
+
+import numpy as np
+import pytest
+
+from gfimu.array import AccelerometerArray
+from gfimu.calibration.result import Calibration, combine, load_calibration, parameter_names
+from gfimu.errors import InputError, UnitError
+from gfimu.recording import Recording
+
+
+@pytest.fixture
+def calibration(mti):
+    rng = np.random.default_rng(5)
+    root = rng.normal(size=(12, 12))
+    return Calibration(
+        "six-position",
+        "lsb",
+        ("a11", "a12", "a13"),
+        "poses",
+        9.81,
+        parameter_names("a1", "poses"),
+        mti.parameters("poses"),
+        root @ root.T,
+        statements=("a statement",),
+        warnings=("a warning",),
+        statistics={"poses": 6.0, "input": "averaged"},
+    )
+
+
+@pytest.fixture
+def recording():
+    rng = np.random.default_rng(6)
+    return Recording(np.arange(5) / 100, 33000 + rng.normal(0, 4000, (5, 3)), ("a11", "a12", "a13"), unit="lsb")
+
+
+def test_file_round_trip(calibration, tmp_path):
+    calibration.save(tmp_path / "cal.json")
+    again = load_calibration(tmp_path / "cal.json")
+    np.testing.assert_array_equal(again.values, calibration.values)
+    np.testing.assert_array_equal(again.covariance, calibration.covariance)
+    for name in ("method", "unit", "channels", "gauge", "gravity", "names", "statements", "warnings", "statistics"):
+        assert getattr(again, name) == getattr(calibration, name)
+    content = json.loads((tmp_path / "cal.json").read_text())
+    assert content["format_version"] == 1
+    assert content["parameters"][0] == {
+        "name": "a1_M_xx",
+        "value": 409.675030,
+        "std": pytest.approx(calibration.std_of("a1_M_xx")),
+        "unit": "lsb per m_s2",
+    }
+    np.testing.assert_allclose(np.diag(content["correlation"]), 1.0)
+
+
+def test_apply_and_invert(calibration, mti, recording):
+    corrected = calibration.apply(recording)
+    assert corrected.unit == "m_s2"
+    np.testing.assert_allclose(corrected.readings, mti.correct(recording.readings))
+    back = calibration.invert(corrected)
+    assert back.unit == "lsb"
+    np.testing.assert_allclose(back.readings, recording.readings, rtol=1e-12)
+
+
+def test_wrong_unit_is_refused(calibration, recording):
+    with pytest.raises(UnitError, match="readings are in m_s2, this calibration needs lsb"):
+        calibration.apply(calibration.apply(recording))
+    with pytest.raises(UnitError, match="readings are in lsb, this calibration needs m_s2"):
+        calibration.invert(recording)
+
+
+def test_missing_and_uncovered_channels(calibration, recording):
+    other = Recording(recording.t_s, recording.readings, ("a11", "a12", "a23"), unit="lsb")
+    with pytest.raises(InputError, match="lacks a13"):
+        calibration.apply(other)
+    four = Recording(recording.t_s, np.ones((5, 4)), ("a11", "a12", "a13", "a21"), unit="lsb")
+    with pytest.raises(InputError, match="a21 would stay in lsb"):
+        calibration.apply(four)
+
+
+def test_combining_keeps_blocks(calibration):
+    names = parameter_names("a2", "poses")
+    other = Calibration(
+        "six-position", "lsb", ("a21", "a22", "a23"), "poses", 9.81, names, calibration.values, np.eye(12)
+    )
+    both = combine([calibration, other])
+    assert both.chips == ("a1", "a2")
+    np.testing.assert_array_equal(both.covariance[:12, :12], calibration.covariance)
+    np.testing.assert_array_equal(both.covariance[:12, 12:], 0.0)
+    assert both.std_of("a2_M_xx") == 1.0
+    with pytest.raises(InputError, match="can't be joined"):
+        combine([calibration, Calibration("recursive", *other_fields(other))])
+
+
+def other_fields(calibration):
+    return (
+        calibration.unit,
+        calibration.channels,
+        calibration.gauge,
+        calibration.gravity,
+        calibration.names,
+        calibration.values,
+        calibration.covariance,
+    )
+
+
+def test_fitted_positions_reach_the_array():
+    array = AccelerometerArray.load("cube12")
+    names = [name for chip in array.chips for name in parameter_names(chip.name, "array")]
+    names += [f"{chip.name}_r_{axis}" for chip in array.chips for axis in "xyz"]
+    moved = array.chip_positions + 0.001
+    values = np.concatenate([np.tile(np.r_[np.eye(3).ravel(), np.zeros(3)], 4), moved.ravel()])
+    calibration = Calibration("array", "m_s2", array.channels, "array", 9.81, tuple(names), values, np.zeros((60, 60)))
+    np.testing.assert_allclose(calibration.calibrated_array(array).chip_positions, moved)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"format": "other"}, "not a calibration file"),
+        ({"format_version": 99}, "format version 99"),
+        ({"covariance": [[1.0]]}, "covariance"),
+        ({"parameters": []}, "needs that many values"),
+        ({"unit": "furlong"}, "can't be in 'furlong'"),
+        ({"gauge": "nothing"}, "nothing"),
+    ],
+)
+def test_damaged_files(calibration, tmp_path, change, message):
+    content = calibration.to_dict() | change
+    (tmp_path / "cal.json").write_text(json.dumps(content))
+    with pytest.raises(InputError, match=message):
+        load_calibration(tmp_path / "cal.json")
+
+
+def test_files_that_are_none(tmp_path):
+    with pytest.raises(InputError, match="check the path"):
+        load_calibration(tmp_path / "missing.json")
+    (tmp_path / "text.json").write_text("hello")
+    with pytest.raises(InputError, match="not a calibration file"):
+        load_calibration(tmp_path / "text.json")
