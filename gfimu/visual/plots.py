@@ -89,12 +89,20 @@ class Plot:
         return rrb.TimeSeriesView(
             origin=f"/{self.entity}",
             name=self.title,
-            axis_x=rrb.TimeAxis(link=rrb.components.LinkAxis.LinkToGlobal),
+            axis_x=rrb.TimeAxis(link=rrb.components.LinkAxis.LinkToGlobal, view_range=_whole_run(self.lines)),
             axis_y=None if self.span is None else rrb.ScalarAxis(range=self.span),
             plot_legend=rrb.PlotLegend(
                 corner=_emptiest_corner(self.lines), visible=self.legend and len(self.lines) <= _LONGEST_LEGEND
             ),
         )
+
+
+def _whole_run(lines: Sequence[Line]) -> rr.TimeRange:
+    """Range of all times of the lines; the viewer would open on the surroundings of its cursor."""
+    times = [float(line.t[end]) for line in lines if len(line.t) for end in (0, -1)] or [0.0]
+    return rr.TimeRange(
+        start=rr.TimeRangeBoundary.absolute(seconds=min(times)), end=rr.TimeRangeBoundary.absolute(seconds=max(times))
+    )
 
 
 def _emptiest_corner(lines: Sequence[Line]) -> rrb.Corner2D:

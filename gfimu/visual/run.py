@@ -21,7 +21,7 @@ from gfimu.visual.run_plots import (
     raw_plots,
     table_rate_plots,
 )
-from gfimu.visual.scene import Body, Path, Scene, SensingArrows, Shape, ghost_shapes, rig_shapes
+from gfimu.visual.scene import Body, Path, Scene, SensingArrows, Shape, bounding_box, ghost_shapes, rig_shapes
 
 __all__ = ["run_scene", "write_run"]
 
@@ -131,7 +131,11 @@ def run_scene(
         if position.ndim == 2:
             position = np.column_stack([np.interp(estimate.t_s, known.t, column) for column in position.T])
         bodies.append(Body("estimate", ghost_shapes(array), Path(estimate.t_s, estimate.quaternion, position)))
-    return Scene(bodies)
+    if on_table:
+        return Scene(bodies)
+    start = np.nan_to_num(np.atleast_2d(solid.position)[0])
+    distance = 4.0 * float(bounding_box(array)[0].max())
+    return Scene(bodies, eye=start + distance * np.array([1.1, -1.0, 0.8]), look_at=start)
 
 
 def _on_table(recording: Recording, known: KnownMotion | None) -> bool:
@@ -157,7 +161,8 @@ def _layout(scene: rrb.Spatial3DView, raw: Sequence[Plot], cells: Sequence[Seque
 
 _LEGEND = """\
 **3-D.** Table and cube stand as they truly stand, or as the reference says; the orange outline and its pointer turn
-with the estimate. Thin lines are the sensing axes; each arrow is as long as its axis reads, 6 cm for 1 g.
+with the estimate. Thin lines are the sensing axes; each arrow is as long as its axis reads; 1 g is a little
+more than half the cube.
 
 **Colours.** Grey: truth. Orange: estimate, its ±2σ paler. Sky blue: tachometer or encoder. Violet: command.
 Red, green, blue: x, y, z. One hue per chip.

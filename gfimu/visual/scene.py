@@ -18,7 +18,19 @@ from gfimu.array import AccelerometerArray
 from gfimu.units import STANDARD_GRAVITY
 from gfimu.visual.colours import ESTIMATE, METAL, TABLE, Colour, chip_colour
 
-__all__ = ["Body", "Box", "Cylinder", "Mesh", "Path", "Scene", "SensingArrows", "Shape", "ghost_shapes", "rig_shapes"]
+__all__ = [
+    "Body",
+    "Box",
+    "Cylinder",
+    "Mesh",
+    "Path",
+    "Scene",
+    "SensingArrows",
+    "Shape",
+    "bounding_box",
+    "ghost_shapes",
+    "rig_shapes",
+]
 
 TIMELINE = "time"
 """Name of the timeline: time on the board's clock, s."""
@@ -27,8 +39,8 @@ _MOST_POSES = 20_000  # poses of a body in one file; longer runs are thinned eve
 _SIDES = 96  # of a cylinder
 _TABLE_RADIUS = 0.15
 _TABLE_THICKNESS = 0.012
-_AXIS_LENGTH = 0.018  # a sensing axis is drawn this far to both sides of its chip, m
-_ARROW_PER_M_S2 = 0.06 / STANDARD_GRAVITY  # 1 g is drawn 6 cm long
+_AXIS_LENGTH = 0.36  # a sensing axis is drawn this far to both sides of its chip, in half sizes of the array
+_ARROW_PER_G = 1.2  # length of an arrow at 1 g, in half sizes of the array
 
 
 @dataclass(frozen=True)
@@ -97,8 +109,8 @@ class SensingArrows:
         Time, s.
     readings : ndarray, shape (n, c)
         Reading of each channel, m/s².
-    length_per_m_s2 : float
-        Length drawn for 1 m/s², m.
+    length_per_m_s2 : float, optional
+        Length drawn for 1 m/s², m; by default 1 g is 1.2 half sizes of the array (6 cm on the cube of 10 cm).
     colour : Colour, optional
         One colour for all arrows; each chip's own otherwise.
     """
@@ -106,7 +118,7 @@ class SensingArrows:
     array: AccelerometerArray
     t: NDArray[np.float64]
     readings: NDArray[np.float64]
-    length_per_m_s2: float = _ARROW_PER_M_S2
+    length_per_m_s2: float | None = None
     colour: Colour | None = None
 
 
@@ -170,7 +182,7 @@ def rig_shapes(array: AccelerometerArray) -> Mapping[str, Sequence[Shape]]:
         ``base`` and ``table`` (a disc with a mark on its rim, top face at z = 0 of the table's frame) and ``cube``
         (the smallest box around the chips, and the chips).
     """
-    half, centre = _bounding_box(array)
+    half, centre = bounding_box(array)
     chip = max(0.06 * float(half.max()), 0.001)
     names = [chip_.name for chip_ in array.chips]
     chips = [
@@ -190,15 +202,13 @@ def rig_shapes(array: AccelerometerArray) -> Mapping[str, Sequence[Shape]]:
 
 def ghost_shapes(array: AccelerometerArray) -> Sequence[Shape]:
     """Shapes of the estimate's ghost: an outline around the cube and a pointer along its x axis."""
-    half, centre = _bounding_box(array)
-    length = max(1.6 * float(half[0]), 0.03)
-    return [
-        Box((1.12 * half).tolist(), centre.tolist(), colour=ESTIMATE, wireframe=True),
-        Box((length, 0.0025, 0.0015), (centre[0] + length, 0.0, -float(half[2])), colour=ESTIMATE),
-    ]
+    half, centre = bounding_box(array)
+    length, size = 1.6 * float(half[0]), float(half.max())
+    pointer = Box((length, 0.05 * size, 0.03 * size), (centre[0] + length, 0.0, -float(half[2])), colour=ESTIMATE)
+    return [Box((1.12 * half).tolist(), centre.tolist(), colour=ESTIMATE, wireframe=True), pointer]
 
 
-def _bounding_box(array: AccelerometerArray) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def bounding_box(array: AccelerometerArray) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Half sizes and centre of the smallest box around the chips, m; flat arrays get some thickness."""
     low, high = array.chip_positions.min(axis=0), array.chip_positions.max(axis=0)
     half = (high - low) / 2
@@ -213,7 +223,7 @@ def _archetype(shape: Shape) -> rr.Boxes3D | rr.Mesh3D:
                 centers=[shape.centre],
                 quaternions=[_xyzw(shape.quaternion)],
                 colors=[shape.colour],
-                radii=[0.0008] if shape.wireframe else None,
+                radii=[0.015 * max(shape.half_size)] if shape.wireframe else None,
                 labels=[shape.label] if shape.label else None,
                 show_labels=False if shape.label else None,
                 fill_mode="MajorWireframe" if shape.wireframe else "Solid",
@@ -273,15 +283,18 @@ def _log_arrows(stream: rr.RecordingStream, entity: str, arrows: SensingArrows) 
     array = arrows.array
     keep = _thinned(len(arrows.t))
     t = arrows.t[keep]
-    lengths = np.nan_to_num(arrows.readings[keep]) * arrows.length_per_m_s2  # (n, c)
+    size = float(bounding_box(array)[0].max())
+    scale = _ARROW_PER_G * size / STANDARD_GRAVITY if arrows.length_per_m_s2 is None else arrows.length_per_m_s2
+    lengths = np.nan_to_num(arrows.readings[keep]) * scale  # (n, c)
     vectors = lengths[:, :, None] * array.axes  # (n, c, 3)
     chips = [chip_colour(int(chip)) for chip in array.chip_of_channel]
-    axes = np.stack([array.positions - _AXIS_LENGTH * array.axes, array.positions + _AXIS_LENGTH * array.axes], axis=1)
-    stream.log(f"{entity}/lines", rr.LineStrips3D(axes, colors=chips, radii=[0.0005]), static=True)
+    half = _AXIS_LENGTH * size * array.axes
+    axes = np.stack([array.positions - half, array.positions + half], axis=1)  # (c, 2, 3)
+    stream.log(f"{entity}/lines", rr.LineStrips3D(axes, colors=chips, radii=[0.01 * size]), static=True)
     still = rr.Arrows3D.from_fields(
         origins=array.positions,
         colors=chips if arrows.colour is None else [arrows.colour],
-        radii=[0.0022],
+        radii=[0.044 * size],
         labels=list(array.channels),
         show_labels=False,
     )
