@@ -1,0 +1,214 @@
+"""`gfimu score` and `gfimu optimize`: compare array geometries, and search better ones."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, progress
+
+if TYPE_CHECKING:
+    from gfimu.array import AccelerometerArray
+    from gfimu.scoring import Score
+
+__all__ = ["register"]
+
+_AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands."""
+    app.command(name="score")(_score)
+    app.command(name="optimize")(_optimize)
+
+
+def _score(
+    arrays: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[ARRAY]...", help="Names, array files (.toml) or MJCF files (.xml); all shipped ones."),
+    ] = None,
+    length_unit: Annotated[
+        float | None, typer.Option("--length-unit-m", help="Length that counts as 1, m; else half of each cube's edge.")
+    ] = None,
+    speed: Annotated[float, typer.Option("--speed-rad-s", help="Angular speed of the rate bound, rad/s.")] = math.tau,
+    spin_axis: Annotated[str, typer.Option(help="Body axis of that spin: x, y or z.")] = "z",
+    noise: Annotated[
+        float, typer.Option("--noise-m-s2", help="Standard deviation of a channel, m/s²: 0.0287 is ADXL345 at 100 Hz.")
+    ] = 0.0287,
+    as_json: JsonOption = False,
+) -> None:
+    """Score array geometries: condition number, GDOP, errors per axis, what ω² leaves, what ω can be seen.
+
+    Example: gfimu score cube12 p3_three_plus_one --speed-rad-s 10
+    """
+    from gfimu.errors import unknown_name
+    from gfimu.model_files import list_models
+    from gfimu.scoring import score
+
+    if spin_axis not in _AXES:
+        raise unknown_name("axis", spin_axis, _AXES)
+    loaded = [_load(name) for name in arrays or list_models("arrays")]
+    omega = [speed * component for component in _AXES[spin_axis]]
+    scores = score(loaded, length_unit_m=length_unit, omega_rad_s=omega, noise_m_s2=noise)
+    if as_json:
+        print_json({"length_unit_m": scores[0].length_unit_m, "arrays": [entry.to_dict() for entry in scores]})
+        return
+    _print_scores(scores, f"{speed:.4g} rad/s about {spin_axis}, channel noise {noise:.4g} m/s²")
+
+
+def _optimize(
+    chips: Annotated[int, typer.Option("--chips", help="Number of chips.")],
+    axes_per_chip: Annotated[int, typer.Option("--axes-per-chip", help="Sensing axes of a chip: 1, 2 or 3.")] = 3,
+    box: Annotated[
+        tuple[float, float, float], typer.Option("--box-m", help="Edges of the box around the body origin, m.")
+    ] = (0.1, 0.1, 0.1),
+    spacing: Annotated[float, typer.Option("--min-spacing-m", help="Least distance between chips, m.")] = 0.005,
+    non_recursive: Annotated[
+        bool, typer.Option("--non-recursive", help="Only geometries whose angular acceleration is free of ω².")
+    ] = False,
+    restarts: Annotated[int, typer.Option("--restarts", help="Number of starts to polish.")] = 40,
+    seed: Annotated[int, typer.Option("--seed", help="Seed of the random starts.")] = 0,
+    out: Annotated[Path | None, typer.Option("--out", help="Write the geometry as an array file (.toml).")] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Search the geometry of least GDOP for a number of chips in a box.
+
+    Example: gfimu optimize --chips 5 --non-recursive --out best5.toml
+    """
+    import numpy as np
+
+    from gfimu.atomic_file import write_text
+    from gfimu.errors import InputError
+    from gfimu.geometry_search import optimize
+
+    if out is not None and out.suffix != ".toml":
+        raise InputError(f"{out}: an array file ends in .toml; name it so")
+    if seed < 0:
+        raise InputError(f"seed {seed}: must be zero or positive")
+    with progress("searching geometries", total=restarts) as advance:
+        result = optimize(
+            chips,
+            rng=np.random.default_rng(seed),
+            axes_per_chip=axes_per_chip,
+            box_m=box,
+            min_spacing_m=spacing,
+            non_recursive=non_recursive,
+            restarts=restarts,
+            name=out.stem if out is not None else "",
+            report=advance,
+        )
+    if out is not None:
+        write_text(out, result.array.to_toml())
+    if as_json:
+        print_json(result.to_dict())
+        return
+    print_table(
+        f"{result.array.name}: positions in the body frame",
+        ["chip", "x m", "y m", "z m", "sensing axes"],
+        [
+            [
+                chip.name,
+                *(f"{value:.5f}" for value in chip.position),
+                "any, e.g. body axes" if axes_per_chip == 3 else "  ".join(_vector(axis) for axis in chip.axes),
+            ]
+            for chip in result.array.chips
+        ],
+    )
+    _print_scores([result.score], "")
+    bound = "" if math.isnan(result.gdop_lower_bound) else f"; no geometry is below {result.gdop_lower_bound:.4f}"
+    typer.echo(f"{result.agreeing} of {result.starts} starts ended at this GDOP{bound}")
+    if out is not None:
+        print_paths([("the array", out)])
+
+
+def _load(name: str) -> AccelerometerArray:
+    """Load an array by name, from an array file, or from the sites of an MJCF file."""
+    from gfimu.array import AccelerometerArray
+
+    if name.endswith(".xml"):
+        from sim.mjcf_array import array_from_mjcf
+
+        return array_from_mjcf(name)
+    return AccelerometerArray.load(name)
+
+
+def _print_scores(scores: list[Score], condition: str) -> None:
+    units = sorted({entry.length_unit_m for entry in scores})
+    unit = (
+        f"{units[0]:g} m"
+        if len(units) == 1
+        else ", ".join(f"{entry.length_unit_m:g} m ({entry.name})" for entry in scores)
+        if len(scores) <= 3
+        else "each array's own: " + "; ".join(f"{length:g} m for {_names_of(scores, length)}" for length in units)
+    )
+    print_table(
+        "Array geometries",
+        ["array", "axes", "κ(J)", "GDOP", "GDOP, ω free", "σ_α", "σ_p", "ω² left in", "ω products seen"],
+        [
+            [
+                entry.name,
+                entry.n_channels,
+                f"{entry.condition_number:.4f}",
+                f"{entry.gdop:.4f}",
+                _number(entry.gdop_joint, ".4f"),
+                _triple(entry.sigma_alpha),
+                _triple(entry.sigma_p),
+                _contaminated(entry),
+                f"{entry.null_space_rank} of 6",
+            ]
+            for entry in scores
+        ],
+        note=f"Lengths in units of {unit}; σ for channels of standard deviation 1 (σ_α per length unit). "
+        "GDOP, ω free: without a given ω and without recursion.",
+    )
+    dirty = [entry for entry in scores if entry.omega_squared_terms]
+    if dirty:
+        print_table(
+            "Products of ω left in the linear solution [α; p] = S a",
+            ["array", "component", "terms"],
+            [
+                [entry.name if first else "", component, terms]
+                for entry in dirty
+                for first, (component, terms) in _with_first(entry.omega_squared_terms)
+            ],
+        )
+    if condition:
+        print_table(
+            f"Cramér–Rao bound of one sample on ω, rad/s, at {condition}",
+            ["array", "ω_x", "ω_y", "ω_z"],
+            [[entry.name, *(_number(value, ".4g") for value in entry.rate_bound_rad_s)] for entry in scores],
+            note="—: one sample can't tell this component.",
+        )
+
+
+def _names_of(scores: list[Score], length: float) -> str:
+    same = [entry.name for entry in scores if entry.length_unit_m == length]
+    return ", ".join(same) if len(same) <= 2 else f"{len(same)} arrays"
+
+
+def _with_first(terms: dict[str, str]) -> list[tuple[bool, tuple[str, str]]]:
+    return [(number == 0, item) for number, item in enumerate(terms.items())]
+
+
+def _number(value: float, form: str) -> str:
+    return format(value, form) if math.isfinite(value) else "—"
+
+
+def _triple(values: object) -> str:
+    """Three numbers, or one where they agree."""
+    texts = [f"{value:.4f}" for value in values]  # type: ignore[attr-defined]
+    return texts[0] if len(set(texts)) == 1 else " ".join(texts)
+
+
+def _contaminated(entry: Score) -> str:
+    names = list(entry.omega_squared_terms)
+    if not names:
+        return "none"
+    return "α and p" if len(names) == 6 else " ".join(name.replace("alpha", "α") for name in names)
+
+
+def _vector(axis: object) -> str:
+    return "(" + ", ".join(f"{value:.4f}" for value in axis) + ")"  # type: ignore[attr-defined]
