@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 
 from gfimu import __version__
 from gfimu.array import OMEGA_PRODUCTS, AccelerometerArray
-from gfimu.attitude import from_rotation, integrate_attitude, table_angle
+from gfimu.attitude import from_rotation, integrate_attitude, table_angle, to_rotation
 from gfimu.column_file import open_columns, write_columns
 from gfimu.errors import InputError, unknown_name
 from gfimu.linear_solution import linear_solution
@@ -167,7 +167,7 @@ def estimate(
         Angular rate at the first sample, body axes, rad/s.
     quaternion0 : array_like, shape (4,), optional
         Attitude (w, x, y, z) at the first sample. By default the recording's mounting, or without one the attitude
-        that levels the mean of p over the first second, with heading zero.
+        that levels the mean of p over the first second, with heading zero; good if the origin is not accelerated then.
     noise_std : array_like, scalar or shape (c,), optional
         Standard deviation of one sample of each channel, m/s²; by default from the parts' data sheets.
     with_position : bool
@@ -196,7 +196,11 @@ def estimate(
     rate = METHODS[method](RateProblem(array, recording.t_s, readings, noise, linear, rate0))
     motion = linear.with_omega(rate.omega)
     alpha, p = motion[:, :3], motion[:, 3:]
-    start = _initial_attitude(recording, p) if quaternion0 is None else np.asarray(quaternion0, dtype=float)
+    start = (
+        _initial_attitude(recording, motion, rate.omega)
+        if quaternion0 is None
+        else np.asarray(quaternion0, dtype=float)
+    )
     quaternion = integrate_attitude(recording.t_s, rate.omega, alpha, start)
     mounting = Rotation.from_rotvec(recording.mounting_rotvec)
     axis = mounting.inv().apply([0.0, 0.0, 1.0])  # the table's axis in body axes
@@ -259,12 +263,17 @@ def _integrated_variance(t: NDArray[np.float64], variance: NDArray[np.float64]) 
     return result
 
 
-def _initial_attitude(recording: Recording, p: NDArray[np.float64]) -> NDArray[np.float64]:
+def _initial_attitude(
+    recording: Recording, motion: NDArray[np.float64], omega: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """Attitude at the first sample: as mounted if the recording says so, else levelled."""
     if "mounting_rotvec_rad" in recording.metadata:
         return from_rotation(Rotation.from_rotvec(recording.mounting_rotvec))
-    known = np.flatnonzero(np.isfinite(p).all(axis=1))
+    known = np.flatnonzero(np.isfinite(motion).all(axis=1) & np.isfinite(omega).all(axis=1))
     if not known.size:
         raise InputError("p is unknown at every sample; check the recording for missing readings")
-    first = recording.t_s[known] < recording.t_s[known[0]] + _LEVEL_SECONDS
-    return level(p[known[first]])
+    t = recording.t_s[known]
+    first = known[t < t[0] + _LEVEL_SECONDS]
+    # Turn each p back into the axes of the first sample, so that a body that turns meanwhile is levelled too.
+    turned = to_rotation(integrate_attitude(recording.t_s[first], omega[first], motion[first, :3]))
+    return level(turned.apply(motion[first, 3:]))

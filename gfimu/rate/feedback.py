@@ -11,6 +11,7 @@ from gfimu.errors import InputError
 __all__ = ["integrate_rate_recursively"]
 
 _GAP_PERIODS = 1.5
+_STEP_RATIO = 2.0
 _FASTEST = 1e5
 _ITERATIONS = 50
 
@@ -25,7 +26,7 @@ def integrate_rate_recursively(
     """Integrate ω̇ = α_linear(t) − Λ s(ω) through the samples (GF-IMU paper, step 5 in its recursive form).
 
     The step is the implicit Adams–Moulton formula through the last two samples and the new one, for any spacing
-    (third order); behind a gap and at the start it is the trapezoid.
+    (third order); behind a gap, at the start, and where one step is more than twice the other it is the trapezoid.
 
     Parameters
     ----------
@@ -100,7 +101,7 @@ def _integrate(t, linear, leakage, pattern, omega0, longest):  # type: ignore[no
         h = t[i] - t[i - 1]
         if h > longest:
             step_before = 0.0
-        if step_before > 0.0:
+        if h <= _STEP_RATIO * step_before and step_before <= _STEP_RATIO * h:
             k = step_before
             w_new = h * (2.0 * h + 3.0 * k) / (6.0 * (h + k))
             w_last = h * (h + 3.0 * k) / (6.0 * k)
