@@ -19,7 +19,8 @@ whose middle stages fall on the sample between. Without dependence on ω it is S
 Runge–Kutta step over one period, with α interpolated linearly for its middle stages, is the trapezoid.)
 
 Weights follow from the actual sample times, so jitter is allowed for. No polynomial crosses a gap (a step longer than
-1.5 median periods, or samples that are NaN): inside each gapless stretch the samples near the ends use the nearest
+1.5 median periods, or samples that are NaN) or two samples closer than a median period over 1.5, which would give their
+neighbours large weights of either sign: inside each gapless stretch the samples near the ends use the nearest
 stencil that fits, and the gap itself is bridged by its two end samples. Nothing is known about α inside a gap, so the
 rate behind a long one is only as good as that straight line.
 """
@@ -200,7 +201,8 @@ def _integrals(t: NDArray[np.float64], values: NDArray[np.float64], method: str)
 def _place_stencils(t: NDArray[np.float64], stencil: _Stencil) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """First sample and number of samples of the stencil of each interval, so that none crosses a gap."""
     step = np.diff(t)
-    gap = step > _GAP_PERIODS * np.median(step)
+    period = np.median(step)
+    gap = (step > _GAP_PERIODS * period) | (step < period / _GAP_PERIODS)
     left = np.arange(len(step))
     # Stretch [start, stop] of gapless samples that each interval lies in.
     stretch = np.concatenate([[0], np.cumsum(gap)])[:-1]
