@@ -26,6 +26,7 @@ __all__ = ["DEFAULT_NOISE_STD", "Score", "gdop", "gdop_lower_bound", "score"]
 DEFAULT_NOISE_STD = 0.0287
 """Channel noise at which rate bounds are quoted, m/s²: ADXL345, x and y axes at 100 Hz (0.75 LSB of 3.9 mg)."""
 
+_NEGLIGIBLE = 1e-6  # coefficient of a product of ω not worth a word
 _SINGULAR = 1e-13  # of the cube of the mean eigenvalue
 
 
@@ -84,15 +85,15 @@ class Score:
     @property
     def omega_squared_terms(self) -> dict[str, str]:
         """Terms left by ω² in words, for each component of α and p that has any; length unit as stated."""
-        return {
+        words = {
             name: " ".join(
-                f"{coefficient:+.4g}·ω{product[0]}ω{product[1]}"
+                f"{coefficient:+.4g}·{_product_in_words(product)}"
                 for coefficient, product in zip(row, OMEGA_PRODUCTS, strict=True)
-                if coefficient
+                if abs(coefficient) > _NEGLIGIBLE
             )
             for name, row in zip(MOTION_NAMES, self.omega_squared_matrix, strict=True)
-            if row.any()
         }
+        return {name: terms for name, terms in words.items() if terms}
 
     def to_dict(self) -> dict[str, Any]:
         """Return the entry of ``gfimu score --json``."""
@@ -219,6 +220,11 @@ def _score(array: AccelerometerArray, unit: float, omega: NDArray[np.float64], n
         noise_m_s2=noise,
         rate_bound_rad_s=rate_bound(array, omega, noise),
     )
+
+
+def _product_in_words(product: str) -> str:
+    first, second = product
+    return f"ω{first}²" if first == second else f"ω{first}ω{second}"
 
 
 @njit(cache=True)

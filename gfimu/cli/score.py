@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -56,7 +57,7 @@ def _score(
     if as_json:
         print_json({"length_unit_m": scores[0].length_unit_m, "arrays": [entry.to_dict() for entry in scores]})
         return
-    _print_scores(scores, f"{speed:.4g} rad/s about {spin_axis}, channel noise {noise:.4g} m/s²")
+    _print_scores(scores, f"{speed:.4g} rad/s about {spin_axis} and channel noise {noise:.4g} m/s²")
 
 
 def _optimize(
@@ -117,7 +118,7 @@ def _optimize(
             for chip in result.array.chips
         ],
     )
-    _print_scores([result.score], "")
+    _print_scores([result.score], f"1 rev/s about z and channel noise {result.score.noise_m_s2:.4g} m/s²")
     bound = "" if math.isnan(result.gdop_lower_bound) else f"; no geometry is below {result.gdop_lower_bound:.4f}"
     typer.echo(f"{result.agreeing} of {result.starts} starts ended at this GDOP{bound}")
     if out is not None:
@@ -146,7 +147,7 @@ def _print_scores(scores: list[Score], condition: str) -> None:
     )
     print_table(
         "Array geometries",
-        ["array", "axes", "κ(J)", "GDOP", "GDOP, ω free", "σ_α", "σ_p", "ω² left in", "ω products seen"],
+        ["array", "axes", "κ(J)", "GDOP", "GDOP*", "ω² left in", "ω seen"],
         [
             [
                 entry.name,
@@ -154,33 +155,39 @@ def _print_scores(scores: list[Score], condition: str) -> None:
                 f"{entry.condition_number:.4f}",
                 f"{entry.gdop:.4f}",
                 _number(entry.gdop_joint, ".4f"),
-                _triple(entry.sigma_alpha),
-                _triple(entry.sigma_p),
                 _contaminated(entry),
                 f"{entry.null_space_rank} of 6",
             ]
             for entry in scores
         ],
-        note=f"Lengths in units of {unit}; σ for channels of standard deviation 1 (σ_α per length unit). "
-        "GDOP, ω free: without a given ω and without recursion.",
+        note=f"Lengths in units of {unit}. GDOP*: with ω unknown and no recursion (joint form). "
+        "ω seen: products of ω that the null space of J sees.",
+    )
+    print_table(
+        "Standard deviations, x y z",
+        ["array", "σ_α", "σ_p", "σ_ω, rad/s"],
+        [
+            [
+                entry.name,
+                _triple(entry.sigma_alpha, ".4f"),
+                _triple(entry.sigma_p, ".4f"),
+                _triple(entry.rate_bound_rad_s, ".3g"),
+            ]
+            for entry in scores
+        ],
+        note="σ_α (per length unit) and σ_p for channels of standard deviation 1. σ_ω: least one sample can reach "
+        f"(Cramér–Rao) at {condition}; —: one sample can't tell.",
     )
     dirty = [entry for entry in scores if entry.omega_squared_terms]
     if dirty:
         print_table(
             "Products of ω left in the linear solution [α; p] = S a",
-            ["array", "component", "terms"],
+            ["array", "of", "terms"],
             [
-                [entry.name if first else "", component, terms]
+                [entry.name if first else "", component.replace("alpha", "α"), terms]
                 for entry in dirty
                 for first, (component, terms) in _with_first(entry.omega_squared_terms)
             ],
-        )
-    if condition:
-        print_table(
-            f"Cramér–Rao bound of one sample on ω, rad/s, at {condition}",
-            ["array", "ω_x", "ω_y", "ω_z"],
-            [[entry.name, *(_number(value, ".4g") for value in entry.rate_bound_rad_s)] for entry in scores],
-            note="—: one sample can't tell this component.",
         )
 
 
@@ -197,9 +204,9 @@ def _number(value: float, form: str) -> str:
     return format(value, form) if math.isfinite(value) else "—"
 
 
-def _triple(values: object) -> str:
+def _triple(values: Iterable[float], form: str) -> str:
     """Three numbers, or one where they agree."""
-    texts = [f"{value:.4f}" for value in values]  # type: ignore[attr-defined]
+    texts = [_number(value, form) for value in values]
     return texts[0] if len(set(texts)) == 1 else " ".join(texts)
 
 
@@ -210,5 +217,5 @@ def _contaminated(entry: Score) -> str:
     return "α and p" if len(names) == 6 else " ".join(name.replace("alpha", "α") for name in names)
 
 
-def _vector(axis: object) -> str:
-    return "(" + ", ".join(f"{value:.4f}" for value in axis) + ")"  # type: ignore[attr-defined]
+def _vector(axis: Iterable[float]) -> str:
+    return "(" + ", ".join(f"{value:.4f}" for value in axis) + ")"
