@@ -22,6 +22,7 @@ _BINS_PER_DECADE = 20
 _CLUSTER_SHARE = 0.05
 _VALLEY_SHARE = 0.01
 _STANDING_RATE = 0.05
+_ROUNDING = 1e-13
 
 
 @dataclass(frozen=True)
@@ -83,7 +84,9 @@ def motion_statistic(recording: Recording, window: int) -> NDArray[np.float64]:
         with np.errstate(invalid="ignore", divide="ignore"):
             mean = _window_sum(centred, window) / count
             variance = (_window_sum(centred**2, window) - count * mean**2) / (count - 1)
-        squares += np.where(count > half, np.maximum(variance, 0.0), np.inf) ** 2
+        rounding = _ROUNDING * np.ptp(centred) ** 2  # what running sums leave of a variance of zero
+        variance = np.where(variance > rounding, variance, 0.0)
+        squares += np.where(count > half, variance, np.inf) ** 2
     statistic = np.full(n, np.inf)
     statistic[half : n - half] = np.sqrt(squares)
     for gap in recording.gaps:
@@ -112,11 +115,13 @@ def rest_threshold(statistic: NDArray[np.float64]) -> float:
     positive = values[values > 0.0]
     if len(positive) == 0:
         return 1.0  # perfectly still throughout: any threshold says rest
+    if len(values) - len(positive) >= _CLUSTER_SHARE * len(values):
+        return float(positive.min())  # readings without noise: rest is where nothing changes at all
     logs = np.log10(positive)
     edges = np.arange(logs.min() - 0.5, logs.max() + 0.5, 1.0 / _BINS_PER_DECADE)
     counts, edges = np.histogram(logs, edges)
     density = np.convolve(counts, np.ones(3) / 3.0, mode="same")
-    reached = np.cumsum(counts) + (len(values) - len(positive))
+    reached = np.cumsum(counts)
     lowest = int(np.argmax(reached >= _CLUSTER_SHARE * len(values)))
     peak = lowest
     while True:  # climb to the top of the cluster, across small dents

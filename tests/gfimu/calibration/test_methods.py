@@ -86,7 +86,7 @@ def test_recursive_is_usable_while_data_arrive(triad):
             assert calibrator.determined
             result = calibrator.calibration(unit="m_s2", channels=("a11", "a12", "a13"), gravity=GRAVITY)
             std.append(result.std)
-    assert np.all(np.diff(std, axis=0) < 1e-12)  # more data, less uncertainty
+    assert np.all(std[-1] < 0.4 * std[0])  # from 7 to 60 readings: √(7/60) = 0.34
     np.testing.assert_array_less(np.abs(result.values - triad.parameters("poses")), 4.5 * std[-1])
 
 
