@@ -1,0 +1,111 @@
+"""The commands estimate and convert as a user types them."""
+
+import gzip
+import json
+import struct
+
+import numpy as np
+import pytest
+
+from gfimu import AccelerometerArray, Estimate, Recording, specific_force
+from gfimu.units import STANDARD_GRAVITY
+
+CUBE = AccelerometerArray.load("cube12")
+
+
+@pytest.fixture
+def run(tmp_path):
+    """A table turned back and forth for 10 s; 100 Hz, perfect sensors, two frames lost."""
+    t = np.arange(1000) / 100.0
+    axis = np.array([[0.0, 0.0, 1.0]])
+    omega = np.sin(t)[:, None] * axis
+    readings = specific_force(CUBE, STANDARD_GRAVITY * axis, np.cos(t)[:, None] * axis, omega)
+    keep = np.delete(np.arange(1000), [500, 501])
+    file = tmp_path / "run.parquet"
+    Recording.from_arrays(
+        t[keep],
+        readings[keep],
+        CUBE,
+        reference={"tacho_rad_s": np.sin(t[keep])},
+        metadata={"mounting_rotvec_rad": [0, 0, 0]},
+    ).write(file)
+    return file
+
+
+@pytest.mark.parametrize("suffix", ["parquet", "csv"])
+def test_estimate(gfimu_command, run, suffix):
+    out = run.with_name(f"estimate.{suffix}")
+    result = gfimu_command("estimate", run, "--array", "cube12", "--out", out, "--json")
+    assert (result.code, result.stderr) == (0, "")
+    figures = json.loads(result.stdout)
+    assert figures["samples"] == 998
+    assert figures["gaps"] == 1
+    assert figures["sample_rate_hz"] == pytest.approx(100.0)
+    assert figures["tacho_rmse_rad_s"] < 1e-5
+    assert figures["angle_rad"] == pytest.approx(1 - np.cos(9.99), abs=1e-4)
+    assert figures["p_rms_m_s2"] == pytest.approx([0.0, 0.0, STANDARD_GRAVITY], abs=1e-9)
+    assert figures["files"] == {"estimate": str(out)}
+    found = Estimate.read(out)
+    np.testing.assert_allclose(found.omega[:, 2], np.sin(found.t_s), atol=1e-5)
+
+
+def test_table_for_people(gfimu_command, run):
+    out = run.with_name("estimate.parquet")
+    result = gfimu_command("estimate", run, "--array", "cube12", "--out", out)
+    assert result.code == 0
+    for words in ("samples", "998", "gaps", "angle at the end", "ω against tacho", "cube12"):
+        assert words in result.stdout
+    assert str(out) in result.stdout
+
+
+def test_array_is_found_in_the_recording_or_a_file(gfimu_command, run):
+    named = gfimu_command("estimate", run, "--out", run.with_name("a.parquet"), "--json")
+    assert json.loads(named.stdout)["array"] == "cube12"
+    file = run.with_name("my_cube.toml")
+    file.write_text(CUBE.to_toml().replace('"cube12"', '"my_cube"', 1))
+    given = gfimu_command("estimate", run, "--array", file, "--out", run.with_name("b.parquet"), "--json")
+    assert json.loads(given.stdout)["array"] == "my_cube"
+
+
+def test_position_and_rerun(gfimu_command, run):
+    out, rrd = run.with_name("estimate.parquet"), run.with_name("run.rrd")
+    result = gfimu_command("estimate", run, "--out", out, "--rrd", rrd, "--position", "--json")
+    assert result.code == 0
+    assert Estimate.read(out).position is not None
+    assert rrd.stat().st_size > 10_000
+    assert json.loads(result.stdout)["files"] == {"estimate": str(out), "rrd": str(rrd)}
+
+
+def test_convert_there_and_back(gfimu_command, run):
+    text, back = run.with_name("run.csv"), run.with_name("back.parquet")
+    assert gfimu_command("convert", run, text).code == 0
+    result = gfimu_command("convert", text, back, "--json")
+    assert json.loads(result.stdout)["samples"] == 998
+    one, other = Recording.read(run), Recording.read(back)
+    np.testing.assert_array_equal(one.readings, other.readings)
+    assert one.metadata == other.metadata
+    assert one.gaps.tolist() == other.gaps.tolist() == [499]
+
+
+def test_convert_and_estimate_a_mimu4444_stream(gfimu_command, tmp_path):
+    packets = []
+    for number in range(100):
+        body = struct.pack(">BHBI48h", 0xAA, number, 0x64, number * 1_024_000, *([0, 0, 2048, 0, 0, 0] * 8))
+        packets.append(body + struct.pack(">H", sum(body) % 65536))
+    stream = tmp_path / "stream.bin.gz"
+    stream.write_bytes(gzip.compress(bytes.fromhex("A02800C8") + b"".join(packets)))
+    result = gfimu_command("convert", stream, tmp_path / "run.csv", "--json")
+    assert json.loads(result.stdout)["packets"] == 100
+    for source in (stream, tmp_path / "run.csv"):
+        result = gfimu_command("estimate", source, "--array", "mimu4444", "--out", tmp_path / "e.parquet", "--json")
+        assert json.loads(result.stdout)["samples"] == 100
+
+
+def test_measured_stream(gfimu_command, shared_data, tmp_path):
+    stream = shared_data / "mimu4444" / "exp_1.bin.gz"
+    out = tmp_path / "estimate.parquet"
+    result = gfimu_command("estimate", stream, "--array", "mimu4444", "--out", out, "--json")
+    figures = json.loads(result.stdout)
+    assert 0.98 < figures["centripetal"]["slope"] < 1.02
+    assert figures["centripetal"]["correlation"] >= 0.98
+    assert np.isfinite(Estimate.read(out).omega_products).all()
