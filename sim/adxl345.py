@@ -20,11 +20,10 @@ from gfimu.array import AccelerometerArray
 from gfimu.errors import InputError
 from sim.data_sheet import DataSheet
 
-__all__ = ["Sensor", "SensorErrors", "SensorSettings", "averaging_window", "draw_errors", "flicker", "quantise"]
+__all__ = ["Sensor", "SensorErrors", "SensorSettings", "conversion_offsets", "draw_errors", "flicker", "quantise"]
 
 _REFERENCE_RATE = 100.0  # rate of the noise figures, Hz
 _REFERENCE_TEMPERATURE = 25.0
-_SINC_HALF_POWER = 0.4429464  # a moving average of length W is 3 dB down at this over W
 _SUPPLIES = (2.5, 3.3)
 
 
@@ -43,7 +42,7 @@ class SensorSettings:
     supply : float
         Supply voltage, 2.5 or 3.3 V.
     errors, noise, quantisation, bandwidth : bool
-        Parts of the chain that can be left out; ``bandwidth`` is the average over the sampling window.
+        Parts of the chain that can be left out; ``bandwidth`` is the average over the conversions of a sample.
     bias_instability : float
         Flicker floor B of the Allan deviation, m/s² (0: none).
     """
@@ -301,15 +300,17 @@ def quantise(
     return np.where(zero_lsb, codes & ~1, codes)
 
 
-def averaging_window(settings: SensorSettings, sheet: DataSheet) -> float:
-    """Length of the moving average that stands for the chip's bandwidth, s (0: bandwidth left out).
+def conversion_offsets(settings: SensorSettings, sheet: DataSheet) -> NDArray[np.float64]:
+    """Return when the conversions behind one sample take place, against its time stamp, s; their mean is the sample.
 
-    The data sheet gives the −3 dB frequency, half the output data rate, but not the filter's shape nor its delay. An
-    average centred on the time stamp has that bandwidth and no delay; a chain that lags is the effect `sensor_lag`.
+    The data sheet gives the −3 dB frequency, half the output data rate, but neither the filter's shape nor its delay.
+    Two conversions a quarter of a period before and after the time stamp have that bandwidth (|cos(πf/2r)| at the
+    output data rate r, zero at r) and no delay; a chain that lags is the effect `sensor_lag`.
     """
     if not settings.bandwidth:
-        return 0.0
-    return _SINC_HALF_POWER / (sheet.bandwidth_ratio * settings.output_data_rate)
+        return np.zeros(1)
+    half_power = sheet.bandwidth_ratio * settings.output_data_rate
+    return np.array([-0.125, 0.125]) / half_power
 
 
 def flicker(shape: tuple[int, int], instability: float, rng: np.random.Generator) -> NDArray[np.float64]:

@@ -8,7 +8,7 @@ smooth change of its time scale, so that rotation, rate and angular acceleration
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
 
@@ -130,7 +130,8 @@ class Chirp:
         edge = np.minimum(t, self.duration - t) / (_WINDOW_SHARE * self.duration)
         value = start + self.amplitude * _smooth_step(np.clip(edge, 0.0, 1.0)) * np.sin(2 * np.pi * cycles)
         flat = [(1, 0.0), (2, 0.0)]
-        return PPoly.from_spline(make_interp_spline(t, value, k=5, bc_type=(flat, flat)))
+        spline = make_interp_spline(t, value, k=5, bc_type=(flat, flat))  # type: ignore[arg-type]
+        return PPoly.from_spline((spline.t, spline.c, spline.k))
 
 
 def spin_profile(segments: Sequence[Segment], *, start_rate: float = 0.0, start_angle: float = 0.0) -> SplineSpin:
@@ -235,8 +236,8 @@ class Tumble:
     rest: float = 2.0
     spin_up: float = 3.0
     inertia: tuple[float, float, float] = (1.0, 2.0, 3.0)
-    sway: tuple[float, float, float] = field(default=(0.0, 0.0, 0.0))
-    sway_frequency: tuple[float, float, float] = field(default=(0.5, 0.7, 0.3))
+    sway: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    sway_frequency: tuple[float, float, float] = (0.5, 0.7, 0.3)
 
     def __post_init__(self) -> None:
         i1, i2, i3 = self.inertia

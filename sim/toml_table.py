@@ -78,6 +78,15 @@ class TomlTable:
             raise InputError(f"{self._where}: {key} = {value!r} {remedy}")
         return value
 
+    def whole(self, key: str, default: int | None = _MISSING, *, least: int = 0) -> int | None:
+        """Return a whole number of at least ``least``, or None where that is the default and the key is missing."""
+        value = self.raw(key, default)
+        if value is None and key not in self._data:
+            return None
+        if isinstance(value, bool) or not isinstance(value, int) or value < least:
+            raise InputError(f"{self._where}: {key} = {value!r} must be a whole number of at least {least}")
+        return value
+
     def flag(self, key: str, default: bool) -> bool:
         """Return true or false."""
         value = self.raw(key, default)

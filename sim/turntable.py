@@ -165,7 +165,7 @@ def drive(world: World, command: SpinMotion, duration: float, *, step: float = _
     model = turntable_model(world.changed(nod=Nod(), stretch=0.0))
     model.opt.timestep = step
     data = mujoco.MjData(model)
-    t = np.arange(int(np.floor(duration / step * (1 + 1e-12))) + 2) * step
+    t: NDArray[np.float64] = np.arange(int(np.floor(duration / step * (1 + 1e-12))) + 2, dtype=float) * step
     wanted = command.at(t)
     data.qpos[0], data.qvel[0] = wanted.angle[0], wanted.rate[0]
     data.act[:] = wanted.angle[0]

@@ -1,0 +1,107 @@
+"""True motion of the cube: what an estimate is compared with."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from gfimu.errors import InputError
+from gfimu.recording import Recording
+from sim.motion import BodyState, SpinState
+from sim.world import World
+
+if TYPE_CHECKING:
+    from gfimu.visual import KnownMotion
+
+__all__ = ["cube_state", "known_motion", "truth_columns"]
+
+
+def cube_state(world: World, spin: SpinState) -> BodyState:
+    """Motion of the cube on the table, about its own centre.
+
+    Parameters
+    ----------
+    world : World
+        The world: place and attitude of the cube, tilt and nod of the axis, stretch of the arms.
+    spin : SpinState
+        Spin of the cube at n times.
+
+    Returns
+    -------
+    BodyState
+        Position, velocity and acceleration of the cube's centre in the world; rotation, rate and angular acceleration
+        in cube axes. The velocity of stretching and nodding arms is left out where the forward model leaves it out.
+    """
+    zeros = np.zeros_like(spin.rate)
+    along = np.array([np.cos(world.nod.direction), np.sin(world.nod.direction), 0.0])
+    across = np.array([along[1], -along[0], 0.0])  # along × z
+    cos, sin = np.cos(spin.angle + world.nod.phase), np.sin(spin.angle + world.nod.phase)
+    lean_rate = -world.nod.amplitude * sin * spin.rate
+    lean_acceleration = -world.nod.amplitude * (cos * spin.rate**2 + sin * spin.acceleration)
+    # In the nodding axis frame.
+    omega = np.outer(lean_rate, along) + np.stack([zeros, zeros, spin.rate], axis=-1)
+    alpha = np.outer(lean_acceleration, along) + np.outer(spin.rate * lean_rate, across)
+    alpha[:, 2] += spin.acceleration
+    turn = Rotation.from_rotvec(np.stack([zeros, zeros, spin.angle], axis=-1))
+    arm = turn.apply(world.cube_offset) * (1.0 + world.stretch * spin.rate**2)[:, None]
+    velocity = np.cross(omega, arm)
+    acceleration = np.cross(alpha, arm) + np.cross(omega, velocity)
+    lean = Rotation.from_rotvec(np.outer(world.nod.amplitude * cos, along))
+    to_world = Rotation.from_rotvec(world.axis_rotvec) * lean
+    attitude = turn * Rotation.from_rotvec(world.mount_rotvec)  # from cube to nodding axis frame
+    return BodyState(
+        position=to_world.apply(arm),
+        rotation=(to_world * attitude).as_matrix(),
+        velocity=to_world.apply(velocity),
+        acceleration=to_world.apply(acceleration),
+        omega=attitude.inv().apply(omega),
+        alpha=attitude.inv().apply(alpha),
+    )
+
+
+def truth_columns(body: BodyState, gravity: float) -> Mapping[str, NDArray[np.float64]]:
+    """Columns of the true motion for a recording: p, alpha, omega, attitude, velocity and position, each (n,)."""
+    p = np.einsum("nji,nj->ni", body.rotation, body.acceleration + np.array([0.0, 0.0, gravity]))
+    quaternion = Rotation.from_matrix(body.rotation).as_quat(scalar_first=True)
+    quaternion *= np.where(quaternion[:, :1] < 0, -1.0, 1.0)
+    columns: dict[str, NDArray[np.float64]] = {}
+    for quantity, unit, values in (
+        ("p", "_m_s2", p),
+        ("alpha", "_rad_s2", body.alpha),
+        ("omega", "_rad_s", body.omega),
+        ("velocity", "_m_s", body.velocity),
+        ("position", "_m", body.position),
+    ):
+        columns |= {f"truth_{quantity}_{axis}{unit}": values[:, place] for place, axis in enumerate("xyz")}
+    return columns | {f"truth_q_{part}": quaternion[:, place] for place, part in enumerate("wxyz")}
+
+
+def known_motion(recording: Recording) -> KnownMotion:
+    """Return the true motion in a simulated recording, for its picture.
+
+    Raises
+    ------
+    InputError
+        If the recording holds no truth.
+    """
+    from gfimu.visual import KnownMotion
+
+    def triple(quantity: str, unit: str) -> NDArray[np.float64]:
+        return np.column_stack([recording.extra[f"truth_{quantity}_{axis}{unit}"] for axis in "xyz"])
+
+    if "truth_q_w" not in recording.extra:
+        raise InputError("the recording holds no truth; simulate it again")
+    return KnownMotion(
+        name="truth",
+        t=recording.t_s,
+        quaternion=np.column_stack([recording.extra[f"truth_q_{part}"] for part in "wxyz"]),
+        position=triple("position", "_m"),
+        omega=triple("omega", "_rad_s"),
+        alpha=triple("alpha", "_rad_s2"),
+        p=triple("p", "_m_s2"),
+        angle=recording.reference.get("angle_rad"),
+    )
