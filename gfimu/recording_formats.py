@@ -24,24 +24,24 @@ def open_recording(path: str | Path, *, array: AccelerometerArray | None = None)
     return read_mimu4444(path) if is_mimu4444(path) else Recording.read(path, array=array)
 
 
-def open_run(path: str | Path, array: str | Path | None = None) -> tuple[Recording, AccelerometerArray]:
+def open_run(path: str | Path, array: AccelerometerArray | None = None) -> tuple[Recording, AccelerometerArray]:
     """Read a recording together with its array.
 
     Parameters
     ----------
     path : str or Path
         The recording.
-    array : str or Path, optional
-        Name or file of the array; by default the one that the recording names.
+    array : AccelerometerArray, optional
+        The array; by default the one that the recording names.
 
     Raises
     ------
     InputError
-        As `open_recording`; also if the array is unknown, or neither given nor named in the recording.
+        As `open_recording`; also if the array is neither given nor named in the recording, or unknown.
     """
     if array is None:
-        array = "mimu4444" if is_mimu4444(path) else open_columns(path).metadata.get("array")
-        if not isinstance(array, str):
+        name = "mimu4444" if is_mimu4444(path) else open_columns(path).metadata.get("array")
+        if not isinstance(name, str):
             raise InputError(f"{path}: the recording does not name its array; give it with --array")
-    geometry = AccelerometerArray.load(array)
-    return open_recording(path, array=geometry), geometry
+        array = AccelerometerArray.load(name)
+    return open_recording(path, array=array), array

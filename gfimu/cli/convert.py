@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from gfimu.cli.array_option import load_array
 from gfimu.cli.output import JsonOption, print_json, print_paths, print_table
 
 __all__ = ["register"]
@@ -29,10 +30,9 @@ def _convert(
 
     Example: gfimu convert exp_1.bin.gz run.parquet
     """
-    from gfimu.array import AccelerometerArray
     from gfimu.recording_formats import open_recording
 
-    recording = open_recording(source, array=None if array is None else AccelerometerArray.load(array))
+    recording = open_recording(source, array=None if array is None else load_array(array))
     recording.write(target)
     figures = {
         "samples": len(recording),

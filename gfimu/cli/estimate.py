@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 import typer
 
+from gfimu.cli.array_option import load_array
 from gfimu.cli.output import JsonOption, print_json, print_paths, print_table
 
 if TYPE_CHECKING:
@@ -25,7 +26,8 @@ def _estimate(
     run: Annotated[Path, typer.Argument(help="Recording: .csv, .parquet, or a MIMU4444 stream (.bin, .bin.gz).")],
     out: Annotated[Path, typer.Option("--out", help="Estimate file to write, .parquet or .csv.")],
     array: Annotated[
-        str | None, typer.Option("--array", help="Array: a name or a TOML file; else the one the recording names.")
+        str | None,
+        typer.Option("--array", help="Array: a name, a .toml file or MJCF sites (.xml); else the recording's own."),
     ] = None,
     method: Annotated[str, typer.Option("--method", help="Method for the angular rate.")] = "integrate",
     form: Annotated[
@@ -43,7 +45,7 @@ def _estimate(
     from gfimu.estimation import estimate
     from gfimu.recording_formats import open_run
 
-    recording, geometry = open_run(run, array)
+    recording, geometry = open_run(run, None if array is None else load_array(array))
     found = estimate(recording, geometry, method=method, form=form, with_position=position)
     found.write(out)
     written = {"estimate": out}

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from gfimu.cli.array_option import load_array
 from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, progress
 
 if TYPE_CHECKING:
-    from gfimu.array import AccelerometerArray
     from gfimu.scoring import Score
 
 __all__ = ["register"]
@@ -51,7 +51,7 @@ def _score(
 
     if spin_axis not in _AXES:
         raise unknown_name("axis", spin_axis, _AXES)
-    loaded = [_load(name) for name in arrays or list_models("arrays")]
+    loaded = [load_array(name) for name in arrays or list_models("arrays")]
     omega = [speed * component for component in _AXES[spin_axis]]
     scores = score(loaded, length_unit_m=length_unit, omega_rad_s=omega, noise_m_s2=noise)
     if as_json:
@@ -123,17 +123,6 @@ def _optimize(
     typer.echo(f"{result.agreeing} of {result.starts} starts ended at this GDOP{bound}")
     if out is not None:
         print_paths([("the array", out)])
-
-
-def _load(name: str) -> AccelerometerArray:
-    """Load an array by name, from an array file, or from the sites of an MJCF file."""
-    from gfimu.array import AccelerometerArray
-
-    if name.endswith(".xml"):
-        from sim.mjcf_array import array_from_mjcf
-
-        return array_from_mjcf(name)
-    return AccelerometerArray.load(name)
 
 
 def _print_scores(scores: list[Score], condition: str) -> None:

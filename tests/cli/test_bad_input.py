@@ -134,6 +134,36 @@ def test_bad_option(gfimu_command, tmp_path, monkeypatch, options, words):
     assert [file.name for file in tmp_path.iterdir()] == ["run.csv"]
 
 
+def test_mjcf_without_sites(gfimu_command, tmp_path):
+    (tmp_path / "run.csv").write_text(GOOD)
+    model = tmp_path / "bare.xml"
+    model.write_text("<mujoco><worldbody><body><geom size='0.1'/></body></worldbody></mujoco>")
+    out = tmp_path / "estimate.csv"
+    result = gfimu_command("estimate", tmp_path / "run.csv", "--array", model, "--out", out)
+    assert_refused(result, "bare.xml", "no named site", "add one site per sensing axis")
+    assert_refused(gfimu_command("score", model), "bare.xml", "no named site")
+    assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    ("scenario", "words"),
+    [
+        ("papre_run", ["unknown scenario 'papre_run'", "paper_run"]),
+        ("missing/run.toml", ["missing/run.toml", "no such file"]),
+        ("unknown_key.toml", ["unknown_key.toml", "sample_rate"]),
+        ("unknown_motion.toml", ["unknown_motion.toml", "'dance'"]),
+    ],
+)
+def test_bad_scenario(gfimu_command, tmp_path, monkeypatch, scenario, words):
+    monkeypatch.chdir(tmp_path)
+    good = 'name = "x"\narray = "cube12"\nsample_rate_hz = 100.0\nduration_s = 1.0\n[motion]\nkind = "rest"\n'
+    (tmp_path / "unknown_key.toml").write_text(good.replace("sample_rate_hz", "sample_rate"))
+    (tmp_path / "unknown_motion.toml").write_text(good.replace("rest", "dance"))
+    before = sorted(tmp_path.iterdir())
+    assert_refused(gfimu_command("simulate", scenario, "--out", "run.csv"), *words)
+    assert sorted(tmp_path.iterdir()) == before
+
+
 def test_missing_run_and_unwritable_folder(gfimu_command, tmp_path):
     result = gfimu_command("estimate", tmp_path / "no.csv", "--array", "cube12", "--out", tmp_path / "e.csv")
     assert_refused(result, "no.csv", "no such file")
