@@ -1,0 +1,327 @@
+"""The LPC1768 board: processor, peripherals, four ADXL345 on SSP1, virtual time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, Protocol
+
+from firmware_bridge.adxl345_device import TICKS_PER_SECOND, Adxl345
+from firmware_bridge.board.cpu import Cpu
+from firmware_bridge.board.dwt import CycleCounter
+from firmware_bridge.board.gpio import Gpio, GpioInterrupts
+from firmware_bridge.board.i2c import I2c
+from firmware_bridge.board.nvic import Nvic
+from firmware_bridge.board.peripheral import NEVER, Peripheral, StoredRegisters
+from firmware_bridge.board.ssp import Ssp
+from firmware_bridge.board.system_control import BROWN_OUT, POWER_ON, SystemControl
+from firmware_bridge.board.systick import SysTick
+from firmware_bridge.board.timer import Timer
+from firmware_bridge.board.uart import Uart
+from firmware_bridge.board.watchdog import Watchdog
+from firmware_bridge.lpc1768.elf import ElfImage
+
+__all__ = ["Board", "Tracer"]
+
+_ACCESS_CYCLES = 4
+_SPI_SELECT_PORT = 2  # P2.0…P2.3 select sensors 1…4
+
+_STORED = (
+    ("pwm1", 0x40018000, 0x1000),
+    ("spi", 0x40020000, 0x1000),
+    ("rtc", 0x40024000, 0x1000),
+    ("pincon", 0x4002C000, 0x1000),
+    ("adc", 0x40034000, 0x1000),
+    ("can", 0x40038000, 0x10000),
+    ("dac", 0x4008C000, 0x1000),
+    ("i2s", 0x400A8000, 0x1000),
+    ("rit", 0x400B0000, 0x1000),
+    ("mcpwm", 0x400B8000, 0x1000),
+    ("qei", 0x400BC000, 0x1000),
+    ("ethernet", 0x50000000, 0x4000),
+    ("gpdma", 0x50004000, 0x4000),
+    ("usb", 0x5000C000, 0x4000),
+)
+
+
+class Tracer(Protocol):
+    """Takes note of what happens on the board."""
+
+    def access(self, ticks: int, peripheral: str, offset: int, value: int, *, write: bool) -> None:
+        """A register was read or written."""
+
+    def exception(self, ticks: int, number: int, *, entered: bool) -> None:
+        """An exception was entered or left."""
+
+
+class Board:
+    """A board with one firmware image.
+
+    Parameters
+    ----------
+    image : ElfImage
+        The firmware.
+    sensors : sequence of Adxl345
+        Chips on SSP1, selected by P2.0, P2.1 and so on; the same chips hang on I2C0 for images that use it.
+    tracer : Tracer, optional
+        Is told every register access and every exception (slow).
+
+    Attributes
+    ----------
+    now : int
+        Virtual time, ticks (`TICKS_PER_SECOND`).
+    cycle : int
+        Ticks per core clock cycle.
+    """
+
+    def __init__(self, image: ElfImage, sensors: Sequence[Adxl345] = (), *, tracer: Tracer | None = None) -> None:
+        self.image = image
+        self.sensors = list(sensors)
+        self.tracer = tracer
+        self.now = 0
+        self.cycle = TICKS_PER_SECOND // 4_000_000
+        self.until = NEVER
+        self.alarm = -1
+        self.reset_cause: int | None = None
+        self.stopped = False
+        self.sleeping = False
+        self.last_access = ""
+        self.resets = 0
+        self.exceptions = 0
+        self.lose_exception: Callable[[int], bool] | None = None
+        self._events: list[int] = []
+        self._peripherals: list[Peripheral] = []
+        self._accesses = 0
+        self._polled = (-1, -1)
+        self._ready = False
+        self._build()
+        self.cpu = Cpu(self, image)
+        self._map()
+        self._ready = True
+        self._reset_all()
+
+    def _build(self) -> None:
+        self.system_control = SystemControl(self)
+        self.nvic = Nvic(self)
+        self.systick = SysTick(self, "systick", 0)
+        self.timers = [
+            Timer(self, "timer0", 0x40004000, 1, 2),
+            Timer(self, "timer1", 0x40008000, 2, 4),
+            Timer(self, "timer2", 0x40090000, 3, 32 + 12),
+            Timer(self, "timer3", 0x40094000, 4, 32 + 14),
+        ]
+        self.uarts = [
+            Uart(self, "uart0", 0x4000C000, 5, 6),
+            Uart(self, "uart1", 0x40010000, 6, 8),
+            Uart(self, "uart2", 0x40098000, 7, 32 + 16),
+            Uart(self, "uart3", 0x4009C000, 8, 32 + 18),
+        ]
+        self.i2cs = [
+            I2c(self, "i2c0", 0x4001C000, 10, 14),
+            I2c(self, "i2c1", 0x4005C000, 11, 32 + 6),
+            I2c(self, "i2c2", 0x400A0000, 12, 32 + 20),
+        ]
+        self.ssps = [Ssp(self, "ssp0", 0x40088000, 14, 32 + 10), Ssp(self, "ssp1", 0x40030000, 15, 20)]
+        self.gpio_interrupts = GpioInterrupts(self)
+        self.gpio = Gpio(self)
+        self.gpio.on_change = self._pins_changed
+        self.watchdog = Watchdog(self, "watchdog", 0x40000000, irq=0)
+        self.cycle_counter = CycleCounter(self, "dwt", 0xE0001000)
+        for name, base, size in _STORED:
+            StoredRegisters(self, name, base, size)
+        self.i2cs[0].devices = list(self.sensors)
+
+    def _map(self) -> None:
+        for peripheral in self._peripherals:
+            if peripheral is self.systick:
+                continue
+            read, write = peripheral.read, peripheral.write
+            if self.tracer is not None:
+                read, write = self._traced(peripheral, self.tracer)
+            self.cpu.map_registers(peripheral.base, peripheral.size, read, write)
+        self.cpu.map_registers(0x42000000, 0x02000000, *self._bit_band(0x40000000))
+        self.cpu.map_registers(0x22000000, 0x02000000, *self._bit_band(0x20000000))
+
+    def _traced(self, peripheral: Peripheral, tracer: Tracer) -> tuple[Any, Any]:
+        def read(offset: int, size: int) -> int:
+            value = peripheral.read(offset, size)
+            tracer.access(self.now, peripheral.name, offset, value, write=False)
+            return value
+
+        def write(offset: int, value: int, size: int) -> None:
+            tracer.access(self.now, peripheral.name, offset, value, write=True)
+            peripheral.write(offset, value, size)
+
+        return read, write
+
+    def _bit_band(self, region: int) -> tuple[Any, Any]:
+        """Reader and writer of a bit-band alias: one word per bit of the region."""
+
+        def place(offset: int) -> tuple[int, int]:
+            return region + (offset >> 5 & ~3), offset >> 2 & 31
+
+        def read(offset: int, size: int) -> int:
+            address, bit = place(offset)
+            return self._read_word(address) >> bit & 1
+
+        def write(offset: int, value: int, size: int) -> None:
+            address, bit = place(offset)
+            old = self._read_word(address)
+            self._write_word(address, old & ~(1 << bit) | (value & 1) << bit)
+
+        return read, write
+
+    def _peripheral_at(self, address: int) -> Peripheral | None:
+        for peripheral in self._peripherals:
+            if peripheral is not self.systick and 0 <= address - peripheral.base < peripheral.size:
+                return peripheral
+        return None
+
+    def _read_word(self, address: int) -> int:
+        peripheral = self._peripheral_at(address)
+        if peripheral is not None:
+            return peripheral.read(address - peripheral.base, 4)
+        return int.from_bytes(self.cpu.peek(address, 4), "little")
+
+    def _write_word(self, address: int, value: int) -> None:
+        peripheral = self._peripheral_at(address)
+        if peripheral is not None:
+            peripheral.write(address - peripheral.base, value, 4)
+        else:
+            self.cpu.poke(address, value.to_bytes(4, "little"))
+
+    # Time
+
+    @property
+    def seconds(self) -> float:
+        """Virtual time, s."""
+        return self.now / TICKS_PER_SECOND
+
+    def add(self, peripheral: Peripheral) -> int:
+        """Take in a peripheral; return the number of its event."""
+        self._peripherals.append(peripheral)
+        self._events.append(NEVER)
+        return len(self._events) - 1
+
+    def schedule(self, slot: int, when: int) -> None:
+        """Wake a peripheral at ``when`` (instead of what it asked for before)."""
+        self._events[slot] = when
+        self.until = min(self._events)
+        self.alarm = min(self.alarm, self.until)
+
+    def service(self) -> None:
+        """Do the events that are due, in the order of their times and then of the peripherals."""
+        while self.until <= self.now:
+            slot = self._events.index(self.until)
+            self._events[slot] = NEVER
+            self._peripherals[slot].event()
+            self.until = min(self._events)
+        self.alarm = -1
+
+    def before_access(self) -> None:
+        """A register is accessed: that takes time, and what is due comes first."""
+        self.now += _ACCESS_CYCLES * self.cycle
+        self._accesses += 1
+        if self.now >= self.until:
+            self.service()
+
+    def spinning(self, slot: int) -> bool:
+        """Tell whether the last register access was the same: the program waits in a loop."""
+        last_slot, last_access = self._polled
+        self._polled = (slot, self._accesses)
+        return slot == last_slot and self._accesses == last_access + 1
+
+    def wait_until(self, when: int) -> None:
+        """The program polls: skip to ``when``, or to the next event if that is earlier."""
+        self.now = max(self.now, min(when, self.until))
+        if self.now >= self.until:
+            self.service()
+
+    def change_clock(self, cycle: int) -> None:
+        """The core clock or a peripheral divider changes; every counter goes on from its present count."""
+        for peripheral in self._peripherals if self._ready else ():
+            peripheral.clock_will_change()
+        self.cycle = cycle
+        for peripheral in self._peripherals if self._ready else ():
+            peripheral.clock_changed()
+
+    def run_until(self, ticks: int) -> None:
+        """Run to a point of virtual time.
+
+        Raises
+        ------
+        BoardFault
+            When the firmware does what the processor can't do.
+        """
+        if self.sleeping:
+            self.sleeping = False
+            if not self.cpu.resume_sleep(ticks):
+                return
+        self.cpu.run(ticks)
+
+    def run_for(self, seconds: float) -> None:
+        """Run for a span of virtual time, s."""
+        self.run_until(self.now + round(seconds * TICKS_PER_SECOND))
+
+    # Resets
+
+    def request_reset(self, cause: int) -> None:
+        """Reset at the next instruction boundary."""
+        self.reset_cause = cause
+        self.alarm = -1
+
+    def do_reset(self) -> None:
+        """Carry out a requested reset."""
+        if self.reset_cause is not None:
+            self.system_control.power_cause(self.reset_cause)
+        self.reset_cause = None
+        self.resets += 1
+        self._reset_all()
+
+    def brown_out(self) -> None:
+        """Supply voltage drops: processor, peripherals and sensors start again; unsent bytes are lost."""
+        self.request_reset(BROWN_OUT)
+        self.sleeping = False
+        for sensor in self.sensors:
+            sensor.power_on()
+        self.do_reset()
+
+    def _reset_all(self) -> None:
+        for slot in range(len(self._events)):
+            self._events[slot] = NEVER
+        self.until = NEVER
+        for peripheral in self._peripherals:
+            peripheral.reset()
+        for ssp in self.ssps:
+            ssp.selected = None
+        self.cpu.reset()
+        if not self.resets:
+            self.system_control.cause = POWER_ON
+
+    # Wiring
+
+    def _pins_changed(self, port: int, changed: int, levels: int) -> None:
+        """Chip-selects go to the sensors; the highest selected one answers."""
+        if port != _SPI_SELECT_PORT:
+            return
+        selected = None
+        for number, sensor in enumerate(self.sensors):
+            bit = 1 << number
+            if changed & bit:
+                if levels & bit:
+                    sensor.deselect(self.now)
+                else:
+                    sensor.select(self.now)
+            if not levels & bit:
+                selected = sensor
+        self.ssps[1].selected = selected
+
+    def note_exception(self, number: int, *, entered: bool) -> None:
+        """Count an exception and tell the tracer."""
+        if entered:
+            self.exceptions += 1
+        if self.tracer is not None:
+            self.tracer.exception(self.now, number, entered=entered)
+
+    def word(self, symbol: str) -> int:
+        """Value of a 32-bit variable of the firmware."""
+        return int.from_bytes(self.cpu.peek(self.image.symbols[symbol], 4), "little")

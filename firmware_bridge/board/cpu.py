@@ -1,0 +1,354 @@
+"""The Cortex-M3 in Unicorn: memory, registers, exception entry and return, the run loop.
+
+Unicorn (GPL-2) runs the instructions and nothing else: interrupts, sleep and time are done here. Interrupts are taken
+at the boundaries of Unicorn's translation blocks, always before a block is counted and executed, so the result does
+not depend on where the caller cuts time into slices. Emulation is never stopped from inside a register access: the
+access would be repeated.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import mmap
+import struct
+from typing import TYPE_CHECKING, Any
+
+from firmware_bridge.board.faults import BoardFault, FaultKind
+from firmware_bridge.board.nvic import SVCALL
+from gfimu.errors import InputError
+
+if TYPE_CHECKING:
+    from firmware_bridge.board.board import Board
+    from firmware_bridge.lpc1768.elf import ElfImage
+
+try:
+    import unicorn
+    from unicorn import arm_const as arm
+    from unicorn.unicorn_py3 import unicorn as binding
+except ImportError:  # the extra is not installed; `require_unicorn` says so
+    unicorn = None
+
+__all__ = ["Cpu", "require_unicorn"]
+
+FLASH_SIZE, RAM_BASE, RAM_SIZE, AHB_RAM_BASE, AHB_RAM_SIZE = 512 << 10, 0x10000000, 32 << 10, 0x2007C000, 32 << 10
+_EXC_RETURN = 0xFFFFFFF0
+_UNTIL = 0xFFFFFFF0  # never reached: emulation ends by WFI, by a stop or by an exception return
+_ENTRY_CYCLES = 12
+_FRAME_BYTES = 32
+_STACK_ALIGNED = 1 << 9
+_SWI, _PREFETCH_ABORT, _EXCEPTION_EXIT = 2, 3, 8
+_IT_BITS = 0x0600FC00
+
+
+def require_unicorn() -> None:
+    """Raise `InputError` that says what to install when the emulator is missing."""
+    if unicorn is None:
+        raise InputError("the board needs the emulator unicorn, which is not installed; pip install 'gfimu[firmware]'")
+
+
+class _Registers:
+    """Several registers read or written with one call."""
+
+    def __init__(self, handle: Any, names: list[int]) -> None:
+        count = len(names)
+        self._handle, self._count = handle, count
+        self._names = (ctypes.c_int32 * count)(*names)
+        self.values = (ctypes.c_uint32 * count)()
+        address = ctypes.addressof(self.values)
+        self._places = (ctypes.c_void_p * count)(*[address + 4 * k for k in range(count)])
+
+    def read(self) -> Any:
+        binding.uclib.uc_reg_read_batch(self._handle, self._names, self._places, self._count)
+        return self.values
+
+    def write(self) -> None:
+        binding.uclib.uc_reg_write_batch(self._handle, self._names, self._places, self._count)
+
+
+class Cpu:
+    """Processor core and memories.
+
+    Parameters
+    ----------
+    board : Board
+        The board around it.
+    image : ElfImage
+        What is in the flash.
+    """
+
+    def __init__(self, board: Board, image: ElfImage) -> None:
+        require_unicorn()
+        self.board = board
+        self.image = image
+        self.limit = 0
+        self.masked = False
+        self._exception_return = False
+        self._supervisor_call = False
+        self._intr_error = -1
+        self.uc = unicorn.Uc(unicorn.UC_ARCH_ARM, unicorn.UC_MODE_THUMB)
+        # UC_MODE_MCLASS would force a Cortex-M33 in unicorn 2.1; the model named here is the part on the board.
+        self.uc.ctl_set_cpu_model(arm.UC_CPU_ARM_CORTEX_M3)
+        self._handle = self.uc._uch
+        self.memory: dict[int, mmap.mmap] = {}
+        for base, size, rights in (
+            (0, FLASH_SIZE, unicorn.UC_PROT_READ | unicorn.UC_PROT_EXEC),
+            (RAM_BASE, RAM_SIZE, unicorn.UC_PROT_ALL),
+            (AHB_RAM_BASE, AHB_RAM_SIZE, unicorn.UC_PROT_ALL),
+        ):
+            self._map_memory(base, size, rights)
+        for segment in image.segments:
+            self.poke(segment.address, segment.data)
+        r = arm
+        self._core = _Registers(
+            self._handle,
+            [r.UC_ARM_REG_R0, r.UC_ARM_REG_R1, r.UC_ARM_REG_R2, r.UC_ARM_REG_R3, r.UC_ARM_REG_R12, r.UC_ARM_REG_LR,
+             r.UC_ARM_REG_XPSR, r.UC_ARM_REG_SP, r.UC_ARM_REG_CONTROL],
+        )  # fmt: skip
+        self._unstack = _Registers(
+            self._handle,
+            [r.UC_ARM_REG_SP, r.UC_ARM_REG_R0, r.UC_ARM_REG_R1, r.UC_ARM_REG_R2, r.UC_ARM_REG_R3, r.UC_ARM_REG_R12,
+             r.UC_ARM_REG_LR, r.UC_ARM_REG_XPSR],
+        )  # fmt: skip
+        self._entry = _Registers(self._handle, [r.UC_ARM_REG_SP, r.UC_ARM_REG_XPSR, r.UC_ARM_REG_LR])
+        self._masks = _Registers(self._handle, [r.UC_ARM_REG_PRIMASK, r.UC_ARM_REG_BASEPRI, r.UC_ARM_REG_FAULTMASK])
+        self._pc = _Registers(self._handle, [r.UC_ARM_REG_PC])
+        self._callbacks: list[Any] = []
+        self._hook(unicorn.UC_HOOK_INTR, binding.HOOK_INTR_CFUNC(self._on_intr))
+        self._hook(unicorn.UC_HOOK_BLOCK, binding.HOOK_CODE_CFUNC(self._block_hook()))
+        self.pc = 0
+
+    # Memory
+
+    def _map_memory(self, base: int, size: int, rights: int) -> None:
+        """Map memory that this process and the guest share."""
+        memory = mmap.mmap(-1, size)
+        self.memory[base] = memory
+        address = ctypes.addressof(ctypes.c_char.from_buffer(memory))
+        error = binding.uclib.uc_mem_map_ptr(
+            self._handle,
+            ctypes.c_uint64(base),
+            ctypes.c_size_t(size),
+            ctypes.c_uint32(rights),
+            ctypes.c_void_p(address),
+        )
+        if error:
+            raise unicorn.UcError(error)
+
+    def _memory_at(self, address: int, count: int) -> tuple[mmap.mmap, int]:
+        for base, memory in self.memory.items():
+            if base <= address and address + count <= base + len(memory):
+                return memory, address - base
+        raise self._fault(FaultKind.STACKING, f"no memory at {address:#010x}")
+
+    def peek(self, address: int, count: int) -> bytes:
+        """Bytes in flash or RAM."""
+        memory, offset = self._memory_at(address, count)
+        return memory[offset : offset + count]
+
+    def poke(self, address: int, data: bytes) -> None:
+        """Put bytes into flash or RAM."""
+        memory, offset = self._memory_at(address, len(data))
+        memory[offset : offset + len(data)] = data
+
+    # Hooks
+
+    def _hook(self, kind: int, callback: Any) -> None:
+        self._callbacks.append(callback)
+        handle = ctypes.c_size_t()
+        binding.uclib.uc_hook_add(
+            self._handle,
+            ctypes.byref(handle),
+            ctypes.c_int(kind),
+            ctypes.cast(callback, ctypes.c_void_p),
+            None,
+            ctypes.c_uint64(1),
+            ctypes.c_uint64(0),
+        )
+
+    def map_registers(self, base: int, size: int, read: Any, write: Any) -> None:
+        """Send accesses to an address range to ``read(offset, size)`` and ``write(offset, value, size)``."""
+        board = self.board
+
+        def on_read(_: Any, offset: int, width: int, __: Any) -> int:
+            board.before_access()
+            return read(offset, width) & 0xFFFFFFFF
+
+        def on_write(_: Any, offset: int, width: int, value: int, __: Any) -> None:
+            board.before_access()
+            write(offset, value, width)
+
+        callbacks = binding.MMIO_READ_CFUNC(on_read), binding.MMIO_WRITE_CFUNC(on_write)
+        self._callbacks += callbacks
+        error = binding.uclib.uc_mmio_map(
+            self._handle, ctypes.c_uint64(base), ctypes.c_size_t(size), callbacks[0], None, callbacks[1], None
+        )
+        if error:
+            raise unicorn.UcError(error)
+
+    def _block_hook(self) -> Any:
+        board, stop, handle = self.board, binding.uclib.uc_emu_stop, self._handle
+
+        def on_block(_: Any, __: int, size: int, ___: Any) -> None:
+            if board.now >= board.alarm and self._must_stop():
+                board.stopped = True
+                stop(handle)
+                return
+            board.now += (size >> 1) * board.cycle  # about one cycle per half-word of code
+
+        return on_block
+
+    def _must_stop(self) -> bool:
+        """Look, before a block is executed, whether an interrupt or the end of the slice comes first."""
+        board = self.board
+        if board.now >= board.until:
+            board.service()
+        if board.reset_cause is not None:
+            return True
+        exception = board.nvic.best()
+        self.masked = bool(exception) and board.nvic.masked(exception, *self._masks.read())
+        board.alarm = -1 if self.masked else min(board.until, self.limit)
+        return (exception != 0 and not self.masked) or board.now >= self.limit
+
+    def _on_intr(self, _: Any, number: int, __: Any) -> None:
+        pc = self._pc.read()[0]
+        if number == _EXCEPTION_EXIT or (number == _PREFETCH_ABORT and pc >= _EXC_RETURN):
+            self._exception_return = True
+        elif number == _SWI:
+            self._supervisor_call = True
+        else:
+            self._intr_error = number
+        binding.uclib.uc_emu_stop(self._handle)
+
+    # Exceptions
+
+    def reset(self) -> None:
+        """Load stack pointer and entry point from the vector table; RAM keeps what it holds, as on the chip."""
+        stack, entry = struct.unpack("<II", self.peek(0, 8))
+        for register in (arm.UC_ARM_REG_PRIMASK, arm.UC_ARM_REG_BASEPRI, arm.UC_ARM_REG_FAULTMASK):
+            self.uc.reg_write(register, 0)
+        self.uc.reg_write(arm.UC_ARM_REG_XPSR, 1 << 24)
+        self.uc.reg_write(arm.UC_ARM_REG_CONTROL, 0)
+        self.uc.reg_write(arm.UC_ARM_REG_MSP, stack)
+        self.pc = entry | 1
+        self.masked = False
+
+    def enter(self, exception: int) -> None:
+        """Exception entry (ARMv7-M ARM B1.5.6): stack eight words, run the handler on the main stack."""
+        board, nvic = self.board, self.board.nvic
+        r0, r1, r2, r3, r12, lr, xpsr, sp, control = self._core.read()
+        padding = sp & 4
+        frame = sp - _FRAME_BYTES - padding
+        status = (xpsr & ~_STACK_ALIGNED) | (_STACK_ALIGNED if padding else 0)
+        self.poke(frame, struct.pack("<8I", r0, r1, r2, r3, r12, lr, self.pc & ~1, status))
+        process_stack = not nvic.active and control & 2
+        entry = self._entry
+        entry.values[0] = frame
+        entry.values[1] = (xpsr & ~_IT_BITS & ~0x1FF) | exception
+        entry.values[2] = 0xFFFFFFF1 if nvic.active else 0xFFFFFFFD if process_stack else 0xFFFFFFF9
+        entry.write()  # the stack pointer first: a new exception number may switch to the main stack
+        if process_stack:
+            self.uc.reg_write(arm.UC_ARM_REG_CONTROL, control & ~2)
+        nvic.enter(exception)
+        board.now += _ENTRY_CYCLES * board.cycle
+        board.note_exception(exception, entered=True)
+        self.pc = struct.unpack("<I", self.peek(nvic.vtor + 4 * exception, 4))[0] | 1
+
+    def leave(self) -> None:
+        """Exception return (ARMv7-M ARM B1.5.8)."""
+        board, nvic = self.board, self.board.nvic
+        if not nvic.active:
+            raise self._fault(FaultKind.EXCEPTION_RETURN, "exception return outside an exception")
+        ended = nvic.active[-1]
+        nvic.leave()
+        process_stack = self._pc.read()[0] & 0xC == 0xC
+        if process_stack:
+            self.uc.reg_write(arm.UC_ARM_REG_SP, self.uc.reg_read(arm.UC_ARM_REG_SP))
+            sp = self.uc.reg_read(arm.UC_ARM_REG_PSP)
+        else:
+            sp = self._core.read()[7]
+        r0, r1, r2, r3, r12, lr, pc, status = struct.unpack("<8I", self.peek(sp, _FRAME_BYTES))
+        after = sp + _FRAME_BYTES + (4 if status & _STACK_ALIGNED else 0)
+        values = self._unstack.values
+        values[1], values[2], values[3], values[4], values[5], values[6] = r0, r1, r2, r3, r12, lr
+        values[7] = status & ~_STACK_ALIGNED
+        if process_stack:
+            values[0] = self.uc.reg_read(arm.UC_ARM_REG_SP)
+            self._unstack.write()
+            self.uc.reg_write(arm.UC_ARM_REG_CONTROL, self.uc.reg_read(arm.UC_ARM_REG_CONTROL) | 2)
+            self.uc.reg_write(arm.UC_ARM_REG_SP, after)
+        else:
+            values[0] = after
+            self._unstack.write()
+        self.pc = pc | 1
+        board.now += _ENTRY_CYCLES * board.cycle
+        board.alarm = -1
+        board.note_exception(ended, entered=False)
+
+    # Running
+
+    def run(self, limit: int) -> None:
+        """Run until virtual time reaches ``limit`` (ticks)."""
+        board, nvic = self.board, self.board.nvic
+        start, handle, pc_register = binding.uclib.uc_emu_start, self._handle, self._pc
+        self.limit = limit
+        never = ctypes.c_uint64(_UNTIL)
+        zero, none = ctypes.c_uint64(0), ctypes.c_size_t(0)
+        board.alarm = -1
+        while board.now < limit:
+            if board.now >= board.until:
+                board.service()
+            if board.reset_cause is not None:
+                board.do_reset()
+            exception = nvic.best()
+            if exception and not nvic.masked(exception, *self._masks.read()):
+                self.enter(exception)
+            board.alarm = -1
+            error = start(handle, ctypes.c_uint64(self.pc), never, zero, none)
+            if error:
+                raise self._fault(FaultKind.of(error), board.last_access)
+            if self._exception_return:
+                self._exception_return = False
+                self.leave()
+                continue
+            if self._intr_error >= 0:
+                number, self._intr_error = self._intr_error, -1
+                raise self._fault(FaultKind.UNDEFINED, f"processor exception {number}")
+            self.pc = pc_register.read()[0] | 1
+            if self._supervisor_call:
+                self._supervisor_call = False
+                nvic.pend(SVCALL)
+                continue
+            if self.board.stopped:
+                self.board.stopped = False
+                continue
+            if not self._sleep(limit):
+                return
+
+    def resume_sleep(self, limit: int) -> bool:
+        """Go on sleeping where the last slice ended; False if this slice ends first, too."""
+        return self._sleep(limit)
+
+    def _sleep(self, limit: int) -> bool:
+        """WFI: skip to the event that wakes the processor; False if the slice ends first."""
+        board = self.board
+        while not board.nvic.wakes and board.reset_cause is None:
+            if board.until > limit:
+                board.now = max(board.now, limit)
+                board.sleeping = True
+                return False
+            board.now = max(board.now, board.until)
+            board.service()
+        return True
+
+    # Faults
+
+    def _fault(self, kind: FaultKind, detail: str) -> BoardFault:
+        """Describe where the processor stands."""
+        names = [f"r{number}" for number in range(13)] + ["sp", "lr", "pc", "xpsr", "msp", "psp"]
+        registers = {
+            name: int(self.uc.reg_read(getattr(arm, f"UC_ARM_REG_{name.upper()}"))) & 0xFFFFFFFF for name in names
+        }
+        active = self.board.nvic.active[-1] if self.board.nvic.active else 0
+        return BoardFault(
+            kind, registers["pc"], registers, self.image.symbol_at(registers["pc"]), detail, active, self.board.seconds
+        )

@@ -1,0 +1,206 @@
+"""Build the firmware with the C compiler that comes in the `ziglang` wheel, and know what was built from what."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import struct
+import subprocess
+import sys
+import tempfile
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import tomli_w
+
+from firmware_bridge.lpc1768.elf import ElfImage
+from gfimu.atomic_file import atomic_path, write_text
+from gfimu.errors import GfimuError, InputError
+
+__all__ = [
+    "IMAGES",
+    "BuildReport",
+    "build",
+    "build_host_library",
+    "check_image",
+    "compiler_version",
+    "image_path",
+    "source_hash",
+]
+
+FOLDER = Path(__file__).resolve().parent
+SOURCES = FOLDER / "src"
+
+IMAGES: dict[str, tuple[str, ...]] = {
+    "gfimu": ("startup.c", "board.c", "core.c", "adxl345.c"),
+    "selfcheck": ("startup.c", "selfcheck.c"),
+}
+"""Images and the C files that make them."""
+
+_FLAGS = (
+    "-target", "thumb-freestanding-eabi", "-mcpu=cortex_m3", "-mthumb", "-std=c11", "-O2", "-g0",
+    "-ffreestanding", "-fno-builtin", "-fno-sanitize=undefined", "-fno-unwind-tables",
+    "-fno-asynchronous-unwind-tables", "-ffunction-sections", "-fdata-sections",
+    "-Wall", "-Wextra", "-Wconversion", "-Werror", "-nostdlib",
+    "-Wl,-T,lpc1768.ld", "-Wl,--gc-sections", "-Wl,-e,Reset_Handler",
+)  # fmt: skip
+_VECTORS_SUMMED = 7
+MISSING_COMPILER = "the firmware can't be built: ziglang is not installed; pip install 'gfimu[firmware]'"
+
+
+@dataclass(frozen=True)
+class BuildReport:
+    """One built image.
+
+    Parameters
+    ----------
+    name : str
+        Image name.
+    elf, binary : Path
+        The ELF file (with symbols) and the raw image for the flash.
+    sha256 : str
+        Hash of the ELF file.
+    source_sha256 : str
+        Hash of the sources, linker script, flags and definitions.
+    compiler : str
+        Compiler and version.
+    text_bytes, data_bytes, bss_bytes : int
+        Flash and memory used.
+    defines : mapping of str to str
+        Preprocessor definitions beyond the defaults.
+    """
+
+    name: str
+    elf: Path
+    binary: Path
+    sha256: str
+    source_sha256: str
+    compiler: str
+    text_bytes: int
+    data_bytes: int
+    bss_bytes: int
+    defines: Mapping[str, str] = field(default_factory=dict)
+
+
+def image_path(name: str = "gfimu") -> Path:
+    """Path of a committed image; raises `InputError` that lists the images."""
+    if name not in IMAGES:
+        raise InputError(f"unknown image {name!r}; valid: {', '.join(IMAGES)}, or the path of an ELF file")
+    return FOLDER / "image" / f"{name}.elf"
+
+
+def compiler_version() -> str:
+    """Version of the installed compiler.
+
+    Raises
+    ------
+    InputError
+        If `ziglang` is not installed; the message says what to install.
+    """
+    if importlib.util.find_spec("ziglang") is None:
+        raise InputError(MISSING_COMPILER)
+    return "ziglang " + _zig("version", cwd=FOLDER).strip()
+
+
+def source_hash(name: str, defines: Mapping[str, str] | None = None) -> str:
+    """SHA-256 over everything that decides the bytes of an image, except the compiler's version."""
+    digest = hashlib.sha256()
+    for file in sorted(SOURCES.iterdir()):
+        digest.update(file.name.encode() + b"\0" + file.read_bytes().replace(b"\r\n", b"\n") + b"\0")
+    digest.update(repr((name, IMAGES[name], _FLAGS, sorted((defines or {}).items()))).encode())
+    return digest.hexdigest()
+
+
+def build(
+    name: str = "gfimu", out: str | Path | None = None, *, defines: Mapping[str, str] | None = None
+) -> BuildReport:
+    """Compile and link one image; write ``NAME.elf``, ``NAME.bin`` and ``NAME.toml``.
+
+    Parameters
+    ----------
+    name : str
+        Image in `IMAGES`.
+    out : str or Path, optional
+        Folder for the results; by default the package's own ``image`` folder.
+    defines : mapping of str to str, optional
+        Preprocessor definitions, such as ``{"GFIMU_SPI_HZ": "100000U"}``.
+
+    Raises
+    ------
+    InputError
+        If the compiler is not installed or the image is unknown.
+    GfimuError
+        If the sources do not compile; the message holds the compiler's.
+    """
+    image_path(name)
+    compiler = compiler_version()
+    folder = Path(out) if out is not None else FOLDER / "image"
+    identity = source_hash(name, defines)
+    options = [f"-D{key}={value}" for key, value in sorted((defines or {}).items())]
+    options.append(f"-DGFIMU_BUILD_ID=0x{identity[:8]}U")
+    with tempfile.TemporaryDirectory() as scratch:
+        linked = Path(scratch) / f"{name}.elf"
+        _zig("cc", *_FLAGS, *options, *IMAGES[name], "-o", str(linked), cwd=SOURCES)
+        content = _with_boot_checksum(linked.read_bytes())
+    image = ElfImage.parse(content, name)
+    elf, binary = folder / f"{name}.elf", folder / f"{name}.bin"
+    for path, data in ((elf, content), (binary, image.flash_bytes())):
+        with atomic_path(path) as temporary:
+            temporary.write_bytes(data)
+    text, data_bytes, bss = image.section_sizes()
+    report = BuildReport(
+        name, elf, binary, hashlib.sha256(content).hexdigest(), identity, compiler, text, data_bytes, bss, defines or {}
+    )
+    facts = {
+        "compiler": compiler,
+        "sha256": report.sha256,
+        "source_sha256": identity,
+        "text_bytes": text,
+        "data_bytes": data_bytes,
+        "bss_bytes": bss,
+        "defines": dict(report.defines),
+    }
+    write_text(folder / f"{name}.toml", tomli_w.dumps(facts))
+    return report
+
+
+def check_image(name: str = "gfimu") -> dict[str, str | bool]:
+    """Compare a committed image with its recorded hash and with the sources that are here now."""
+    elf = image_path(name)
+    facts = tomllib.loads(elf.with_suffix(".toml").read_text(encoding="utf-8"))
+    return {
+        "compiler": facts["compiler"],
+        "image_as_recorded": hashlib.sha256(elf.read_bytes()).hexdigest() == facts["sha256"],
+        "sources_as_recorded": source_hash(name, facts["defines"]) == facts["source_sha256"],
+    }
+
+
+def build_host_library(out: str | Path) -> Path:
+    """Compile the firmware's core for this computer, as a shared library for tests; return its path."""
+    compiler_version()
+    suffix = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
+    library = Path(out) / f"firmware_host{suffix}"
+    flags = ("-std=c11", "-O1", "-g0", "-shared", "-fPIC", "-Wall", "-Wextra", "-Werror", "-fsanitize=undefined")
+    files = ("host/hal_host.c", "src/core.c", "src/adxl345.c")
+    _zig("cc", *flags, "-fsanitize-trap=undefined", *files, "-o", str(library), cwd=FOLDER)
+    return library
+
+
+def _zig(*arguments: str, cwd: Path) -> str:
+    run = subprocess.run(
+        [sys.executable, "-m", "ziglang", *arguments], cwd=cwd, capture_output=True, text=True, check=False
+    )
+    if run.returncode:
+        raise GfimuError(f"the C compiler failed:\n{run.stderr.strip()}")
+    return run.stdout
+
+
+def _with_boot_checksum(content: bytes) -> bytes:
+    """Fill word 7 of the vector table so that the first eight words sum to zero: the boot ROM asks for it (UM10360 32.3.1.1)."""
+    offset = ElfImage.parse(content, "image").file_offset(0)
+    words = struct.unpack_from(f"<{_VECTORS_SUMMED}I", content, offset)
+    patched = bytearray(content)
+    struct.pack_into("<I", patched, offset + 4 * _VECTORS_SUMMED, -sum(words) & 0xFFFFFFFF)
+    return bytes(patched)

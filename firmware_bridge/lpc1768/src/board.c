@@ -1,0 +1,311 @@
+/* The hardware side: clocks, SSP1 with GPIO chip-selects, timers, UART0, watchdog, main loop. */
+#include "core.h"
+#include "hal.h"
+#include "lpc1768.h"
+
+#ifndef GFIMU_SPI_HZ
+#define GFIMU_SPI_HZ 5000000U
+#endif
+#ifndef GFIMU_BOOT_BAUD
+#define GFIMU_BOOT_BAUD 1562500U
+#endif
+#ifndef GFIMU_AUTOSTART
+#define GFIMU_AUTOSTART 1
+#endif
+
+#define CORE_HZ 100000000U /* CCLK; the peripherals used run at CCLK */
+#define BAUD_MIN 9600U
+#define SSP_PRESCALER 2U
+#define SSP_DIVIDER ((CORE_HZ + (SSP_PRESCALER * GFIMU_SPI_HZ) - 1U) / (SSP_PRESCALER * GFIMU_SPI_HZ))
+#define SPI_PINS 0x0FU /* P2.0…P2.3: chip-selects of sensors 1…4 */
+
+#define WATCHDOG_TICKS 2000000U /* 2 s of the 4 MHz internal oscillator, divided by 4 */
+#define WATCHDOG_FEED_US 100000U
+
+#define PRIORITY_SAMPLE 1U
+#define PRIORITY_UART 2U
+
+_Static_assert((SSP_DIVIDER >= 1U) && (SSP_DIVIDER <= 256U), "GFIMU_SPI_HZ is out of the SSP's reach");
+
+static volatile bool transmitting;
+
+void TIMER0_Handler(void);
+void UART0_Handler(void);
+
+/* ---- clocks ---- */
+
+static void pll_feed(void)
+{
+    PLL0FEED = 0xAAU;
+    PLL0FEED = 0x55U;
+}
+
+/* 12 MHz crystal × 2 × 100 / 6 = 400 MHz, / 4 = 100 MHz (UM10360 4.5.13) */
+static void clock_init(void)
+{
+    SCS = 1U << 5;
+    while ((SCS & (1U << 6)) == 0U) {
+    }
+    CCLKCFG = 3U;
+    CLKSRCSEL = 1U;
+    PLL0CFG = (5U << 16) | 99U;
+    pll_feed();
+    PLL0CON = 1U;
+    pll_feed();
+    while ((PLL0STAT & (1U << 26)) == 0U) {
+    }
+    PLL0CON = 3U;
+    pll_feed();
+    while ((PLL0STAT & (3U << 24)) != (3U << 24)) {
+    }
+    FLASHCFG = (FLASHCFG & 0xFFFU) | 0x4000U;
+    PCONP |= PCONP_TIMER0 | PCONP_TIMER1 | PCONP_UART0 | PCONP_SSP1 | PCONP_GPIO;
+    PCLKSEL0 = (1U << 2) | (1U << 4) | (1U << 6) | (1U << 20); /* TIMER0, TIMER1, UART0, SSP1 at CCLK */
+}
+
+/* ---- SPI ---- */
+
+static void spi_init(void)
+{
+    PINSEL0 = (1U << 4) | (1U << 6) | (2U << 14) | (2U << 16) | (2U << 18); /* TXD0, RXD0, SCK1, MISO1, MOSI1 */
+    PINSEL4 &= ~0xFFU;
+    FIO2SET = SPI_PINS;
+    FIO2DIR |= SPI_PINS;
+    SSP1CR0 = SSP_CR0_16_BIT | SSP_CR0_MODE_3 | ((SSP_DIVIDER - 1U) << SSP_CR0_DIVIDER_SHIFT);
+    SSP1CPSR = SSP_PRESCALER;
+    SSP1CR1 = SSP_CR1_ENABLE;
+}
+
+void hal_spi_exchange(uint32_t sensor, uint16_t *words, uint32_t count)
+{
+    FIO2CLR = 1U << sensor;
+    for (uint32_t i = 0U; i < count; i++) {
+        SSP1DR = words[i];
+    }
+    while ((SSP1SR & SSP_SR_BUSY) != 0U) {
+    }
+    for (uint32_t i = 0U; i < count; i++) {
+        words[i] = (uint16_t)SSP1DR;
+    }
+    FIO2SET = 1U << sensor;
+}
+
+uint32_t hal_spi_khz(void)
+{
+    return CORE_HZ / (SSP_PRESCALER * SSP_DIVIDER) / 1000U;
+}
+
+/* ---- time ---- */
+
+static void time_init(void)
+{
+    T1PR = (CORE_HZ / 1000000U) - 1U;
+    T1TCR = TIMER_RESET;
+    T1TCR = TIMER_ENABLE;
+}
+
+uint32_t hal_time_us(void)
+{
+    return T1TC;
+}
+
+void hal_timer_start(uint32_t rate_hz)
+{
+    T0TCR = TIMER_RESET;
+    T0PR = 0U;
+    T0MR0 = ((CORE_HZ + (rate_hz / 2U)) / rate_hz) - 1U;
+    T0MCR = TIMER_MR0_INTERRUPT | TIMER_MR0_RESET;
+    T0IR = 1U;
+    T0TCR = TIMER_ENABLE;
+}
+
+void hal_timer_stop(void)
+{
+    T0TCR = 0U;
+    T0IR = 1U;
+}
+
+void TIMER0_Handler(void)
+{
+    T0IR = 1U;
+    core_sample();
+}
+
+/* ---- UART ---- */
+
+struct baud_setting {
+    uint32_t divisor;
+    uint32_t fraction; /* FDR: MULVAL in bits 4…7, DIVADDVAL in bits 0…3 */
+    uint32_t error;    /* deviation from the wanted rate, baud */
+};
+
+/* Divisor and fractional divider that come nearest: baud = CORE_HZ / (16 · divisor · (1 + add / multiplier)). */
+static struct baud_setting find_baud(uint32_t baud)
+{
+    struct baud_setting best = {1U, 0x10U, UINT32_MAX};
+    for (uint32_t multiplier = 1U; multiplier <= 15U; multiplier++) {
+        for (uint32_t add = 0U; add < multiplier; add++) {
+            uint32_t clock = (CORE_HZ / 16U) * multiplier / (multiplier + add);
+            uint32_t divisor = (clock + (baud / 2U)) / baud;
+            if ((divisor >= 1U) && (divisor <= 0xFFFFU) && ((add == 0U) || (divisor >= 3U))) {
+                uint32_t actual = clock / divisor;
+                uint32_t error = (actual > baud) ? (actual - baud) : (baud - actual);
+                if (error < best.error) {
+                    best.divisor = divisor;
+                    best.fraction = (multiplier << 4) | add;
+                    best.error = error;
+                }
+            }
+        }
+    }
+    return best;
+}
+
+bool hal_baud_possible(uint32_t baud)
+{
+    return (baud >= BAUD_MIN) && (baud <= (CORE_HZ / 16U)) && (find_baud(baud).error <= (baud / 100U));
+}
+
+void hal_set_baud(uint32_t baud)
+{
+    struct baud_setting setting = find_baud(baud);
+    U0LCR = UART_LCR_DIVISOR | UART_LCR_8N1;
+    U0DLL = setting.divisor & 0xFFU;
+    U0DLM = setting.divisor >> 8;
+    U0FDR = setting.fraction;
+    U0LCR = UART_LCR_8N1;
+}
+
+static void uart_init(void)
+{
+    hal_set_baud(GFIMU_BOOT_BAUD);
+    U0FCR = 0x07U;
+    U0IER = UART_IER_RECEIVE | UART_IER_TRANSMIT | UART_IER_LINE_STATUS;
+}
+
+static void fill_transmitter(void)
+{
+    const uint8_t *bytes;
+    uint32_t count = core_transmit_peek(&bytes);
+    if (count > UART_FIFO_BYTES) {
+        count = UART_FIFO_BYTES;
+    }
+    for (uint32_t i = 0U; i < count; i++) {
+        U0THR = bytes[i];
+    }
+    core_transmit_taken(count);
+    transmitting = (count != 0U);
+}
+
+void hal_transmit_kick(void)
+{
+    hal_lock();
+    if (!transmitting) {
+        fill_transmitter();
+    }
+    hal_unlock();
+}
+
+bool hal_transmit_idle(void)
+{
+    const uint8_t *bytes;
+    return (core_transmit_peek(&bytes) == 0U) && ((U0LSR & UART_LSR_IDLE) != 0U);
+}
+
+void UART0_Handler(void)
+{
+    uint32_t cause = U0IIR;
+    if ((cause & UART_IIR_NONE) == 0U) {
+        if ((cause & 0x0EU) == 0x02U) {
+            hal_lock(); /* a sample between "nothing left" and "not transmitting" would wait for the next one */
+            fill_transmitter();
+            hal_unlock();
+        } else {
+            uint32_t line = U0LSR;
+            if ((line & UART_LSR_ERRORS) != 0U) {
+                core_receive_error();
+            }
+            while ((line & UART_LSR_READY) != 0U) {
+                core_receive((uint8_t)U0RBR);
+                line = U0LSR;
+            }
+        }
+    }
+}
+
+/* ---- critical sections ---- */
+
+static volatile uint32_t lock_depth;
+
+void hal_lock(void)
+{
+    interrupts_off();
+    lock_depth++;
+}
+
+void hal_unlock(void)
+{
+    lock_depth--;
+    if (lock_depth == 0U) {
+        interrupts_on();
+    }
+}
+
+/* ---- watchdog ---- */
+
+static void watchdog_feed(void)
+{
+    hal_lock(); /* the two writes must follow each other (UM10360 28.4.3) */
+    WDFEED = 0xAAU;
+    WDFEED = 0x55U;
+    hal_unlock();
+}
+
+/* Fed only while samples are taken as they should be. */
+static void watchdog_watch(void)
+{
+    static uint32_t fed_us;
+    static uint32_t seen;
+    uint32_t now_us = hal_time_us();
+    if ((now_us - fed_us) >= WATCHDOG_FEED_US) {
+        uint32_t beat = core_heartbeat();
+        if (!core_is_streaming() || (beat != seen)) {
+            seen = beat;
+            fed_us = now_us;
+            watchdog_feed();
+        }
+    }
+}
+
+int main(void)
+{
+    hal_lock();
+    uint32_t cause = RSID & 0x0FU;
+    RSID = cause; /* the flags are cleared by writing ones */
+    clock_init();
+    time_init();
+    spi_init();
+    uart_init();
+    core_init(cause, GFIMU_BOOT_BAUD);
+    NVIC_PRIORITY(IRQ_TIMER0) = PRIORITY_SAMPLE << NVIC_PRIORITY_SHIFT;
+    NVIC_PRIORITY(IRQ_UART0) = PRIORITY_UART << NVIC_PRIORITY_SHIFT;
+    NVIC_ISER0 = (1U << IRQ_TIMER0) | (1U << IRQ_UART0);
+    WDTC = WATCHDOG_TICKS;
+    WDMOD = WDMOD_ENABLE_RESET;
+    watchdog_feed();
+#if GFIMU_AUTOSTART
+    core_start();
+#endif
+    hal_unlock();
+    for (;;) {
+        core_poll();
+        watchdog_watch();
+        /* With interrupts off, nothing can arrive between the question and the sleep; a pending one still wakes. */
+        interrupts_off();
+        if (!core_has_work()) {
+            wait_for_interrupt();
+        }
+        interrupts_on();
+    }
+    return 0;
+}

@@ -1,0 +1,556 @@
+#include "core.h"
+
+#include <stddef.h>
+
+#include "adxl345.h"
+#include "hal.h"
+
+#ifndef GFIMU_BUILD_ID
+#define GFIMU_BUILD_ID 0U
+#endif
+#ifndef GFIMU_BOOT_RATE_HZ
+#define GFIMU_BOOT_RATE_HZ 100U
+#endif
+
+#define SYNC_1 0xA5U
+#define SYNC_2 0x5AU
+#define FRAME_VERSION 1U
+#define HEADER_BYTES 10U
+#define PAYLOAD_BYTES 24U
+#define CRC_OFFSET (FRAME_BYTES - 2U)
+#define NO_READING INT16_MIN
+#define NO_TEMPERATURE INT16_MIN
+
+#define COMMAND_SYNC_1 0xC3U
+#define COMMAND_SYNC_2 0x3CU
+#define COMMAND_HEADER_BYTES 4U
+#define COMMAND_PAYLOAD_MAX 8U
+#define COMMAND_BYTES_MAX (COMMAND_HEADER_BYTES + COMMAND_PAYLOAD_MAX + 2U)
+
+#define RECEIVE_RING 64U /* a power of two */
+#define TRANSMIT_RING (FRAME_SLOTS * FRAME_BYTES)
+#define BITS_PER_FRAME (FRAME_BYTES * 10U)
+#define MICROSECONDS 1000000U
+#define RETRY_US 20000U /* how often a missing sensor is looked for */
+
+_Static_assert((RECEIVE_RING & (RECEIVE_RING - 1U)) == 0U, "the receive ring is indexed with a mask");
+_Static_assert(HEADER_BYTES + PAYLOAD_BYTES + 6U == FRAME_BYTES, "frame layout");
+_Static_assert(SENSOR_COUNT * 6U == PAYLOAD_BYTES, "a sample fills the payload");
+
+static struct {
+    /* configuration */
+    uint32_t rate_hz;
+    uint32_t baud;
+    uint8_t bw_rate;
+    uint8_t data_format;
+    uint8_t reset_cause;
+    /* sampling */
+    bool streaming;
+    bool first;
+    uint16_t sequence;
+    uint16_t message_sequence;
+    uint32_t last_sample_us;
+    uint32_t last_retry_us;
+    volatile uint32_t heartbeat;
+    uint32_t dropped;
+    uint32_t present; /* bit mask of answering sensors */
+    uint16_t sticky;  /* status bits to report in the next frame */
+    volatile bool announce;
+    uint32_t new_baud; /* 0, or the rate to switch to once the reply has left */
+} core;
+
+/* Frames to send. Only whole frames enter and frames never wrap, since the ring is a multiple of their size. */
+static uint8_t transmit_ring[TRANSMIT_RING];
+static volatile uint32_t transmit_head; /* where the next frame goes */
+static volatile uint32_t transmit_tail; /* the next byte to send */
+
+static uint8_t receive_ring[RECEIVE_RING];
+static volatile uint32_t receive_head;
+static volatile uint32_t receive_tail;
+
+static uint8_t command_bytes[COMMAND_BYTES_MAX];
+static uint32_t command_length;
+
+/* CRC-16/CCITT-FALSE, polynomial 0x1021, one nibble at a time. */
+static const uint16_t crc_table[16] = {
+    0x0000U, 0x1021U, 0x2042U, 0x3063U, 0x4084U, 0x50A5U, 0x60C6U, 0x70E7U,
+    0x8108U, 0x9129U, 0xA14AU, 0xB16BU, 0xC18CU, 0xD1ADU, 0xE1CEU, 0xF1EFU,
+};
+
+uint16_t core_crc16(const uint8_t *bytes, uint32_t count)
+{
+    uint32_t crc = 0xFFFFU;
+    for (uint32_t i = 0U; i < count; i++) {
+        uint32_t byte = bytes[i];
+        crc = (crc << 4) ^ crc_table[((crc >> 12) ^ (byte >> 4)) & 0xFU];
+        crc = (crc << 4) ^ crc_table[((crc >> 12) ^ byte) & 0xFU];
+    }
+    return (uint16_t)crc;
+}
+
+static void put16(uint8_t *at, uint32_t value)
+{
+    at[0] = (uint8_t)value;
+    at[1] = (uint8_t)(value >> 8);
+}
+
+static void put32(uint8_t *at, uint32_t value)
+{
+    put16(at, value);
+    put16(&at[2], value >> 16);
+}
+
+static uint32_t get16(const uint8_t *at)
+{
+    return (uint32_t)at[0] | ((uint32_t)at[1] << 8);
+}
+
+static uint32_t get32(const uint8_t *at)
+{
+    return get16(at) | (get16(&at[2]) << 16);
+}
+
+/* ---- frames ---- */
+
+static uint32_t transmit_used(void)
+{
+    uint32_t head = transmit_head;
+    uint32_t tail = transmit_tail;
+    return (head >= tail) ? (head - tail) : (head + TRANSMIT_RING - tail);
+}
+
+/* A free frame in the ring, or NULL when the line can't keep up. One frame stays empty to tell full from empty. */
+static uint8_t *frame_open(uint32_t type, uint32_t sequence, uint32_t time_us)
+{
+    uint8_t *frame = NULL;
+    if ((transmit_used() + (2U * FRAME_BYTES)) <= TRANSMIT_RING) {
+        frame = &transmit_ring[transmit_head];
+        frame[0] = SYNC_1;
+        frame[1] = SYNC_2;
+        frame[2] = FRAME_VERSION;
+        frame[3] = (uint8_t)type;
+        put16(&frame[4], sequence);
+        put32(&frame[6], time_us);
+    }
+    return frame;
+}
+
+static void frame_close(uint8_t *frame, uint32_t status)
+{
+    uint32_t next = transmit_head + FRAME_BYTES;
+    put16(&frame[34], status);
+    put16(&frame[36], (uint16_t)NO_TEMPERATURE);
+    put16(&frame[CRC_OFFSET], core_crc16(frame, CRC_OFFSET));
+    transmit_head = (next == TRANSMIT_RING) ? 0U : next;
+    hal_transmit_kick();
+}
+
+uint32_t core_transmit_peek(const uint8_t **bytes)
+{
+    uint32_t head = transmit_head;
+    uint32_t tail = transmit_tail;
+    *bytes = &transmit_ring[tail];
+    return (head >= tail) ? (head - tail) : (TRANSMIT_RING - tail);
+}
+
+void core_transmit_taken(uint32_t count)
+{
+    uint32_t next = transmit_tail + count;
+    transmit_tail = (next >= TRANSMIT_RING) ? (next - TRANSMIT_RING) : next;
+}
+
+static void send_message(uint32_t type, const uint8_t *payload, uint32_t count)
+{
+    hal_lock();
+    uint8_t *frame = frame_open(type, core.message_sequence, hal_time_us());
+    if (frame != NULL) {
+        for (uint32_t i = 0U; i < PAYLOAD_BYTES; i++) {
+            frame[HEADER_BYTES + i] = (i < count) ? payload[i] : 0U;
+        }
+        frame_close(frame, 0U);
+        core.message_sequence++;
+    }
+    hal_unlock();
+}
+
+static void send_identity(void)
+{
+    uint8_t payload[PAYLOAD_BYTES];
+    payload[0] = FRAME_VERSION;
+    payload[1] = FIRMWARE_MAJOR;
+    payload[2] = FIRMWARE_MINOR;
+    payload[3] = FIRMWARE_PATCH;
+    put16(&payload[4], core.rate_hz);
+    payload[6] = core.bw_rate;
+    payload[7] = core.data_format;
+    put32(&payload[8], core.baud);
+    payload[12] = (uint8_t)core.present;
+    payload[13] = core.reset_cause;
+    payload[14] = core.streaming ? 1U : 0U;
+    payload[15] = SENSOR_COUNT;
+    put32(&payload[16], GFIMU_BUILD_ID);
+    put16(&payload[20], hal_spi_khz());
+    put16(&payload[22], (core.dropped > 0xFFFFU) ? 0xFFFFU : core.dropped);
+    send_message(FRAME_IDENTITY, payload, PAYLOAD_BYTES);
+}
+
+/* ---- sampling ---- */
+
+static void set_present(uint32_t sensor, bool answers)
+{
+    uint32_t mask = answers ? (core.present | (1U << sensor)) : (core.present & ~(1U << sensor));
+    if (mask != core.present) {
+        core.present = mask;
+        core.announce = true;
+    }
+}
+
+static void configure_sensors(void)
+{
+    for (uint32_t sensor = 0U; sensor < SENSOR_COUNT; sensor++) {
+        set_present(sensor, adxl345_configure(sensor, core.data_format, core.bw_rate));
+    }
+}
+
+void core_start(void)
+{
+    core.first = true;
+    core.sequence = 0U;
+    core.streaming = true;
+    core.last_sample_us = hal_time_us();
+    hal_timer_start(core.rate_hz);
+}
+
+static void stop(void)
+{
+    hal_timer_stop();
+    core.streaming = false;
+}
+
+/* Reads one sensor into six bytes of the frame; returns its status bits. */
+static uint32_t sample_sensor(uint32_t sensor, uint8_t *at)
+{
+    uint32_t status = 0U;
+    struct adxl345_reading reading;
+    bool good = ((core.present >> sensor) & 1U) != 0U;
+    if (good) {
+        good = adxl345_read(sensor, core.data_format, &reading);
+        set_present(sensor, good);
+    }
+    if (!good) {
+        reading.int_source = ADXL345_DATA_READY;
+        reading.counts[0] = NO_READING;
+        reading.counts[1] = NO_READING;
+        reading.counts[2] = NO_READING;
+        status |= STATUS_MISSING(sensor);
+    }
+    if ((reading.int_source & ADXL345_OVERRUN) != 0U) {
+        status |= STATUS_OVERRUN(sensor);
+    }
+    if ((reading.int_source & ADXL345_DATA_READY) == 0U) {
+        status |= STATUS_STALE;
+    }
+    for (uint32_t axis = 0U; axis < 3U; axis++) {
+        put16(&at[2U * axis], (uint16_t)reading.counts[axis]);
+    }
+    return status;
+}
+
+/* Looks for one missing sensor now and then, so that one that comes back is used again. */
+static void retry_missing(uint32_t now_us)
+{
+    const uint32_t all = (1U << SENSOR_COUNT) - 1U;
+    if ((core.present != all) && ((now_us - core.last_retry_us) >= RETRY_US)) {
+        core.last_retry_us = now_us;
+        for (uint32_t sensor = 0U; sensor < SENSOR_COUNT; sensor++) {
+            if (((core.present >> sensor) & 1U) == 0U) {
+                set_present(sensor, adxl345_configure(sensor, core.data_format, core.bw_rate));
+            }
+        }
+    }
+}
+
+void core_sample(void)
+{
+    uint32_t now_us = hal_time_us();
+    uint32_t status = core.sticky;
+    uint32_t period_us = MICROSECONDS / core.rate_hz;
+    if (!core.streaming) {
+        return;
+    }
+    uint8_t *frame = frame_open(FRAME_SAMPLE, core.sequence, now_us);
+    if ((now_us - core.last_sample_us) > (period_us + (period_us / 2U))) {
+        status |= STATUS_LATE;
+    }
+    core.last_sample_us = now_us;
+    core.sequence++;
+    core.heartbeat++;
+    if (frame == NULL) {
+        core.dropped++;
+        core.sticky |= STATUS_FRAMES_DROPPED;
+        return;
+    }
+    for (uint32_t sensor = 0U; sensor < SENSOR_COUNT; sensor++) {
+        status |= sample_sensor(sensor, &frame[HEADER_BYTES + (6U * sensor)]);
+    }
+    if (core.first) {
+        status |= STATUS_FIRST;
+        core.first = false;
+    }
+    if ((core.data_format & ADXL345_SELF_TEST) != 0U) {
+        status |= STATUS_SELF_TEST;
+    }
+    core.sticky = 0U;
+    frame_close(frame, status);
+    retry_missing(now_us);
+}
+
+uint32_t core_heartbeat(void)
+{
+    return core.heartbeat;
+}
+
+bool core_is_streaming(void)
+{
+    return core.streaming;
+}
+
+/* ---- commands ---- */
+
+void core_receive(uint8_t byte)
+{
+    uint32_t next = (receive_head + 1U) & (RECEIVE_RING - 1U);
+    if (next == receive_tail) {
+        core_receive_error();
+    } else {
+        receive_ring[receive_head] = byte;
+        receive_head = next;
+    }
+}
+
+void core_receive_error(void)
+{
+    hal_lock();
+    core.sticky |= STATUS_RECEIVE_ERROR;
+    hal_unlock();
+}
+
+static bool line_carries(uint32_t baud, uint32_t rate_hz)
+{
+    return (rate_hz * BITS_PER_FRAME) < baud;
+}
+
+/* Changes the sensors' configuration with the sample timer at rest. */
+static void reconfigure(void)
+{
+    bool streaming = core.streaming;
+    if (streaming) {
+        stop();
+    }
+    configure_sensors();
+    if (streaming) {
+        core_start();
+    }
+}
+
+static uint32_t set_rate(uint32_t rate_hz, uint32_t code)
+{
+    uint32_t result = RESULT_DONE;
+    if ((rate_hz < RATE_MIN_HZ) || (rate_hz > RATE_MAX_HZ) ||
+        ((code != RATE_CODE_AUTO) && (code > ADXL345_RATE_CODE_MAX))) {
+        result = RESULT_BAD_VALUE;
+    } else if (!line_carries(core.baud, rate_hz)) {
+        result = RESULT_LINE_TOO_SLOW;
+    } else {
+        core.rate_hz = rate_hz;
+        core.bw_rate = (code == RATE_CODE_AUTO) ? adxl345_rate_code(rate_hz) : (uint8_t)code;
+        reconfigure();
+    }
+    return result;
+}
+
+static uint32_t set_range(uint32_t range, uint32_t full_resolution)
+{
+    uint32_t result = RESULT_BAD_VALUE;
+    if ((range <= 3U) && (full_resolution <= 1U)) {
+        core.data_format = (uint8_t)((core.data_format & ADXL345_SELF_TEST) | range |
+                                     ((full_resolution != 0U) ? ADXL345_FULL_RESOLUTION : 0U));
+        reconfigure();
+        result = RESULT_DONE;
+    }
+    return result;
+}
+
+static uint32_t set_self_test(uint32_t on)
+{
+    uint32_t result = RESULT_BAD_VALUE;
+    if (on <= 1U) {
+        core.data_format =
+            (uint8_t)((core.data_format & ~ADXL345_SELF_TEST) | ((on != 0U) ? ADXL345_SELF_TEST : 0U));
+        reconfigure();
+        result = RESULT_DONE;
+    }
+    return result;
+}
+
+static uint32_t set_baud(uint32_t baud)
+{
+    uint32_t result = RESULT_DONE;
+    if (!hal_baud_possible(baud)) {
+        result = RESULT_BAD_VALUE;
+    } else if (core.streaming && !line_carries(baud, core.rate_hz)) {
+        result = RESULT_LINE_TOO_SLOW;
+    } else {
+        core.new_baud = baud;
+    }
+    return result;
+}
+
+static uint32_t execute(uint32_t command, const uint8_t *payload, uint32_t count)
+{
+    /* bytes of payload that each command needs, by its number */
+    static const uint8_t lengths[] = {0U, 0U, 0U, 3U, 2U, 1U, 0U, 4U};
+    uint32_t result = RESULT_DONE;
+    if ((command == 0U) || (command >= sizeof(lengths))) {
+        return RESULT_UNKNOWN_COMMAND;
+    }
+    if (count != lengths[command]) {
+        return RESULT_BAD_LENGTH;
+    }
+    switch (command) {
+    case COMMAND_START:
+        if (line_carries(core.baud, core.rate_hz)) {
+            core_start();
+        } else {
+            result = RESULT_LINE_TOO_SLOW;
+        }
+        break;
+    case COMMAND_STOP:
+        stop();
+        break;
+    case COMMAND_SET_RATE:
+        result = set_rate(get16(payload), payload[2]);
+        break;
+    case COMMAND_SET_RANGE:
+        result = set_range(payload[0], payload[1]);
+        break;
+    case COMMAND_SELF_TEST:
+        result = set_self_test(payload[0]);
+        break;
+    case COMMAND_IDENTIFY:
+        core.announce = true;
+        break;
+    default: /* COMMAND_SET_BAUD: the lengths above admit no other */
+        result = set_baud(get32(payload));
+        break;
+    }
+    return result;
+}
+
+static void drop_command_bytes(uint32_t count)
+{
+    command_length -= count;
+    for (uint32_t i = 0U; i < command_length; i++) {
+        command_bytes[i] = command_bytes[i + count];
+    }
+}
+
+/* One step of the parser: carries out a whole command, or drops one byte that can't begin one.
+ * Returns false when more bytes are needed. */
+static bool parse_command(void)
+{
+    if ((command_length >= 1U) && (command_bytes[0] != COMMAND_SYNC_1)) {
+        drop_command_bytes(1U);
+        return true;
+    }
+    if ((command_length >= 2U) && (command_bytes[1] != COMMAND_SYNC_2)) {
+        drop_command_bytes(1U);
+        return true;
+    }
+    if (command_length < COMMAND_HEADER_BYTES) {
+        return false;
+    }
+    uint32_t count = command_bytes[3];
+    uint32_t total = COMMAND_HEADER_BYTES + count + 2U;
+    if (count > COMMAND_PAYLOAD_MAX) {
+        drop_command_bytes(1U);
+        return true;
+    }
+    if (command_length < total) {
+        return false;
+    }
+    if (core_crc16(command_bytes, total - 2U) != get16(&command_bytes[total - 2U])) {
+        core_receive_error();
+        drop_command_bytes(1U);
+        return true;
+    }
+    uint8_t reply[2U + COMMAND_PAYLOAD_MAX];
+    reply[0] = command_bytes[2];
+    reply[1] = (uint8_t)execute(command_bytes[2], &command_bytes[COMMAND_HEADER_BYTES], count);
+    for (uint32_t i = 0U; i < count; i++) {
+        reply[2U + i] = command_bytes[COMMAND_HEADER_BYTES + i];
+    }
+    send_message(FRAME_REPLY, reply, 2U + count);
+    drop_command_bytes(total);
+    return true;
+}
+
+bool core_has_work(void)
+{
+    return (receive_head != receive_tail) || core.announce || (core.new_baud != 0U);
+}
+
+void core_poll(void)
+{
+    if (core.new_baud != 0U) {
+        /* No frame may be cut by the change of speed: nothing new enters while the queue empties. */
+        bool streaming = core.streaming;
+        if (streaming) {
+            stop();
+        }
+        while (!hal_transmit_idle()) {
+        }
+        core.baud = core.new_baud;
+        hal_set_baud(core.new_baud);
+        core.new_baud = 0U;
+        if (streaming) {
+            core_start();
+        }
+    }
+    while (receive_head != receive_tail) {
+        command_bytes[command_length] = receive_ring[receive_tail];
+        command_length++;
+        receive_tail = (receive_tail + 1U) & (RECEIVE_RING - 1U);
+        while (parse_command()) {
+        }
+    }
+    if (core.announce) {
+        core.announce = false;
+        send_identity();
+    }
+}
+
+void core_init(uint32_t reset_cause, uint32_t baud)
+{
+    core.rate_hz = GFIMU_BOOT_RATE_HZ;
+    core.baud = baud;
+    core.bw_rate = adxl345_rate_code(core.rate_hz);
+    core.data_format = ADXL345_FULL_RESOLUTION | 3U; /* ±16 g, 3.9 mg per count */
+    core.reset_cause = (uint8_t)reset_cause;
+    core.streaming = false;
+    core.sequence = 0U;
+    core.message_sequence = 0U;
+    core.heartbeat = 0U;
+    core.dropped = 0U;
+    core.present = 0U;
+    core.last_retry_us = hal_time_us();
+    core.sticky = ((reset_cause & RESET_WATCHDOG) != 0U) ? STATUS_WATCHDOG_RESET : 0U;
+    core.announce = true;
+    core.new_baud = 0U;
+    transmit_head = 0U;
+    transmit_tail = 0U;
+    receive_head = 0U;
+    receive_tail = 0U;
+    command_length = 0U;
+    configure_sensors();
+}

@@ -1,0 +1,35 @@
+/* What the core needs from the hardware. board.c implements it on the LPC1768, hal_host.c in the host build. */
+#ifndef HAL_H
+#define HAL_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+/* Select one sensor, exchange 16-bit words (at most 8) in place, deselect it. */
+void hal_spi_exchange(uint32_t sensor, uint16_t *words, uint32_t count);
+
+/* SPI clock, kHz. */
+uint32_t hal_spi_khz(void);
+
+/* Free-running time, microseconds since reset. */
+uint32_t hal_time_us(void);
+
+/* Start the sample timer at rate_hz, or stop it. */
+void hal_timer_start(uint32_t rate_hz);
+void hal_timer_stop(void);
+
+/* Tell the transmitter that bytes are waiting. */
+void hal_transmit_kick(void);
+
+/* True when every queued byte has left the line. */
+bool hal_transmit_idle(void);
+
+/* True if the baud rate can be made within 1 %. */
+bool hal_baud_possible(uint32_t baud);
+void hal_set_baud(uint32_t baud);
+
+/* Nothing that interrupts do can happen between lock and unlock; pairs may enclose each other. */
+void hal_lock(void);
+void hal_unlock(void);
+
+#endif
