@@ -1,0 +1,251 @@
+"""The steps of `gfimu demo`: each does one job of the package on the paper's run and says what came out in one line."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from gfimu.drift_monte_carlo import DriftSample
+    from gfimu.estimation import Estimate
+    from gfimu.recording import Recording
+    from gfimu.rest_bias import RestBias
+    from sim.scenarios import Scenario
+
+__all__ = ["STEPS", "Demo", "Row"]
+
+_SCENARIO = "paper_run"
+_DRIFT_SECONDS = 5.0  # the closed forms of the drift still hold then
+_MONTE_CARLO_RUNS = 200
+
+
+@dataclass(frozen=True)
+class Row:
+    """One line of the demo's table.
+
+    Parameters
+    ----------
+    what : str
+        The question in the reader's words.
+    result : str
+        The answer with its unit.
+    beside : str
+        What to compare it with.
+    figures : mapping
+        The numbers behind it, for JSON, with units in the keys.
+    """
+
+    what: str
+    result: str
+    beside: str
+    figures: dict[str, Any]
+
+
+@dataclass
+class Demo:
+    """What the steps have made so far; each step reads what earlier ones left here.
+
+    Parameters
+    ----------
+    out : Path
+        Folder for the files.
+    seed : int
+        Seed of everything left to chance.
+    """
+
+    out: Path
+    seed: int
+    rows: list[Row] = field(default_factory=list)
+    written: dict[str, Path] = field(default_factory=dict)
+    scenario: Scenario = field(init=False)
+    recording: Recording = field(init=False)
+    bias: RestBias = field(init=False)
+    estimate: Estimate = field(init=False)
+    drift: DriftSample = field(init=False)
+
+    def truth(self, quantity: str, unit: str) -> NDArray[np.float64]:
+        """Return a vector of the true motion, shape (n, 3)."""
+        return np.column_stack([self.recording.extra[f"truth_{quantity}_{axis}_{unit}"] for axis in "xyz"])
+
+    def position_error(self) -> NDArray[np.float64]:
+        """Return the position error of the estimate in the world, m, shape (n, 3): the cube stands on the axis."""
+        if self.estimate.position is None:
+            raise TypeError("the estimate holds no position")
+        true = self.truth("position", "m")
+        return self.estimate.position - (true - true[0])
+
+
+def score_geometry(demo: Demo) -> None:
+    """Score the array."""
+    from gfimu.scoring import score
+
+    (cube,) = score("cube12")
+    leakage = float(np.max(np.abs(cube.omega_squared_leakage)))
+    demo.rows.append(
+        Row(
+            "geometry: condition number, GDOP",
+            f"{cube.condition_number:.4f}, {cube.gdop:.4f}",
+            "paper: 1.414, 1.061 (L/2 = 1)",
+            {"condition_number": cube.condition_number, "gdop": cube.gdop, "omega_squared_leakage": leakage},
+        )
+    )
+
+
+def simulate_run(demo: Demo) -> None:
+    """Simulate the paper's run in MuJoCo."""
+    from sim.scenarios import Scenario, simulate
+
+    path = demo.out / "run.parquet"
+    demo.scenario = Scenario.load(_SCENARIO)
+    demo.recording = simulate(demo.scenario, seed=demo.seed, out=path)
+    demo.written["recording"] = path
+    fastest = float(np.abs(demo.truth("omega", "rad_s")).max())
+    largest = max(abs(bias) for bias in demo.recording.metadata["truth_bias_m_s2"].values())
+    demo.rows.append(
+        Row(
+            "simulated run",
+            f"{demo.recording.duration:.0f} s × {len(demo.recording.channels)} channels",
+            f"±{fastest:.0f} rad/s at {demo.recording.sample_rate:.0f} Hz; biases up to {largest:.2f} m/s²",
+            {"samples": len(demo.recording), "peak_rate_rad_s": fastest, "largest_bias_m_s2": largest},
+        )
+    )
+
+
+def read_biases(demo: Demo) -> None:
+    """Read the channels' biases off at rest, as the paper does."""
+    from gfimu.rest_bias import rest_bias
+
+    array = demo.scenario.array
+    demo.bias = rest_bias(demo.recording, array, gravity=demo.scenario.gravity)
+    true_bias = np.array([demo.recording.metadata["truth_bias_m_s2"][channel] for channel in array.channels])
+    error = float(np.sqrt(np.mean((demo.bias.bias - true_bias) ** 2)))
+    spread = float(np.sqrt(np.mean(demo.bias.std**2)))
+    demo.rows.append(
+        Row(
+            "biases read at rest, rms error",
+            f"{error:.3f} m/s²",
+            f"{spread:.3f} by noise, the rest by gain and axis errors",
+            {"rmse_m_s2": error, "noise_std_m_s2": spread},
+        )
+    )
+
+
+def estimate_motion(demo: Demo) -> None:
+    """Estimate acceleration, rate and angle."""
+    from dataclasses import replace
+
+    from gfimu.estimation import estimate
+
+    array = demo.scenario.array
+    raw = estimate(demo.recording, array)
+    found = estimate(demo.bias.remove(demo.recording), array, with_position=True)
+    # The band of the rate holds the channels' noise; what is left of the biases adds to it.
+    std = np.hypot(found.omega_std, demo.bias.rate_std(found.t_s))
+    path = demo.out / "estimate.parquet"
+    demo.estimate = replace(found, omega_std=std)
+    demo.estimate.write(path)
+    demo.written["estimate"] = path
+    alpha = _rms(demo.estimate.alpha[:, 2] - demo.truth("alpha", "rad_s2")[:, 2])
+    omega = demo.estimate.omega[:, 2] - demo.truth("omega", "rad_s")[:, 2]
+    without = _rms(raw.omega[:, 2] - demo.truth("omega", "rad_s")[:, 2])
+    angle = float(demo.estimate.angle[-1] - demo.recording.reference["angle_rad"][-1])
+    peak = float(np.abs(demo.truth("alpha", "rad_s2")[:, 2]).max())
+    demo.rows += [
+        Row(
+            "angular acceleration, rms error",
+            f"{alpha:.3f} rad/s²",
+            f"the table reaches {peak:.1f} rad/s²",
+            {"rmse_rad_s2": alpha, "peak_rad_s2": peak},
+        ),
+        Row(
+            "angular rate, integrated, rms error",
+            f"{_rms(omega):.3f} rad/s",
+            f"{without:.0f} rad/s with biases left in",
+            {"rmse_rad_s": _rms(omega), "rmse_raw_rad_s": without, "expected_std_at_end_rad_s": float(std[-1, 2])},
+        ),
+        Row(
+            "table angle, error at the end",
+            f"{angle:+.2f} rad",
+            f"after {np.abs(np.diff(demo.recording.reference['angle_rad'])).sum() / (2 * np.pi):.0f} revolutions",
+            {"error_rad": angle},
+        ),
+    ]
+
+
+def state_drift(demo: Demo) -> None:
+    """State the position drift that was to be expected."""
+    from gfimu.drift import ErrorSources, drift_budget
+    from gfimu.drift_monte_carlo import monte_carlo_drift
+    from gfimu.part import white_noise_std
+
+    array, recording = demo.scenario.array, demo.recording
+    noise = _rms(white_noise_std(array, recording.sample_rate))
+    sources = ErrorSources(bias=_rms(demo.bias.std), noise_density=noise / np.sqrt(recording.sample_rate / 2))
+    budget = drift_budget(array, _DRIFT_SECONDS, sources, gravity=demo.scenario.gravity)
+    duration = recording.duration
+    demo.drift = monte_carlo_drift(
+        array, duration, sources, runs=_MONTE_CARLO_RUNS, rng=np.random.default_rng(demo.seed)
+    )
+    error = demo.position_error()
+    early = int(np.searchsorted(recording.t_s, recording.t_s[0] + _DRIFT_SECONDS))
+    closed = float(np.hypot(*budget.total_std[:2]))
+    final = float(np.hypot(*demo.drift.std[-1, :2]))
+    demo.rows += [
+        Row(
+            f"position drift after {_DRIFT_SECONDS:.0f} s",
+            f"{np.hypot(*error[early, :2]):.1f} m",
+            f"expected {closed:.1f} m; formula holds to {budget.valid_until:.1f} s",
+            {"error_m": float(np.hypot(*error[early, :2])), "expected_m": closed, "valid_until_s": budget.valid_until},
+        ),
+        Row(
+            f"position drift after {duration:.0f} s",
+            f"{np.hypot(*error[-1, :2]):.0f} m",
+            f"expected {final:.0f} m by Monte Carlo",
+            {"error_m": float(np.hypot(*error[-1, :2])), "expected_m": final},
+        ),
+    ]
+
+
+def draw_run(demo: Demo) -> None:
+    """Write the rerun recording."""
+    from gfimu.visual import ExpectedDrift, write_run
+    from sim.drawing import rig_drawing
+    from sim.truth import known_motion
+
+    path = demo.out / "run.rrd"
+    t = demo.recording.t_s
+    spread = np.sqrt(np.mean(demo.drift.std[:, :2] ** 2, axis=1))
+    expected = np.interp(t - t[0], demo.drift.t_s, spread)
+    table = "\n".join(f"| {row.what} | {row.result} | {row.beside} |" for row in demo.rows)
+    write_run(
+        path,
+        demo.recording,
+        demo.scenario.array,
+        estimate=demo.estimate,
+        known=known_motion(demo.recording),
+        drift=ExpectedDrift(t, demo.position_error(), expected),
+        shapes=rig_drawing(demo.scenario.world),
+        notes=f"| | | |\n|---|---|---|\n{table}",
+        title="the paper's run",
+    )
+    demo.written["rerun recording"] = path
+
+
+STEPS: tuple[Callable[[Demo], None], ...] = (
+    score_geometry,
+    simulate_run,
+    read_biases,
+    estimate_motion,
+    state_drift,
+    draw_run,
+)
+"""The steps in their order; the first line of each docstring is what the command shows while it runs."""
+
+
+def _rms(values: NDArray[np.float64]) -> float:
+    return float(np.sqrt(np.nanmean(values**2)))

@@ -1,0 +1,105 @@
+"""Biases of the channels read off at rest, as the GF-IMU paper does (its step 10 b, Table 1).
+
+While nothing moves, each channel should read its share of gravity; what it reads beyond that is taken as its bias.
+Levelling is assumed: a tilt of the table goes into the biases. What is left afterwards is the noise of the average,
+and it grows into the rate with time; `RestBias.rate_std` says how much.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from gfimu.array import AccelerometerArray
+from gfimu.errors import InputError
+from gfimu.kinematics import specific_force
+from gfimu.recording import Recording
+from gfimu.rest import detect_rest
+from gfimu.units import STANDARD_GRAVITY
+
+__all__ = ["RestBias", "rest_bias"]
+
+
+@dataclass(frozen=True)
+class RestBias:
+    """Biases of the channels of an array, read off at rest.
+
+    Parameters
+    ----------
+    array : AccelerometerArray
+        The array, with c channels.
+    bias : ndarray, shape (c,)
+        Mean reading beyond gravity, m/s².
+    std : ndarray, shape (c,)
+        Standard deviation of that mean by the noise seen, m/s².
+    start_s, stop_s : float
+        The stretch of rest, s.
+    """
+
+    array: AccelerometerArray
+    bias: NDArray[np.float64]
+    std: NDArray[np.float64]
+    start_s: float
+    stop_s: float
+
+    def remove(self, recording: Recording) -> Recording:
+        """Return the recording without these biases, in the channel order of the array."""
+        readings = recording.for_array(self.array) - self.bias
+        return replace(recording, readings=readings, channels=self.array.channels)
+
+    def rate_std(self, t: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the standard deviation that what is left of the biases gives an integrated rate, rad/s, (n, 3).
+
+        ``t`` has shape (n,), s; the integration starts at its first value.
+        """
+        pseudo_inverse = np.linalg.pinv(self.array.regression_matrix)  # (6, c)
+        alpha_std = np.sqrt(pseudo_inverse[:3] ** 2 @ self.std**2)  # (3,)
+        return (t - t[0])[:, None] * alpha_std
+
+
+def rest_bias(
+    recording: Recording, array: AccelerometerArray, *, gravity: float = STANDARD_GRAVITY, min_duration_s: float = 1.0
+) -> RestBias:
+    """Read the biases off the first rest of a recording.
+
+    Parameters
+    ----------
+    recording : Recording
+        Readings in m/s²; the recording's mounting says how the cube lay.
+    array : AccelerometerArray
+        Geometry of the channels.
+    gravity : float
+        Local gravity, m/s².
+    min_duration_s : float
+        Shortest rest to use, s.
+
+    Raises
+    ------
+    InputError
+        If nothing rests that long, or a channel has no reading at all.
+    """
+    readings = recording.for_array(array)
+    silent = ~np.isfinite(readings).any(axis=0)
+    if silent.any():
+        raise InputError(f"channel {array.channels[int(np.argmax(silent))]} has no readings; check its wiring")
+    rest = detect_rest(recording, min_duration_s=min_duration_s)
+    if len(rest) == 0:
+        raise InputError(
+            f"no rest of {min_duration_s:g} s in the recording to read biases off; record one, or calibrate first"
+        )
+    rows = slice(int(rest.start[0]), int(rest.stop[0]))
+    readings = readings[rows]
+    count = np.isfinite(readings).sum(axis=0)  # the rest was found with at least half of every window there
+    up = Rotation.from_rotvec(recording.mounting_rotvec).inv().apply([0.0, 0.0, gravity])
+    expected = specific_force(array, up, np.zeros(3), np.zeros(3))[0]  # (c,)
+    t = recording.t_s[rows]
+    return RestBias(
+        array,
+        np.nanmean(readings, axis=0) - expected,
+        np.nanstd(readings, axis=0, ddof=1) / np.sqrt(count),
+        float(t[0]),
+        float(t[-1]),
+    )
