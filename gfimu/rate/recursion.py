@@ -1,131 +1,828 @@
-"""Integration of an angular acceleration that depends on the rate: α = α_linear − Λ s(ω)."""
+"""The recursions of the rate filter and smoother, compiled: one sample after the other.
+
+State x = [ω (3); b_α (3); b_z (d); b_gyro (0 or 3); ε (3)], biases constant. From sample k − 1 to k
+
+    ω ← ω + Σ_j w_j (α_j − K_j b_z − L_j s(ω_j)) − Δt b_α + Δt/2 (ε_{k−1} + ε_k)                       (1)
+
+with w the weights of the interval's quadrature and (K, L) zero for sets of channels that see α cleanly. ε is minus the
+noise of α at a sample. Half of it enters before the sample is measured and half after, the same noise twice: where
+the body turns far between samples (|ω| Δt near 1), taking the intervals' noises for independent would be wrong by
+more than a tenth. The null space is the measurement, one whitened row after the other, linearised at the predicted rate,
+
+    z_i = M_i s(ω) + (T b_z)_i + noise,    s = products of ω,                                          (2)
+
+to second order while ω is not much larger than its uncertainty: with P the covariance of ω and B_i the symmetric form
+of row i, z_i has mean ωᵀB_iω + tr(B_i P) and the variance 2 tr(B_i P B_i P) more than the linear one.
+
+Everything that a sample needs is in arrays, so a run can stop after any sample and go on with the same answer. Sizes
+are lengths of tuples: constants for the compiler, which unrolls the loops over the state.
+"""
 
 from __future__ import annotations
+
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from gfimu.errors import InputError
+from gfimu.rate.unrolled import update as _update_twelve
 
-__all__ = ["integrate_rate_recursively"]
+__all__ = ["Record", "RecursionInput", "RecursionOutput", "RecursionState", "Tables", "Tuning", "backward", "forward",
+           "prepare"]
 
-_GAP_PERIODS = 1.5
-_FASTEST = 1e5
-_ITERATIONS = 50
+_COMPILE: dict[str, Any] = {"cache": True, "error_model": "numpy", "fastmath": {"contract", "reassoc", "nsz"}}
+_UNIFORM = 1e-6
+_GAP = 1.5
+_WALK_MEMORY = 1.0  # s, over which the wandering of α is averaged
+_SLOW = 1e-3  # tr P above this share of |ω|² switches the second-order terms on
+_MEMORY = 2.0  # length of the filter's memory in units of 1/|ω|
+
+# Places in RecursionState.scalars
+_TIME, _WALK, _LAST_GOOD, _BLOCK_SQUARES, _REST_SAMPLES = range(5)
+# Places in RecursionState.counts
+_STARTED, _BLOCK, _REST_BLOCKS, _SAMPLES = range(4)
 
 
-def integrate_rate_recursively(
-    t: NDArray[np.float64],
-    alpha_linear: NDArray[np.float64],
-    leakage: NDArray[np.float64],
-    pattern: NDArray[np.intp],
-    omega0: NDArray[np.float64],
-) -> NDArray[np.float64]:
-    """Integrate ω̇ = α_linear(t) − Λ s(ω) through the samples (GF-IMU paper, step 5 in its recursive form).
+class Tables(NamedTuple):
+    """Matrices per set of channels (`gfimu.rate.sensing.ChannelTables`), stacked."""
 
-    The step is the implicit Adams–Moulton formula through the last two samples and the new one, for any spacing
-    (third order); behind a gap and at the start it is the trapezoid.
+    alpha_bias: NDArray[np.float64]  # (sets, 3, d)
+    alpha_leak: NDArray[np.float64]  # (sets, 3, 6)
+    alpha_noise: NDArray[np.float64]  # (sets, 3, 3)
+    null_sensitivity: NDArray[np.float64]  # (sets, d, 6)
+    null_bias: NDArray[np.float64]  # (sets, d, d)
+    null_count: NDArray[np.int64]  # (sets,)
+    plain: NDArray[np.bool_]  # (sets,)
+    alpha_rows: NDArray[np.float64]  # (sets, 3, c)
+    null_rows: NDArray[np.float64]  # (sets, d, c)
 
-    Parameters
-    ----------
-    t : ndarray, shape (n,)
-        Sample times, s, strictly increasing.
-    alpha_linear : ndarray, shape (n, 3)
-        Part of the angular acceleration that is linear in the readings, rad/s²; rows with NaN count as lost.
-    leakage : ndarray, shape (k, 3, 6)
-        Λ of each pattern.
-    pattern : ndarray, shape (n,)
-        Pattern of each sample.
-    omega0 : ndarray, shape (3,)
-        Rate at the first valid sample, rad/s.
 
-    Returns
-    -------
-    ndarray, shape (n, 3)
-        Angular rate in body axes, rad/s; NaN in lost rows.
+class Tuning(NamedTuple):
+    """Numbers that stay the same over a run."""
 
-    Raises
-    ------
-    InputError
-        If the recursion diverges: α grows with ω², so an error of the rate feeds itself.
+    period: float  # nominal sample period, s
+    weights: NDArray[np.float64]  # (m − 1, m): quadrature of each interval of the stencil, in periods
+    position: int  # interval of the stencil that is integrated
+    inverse_noise: NDArray[np.float64]  # (c,) 1/σ, s²/m
+    scale_variance: float  # of the scale factors
+    placement_variance: float  # over σ² of a channel, 1/(m/s²)² m²
+    gyro_variance: float  # (rad/s)²
+    rest_window: int  # samples per block of the rest test; 0: no test
+    rest_variance: float  # of the rate at rest, (rad/s)²
+    rest_limits: NDArray[np.float64]  # (6,) noise, halves, α, z, ω (all χ²), and largest variance of ω
+    likelihood: bool
+
+
+class RecursionState(NamedTuple):
+    """What is carried from one sample to the next."""
+
+    x: NDArray[np.float64]  # (n,)
+    covariance: NDArray[np.float64]  # (n, n)
+    scalars: NDArray[np.float64]  # (5,)
+    counts: NDArray[np.int64]  # (4,)
+    settles: NDArray[np.bool_]  # (1,) the run starts at rest
+    block_sums: NDArray[np.float64]  # (3, c): first half, second half, first sample of the block
+    block_x: NDArray[np.float64]  # (n,) state when the block began
+    block_covariance: NDArray[np.float64]  # (n, n)
+    reference: NDArray[np.float64]  # (c,) mean reading while the biases were learned, m/s²
+
+    def copy(self) -> RecursionState:
+        """Return a state that shares nothing with this one."""
+        return RecursionState(*(field.copy() for field in self))
+
+
+class RecursionInput(NamedTuple):
+    """Samples, with enough of the ones before and after for the quadrature."""
+
+    t: NDArray[np.float64]  # (N,)
+    y: NDArray[np.float64]  # (N, c)
+    alpha: NDArray[np.float64]  # (N, 3) A y
+    z: NDArray[np.float64]  # (N, d) Z y
+    channel_set: NDArray[np.int64]  # (N,)
+    gyro: NDArray[np.float64]  # (N, 3), NaN where there is none
+    uniform_run: NDArray[np.int64]  # (N,) equal steps in a row up to here
+    whole_run: NDArray[np.int64]  # (N,) steps without a gap up to here
+    corrected: NDArray[np.float64]  # (N, 3) α of the past without what the products of ω left in it
+
+
+class RecursionOutput(NamedTuple):
+    """Estimates per sample."""
+
+    omega: NDArray[np.float64]  # (N, 3)
+    covariance: NDArray[np.float64]  # (N, 6) xx, yy, zz, xy, xz, yz
+    nis: NDArray[np.float64]  # (N,)
+    dof: NDArray[np.int64]  # (N,)
+    likelihood: NDArray[np.float64]  # (N,)
+    rest: NDArray[np.bool_]  # (N,) a block of rest ended here
+
+
+class Record(NamedTuple):
+    """What the backward pass needs of each sample of a block of length B, with up to u scalar updates."""
+
+    x: NDArray[np.float64]  # (B, 3) predicted rate
+    rows: NDArray[np.float64]  # (B, 3, n) rows of the predicted covariance
+    transition: NDArray[np.float64]  # (B, 3, n) rows of the transition to this sample
+    count: NDArray[np.int64]  # (B,)
+    h: NDArray[np.float64]  # (B, u, n)
+    gain: NDArray[np.float64]  # (B, u, n)
+    inverse: NDArray[np.float64]  # (B, u) 1/S
+    innovation: NDArray[np.float64]  # (B, u)
+
+
+@njit(**_COMPILE)
+def prepare(
+    first: int,
+    last: int,
+    period: float,
+    masks: NDArray[np.int64],
+    tables: Tables,
+    limits: NDArray[np.float64],
+    stuck_after: int,
+    held: NDArray[np.float64],
+    run: NDArray[np.int64],
+    tally: NDArray[np.int64],
+    data: RecursionInput,
+) -> int:
+    """Turn readings into α and z; returns the first sample that needs a set of channels not in the tables yet.
+
+    Readings of missing channels become zero. ``held`` (c,) and ``run`` (c,) carry the last reading and how often it repeated; ``tally`` (3, c) counts samples in
+    which a channel was missing, saturated and stuck.
     """
-    valid = np.isfinite(alpha_linear).all(axis=1)
-    omega = np.full_like(alpha_linear, np.nan)
-    times = np.ascontiguousarray(t[valid])
-    if len(times) == 0:
-        return omega
-    longest = _GAP_PERIODS * float(np.median(np.diff(times))) if len(times) > 1 else np.inf
-    found, reached = _integrate(
-        times,
-        np.ascontiguousarray(alpha_linear[valid]),
-        np.ascontiguousarray(leakage),
-        pattern[valid],
-        np.asarray(omega0, dtype=float),
-        longest,
-    )
-    if reached < len(times):
-        raise InputError(
-            f"the rate diverges {times[reached] - times[0]:.3g} s after the start, because this array's alpha depends "
-            "on omega²; use a shorter run, less biased readings, or an array that allows form 'joint'"
-        )
-    omega[valid] = found
-    return omega
+    t = data.t
+    y = data.y
+    c = y.shape[1]
+    d = data.z.shape[1]
+    for k in range(first, last):
+        missing = 0
+        for i in range(c):
+            value = y[k, i]
+            if not np.isfinite(value):
+                missing |= 1 << i
+            elif abs(value) >= limits[i]:
+                missing |= 1 << i
+            elif stuck_after > 0 and value == held[i] and run[i] + 1 >= stuck_after:
+                missing |= 1 << i
+        place = 0
+        if missing != 0:
+            place = -1
+            for known in range(len(masks)):
+                if masks[known] == missing:
+                    place = known
+            if place < 0:
+                return k
+        for i in range(c):
+            value = y[k, i]
+            if not np.isfinite(value):
+                tally[0, i] += 1
+                continue
+            if value == held[i]:
+                run[i] += 1
+            else:
+                run[i] = 1
+                held[i] = value
+            if abs(value) >= limits[i]:
+                tally[1, i] += 1
+            elif stuck_after > 0 and run[i] >= stuck_after:
+                tally[2, i] += 1
+        usable = tables.null_count[place] >= 0
+        data.channel_set[k] = place if usable else -1
+        step = t[k] - t[k - 1] if k > 0 else 0.0
+        whole = k > 0 and step < _GAP * period and usable and data.channel_set[k - 1] >= 0
+        data.whole_run[k] = data.whole_run[k - 1] + 1 if whole else 0
+        uniform = whole and abs(step - period) < _UNIFORM * period
+        data.uniform_run[k] = data.uniform_run[k - 1] + 1 if uniform else 0
+        if not usable:  # α is held
+            for a in range(3):
+                data.alpha[k, a] = data.alpha[k - 1, a] if k > 0 else 0.0
+            continue
+        if missing != 0:
+            for i in range(c):
+                if (missing >> i) & 1:
+                    y[k, i] = 0.0
+        for a in range(3):
+            total = 0.0
+            for i in range(c):
+                total += tables.alpha_rows[place, a, i] * y[k, i]
+            data.alpha[k, a] = total
+        for j in range(d):
+            total = 0.0
+            for i in range(c):
+                total += tables.null_rows[place, j, i] * y[k, i]
+            data.z[k, j] = total
+    return last
 
 
-@njit(cache=True)
-def _acceleration(linear, leakage, omega, out):  # type: ignore[no-untyped-def]
-    x, y, z = omega[0], omega[1], omega[2]
-    for row in range(3):
-        out[row] = linear[row] - (
-            leakage[row, 0] * x * x
-            + leakage[row, 1] * y * y
-            + leakage[row, 2] * z * z
-            + leakage[row, 3] * x * y
-            + leakage[row, 4] * x * z
-            + leakage[row, 5] * y * z
-        )
-
-
-@njit(cache=True)
-def _integrate(t, linear, leakage, pattern, omega0, longest):  # type: ignore[no-untyped-def]
-    n = len(t)
-    omega = np.empty((n, 3))
-    omega[0] = omega0
-    older, last, new = np.zeros(3), np.empty(3), np.empty(3)
-    guess, fixed = np.empty(3), np.empty(3)
-    _acceleration(linear[0], leakage[pattern[0]], omega[0], last)
-    step_before = 0.0  # no usable sample before the last one
-    for i in range(1, n):
-        h = t[i] - t[i - 1]
-        if h > longest:
-            step_before = 0.0
-        if step_before > 0.0:
-            k = step_before
-            w_new = h * (2.0 * h + 3.0 * k) / (6.0 * (h + k))
-            w_last = h * (h + 3.0 * k) / (6.0 * k)
-            w_older = -(h**3) / (6.0 * k * (h + k))
+@njit(**_COMPILE)
+def _quadrature(data, tuning, k, closing, weights):  # type: ignore[no-untyped-def]
+    """Weights of the interval from sample k − 1 to k; returns the stencil's first sample and its length."""
+    points = tuning.weights.shape[1]
+    step = data.t[k] - data.t[k - 1]
+    start = max(k - 1 - tuning.position, 0)
+    if start + points > closing:
+        start = closing - points
+    if start >= 0 and data.whole_run[start + points - 1] >= points - 1:
+        left = k - 1 - start
+        if data.uniform_run[start + points - 1] >= points - 1:
+            for j in range(points):
+                weights[j] = tuning.weights[left, j] * step
         else:
-            w_new, w_last, w_older = 0.5 * h, 0.5 * h, 0.0
-        for axis in range(3):
-            fixed[axis] = omega[i - 1, axis] + w_last * last[axis] + w_older * older[axis]
-            guess[axis] = omega[i - 1, axis] + h * last[axis]
-        for _ in range(_ITERATIONS):
-            _acceleration(linear[i], leakage[pattern[i]], guess, new)
-            change, size = 0.0, 0.0
-            for axis in range(3):
-                value = fixed[axis] + w_new * new[axis]
-                change = max(change, abs(value - guess[axis]))
-                size = max(size, abs(value))
-                guess[axis] = value
-            if not change > 1e-13 * (1.0 + size):
-                break
-        if not size < _FASTEST:
-            return omega, i
-        _acceleration(linear[i], leakage[pattern[i]], guess, new)
-        omega[i] = guess
-        for axis in range(3):
-            older[axis] = last[axis]
-            last[axis] = new[axis]
-        step_before = h if h <= longest else 0.0
-    return omega, n
+            _uneven_weights(data.t, start, points, k - 1, weights)
+        return start, points
+    weights[0] = 0.5 * step
+    weights[1] = 0.5 * step
+    return k - 1, 2
+
+
+@njit(**_COMPILE)
+def _uneven_weights(t, start, points, left, weights):  # type: ignore[no-untyped-def]
+    """Integrate Lagrange's polynomials of uneven nodes from sample ``left`` to the next (Gauss–Legendre, exact)."""
+    step = t[left + 1] - t[left]
+    for j in range(points):
+        weights[j] = 0.0
+    for g in range(3):
+        abscissa = 0.5 + (g - 1) * 0.3872983346207417
+        share = 0.4444444444444444 if g == 1 else 0.2777777777777778
+        at = t[left] + abscissa * step
+        for j in range(points):
+            basis = 1.0
+            for i in range(points):
+                if i != j:
+                    basis *= (at - t[start + i]) / (t[start + j] - t[start + i])
+            weights[j] += share * basis * step
+
+
+@njit(**_COMPILE)
+def _correct(alpha, tables, place, x, omega0, omega1, omega2, out):  # type: ignore[no-untyped-def]
+    """Take K b_z and L s(ω) out of one sample of α."""
+    d = tables.alpha_bias.shape[2]
+    for a in range(3):
+        leak = tables.alpha_leak[place, a]
+        value = alpha[a] - (
+            leak[0] * omega0 * omega0
+            + leak[1] * omega1 * omega1
+            + leak[2] * omega2 * omega2
+            + leak[3] * omega0 * omega1
+            + leak[4] * omega0 * omega2
+            + leak[5] * omega1 * omega2
+        )
+        for j in range(d):
+            value -= tables.alpha_bias[place, a, j] * x[6 + j]
+        out[a] = value
+
+
+@njit(**_COMPILE)
+def _inflation(y, state, tuning, present, omega_squared):  # type: ignore[no-untyped-def]
+    """Variance of the scale and placement errors against the noise, as white noise over the filter's memory."""
+    c = len(y)
+    total = 0.0
+    for i in range(c):
+        if present or y[i] != 0.0:
+            change = (y[i] - state.reference[i]) * tuning.inverse_noise[i]
+            total += change * change
+    total = tuning.scale_variance * total / c + tuning.placement_variance * omega_squared * omega_squared
+    memory = 1.0 / tuning.period
+    speed = np.sqrt(omega_squared)
+    if speed * memory * tuning.period > _MEMORY:
+        memory = max(_MEMORY / (speed * tuning.period), 1.0)
+    return total * memory
+
+
+@njit(**_COMPILE)
+def forward(  # type: ignore[no-untyped-def]
+    data, first, last, closing, tables, tuning, state, out, offset, record, states, null_axes, gyro_axes
+):
+    """Run the filter over the samples ``first`` to ``last − 1``.
+
+    ``closing`` is the number of samples that the stencils may use; ``offset`` is added to a sample's place to find
+    its place in ``out``; the record is filled when its arrays are not empty. ``states``, ``null_axes`` and
+    ``gyro_axes`` are tuples as long as the state, the null space and the gyro.
+    """
+    n = len(states)
+    d = len(null_axes)
+    x = state.x
+    covariance = state.covariance
+    keep = record.count.shape[0] > 0
+    points = tuning.weights.shape[1]
+    weights = np.zeros(max(points, 2))
+    ph = np.zeros(n)
+    h = np.zeros(n)
+    before = np.zeros(n)
+    moved = np.zeros(3)
+    rows = np.zeros((3, n))
+    product = np.zeros((3, n))
+    slope = np.zeros((3, 3))
+    settles = state.settles[0]
+    noise_row = n - 3
+    slopes = np.zeros((max(d, 1), 3))
+    innovations = np.zeros(d)
+    variances = np.zeros(d)
+    unrolled = n == 15 and d == 6
+    for k in range(first, last):
+        row = k - first
+        place = data.channel_set[k]
+        sensed = place >= 0
+        step = 0.0
+        inflation = 0.0
+        noise_set = place if sensed else 0
+        if tuning.scale_variance + tuning.placement_variance > 0.0 and sensed:
+            inflation = _inflation(
+                data.y[k], state, tuning, place == 0, x[0] * x[0] + x[1] * x[1] + x[2] * x[2]
+            )
+        if state.counts[_STARTED] > 0:
+            # Prediction, (1).
+            step = data.t[k] - state.scalars[_TIME]
+            start, used = _quadrature(data, tuning, k, closing, weights)
+            clean = True
+            s0 = 0.0
+            s1 = 0.0
+            s2 = 0.0
+            for j in range(used):
+                node = start + j
+                node_set = data.channel_set[node]
+                if node_set >= 0 and not tables.plain[node_set]:
+                    clean = False
+                    break
+                s0 += weights[j] * data.alpha[node, 0]
+                s1 += weights[j] * data.alpha[node, 1]
+                s2 += weights[j] * data.alpha[node, 2]
+            half = 0.5 * step
+            if clean:
+                for r in range(n):
+                    covariance[0, r] += half * covariance[noise_row, r] - step * covariance[3, r]
+                    covariance[1, r] += half * covariance[noise_row + 1, r] - step * covariance[4, r]
+                    covariance[2, r] += half * covariance[noise_row + 2, r] - step * covariance[5, r]
+                for r in range(n):
+                    covariance[r, 0] += half * covariance[r, noise_row] - step * covariance[r, 3]
+                    covariance[r, 1] += half * covariance[r, noise_row + 1] - step * covariance[r, 4]
+                    covariance[r, 2] += half * covariance[r, noise_row + 2] - step * covariance[r, 5]
+            else:
+                # What K and L leave in α, with ω of the past as estimated and of the future extrapolated.
+                s0 = 0.0
+                s1 = 0.0
+                s2 = 0.0
+                rows[:] = 0.0
+                for a in range(3):
+                    rows[a, a] = 1.0
+                    rows[a, 3 + a] = -step
+                    rows[a, noise_row + a] = half
+                previous = data.corrected[k - 1]
+                for j in range(used):
+                    node = start + j
+                    node_set = data.channel_set[node]
+                    if node < k:
+                        s0 += weights[j] * data.corrected[node, 0]
+                        s1 += weights[j] * data.corrected[node, 1]
+                        s2 += weights[j] * data.corrected[node, 2]
+                    elif node_set < 0 or tables.plain[node_set]:
+                        s0 += weights[j] * data.alpha[node, 0]
+                        s1 += weights[j] * data.alpha[node, 1]
+                        s2 += weights[j] * data.alpha[node, 2]
+                    else:
+                        ahead = data.t[node] - data.t[k - 1]
+                        _correct(
+                            data.alpha[node], tables, node_set, x,
+                            x[0] + ahead * (previous[0] - x[3]),
+                            x[1] + ahead * (previous[1] - x[4]),
+                            x[2] + ahead * (previous[2] - x[5]),
+                            moved,
+                        )  # fmt: skip
+                        s0 += weights[j] * moved[0]
+                        s1 += weights[j] * moved[1]
+                        s2 += weights[j] * moved[2]
+                    if node_set >= 0 and not tables.plain[node_set]:
+                        for a in range(3):
+                            leak = tables.alpha_leak[node_set, a]
+                            rows[a, 0] -= weights[j] * (2 * leak[0] * x[0] + leak[3] * x[1] + leak[4] * x[2])
+                            rows[a, 1] -= weights[j] * (2 * leak[1] * x[1] + leak[3] * x[0] + leak[5] * x[2])
+                            rows[a, 2] -= weights[j] * (2 * leak[2] * x[2] + leak[4] * x[0] + leak[5] * x[1])
+                            for i in range(d):
+                                rows[a, 6 + i] -= weights[j] * tables.alpha_bias[node_set, a, i]
+                for a in range(3):
+                    for r in range(n):
+                        total = 0.0
+                        for q in range(n):
+                            total += rows[a, q] * covariance[q, r]
+                        product[a, r] = total
+                for a in range(3):
+                    for r in range(3, n):
+                        covariance[a, r] = product[a, r]
+                        covariance[r, a] = product[a, r]
+                    for b in range(3):
+                        total = 0.0
+                        for q in range(n):
+                            total += product[a, q] * rows[b, q]
+                        covariance[a, b] = total
+                for a in range(3):
+                    for b in range(a):
+                        mean = 0.5 * (covariance[a, b] + covariance[b, a])
+                        covariance[a, b] = mean
+                        covariance[b, a] = mean
+            x[0] += s0 - step * x[3] + half * x[noise_row]
+            x[1] += s1 - step * x[4] + half * x[noise_row + 1]
+            x[2] += s2 - step * x[5] + half * x[noise_row + 2]
+            _renew_noise(x, covariance, tables.alpha_noise[noise_set], 1.0 + inflation, half, noise_row)
+            extra = 0.0
+            if not sensed:  # α is held: its wandering adds up
+                age = data.t[k] - state.scalars[_LAST_GOOD]
+                extra = state.scalars[_WALK] * age * age * step
+            elif data.whole_run[k] == 0:
+                extra = state.scalars[_WALK] * step * step * step / 12.0
+            if extra > 0.0:
+                for a in range(3):
+                    covariance[a, a] += extra
+            if sensed and data.whole_run[k] > 0:
+                jump = 0.0
+                for a in range(3):
+                    change = data.alpha[k, a] - data.alpha[k - 1, a]
+                    jump += change * change - 2.0 * tables.alpha_noise[noise_set, a, a]
+                forget = min(1.0, step / _WALK_MEMORY)
+                state.scalars[_WALK] = max(0.0, (1.0 - forget) * state.scalars[_WALK] + forget * jump / (3.0 * step))
+            if keep:
+                if clean:
+                    rows[:] = 0.0
+                    for a in range(3):
+                        rows[a, a] = 1.0
+                        rows[a, 3 + a] = -step
+                        rows[a, noise_row + a] = half
+                record.transition[row] = rows
+        else:
+            _renew_noise(x, covariance, tables.alpha_noise[noise_set], 1.0 + inflation, 0.0, noise_row)
+            if keep:
+                record.transition[row] = 0.0
+                for a in range(3):
+                    record.transition[row, a, a] = 1.0
+        state.counts[_STARTED] = 1
+        state.scalars[_TIME] = data.t[k]
+        if sensed:
+            state.scalars[_LAST_GOOD] = data.t[k]
+        used_rows = 0
+        if keep:
+            for a in range(3):
+                record.x[row, a] = x[a]
+                for r in range(n):
+                    record.rows[row, a, r] = covariance[a, r]
+
+        # Null space, (2), one row after the other.
+        w0 = x[0]
+        w1 = x[1]
+        w2 = x[2]
+        nis = 0.0
+        dof = 0
+        determinant = 1.0
+        # In the first block after a start at rest ω is known from the start alone and drifts with the unknown bias of
+        # α: far too uncertain for a linearised z. If the block turns out as rest, the mean of z is used at its end.
+        settling = tuning.rest_window > state.counts[_SAMPLES] and settles
+        if sensed and d > 0 and not settling:
+            plain = place == 0
+            measured_rows = d if plain else tables.null_count[place]
+            sensitivity = tables.null_sensitivity[place]
+            second_order = covariance[0, 0] + covariance[1, 1] + covariance[2, 2] > _SLOW * (
+                w0 * w0 + w1 * w1 + w2 * w2
+            )
+            if second_order:
+                for a in range(3):
+                    for b in range(3):
+                        slope[a, b] = covariance[a, b]
+            for i in range(measured_rows):
+                m = sensitivity[i]
+                h0 = 2.0 * w0 * m[0] + w1 * m[3] + w2 * m[4]
+                h1 = 2.0 * w1 * m[1] + w0 * m[3] + w2 * m[5]
+                h2 = 2.0 * w2 * m[2] + w0 * m[4] + w1 * m[5]
+                slopes[i, 0] = h0
+                slopes[i, 1] = h1
+                slopes[i, 2] = h2
+                innovations[i] = data.z[k, i] - 0.5 * (h0 * w0 + h1 * w1 + h2 * w2)
+                variances[i] = 1.0 + inflation
+                if second_order:
+                    mean, wider = _second_order(m, slope)
+                    innovations[i] -= mean
+                    variances[i] += wider
+                if plain:
+                    innovations[i] -= x[6 + i]
+                else:
+                    for j in range(d):
+                        innovations[i] -= tables.null_bias[place, i, j] * x[6 + j]
+            if unrolled and plain and not keep:
+                nis, determinant = _update_twelve(x, covariance, slopes, innovations, variances)
+            else:
+                before[:] = x
+                for i in range(measured_rows):
+                    h[:] = 0.0
+                    for a in range(3):
+                        h[a] = slopes[i, a]
+                    for j in range(d):
+                        h[6 + j] = tables.null_bias[place, i, j]
+                    variance = variances[i]
+                    innovation = innovations[i]
+                    for r in range(n):
+                        total = h[0] * covariance[0, r] + h[1] * covariance[1, r] + h[2] * covariance[2, r]
+                        if plain:
+                            total += covariance[6 + i, r]
+                        else:
+                            for j in range(d):
+                                total += h[6 + j] * covariance[6 + j, r]
+                        ph[r] = total
+                    for r in range(6 + d):
+                        variance += h[r] * ph[r]
+                        innovation -= h[r] * (x[r] - before[r])
+                    inverse = 1.0 / variance
+                    if keep:
+                        _remember(record, row, used_rows, h, ph, inverse, innovation)
+                        used_rows += 1
+                    _apply(x, covariance, ph, inverse, innovation, states)
+                    nis += innovation * innovation * inverse
+                    determinant *= variance
+            dof = measured_rows
+        if len(gyro_axes) > 0:
+            for a in range(3):
+                if np.isfinite(data.gyro[k, a]):
+                    for r in range(n):
+                        ph[r] = covariance[a, r] + covariance[6 + d + a, r]
+                    variance = tuning.gyro_variance + ph[a] + ph[6 + d + a]
+                    innovation = data.gyro[k, a] - x[a] - x[6 + d + a]
+                    inverse = 1.0 / variance
+                    if keep:
+                        h[:] = 0.0
+                        h[a] = 1.0
+                        h[6 + d + a] = 1.0
+                        _remember(record, row, used_rows, h, ph, inverse, innovation)
+                        used_rows += 1
+                    _apply(x, covariance, ph, inverse, innovation, states)
+                    nis += innovation * innovation * inverse
+                    determinant *= variance
+                    dof += 1
+
+        # Rest: at the end of each block that passes the test ω = 0 is one more measurement.
+        rest = False
+        if tuning.rest_window > 0 and _rest_block(data, k, tables, tuning, state):
+            rest = True
+            for a in range(3):
+                for r in range(n):
+                    ph[r] = covariance[a, r]
+                inverse = 1.0 / (tuning.rest_variance + ph[a])
+                innovation = -x[a]
+                if keep:
+                    h[:] = 0.0
+                    h[a] = 1.0
+                    _remember(record, row, used_rows, h, ph, inverse, innovation)
+                    used_rows += 1
+                _apply(x, covariance, ph, inverse, innovation, states)
+            if settling:
+                for i in range(d):
+                    for r in range(n):
+                        ph[r] = covariance[6 + i, r]
+                    inverse = 1.0 / (1.0 / tuning.rest_window + ph[6 + i])
+                    innovation = -x[6 + i]
+                    for j in range(data.y.shape[1]):
+                        innovation += tables.null_rows[0, i, j] * state.reference[j]
+                    if keep:
+                        h[:] = 0.0
+                        h[6 + i] = 1.0
+                        _remember(record, row, used_rows, h, ph, inverse, innovation)
+                        used_rows += 1
+                    _apply(x, covariance, ph, inverse, innovation, states)
+        state.counts[_SAMPLES] += 1
+        if keep:
+            record.count[row] = used_rows
+        if tuning.rest_window > 0 and state.counts[_BLOCK] == 0:
+            state.block_x[:] = x
+            state.block_covariance[:] = covariance
+
+        if sensed:
+            if tables.plain[place]:
+                for a in range(3):
+                    data.corrected[k, a] = data.alpha[k, a]
+            else:
+                _correct(data.alpha[k], tables, place, x, x[0], x[1], x[2], data.corrected[k])
+        elif k > 0:
+            for a in range(3):
+                data.corrected[k, a] = data.corrected[k - 1, a]
+        target = k + offset
+        for a in range(3):
+            out.omega[target, a] = x[a]
+            out.covariance[target, a] = covariance[a, a]
+        out.covariance[target, 3] = covariance[0, 1]
+        out.covariance[target, 4] = covariance[0, 2]
+        out.covariance[target, 5] = covariance[1, 2]
+        out.nis[target] = nis
+        out.dof[target] = dof
+        out.rest[target] = rest
+        if tuning.likelihood:
+            out.likelihood[target] = -0.5 * (nis + np.log(determinant))
+
+
+@njit(**_COMPILE)
+def _renew_noise(x, covariance, noise, factor, half, noise_row):  # type: ignore[no-untyped-def]
+    """Take the ε of a new sample into the state: half of it is in ω already."""
+    for a in range(3):
+        x[noise_row + a] = 0.0
+        for r in range(len(x)):
+            covariance[noise_row + a, r] = 0.0
+            covariance[r, noise_row + a] = 0.0
+    for a in range(3):
+        for b in range(3):
+            value = factor * noise[a, b]
+            covariance[noise_row + a, noise_row + b] = value
+            covariance[a, noise_row + b] = half * value
+            covariance[noise_row + b, a] = half * value
+            covariance[a, b] += half * half * value
+
+
+@njit(**_COMPILE)
+def _apply(x, covariance, ph, inverse, innovation, states):  # type: ignore[no-untyped-def]
+    """Update by one scalar measurement: x += P h e/S, P −= P h hᵀP/S."""
+    n = len(states)
+    root = np.sqrt(inverse)
+    pull = innovation * inverse
+    for r in range(n):
+        x[r] += ph[r] * pull
+        ph[r] *= root
+    for r in range(n):
+        factor = ph[r]
+        for q in range(n):
+            covariance[r, q] -= factor * ph[q]
+
+
+@njit(**_COMPILE)
+def _second_order(m, p):  # type: ignore[no-untyped-def]
+    """Return tr(BP) and 2 tr(BPBP) of the symmetric form B of a row of M."""
+    b = 0.5 * m[3]
+    c = 0.5 * m[4]
+    e = 0.5 * m[5]
+    c00 = m[0] * p[0, 0] + b * p[1, 0] + c * p[2, 0]
+    c01 = m[0] * p[0, 1] + b * p[1, 1] + c * p[2, 1]
+    c02 = m[0] * p[0, 2] + b * p[1, 2] + c * p[2, 2]
+    c10 = b * p[0, 0] + m[1] * p[1, 0] + e * p[2, 0]
+    c11 = b * p[0, 1] + m[1] * p[1, 1] + e * p[2, 1]
+    c12 = b * p[0, 2] + m[1] * p[1, 2] + e * p[2, 2]
+    c20 = c * p[0, 0] + e * p[1, 0] + m[2] * p[2, 0]
+    c21 = c * p[0, 1] + e * p[1, 1] + m[2] * p[2, 1]
+    c22 = c * p[0, 2] + e * p[1, 2] + m[2] * p[2, 2]
+    return c00 + c11 + c22, 2.0 * (
+        c00 * c00 + c11 * c11 + c22 * c22 + 2.0 * (c01 * c10 + c02 * c20 + c12 * c21)
+    )
+
+
+@njit(**_COMPILE)
+def _remember(record, row, place, h, ph, inverse, innovation):  # type: ignore[no-untyped-def]
+    """Store one scalar update for the backward pass."""
+    for r in range(len(h)):
+        record.h[row, place, r] = h[r]
+        record.gain[row, place, r] = ph[r] * inverse
+    record.inverse[row, place] = inverse
+    record.innovation[row, place] = innovation
+
+
+@njit(**_COMPILE)
+def _rest_block(data, k, tables, tuning, state):  # type: ignore[no-untyped-def]
+    """Add sample k to the block; at the block's end test for rest (`gfimu.rate.rest_test`) and start a new block."""
+    c = data.y.shape[1]
+    counts = state.counts
+    window = tuning.rest_window
+    if data.channel_set[k] != 0 or (counts[_BLOCK] > 0 and data.whole_run[k] == 0):
+        counts[_BLOCK] = 0
+        return False
+    if counts[_BLOCK] == 0:
+        state.scalars[_BLOCK_SQUARES] = 0.0
+        for i in range(c):
+            state.block_sums[0, i] = 0.0
+            state.block_sums[1, i] = 0.0
+            state.block_sums[2, i] = data.y[k, i]
+    half = 0 if counts[_BLOCK] < window // 2 else 1
+    squares = 0.0
+    for i in range(c):
+        change = (data.y[k, i] - state.block_sums[2, i]) * tuning.inverse_noise[i]
+        state.block_sums[half, i] += change
+        squares += change * change
+    state.scalars[_BLOCK_SQUARES] += squares
+    counts[_BLOCK] += 1
+    if counts[_BLOCK] < window:
+        return False
+    counts[_BLOCK] = 0
+    return _is_rest(tables, tuning, state)
+
+
+@njit(**_COMPILE)
+def _is_rest(tables, tuning, state):  # type: ignore[no-untyped-def]
+    """Test the block just completed against the hypothesis of rest."""
+    c = state.block_sums.shape[1]
+    d = tables.null_rows.shape[1]
+    window = tuning.rest_window
+    first = window // 2
+    second = window - first
+    limits = tuning.rest_limits
+    sums = state.block_sums
+    # ω when the block began: known, and not far from zero.
+    known = state.block_covariance
+    for a in range(3):
+        if known[a, a] > limits[5]:
+            return False
+    consistent = np.linalg.solve(known[:3, :3] + tuning.rest_variance * np.eye(3), state.block_x[:3])
+    if (consistent * state.block_x[:3]).sum() > limits[4]:
+        return False
+    # Scatter within the block, and its second half against its first.
+    scatter = state.scalars[_BLOCK_SQUARES]
+    halves = 0.0
+    for i in range(c):
+        total = sums[0, i] + sums[1, i]
+        scatter -= total * total / window
+        difference = sums[1, i] / second - sums[0, i] / first
+        halves += difference * difference
+    if scatter > limits[0] or halves / (1.0 / first + 1.0 / second) > limits[1]:
+        return False
+    # Means against the biases known when the block began.
+    mean = np.empty(c)
+    for i in range(c):
+        mean[i] = sums[2, i] + (sums[0, i] + sums[1, i]) / (window * tuning.inverse_noise[i])
+    alpha = tables.alpha_rows[0] @ mean - state.block_x[3:6]
+    spread = known[3:6, 3:6] + tables.alpha_noise[0] / window
+    if (np.linalg.solve(spread, alpha) * alpha).sum() > limits[2]:
+        return False
+    if d > 0:
+        null = tables.null_rows[0] @ mean - state.block_x[6 : 6 + d]
+        spread_null = known[6 : 6 + d, 6 : 6 + d] + np.eye(d) / window
+        if (np.linalg.solve(spread_null, null) * null).sum() > limits[3]:
+            return False
+    blocks = state.counts[_REST_BLOCKS]
+    for i in range(c):
+        state.reference[i] += (mean[i] - state.reference[i]) / (blocks + 1)
+    state.counts[_REST_BLOCKS] = blocks + 1
+    state.scalars[_REST_SAMPLES] += window
+    return True
+
+
+@njit(**_COMPILE)
+def backward(record, count, adjoint, curvature, omega, covariance, first, states):  # type: ignore[no-untyped-def]
+    """Run the smoother back over a recorded block of ``count`` samples (Bryson–Frazier form of Rauch–Tung–Striebel).
+
+    For each scalar measurement, from the last to the first, with gain k = P h/S:
+
+        λ ← λ − h (e/S + kᵀλ),   Λ ← (I − k hᵀ)ᵀ Λ (I − k hᵀ) + h hᵀ/S
+
+    then x_s = x − P λ and P_s = P − P Λ P with the predicted x and P, and λ ← Fᵀλ, Λ ← FᵀΛF. No inverse is needed.
+    """
+    n = len(states)
+    work = np.zeros(n)
+    three = np.zeros((3, n))
+    for row in range(count - 1, -1, -1):
+        for place in range(record.count[row] - 1, -1, -1):
+            h = record.h[row, place]
+            gain = record.gain[row, place]
+            inverse = record.inverse[row, place]
+            along = record.innovation[row, place] * inverse
+            for r in range(n):
+                along += gain[r] * adjoint[r]
+            both = inverse
+            for r in range(n):
+                total = 0.0
+                for q in range(n):
+                    total += curvature[r, q] * gain[q]
+                work[r] = total
+                both += total * gain[r]
+            for r in range(n):
+                adjoint[r] -= h[r] * along
+                for q in range(n):
+                    curvature[r, q] += both * h[r] * h[q] - h[r] * work[q] - work[r] * h[q]
+        for a in range(3):
+            total = record.x[row, a]
+            for r in range(n):
+                total -= record.rows[row, a, r] * adjoint[r]
+                value = 0.0
+                for q in range(n):
+                    value += record.rows[row, a, q] * curvature[q, r]
+                three[a, r] = value
+            omega[first + row, a] = total
+        for place in range(6):
+            a = place if place < 3 else (0 if place < 5 else 1)
+            b = place if place < 3 else (1 if place == 3 else 2)
+            total = record.rows[row, a, b]
+            for r in range(n):
+                total -= three[a, r] * record.rows[row, b, r]
+            covariance[first + row, place] = total
+        # λ ← Fᵀλ, Λ ← FᵀΛF with F the identity but for the rows of ω; the rows of ε are zero: it starts anew.
+        transition = record.transition[row]
+        adjoint[n - 3 :] = 0.0
+        curvature[n - 3 :] = 0.0
+        curvature[:, n - 3 :] = 0.0
+        for r in range(n):
+            total = adjoint[r] if r >= 3 else 0.0
+            for a in range(3):
+                total += transition[a, r] * adjoint[a]
+            work[r] = total
+        adjoint[:] = work
+        # Λ F, column by column, then Fᵀ (Λ F), row by row.
+        for r in range(n):
+            l0 = curvature[r, 0]
+            l1 = curvature[r, 1]
+            l2 = curvature[r, 2]
+            for q in range(n):
+                base = curvature[r, q] if q >= 3 else 0.0
+                curvature[r, q] = base + l0 * transition[0, q] + l1 * transition[1, q] + l2 * transition[2, q]
+        for q in range(n):
+            l0 = curvature[0, q]
+            l1 = curvature[1, q]
+            l2 = curvature[2, q]
+            for r in range(n):
+                base = curvature[r, q] if r >= 3 else 0.0
+                curvature[r, q] = base + transition[0, r] * l0 + transition[1, r] * l1 + transition[2, r] * l2

@@ -1,0 +1,119 @@
+"""Test for rest: is a block of samples consistent with a body that doesn't turn?
+
+A block of W samples is taken for rest if none of five statistics is larger than rest explains:
+
+============  ====================================================================  ==============
+statistic     of                                                                    distribution
+============  ====================================================================  ==============
+scatter       the readings about their means within the block                       χ²(c (W − 1))
+halves        the means of the second half against those of the first               χ²(c)
+alpha         mean α against its bias as known when the block began                  χ²(3)
+null space    mean z against its bias as known when the block began                  χ²(d)
+rate          ω when the block began against zero                                    χ²(3)
+============  ====================================================================  ==============
+
+Each is tested at a fifth of the stated false-alarm rate, so that a block at rest is missed in at most that share of
+cases. Turning steadily about the vertical changes no reading; it is told from rest by the null space (down to
+about √(3 σ_b/h), σ_b the uncertainty of the null-space bias) and by the rate that the filter remembers, which is why
+a block only counts if ω was known to ``largest_rate_std`` when it began. A start in the dark, with ω unknown, is
+never taken for rest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.stats import chi2
+
+from gfimu.array import AccelerometerArray
+from gfimu.errors import InputError
+
+__all__ = ["RestTest", "constant_readings"]
+
+
+@dataclass(frozen=True)
+class RestTest:
+    """Settings of the test.
+
+    Parameters
+    ----------
+    window_s : float
+        Length of a block, s.
+    false_alarm : float
+        Largest probability that a block at rest is not recognised.
+    rate_std : float
+        How far from zero the rate may be at rest, rad/s (standard deviation).
+    largest_rate_std : float
+        A block counts only if ω was known at least this well when it began, rad/s.
+    noise_margin : float
+        The true noise may be larger than stated by this ratio.
+    """
+
+    window_s: float = 0.5
+    false_alarm: float = 0.01
+    rate_std: float = 1e-3
+    largest_rate_std: float = 0.2
+    noise_margin: float = 0.1
+
+    def __post_init__(self) -> None:
+        if not 0 < self.false_alarm < 1:
+            raise InputError(f"false_alarm = {self.false_alarm!r}: must lie between 0 and 1")
+        for name in ("window_s", "rate_std", "largest_rate_std"):
+            if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0):
+                raise InputError(f"{name} = {getattr(self, name)!r}: must be a positive number")
+
+    def window(self, period: float) -> int:
+        """Samples per block, at least four."""
+        return max(4, round(self.window_s / period))
+
+    def limits(self, n_channels: int, n_null: int, period: float) -> NDArray[np.float64]:
+        """Limits of scatter, halves, α, null space and rate, and the largest variance of ω, shape (6,)."""
+        freedom = np.array([n_channels * (self.window(period) - 1), n_channels, 3, max(n_null, 1), 3])
+        largest = chi2.ppf(1.0 - self.false_alarm / len(freedom), freedom)
+        largest[:2] *= (1.0 + self.noise_margin) ** 2
+        return np.append(largest, self.largest_rate_std**2)
+
+
+def constant_readings(
+    array: AccelerometerArray,
+    readings: ArrayLike,
+    noise_std: ArrayLike,
+    period: float,
+    test: RestTest | None = None,
+) -> NDArray[np.bool_]:
+    """Blocks whose readings are constant: the part of the test that needs no filter (scatter and halves).
+
+    Necessary for rest, not sufficient: turning steadily about the vertical is constant too.
+
+    Parameters
+    ----------
+    array : AccelerometerArray
+        The array, with c channels.
+    readings : array_like, shape (n, c)
+        Specific force, m/s².
+    noise_std : array_like, shape (c,) or scalar
+        White noise of each channel per sample, m/s².
+    period : float
+        Sample period, s.
+    test : RestTest, optional
+        Settings.
+
+    Returns
+    -------
+    ndarray of bool, shape (n,)
+        True in the blocks that pass; False in an incomplete last block and where a reading is missing.
+    """
+    settings = test or RestTest()
+    rows = np.asarray(readings, dtype=float) / np.broadcast_to(np.asarray(noise_std, dtype=float), (array.n_channels,))
+    window = settings.window(period)
+    blocks = len(rows) // window
+    limits = settings.limits(array.n_channels, 0, period)
+    block = rows[: blocks * window].reshape(blocks, window, array.n_channels)
+    scatter = ((block - block.mean(axis=1, keepdims=True)) ** 2).sum(axis=(1, 2))
+    half = window // 2
+    difference = block[:, half:].mean(axis=1) - block[:, :half].mean(axis=1)  # (blocks, c)
+    halves = (difference**2).sum(axis=1) / (1.0 / half + 1.0 / (window - half))
+    passed = (scatter <= limits[0]) & (halves <= limits[1])  # False where NaN
+    return np.append(np.repeat(passed, window), np.zeros(len(rows) - blocks * window, dtype=bool))

@@ -1,0 +1,142 @@
+"""Result of a rate estimator: estimate, covariance, innovation statistics, rest, sign."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["ChannelReport", "RateEstimate", "SignDecision", "full_covariance"]
+
+
+@dataclass(frozen=True)
+class SignDecision:
+    """Which of the two mirrored rates is the true one: ω and −ω give the same centripetal readings.
+
+    Parameters
+    ----------
+    state : {"known", "decided", "undecided"}
+        ``known``: the start was known, so the sign was never in doubt.
+    log_likelihood_ratio : float
+        Of the estimate against its mirror image where the decision fell (or at the end, undecided).
+    decided_at_s : float
+        Time from which on the sign is certain, s; NaN if undecided.
+    """
+
+    state: str = "known"
+    log_likelihood_ratio: float = np.inf
+    decided_at_s: float = np.nan
+
+
+@dataclass(frozen=True)
+class ChannelReport:
+    """What was wrong with the channels and what was done about it.
+
+    Parameters
+    ----------
+    missing, saturated, stuck : mapping of str to int
+        Samples in which a channel was left out, per channel with any.
+    samples_without_alpha : int
+        Samples with too few channels to see α: the rate was carried on with growing uncertainty.
+    gaps : int
+        Gaps in time that were bridged.
+    """
+
+    missing: Mapping[str, int] = field(default_factory=dict)
+    saturated: Mapping[str, int] = field(default_factory=dict)
+    stuck: Mapping[str, int] = field(default_factory=dict)
+    samples_without_alpha: int = 0
+    gaps: int = 0
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the report as JSON can hold it."""
+        return {
+            "missing": dict(self.missing),
+            "saturated": dict(self.saturated),
+            "stuck": dict(self.stuck),
+            "samples_without_alpha": self.samples_without_alpha,
+            "gaps": self.gaps,
+        }
+
+    def sentences(self) -> list[str]:
+        """Return the report in words, one sentence per finding; empty if nothing was wrong."""
+        found = []
+        for what, counts in (("missing", self.missing), ("saturated", self.saturated), ("stuck", self.stuck)):
+            if counts:
+                names = ", ".join(f"{name} {count}" for name, count in counts.items())
+                found.append(f"{what} channels left out (samples): {names}")
+        if self.samples_without_alpha:
+            found.append(f"{self.samples_without_alpha} samples with too few channels: rate carried on, less certain")
+        if self.gaps:
+            found.append(f"{self.gaps} gaps in time bridged, rate less certain after each")
+        return found
+
+
+@dataclass(frozen=True)
+class RateEstimate:
+    """Angular rate and how well it is known.
+
+    Parameters
+    ----------
+    method : str
+        Name of the estimator.
+    t_s : ndarray, shape (n,)
+        Sample times, s.
+    omega : ndarray, shape (n, 3)
+        Angular rate in body axes, rad/s; NaN where the method has no estimate.
+    covariance : ndarray, shape (n, 3, 3)
+        Covariance of ``omega``, (rad/s)².
+    nis : ndarray, shape (n,)
+        Normalised innovation squared of each sample; with a right model χ² with ``nis_dof`` degrees of freedom.
+        For methods without innovations: the normalised residual squared, NaN where there is none.
+    nis_dof : ndarray of int, shape (n,)
+        Degrees of freedom of ``nis``; zero where nothing was compared.
+    rest : ndarray of bool, shape (n,)
+        Samples recognised as rest.
+    sign : SignDecision
+        Whether the sign of ω is certain. While undecided, ``mirrored`` is the other hypothesis.
+    mirrored : RateEstimate or None
+        The mirror hypothesis where the sign stayed undecided.
+    bias, bias_covariance : ndarray or None
+        Final [b_α (rad/s²); b_z (noise units); b_gyro (rad/s)] of the filter and its covariance.
+    channels : ChannelReport
+        Channels left out, gaps bridged.
+    """
+
+    method: str
+    t_s: NDArray[np.float64]
+    omega: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+    nis: NDArray[np.float64]
+    nis_dof: NDArray[np.int64]
+    rest: NDArray[np.bool_]
+    sign: SignDecision = field(default_factory=SignDecision)
+    mirrored: RateEstimate | None = None
+    bias: NDArray[np.float64] | None = None
+    bias_covariance: NDArray[np.float64] | None = None
+    channels: ChannelReport = field(default_factory=ChannelReport)
+    unit: str = "rad/s"
+    format_version: int = 1
+
+    def __len__(self) -> int:
+        return len(self.t_s)
+
+    @property
+    def std(self) -> NDArray[np.float64]:
+        """Standard deviation of each component of ω, shape (n, 3), rad/s."""
+        return np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2))
+
+    @property
+    def mean_nis(self) -> float:
+        """Sum of ``nis`` over the sum of its degrees of freedom: 1 for a filter whose model is right."""
+        used = (self.nis_dof > 0) & np.isfinite(self.nis)
+        freedom = int(self.nis_dof[used].sum())
+        return float(self.nis[used].sum() / freedom) if freedom else float("nan")
+
+
+def full_covariance(packed: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Symmetric matrices (n, 3, 3) from their elements xx, yy, zz, xy, xz, yz, shape (n, 6)."""
+    return packed[:, [0, 3, 4, 3, 1, 5, 4, 5, 2]].reshape(-1, 3, 3)

@@ -1,0 +1,249 @@
+"""What the rate estimators know about the sensors: their errors, and what each set of working channels can tell.
+
+For any set of working channels the readings y split into two parts that share no unknown motion:
+
+* the angular acceleration, α = A y − L s(ω) − (bias), with A J = [I 0]: the filter integrates it;
+* the null space of J, z = Z y = M s(ω) + (bias) + noise: the filter's measurement of the products s of ω.
+
+A is the unweighted left inverse wherever J is orthogonal to Q (no products of ω in α), otherwise the joint form that
+removes the products as far as the null space sees them well; L is what is left. Z is whitened: its noise has unit
+variance. Biases are constant per channel; what the filter can know of them is b_α = A b and b_z = Z b of the full set,
+and every smaller set of channels sees linear combinations of those: A' = A + K Z and Z' = T Z.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import ArrayLike, NDArray
+
+from gfimu.array import AccelerometerArray
+from gfimu.errors import InputError
+from gfimu.kinematics import require_all_motions
+from gfimu.model_files import find_model, read_toml
+
+__all__ = ["ChannelTables", "SensorErrors"]
+
+_RANK_TOLERANCE = 1e-9
+_WEAK = 0.1  # products seen more weakly than this share of the best are not used to clean α
+_REFERENCE_RATE = 100.0  # Hz, at which parts state their noise in LSB rms
+_EQUAL_READINGS = 1e-7  # probability per sample at which equal readings count as a stuck channel
+
+
+@dataclass(frozen=True)
+class SensorErrors:
+    """Errors of the sensors of an array, as far as an estimator should reckon with them.
+
+    Parameters
+    ----------
+    noise_std : ndarray, shape (c,)
+        White noise of each channel per sample, m/s².
+    bias_std : ndarray, shape (c,)
+        Uncertainty of the constant bias of each channel before the run, m/s².
+    scale_std : float
+        Uncertainty of the scale factors, a ratio (0.01 is 1 %).
+    placement_std : float
+        Uncertainty of the positions, m.
+    full_range : ndarray, shape (c,)
+        Readings at or beyond ± this are saturated, m/s².
+    stuck_after : int
+        So many equal readings in a row mean that a channel is stuck; 0 switches the check off.
+    gyro_noise_std : float
+        White noise of a gyro axis per sample, rad/s.
+    gyro_bias_std : float
+        Uncertainty of the constant bias of a gyro axis before the run, rad/s.
+    """
+
+    noise_std: NDArray[np.float64]
+    bias_std: NDArray[np.float64]
+    scale_std: float = 0.0
+    placement_std: float = 0.0
+    full_range: NDArray[np.float64] | None = None
+    stuck_after: int = 0
+    gyro_noise_std: float = 0.005
+    gyro_bias_std: float = 0.35
+
+    def __post_init__(self) -> None:
+        for name in ("noise_std", "bias_std"):
+            value = getattr(self, name)
+            if value.ndim != 1 or not np.isfinite(value).all() or np.any(value < 0):
+                raise InputError(f"{name} must hold one number per channel, none negative, m/s²")
+        if np.any(self.noise_std <= 0):
+            raise InputError("noise_std must be positive for every channel; a real sensor has noise, m/s²")
+        for name in ("scale_std", "placement_std", "gyro_noise_std", "gyro_bias_std"):
+            if not (np.isfinite(getattr(self, name)) and getattr(self, name) >= 0):
+                raise InputError(f"{name} = {getattr(self, name)!r}: must be a number ≥ 0")
+
+    @classmethod
+    def uniform(
+        cls, array: AccelerometerArray, noise_std: ArrayLike, bias_std: ArrayLike = 0.0, **others: Any
+    ) -> SensorErrors:
+        """Build the same errors for all channels, or one number per channel; other fields by name."""
+        c = array.n_channels
+        try:
+            noise = np.array(np.broadcast_to(np.asarray(noise_std, dtype=float), (c,)))
+            bias = np.array(np.broadcast_to(np.asarray(bias_std, dtype=float), (c,)))
+        except ValueError:
+            raise InputError(f"noise_std and bias_std need one number, or {c}: one per channel") from None
+        return cls(noise, bias, **others)
+
+    @classmethod
+    def from_parts(cls, array: AccelerometerArray, sample_rate: float, **others: Any) -> SensorErrors:
+        """Take the errors from the data sheets of the array's parts (``models/parts``).
+
+        White noise is the part's LSB rms at 100 Hz times √(rate/100 Hz), with the quantisation step's Δ²/12 added;
+        bias is the typical deviation at switch-on. Other fields by name.
+
+        Raises
+        ------
+        InputError
+            If a part is unknown.
+        """
+        noise, bias, limit, stuck = [], [], [], 0
+        for chip in array.chips:
+            part = read_toml(find_model("parts", chip.part))
+            lsb = float(part["lsb_m_s2"])
+            axes = len(chip.axes)
+            rms = np.array(part["noise_lsb_rms_100_hz"])[:axes] * lsb * np.sqrt(sample_rate / _REFERENCE_RATE)
+            noise.append(np.sqrt(rms**2 + lsb**2 / 12.0))
+            bias.append(np.array(part["offset_std_m_s2"])[:axes])
+            limit.append(np.full(axes, float(part["full_range_m_s2"]) - lsb))
+            stuck = max(stuck, _equal_run(float(rms.min()) / lsb))
+        fields = {"full_range": np.concatenate(limit), "stuck_after": stuck} | others
+        if "noise_std" in fields:
+            noise = [np.broadcast_to(np.asarray(fields.pop("noise_std"), dtype=float), (array.n_channels,))]
+        if "bias_std" in fields:
+            bias = [np.broadcast_to(np.asarray(fields.pop("bias_std"), dtype=float), (array.n_channels,))]
+        return cls(np.concatenate(noise), np.concatenate(bias), **fields)
+
+    @property
+    def limits(self) -> NDArray[np.float64]:
+        """Saturation limit of each channel, shape (c,), m/s²; infinite where none is known."""
+        return np.full(len(self.noise_std), np.inf) if self.full_range is None else np.asarray(self.full_range)
+
+
+def _equal_run(noise_in_lsb: float) -> int:
+    """Count equal readings in a row that noise of this size, rounded to whole LSB, hardly ever gives."""
+    # Two readings round to the same count with a probability of about 1/(2 √π σ), σ in LSB (at most near 1).
+    probability = min(0.9, 1.0 / (2.0 * np.sqrt(np.pi) * max(noise_in_lsb, 1e-3)))
+    return int(np.ceil(np.log(_EQUAL_READINGS) / np.log(probability))) + 1
+
+
+class ChannelTables:
+    """Matrices of α and of the null space for each set of working channels met so far.
+
+    Set 0 has every channel. Another set is added when a sample needs it (`index`). All tables are stacked over the
+    sets; a missing channel has zero columns.
+
+    Parameters
+    ----------
+    array : AccelerometerArray
+        An array that sees all six motions.
+    errors : SensorErrors
+        Noise of its channels.
+
+    Raises
+    ------
+    GeometryError
+        If the array can't see all six motions.
+    """
+
+    def __init__(self, array: AccelerometerArray, errors: SensorErrors) -> None:
+        require_all_motions(array)
+        if len(errors.noise_std) != array.n_channels:
+            raise InputError(f"noise_std holds {len(errors.noise_std)} numbers; array {array.name!r} has "
+                             f"{array.n_channels} channels")
+        self.array = array
+        self._variance = errors.noise_std**2
+        self._length_scale = np.array([array.length_unit] * 3 + [1.0] * 3)
+        c = array.n_channels
+        basis, strengths = self._whitened_null_space()
+        self.n_null = len(basis)
+        self._basis = basis
+        self._base_alpha = self._alpha_rows(np.ones(c, dtype=bool), basis)
+        self.seen_products = int(np.sum(strengths > _RANK_TOLERANCE * max(1.0, strengths.max(initial=0.0))))
+        d = self.n_null
+        self.masks = np.zeros(0, dtype=np.int64)
+        self.alpha_rows = np.zeros((0, 3, c))
+        self.alpha_bias = np.zeros((0, 3, d))  # K
+        self.alpha_leak = np.zeros((0, 3, 6))  # L
+        self.alpha_noise = np.zeros((0, 3, 3))
+        self.null_rows = np.zeros((0, d, c))  # Z
+        self.null_sensitivity = np.zeros((0, d, 6))  # M
+        self.null_bias = np.zeros((0, d, d))  # T
+        self.null_count = np.zeros(0, dtype=np.int64)  # −1: α can't be seen with this set
+        self.plain = np.zeros(0, dtype=np.bool_)  # α = A y − b_α with nothing else to subtract
+        self.index(0)
+
+    def index(self, missing: int) -> int:
+        """Place of the set without the channels whose bits are set in ``missing``, built if new."""
+        known = np.flatnonzero(self.masks == missing)
+        if known.size:
+            return int(known[0])
+        c, d = self.array.n_channels, self.n_null
+        present = np.array([not (missing >> channel) & 1 for channel in range(c)])
+        rows = np.zeros((3, c))
+        bias, leak, noise = np.zeros((3, d)), np.zeros((3, 6)), np.zeros((3, 3))
+        null_rows, sensitivity, combination = np.zeros((d, c)), np.zeros((d, 6)), np.zeros((d, d))
+        count = -1
+        if np.linalg.matrix_rank(self.array.regression_matrix[present] / self._length_scale, tol=1e-6) == 6:
+            if missing == 0:
+                kept = np.eye(d)
+            else:  # combinations of the null space that don't touch the missing channels
+                kept = scipy.linalg.null_space(self._basis[:, ~present].T, rcond=_RANK_TOLERANCE).T
+            count = len(kept)
+            smaller = kept @ self._basis  # (count, c)
+            smaller[:, ~present] = 0.0
+            null_rows[:count], combination[:count] = smaller, kept
+            sensitivity[:count] = _clean(smaller @ self.array.centripetal_matrix)
+            rows = self._base_alpha if missing == 0 else self._alpha_rows(present, smaller)
+            bias = (rows - self._base_alpha) * self._variance @ self._basis.T  # (3, d), Z R Zᵀ = I
+            leak = _clean(rows @ self.array.centripetal_matrix)
+            noise = rows * self._variance @ rows.T
+        self.masks = np.append(self.masks, np.int64(missing))
+        self.alpha_rows = np.concatenate([self.alpha_rows, rows[None]])
+        self.alpha_bias = np.concatenate([self.alpha_bias, bias[None]])
+        self.alpha_leak = np.concatenate([self.alpha_leak, leak[None]])
+        self.alpha_noise = np.concatenate([self.alpha_noise, noise[None]])
+        self.null_rows = np.concatenate([self.null_rows, null_rows[None]])
+        self.null_sensitivity = np.concatenate([self.null_sensitivity, sensitivity[None]])
+        self.null_bias = np.concatenate([self.null_bias, combination[None]])
+        self.null_count = np.append(self.null_count, np.int64(count))
+        self.plain = np.append(self.plain, not (leak.any() or missing))
+        return len(self.masks) - 1
+
+    def bias_covariance(self, bias_std: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Covariance of [b_α; b_z] for independent channel biases, shape (3 + d, 3 + d)."""
+        rows = np.vstack([self._base_alpha, self._basis])
+        return rows * bias_std**2 @ rows.T
+
+    def _whitened_null_space(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Rows Z with Z J = 0 and unit noise, those that see ω best first, and their strengths."""
+        basis = scipy.linalg.null_space(
+            (self.array.regression_matrix / self._length_scale).T, rcond=_RANK_TOLERANCE
+        ).T  # (c - 6, c)
+        if len(basis) == 0:
+            return basis, np.zeros(0)
+        cholesky = np.linalg.cholesky(basis * self._variance @ basis.T)
+        white = scipy.linalg.solve_triangular(cholesky, basis, lower=True)
+        rotation, strengths, _ = np.linalg.svd(white @ self.array.centripetal_matrix)
+        return rotation.T @ white, strengths
+
+    def _alpha_rows(self, present: NDArray[np.bool_], null_rows: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Rows A of the working channels: unweighted left inverse, cleaned of ω² by well-seen products."""
+        rows = np.zeros((3, self.array.n_channels))
+        inverse = np.linalg.pinv(self.array.regression_matrix[present] / self._length_scale)
+        rows[:, present] = inverse[:3] / self.array.length_unit
+        leak = _clean(rows @ self.array.centripetal_matrix)
+        if leak.any() and len(null_rows):
+            rows = rows - leak @ np.linalg.pinv(null_rows @ self.array.centripetal_matrix, rcond=_WEAK) @ null_rows
+        return rows
+
+
+def _clean(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Set rounding errors to zero, so that what cancels exactly is an exact zero."""
+    largest = np.abs(matrix).max(initial=0.0)
+    return np.where(np.abs(matrix) > _RANK_TOLERANCE * max(1.0, largest), matrix, 0.0)

@@ -1,0 +1,102 @@
+"""Small worlds for tests and benchmarks of rate estimation, independent of the simulator: motions known in closed
+form or from Euler's equations, readings from the rigid-body formula written out chip by chip, data-sheet noise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from gfimu.array import AccelerometerArray, Chip
+
+GRAVITY = 9.80665
+LSB = 0.0039 * GRAVITY
+NOISE_LSB_100_HZ = np.array([0.75, 0.75, 1.1])
+TURN_ON_BIAS = 0.035 * GRAVITY
+CORNERS = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
+
+
+@dataclass(frozen=True)
+class Motion:
+    t: np.ndarray  # (n,)
+    omega: np.ndarray  # (n, 3)
+    alpha: np.ndarray  # (n, 3)
+    p: np.ndarray  # (n, 3)
+
+
+def cube(edge: float = 0.06) -> AccelerometerArray:
+    """Four triads on alternate corners; an edge of 6 cm keeps 10 rev/s within ±16 g."""
+    chips = tuple(Chip(f"a{i + 1}", corner * edge / 2, np.eye(3)) for i, corner in enumerate(CORNERS))
+    return AccelerometerArray("cube", chips, edge / 2)
+
+
+def smooth_step(t, start, stop):
+    """Rise from 0 to 1 with continuous acceleration, and its derivative."""
+    u = np.clip((t - start) / (stop - start), 0, 1)
+    return u - np.sin(2 * np.pi * u) / (2 * np.pi), (1 - np.cos(2 * np.pi * u)) / (stop - start) * ((u > 0) & (u < 1))
+
+
+def turntable(rate: float, speed: float, duration: float = 30.0) -> Motion:
+    """Rest 2 s, up to ``speed`` in 3 s, hold, through zero to −speed, hold, stop."""
+    t = np.arange(round(duration * rate)) / rate
+    omega, alpha = np.zeros((len(t), 3)), np.zeros((len(t), 3))
+    for start, stop, change in ((2, 5, speed), (12, 18, -2 * speed), (25, 28, speed)):
+        value, slope = smooth_step(t, start, stop)
+        omega[:, 2] += change * value
+        alpha[:, 2] += change * slope
+    p = np.tile([0.0, 0.0, GRAVITY], (len(t), 1))
+    return Motion(t, omega, alpha, p)
+
+
+def tumble(rate: float, speed: float, duration: float = 30.0) -> Motion:
+    """Rest 2 s, spun up by a smooth torque within 3 s, then free of torque, moments of inertia 1:2:3, falling freely."""
+    t = np.arange(round(duration * rate)) / rate
+    inertia = np.array([1.0, 2.0, 3.0])
+    direction = np.array([0.5, 1.0, 0.4])
+    direction /= np.linalg.norm(direction / inertia)
+
+    def euler(time, omega, size):
+        torque = direction * size * smooth_step(time, 2, 5)[1]
+        return (torque - np.cross(omega, inertia * omega)) / inertia
+
+    size = speed
+    for _ in range(8):  # the torque turns with the body: find the impulse that ends at the wanted speed
+        reached = np.linalg.norm(solve_ivp(euler, (0, 5), np.zeros(3), args=(size,), rtol=1e-6, atol=1e-6,
+                                           max_step=0.2).y[:, -1])
+        size *= speed / reached
+    solution = solve_ivp(euler, (0, duration), np.zeros(3), method="DOP853", t_eval=t, args=(size,), rtol=1e-11,
+                         atol=1e-11, max_step=0.1)
+    omega = solution.y.T
+    alpha = np.array([euler(time, w, size) for time, w in zip(t, omega, strict=True)])
+    return Motion(t, omega, alpha, np.zeros_like(omega))
+
+
+def readings(array: AccelerometerArray, motion: Motion) -> np.ndarray:
+    """Specific force of each channel, chip by chip: p + α × r + ω × (ω × r)."""
+    columns = []
+    for chip in array.chips:
+        r = chip.position
+        force = motion.p + np.cross(motion.alpha, r) + np.cross(motion.omega, np.cross(motion.omega, r))
+        columns.append(force @ chip.axes.T)
+    return np.hstack(columns)
+
+
+def noise_std(array: AccelerometerArray, rate: float) -> np.ndarray:
+    """Data-sheet noise per channel, without the quantisation step's."""
+    return np.concatenate([NOISE_LSB_100_HZ[: len(chip.axes)] for chip in array.chips]) * LSB * np.sqrt(rate / 100)
+
+
+def measure(array, motion, rng, *, bias=TURN_ON_BIAS, scale=0.0, quantise=True):
+    """Readings of ADXL345s: scale errors, turn-on bias, noise, 3.9 mg steps."""
+    rate = 1 / (motion.t[1] - motion.t[0])
+    values = readings(array, motion)
+    c = values.shape[1]
+    values = values * (1 + scale * rng.standard_normal(c)) + bias * rng.standard_normal(c)
+    values += noise_std(array, rate) * rng.standard_normal(values.shape)
+    return np.round(values / LSB) * LSB if quantise else values
+
+
+def total_noise_std(array, rate):
+    """Noise per channel with the quantisation step's."""
+    return np.sqrt(noise_std(array, rate) ** 2 + LSB**2 / 12)
