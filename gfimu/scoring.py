@@ -223,7 +223,7 @@ def _score(array: AccelerometerArray, unit: float, omega: NDArray[np.float64], n
 
 
 def _product_in_words(product: str) -> str:
-    first, second = product
+    first, second = product[0], product[1]
     return f"ω{first}²" if first == second else f"ω{first}ω{second}"
 
 
