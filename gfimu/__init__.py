@@ -44,6 +44,7 @@ _PUBLIC = {
     "closed_form": "gfimu.kinematics",
     "drift_budget": "gfimu.drift",
     "equivalent_rate_drift": "gfimu.drift",
+    "estimate_from_rest": "gfimu.rest_bias",
     "estimate": "gfimu.estimation",
     "integrate_attitude": "gfimu.attitude",
     "integrate_rate": "gfimu.rate.integration",

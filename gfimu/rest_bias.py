@@ -8,6 +8,7 @@ and it grows into the rate with time; `RestBias.rate_std` says how much.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,12 +16,13 @@ from scipy.spatial.transform import Rotation
 
 from gfimu.array import AccelerometerArray
 from gfimu.errors import InputError
+from gfimu.estimation import Estimate, estimate
 from gfimu.kinematics import specific_force
 from gfimu.recording import Recording
 from gfimu.rest import detect_rest
 from gfimu.units import STANDARD_GRAVITY
 
-__all__ = ["RestBias", "rest_bias"]
+__all__ = ["RestBias", "estimate_from_rest", "rest_bias"]
 
 
 @dataclass(frozen=True)
@@ -102,4 +104,43 @@ def rest_bias(
         np.nanstd(readings, axis=0, ddof=1) / np.sqrt(count),
         float(t[0]),
         float(t[-1]),
+    )
+
+
+def estimate_from_rest(
+    recording: Recording,
+    array: AccelerometerArray,
+    *,
+    method: str = "integrate",
+    gravity: float = STANDARD_GRAVITY,
+    **options: Any,
+) -> Estimate:
+    """Estimate the motion with the biases of the first rest taken off.
+
+    Parameters
+    ----------
+    recording : Recording
+        Readings in m/s²; the table level and at rest for a second or more before it moves.
+    array : AccelerometerArray
+        Geometry of the channels.
+    method : str
+        Method for the angular rate. The standard deviation of ``integrate`` grows by what is left of the biases.
+    gravity : float
+        Local gravity, m/s².
+    **options
+        As for `gfimu.estimation.estimate`.
+
+    Raises
+    ------
+    InputError
+        As `rest_bias` and `gfimu.estimation.estimate`.
+    """
+    found = rest_bias(recording, array, gravity=gravity)
+    result = estimate(found.remove(recording), array, method=method, **options)
+    left = found.rate_std(result.t_s) if method == "integrate" else 0.0
+    biases = dict(zip(array.channels, found.bias.tolist(), strict=True))
+    return replace(
+        result,
+        omega_std=np.hypot(result.omega_std, left),
+        metadata={**result.metadata, "rest_bias_m_s2": biases},
     )

@@ -137,17 +137,13 @@ def read_biases(demo: Demo) -> None:
 
 def estimate_motion(demo: Demo) -> None:
     """Estimate acceleration, rate and angle."""
-    from dataclasses import replace
-
     from gfimu.estimation import estimate
+    from gfimu.rest_bias import estimate_from_rest
 
     array = demo.scenario.array
     raw = estimate(demo.recording, array)
-    found = estimate(demo.bias.remove(demo.recording), array, with_position=True)
-    # The band of the rate holds the channels' noise; what is left of the biases adds to it.
-    std = np.hypot(found.omega_std, demo.bias.rate_std(found.t_s))
     path = demo.out / "estimate.parquet"
-    demo.estimate = replace(found, omega_std=std)
+    demo.estimate = estimate_from_rest(demo.recording, array, gravity=demo.scenario.gravity, with_position=True)
     demo.estimate.write(path)
     demo.written["estimate"] = path
     alpha = _rms(demo.estimate.alpha[:, 2] - demo.truth("alpha", "rad_s2")[:, 2])
@@ -166,7 +162,11 @@ def estimate_motion(demo: Demo) -> None:
             "angular rate, integrated, rms error",
             f"{_rms(omega):.3f} rad/s",
             f"{without:.0f} rad/s with biases left in",
-            {"rmse_rad_s": _rms(omega), "rmse_raw_rad_s": without, "expected_std_at_end_rad_s": float(std[-1, 2])},
+            {
+                "rmse_rad_s": _rms(omega),
+                "rmse_raw_rad_s": without,
+                "expected_std_at_end_rad_s": float(demo.estimate.omega_std[-1, 2]),
+            },
         ),
         Row(
             "table angle, error at the end",

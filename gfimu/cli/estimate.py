@@ -33,20 +33,25 @@ def _estimate(
     form: Annotated[
         str, typer.Option("--form", help="How readings turn into p and α: auto, linear, joint or recursive.")
     ] = "auto",
+    rest_bias: Annotated[
+        bool, typer.Option("--rest-bias", help="Read the biases off the first rest (table level) and take them off.")
+    ] = False,
     position: Annotated[bool, typer.Option("--position", help="Integrate to velocity and position too.")] = False,
     rrd: Annotated[Path | None, typer.Option("--rrd", help="Rerun recording to write.")] = None,
     json: JsonOption = False,
 ) -> None:
     """Estimate p, α, ω, attitude and table angle from a recording.
 
-    Example: gfimu estimate run.parquet --array cube12 --out estimate.parquet
+    Example: gfimu estimate run.parquet --rest-bias --out estimate.parquet
     """
     from gfimu.estimate_summary import summarise
     from gfimu.estimation import estimate
     from gfimu.recording_formats import open_run
+    from gfimu.rest_bias import estimate_from_rest
 
     recording, geometry = open_run(run, None if array is None else load_array(array))
-    found = estimate(recording, geometry, method=method, form=form, with_position=position)
+    solve = estimate_from_rest if rest_bias else estimate
+    found = solve(recording, geometry, method=method, form=form, with_position=position)
     found.write(out)
     written = {"estimate": out}
     if rrd is not None:

@@ -9,7 +9,7 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.spatial.transform import Rotation
 
 from gfimu import AccelerometerArray, InputError, Recording, specific_force
-from gfimu.rest_bias import RestBias, rest_bias
+from gfimu.rest_bias import RestBias, estimate_from_rest, rest_bias
 
 ARRAY = AccelerometerArray.load("cube12")
 BIAS = np.linspace(-0.5, 0.4, 12)
@@ -70,3 +70,15 @@ def test_a_dead_channel_is_named():
     run.readings[:, 4] = np.nan
     with pytest.raises(InputError, match="a22"):
         rest_bias(run, ARRAY)
+
+
+def test_the_rate_stays_within_the_band_it_gives():
+    scores = []
+    for seed in range(40):
+        run = recording(0.03, seed=seed)
+        found = estimate_from_rest(run, ARRAY, noise_std=0.03)
+        error = found.omega[-1, 2] - run.reference["tacho_rad_s"][-1]
+        scores.append(error / found.omega_std[-1, 2])
+    # The mean square of 40 standard normal scores is within 4 standard deviations, 4 √(2/40), of 1.
+    assert np.mean(np.square(scores)) == pytest.approx(1.0, abs=4 * np.sqrt(2 / 40))
+    assert found.metadata["rest_bias_m_s2"]["a11"] == pytest.approx(BIAS[0], abs=0.02)
