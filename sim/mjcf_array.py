@@ -22,7 +22,8 @@ def array_from_mjcf(
 ) -> AccelerometerArray:
     """Read an accelerometer array from the sites of an MJCF file.
 
-    Sites at one point make one chip; a chip has up to three sensing axes, in the order of the compiled model (a body's own sites before those of its children).
+    Sites at one point make one chip; a chip has up to three sensing axes, in the order of the compiled
+    model: a body's own sites before those of its children.
 
     Parameters
     ----------

@@ -50,16 +50,16 @@ def cube_state(world: World, spin: SpinState) -> BodyState:
     arm = turn.apply(world.cube_offset) * (1.0 + world.stretch * spin.rate**2)[:, None]
     velocity = np.cross(omega, arm)
     acceleration = np.cross(alpha, arm) + np.cross(omega, velocity)
-    lean = Rotation.from_rotvec(np.outer(world.nod.amplitude * cos, along))
-    to_world = Rotation.from_rotvec(world.axis_rotvec) * lean
-    attitude = turn * Rotation.from_rotvec(world.mount_rotvec)  # from cube to nodding axis frame
+    lean = Rotation.from_rotvec(np.outer(world.nod.amplitude * cos, along)).as_matrix()
+    to_world = Rotation.from_rotvec(world.axis_rotvec).as_matrix() @ lean  # (n, 3, 3)
+    attitude = turn.as_matrix() @ Rotation.from_rotvec(world.mount_rotvec).as_matrix()  # from cube to nodding axis
     return BodyState(
-        position=to_world.apply(arm),
-        rotation=(to_world * attitude).as_matrix(),
-        velocity=to_world.apply(velocity),
-        acceleration=to_world.apply(acceleration),
-        omega=attitude.inv().apply(omega),
-        alpha=attitude.inv().apply(alpha),
+        position=np.einsum("nij,nj->ni", to_world, arm),
+        rotation=to_world @ attitude,
+        velocity=np.einsum("nij,nj->ni", to_world, velocity),
+        acceleration=np.einsum("nij,nj->ni", to_world, acceleration),
+        omega=np.einsum("nji,nj->ni", attitude, omega),
+        alpha=np.einsum("nji,nj->ni", attitude, alpha),
     )
 
 

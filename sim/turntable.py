@@ -81,28 +81,12 @@ def turntable_model(world: World) -> mujoco.MjModel:
     The world decides the chips, the cube's place and attitude on the table, the tilt of the axis and gravity. A
     nodding axis gets a hinge of its own, and stretching arms a slide for each chip; prescribed motion moves both.
     """
-    spec = mujoco.MjSpec.from_file(str(find_model("mjcf", "turntable", suffix=".xml")))
-    axis = spec.body("axis")
-    axis.quat = _quaternion(Rotation.from_rotvec(world.axis_rotvec))
-    if world.nod.amplitude:
-        direction = [np.cos(world.nod.direction), np.sin(world.nod.direction), 0.0]
-        axis.add_joint(name=_NOD_JOINT, type=mujoco.mjtJoint.mjJNT_HINGE, axis=direction)
-    mount = Rotation.from_rotvec(world.mount_rotvec)
-    arms = mount.inv().apply(world.cube_offset) + world.array.chip_positions  # from the axis, in cube axes
-    cube = spec.body("cube")
-    cube.pos, cube.quat = world.cube_offset, _quaternion(mount)
-    _fit_chips(spec, world.array, arms if world.stretch else None)
-    spec.option.gravity = [0.0, 0.0, -world.gravity]
-    return spec.compile()
+    return _turntable(world).compile()
 
 
 def free_model(world: World) -> mujoco.MjModel:
     """Compile the free cube of ``models/mjcf/free_cube.xml`` with the chips and the gravity of a world."""
-    spec = mujoco.MjSpec.from_file(str(find_model("mjcf", "free_cube", suffix=".xml")))
-    spec.body("cube").pos = np.zeros(3)
-    _fit_chips(spec, world.array, None)
-    spec.option.gravity = [0.0, 0.0, -world.gravity]
-    return spec.compile()
+    return _free_cube(world).compile()
 
 
 def prescribed_readings(world: World, motion: SpinMotion | BodyMotion, t: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -123,7 +107,9 @@ def prescribed_readings(world: World, motion: SpinMotion | BodyMotion, t: NDArra
         Readings of ideal sensors, m/s², before the sensing chain.
     """
     free = isinstance(motion.at(t[:1]), BodyState)
-    model = free_model(world) if free else turntable_model(world)
+    spec = _free_cube(world) if free else _turntable(world)
+    spec.compiler.fusestatic = spec.compiler.discardvisual = True  # what neither moves nor senses costs time only
+    model = spec.compile()
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT  # motion is given: friction can't change it
     chip_times = world.chip_times(t)  # (n, k)
     readings = np.empty((len(t), world.array.n_channels))
@@ -182,6 +168,30 @@ def drive(world: World, command: SpinMotion, duration: float, *, step: float = _
     return DrivenRun(
         t, SpinState(log[:, 0], log[:, 1], log[:, 2]), sensors[:, accelerometers], sensors[:, tacho], log[:, 3]
     )
+
+
+def _turntable(world: World) -> mujoco.MjSpec:
+    spec = mujoco.MjSpec.from_file(str(find_model("mjcf", "turntable", suffix=".xml")))
+    axis = spec.body("axis")
+    axis.quat = _quaternion(Rotation.from_rotvec(world.axis_rotvec))
+    if world.nod.amplitude:
+        direction = [np.cos(world.nod.direction), np.sin(world.nod.direction), 0.0]
+        axis.add_joint(name=_NOD_JOINT, type=mujoco.mjtJoint.mjJNT_HINGE, axis=direction)
+    mount = Rotation.from_rotvec(world.mount_rotvec)
+    arms = mount.inv().apply(world.cube_offset) + world.array.chip_positions  # from the axis, in cube axes
+    cube = spec.body("cube")
+    cube.pos, cube.quat = world.cube_offset, _quaternion(mount)
+    _fit_chips(spec, world.array, arms if world.stretch else None)
+    spec.option.gravity = [0.0, 0.0, -world.gravity]
+    return spec
+
+
+def _free_cube(world: World) -> mujoco.MjSpec:
+    spec = mujoco.MjSpec.from_file(str(find_model("mjcf", "free_cube", suffix=".xml")))
+    spec.body("cube").pos = np.zeros(3)
+    _fit_chips(spec, world.array, None)
+    spec.option.gravity = [0.0, 0.0, -world.gravity]
+    return spec
 
 
 def _fit_chips(spec: mujoco.MjSpec, array: AccelerometerArray, arms: NDArray[np.float64] | None) -> None:
@@ -269,10 +279,10 @@ def _inverse(
     qpos, qvel, qacc, sensors = data.qpos, data.qvel, data.qacc, data.sensordata  # views into the simulation
     log = np.empty((len(position), model.nsensordata))
     inverse = mujoco.mj_inverse
-    for row in range(len(position)):
-        qpos[:] = position[row]
-        qvel[:] = velocity[row]
-        qacc[:] = acceleration[row]
+    for row, (q, v, a) in enumerate(zip(position, velocity, acceleration, strict=True)):
+        qpos[:] = q
+        qvel[:] = v
+        qacc[:] = a
         inverse(model, data)
         log[row] = sensors
     return log[:, _accelerometers(model)]
