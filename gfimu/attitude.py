@@ -33,16 +33,10 @@ __all__ = [
     "twist_angle",
 ]
 
-_EXPONENTIAL, _CONING, _FOURTH_ORDER, _RUNGE_KUTTA = range(4)
-_METHODS = {
-    "exponential": _EXPONENTIAL,
-    "coning": _CONING,
-    "fourth_order": _FOURTH_ORDER,
-    "runge_kutta": _RUNGE_KUTTA,
-}
-
-ATTITUDE_METHODS = tuple(_METHODS)
+ATTITUDE_METHODS = ("exponential", "coning", "fourth_order", "runge_kutta")
 """Names of the attitude methods."""
+
+_FUSED = {"contract"}  # multiply and add in one instruction; no other freedom for the compiler
 
 
 def integrate_attitude(
@@ -81,13 +75,13 @@ def integrate_attitude(
     """
     if method is None:
         method = "coning" if alpha is None else "fourth_order"
-    if method not in _METHODS:
+    if method not in ATTITUDE_METHODS:
         raise unknown_name("attitude method", method, ATTITUDE_METHODS)
     if method == "fourth_order" and alpha is None:
         raise InputError("attitude method 'fourth_order' needs alpha; give it or use method='coning'")
     times = np.asarray(t, dtype=float)
     rate = np.asarray(omega, dtype=float)
-    acceleration = np.zeros_like(rate) if alpha is None else np.asarray(alpha, dtype=float)
+    acceleration = rate if alpha is None else np.asarray(alpha, dtype=float)
     if times.ndim != 1 or rate.shape != (len(times), 3) or acceleration.shape != rate.shape:
         raise InputError(
             f"times have shape {times.shape}, omega {rate.shape}, alpha {acceleration.shape}; "
@@ -100,12 +94,13 @@ def integrate_attitude(
         raise InputError("q0 must be four finite numbers (w, x, y, z), not all zero")
     start = start / np.linalg.norm(start)
 
-    valid = np.isfinite(rate).all(axis=1) & np.isfinite(acceleration).all(axis=1)
-    if valid.all():
-        return _propagate(times, rate, acceleration, start, _METHODS[method])
-    quaternion = np.full((len(times), 4), np.nan)
-    if valid.any():
-        quaternion[valid] = _propagate(times[valid], rate[valid], acceleration[valid], start, _METHODS[method])
+    if method != "fourth_order":
+        acceleration = rate  # not looked at, so its NaN don't matter
+    quaternion = _propagate(times, rate, acceleration, start, method)
+    if len(times) and not np.isfinite(quaternion[-1]).all():  # a NaN anywhere has come through to the end
+        valid = np.isfinite(rate).all(axis=1) & np.isfinite(acceleration).all(axis=1)
+        quaternion[~valid] = np.nan
+        quaternion[valid] = _propagate(times[valid], rate[valid], acceleration[valid], start, method)
     return quaternion
 
 
@@ -170,47 +165,87 @@ def from_rotation(rotation: Rotation) -> NDArray[np.float64]:
     return rotation.as_quat()[..., [3, 0, 1, 2]]
 
 
-@njit(cache=True)
-def _propagate(t, omega, alpha, q0, method):  # type: ignore[no-untyped-def]
+def _propagate(
+    t: NDArray[np.float64],
+    omega: NDArray[np.float64],
+    alpha: NDArray[np.float64],
+    q0: NDArray[np.float64],
+    method: str,
+) -> NDArray[np.float64]:
+    """Propagate along complete samples."""
+    if method == "runge_kutta":
+        return _propagate_by_runge_kutta(t, omega, q0)
+    return _propagate_by_rotation_vectors(t, omega, alpha, q0, float(method != "exponential"), method == "fourth_order")
+
+
+@njit(cache=True, fastmath=_FUSED)
+def _propagate_by_rotation_vectors(t, omega, alpha, q0, coning, fourth_order):  # type: ignore[no-untyped-def]
     n = len(t)
     result = np.empty((n, 4))
-    if n == 0:
-        return result
     w, x, y, z = q0[0], q0[1], q0[2], q0[3]
-    result[0] = q0
+    result[:1] = q0
     for i in range(n - 1):
         h = t[i + 1] - t[i]
         ax, ay, az = omega[i, 0], omega[i, 1], omega[i, 2]
         bx, by, bz = omega[i + 1, 0], omega[i + 1, 1], omega[i + 1, 2]
-        if method == _RUNGE_KUTTA:
-            w, x, y, z = _runge_kutta_step(w, x, y, z, ax, ay, az, bx, by, bz, h)
-        else:
-            px, py, pz = 0.5 * h * (ax + bx), 0.5 * h * (ay + by), 0.5 * h * (az + bz)
-            if method >= _CONING:
-                c = h * h / 12.0
-                px += c * (ay * bz - az * by)
-                py += c * (az * bx - ax * bz)
-                pz += c * (ax * by - ay * bx)
-                if method == _FOURTH_ORDER:
-                    px += c * (alpha[i, 0] - alpha[i + 1, 0])
-                    py += c * (alpha[i, 1] - alpha[i + 1, 1])
-                    pz += c * (alpha[i, 2] - alpha[i + 1, 2])
-            squared = px * px + py * py + pz * pz
-            if squared < 1e-6:  # sin(θ/2)/θ and cos(θ/2) by series: the next terms are below 1e-16
-                s = 0.5 - squared / 48.0 + squared * squared / 3840.0
-                e = 1.0 - squared / 8.0 + squared * squared / 384.0
-            else:
-                angle = math.sqrt(squared)
-                s = math.sin(0.5 * angle) / angle
-                e = math.cos(0.5 * angle)
-            px, py, pz = s * px, s * py, s * pz
-            w, x, y, z = (
-                w * e - x * px - y * py - z * pz,
-                w * px + x * e + y * pz - z * py,
-                w * py - x * pz + y * e + z * px,
-                w * pz + x * py - y * px + z * e,
-            )
-        # Rounding and the Runge-Kutta step leave the norm slightly off 1.
+        c = coning * h * h * (1 / 12)
+        px = 0.5 * h * (ax + bx) + c * (ay * bz - az * by)
+        py = 0.5 * h * (ay + by) + c * (az * bx - ax * bz)
+        pz = 0.5 * h * (az + bz) + c * (ax * by - ay * bx)
+        if fourth_order:
+            px += c * (alpha[i, 0] - alpha[i + 1, 0])
+            py += c * (alpha[i, 1] - alpha[i + 1, 1])
+            pz += c * (alpha[i, 2] - alpha[i + 1, 2])
+        s, e = _half_angle_factors(px * px + py * py + pz * pz)
+        px, py, pz = s * px, s * py, s * pz
+        w, x, y, z = (
+            w * e - x * px - y * py - z * pz,
+            w * px + x * e + y * pz - z * py,
+            w * py - x * pz + y * e + z * px,
+            w * pz + x * py - y * px + z * e,
+        )
+        # The step is a rotation, so the norm only gathers rounding errors. One Newton step for 1/√ takes them off
+        # what is stored; the recurrence need not wait for it.
+        norm = 1.5 - 0.5 * (w * w + x * x + y * y + z * z)
+        result[i + 1, 0] = w * norm
+        result[i + 1, 1] = x * norm
+        result[i + 1, 2] = y * norm
+        result[i + 1, 3] = z * norm
+    return result
+
+
+@njit(cache=True, fastmath=_FUSED, inline="always")
+def _half_angle_factors(squared):  # type: ignore[no-untyped-def]
+    """Return sin(θ/2)/θ and cos(θ/2) for θ² = ``squared``."""
+    if squared < 0.25:  # Taylor series in u = −θ²/4, to the last digit; written with products, divisions are slow
+        u = -0.25 * squared
+        s = u * (1 / 39916800)
+        s = u * (1 / 362880 + s)
+        s = u * (1 / 5040 + s)
+        s = u * (1 / 120 + s)
+        s = u * (1 / 6 + s)
+        e = u * (1 / 479001600)
+        e = u * (1 / 3628800 + e)
+        e = u * (1 / 40320 + e)
+        e = u * (1 / 720 + e)
+        e = u * (1 / 24 + e)
+        e = u * (1 / 2 + e)
+        return 0.5 + 0.5 * s, 1.0 + e
+    angle = math.sqrt(squared)
+    return math.sin(0.5 * angle) / angle, math.cos(0.5 * angle)
+
+
+@njit(cache=True, fastmath=_FUSED)
+def _propagate_by_runge_kutta(t, omega, q0):  # type: ignore[no-untyped-def]
+    n = len(t)
+    result = np.empty((n, 4))
+    w, x, y, z = q0[0], q0[1], q0[2], q0[3]
+    result[:1] = q0
+    for i in range(n - 1):
+        h = t[i + 1] - t[i]
+        ax, ay, az = omega[i, 0], omega[i, 1], omega[i, 2]
+        bx, by, bz = omega[i + 1, 0], omega[i + 1, 1], omega[i + 1, 2]
+        w, x, y, z = _runge_kutta_step(w, x, y, z, ax, ay, az, bx, by, bz, h)
         norm = 1.0 / math.sqrt(w * w + x * x + y * y + z * z)
         w, x, y, z = w * norm, x * norm, y * norm, z * norm
         result[i + 1, 0] = w
@@ -220,7 +255,7 @@ def _propagate(t, omega, alpha, q0, method):  # type: ignore[no-untyped-def]
     return result
 
 
-@njit(cache=True)
+@njit(cache=True, fastmath=_FUSED)
 def _rate_of_quaternion(w, x, y, z, p, q, r):  # type: ignore[no-untyped-def]
     return (
         0.5 * (-x * p - y * q - z * r),
@@ -230,7 +265,7 @@ def _rate_of_quaternion(w, x, y, z, p, q, r):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(cache=True)
+@njit(cache=True, fastmath=_FUSED)
 def _runge_kutta_step(w, x, y, z, ax, ay, az, bx, by, bz, h):  # type: ignore[no-untyped-def]
     mx, my, mz = 0.5 * (ax + bx), 0.5 * (ay + by), 0.5 * (az + bz)
     k1 = _rate_of_quaternion(w, x, y, z, ax, ay, az)

@@ -154,6 +154,27 @@ def test_lost_samples_are_bridged_and_marked():
     assert angle_between(q[-1], Rotation.from_rotvec([0.3 * t[-1], -0.2 * t[-1], t[-1]])) < 1e-9
 
 
+@pytest.mark.parametrize("method", ATTITUDE_METHODS)
+@pytest.mark.parametrize("lost", [0, 5, 19])
+def test_a_lost_first_or_last_sample_is_no_trouble(method, lost):
+    t = np.arange(20) * 0.01
+    omega = np.tile([0.3, -0.2, 1.0], (20, 1))
+    omega[lost, 1] = np.nan
+    q = integrate_attitude(t, omega, np.zeros((20, 3)), method=method)
+    kept = np.delete(np.arange(20), lost)
+    assert np.isnan(q[lost]).all()
+    truth = Rotation.from_rotvec((t[kept] - t[kept[0]])[:, None] * [0.3, -0.2, 1.0])
+    assert angle_between(q[kept], truth).max() < 1e-7
+
+
+def test_nan_in_alpha_matters_only_where_alpha_is_used():
+    t = np.arange(20) * 0.01
+    omega, alpha = np.ones((20, 3)), np.zeros((20, 3))
+    alpha[7] = np.nan
+    assert np.isfinite(integrate_attitude(t, omega, alpha, method="coning")).all()
+    assert np.isnan(integrate_attitude(t, omega, alpha)).any(axis=1).tolist() == [i == 7 for i in range(20)]
+
+
 def test_table_angle_counts_turns():
     t = np.arange(0, 10, 0.01)
     omega = np.column_stack([np.zeros_like(t), np.zeros_like(t), 4 * np.cos(t)])
