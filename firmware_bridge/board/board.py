@@ -79,6 +79,7 @@ class Board:
         self.tracer = tracer
         self.now = 0
         self.cycle = TICKS_PER_SECOND // 4_000_000
+        self.access_ticks = _ACCESS_CYCLES * self.cycle
         self.until = NEVER
         self.alarm = -1
         self.reset_cause: int | None = None
@@ -90,7 +91,7 @@ class Board:
         self.lose_exception: Callable[[int], bool] | None = None
         self._events: list[int] = []
         self._peripherals: list[Peripheral] = []
-        self._accesses = 0
+        self.accesses = 0
         self._polled = (-1, -1)
         self._ready = False
         self._build()
@@ -204,9 +205,14 @@ class Board:
 
     def schedule(self, slot: int, when: int) -> None:
         """Wake a peripheral at ``when`` (instead of what it asked for before)."""
-        self._events[slot] = when
-        self.until = min(self._events)
-        self.alarm = min(self.alarm, self.until)
+        events = self._events
+        before = events[slot]
+        events[slot] = when
+        if when < self.until:
+            self.until = when
+            self.alarm = min(self.alarm, when)
+        elif before == self.until:
+            self.until = min(events)
 
     def service(self) -> None:
         """Do the events that are due, in the order of their times and then of the peripherals."""
@@ -219,16 +225,16 @@ class Board:
 
     def before_access(self) -> None:
         """A register is accessed: that takes time, and what is due comes first."""
-        self.now += _ACCESS_CYCLES * self.cycle
-        self._accesses += 1
+        self.now += self.access_ticks
+        self.accesses += 1
         if self.now >= self.until:
             self.service()
 
     def spinning(self, slot: int) -> bool:
         """Tell whether the last register access was the same: the program waits in a loop."""
         last_slot, last_access = self._polled
-        self._polled = (slot, self._accesses)
-        return slot == last_slot and self._accesses == last_access + 1
+        self._polled = (slot, self.accesses)
+        return slot == last_slot and self.accesses == last_access + 1
 
     def wait_until(self, when: int) -> None:
         """The program polls: skip to ``when``, or to the next event if that is earlier."""
@@ -241,6 +247,7 @@ class Board:
         for peripheral in self._peripherals if self._ready else ():
             peripheral.clock_will_change()
         self.cycle = cycle
+        self.access_ticks = _ACCESS_CYCLES * cycle
         for peripheral in self._peripherals if self._ready else ():
             peripheral.clock_changed()
 

@@ -14,7 +14,7 @@ import struct
 from typing import TYPE_CHECKING, Any
 
 from firmware_bridge.board.faults import BoardFault, FaultKind
-from firmware_bridge.board.nvic import SVCALL
+from firmware_bridge.board.nvic import HARD_FAULT, SVCALL
 from gfimu.errors import InputError
 
 if TYPE_CHECKING:
@@ -25,6 +25,8 @@ try:
     import unicorn
     from unicorn import arm_const as arm
     from unicorn.unicorn_py3 import unicorn as binding
+    # Called without releasing the interpreter's lock: taking it again in every call-back would cost more than the call.
+    _LIBRARY = ctypes.PyDLL(None, handle=binding.uclib._handle)
 except ImportError:  # the extra is not installed; `require_unicorn` says so
     unicorn = None
 
@@ -38,6 +40,7 @@ _FRAME_BYTES = 32
 _STACK_ALIGNED = 1 << 9
 _SWI, _PREFETCH_ABORT, _EXCEPTION_EXIT = 2, 3, 8
 _IT_BITS = 0x0600FC00
+_PRIMASK = 123  # UC_ARM_REG_PRIMASK, read once per block while an interrupt is held back
 
 
 def require_unicorn() -> None:
@@ -58,11 +61,11 @@ class _Registers:
         self._places = (ctypes.c_void_p * count)(*[address + 4 * k for k in range(count)])
 
     def read(self) -> Any:
-        binding.uclib.uc_reg_read_batch(self._handle, self._names, self._places, self._count)
+        _LIBRARY.uc_reg_read_batch(self._handle, self._names, self._places, self._count)
         return self.values
 
     def write(self) -> None:
-        binding.uclib.uc_reg_write_batch(self._handle, self._names, self._places, self._count)
+        _LIBRARY.uc_reg_write_batch(self._handle, self._names, self._places, self._count)
 
 
 class Cpu:
@@ -81,8 +84,9 @@ class Cpu:
         self.board = board
         self.image = image
         self.limit = 0
-        self.masked = False
+        self._next_exception = 0
         self._exception_return = False
+        self._returned_to = 0
         self._supervisor_call = False
         self._intr_error = -1
         self.uc = unicorn.Uc(unicorn.UC_ARCH_ARM, unicorn.UC_MODE_THUMB)
@@ -111,6 +115,8 @@ class Cpu:
         )  # fmt: skip
         self._entry = _Registers(self._handle, [r.UC_ARM_REG_SP, r.UC_ARM_REG_XPSR, r.UC_ARM_REG_LR])
         self._masks = _Registers(self._handle, [r.UC_ARM_REG_PRIMASK, r.UC_ARM_REG_BASEPRI, r.UC_ARM_REG_FAULTMASK])
+        self._primask_value = ctypes.c_uint32()
+        self._primask_place = ctypes.byref(self._primask_value)
         self._pc = _Registers(self._handle, [r.UC_ARM_REG_PC])
         self._callbacks: list[Any] = []
         self._hook(unicorn.UC_HOOK_INTR, binding.HOOK_INTR_CFUNC(self._on_intr))
@@ -124,7 +130,7 @@ class Cpu:
         memory = mmap.mmap(-1, size)
         self.memory[base] = memory
         address = ctypes.addressof(ctypes.c_char.from_buffer(memory))
-        error = binding.uclib.uc_mem_map_ptr(
+        error = _LIBRARY.uc_mem_map_ptr(
             self._handle,
             ctypes.c_uint64(base),
             ctypes.c_size_t(size),
@@ -155,7 +161,7 @@ class Cpu:
     def _hook(self, kind: int, callback: Any) -> None:
         self._callbacks.append(callback)
         handle = ctypes.c_size_t()
-        binding.uclib.uc_hook_add(
+        _LIBRARY.uc_hook_add(
             self._handle,
             ctypes.byref(handle),
             ctypes.c_int(kind),
@@ -170,23 +176,29 @@ class Cpu:
         board = self.board
 
         def on_read(_: Any, offset: int, width: int, __: Any) -> int:
-            board.before_access()
+            board.now += board.access_ticks
+            board.accesses += 1
+            if board.now >= board.until:
+                board.service()
             return read(offset, width) & 0xFFFFFFFF
 
         def on_write(_: Any, offset: int, width: int, value: int, __: Any) -> None:
-            board.before_access()
+            board.now += board.access_ticks
+            board.accesses += 1
+            if board.now >= board.until:
+                board.service()
             write(offset, value, width)
 
         callbacks = binding.MMIO_READ_CFUNC(on_read), binding.MMIO_WRITE_CFUNC(on_write)
         self._callbacks += callbacks
-        error = binding.uclib.uc_mmio_map(
+        error = _LIBRARY.uc_mmio_map(
             self._handle, ctypes.c_uint64(base), ctypes.c_size_t(size), callbacks[0], None, callbacks[1], None
         )
         if error:
             raise unicorn.UcError(error)
 
     def _block_hook(self) -> Any:
-        board, stop, handle = self.board, binding.uclib.uc_emu_stop, self._handle
+        board, stop, handle = self.board, _LIBRARY.uc_emu_stop, self._handle
 
         def on_block(_: Any, __: int, size: int, ___: Any) -> None:
             if board.now >= board.alarm and self._must_stop():
@@ -204,20 +216,33 @@ class Cpu:
             board.service()
         if board.reset_cause is not None:
             return True
-        exception = board.nvic.best()
-        self.masked = bool(exception) and board.nvic.masked(exception, *self._masks.read())
-        board.alarm = -1 if self.masked else min(board.until, self.limit)
-        return (exception != 0 and not self.masked) or board.now >= self.limit
+        self._next_exception = self._deliverable()
+        return self._next_exception != 0 or board.now >= self.limit
+
+    def _deliverable(self) -> int:
+        """Exception to enter now, 0 if none; sets the alarm for the next look."""
+        board = self.board
+        exception = board.nvic.best() if board.nvic.pending else 0
+        if exception > HARD_FAULT and (self._primask() & 1 or board.nvic.masked(exception, *self._masks.read())):
+            board.alarm = -1  # look at every block until the mask is gone
+            return 0
+        board.alarm = min(board.until, self.limit)
+        return exception
+
+    def _primask(self) -> int:
+        _LIBRARY.uc_reg_read(self._handle, _PRIMASK, self._primask_place)
+        return self._primask_value.value
 
     def _on_intr(self, _: Any, number: int, __: Any) -> None:
         pc = self._pc.read()[0]
         if number == _EXCEPTION_EXIT or (number == _PREFETCH_ABORT and pc >= _EXC_RETURN):
             self._exception_return = True
+            self._returned_to = pc
         elif number == _SWI:
             self._supervisor_call = True
         else:
             self._intr_error = number
-        binding.uclib.uc_emu_stop(self._handle)
+        _LIBRARY.uc_emu_stop(self._handle)
 
     # Exceptions
 
@@ -230,7 +255,6 @@ class Cpu:
         self.uc.reg_write(arm.UC_ARM_REG_CONTROL, 0)
         self.uc.reg_write(arm.UC_ARM_REG_MSP, stack)
         self.pc = entry | 1
-        self.masked = False
 
     def enter(self, exception: int) -> None:
         """Exception entry (ARMv7-M ARM B1.5.6): stack eight words, run the handler on the main stack."""
@@ -260,7 +284,7 @@ class Cpu:
             raise self._fault(FaultKind.EXCEPTION_RETURN, "exception return outside an exception")
         ended = nvic.active[-1]
         nvic.leave()
-        process_stack = self._pc.read()[0] & 0xC == 0xC
+        process_stack = self._returned_to & 0xC == 0xC
         if process_stack:
             self.uc.reg_write(arm.UC_ARM_REG_SP, self.uc.reg_read(arm.UC_ARM_REG_SP))
             sp = self.uc.reg_read(arm.UC_ARM_REG_PSP)
@@ -281,7 +305,6 @@ class Cpu:
             self._unstack.write()
         self.pc = pc | 1
         board.now += _ENTRY_CYCLES * board.cycle
-        board.alarm = -1
         board.note_exception(ended, entered=False)
 
     # Running
@@ -289,7 +312,7 @@ class Cpu:
     def run(self, limit: int) -> None:
         """Run until virtual time reaches ``limit`` (ticks)."""
         board, nvic = self.board, self.board.nvic
-        start, handle, pc_register = binding.uclib.uc_emu_start, self._handle, self._pc
+        start, handle, pc_register = _LIBRARY.uc_emu_start, self._handle, self._pc
         self.limit = limit
         never = ctypes.c_uint64(_UNTIL)
         zero, none = ctypes.c_uint64(0), ctypes.c_size_t(0)
@@ -299,10 +322,12 @@ class Cpu:
                 board.service()
             if board.reset_cause is not None:
                 board.do_reset()
-            exception = nvic.best()
-            if exception and not nvic.masked(exception, *self._masks.read()):
+                self._next_exception = 0
+            exception = self._next_exception or self._deliverable()
+            if exception:
+                self._next_exception = 0
                 self.enter(exception)
-            board.alarm = -1
+                board.alarm = -1 if nvic.pending else min(board.until, limit)
             error = start(handle, ctypes.c_uint64(self.pc), never, zero, none)
             if error:
                 raise self._fault(FaultKind.of(error), board.last_access)

@@ -87,7 +87,8 @@ class Gpio(Peripheral):
             self.levels[port] = levels
             if self.on_change is not None:
                 self.on_change(port, changed, levels)
-            self.board.gpio_interrupts.pins_changed(port, changed, levels)
+            if self.board.gpio_interrupts.watching:
+                self.board.gpio_interrupts.pins_changed(port, changed, levels)
 
 
 class GpioInterrupts(Peripheral):
@@ -98,6 +99,7 @@ class GpioInterrupts(Peripheral):
 
     def reset(self) -> None:
         """No edge enabled."""
+        self.watching = False
         self.status = {(port, edge): 0 for port in (0, 2) for edge in "RF"}
         self.enable = {(port, edge): 0 for port in (0, 2) for edge in "RF"}
 
@@ -134,3 +136,4 @@ class GpioInterrupts(Peripheral):
             self._update()
         elif place in {0x0C, 0x10}:
             self.enable[port, "RF"[(place - 0x0C) >> 2]] = value
+            self.watching = any(self.enable.values())

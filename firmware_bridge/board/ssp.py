@@ -125,7 +125,8 @@ class Ssp(Peripheral):
 
     def _exchange(self, value: int) -> None:
         now = self.board.now
-        if not self.control1 & 2 or self._waiting() >= _DEPTH:
+        crowded = len(self.words) >= _DEPTH
+        if not self.control1 & 2 or (crowded and self._waiting() >= _DEPTH):
             return
         start = max(now, self.done)
         self.done = start + self.bits * self.bit
@@ -140,7 +141,7 @@ class Ssp(Peripheral):
             answer = self.selected.transfer(value & 0xFF, start)
         else:
             answer = _FLOATING
-        if len(self.words) >= 2 * _DEPTH or self._received() >= _DEPTH:
+        if crowded and (len(self.words) >= 2 * _DEPTH or self._received() >= _DEPTH):
             self.raw |= _OVERRUN
         else:
             self.words.append((self.done, answer & ((1 << self.bits) - 1)))

@@ -41,7 +41,7 @@ class Uart(Peripheral):
         self.sent_end = 0
         self.empty_pending = False
         self.timeout = False
-        self.empty_at = self.timeout_at = NEVER
+        self.empty_at = self.timeout_at = self.planned = NEVER
         self._set_character()
 
     def _set_character(self) -> None:
@@ -49,6 +49,7 @@ class Uart(Peripheral):
         multiplier, add = self.fraction >> 4 & 15 or 1, self.fraction & 15
         bit = 16 * (self.divisor or 1) * self.board.cycle * divider * (multiplier + add) / multiplier
         self.character = max(1, round(_BITS_PER_CHARACTER * bit))
+        self._lone_byte = self.character * (_BITS_PER_CHARACTER - 1) // _BITS_PER_CHARACTER
 
     @property
     def baud(self) -> float:
@@ -83,7 +84,8 @@ class Uart(Peripheral):
 
     def _plan(self) -> None:
         next_byte = self.on_line[0][0] if self.on_line else NEVER
-        self.board.schedule(self.slot, min(next_byte, self.empty_at, self.timeout_at))
+        self.planned = min(next_byte, self.empty_at, self.timeout_at)
+        self.board.schedule(self.slot, self.planned)
 
     def event(self) -> None:
         """A byte has arrived, the transmitter ran empty, or the receiver waited too long."""
@@ -204,17 +206,24 @@ class Uart(Peripheral):
             self._set_character()
 
     def _send(self, byte: int) -> None:
-        now = self.board.now
-        depth = _DEPTH if self.fifo_control & 1 else 1
-        if self.sent_end > now + depth * self.character:
+        now, end, character = self.board.now, self.sent_end, self.character
+        if end <= now:
+            end = now + character
+        elif end <= now + (_DEPTH if self.fifo_control & 1 else 1) * character:
+            end += character
+        else:
             return  # the FIFO is full: the byte is lost
-        self.sent_end = max(now, self.sent_end) + self.character
+        self.sent_end = end
         self.sent.append(byte)
-        self.sent_at.append(self.sent_end)
-        self.empty_pending = False
-        self.empty_at = max(self.sent_end - self.character, now + self.board.cycle)
-        self._plan()
-        if self.interrupt_enable:
+        self.sent_at.append(end)
+        # The interrupt comes when the last byte moves to the shift register, but after a lone byte not before its
+        # stop bit (UM10360 14.4.5).
+        empty, lone = end - character, now + self._lone_byte
+        self.empty_at = empty if empty > lone else lone
+        if self.planned > self.empty_at:
+            self._plan()  # else the event that is planned already looks again
+        if self.empty_pending:
+            self.empty_pending = False
             self._update_line()
 
     def clock_changed(self) -> None:

@@ -266,11 +266,11 @@ static void watchdog_watch(void)
 {
     static uint32_t fed_us;
     static uint32_t seen;
-    uint32_t now_us = hal_time_us();
-    if ((now_us - fed_us) >= WATCHDOG_FEED_US) {
-        uint32_t beat = core_heartbeat();
-        if (!core_is_streaming() || (beat != seen)) {
-            seen = beat;
+    uint32_t beat = core_heartbeat();
+    if (!core_is_streaming() || (beat != seen)) {
+        uint32_t now_us = hal_time_us();
+        seen = beat;
+        if ((now_us - fed_us) >= WATCHDOG_FEED_US) {
             fed_us = now_us;
             watchdog_feed();
         }
