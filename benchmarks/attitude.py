@@ -2,8 +2,8 @@
 
 Run ``python benchmarks/attitude.py [SAMPLES]``. Three loops over the same tumble: NumPy calls on each sample, as one
 would write it down first; plain floats from lists, fourth-order rotation vector and Runge-Kutta, as fast as Python
-gets. Loop and library are timed back to back and the ratio taken pair by pair, so that other load on the machine hits
-both.
+gets. Loop and library are timed back to back, both in CPU time of their one thread, and the ratio is taken pair by
+pair, so that other load on the machine does not decide.
 """
 
 from __future__ import annotations
@@ -121,9 +121,9 @@ def numpy_loop(t, omega, alpha):
 
 
 def _seconds(call, *arguments, **keywords) -> float:
-    start = time.perf_counter()
+    start = time.process_time()
     call(*arguments, **keywords)
-    return time.perf_counter() - start
+    return time.process_time() - start
 
 
 if __name__ == "__main__":
