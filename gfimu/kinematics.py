@@ -283,8 +283,8 @@ def motion_from_readings(
     motion = _product_by_blocks(rows, inverse)
     if rates is not None and leakage.any():
         motion -= omega_products(rates) @ leakage.T
-    holed = np.flatnonzero(np.isnan(motion).any(axis=1))
-    if holed.size:
+    if np.isnan(motion.min(initial=np.inf)):  # one fast pass; missing readings are rare
+        holed = np.flatnonzero(np.isnan(motion).any(axis=1))
         motion[holed] = _motion_of_holed_rows(array, rows[holed], None if rates is None else rates[holed])
     return MotionEstimate(motion[:, :3], motion[:, 3:], inverse @ inverse.T)
 
