@@ -21,8 +21,8 @@ from collections.abc import Callable
 import numpy as np
 
 from gfimu.array import AccelerometerArray
+from gfimu.dilution import gdop
 from gfimu.kinematics import closed_form, motion_from_readings, pseudo_inverse
-from gfimu.scoring import gdop
 
 ROUNDS = 7
 GEOMETRIES = 100_000
@@ -88,7 +88,7 @@ def gdop_against_inverse() -> None:
     )
     compare("gdop over J, JᵀJ, numpy inv", inverse, by_triads, 10)
     compare("gdop over numpy inv alone", seconds["numpy inv alone, JᵀJ given"], by_triads, 10)
-    compare("gdop with axes over J, JᵀJ, numpy inv", inverse, by_axes, None)
+    compare("gdop with axes over J, JᵀJ, numpy inv", inverse, by_axes, 10)
 
 
 def normal_matrices(places: np.ndarray) -> np.ndarray:
@@ -113,10 +113,9 @@ def rounds_of(contenders: dict[str, Callable[[], object]]) -> dict[str, np.ndarr
     return seconds
 
 
-def compare(meaning: str, slow: np.ndarray, fast: np.ndarray, wanted: float | None) -> None:
-    asked = "" if wanted is None else f"asked: {wanted:g}; "
-    ratios = slow / fast
-    print(f"  {meaning}: {slow.min() / fast.min():.2f} ({asked}by rounds {ratios.min():.2f} to {ratios.max():.2f})")
+def compare(meaning: str, slow: np.ndarray, fast: np.ndarray, wanted: float) -> None:
+    ratio, by_rounds = slow.min() / fast.min(), slow / fast
+    print(f"  {meaning}: {ratio:.2f} (asked: {wanted:g}; by rounds {by_rounds.min():.2f} to {by_rounds.max():.2f})")
 
 
 if __name__ == "__main__":

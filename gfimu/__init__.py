@@ -46,6 +46,7 @@ _PUBLIC = {
     "equivalent_rate_drift": "gfimu.drift",
     "estimate_from_rest": "gfimu.rest_bias",
     "estimate": "gfimu.estimation",
+    "gdop": "gfimu.dilution",
     "integrate_attitude": "gfimu.attitude",
     "integrate_rate": "gfimu.rate.integration",
     "joint_form": "gfimu.kinematics",

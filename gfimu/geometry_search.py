@@ -17,10 +17,11 @@ import scipy.optimize
 from numpy.typing import ArrayLike, NDArray
 
 from gfimu.array import AccelerometerArray, Chip
+from gfimu.dilution import gdop, gdop_lower_bound
 from gfimu.errors import GeometryError, InputError
 from gfimu.geometry_objective import GeometryObjective
 from gfimu.kinematics import require_all_motions
-from gfimu.scoring import Score, gdop, gdop_lower_bound, score
+from gfimu.scoring import Score, score
 
 __all__ = ["SearchResult", "optimize"]
 

@@ -5,10 +5,11 @@ import pytest
 from scipy.optimize import approx_fprime
 
 from gfimu.array import AccelerometerArray
+from gfimu.dilution import gdop_lower_bound
 from gfimu.errors import GeometryError, InputError
 from gfimu.geometry_objective import GeometryObjective
 from gfimu.geometry_search import optimize
-from gfimu.scoring import gdop_lower_bound, score
+from gfimu.scoring import score
 
 
 def search(n_chips, seed=1, restarts=12, **options):

@@ -10,9 +10,10 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from gfimu.array import AccelerometerArray, Chip
+from gfimu.dilution import gdop, gdop_lower_bound
 from gfimu.errors import GeometryError, InputError
 from gfimu.model_files import list_models
-from gfimu.scoring import gdop, gdop_lower_bound, score
+from gfimu.scoring import score
 
 # Lengths in units of half the cube's edge. κ and GDOP of the tetrahedral cube: GF-IMU paper (1.414, 1.061); the rest
 # from a numerical study of the geometries, to the digits given there. Last column: GDOP of [J Q] (none: inf).
