@@ -61,6 +61,12 @@ def _measured(function, arguments, pipe) -> None:
 
 
 def _peak() -> float:
+    # Linux hands ru_maxrss on from the parent process; its own high-water mark is in /proc.
+    status = Path("/proc/self/status")
+    if status.exists():
+        return (
+            next(int(line.split()[1]) for line in status.read_text().splitlines() if line.startswith("VmHWM")) / 1024.0
+        )
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
 
 

@@ -23,7 +23,7 @@ from gfimu.errors import InputError
 
 __all__ = ["ColumnFile", "open_columns", "write_columns"]
 
-_BLOCK_BYTES = 1 << 22
+_BLOCK_BYTES = 1 << 20
 _BLOCK_ROWS = 1 << 16
 _ROW_GROUP_ROWS = 1 << 18
 _FOREIGN_METADATA = {"ARROW:schema", "pandas"}
@@ -220,6 +220,8 @@ class _CsvColumns:
                 raise self._locate(columns, error) from None
 
     def read_as_found(self, columns: Sequence[str]) -> dict[str, NDArray[Any]]:
+        if not columns:  # an empty list of columns means all of them to the CSV reader
+            return {}
         read = self._read_options()
         convert = pa_csv.ConvertOptions(include_columns=list(columns), null_values=_MISSING)
         try:
