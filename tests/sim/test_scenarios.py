@@ -296,3 +296,28 @@ def test_the_mean_of_a_sample_is_that_of_its_conversions():
     swing = (recording.readings - recording.readings.mean(axis=0))[:, 0].std()
     ideal = (instant - instant.mean(axis=0))[:, 0].std()
     assert swing / ideal == pytest.approx(np.cos(np.pi * 10 / 200), rel=1e-6)
+
+
+def test_a_late_reference_is_late_in_tacho_and_encoder():
+    late = "effect=[{name='tacho_latency', parameters={delay_s=0.05}}]"
+    recording = simulate(Scenario.load("paper_run", changes=[PERFECT, late, "reference.tacho_noise_std_rad_s=0"]))
+    prompt = simulate(Scenario.load("paper_run", changes=[PERFECT, "reference.tacho_noise_std_rad_s=0"]))
+    for column in ("tacho_rad_s", "angle_rad"):
+        np.testing.assert_allclose(recording.reference[column][5:], prompt.reference[column][:-5], atol=1e-9)
+    assert np.abs(recording.reference["angle_rad"] - prompt.reference["angle_rad"]).max() > 0.1
+
+
+def test_noise_effects_reach_the_sensors():
+    quiet = ["sensor.errors=false", "sensor.quantisation=false"]
+    noisy = "effect=[{name='noise', parameters={factor=4.0}}]"
+    walking = "effect=[{name='bias_random_walk', parameters={strength_m_s2_rts=0.1}}]"
+    nominal, factor, walk = (
+        simulate(Scenario.load("rest", changes=changes)).readings
+        for changes in (quiet, [*quiet, noisy], [*quiet, walking])
+    )
+    tolerance = 5 / np.sqrt(2 * len(nominal))
+    np.testing.assert_allclose(factor.std(axis=0), 4 * nominal.std(axis=0), rtol=2 * tolerance)
+    # Increments over one second: a walk of 0.1 m/s² per √s and twice the white noise; 59 of them in 12 channels.
+    steps = np.diff(walk[::100], axis=0)
+    expected = np.sqrt(0.1**2 + 2 * nominal.var(axis=0).mean())
+    assert np.sqrt(np.mean(steps**2)) == pytest.approx(expected, rel=5 / np.sqrt(2 * steps.size))
