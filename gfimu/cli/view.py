@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from gfimu.cli.array_option import load_array
 from gfimu.cli.output import print_paths
 
 __all__ = ["register"]
@@ -20,7 +21,8 @@ def register(app: typer.Typer) -> None:
 def _view(
     file: Annotated[Path, typer.Argument(help="A .rrd file, or a recording (.csv, .parquet, .bin) to make one from.")],
     array: Annotated[
-        str | None, typer.Option("--array", help="Array of a recording: a name or a TOML file; else the one it names.")
+        str | None,
+        typer.Option("--array", help="Array: a name, a .toml file or MJCF sites (.xml); else the recording's own."),
     ] = None,
     out: Annotated[Path | None, typer.Option("--out", help="Write the .rrd here and don't open it.")] = None,
 ) -> None:
@@ -37,7 +39,7 @@ def _view(
         open_viewer(file)
         return
     picture = out or picture_path(file)
-    picture_of(file, picture, array=array)
+    picture_of(file, picture, array=None if array is None else load_array(array))
     print_paths([("rerun recording", picture)])
     if out is None:
         open_viewer(picture)

@@ -6,9 +6,12 @@ import os
 import tempfile
 from pathlib import Path
 
+from gfimu.array import AccelerometerArray
 from gfimu.errors import GeometryError, InputError
 from gfimu.estimation import Estimate, estimate
+from gfimu.recording import Recording
 from gfimu.recording_formats import open_run
+from gfimu.rest_bias import estimate_from_rest
 from gfimu.visual.run import write_run
 
 __all__ = ["picture_of", "picture_path"]
@@ -22,7 +25,7 @@ def picture_path(recording: Path) -> Path:
     return Path(tempfile.mkdtemp(prefix="gfimu-")) / name
 
 
-def picture_of(recording: Path, out: Path, *, array: str | Path | None = None) -> None:
+def picture_of(recording: Path, out: Path, *, array: AccelerometerArray | None = None) -> None:
     """Write the rerun recording of a recording file, with its estimate where the array sees all six motions.
 
     Parameters
@@ -31,8 +34,8 @@ def picture_of(recording: Path, out: Path, *, array: str | Path | None = None) -
         Recording, in any format that `gfimu.recording_formats.open_run` reads.
     out : Path
         File to write, ``.rrd``.
-    array : str or Path, optional
-        Name or file of the array; the recording's own otherwise.
+    array : AccelerometerArray, optional
+        The array; the recording's own otherwise.
 
     Raises
     ------
@@ -42,10 +45,20 @@ def picture_of(recording: Path, out: Path, *, array: str | Path | None = None) -
     if recording.suffix == ".rrd":
         raise InputError(f"{recording}: already a rerun recording; open it without --out")
     run, geometry = open_run(recording, array)
-    found: Estimate | None = None
-    note = ""
-    try:
-        found = estimate(run, geometry)
-    except GeometryError as error:
-        note = f"No estimate: {error}."
+    found, note = _estimate(run, geometry)
     write_run(out, run, geometry, estimate=found, notes=note, title=recording.stem)
+
+
+def _estimate(run: Recording, array: AccelerometerArray) -> tuple[Estimate | None, str]:
+    """Estimate as far as possible; a note says how, for the picture."""
+    on_table = any(name in run.reference for name in ("tacho_rad_s", "command_rad_s", "angle_rad"))
+    try:
+        if on_table:
+            return estimate_from_rest(run, array), "Biases were read off the first rest, with the table taken as level."
+        return estimate(run, array), ""
+    except GeometryError as error:
+        return None, f"No estimate: {error}."
+    except InputError as error:  # nothing to read biases off: their effect stays in the picture
+        if not on_table:
+            raise
+        return estimate(run, array), f"Biases are left in: {error}."

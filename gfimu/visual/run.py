@@ -155,7 +155,9 @@ def _layout(scene: rrb.Spatial3DView, raw: Sequence[Plot], cells: Sequence[Seque
         )
     left = rrb.Vertical(scene, rrb.Tabs(*[plot.view() for plot in raw], notes_view(), active_tab=0), row_shares=[3, 2])
     views = [cell[0].view() if len(cell) == 1 else rrb.Tabs(*[plot.view() for plot in cell]) for cell in cells]
-    right = rrb.Grid(*views, grid_columns=2) if len(views) > 3 else rrb.Vertical(*views)
+    across = 2 if len(views) > 3 else 1
+    rows = [views[first : first + across] for first in range(0, len(views), across)]
+    right = rrb.Vertical(*[row[0] if len(row) == 1 else rrb.Horizontal(*row) for row in rows])
     return rrb.Horizontal(left, right, column_shares=[2, 3])
 
 

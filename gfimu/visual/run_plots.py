@@ -104,7 +104,7 @@ def motion_plots(estimate: MotionEstimate, known: KnownMotion | None) -> Iterato
     ):
         lines = [Line(f"{symbol} {_NAMES[axis]}", estimate.t_s, values[:, axis], AXES[axis], 1.0) for axis in axes]
         if known is not None and truth is not None:
-            lines.append(Line(known.name, known.t, truth[:, axes], TRUTH))
+            lines.insert(0, Line(known.name, known.t, truth[:, axes], TRUTH, 2.5))
         yield Plot(title, lines)
 
 

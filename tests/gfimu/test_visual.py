@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from gfimu import AccelerometerArray, InputError, Recording, specific_force
 from gfimu.visual import Box, Cylinder, ExpectedDrift, KnownMotion, Line, Mesh, Plot, write_comparison, write_run
+from gfimu.visual.picture import picture_of, picture_path
 from gfimu.visual.plots import _broken_at_gaps, _emptiest_corner
 from gfimu.visual.scene import _cylinder_mesh
 from gfimu.visual.viewer import open_viewer
@@ -239,3 +240,40 @@ def test_the_viewer_refuses_what_is_not_a_rerun_recording(tmp_path):
         open_viewer(junk)
     with pytest.raises(InputError, match="No such file"):
         open_viewer(tmp_path / "missing.rrd")
+
+
+def test_a_picture_takes_the_rest_biases_off_on_a_table_and_says_so(tmp_path, run):
+    array, t = run.array, np.arange(400) * 0.01
+    rate = np.where(t > 2.0, t - 2.0, 0.0)
+    up = np.array([0.0, 0.0, 1.0])
+    ideal = specific_force(array, 9.80665 * up + 0 * t[:, None], np.outer(t > 2.0, up), np.outer(rate, up))
+    noise = 0.01 * np.random.default_rng(0).standard_normal(ideal.shape)
+    biased = Recording.from_arrays(
+        t, ideal + noise + np.linspace(-0.4, 0.5, 12), array, reference={"tacho_rad_s": rate}
+    )
+    file, out = tmp_path / "run.csv", tmp_path / "run.view.rrd"
+    biased.write(file)
+    assert picture_path(file) == out
+    picture_of(file, out)
+    found = contents(out)
+    assert "Biases were read off the first rest" in str(found["/notes"])
+    error = next(name for name in found if name.endswith("estimate_tacho"))
+    assert np.abs(numbers(found[error]["scalars"])).max() < 0.05
+
+
+def test_a_picture_without_rest_leaves_the_biases_in_and_says_so(tmp_path, run):
+    file, out = tmp_path / "run.parquet", tmp_path / "run.rrd"
+    run.recording.write(file)
+    picture_of(file, out)
+    assert "Biases are left in" in str(contents(out)["/notes"])
+
+
+def test_a_picture_of_an_array_that_sees_too_little_shows_the_readings_alone(tmp_path, run):
+    flat = AccelerometerArray("two", run.array.chips[:1])
+    recording = Recording.from_arrays(run.recording.t_s, run.recording.readings[:, :3], flat)
+    file, out = tmp_path / "run.parquet", tmp_path / "run.rrd"
+    recording.write(file)
+    picture_of(file, out, array=flat)
+    found = contents(out)
+    assert "No estimate" in str(found["/notes"])
+    assert any(name.startswith("/plots/raw") for name in found)
