@@ -232,3 +232,25 @@ def test_bad_arguments_are_refused():
         gdop(np.zeros((4, 2)))
     with pytest.raises(InputError, match="axes of shape"):
         gdop(np.zeros((4, 3)), np.zeros((5, 3)))
+
+
+def test_table_in_the_docs_is_what_the_code_computes(project_root):
+    rows = [
+        [cell.strip() for cell in line.strip("| \n").split("|")]
+        for line in (project_root / "docs" / "geometry.md").read_text(encoding="utf-8").splitlines()
+        if line.startswith("| `")
+    ]
+    assert {row[0].strip("`") for row in rows} == set(list_models("arrays"))
+    for name, channels, condition, dilution, joint, left, seen in rows:
+        (found,) = score(name.strip("`"))
+        assert int(channels) == found.n_channels
+        assert condition == f"{found.condition_number:.4f}"
+        assert dilution == f"{found.gdop:.4f}"
+        assert joint == ("–" if math.isinf(found.gdop_joint) else f"{found.gdop_joint:.4f}")
+        parts = [
+            symbol
+            for symbol, rows_of in (("α", slice(0, 3)), ("p", slice(3, 6)))
+            if found.omega_squared_leakage[rows_of].any()
+        ]
+        assert left == (", ".join(parts) or "none")
+        assert int(seen) == found.null_space_rank
