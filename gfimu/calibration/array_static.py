@@ -57,8 +57,8 @@ def array_static(observations: Observations, array: AccelerometerArray, *, gravi
         raise InputError(f"the readings are of {', '.join(observations.channels)}, not of array {array.name!r}")
     means = observations.means
     check_magnitude_coverage(pose_directions(means[:, :3]))
-    start, scales = _start(means, axes, array, gravity)
-    gauge = _rotation_gauge(axes, scales)  # (3, u)
+    start = _start(means, axes, array, gravity)
+    gauge = _rotation_gauge(axes)  # (3, u)
     adjustment = gauss_helmert(
         _same_specific_force(axes, gravity),
         start,
@@ -134,14 +134,13 @@ def _triads(array: AccelerometerArray) -> Floats:
     return np.array([chip.axes for chip in array.chips])
 
 
-def _start(means: Floats, axes: Floats, array: AccelerometerArray, gravity: float) -> tuple[Floats, Floats]:
-    """Take starting values and scale from the sphere of each chip; refuse a chip not mounted as drawn."""
-    parameters, scales, directions = [], [], []
+def _start(means: Floats, axes: Floats, array: AccelerometerArray, gravity: float) -> Floats:
+    """Take starting values from the sphere of each chip; refuse a chip not mounted as drawn."""
+    parameters, directions = [], []
     for number in range(len(axes)):
         centre, radius = fit_sphere(means[:, 3 * number : 3 * number + 3])
         scale = radius / gravity
         parameters.append(np.concatenate([(scale * np.eye(3)).ravel(), centre]))
-        scales.append(scale)
         arrows = (means[:, 3 * number : 3 * number + 3] - centre) @ axes[number]
         directions.append(arrows / np.linalg.norm(arrows, axis=1, keepdims=True))
     common = np.median(directions, axis=0)
@@ -153,17 +152,17 @@ def _start(means: Floats, axes: Floats, array: AccelerometerArray, gravity: floa
                 f"chip {chip.name} points {angle:.0f}° away from the other chips: its axes are not as array "
                 f"{array.name!r} draws them; correct the array file or the wiring"
             )
-    return np.concatenate(parameters), np.array(scales)
+    return np.concatenate(parameters)
 
 
-def _rotation_gauge(axes: Floats, scales: Floats) -> Floats:
-    """Rows of the three conditions Σ_i antisymmetric part of A_iᵀ M_i A_i / s_i = 0, shape (3, u)."""
+def _rotation_gauge(axes: Floats) -> Floats:
+    """Rows of the three conditions Σ_i antisymmetric part of A_iᵀ M_i A_i = 0, shape (3, u)."""
     rows = np.zeros((3, 12 * len(axes)))
-    for number, (a, scale) in enumerate(zip(axes, scales, strict=True)):
+    for number, a in enumerate(axes):
         for row, (p, q) in enumerate(((2, 1), (0, 2), (1, 0))):
             # (A^T M A)_pq − (A^T M A)_qp, linear in the elements of M.
             weight = np.outer(a[:, p], a[:, q]) - np.outer(a[:, q], a[:, p])
-            rows[row, 12 * number : 12 * number + 9] = weight.ravel() / scale
+            rows[row, 12 * number : 12 * number + 9] = weight.ravel()
     return rows
 
 

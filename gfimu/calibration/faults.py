@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,7 @@ from gfimu.errors import InputError
 from gfimu.recording import Recording
 from gfimu.rest import Rest
 
-__all__ = ["check_gravity", "check_readings", "moved_poses", "repeated_poses", "scale_warning"]
+__all__ = ["check_gravity", "check_readings", "moved_poses", "repeated_poses", "scale_warning", "without_moved_poses"]
 
 Floats = NDArray[np.float64]
 
@@ -101,6 +102,17 @@ def moved_poses(recording: Recording, rest: Rest) -> list[int]:
         if np.any((step > _MOVED_SIGMA * noise * np.sqrt(2.0 / third)) & (step > _MOVED_SHARE * scale)):
             moved.append(number)
     return moved
+
+
+def without_moved_poses(recording: Recording, rest: Rest) -> tuple[Rest, tuple[str, ...]]:
+    """Leave out poses that moved while they were recorded, and say which."""
+    moved = moved_poses(recording, rest)
+    if not moved:
+        return rest, ()
+    places = ", ".join(f"{number + 1} ({recording.t_s[rest.start[number]]:.1f} s)" for number in moved)
+    kept = np.setdiff1d(np.arange(len(rest)), moved)
+    text = f"poses that moved while recorded, left out: {places}"
+    return replace(rest, start=rest.start[kept], stop=rest.stop[kept]), (text,)
 
 
 def repeated_poses(means: Floats) -> tuple[str, ...]:

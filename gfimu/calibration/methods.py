@@ -7,7 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from gfimu.calibration.faults import check_gravity, check_readings, moved_poses, repeated_poses, scale_warning
+from gfimu.calibration.faults import (
+    check_gravity,
+    check_readings,
+    repeated_poses,
+    scale_warning,
+    without_moved_poses,
+)
 from gfimu.calibration.multi_position import multi_position, multi_position_gyro
 from gfimu.calibration.observations import observations_from
 from gfimu.calibration.recursive import recursive
@@ -16,7 +22,7 @@ from gfimu.calibration.six_position import six_position
 from gfimu.calibration.twelve_position import twelve_position
 from gfimu.errors import InputError, unknown_name
 from gfimu.recording import Recording
-from gfimu.rest import Rest, detect_rest
+from gfimu.rest import detect_rest
 from gfimu.units import STANDARD_GRAVITY
 
 __all__ = ["METHODS", "calibrate", "calibrate_gyro"]
@@ -86,7 +92,7 @@ def calibrate(
     warnings = list(check_gravity(gravity))
     rest = detect_rest(recording, threshold=rest_threshold, min_duration_s=min_rest_s)
     warnings += check_readings(recording, rest)
-    rest, moved = _without_moved_poses(recording, rest)
+    rest, moved = without_moved_poses(recording, rest)
     warnings += moved
     observations = observations_from(recording, rest, input_kind)
     options: dict[str, float] = {}
@@ -134,17 +140,6 @@ def calibrate_gyro(
         unit="rad_s",
     )
     return multi_position_gyro(observations_from(rates, rest, "averaged"))
-
-
-def _without_moved_poses(recording: Recording, rest: Rest) -> tuple[Rest, tuple[str, ...]]:
-    """Leave out poses that moved while they were recorded, and say which."""
-    moved = moved_poses(recording, rest)
-    if not moved:
-        return rest, ()
-    places = ", ".join(f"{number + 1} ({recording.t_s[rest.start[number]]:.1f} s)" for number in moved)
-    kept = np.setdiff1d(np.arange(len(rest)), moved)
-    text = f"poses that moved while recorded, left out: {places}"
-    return replace(rest, start=rest.start[kept], stop=rest.stop[kept]), (text,)
 
 
 def _nominal_scales(recording: Recording, chips: tuple[str, ...]) -> dict[str, float]:

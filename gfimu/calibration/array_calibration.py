@@ -1,0 +1,135 @@
+"""Calibration of a whole array from one recording: poses for the chips' models, motion for their positions."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from gfimu.array import AccelerometerArray
+from gfimu.calibration.array_motion import ArrayMotion, array_motion, motion_reference
+from gfimu.calibration.array_static import array_static
+from gfimu.calibration.faults import check_gravity, check_readings, without_moved_poses
+from gfimu.calibration.observations import averaged_poses
+from gfimu.calibration.result import Calibration
+from gfimu.errors import InputError
+from gfimu.recording import Recording
+from gfimu.rest import detect_rest
+from gfimu.units import STANDARD_GRAVITY
+
+__all__ = ["calibrate_array"]
+
+
+def calibrate_array(
+    recording: Recording,
+    array: AccelerometerArray,
+    *,
+    gravity: float = STANDARD_GRAVITY,
+    motion: Recording | None = None,
+    fit_positions: bool | None = None,
+    rest_threshold: float | None = None,
+    min_rest_s: float = 3.0,
+) -> Calibration:
+    """Calibrate all chips of an array in one body frame, and their positions where there is motion.
+
+    Parameters
+    ----------
+    recording : Recording
+        Static poses, nine or more of different direction.
+    array : AccelerometerArray
+        The drawing.
+    gravity : float
+        Local gravity, m/s².
+    motion : Recording, optional
+        Recording with the motion; ``recording`` itself if not given.
+    fit_positions : bool, optional
+        Fit positions; by default when there is motion with a reference (tachometer or gyro).
+    rest_threshold : float, optional
+        Threshold of rest, reading unit squared; chosen by the data if not given.
+    min_rest_s : float
+        Shortest pose, s.
+
+    Returns
+    -------
+    Calibration
+        Twelve parameters per chip, and positions ``a1_r_x`` … with a note of which combinations are not determined.
+        Biases that motion shows are reported but not applied: the ones at rest are far better known.
+
+    Raises
+    ------
+    InputError
+        If the poses or the motion do not suffice, or the data are faulty.
+    """
+    warnings = list(check_gravity(gravity))
+    ordered = _in_array_order(recording, array)
+    rest = detect_rest(ordered, threshold=rest_threshold, min_duration_s=min_rest_s)
+    warnings += check_readings(ordered, rest)
+    rest, moved = without_moved_poses(ordered, rest)
+    warnings += moved
+    result = array_static(averaged_poses(ordered, rest), array, gravity=gravity)
+    result = replace(
+        result,
+        warnings=(*warnings, *result.warnings),
+        statistics={
+            **result.statistics,
+            "rest_threshold": rest.threshold,
+            "rest_threshold_chosen_by": "data" if rest.chosen_by_data else "user",
+        },
+    )
+    moving = result.apply(ordered if motion is None else _in_array_order(motion, array))
+    if fit_positions is False:
+        return result
+    try:
+        reference = motion_reference(moving)
+    except InputError as error:
+        if fit_positions or motion is not None:
+            raise
+        return replace(result, statements=(*result.statements, f"positions are as drawn: {error}"))
+    return _with_positions(result, array, array_motion(moving, array, reference))
+
+
+def _in_array_order(recording: Recording, array: AccelerometerArray) -> Recording:
+    missing = [channel for channel in array.channels if channel not in recording.channels]
+    if missing:
+        raise InputError(
+            f"the recording lacks {', '.join(missing)} of array {array.name!r}; it has {', '.join(recording.channels)}"
+        )
+    columns = [recording.channels.index(channel) for channel in array.channels]
+    return replace(recording, readings=recording.readings[:, columns], channels=array.channels)
+
+
+def _with_positions(result: Calibration, array: AccelerometerArray, motion: ArrayMotion) -> Calibration:
+    """Add the fitted positions to a static calibration."""
+    static, count = len(result.names), motion.positions.size
+    covariance = np.zeros((static + count, static + count))
+    covariance[:static, :static] = result.covariance
+    covariance[static:, static:] = motion.covariance[:count, :count]
+    undetermined = motion.null_space[:count]
+    directions, sizes, _ = np.linalg.svd(undetermined, full_matrices=False)
+    undetermined = directions[:, sizes > 1e-6]
+    null_space = np.zeros((static + count, result.null_space.shape[1] + undetermined.shape[1]))
+    null_space[:static, : result.null_space.shape[1]] = result.null_space
+    null_space[static:, result.null_space.shape[1] :] = undetermined
+    offset = np.linalg.norm(motion.positions - array.chip_positions, axis=1)
+    largest = float(np.abs(motion.biases).max())
+    statement = (
+        f"motion ({motion.reference}) shows residual biases of up to {largest:.3g} m/s²; they are not applied, "
+        "as the biases at rest are better known"
+    )
+    return replace(
+        result,
+        names=(*result.names, *(f"{chip.name}_r_{axis}" for chip in array.chips for axis in "xyz")),
+        values=np.concatenate([result.values, motion.positions.ravel()]),
+        covariance=covariance,
+        null_space=null_space,
+        statements=(*result.statements, *motion.statements, statement),
+        statistics={
+            **result.statistics,
+            "motion_samples": float(motion.samples),
+            "motion_reference": motion.reference,
+            "motion_residual_rms_before_m_s2": motion.residual_rms_before_m_s2,
+            "motion_residual_rms_m_s2": motion.residual_rms_m_s2,
+            "largest_position_offset_m": float(offset.max()),
+            "largest_motion_bias_m_s2": largest,
+        },
+    )
