@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gfimu.array import AccelerometerArray
 from gfimu.errors import GeometryError, InputError
+from gfimu.observability import MOTION_NAMES, RANK_TOLERANCE, require_all_motions, unseen_motions
 
 __all__ = [
     "ALTERNATE_CORNERS",
@@ -42,13 +43,9 @@ __all__ = [
     "unseen_motions",
 ]
 
-MOTION_NAMES = ("alpha_x", "alpha_y", "alpha_z", "p_x", "p_y", "p_z")
-"""Order of the columns of J and of the rows of its left inverse."""
-
 ALTERNATE_CORNERS = np.array([[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]])
 """Signs of the positions of chips 1 to 4 of the tetrahedral cube, shape (4, 3)."""
 
-_RANK_TOLERANCE = 1e-9  # relative, of singular values with lengths in the array's length unit
 _EXACT = 1e-12
 _BLOCK = 2048  # rows per matrix product: the block stays in the first-level cache
 
@@ -156,38 +153,6 @@ def specific_force(array: AccelerometerArray, p: ArrayLike, alpha: ArrayLike, om
     """
     motion = np.concatenate(np.broadcast_arrays(*np.atleast_2d(alpha, p)), axis=-1)  # (n, 6)
     return motion @ array.regression_matrix.T + omega_products(np.atleast_2d(omega)) @ array.centripetal_matrix.T
-
-
-def unseen_motions(array: AccelerometerArray) -> tuple[str, ...]:
-    """Motions that leave every reading unchanged, in words; empty if J has rank 6.
-
-    Each is a field α × r + p: a rotation about an axis through a point, a translation, or a screw.
-    """
-    scale = np.array([array.length_unit] * 3 + [1.0] * 3)
-    columns = array.regression_matrix / scale  # (c, 6), all columns of order one
-    free = scipy.linalg.null_space(columns, rcond=_RANK_TOLERANCE)  # (6, d)
-    if free.shape[1] == 0:
-        return ()
-    # The basis with ones at d chosen components has the most zeros and reads best.
-    *_, pivots = scipy.linalg.qr(free.T, pivoting=True, mode="economic")
-    basis = np.linalg.solve(free[pivots[: free.shape[1]]].T, free.T)  # (d, 6)
-    return tuple(_motion_in_words(motion / scale) for motion in basis)
-
-
-def require_all_motions(array: AccelerometerArray) -> None:
-    """Check that the array sees all six components of α and p.
-
-    Raises
-    ------
-    GeometryError
-        If J has rank < 6; the message names the motions that the array can't see.
-    """
-    unseen = unseen_motions(array)
-    if unseen:
-        raise GeometryError(
-            f"array {array.name!r} (rank {6 - len(unseen)} of 6, {array.n_channels} channels) can't see "
-            f"{'; '.join(unseen)}; add sensing axes that do"
-        )
 
 
 def pseudo_inverse(array: AccelerometerArray) -> NDArray[np.float64]:
@@ -341,11 +306,11 @@ def null_space(array: AccelerometerArray) -> NullSpace:
     """
     require_all_motions(array)
     scale = np.array([array.length_unit] * 3 + [1.0] * 3)
-    basis = scipy.linalg.null_space((array.regression_matrix / scale).T, rcond=_RANK_TOLERANCE).T  # (c - 6, c)
+    basis = scipy.linalg.null_space((array.regression_matrix / scale).T, rcond=RANK_TOLERANCE).T  # (c - 6, c)
     if len(basis) == 0:
         return NullSpace(basis, np.empty((0, 6)), 0)
     rotation, strengths, products = np.linalg.svd(basis @ array.centripetal_matrix)
-    rank = int(np.sum(strengths > _RANK_TOLERANCE * array.length_unit))
+    rank = int(np.sum(strengths > RANK_TOLERANCE * array.length_unit))
     sensitivity = np.zeros((len(basis), 6))
     sensitivity[:rank] = strengths[:rank, None] * products[:rank]
     return NullSpace(rotation.T @ basis, sensitivity, rank)
@@ -359,7 +324,7 @@ def _left_inverse(regression: NDArray[np.float64], length: float) -> NDArray[np.
 
 def _without_rounding(leakage: NDArray[np.float64], length: float) -> NDArray[np.float64]:
     size = np.abs(leakage) / np.array([1.0] * 3 + [length] * 3)[:, None]
-    return np.where(size > _RANK_TOLERANCE, leakage, 0.0)
+    return np.where(size > RANK_TOLERANCE, leakage, 0.0)
 
 
 def _joint_inverse(array: AccelerometerArray) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
@@ -367,9 +332,9 @@ def _joint_inverse(array: AccelerometerArray) -> tuple[NDArray[np.float64], NDAr
     length = array.length_unit
     scale = np.array([length] * 3 + [1.0] * 3 + [length] * 6)
     combined = np.hstack([array.regression_matrix, array.centripetal_matrix]) / scale  # (c, 12)
-    inverse = np.linalg.pinv(combined, rcond=_RANK_TOLERANCE)
+    inverse = np.linalg.pinv(combined, rcond=RANK_TOLERANCE)
     # An unknown is determined if its unit vector lies in the row space of [J Q].
-    seen = np.abs(inverse @ combined - np.eye(12)).max(axis=1) < np.sqrt(_RANK_TOLERANCE)
+    seen = np.abs(inverse @ combined - np.eye(12)).max(axis=1) < np.sqrt(RANK_TOLERANCE)
     return inverse / scale[:, None], seen
 
 
@@ -382,7 +347,7 @@ def _motion_of_holed_rows(
     patterns, membership = np.unique(~np.isnan(rows), axis=0, return_inverse=True)
     for number, present in enumerate(patterns):
         regression = array.regression_matrix[present]
-        if np.linalg.matrix_rank(regression / scale, tol=_RANK_TOLERANCE) < 6:
+        if np.linalg.matrix_rank(regression / scale, tol=RANK_TOLERANCE) < 6:
             continue
         inverse = _left_inverse(regression, array.length_unit)
         leakage = _without_rounding(inverse @ array.centripetal_matrix[present], array.length_unit)
@@ -465,30 +430,3 @@ def _sum_alternate_corners(
         motion[i, 3] = px * ((x1 + x2) + (x3 + x4))
         motion[i, 4] = py * ((y1 + y2) + (y3 + y4))
         motion[i, 5] = pz * ((z1 + z2) + (z3 + z4))
-
-
-def _motion_in_words(motion: NDArray[np.float64]) -> str:
-    """Describe the field α × r + p of one unseen motion, shape (6,), SI."""
-    alpha, p = motion[:3], motion[3:]
-    turn = float(np.linalg.norm(alpha))
-    if turn < _RANK_TOLERANCE * np.linalg.norm(motion):
-        return f"acceleration along {_direction(p)}"
-    axis = alpha / turn
-    point = np.cross(alpha, p) / turn**2
-    words = f"angular acceleration about {_direction(axis)}"
-    if np.linalg.norm(point) > 1e-9:
-        words += f" through the point ({', '.join(f'{value:.4g}' for value in np.round(point, 12) + 0.0)}) m"
-    pitch = float(axis @ p) / turn
-    if abs(pitch) > 1e-9:
-        words += f" together with an acceleration of {pitch:.4g} m per rad along it"
-    return words
-
-
-def _direction(vector: NDArray[np.float64]) -> str:
-    """Name a direction: a body axis where it is one, else its components."""
-    unit = vector / np.linalg.norm(vector)
-    unit *= np.sign(unit[np.argmax(np.abs(unit))])
-    if np.max(np.abs(unit)) > 1 - _RANK_TOLERANCE:
-        return "xyz"[int(np.argmax(np.abs(unit)))]
-    unit[np.abs(unit) < _RANK_TOLERANCE] = 0.0
-    return f"({', '.join(f'{value:.4g}' for value in unit)})"
