@@ -142,10 +142,12 @@ class RateFilter:
         )
         self.state = self._start()
         self._compiled_tables = self._tables()
-        self._history = points + 2
+        self._history = points + 2 + self._tuning.rest_window
         self._buffer = _buffer(capacity + self._history + points, c, d)
         self._received = 0  # rows of the buffer that hold samples
         self._done = 0  # rows of the buffer that are estimated
+        self._limits = errors.limits
+        self._stuck_after = errors.stuck_after or np.iinfo(np.int64).max
         self._held = np.full(c, np.nan)
         self._run = np.zeros(c, dtype=np.int64)
         self._tally = np.zeros((3, c), dtype=np.int64)
@@ -166,7 +168,7 @@ class RateFilter:
         rest = self.settings.rest
         settles = np.array([rest is not None and not x.any() and self.settings.start_std <= rest.largest_rate_std])
         return RecursionState(
-            x, covariance, np.zeros(5), np.zeros(4, dtype=np.int64), settles, np.zeros((3, c)), x.copy(), covariance.copy(),
+            x, covariance, np.zeros(3), np.zeros(4, dtype=np.int64), settles, x.copy(), covariance.copy(),
             np.zeros(c),
         )  # fmt: skip
 
@@ -269,8 +271,8 @@ class RateFilter:
         reached = first
         while True:
             reached = prepare(
-                reached, last, self.period, self.tables.masks, self._compiled_tables, self.errors.limits,
-                self.errors.stuck_after, self._held, self._run, self._tally, data,
+                reached, last, self.period, self.tables.masks, self._compiled_tables, self._limits,
+                self._stuck_after, self._held, self._run, self._tally, data,
             )  # fmt: skip
             if reached == last:
                 break
@@ -285,10 +287,7 @@ class RateFilter:
 
     def _missing(self, row: NDArray[np.float64]) -> int:
         """Bits of the channels that can't be used in a sample."""
-        errors = self.errors
-        bad = ~np.isfinite(row) | (np.abs(row) >= errors.limits)
-        if errors.stuck_after > 0:
-            bad |= (row == self._held) & (self._run + 1 >= errors.stuck_after)
+        bad = ~(np.abs(row) < self._limits) | ((row == self._held) & (self._run + 1 >= self._stuck_after))
         return sum(1 << int(channel) for channel in np.flatnonzero(bad))
 
     def _advance(

@@ -26,7 +26,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from gfimu.rate.unrolled import update as _update_twelve
+from gfimu.rate.second_order import second_order
+from gfimu.rate.unrolled import step as _step_twelve
 
 __all__ = ["Record", "RecursionInput", "RecursionOutput", "RecursionState", "Tables", "Tuning", "backward", "forward",
            "prepare"]
@@ -39,7 +40,7 @@ _SLOW = 1e-3  # tr P above this share of |ω|² switches the second-order terms 
 _MEMORY = 2.0  # length of the filter's memory in units of 1/|ω|
 
 # Places in RecursionState.scalars
-_TIME, _WALK, _LAST_GOOD, _BLOCK_SQUARES, _REST_SAMPLES = range(5)
+_TIME, _WALK, _LAST_GOOD = range(3)
 # Places in RecursionState.counts
 _STARTED, _BLOCK, _REST_BLOCKS, _SAMPLES = range(4)
 
@@ -79,10 +80,9 @@ class RecursionState(NamedTuple):
 
     x: NDArray[np.float64]  # (n,)
     covariance: NDArray[np.float64]  # (n, n)
-    scalars: NDArray[np.float64]  # (5,)
+    scalars: NDArray[np.float64]  # (3,)
     counts: NDArray[np.int64]  # (4,)
     settles: NDArray[np.bool_]  # (1,) the run starts at rest
-    block_sums: NDArray[np.float64]  # (3, c): first half, second half, first sample of the block
     block_x: NDArray[np.float64]  # (n,) state when the block began
     block_covariance: NDArray[np.float64]  # (n, n)
     reference: NDArray[np.float64]  # (c,) mean reading while the biases were learned, m/s²
@@ -101,7 +101,7 @@ class RecursionInput(NamedTuple):
     z: NDArray[np.float64]  # (N, d) Z y
     channel_set: NDArray[np.int64]  # (N,)
     gyro: NDArray[np.float64]  # (N, 3), NaN where there is none
-    uniform_run: NDArray[np.int64]  # (N,) equal steps in a row up to here
+    uniform_run: NDArray[np.int64]  # (N,) equal steps between complete samples in a row up to here
     whole_run: NDArray[np.int64]  # (N,) steps without a gap up to here
     corrected: NDArray[np.float64]  # (N, 3) α of the past without what the products of ω left in it
 
@@ -151,46 +151,48 @@ def prepare(
     """
     t = data.t
     y = data.y
+    alpha = data.alpha
+    z = data.z
+    alpha_rows = tables.alpha_rows
+    null_rows = tables.null_rows
+    null_count = tables.null_count
     c = y.shape[1]
-    d = data.z.shape[1]
+    d = z.shape[1]
+    repeats = np.empty(c, dtype=np.int64)
     for k in range(first, last):
-        missing = 0
+        faults = 0
         for i in range(c):
             value = y[k, i]
-            if not np.isfinite(value):
-                missing |= 1 << i
-            elif abs(value) >= limits[i]:
-                missing |= 1 << i
-            elif stuck_after > 0 and value == held[i] and run[i] + 1 >= stuck_after:
-                missing |= 1 << i
+            repeats[i] = run[i] + 1 if value == held[i] else 1
+            faults += int(not abs(value) < limits[i]) + int(repeats[i] >= stuck_after)  # NaN is not less either
         place = 0
-        if missing != 0:
+        missing = 0
+        if faults > 0:
+            for i in range(c):
+                if not abs(y[k, i]) < limits[i] or repeats[i] >= stuck_after:
+                    missing |= 1 << i
             place = -1
             for known in range(len(masks)):
                 if masks[known] == missing:
                     place = known
             if place < 0:
                 return k
+            for i in range(c):
+                if np.isnan(y[k, i]):
+                    tally[0, i] += 1
+                elif not abs(y[k, i]) < limits[i]:
+                    tally[1, i] += 1
+                elif repeats[i] >= stuck_after:
+                    tally[2, i] += 1
         for i in range(c):
-            value = y[k, i]
-            if not np.isfinite(value):
-                tally[0, i] += 1
-                continue
-            if value == held[i]:
-                run[i] += 1
-            else:
-                run[i] = 1
-                held[i] = value
-            if abs(value) >= limits[i]:
-                tally[1, i] += 1
-            elif stuck_after > 0 and run[i] >= stuck_after:
-                tally[2, i] += 1
-        usable = tables.null_count[place] >= 0
+            run[i] = repeats[i]
+            held[i] = y[k, i]
+        usable = null_count[place] >= 0
         data.channel_set[k] = place if usable else -1
         step = t[k] - t[k - 1] if k > 0 else 0.0
         whole = k > 0 and step < _GAP * period and usable and data.channel_set[k - 1] >= 0
         data.whole_run[k] = data.whole_run[k - 1] + 1 if whole else 0
-        uniform = whole and abs(step - period) < _UNIFORM * period
+        uniform = whole and place == 0 and data.channel_set[k - 1] == 0 and abs(step - period) < _UNIFORM * period
         data.uniform_run[k] = data.uniform_run[k - 1] + 1 if uniform else 0
         if not usable:  # α is held
             for a in range(3):
@@ -203,13 +205,13 @@ def prepare(
         for a in range(3):
             total = 0.0
             for i in range(c):
-                total += tables.alpha_rows[place, a, i] * y[k, i]
-            data.alpha[k, a] = total
+                total += alpha_rows[place, a, i] * y[k, i]
+            alpha[k, a] = total
         for j in range(d):
             total = 0.0
             for i in range(c):
-                total += tables.null_rows[place, j, i] * y[k, i]
-            data.z[k, j] = total
+                total += null_rows[place, j, i] * y[k, i]
+            z[k, j] = total
     return last
 
 
@@ -311,43 +313,76 @@ def forward(  # type: ignore[no-untyped-def]
     moved = np.zeros(3)
     rows = np.zeros((3, n))
     product = np.zeros((3, n))
-    slope = np.zeros((3, 3))
+    turned = np.zeros(3)
     settles = state.settles[0]
     noise_row = n - 3
     slopes = np.zeros((max(d, 1), 3))
     innovations = np.zeros(d)
     variances = np.zeros(d)
     unrolled = n == 15 and d == 6
+    alpha = data.alpha
+    z = data.z
+    even_weights = tuning.weights
+    plain_set = tables.plain[0]
+    noise_of_all = tables.alpha_noise[0]
+    sensitivity_of_all = tables.null_sensitivity[0]
+    noise_power = noise_of_all[0, 0] + noise_of_all[1, 1] + noise_of_all[2, 2]
+    inflated = tuning.scale_variance + tuning.placement_variance > 0.0
+    forget = min(1.0, tuning.period / _WALK_MEMORY)
+    forget_rate = forget / (3.0 * tuning.period)
     for k in range(first, last):
         row = k - first
         place = data.channel_set[k]
         sensed = place >= 0
         step = 0.0
         inflation = 0.0
+        nis = 0.0
+        dof = 0
+        determinant = 1.0
+        stepped = False
         noise_set = place if sensed else 0
-        if tuning.scale_variance + tuning.placement_variance > 0.0 and sensed:
+        if inflated and sensed:
             inflation = _inflation(
                 data.y[k], state, tuning, place == 0, x[0] * x[0] + x[1] * x[1] + x[2] * x[2]
             )
         if state.counts[_STARTED] > 0:
             # Prediction, (1).
             step = data.t[k] - state.scalars[_TIME]
-            start, used = _quadrature(data, tuning, k, closing, weights)
+            half = 0.5 * step
+            start = min(max(k - 1 - tuning.position, 0), closing - points)
+            even = plain_set and start >= 0 and data.uniform_run[start + points - 1] >= points - 1
             clean = True
             s0 = 0.0
             s1 = 0.0
             s2 = 0.0
-            for j in range(used):
-                node = start + j
-                node_set = data.channel_set[node]
-                if node_set >= 0 and not tables.plain[node_set]:
-                    clean = False
-                    break
-                s0 += weights[j] * data.alpha[node, 0]
-                s1 += weights[j] * data.alpha[node, 1]
-                s2 += weights[j] * data.alpha[node, 2]
-            half = 0.5 * step
-            if clean:
+            if even:
+                left = k - 1 - start
+                for j in range(points):
+                    weight = step * even_weights[left, j]
+                    s0 += weight * alpha[start + j, 0]
+                    s1 += weight * alpha[start + j, 1]
+                    s2 += weight * alpha[start + j, 2]
+                stepped = unrolled and not keep and not (settles and state.counts[_SAMPLES] < tuning.rest_window)
+            else:
+                start, used = _quadrature(data, tuning, k, closing, weights)
+                for j in range(used):
+                    node = start + j
+                    node_set = data.channel_set[node]
+                    if node_set >= 0 and not tables.plain[node_set]:
+                        clean = False
+                        break
+                    s0 += weights[j] * alpha[node, 0]
+                    s1 += weights[j] * alpha[node, 1]
+                    s2 += weights[j] * alpha[node, 2]
+            if stepped:
+                turned[0] = s0
+                turned[1] = s1
+                turned[2] = s2
+                nis, determinant = _step_twelve(
+                    x, covariance, turned, step, noise_of_all, inflation, sensitivity_of_all, z, k, _SLOW
+                )
+                dof = d
+            elif clean:
                 for r in range(n):
                     covariance[0, r] += half * covariance[noise_row, r] - step * covariance[3, r]
                     covariance[1, r] += half * covariance[noise_row + 1, r] - step * covariance[4, r]
@@ -418,10 +453,11 @@ def forward(  # type: ignore[no-untyped-def]
                         mean = 0.5 * (covariance[a, b] + covariance[b, a])
                         covariance[a, b] = mean
                         covariance[b, a] = mean
-            x[0] += s0 - step * x[3] + half * x[noise_row]
-            x[1] += s1 - step * x[4] + half * x[noise_row + 1]
-            x[2] += s2 - step * x[5] + half * x[noise_row + 2]
-            _renew_noise(x, covariance, tables.alpha_noise[noise_set], 1.0 + inflation, half, noise_row)
+            if not stepped:
+                x[0] += s0 - step * x[3] + half * x[noise_row]
+                x[1] += s1 - step * x[4] + half * x[noise_row + 1]
+                x[2] += s2 - step * x[5] + half * x[noise_row + 2]
+                _renew_noise(x, covariance, tables.alpha_noise[noise_set], 1.0 + inflation, half, noise_row)
             extra = 0.0
             if not sensed:  # α is held: its wandering adds up
                 age = data.t[k] - state.scalars[_LAST_GOOD]
@@ -432,12 +468,11 @@ def forward(  # type: ignore[no-untyped-def]
                 for a in range(3):
                     covariance[a, a] += extra
             if sensed and data.whole_run[k] > 0:
-                jump = 0.0
-                for a in range(3):
-                    change = data.alpha[k, a] - data.alpha[k - 1, a]
-                    jump += change * change - 2.0 * tables.alpha_noise[noise_set, a, a]
-                forget = min(1.0, step / _WALK_MEMORY)
-                state.scalars[_WALK] = max(0.0, (1.0 - forget) * state.scalars[_WALK] + forget * jump / (3.0 * step))
+                c0 = alpha[k, 0] - alpha[k - 1, 0]
+                c1 = alpha[k, 1] - alpha[k - 1, 1]
+                c2 = alpha[k, 2] - alpha[k - 1, 2]
+                jump = c0 * c0 + c1 * c1 + c2 * c2 - 2.0 * noise_power
+                state.scalars[_WALK] = max(0.0, (1.0 - forget) * state.scalars[_WALK] + forget_rate * jump)
             if keep:
                 if clean:
                     rows[:] = 0.0
@@ -467,23 +502,16 @@ def forward(  # type: ignore[no-untyped-def]
         w0 = x[0]
         w1 = x[1]
         w2 = x[2]
-        nis = 0.0
-        dof = 0
-        determinant = 1.0
         # In the first block after a start at rest ω is known from the start alone and drifts with the unknown bias of
         # α: far too uncertain for a linearised z. If the block turns out as rest, the mean of z is used at its end.
         settling = tuning.rest_window > state.counts[_SAMPLES] and settles
-        if sensed and d > 0 and not settling:
+        if sensed and d > 0 and not settling and not stepped:
             plain = place == 0
             measured_rows = d if plain else tables.null_count[place]
             sensitivity = tables.null_sensitivity[place]
-            second_order = covariance[0, 0] + covariance[1, 1] + covariance[2, 2] > _SLOW * (
+            slow = covariance[0, 0] + covariance[1, 1] + covariance[2, 2] > _SLOW * (
                 w0 * w0 + w1 * w1 + w2 * w2
             )
-            if second_order:
-                for a in range(3):
-                    for b in range(3):
-                        slope[a, b] = covariance[a, b]
             for i in range(measured_rows):
                 m = sensitivity[i]
                 h0 = 2.0 * w0 * m[0] + w1 * m[3] + w2 * m[4]
@@ -494,8 +522,11 @@ def forward(  # type: ignore[no-untyped-def]
                 slopes[i, 2] = h2
                 innovations[i] = data.z[k, i] - 0.5 * (h0 * w0 + h1 * w1 + h2 * w2)
                 variances[i] = 1.0 + inflation
-                if second_order:
-                    mean, wider = _second_order(m, slope)
+                if slow:
+                    mean, wider = second_order(
+                        m, covariance[0, 0], covariance[0, 1], covariance[0, 2], covariance[1, 1], covariance[1, 2],
+                        covariance[2, 2],
+                    )  # fmt: skip
                     innovations[i] -= mean
                     variances[i] += wider
                 if plain:
@@ -503,36 +534,33 @@ def forward(  # type: ignore[no-untyped-def]
                 else:
                     for j in range(d):
                         innovations[i] -= tables.null_bias[place, i, j] * x[6 + j]
-            if unrolled and plain and not keep:
-                nis, determinant = _update_twelve(x, covariance, slopes, innovations, variances)
-            else:
-                before[:] = x
-                for i in range(measured_rows):
-                    h[:] = 0.0
-                    for a in range(3):
-                        h[a] = slopes[i, a]
-                    for j in range(d):
-                        h[6 + j] = tables.null_bias[place, i, j]
-                    variance = variances[i]
-                    innovation = innovations[i]
-                    for r in range(n):
-                        total = h[0] * covariance[0, r] + h[1] * covariance[1, r] + h[2] * covariance[2, r]
-                        if plain:
-                            total += covariance[6 + i, r]
-                        else:
-                            for j in range(d):
-                                total += h[6 + j] * covariance[6 + j, r]
-                        ph[r] = total
-                    for r in range(6 + d):
-                        variance += h[r] * ph[r]
-                        innovation -= h[r] * (x[r] - before[r])
-                    inverse = 1.0 / variance
-                    if keep:
-                        _remember(record, row, used_rows, h, ph, inverse, innovation)
-                        used_rows += 1
-                    _apply(x, covariance, ph, inverse, innovation, states)
-                    nis += innovation * innovation * inverse
-                    determinant *= variance
+            before[:] = x
+            for i in range(measured_rows):
+                h[:] = 0.0
+                for a in range(3):
+                    h[a] = slopes[i, a]
+                for j in range(d):
+                    h[6 + j] = tables.null_bias[place, i, j]
+                variance = variances[i]
+                innovation = innovations[i]
+                for r in range(n):
+                    total = h[0] * covariance[0, r] + h[1] * covariance[1, r] + h[2] * covariance[2, r]
+                    if plain:
+                        total += covariance[6 + i, r]
+                    else:
+                        for j in range(d):
+                            total += h[6 + j] * covariance[6 + j, r]
+                    ph[r] = total
+                for r in range(6 + d):
+                    variance += h[r] * ph[r]
+                    innovation -= h[r] * (x[r] - before[r])
+                inverse = 1.0 / variance
+                if keep:
+                    _remember(record, row, used_rows, h, ph, inverse, innovation)
+                    used_rows += 1
+                _apply(x, covariance, ph, inverse, innovation, states)
+                nis += innovation * innovation * inverse
+                determinant *= variance
             dof = measured_rows
         if len(gyro_axes) > 0:
             for a in range(3):
@@ -645,26 +673,6 @@ def _apply(x, covariance, ph, inverse, innovation, states):  # type: ignore[no-u
 
 
 @njit(**_COMPILE)
-def _second_order(m, p):  # type: ignore[no-untyped-def]
-    """Return tr(BP) and 2 tr(BPBP) of the symmetric form B of a row of M."""
-    b = 0.5 * m[3]
-    c = 0.5 * m[4]
-    e = 0.5 * m[5]
-    c00 = m[0] * p[0, 0] + b * p[1, 0] + c * p[2, 0]
-    c01 = m[0] * p[0, 1] + b * p[1, 1] + c * p[2, 1]
-    c02 = m[0] * p[0, 2] + b * p[1, 2] + c * p[2, 2]
-    c10 = b * p[0, 0] + m[1] * p[1, 0] + e * p[2, 0]
-    c11 = b * p[0, 1] + m[1] * p[1, 1] + e * p[2, 1]
-    c12 = b * p[0, 2] + m[1] * p[1, 2] + e * p[2, 2]
-    c20 = c * p[0, 0] + e * p[1, 0] + m[2] * p[2, 0]
-    c21 = c * p[0, 1] + e * p[1, 1] + m[2] * p[2, 1]
-    c22 = c * p[0, 2] + e * p[1, 2] + m[2] * p[2, 2]
-    return c00 + c11 + c22, 2.0 * (
-        c00 * c00 + c11 * c11 + c22 * c22 + 2.0 * (c01 * c10 + c02 * c20 + c12 * c21)
-    )
-
-
-@njit(**_COMPILE)
 def _remember(record, row, place, h, ph, inverse, innovation):  # type: ignore[no-untyped-def]
     """Store one scalar update for the backward pass."""
     for r in range(len(h)):
@@ -676,65 +684,63 @@ def _remember(record, row, place, h, ph, inverse, innovation):  # type: ignore[n
 
 @njit(**_COMPILE)
 def _rest_block(data, k, tables, tuning, state):  # type: ignore[no-untyped-def]
-    """Add sample k to the block; at the block's end test for rest (`gfimu.rate.rest_test`) and start a new block."""
-    c = data.y.shape[1]
+    """Count sample k into the block; at the block's end test for rest (`gfimu.rate.rest_test`)."""
     counts = state.counts
     window = tuning.rest_window
     if data.channel_set[k] != 0 or (counts[_BLOCK] > 0 and data.whole_run[k] == 0):
         counts[_BLOCK] = 0
         return False
-    if counts[_BLOCK] == 0:
-        state.scalars[_BLOCK_SQUARES] = 0.0
-        for i in range(c):
-            state.block_sums[0, i] = 0.0
-            state.block_sums[1, i] = 0.0
-            state.block_sums[2, i] = data.y[k, i]
-    half = 0 if counts[_BLOCK] < window // 2 else 1
-    squares = 0.0
-    for i in range(c):
-        change = (data.y[k, i] - state.block_sums[2, i]) * tuning.inverse_noise[i]
-        state.block_sums[half, i] += change
-        squares += change * change
-    state.scalars[_BLOCK_SQUARES] += squares
     counts[_BLOCK] += 1
     if counts[_BLOCK] < window:
         return False
     counts[_BLOCK] = 0
-    return _is_rest(tables, tuning, state)
+    return _is_rest(data.y[k - window + 1 : k + 1], tables, tuning, state)
 
 
 @njit(**_COMPILE)
-def _is_rest(tables, tuning, state):  # type: ignore[no-untyped-def]
-    """Test the block just completed against the hypothesis of rest."""
-    c = state.block_sums.shape[1]
+def _is_rest(y, tables, tuning, state):  # type: ignore[no-untyped-def]
+    """Test the block of readings y (window, c) against the hypothesis of rest."""
+    window, c = y.shape
     d = tables.null_rows.shape[1]
-    window = tuning.rest_window
     first = window // 2
     second = window - first
     limits = tuning.rest_limits
-    sums = state.block_sums
     # ω when the block began: known, and not far from zero.
     known = state.block_covariance
     for a in range(3):
         if known[a, a] > limits[5]:
             return False
+        if state.block_x[a] ** 2 > limits[4] * (known[a, a] + tuning.rest_variance):  # never less than the full χ²
+            return False
+    # Scatter within the block, and its second half against its first.
+    mean = np.empty(c)
+    scatter = 0.0
+    halves = 0.0
+    for i in range(c):
+        origin = y[0, i]
+        early = 0.0
+        squares = 0.0
+        for j in range(first):
+            change = y[j, i] - origin
+            early += change
+            squares += change * change
+        late = 0.0
+        for j in range(first, window):
+            change = y[j, i] - origin
+            late += change
+            squares += change * change
+        total = early + late
+        weight = tuning.inverse_noise[i] * tuning.inverse_noise[i]
+        mean[i] = origin + total / window
+        scatter += weight * (squares - total * total / window)
+        difference = late / second - early / first
+        halves += weight * difference * difference
+    if scatter > limits[0] or halves / (1.0 / first + 1.0 / second) > limits[1]:
+        return False
     consistent = np.linalg.solve(known[:3, :3] + tuning.rest_variance * np.eye(3), state.block_x[:3])
     if (consistent * state.block_x[:3]).sum() > limits[4]:
         return False
-    # Scatter within the block, and its second half against its first.
-    scatter = state.scalars[_BLOCK_SQUARES]
-    halves = 0.0
-    for i in range(c):
-        total = sums[0, i] + sums[1, i]
-        scatter -= total * total / window
-        difference = sums[1, i] / second - sums[0, i] / first
-        halves += difference * difference
-    if scatter > limits[0] or halves / (1.0 / first + 1.0 / second) > limits[1]:
-        return False
     # Means against the biases known when the block began.
-    mean = np.empty(c)
-    for i in range(c):
-        mean[i] = sums[2, i] + (sums[0, i] + sums[1, i]) / (window * tuning.inverse_noise[i])
     alpha = tables.alpha_rows[0] @ mean - state.block_x[3:6]
     spread = known[3:6, 3:6] + tables.alpha_noise[0] / window
     if (np.linalg.solve(spread, alpha) * alpha).sum() > limits[2]:
@@ -748,7 +754,6 @@ def _is_rest(tables, tuning, state):  # type: ignore[no-untyped-def]
     for i in range(c):
         state.reference[i] += (mean[i] - state.reference[i]) / (blocks + 1)
     state.counts[_REST_BLOCKS] = blocks + 1
-    state.scalars[_REST_SAMPLES] += window
     return True
 
 
