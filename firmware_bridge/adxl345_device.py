@@ -8,13 +8,22 @@ only and agree bit by bit.
 
 from __future__ import annotations
 
+import enum
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["RAW_PER_COUNT", "TICKS_PER_SECOND", "Adxl345", "Adxl345Options", "ConversionSource", "format_count"]
+__all__ = [
+    "RAW_PER_COUNT",
+    "TICKS_PER_SECOND",
+    "Adxl345",
+    "Adxl345Options",
+    "ConversionSource",
+    "LineFault",
+    "format_count",
+]
 
 TICKS_PER_SECOND = 14_400_000_000
 """Ticks per second: a whole number of ticks per cycle at 4, 12, 72, 80, 96, 100 and 120 MHz."""
@@ -46,6 +55,18 @@ _POP_TICKS = 5 * TICKS_PER_SECOND // 1_000_000
 _TURN_ON_TICKS = 11 * TICKS_PER_SECOND // 10_000  # τ + 1.1 ms from standby to the first sample
 _SLOWEST_PERIOD = 1024 * TICKS_PER_SECOND // 100  # rate code 0: 0.09765625 Hz
 _FLOATING = 0xFF  # what the host reads from a line that nobody drives
+
+
+class LineFault(enum.IntEnum):
+    """What may be wrong between the chip and the host."""
+
+    NONE = 0
+    SILENT = 1
+    """The chip neither hears nor answers: unplugged, or without power."""
+    STUCK_LOW = 2
+    """The data line to the host is shorted to ground."""
+    STUCK_HIGH = 3
+    """The data line to the host is shorted to the supply."""
 
 
 @dataclass(frozen=True)
@@ -104,10 +125,11 @@ class Adxl345:
     """
 
     def __init__(self, source: ConversionSource, options: Adxl345Options | None = None) -> None:
+        self.line_fault = LineFault.NONE
         self.source = source
         self.options = options or Adxl345Options()
         shift = self.options.self_test_counts
-        self._self_test = tuple(round(counts * RAW_PER_COUNT) for counts in shift)
+        self.self_test_raw = tuple(round(counts * RAW_PER_COUNT) for counts in shift)
         self.power_on()
 
     def power_on(self) -> None:
@@ -161,7 +183,7 @@ class Adxl345:
             place = 0
         self._block_place = place + 1
         offsets = self.registers[OFSX : OFSX + 3]
-        shift = self._self_test if self.registers[DATA_FORMAT] & SELF_TEST else (0, 0, 0)
+        shift = self.self_test_raw if self.registers[DATA_FORMAT] & SELF_TEST else (0, 0, 0)
         x, y, z = self._block[place]
         return (
             x + _signed(offsets[0]) * _RAW_PER_OFFSET_STEP + shift[0],
@@ -299,24 +321,30 @@ class Adxl345:
 
     def transfer(self, value: int, now: int) -> int:
         """Exchange one byte: bit 7 of the first is read, bit 6 multiple bytes."""
+        if self.line_fault == LineFault.SILENT:
+            return _FLOATING
+        answer = self._exchange(value, now)
+        if self.line_fault:
+            return 0 if self.line_fault == LineFault.STUCK_LOW else _FLOATING
+        # A chip in 3-wire mode on four wires, or the other way round, drives a line that the host does not listen to.
+        if bool(self.registers[DATA_FORMAT] & THREE_WIRE) != (self.options.wires == 3):
+            return _FLOATING
+        return answer
+
+    def _exchange(self, value: int, now: int) -> int:
         if self._command is None:
             self._command = value
             self._address = value & 0x3F
             self.catch_up(now)
             self._show(now)
-            return _FLOATING if self._silent() else 0
+            return 0
         address = self._address
         if self._command & 0x40:
             self._address = (address + 1) & 0x3F
         if self._command & 0x80:
-            answer = self._read(address, now)
-            return _FLOATING if self._silent() else answer
+            return self._read(address, now)
         self._write(address, value, now)
-        return _FLOATING if self._silent() else 0
-
-    def _silent(self) -> bool:
-        """Tell whether the chip drives another line than the host listens to: 3-wire mode on four wires or vice versa."""
-        return bool(self.registers[DATA_FORMAT] & THREE_WIRE) != (self.options.wires == 3)
+        return 0
 
     # I2C
 
@@ -329,6 +357,8 @@ class Adxl345:
         """Start or repeated start with an address byte; True when the chip acknowledges."""
         if address_byte >> 1 != self.i2c_address:
             return False
+        if self._reading:
+            self._end_of_read(now)
         self.catch_up(now)
         self._show(now)
         self._selected = True

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
-from firmware_bridge.adxl345_device import TICKS_PER_SECOND, Adxl345
+from firmware_bridge.adxl345_device import TICKS_PER_SECOND, Adxl345, LineFault
 from firmware_bridge.board.cpu import Cpu
 from firmware_bridge.board.dwt import CycleCounter
 from firmware_bridge.board.gpio import Gpio, GpioInterrupts
@@ -73,6 +73,8 @@ class Board:
         Ticks per core clock cycle.
     """
 
+    _cpu_class = Cpu
+
     def __init__(self, image: ElfImage, sensors: Sequence[Adxl345] = (), *, tracer: Tracer | None = None) -> None:
         self.image = image
         self.sensors = list(sensors)
@@ -95,7 +97,7 @@ class Board:
         self._polled = (-1, -1)
         self._ready = False
         self._build()
-        self.cpu = Cpu(self, image)
+        self.cpu = self._cpu_class(self, image)
         self._map()
         self._ready = True
         self._reset_all()
@@ -223,13 +225,6 @@ class Board:
             self.until = min(self._events)
         self.alarm = -1
 
-    def before_access(self) -> None:
-        """A register is accessed: that takes time, and what is due comes first."""
-        self.now += self.access_ticks
-        self.accesses += 1
-        if self.now >= self.until:
-            self.service()
-
     def spinning(self, slot: int) -> bool:
         """Tell whether the last register access was the same: the program waits in a loop."""
         last_slot, last_access = self._polled
@@ -288,11 +283,24 @@ class Board:
         """Supply voltage drops: processor, peripherals and sensors start again; unsent bytes are lost."""
         self.request_reset(BROWN_OUT)
         self.sleeping = False
-        for sensor in self.sensors:
-            sensor.power_on()
+        self._power_on_sensors()
         self.do_reset()
 
+    def _power_on_sensors(self) -> None:
+        for sensor in self.sensors:
+            sensor.power_on()
+
+    def set_line_fault(self, sensor: int, fault: LineFault) -> None:
+        """Break or mend the line between a sensor (from 0) and the processor."""
+        self.sensors[sensor].line_fault = fault
+
     def _reset_all(self) -> None:
+        self._reset_peripherals()
+        self.cpu.reset()
+        if not self.resets:
+            self.system_control.cause = POWER_ON
+
+    def _reset_peripherals(self) -> None:
         for slot in range(len(self._events)):
             self._events[slot] = NEVER
         self.until = NEVER
@@ -300,9 +308,6 @@ class Board:
             peripheral.reset()
         for ssp in self.ssps:
             ssp.selected = None
-        self.cpu.reset()
-        if not self.resets:
-            self.system_control.cause = POWER_ON
 
     # Wiring
 

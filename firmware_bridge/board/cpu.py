@@ -25,6 +25,7 @@ try:
     import unicorn
     from unicorn import arm_const as arm
     from unicorn.unicorn_py3 import unicorn as binding
+
     # Called without releasing the interpreter's lock: taking it again in every call-back would cost more than the call.
     _LIBRARY = ctypes.PyDLL(None, handle=binding.uclib._handle)
 except ImportError:  # the extra is not installed; `require_unicorn` says so
@@ -119,8 +120,7 @@ class Cpu:
         self._primask_place = ctypes.byref(self._primask_value)
         self._pc = _Registers(self._handle, [r.UC_ARM_REG_PC])
         self._callbacks: list[Any] = []
-        self._hook(unicorn.UC_HOOK_INTR, binding.HOOK_INTR_CFUNC(self._on_intr))
-        self._hook(unicorn.UC_HOOK_BLOCK, binding.HOOK_CODE_CFUNC(self._block_hook()))
+        self._install_hooks()
         self.pc = 0
 
     # Memory
@@ -157,6 +157,11 @@ class Cpu:
         memory[offset : offset + len(data)] = data
 
     # Hooks
+
+    def _install_hooks(self) -> None:
+        """Ask Unicorn to call before every block and at every processor exception."""
+        self._hook(unicorn.UC_HOOK_INTR, binding.HOOK_INTR_CFUNC(self._on_intr))
+        self._hook(unicorn.UC_HOOK_BLOCK, binding.HOOK_CODE_CFUNC(self._block_hook()))
 
     def _hook(self, kind: int, callback: Any) -> None:
         self._callbacks.append(callback)

@@ -15,6 +15,7 @@ NMI, HARD_FAULT, SVCALL, PENDSV, SYSTICK, FIRST_IRQ = 2, 3, 11, 14, 15, 16
 EXCEPTIONS = 16 + 35
 THREAD_PRIORITY = 256
 _ALWAYS_ENABLED = (1 << FIRST_IRQ) - 1
+_EXISTING = (1 << EXCEPTIONS) - 1
 _PRIORITY_BITS = 0xF8  # five bits on the LPC1768
 _CPUID = 0x412FC230  # Cortex-M3 r2p0
 _RESET_KEY = 0x05FA
@@ -154,16 +155,16 @@ class Nvic(Peripheral):
         elif 0x10 <= offset < 0x20:
             self.board.systick.write(offset, value, size)
         elif 0x100 <= offset < 0x108:
-            self.enabled |= value << (FIRST_IRQ + 8 * (offset - 0x100))
+            self.enabled |= value << (FIRST_IRQ + 8 * (offset - 0x100)) & _EXISTING
         elif 0x180 <= offset < 0x188:
             self.enabled &= ~(value << (FIRST_IRQ + 8 * (offset - 0x180)))
         elif 0x200 <= offset < 0x208:
-            self.pending |= value << (FIRST_IRQ + 8 * (offset - 0x200))
+            self.pending |= value << (FIRST_IRQ + 8 * (offset - 0x200)) & _EXISTING
         elif 0x280 <= offset < 0x288:
             self.pending &= ~(value << (FIRST_IRQ + 8 * (offset - 0x280)))
             self.pending |= self.lines & ~self.active_mask
         elif offset == 0xF00:
-            self.pending |= 1 << (FIRST_IRQ + (value & 0x1FF))
+            self.pending |= 1 << (FIRST_IRQ + (value & 0x1FF)) & _EXISTING
         elif offset == 0xD04:
             set_bits = (value >> 31 & 1) << NMI | (value >> 28 & 1) << PENDSV | (value >> 26 & 1) << SYSTICK
             clear_bits = (value >> 27 & 1) << PENDSV | (value >> 25 & 1) << SYSTICK
