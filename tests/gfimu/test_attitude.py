@@ -57,6 +57,15 @@ def test_constant_rate_is_scipys_rotation_vector(method, omega, q0):
     np.testing.assert_allclose(np.linalg.norm(q, axis=1), 1.0, atol=4e-16)
 
 
+@pytest.mark.parametrize("angle", [0.0, 1e-9, 1e-3, 0.1, 0.4, 0.4999, 0.5001, 1.0, 3.0, 6.0])
+def test_one_step_is_exact_to_the_last_digits(angle):
+    # Across the seam between series and closed form of sin(θ/2)/θ and cos(θ/2).
+    rotation_vector = angle * np.array([0.6, 0.0, -0.8])
+    q = integrate_attitude([0.0, 1.0], [rotation_vector, rotation_vector])[1]
+    expected = [np.cos(angle / 2), 0.6 * np.sin(angle / 2), 0.0, -0.8 * np.sin(angle / 2)]
+    np.testing.assert_allclose(q, expected, rtol=0, atol=4e-16)
+
+
 @pytest.mark.parametrize(
     ("method", "order"), [("exponential", 2), ("coning", 2), ("runge_kutta", 2), ("fourth_order", 4)]
 )
