@@ -215,7 +215,9 @@ class Twin:
         rms = rms * math.sqrt(max(sample_rate, 100.0) / 100.0)
         axis = np.concatenate([np.arange(len(chip.axes)) for chip in self.array.chips])
         factor = math.prod(effect.value("factor", 1.0) for effect in self.effects if effect.name == "noise")
-        white = np.hypot(rms[axis] * factor, quantum / math.sqrt(12.0))
+        # The data sheet's noise is that of the codes, its own quantisation included.
+        analogue = rms[axis] ** 2 - float(part["lsb_m_s2"]) ** 2 / 12.0
+        white = np.sqrt(np.maximum(analogue, 0.0) * factor**2 + quantum**2 / 12.0)
         return ExpectedNoise(white, quantum, self.range_g * STANDARD_GRAVITY)
 
     def extended(self, effects: Sequence[Effect]) -> Twin:

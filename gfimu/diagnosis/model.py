@@ -98,6 +98,10 @@ class EffectFamily(Protocol):
         """Return the places and structures it can take."""
         ...
 
+    def reach(self, array: AccelerometerArray) -> NDArray[np.bool_] | None:
+        """Return which channels each size changes, shape (m, c), or None where all may change."""
+        ...
+
     def shapes(self, duration: float, sample_rate: float) -> tuple[dict[str, float], ...]:
         """Return the grid of shape parameters."""
         ...

@@ -89,6 +89,14 @@ class Effect(ABC):
         return (Pattern("", np.eye(len(cls.sizes(array)))),)
 
     @classmethod
+    def reach(cls, array: AccelerometerArray) -> NDArray[np.bool_] | None:
+        """Return which channels each size changes, shape (m, c), or None where all may change.
+
+        Sizes that reach different channels share one finite difference.
+        """
+        return None
+
+    @classmethod
     def shapes(cls, duration: float, sample_rate: float) -> tuple[dict[str, float], ...]:
         """Return the grid of shape parameters (frequency, order, time constant) to screen over."""
         return ({},)

@@ -31,6 +31,7 @@ _DEGREE = np.pi / 180.0
 _FINE_STEP = 2e-3
 _SPEED_LOOP_TIME = 0.5
 _REST_RATE = 0.3
+_SLOW_MODE = 90.0
 
 
 class Misalignment(Effect):
@@ -45,6 +46,11 @@ class Misalignment(Effect):
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
         """Rotation vector of each chip in the body frame."""
         return tuple(Size(f"{chip.name}_{axis}_rad", 0.5 * _DEGREE) for chip in array.chips for axis in "xyz")
+
+    @classmethod
+    def reach(cls, array: AccelerometerArray) -> NDArray[np.bool_]:
+        """Return the channels of each chip."""
+        return np.repeat(np.arange(len(array.chips)), 3)[:, None] == array.chip_of_channel
 
     @classmethod
     def patterns(cls, array: AccelerometerArray) -> tuple[Pattern, ...]:
@@ -72,6 +78,11 @@ class SensorPosition(Effect):
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
         """Displacement of each chip in the body frame."""
         return tuple(Size(f"{chip.name}_{axis}_m", 1e-3) for chip in array.chips for axis in "xyz")
+
+    @classmethod
+    def reach(cls, array: AccelerometerArray) -> NDArray[np.bool_]:
+        """Return the channels of each chip."""
+        return np.repeat(np.arange(len(array.chips)), 3)[:, None] == array.chip_of_channel
 
     @classmethod
     def patterns(cls, array: AccelerometerArray) -> tuple[Pattern, ...]:
@@ -345,7 +356,7 @@ class _Twisting:
 
     def __init__(self, motion, t, gain: float, natural: float, damping: float) -> None:  # type: ignore[no-untyped-def]
         self._motion = motion
-        step = min(_FINE_STEP, 0.3 / natural)
+        step = _FINE_STEP if natural < _SLOW_MODE else 0.5 * _FINE_STEP
         self._grid = np.arange(t[0], t[-1] + 2 * step, step)
         push = -gain * motion.at(self._grid).acceleration
         push = push - push[0]  # steady before the first sample

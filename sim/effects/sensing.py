@@ -50,6 +50,10 @@ class _PerChannel(Effect):
     def patterns(cls, array: AccelerometerArray) -> tuple[Pattern, ...]:
         return channel_patterns(array)
 
+    @classmethod
+    def reach(cls, array: AccelerometerArray) -> NDArray[np.bool_]:
+        return np.eye(array.n_channels, dtype=bool)
+
     def per_channel(self, array: AccelerometerArray) -> NDArray[np.float64]:
         return self.vector([f"{channel}{self.suffix}" for channel in array.channels])
 
@@ -190,6 +194,11 @@ class CrossAxis(Effect):
         """One ratio per ordered pair of channels of a chip: ``a11_from_a12``."""
         names = array.channels
         return tuple(Size(f"{names[i]}_from_{names[j]}", 0.01) for i, j in cls._pairs(array))
+
+    @classmethod
+    def reach(cls, array: AccelerometerArray) -> NDArray[np.bool_]:
+        """Return the channel that each pair changes."""
+        return np.array([[i == c for c in range(array.n_channels)] for i, _ in cls._pairs(array)])
 
     @classmethod
     def patterns(cls, array: AccelerometerArray) -> tuple[Pattern, ...]:

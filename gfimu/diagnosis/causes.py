@@ -1,0 +1,119 @@
+"""Causes: an effect at a place, with its fitted sizes and shape; and the sets of them that diagnosis compares."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import block_diag
+
+from gfimu.array import AccelerometerArray
+from gfimu.diagnosis.model import Effect, EffectFamily, Pattern
+
+WHOLE_NUMBERS = frozenset({"order"})
+"""Shape parameters that are whole numbers, picked from a grid and not refined."""
+
+__all__ = ["WHOLE_NUMBERS", "Cause", "Signature", "effects_of_run"]
+
+
+@dataclass(frozen=True)
+class Signature:
+    """One effect in one shape: the columns that its sizes occupy in the normal equations.
+
+    Parameters
+    ----------
+    family : EffectFamily
+        The kind of effect.
+    shape : mapping
+        Shape parameters (frequency, order, time constant).
+    columns : ndarray, shape (m,) or (runs · m,)
+        Column numbers; per-run effects have one block per run.
+    penalty : float
+        Log of the number of alternatives that the shape was picked from.
+    """
+
+    family: EffectFamily
+    shape: Mapping[str, float]
+    columns: NDArray[np.intp]
+    penalty: float = 0.0
+
+
+@dataclass(frozen=True)
+class Cause:
+    """A hypothesis about one effect: where it acts, and how large it is.
+
+    Parameters
+    ----------
+    family : EffectFamily
+        The kind of effect.
+    pattern : str
+        Place or structure, for people.
+    mixing : ndarray, shape (m, k)
+        The m sizes (all runs) in units of their prior from the k coordinates.
+    shape : mapping
+        Shape parameters.
+    coordinates : ndarray, shape (k,)
+        Fitted coordinates.
+    covariance : ndarray, shape (k, k)
+        Their covariance.
+    shape_std : mapping
+        Standard deviations of the shape parameters.
+    log_prior : float
+        Log prior probability of the effect at this place.
+    """
+
+    family: EffectFamily
+    pattern: str
+    mixing: NDArray[np.float64]
+    shape: Mapping[str, float]
+    log_prior: float
+    coordinates: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    covariance: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))
+    shape_std: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def name(self) -> str:
+        """Contract name of the effect."""
+        return str(self.family.name)
+
+    @property
+    def key(self) -> tuple[str, str]:
+        """Effect and place, which identify a hypothesis."""
+        return (self.name, self.pattern)
+
+    @property
+    def free_shape(self) -> dict[str, float]:
+        """Shape parameters that are refined: all but whole numbers."""
+        return {key: value for key, value in self.shape.items() if key not in WHOLE_NUMBERS}
+
+    def at(self, coordinates: NDArray[np.float64], shape: Mapping[str, float] | None = None) -> Cause:
+        """Return the cause with other coordinates and, where given, another shape."""
+        return replace(self, coordinates=coordinates, shape=self.shape if shape is None else shape)
+
+    def sizes(self, array: AccelerometerArray, run: int) -> NDArray[np.float64]:
+        """Return the sizes in a run in their units."""
+        prior = np.array([size.prior_std for size in self.family.sizes(array)])
+        values = (self.mixing @ self.coordinates).reshape(-1, len(prior))
+        return np.asarray(values[run if len(values) > 1 else 0] * prior)
+
+    def effect(self, array: AccelerometerArray, run: int = 0) -> Effect:
+        """Return the effect as it acts in a run."""
+        return self.family.from_sizes(array, self.sizes(array, run), self.shape)
+
+    def positive(self, array: AccelerometerArray) -> NDArray[np.bool_]:
+        """Return which coordinates physics allows one sign only, shape (k,)."""
+        sign = np.array([size.positive for size in self.family.sizes(array)])
+        rows = np.tile(sign, len(self.mixing) // len(sign))
+        return np.asarray((np.abs(self.mixing[rows]) > 0).any(axis=0))
+
+
+def effects_of_run(causes: Sequence[Cause], array: AccelerometerArray, run: int) -> list[Effect]:
+    """Return the effects of a set of causes as they act in one run."""
+    return [cause.effect(array, run) for cause in causes]
+
+
+def per_run_mixing(pattern: Pattern, runs: int) -> NDArray[np.float64]:
+    """Return the mixing of a pattern whose sizes are free in each run."""
+    return np.asarray(block_diag(*[pattern.mixing] * runs))

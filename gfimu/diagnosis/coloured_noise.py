@@ -1,0 +1,131 @@
+"""Noise of unknown level: white plus bias instability, per channel, in a cosine basis.
+
+Bias instability (1/f noise) is a sum of first-order processes with time constants a factor 3.2 apart. In the cosine
+basis of a run its covariance is nearly diagonal, so whitening is white scaling plus a low-rank correction.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import dct
+
+__all__ = ["CosineBasis", "NoiseLevels", "estimate_flicker", "white_level"]
+
+_TIMES = 0.25 * 3.2 ** np.arange(7)
+_TOP_FREQUENCY = 2.5
+_FLICKER_GRID = 9.80665e-3 * np.geomspace(0.02, 3.0, 22)
+_FLICKER_PRIOR = 9.80665e-3 * 0.2
+_FLICKER_PRIOR_SPREAD = np.log(3.3)
+_CHANNEL_SPREAD = np.log(2.0)
+_WEAKEST_CORRECTION = 0.05
+
+
+@dataclass(frozen=True)
+class NoiseLevels:
+    """Noise of the channels and of the reference (last entry of each array).
+
+    Parameters
+    ----------
+    white : ndarray, shape (c + 1,)
+        Standard deviation of white noise, m/s² (rad/s for the reference).
+    flicker : ndarray, shape (c + 1,)
+        Rms of the bias instability.
+    walk : float
+        Random walk of the biases, m/s² per √s.
+    """
+
+    white: NDArray[np.float64]
+    flicker: NDArray[np.float64]
+    walk: float = 0.0
+
+
+class CosineBasis:
+    """Lowest cosines of a run of n samples and the spectrum of bias instability on them."""
+
+    def __init__(self, n: int, period: float) -> None:
+        self.n, self.period = n, period
+        duration = n * period
+        k = np.arange(max(2, min(int(2 * duration * _TOP_FREQUENCY), n // 4)))
+        self.frequency = k / (2 * duration)
+        omega = 2 * np.pi * self.frequency
+        spectrum = sum(2 * tau / (1 + (omega * tau) ** 2) for tau in _TIMES) / (len(_TIMES) * period)
+        ratio = _TIMES / duration
+        spectrum[0] = n * np.mean(2 * ratio * (1 + ratio * np.expm1(-1 / ratio)))
+        self.flicker_spectrum = spectrum
+        # Random walk from the start of the run: 1/(ω²) above, and its mean's variance T/3 at zero.
+        walk = np.empty(len(k))
+        walk[1:] = 1.0 / (omega[1:] ** 2 * period)
+        walk[0] = n * duration / 3.0
+        self.walk_spectrum = walk
+
+    def matrix(self, count: int) -> NDArray[np.float64]:
+        """Return the first ``count`` orthonormal cosines, shape (n, count)."""
+        phase = np.pi * np.outer(np.arange(self.n) + 0.5, np.arange(count)) / self.n
+        basis = np.sqrt(2.0 / self.n) * np.cos(phase)
+        basis[:, 0] = np.sqrt(1.0 / self.n)
+        return basis
+
+    def corrections(self, levels: NoiseLevels) -> NDArray[np.float64]:
+        """Return 1 − σ²/S_k per mode and channel, shape (K, c + 1), cut where it no longer matters."""
+        white = levels.white**2
+        walk = np.append(np.full(len(white) - 1, levels.walk**2), 0.0)
+        spectrum = white + np.outer(self.flicker_spectrum, levels.flicker**2) + np.outer(self.walk_spectrum, walk)
+        share = 1.0 - white / spectrum
+        strong = np.flatnonzero((share > _WEAKEST_CORRECTION).any(axis=1))
+        return share[: int(strong[-1]) + 1 if len(strong) else 1]
+
+    def transform(self, residual: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return all cosine coefficients of residuals (n, c)."""
+        return np.asarray(dct(residual, type=2, norm="ortho", axis=0))
+
+
+def white_level(coefficients: NDArray[np.float64], slowest: float, period: float) -> NDArray[np.float64]:
+    """White-noise standard deviation per column from cosine coefficients above ``slowest`` Hz (robust: median)."""
+    first = min(int(2 * len(coefficients) * period * slowest), len(coefficients) // 2)
+    fast = coefficients[first:]
+    return np.asarray(np.sqrt(np.median(fast**2, axis=0) / 0.4549))
+
+
+def estimate_flicker(
+    coefficients: NDArray[np.float64], white: NDArray[np.float64], basis: CosineBasis, walk: float = 0.0
+) -> NDArray[np.float64]:
+    """Bias instability per channel by Whittle likelihood of the slow coefficients.
+
+    Channels share a common level with a log-normal prior, and each may differ from it by a factor of about two.
+
+    Parameters
+    ----------
+    coefficients : ndarray, shape (n, c)
+        Cosine coefficients of the residual.
+    white : ndarray, shape (c,)
+        White noise per channel.
+    basis : CosineBasis
+        The basis.
+    walk : float
+        Random walk that is in the model already, m/s² per √s.
+
+    Returns
+    -------
+    ndarray, shape (c,)
+        Rms of the bias instability per channel, m/s².
+    """
+    slow = coefficients[1 : len(basis.frequency)] ** 2  # (K, c): the mean itself may be a bias
+    shape = basis.flicker_spectrum[1:]
+    fixed = basis.walk_spectrum[1:] * walk**2
+    likelihood = np.empty((len(_FLICKER_GRID), slow.shape[1]))
+    for row, level in enumerate(_FLICKER_GRID):
+        spectrum = white**2 + (shape * level**2 + fixed)[:, None]
+        likelihood[row] = -0.5 * np.sum(np.log(spectrum) + slow / spectrum, axis=0)
+    grid = np.log(_FLICKER_GRID)
+    tie = -0.5 * ((grid[:, None] - grid[None, :]) / _CHANNEL_SPREAD) ** 2  # channel level against common level
+    joint = likelihood[:, None, :] + tie[:, :, None]  # (channel level, common level, c)
+    top = joint.max(axis=0)
+    common = (top + np.log(np.exp(joint - top).mean(axis=0))).sum(axis=1)
+    common += -0.5 * ((grid - np.log(_FLICKER_PRIOR)) / _FLICKER_PRIOR_SPREAD) ** 2
+    best = int(np.argmax(common))
+    weight = joint[:, best, :] - joint[:, best, :].max(axis=0)
+    weight = np.exp(weight) / np.exp(weight).sum(axis=0)
+    return np.asarray(np.sqrt(weight.T @ _FLICKER_GRID**2))

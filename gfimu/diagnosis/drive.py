@@ -1,0 +1,155 @@
+"""The drive of the table as one smooth unknown: a spline of the angle with a prior on its roughness.
+
+Rate and angular acceleration are derivatives of the same spline, so they are estimated jointly from the reference
+and from the channels, never by differentiating a noisy tachometer.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import BSpline
+from scipy.ndimage import gaussian_filter1d, uniform_filter1d
+from scipy.sparse import csr_array, diags_array
+
+from gfimu.diagnosis.model import SpinState
+from gfimu.diagnosis.run import Run
+
+__all__ = ["AngleSpline", "SplineState", "roughness_prior", "smooth_rate"]
+
+_DEGREE = 4
+_SMOOTHEST = 5.0
+_ROUGHNESS_FACTOR = 6.0
+_REMEMBERED = 6
+
+
+class SplineState:
+    """Angle, rate and acceleration of the spline at n times."""
+
+    def __init__(
+        self, angle: NDArray[np.float64], rate: NDArray[np.float64], acceleration: NDArray[np.float64]
+    ) -> None:
+        self.angle, self.rate, self.acceleration = angle, rate, acceleration
+
+
+class AngleSpline:
+    """Quartic spline of the table angle on uniform knots.
+
+    Parameters
+    ----------
+    start, stop : float
+        Time span, s.
+    spacing : float
+        Knot spacing, s.
+    """
+
+    def __init__(self, start: float, stop: float, spacing: float) -> None:
+        intervals = max(int(np.ceil((stop - start) / spacing)), 8)
+        self.spacing = (stop - start) / intervals
+        self.start, self.stop = start, stop
+        self.knots = start + self.spacing * np.arange(-_DEGREE, intervals + _DEGREE + 1)
+        self.size = intervals + _DEGREE
+        self._first = diags_array([-1.0, 1.0], offsets=[0, 1], shape=(self.size - 1, self.size)).tocsr() / self.spacing
+        inner = diags_array([-1.0, 1.0], offsets=[0, 1], shape=(self.size - 2, self.size - 1)).tocsr() / self.spacing
+        self._second = inner @ self._first
+
+    def matrices(self, t: NDArray[np.float64]) -> tuple[csr_array, csr_array, csr_array]:
+        """Return matrices (n, m) from the coefficients to angle, rate and acceleration at times ``t``."""
+        at = np.clip(t, self.start, self.stop)
+        angle = csr_array(BSpline.design_matrix(at, self.knots, _DEGREE))
+        rate = csr_array(BSpline.design_matrix(at, self.knots[1:-1], _DEGREE - 1)) @ self._first
+        acceleration = csr_array(BSpline.design_matrix(at, self.knots[2:-2], _DEGREE - 2)) @ self._second
+        return angle, csr_array(rate), csr_array(acceleration)
+
+    def roughness_rows(self) -> csr_array:
+        """Return the matrix from the coefficients to the third derivative of the rate per knot interval, rad/s⁴."""
+        matrix = self._second
+        for order in (2, 3):
+            rows = self.size - order - 1
+            step = diags_array([-1.0, 1.0], offsets=[0, 1], shape=(rows, rows + 1)).tocsr() / self.spacing
+            matrix = step @ matrix
+        return csr_array(matrix)
+
+    def interval_centres(self) -> NDArray[np.float64]:
+        """Return the centre of each knot interval, s."""
+        return self.start + self.spacing * (np.arange(self.size - _DEGREE) + 0.5)
+
+    def spin(self, coefficients: NDArray[np.float64]) -> _SplineSpin:
+        """Return the motion with these coefficients."""
+        return _SplineSpin(self, coefficients)
+
+
+class _SplineSpin:
+    """Motion of a table as a spline."""
+
+    def __init__(self, spline: AngleSpline, coefficients: NDArray[np.float64]) -> None:
+        self._spline = spline
+        self._angle = BSpline(spline.knots, coefficients, _DEGREE)
+        self._rate = self._angle.derivative()
+        self._acceleration = self._rate.derivative()
+        self._known: dict[bytes, SplineState] = {}
+
+    def at(self, t: ArrayLike) -> SpinState:
+        """Return the state at times (n,), s; constant rate beyond the ends."""
+        times = np.asarray(t, dtype=float)
+        # Hundreds of effects ask for the same times of the same drive.
+        key = times.tobytes()
+        if key not in self._known:
+            if len(self._known) >= _REMEMBERED:
+                self._known.pop(next(iter(self._known)))
+            self._known[key] = self._evaluate(times)
+        return self._known[key]
+
+    def _evaluate(self, times: NDArray[np.float64]) -> SplineState:
+        inside = np.clip(times, self._spline.start, self._spline.stop)
+        rate = self._rate(inside)
+        return SplineState(self._angle(inside) + rate * (times - inside), rate, self._acceleration(inside))
+
+
+def smooth_rate(run: Run, *, is_angle: bool, width: float = 0.1) -> NDArray[np.float64]:
+    """Smooth the reference to a rate, for starting values and the prior only, shape (n,), rad/s."""
+    known = run.reference_valid
+    reference = np.interp(run.t, run.t[known], run.reference[known])
+    sigma = width / run.sample_period / 2.0
+    smooth = gaussian_filter1d(reference, max(sigma, 0.5), mode="nearest")
+    return np.asarray(np.gradient(smooth, run.sample_period)) if is_angle else np.asarray(smooth)
+
+
+def roughness_prior(
+    run: Run, spline: AngleSpline, *, is_angle: bool, reference_noise: float, factor: float = 1.0
+) -> NDArray[np.float64]:
+    """Standard deviation of the third derivative of the rate per knot interval, rad/s⁴.
+
+    Loose on ramps and stiff on plateaus, so that a ripple at constant speed is a discrepancy and not a motion.
+
+    Parameters
+    ----------
+    run : Run
+        The run; its smoothed reference tells where the motion is rough.
+    spline : AngleSpline
+        The spline.
+    is_angle : bool
+        Whether the reference is an angle.
+    reference_noise : float
+        White noise of the reference, rad/s or rad.
+    factor : float
+        Multiplier of the whole prior.
+
+    Returns
+    -------
+    ndarray, shape (m − 4,)
+        Standard deviations.
+    """
+    period = run.sample_period
+    rate = smooth_rate(run, is_angle=is_angle)
+    third = np.gradient(np.gradient(np.gradient(rate, period), period), period)
+    window = max(int(0.3 / period), 3)
+    power = uniform_filter1d(third**2, window, mode="nearest")
+    # What white noise of the reference alone gives after the same smoothing and differentiation.
+    noise = np.random.default_rng(0).standard_normal(4096) * reference_noise
+    smooth = gaussian_filter1d(noise, max(0.05 / period, 0.5))
+    for _ in range(4 if is_angle else 3):
+        smooth = np.gradient(smooth, period)
+    power = np.maximum(power - 1.5 * float(np.mean(smooth[50:-50] ** 2)), 0.0)
+    at_knots = np.interp(spline.interval_centres(), run.t, power)
+    return factor * np.sqrt(_ROUGHNESS_FACTOR**2 * at_knots + _SMOOTHEST**2)

@@ -1,0 +1,66 @@
+"""Evidence: how much better the data are predicted when a set of effects is admitted.
+
+With signatures in units of their physical prior, coordinates z ~ N(0, k²) and the Gram form (G, b),
+
+    log E = ½ k² bᵀ(I + k²G)⁻¹b − ½ log det(I + k²G),
+
+averaged over scales k, so that neither a timid nor a bold prior decides; coordinates of one sign have half-normal
+priors. Unlike BIC it charges for the prior volume that the data rule out, not for the number of samples.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import lapack
+from scipy.special import log_ndtr, logsumexp
+
+__all__ = ["SCALES", "log_evidence", "posterior"]
+
+SCALES = (0.03, 0.2, 1.0, 5.0, 30.0)
+"""Scales k of the prior: a fraction of the usual size up to a gross error."""
+_SCALE_WEIGHTS = np.log(np.array([0.22, 0.28, 0.28, 0.15, 0.07]))
+
+
+def posterior(
+    gram: NDArray[np.float64], score: NDArray[np.float64], scale: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Posterior mean (k,) and covariance (k, k) of coordinates with prior N(0, scale²)."""
+    information = gram + np.eye(len(score)) / scale**2
+    covariance = np.linalg.inv(information)
+    return covariance @ score, covariance
+
+
+def log_evidence(
+    gram: NDArray[np.float64], score: NDArray[np.float64], positive: NDArray[np.bool_] | None = None
+) -> float:
+    """Log of the evidence of coordinates against none.
+
+    Parameters
+    ----------
+    gram : ndarray, shape (k, k)
+        G.
+    score : ndarray, shape (k,)
+        b.
+    positive : ndarray of bool, shape (k,), optional
+        Coordinates that can only be positive.
+    """
+    count = len(score)
+    signed = positive is not None and positive.any()
+    values = np.empty(len(SCALES))
+    for place, scale in enumerate(SCALES):
+        matrix = gram * scale**2
+        matrix.flat[:: count + 1] += 1.0
+        factor, info = lapack.dpotrf(matrix, lower=1)
+        if info:
+            return -np.inf
+        half, _ = lapack.dtrtrs(factor, score * scale, lower=1)
+        value = 0.5 * float(half @ half) - float(np.log(factor.diagonal()).sum())
+        if signed:
+            inverse, _ = lapack.dpotri(factor, lower=1)
+            inverse = np.tril(inverse) + np.tril(inverse, -1).T
+            mean = inverse @ (score * scale)
+            for sign in np.flatnonzero(positive):
+                value += float(log_ndtr(mean[sign] / np.sqrt(inverse[sign, sign]))) + np.log(2.0)
+        values[place] = value
+    return float(logsumexp(values + _SCALE_WEIGHTS))

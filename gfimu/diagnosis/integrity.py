@@ -1,0 +1,290 @@
+"""Integrity: faults that are seen in the samples themselves, before any Gaussian test.
+
+Lost frames, a coarser step than assumed, clipping, frozen channels, exchanged or inverted channels, a chip in another
+range. What they spoil is marked invalid; what they did is undone in the twin, so that the search sees clean data.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
+
+from gfimu.diagnosis.model import Effect, ExpectedNoise, WorldModel
+from gfimu.diagnosis.run import Run
+
+__all__ = ["IntegrityReport", "check_integrity"]
+
+_LONGEST_EQUAL = 40
+_RANGE_FACTORS = (1 / 16, 1 / 8, 1 / 4, 1 / 2, 2.0, 4.0, 8.0, 16.0)
+_REMOVED = 0.7
+_SIGNIFICANT_RMS = 12.0
+_SPIKE = 8.0
+
+
+@dataclass(frozen=True)
+class IntegrityReport:
+    """Faults of a run and the run with what they spoiled marked invalid.
+
+    Parameters
+    ----------
+    run : Run
+        The run, invalid samples marked.
+    effects : tuple of Effect
+        Faults found, as effects of the library.
+    why : mapping of str to str
+        One sentence per effect name.
+    spikes : int
+        Isolated samples far off their neighbours.
+    """
+
+    run: Run
+    effects: tuple[Effect, ...]
+    why: dict[str, str]
+    spikes: int
+
+
+def check_integrity(model: WorldModel, run: Run, prediction: NDArray[np.float64]) -> IntegrityReport:
+    """Look for faults in the samples of a run.
+
+    Parameters
+    ----------
+    model : WorldModel
+        The simulation; faults that it has already are not reported again.
+    run : Run
+        The run.
+    prediction : ndarray, shape (n, c)
+        What the simulation predicts for the run, m/s².
+    """
+    known = {effect.name for effect in model.effects}
+    library = model.families()
+    effects: list[Effect] = []
+    why: dict[str, str] = {}
+
+    def add(name: str, parameters: dict[str, object], sentence: str) -> None:
+        if name in library:
+            effects.append(library[name](parameters))
+            why[name] = sentence
+
+    expected = model.expected_noise(1.0 / run.sample_period)
+    if run.lost and "dropped_frames" not in known:
+        add(
+            "dropped_frames",
+            {"share": run.lost / len(run.t), "count": int(run.lost), "longest_s": run.longest_gap},
+            f"{run.lost} of {len(run.t)} samples are missing; the longest gap is {run.longest_gap:.3f} s",
+        )
+    step = _resolution(run)
+    if step is not None and step > 1.5 * expected.quantum and "coarse_resolution" not in known:
+        add(
+            "coarse_resolution",
+            {"step_m_s2": step},
+            f"all readings are multiples of {step:.4g} m/s², not of {expected.quantum:.4g} m/s²",
+        )
+    quantum = max(step or 0.0, expected.quantum)
+    run, wiring = _wiring(model, run, prediction, expected.white, known)
+    for name, parameters, sentence in wiring:
+        add(name, parameters, sentence)
+    rewired = [effect for effect in effects if effect.name in {"axis_swap", "sign_flip", "wrong_range"}]
+    if rewired:
+        prediction = _rewire(prediction, rewired, model)
+    limit = _clipping(run, prediction, quantum, expected)
+    if limit is not None:
+        if "saturation" not in known and limit < 0.97 * expected.full_scale:
+            add("saturation", {"limit_m_s2": limit}, f"readings pile up at ±{limit:.2f} m/s² and never exceed it")
+        clipped = (np.abs(run.readings) >= limit - 0.6 * quantum) | (np.abs(prediction) > limit - 4 * expected.white)
+        run = replace(run, valid=run.valid & ~clipped)
+    valid = run.valid.copy()
+    for channel, start, stop in _frozen(run, prediction, quantum, limit):
+        valid[start:stop, channel] = False
+        if "stuck_channel" not in known and not any(effect.name == "stuck_channel" for effect in effects):
+            begin, end = float(run.t[start]), float(run.t[min(stop, len(run.t) - 1)])
+            add(
+                "stuck_channel",
+                {"channel": model.array.channels[channel], "start_s": begin, "stop_s": end},
+                f"channel {model.array.channels[channel]} holds one value from {begin:.2f} s to {end:.2f} s",
+            )
+    run = replace(run, valid=valid)
+    spikes = _spikes(run, expected.white, quantum)
+    run = replace(run, valid=run.valid & ~spikes)
+    return IntegrityReport(run, tuple(effects), why, int(spikes.sum()))
+
+
+def _resolution(run: Run) -> float | None:
+    """Return the step that all readings of most channels are multiples of, m/s²."""
+    steps = []
+    for channel in range(run.readings.shape[1]):
+        values = np.unique(run.readings[run.valid[:, channel], channel])
+        gaps = np.diff(values)
+        gaps = gaps[gaps > 1e-9]
+        if len(gaps) < 2:
+            continue
+        step = float(gaps.min())
+        ratio = gaps / step
+        if np.max(np.abs(ratio - np.round(ratio))) < 0.05 and len(values) < 0.6 * run.valid[:, channel].sum():
+            steps.append(step)
+    if len(steps) < max(2, run.readings.shape[1] // 2):
+        return None
+    return float(np.median(steps))
+
+
+def _clipping(run: Run, prediction: NDArray[np.float64], quantum: float, expected: ExpectedNoise) -> float | None:
+    """Return the level at which readings pile up, m/s²."""
+    levels = []
+    for channel in range(run.readings.shape[1]):
+        mine = run.readings[run.valid[:, channel], channel]
+        if len(mine) < 50:
+            continue
+        sigma = expected.white[channel]
+        for sign in (1.0, -1.0):
+            top = float((sign * mine).max())
+            at_top = np.abs(sign * mine - top) < 0.3 * quantum
+            below = np.abs(sign * mine - (top - quantum)) < 0.3 * quantum
+            beyond = sign * prediction[run.valid[:, channel], channel] > top + 1.5 * sigma
+            if (
+                at_top.sum() >= 8
+                and at_top.sum() > 3 * below.sum() + 4
+                and (beyond & at_top).sum() > 0.5 * at_top.sum()
+            ):
+                levels.append(top)
+    if not levels:
+        return None
+    limit = float(np.median(levels))
+    close = np.abs(np.array(levels) - limit) < 1.5 * quantum
+    return limit if close.sum() >= max(1, len(levels) // 2) else None
+
+
+def _frozen(
+    run: Run, prediction: NDArray[np.float64], quantum: float, limit: float | None
+) -> list[tuple[int, int, int]]:
+    """Return (channel, start, stop) of stretches in which a channel holds one value though it should not."""
+    found = []
+    for channel in range(run.readings.shape[1]):
+        mine = run.readings[:, channel]
+        change = np.flatnonzero((np.abs(np.diff(mine)) > 1e-12) | ~run.valid[1:, channel])
+        edges = np.concatenate([[-1], change, [len(mine) - 1]])
+        lengths = np.diff(edges)
+        usual = np.median(np.abs(np.diff(mine[run.valid[:, channel]]))) if run.valid[:, channel].sum() > 10 else 0.0
+        for place in np.flatnonzero(lengths > _LONGEST_EQUAL):
+            start, stop = int(edges[place]) + 1, int(edges[place + 1]) + 1
+            at_limit = limit is not None and abs(mine[start]) >= limit - 0.6 * quantum
+            moving = float(np.ptp(prediction[start:stop, channel])) > 2.5 * quantum
+            if not at_limit and run.valid[start:stop, channel].any() and (moving or usual > 0.3 * quantum):
+                found.append((channel, start, stop))
+    return found
+
+
+def _spikes(run: Run, white: NDArray[np.float64], quantum: float) -> NDArray[np.bool_]:
+    """Mark isolated samples far off the median of their five neighbours."""
+    smooth = median_filter(run.readings, size=(5, 1), mode="nearest")
+    jump = np.abs(run.readings - smooth)
+    rough = median_filter(np.abs(np.diff(run.readings, axis=0, prepend=run.readings[:1])), size=(9, 1), mode="nearest")
+    return run.valid & (jump > _SPIKE * np.maximum(white, 0.5 * quantum) + 6 * rough)
+
+
+def _wiring(
+    model: WorldModel, run: Run, prediction: NDArray[np.float64], white: NDArray[np.float64], known: set[str]
+) -> tuple[Run, list[tuple[str, dict[str, object], str]]]:
+    """Find exchanged and inverted channels and chips in another range, the clearest first."""
+    names = model.array.channels
+    found: list[tuple[str, dict[str, object], str]] = []
+    prediction = prediction.copy()
+    chip_of = model.array.chip_of_channel
+    for _ in range(4):
+        misfit = _misfits(run, prediction, white)
+        own = np.diag(misfit)
+        options: list[tuple[float, str, dict[str, object], str, NDArray[np.float64]]] = []
+        for one, two in combinations(range(len(names)), 2):
+            before = own[one] + own[two]
+            after = misfit[one, two] + misfit[two, one]
+            if before > 2 * _SIGNIFICANT_RMS**2 and after < (1 - _REMOVED) * before:
+                order = np.arange(len(names))
+                order[[one, two]] = order[[two, one]]
+                options.append(
+                    (
+                        before - after,
+                        "axis_swap",
+                        {"channels": [names[one], names[two]]},
+                        f"{names[one]} and {names[two]} read what the other should",
+                        prediction[:, order],
+                    )
+                )
+        flipped = np.diag(_misfits(run, -prediction, white))
+        for one in range(len(names)):
+            if own[one] > _SIGNIFICANT_RMS**2 and flipped[one] < (1 - _REMOVED) * own[one]:
+                sign = np.ones(len(names))
+                sign[one] = -1
+                options.append(
+                    (
+                        own[one] - flipped[one],
+                        "sign_flip",
+                        {"channel": names[one]},
+                        f"{names[one]} reads the negative of what it should",
+                        prediction * sign,
+                    )
+                )
+        for factor in _RANGE_FACTORS:
+            scaled = np.diag(_misfits(run, factor * prediction, white))
+            for number, chip in enumerate(model.array.chips):
+                mine = chip_of == number
+                if own[mine].sum() > 2 * _SIGNIFICANT_RMS**2 and scaled[mine].sum() < (1 - _REMOVED) * own[mine].sum():
+                    gain = np.where(mine, factor, 1.0)
+                    options.append(
+                        (
+                            float(own[mine].sum() - scaled[mine].sum()),
+                            "wrong_range",
+                            {"chip": chip.name, "factor": factor},
+                            f"chip {chip.name} reads {factor:g} times what it should",
+                            prediction * gain,
+                        )
+                    )
+        options = [option for option in options if option[1] not in known]
+        if not options:
+            break
+        _, name, parameters, sentence, prediction = max(options, key=lambda option: option[0])
+        found.append((name, parameters, sentence))
+        known = known | {name} if name != "sign_flip" else known
+    return run, _merged_flips(found)
+
+
+def _misfits(run: Run, prediction: NDArray[np.float64], white: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the robust mean squared misfit of every channel (row) to every prediction (column), in noise units."""
+    rows = slice(None, None, max(1, len(run.t) // 4000))
+    out = np.empty((prediction.shape[1], prediction.shape[1]))
+    for channel in range(prediction.shape[1]):
+        ok = run.valid[rows, channel]
+        error = (run.readings[rows, channel][ok, None] - prediction[rows][ok]) / white[channel]
+        out[channel] = np.mean(error**2, axis=0) if ok.any() else 0.0
+    return out
+
+
+def _merged_flips(
+    found: list[tuple[str, dict[str, object], str]],
+) -> list[tuple[str, dict[str, object], str]]:
+    flips = [item for item in found if item[0] == "sign_flip"]
+    if len(flips) < 2:
+        return found
+    names = [str(item[1]["channel"]) for item in flips]
+    merged = ("sign_flip", {"channel": names}, f"{', '.join(names)} read the negative of what they should")
+    return [item for item in found if item[0] != "sign_flip"] + [merged]
+
+
+def _rewire(prediction: NDArray[np.float64], effects: Sequence[Effect], model: WorldModel) -> NDArray[np.float64]:
+    """Apply exchanged, inverted and rescaled channels to a prediction."""
+    prediction = prediction.copy()
+    for effect in effects:
+        if effect.name == "axis_swap":
+            one, two = (model.array.index(name) for name in effect.parameters["channels"])
+            prediction[:, [one, two]] = prediction[:, [two, one]]
+        elif effect.name == "sign_flip":
+            value = effect.parameters["channel"]
+            for name in [value] if isinstance(value, str) else value:
+                prediction[:, model.array.index(name)] *= -1
+        else:
+            chips = [chip.name for chip in model.array.chips]
+            mine = model.array.chip_of_channel == chips.index(str(effect.parameters["chip"]))
+            prediction[:, mine] *= float(effect.parameters["factor"])
+    return prediction

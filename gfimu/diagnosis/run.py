@@ -1,0 +1,146 @@
+"""A recording as diagnosis reads it: uniform samples, what is valid, and the reference that drives the twin."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gfimu.diagnosis.model import WorldModel
+from gfimu.errors import InputError
+from gfimu.recording import Recording
+
+__all__ = ["Run", "prepare_run"]
+
+MINIMUM_DURATION = 4.0
+_MINIMUM_SAMPLES = 80
+_REFERENCE_COLUMNS = {"tacho": "tacho_rad_s", "angle": "angle_rad", "command": "command_rad_s"}
+
+
+@dataclass(frozen=True)
+class Run:
+    """One recording on a uniform time grid.
+
+    Parameters
+    ----------
+    t : ndarray, shape (n,)
+        Sample times, s; lost samples are there, marked invalid.
+    readings : ndarray, shape (n, c)
+        Specific force, m/s²; zero where invalid.
+    valid : ndarray of bool, shape (n, c)
+        Which readings count.
+    reference : ndarray, shape (n,)
+        Rate (rad/s) or angle (rad) that drives the twin; zero where invalid.
+    reference_valid : ndarray of bool, shape (n,)
+        Which reference samples count.
+    temperature : ndarray or None, shape (n,)
+        Board temperature, °C.
+    mounting : ndarray, shape (3,)
+        Rotation vector by which the cube was turned from upright, rad.
+    lost : int
+        Number of samples missing from the file.
+    longest_gap : float
+        Longest gap, s.
+    name : str
+        For people.
+    """
+
+    t: NDArray[np.float64]
+    readings: NDArray[np.float64]
+    valid: NDArray[np.bool_]
+    reference: NDArray[np.float64]
+    reference_valid: NDArray[np.bool_]
+    temperature: NDArray[np.float64] | None
+    mounting: NDArray[np.float64]
+    lost: int
+    longest_gap: float
+    name: str = "run"
+
+    @property
+    def sample_period(self) -> float:
+        """Sample period, s."""
+        return float(self.t[1] - self.t[0])
+
+    @property
+    def duration(self) -> float:
+        """Length, s."""
+        return float(self.t[-1] - self.t[0])
+
+    def rows(self, start: int, stop: int) -> Run:
+        """Return the samples from ``start`` up to ``stop``."""
+        part = slice(start, stop)
+        return Run(
+            self.t[part],
+            self.readings[part],
+            self.valid[part],
+            self.reference[part],
+            self.reference_valid[part],
+            None if self.temperature is None else self.temperature[part],
+            self.mounting,
+            self.lost,
+            self.longest_gap,
+            self.name,
+        )
+
+
+def prepare_run(recording: Recording, model: WorldModel, *, name: str = "run") -> Run:
+    """Put a recording on a uniform grid and pick the reference that drives the twin.
+
+    Raises
+    ------
+    InputError
+        If the recording is too short, lacks the reference that the twin names, or that reference never has a value.
+    """
+    readings = recording.for_array(model.array)
+    if len(recording) < _MINIMUM_SAMPLES or recording.duration < MINIMUM_DURATION:
+        raise InputError(
+            f"{name}: {len(recording)} samples over {recording.duration:.1f} s are too short to diagnose; "
+            f"record at least {MINIMUM_DURATION:.0f} s and {_MINIMUM_SAMPLES} samples, better 40 s"
+        )
+    column = _REFERENCE_COLUMNS[model.drive_source]
+    if column not in recording.reference:
+        have = [source for source, key in _REFERENCE_COLUMNS.items() if key in recording.reference]
+        raise InputError(
+            f"{name}: column {column} is missing, but the twin's drive source is {model.drive_source!r}; "
+            + (f"set source = {have[0]!r} in the twin's [drive]" if have else "record a tachometer, angle or command")
+        )
+    drive = np.asarray(recording.reference[column], dtype=float)
+    if np.isfinite(drive).sum() < 20:
+        raise InputError(f"{name}: column {column} has fewer than 20 values; record the reference with the channels")
+    period = recording.sample_period
+    steps = np.diff(recording.t_s)
+    place = np.concatenate([[0], np.cumsum(np.maximum(1, np.rint(steps / period).astype(int)))])
+    n = int(place[-1]) + 1
+    if n > 4 * len(recording):
+        raise InputError(f"{name}: more samples are missing than present; record again without the long gaps")
+    t = recording.t_s[0] + period * np.arange(n)
+    # The median step carries the rounding of the time stamps; the ends do not.
+    t = recording.t_s[0] + (recording.t_s[-1] - recording.t_s[0]) / (n - 1) * np.arange(n)
+    full = np.zeros((n, readings.shape[1]))
+    full[place] = readings
+    valid = np.zeros(full.shape, dtype=bool)
+    valid[place] = np.isfinite(readings)
+    full[~valid] = 0.0
+    reference = np.zeros(n)
+    reference_valid = np.zeros(n, dtype=bool)
+    reference[place] = drive
+    reference_valid[place] = np.isfinite(drive)
+    reference[~reference_valid] = 0.0
+    temperature = recording.reference.get("temperature_degC")
+    warm = None
+    if temperature is not None and np.isfinite(temperature).sum() >= 2:
+        known = np.isfinite(temperature)
+        warm = np.interp(t, recording.t_s[known], np.asarray(temperature)[known])
+    return Run(
+        t,
+        full,
+        valid,
+        reference,
+        reference_valid,
+        warm,
+        recording.mounting_rotvec,
+        lost=n - len(recording),
+        longest_gap=float(steps.max()) if len(steps) else 0.0,
+        name=name,
+    )

@@ -1,0 +1,287 @@
+"""A stretch of a run with its drive: linearised about the present causes, the drive marginalised out.
+
+Observations are the c channels and the reference as one more. With the drive's spline coefficients d, the noise
+weight W and the roughness prior R, the drive is eliminated by
+
+    H = JᵀWJ + R = LLᵀ,  X = L⁻¹JᵀWA,  x = L⁻¹(JᵀWr − Rd),  G = AᵀWA − XᵀX,  b = AᵀWr − Xᵀx,
+
+so that everything after it is small algebra on G and b, whatever the length of the run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import cho_factor, cho_solve, solve_triangular
+from scipy.sparse import csr_array, diags_array, vstack
+
+from gfimu.diagnosis.coloured_noise import CosineBasis, NoiseLevels
+from gfimu.diagnosis.drive import AngleSpline, SplineState, roughness_prior
+from gfimu.diagnosis.model import Effect, Spin, SpinState, WorldModel
+from gfimu.diagnosis.run import Run
+
+__all__ = ["Linearisation", "Segment"]
+
+KNOT_SPACING = 0.05
+_START_ANGLE_STD = 1e-4
+_DEGREE = 4
+_STATE_STEPS = (1e-5, 1e-4, 1e-3)
+
+
+@dataclass(frozen=True)
+class Linearisation:
+    """Residual, drive Jacobian and eliminated drive of a segment about given effects.
+
+    Parameters
+    ----------
+    residual : ndarray, shape (n, c + 1)
+        Measured minus predicted; zero where invalid.
+    jacobian : list of csr_array, each (n, m)
+        Derivative of each observation with respect to the drive's coefficients.
+    factor : ndarray, shape (m, m)
+        Lower Cholesky factor L of H.
+    forward : ndarray, shape (m,)
+        x = L⁻¹(JᵀWr − Rd).
+    objective : float
+        rᵀWr + dᵀRd − xᵀx: twice the negative log likelihood, drive marginalised.
+    """
+
+    residual: NDArray[np.float64]
+    jacobian: list[csr_array]
+    factor: NDArray[np.float64]
+    forward: NDArray[np.float64]
+    objective: float
+
+
+class Segment:
+    """One stretch of a run with its own drive spline.
+
+    Parameters
+    ----------
+    model : WorldModel
+        The simulation.
+    run : Run
+        The stretch.
+    index : int
+        Number of the run it belongs to.
+    start : float
+        Time at which the whole run began, s.
+    """
+
+    def __init__(self, model: WorldModel, run: Run, index: int, start: float) -> None:
+        self.model, self.run, self.index, self.start = model, run, index, start
+        period = run.sample_period
+        spacing = max(KNOT_SPACING, 4 * period)
+        self.spline = AngleSpline(run.t[0] - 2 * spacing, run.t[-1] + 2 * spacing, spacing)
+        self.basis = CosineBasis(len(run.t), period)
+        self.is_angle = model.drive_source == "angle"
+        self.weight_mask = np.column_stack([run.valid, run.reference_valid])  # (n, c + 1)
+        self.levels = self._starting_levels()
+        self.drive_factor = 2.0
+        self._set_roughness()
+        self.coefficients = self._starting_drive()
+
+    # -- starting values -------------------------------------------------------------------------------------
+
+    def _starting_levels(self) -> NoiseLevels:
+        expected = self.model.expected_noise(1.0 / self.run.sample_period)
+        reference = self.run.reference[self.run.reference_valid]
+        white = np.append(expected.white, _difference_noise(reference))
+        return NoiseLevels(white, np.append(np.full(len(expected.white), 2e-3), 0.0))
+
+    def _set_roughness(self) -> None:
+        std = roughness_prior(
+            self.run,
+            self.spline,
+            is_angle=self.is_angle,
+            reference_noise=float(self.levels.white[-1]),
+            factor=self.drive_factor,
+        )
+        rows = self.spline.roughness_rows()
+        scaled = diags_array(1.0 / std) @ rows
+        begin = self.spline.matrices(self.run.t[:1])[0] / _START_ANGLE_STD
+        self.prior = csr_array(scaled.T @ scaled)
+        if not self.is_angle:
+            self.prior = csr_array(self.prior + begin.T @ begin)
+
+    def _starting_drive(self) -> NDArray[np.float64]:
+        """Fit the spline to the reference alone."""
+        run = self.run
+        angle, rate, _ = self.spline.matrices(run.t)
+        weight = diags_array(run.reference_valid / self.levels.white[-1] ** 2)
+        observe = angle if self.is_angle else rate
+        lhs = (observe.T @ weight @ observe + self.prior).toarray()
+        lhs[np.diag_indices_from(lhs)] *= 1 + 1e-12
+        return np.asarray(cho_solve(cho_factor(lhs, lower=True), observe.T @ (weight @ run.reference)))
+
+    def tune_roughness(self, effects: Sequence[Effect]) -> None:
+        """Pick the scale of the roughness prior by marginal likelihood, the drive integrated out."""
+        kept, factor = self.coefficients, self.drive_factor
+        best = (-np.inf, factor)
+        for trial in factor * np.array([0.5, 1.0, 2.0, 4.0]):
+            self.drive_factor = float(trial)
+            self._set_roughness()
+            self.coefficients = kept
+            line = self.linearise(effects)
+            rows = self.spline.size - _DEGREE
+            value = -0.5 * line.objective - float(np.log(line.factor.diagonal()).sum()) - rows * np.log(trial)
+            best = max(best, (value, float(trial)))
+        self.coefficients, self.drive_factor = kept, best[1]
+        self._set_roughness()
+
+    def set_levels(self, levels: NoiseLevels) -> None:
+        """Take new noise levels."""
+        self.levels = levels
+
+    # -- prediction --------------------------------------------------------------------------------------------
+
+    def predict(self, effects: Sequence[Effect], spin: Spin | None = None) -> NDArray[np.float64]:
+        """Predict channels and reference, shape (n, c + 1)."""
+        channels, reference = self.model.predict(
+            self.spline.spin(self.coefficients) if spin is None else spin,
+            self.run.t,
+            effects=effects,
+            temperature=self.run.temperature,
+            mounting=self.run.mounting,
+            start=self.start,
+        )
+        return np.column_stack([channels, reference])
+
+    def residual(self, effects: Sequence[Effect]) -> NDArray[np.float64]:
+        """Return measured minus predicted, shape (n, c + 1); zero where invalid."""
+        measured = np.column_stack([self.run.readings, self.run.reference])
+        return np.where(self.weight_mask, measured - self.predict(effects), 0.0)
+
+    # -- normal equations --------------------------------------------------------------------------------------
+
+    def prepare_weights(self) -> None:
+        """Compute the noise weights for the present levels."""
+        self._share = self.basis.corrections(self.levels)  # (K, c + 1)
+        self._cosines = self.basis.matrix(len(self._share))  # (n, K)
+        self.inverse_variance = 1.0 / self.levels.white**2
+
+    def linearise(self, effects: Sequence[Effect]) -> Linearisation:
+        """Linearise about effects and the present drive, and eliminate the drive."""
+        residual = self.residual(effects)
+        jacobian = self._jacobian(effects)
+        rhs = -(self.prior @ self.coefficients)
+        objective = -float(self.coefficients @ rhs)
+        slow = self._cosines.T @ residual  # (K, c + 1)
+        damped = self._share * slow
+        objective += float(self.inverse_variance @ (np.sum(residual**2, axis=0) - np.sum(slow * damped, axis=0)))
+        weighted, slow_rows = [], []
+        for column, matrix in enumerate(jacobian):
+            if matrix.nnz == 0:
+                continue
+            deviation = np.sqrt(self.inverse_variance[column])
+            weighted.append(matrix * deviation)
+            slow_jacobian = (matrix.T @ self._cosines).T  # (K, m)
+            slow_rows.append(np.sqrt(self._share[:, [column]]) * deviation * slow_jacobian)
+            rhs += self.inverse_variance[column] * (
+                matrix.T @ residual[:, column] - slow_jacobian.T @ damped[:, column]
+            )
+        stacked = vstack(weighted, format="csr")
+        lhs = (self.prior + stacked.T @ stacked).toarray()
+        low = np.concatenate(slow_rows)
+        lhs -= low.T @ low
+        lhs[np.diag_indices_from(lhs)] *= 1 + 1e-12
+        factor = np.linalg.cholesky(lhs)
+        forward = solve_triangular(factor, rhs, lower=True, check_finite=False)
+        return Linearisation(residual, jacobian, factor, forward, objective - float(forward @ forward))
+
+    def _jacobian(self, effects: Sequence[Effect]) -> list[csr_array]:
+        spin = self.spline.spin(self.coefficients)
+        base = self.predict(effects)
+        slopes = []
+        for place, step in enumerate(_STATE_STEPS):
+            moved = self.predict(effects, _Moved(spin, place, step))
+            slopes.append(np.where(self.weight_mask, (moved - base) / step, 0.0))
+        times = self.model.sample_times(self.run.t, effects)
+        chips = np.append(self.model.array.chip_of_channel, times.shape[1] - 1)
+        cache: dict[bytes, tuple[csr_array, csr_array, csr_array]] = {}
+        matrices = []
+        for column, chip in enumerate(chips):
+            at = times[:, chip]
+            key = at.tobytes()
+            if key not in cache:
+                cache[key] = self.spline.matrices(at)
+            total = csr_array((len(at), self.spline.size))
+            for slope, matrix in zip(slopes, cache[key], strict=True):
+                mine = slope[:, column]
+                if np.any(np.abs(mine) > 1e-12):
+                    total = total + diags_array(mine) @ matrix
+            matrices.append(csr_array(total))
+        return matrices
+
+    def whitened_products(
+        self, linear: Linearisation, signatures: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Return G (P, P), b (P,) and X (m, P) of signatures (c + 1, P, n)."""
+        count = signatures.shape[1]
+        gram = np.zeros((count, count))
+        score = np.zeros(count)
+        cross = np.zeros((self.spline.size, count))
+        for column, matrix in enumerate(linear.jacobian):
+            mine = signatures[column]  # (P, n)
+            used = np.flatnonzero(mine.any(axis=1))
+            if len(used) == 0:
+                continue
+            part = mine[used].T  # (n, P)
+            weight, share = self.inverse_variance[column], self._share[:, column]
+            slow = self._cosines.T @ part  # (K, P)
+            damped = share[:, None] * slow
+            gram[np.ix_(used, used)] += weight * (part.T @ part - slow.T @ damped)
+            residual = linear.residual[:, column]
+            score[used] += weight * (part.T @ residual - damped.T @ (self._cosines.T @ residual))
+            if matrix.nnz:
+                cross[:, used] += weight * (matrix.T @ part - (matrix.T @ self._cosines) @ damped)
+        eliminated = solve_triangular(linear.factor, cross, lower=True, check_finite=False)
+        gram -= eliminated.T @ eliminated
+        score -= eliminated.T @ linear.forward
+        return gram, score, eliminated
+
+    def move_drive(
+        self,
+        linear: Linearisation,
+        eliminated: NDArray[np.float64] | None = None,
+        step: NDArray[np.float64] | None = None,
+    ) -> None:
+        """Move the drive to its posterior mean, given the step of the signatures' coordinates."""
+        right = linear.forward if eliminated is None or step is None else linear.forward - eliminated @ step
+        self.coefficients = self.coefficients + solve_triangular(
+            linear.factor, right, lower=True, trans=1, check_finite=False
+        )
+
+    def whitened_residual(self, linear: Linearisation) -> NDArray[np.float64]:
+        """Return W(r − Jδ) with δ the drive's posterior step, shape (n, c + 1): for scans over tones and orders."""
+        step = solve_triangular(linear.factor, linear.forward, lower=True, trans=1, check_finite=False)
+        left = linear.residual.copy()
+        for column, matrix in enumerate(linear.jacobian):
+            if matrix.nnz:
+                left[:, column] -= matrix @ step
+        slow = self._cosines.T @ left
+        return (left - self._cosines @ (self._share * slow)) * self.inverse_variance
+
+
+class _Moved:
+    """A spin with one state shifted by a constant."""
+
+    def __init__(self, spin: Spin, place: int, step: float) -> None:
+        self._spin, self._place, self._step = spin, place, step
+
+    def at(self, t: ArrayLike) -> SpinState:
+        state = self._spin.at(t)
+        parts = [state.angle, state.rate, state.acceleration]
+        parts[self._place] = parts[self._place] + self._step
+        return SplineState(*parts)
+
+
+def _difference_noise(reference: NDArray[np.float64]) -> float:
+    """White noise of a smooth reference from its third differences (robust)."""
+    third = np.diff(reference, n=3)
+    spread = 1.4826 * float(np.median(np.abs(third - np.median(third)))) / np.sqrt(20.0)
+    floor = 1e-4 * float(np.std(reference)) + 1e-6
+    return max(spread, floor)

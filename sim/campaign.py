@@ -1,0 +1,257 @@
+"""Campaigns: worlds with hidden effects, drawn by seed, and recordings of them.
+
+A hidden world is a nominal twin plus effects of random kind, place, shape and size, on a random profile of the table,
+measured by sensors with data-sheet noise, quantisation, bias instability and a noisy tachometer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
+
+from gfimu.recording import Recording
+from gfimu.units import STANDARD_GRAVITY
+from sim import forward
+from sim.effects import EFFECTS, Effect, make_effect
+from sim.motion import SpinMotion, SplineSpin
+from sim.twin import Twin
+
+__all__ = ["Measurement", "bias_instability", "detectability", "hidden_effect", "measure", "random_profile"]
+
+_MG = STANDARD_GRAVITY / 1000.0
+_POWERS = (0.25, 0.5, 2.0, 4.0)
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """How a world is measured.
+
+    Parameters
+    ----------
+    duration : float
+        Length, s.
+    sample_rate : float
+        Samples per second, Hz.
+    bias_instability : float
+        Rms of 1/f noise per channel, m/s².
+    tacho_noise : float
+        White noise of the tachometer, rad/s.
+    """
+
+    duration: float = 40.0
+    sample_rate: float = 100.0
+    bias_instability: float = 0.15 * _MG
+    tacho_noise: float = 0.02
+
+
+def random_profile(rng: np.random.Generator, duration: float, *, top_rate: float = 15.0) -> SplineSpin:
+    """Draw a profile of the table: ramps, plateaus, rests and a gentle sweep.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        Source of chance.
+    duration : float
+        Length, s.
+    top_rate : float
+        Largest plateau rate, rad/s.
+    """
+    knots, rates = [-5.0, -1.0], [0.0, 0.0]
+    now, rate = -1.0, 0.0
+    while now < duration + 1.0:
+        now += rng.uniform(1.5, 4.0)
+        knots.append(now)
+        rates.append(rate)
+        now += rng.uniform(0.5, 2.0)
+        rate = rng.uniform(-top_rate, top_rate) if rng.random() > 0.2 else 0.0
+        knots.append(now)
+        rates.append(rate)
+    fine = np.arange(-2.0, duration + 2.0, 5e-3)
+    profile = np.interp(fine, knots, rates)
+    begin = rng.uniform(0.1, 0.7) * duration
+    sweep = (fine > begin) & (fine < begin + 0.15 * duration)
+    since = fine - begin
+    profile = profile + 2.0 * sweep * np.sin(2 * np.pi * (0.3 * since + 0.1 * since**2))
+    return SplineSpin.through(fine, gaussian_filter1d(profile, 0.08 / 5e-3))
+
+
+def bias_instability(rng: np.random.Generator, n: int, channels: int, rms: float) -> NDArray[np.float64]:
+    """Draw 1/f noise of a given rms over four times the run, shape (n, channels), by shaping a spectrum."""
+    long = 4 * n
+    frequency = np.fft.rfftfreq(long)
+    frequency[0] = np.inf
+    spectrum = rng.standard_normal((len(frequency), channels)) + 1j * rng.standard_normal((len(frequency), channels))
+    noise = np.fft.irfft(spectrum / np.sqrt(frequency)[:, None], long, axis=0)
+    noise *= rms / noise.std(axis=0)
+    return noise[:n]
+
+
+def measure(
+    rng: np.random.Generator,
+    twin: Twin,
+    effects: Sequence[Effect] = (),
+    setting: Measurement = Measurement(),
+    *,
+    motion: SpinMotion | None = None,
+    mounting: NDArray[np.float64] | None = None,
+) -> Recording:
+    """Record a world: the twin's, plus effects, on a random profile unless a motion is given.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        Source of chance.
+    twin : Twin
+        The nominal world.
+    effects : sequence of Effect
+        What is hidden in it.
+    setting : Measurement
+        Length, rate and noise.
+    motion : SpinMotion, optional
+        Motion of the table.
+    mounting : ndarray, shape (3,), optional
+        How the cube was turned from upright, rad.
+    """
+    spin = random_profile(rng, setting.duration) if motion is None else motion
+    t = np.arange(round(setting.duration * setting.sample_rate)) / setting.sample_rate
+    world = twin.world(effects, mounting)
+    temperature = 25.0 + rng.uniform(1.0, 4.0) * (1 - np.exp(-t / rng.uniform(8.0, 30.0)))
+    temperature += 0.5 * np.sin(2 * np.pi * t / rng.uniform(12.0, 40.0) + rng.uniform(0, 6))
+    readings = forward.channels(world, spin, t, temperature)
+    expected = twin.expected_noise(setting.sample_rate)
+    white = np.sqrt(expected.white**2 - expected.quantum**2 / 12.0) * world.noise_factor
+    readings = readings + white * rng.standard_normal(readings.shape)
+    level = setting.bias_instability * np.exp(0.3 * rng.standard_normal(readings.shape[1]))
+    readings += bias_instability(rng, *readings.shape, 1.0) * level
+    if world.bias_walk:
+        step = world.bias_walk / np.sqrt(setting.sample_rate)
+        readings += np.cumsum(step * rng.standard_normal(readings.shape), axis=0)
+    readings = expected.quantum * np.round(readings / expected.quantum)
+    for data_step in world.data_steps:
+        readings = data_step(t, readings, rng)
+    tacho = forward.reference(world, spin, t) + setting.tacho_noise * rng.standard_normal(len(t))
+    kept = np.isfinite(readings).any(axis=1)
+    metadata = {} if mounting is None else {"mounting_rotvec_rad": [float(v) for v in mounting]}
+    return Recording.from_arrays(
+        t[kept],
+        readings[kept],
+        twin.array,
+        reference={"tacho_rad_s": tacho[kept], "temperature_degC": temperature[kept]},
+        metadata={"array": twin.array_name or twin.array.name, **metadata},
+    )
+
+
+def detectability(
+    twin: Twin, effects: Sequence[Effect], motion: SpinMotion, setting: Measurement = Measurement()
+) -> float:
+    """Return d′ = √Σ(Δ/σ)² of effects over all channels and the tachometer, the drive known."""
+    t = np.arange(round(setting.duration * setting.sample_rate)) / setting.sample_rate
+    temperature = 25.0 + 3.0 * (1 - np.exp(-t / 15.0))
+    before = twin.predict(motion, t, temperature=temperature)
+    after = twin.predict(motion, t, effects=effects, temperature=temperature)
+    white = twin.expected_noise(setting.sample_rate).white
+    return float(
+        np.sqrt(
+            np.sum(((after[0] - before[0]) / white) ** 2) + np.sum(((after[1] - before[1]) / setting.tacho_noise) ** 2)
+        )
+    )
+
+
+def hidden_effect(
+    rng: np.random.Generator,
+    twin: Twin,
+    name: str,
+    motion: SpinMotion,
+    target: float,
+    setting: Measurement = Measurement(),
+) -> Effect:
+    """Draw an effect of a kind: place, shape and direction by chance, size so that d′ is about ``target``.
+
+    Effects without a continuous size (wiring, ranges, lost frames, noise) are drawn from what occurs in practice.
+    """
+    if name in _DISCRETE:
+        t = np.arange(round(setting.duration * setting.sample_rate)) / setting.sample_rate
+        return make_effect(name, _DISCRETE[name](rng, twin, np.abs(twin.predict(motion, t)[0]), setting))
+    family = EFFECTS[name]
+    sizes = family.sizes(twin.array)
+    patterns = family.patterns(twin.array)
+    pattern = patterns[0] if rng.random() < 0.5 else patterns[rng.integers(len(patterns))]
+    shape = _shape(rng, name, setting)
+    direction = pattern.mixing @ rng.standard_normal(pattern.mixing.shape[1])
+    direction = direction * np.array([size.prior_std for size in sizes])
+    direction = np.where([size.positive for size in sizes], np.abs(direction), direction)
+    scale = 1.0
+    for _ in range(8):
+        reached = detectability(twin, [family.from_sizes(twin.array, scale * direction, shape)], motion, setting)
+        if reached <= 0:
+            scale *= 10.0
+            continue
+        ratio = np.clip(target / reached, 1e-3, 1e3)
+        scale *= float(ratio)
+        if abs(ratio - 1) < 0.02:
+            break
+    return family.from_sizes(twin.array, scale * direction, shape)
+
+
+def _shape(rng: np.random.Generator, name: str, setting: Measurement) -> dict[str, float]:
+    """Draw shape parameters off the grid that diagnosis screens over."""
+    nyquist = setting.sample_rate / 2
+    draws: dict[str, dict[str, float]] = {
+        "interference_tone": {"frequency_hz": float(rng.uniform(0.03, 0.95) * nyquist)},
+        "cogging": {"order": float(rng.integers(1, 25))},
+        "tacho_ripple": {"order": float(rng.integers(1, 7))},
+        "resonance": {
+            "frequency_hz": float(rng.uniform(3.0, min(25.0, 0.5 * nyquist))),
+            "damping_ratio": float(rng.uniform(0.01, 0.08)),
+        },
+        "warm_up": {"time_constant_s": float(setting.duration * rng.uniform(0.08, 0.8))},
+        "hysteresis": {"width_m_s2": float(_MG * np.exp(rng.uniform(np.log(5.0), np.log(400.0))))},
+        "axis_wobble": {"direction_rad": 0.0},
+    }
+    return draws.get(name, {})
+
+
+def _saturation(rng, twin, magnitude, setting) -> dict[str, object]:  # type: ignore[no-untyped-def]
+    top = float(np.quantile(magnitude, rng.uniform(0.9, 0.997)))
+    return {"limit_m_s2": max(top, 1.05 * twin.gravity)}
+
+
+_DISCRETE: Mapping[str, object] = {
+    "noise": lambda rng, twin, magnitude, setting: {"factor": float(rng.uniform(1.5, 4.0))},
+    "bias_random_walk": lambda rng, twin, magnitude, setting: {"strength_m_s2_rts": float(rng.uniform(0.7, 6.0) * _MG)},
+    "saturation": _saturation,
+    "coarse_resolution": lambda rng, twin, magnitude, setting: {
+        "step_m_s2": float(twin.expected_noise(setting.sample_rate).quantum * 2 ** rng.integers(1, 4))
+    },
+    "wrong_range": lambda rng, twin, magnitude, setting: {
+        "chip": twin.array.chips[rng.integers(len(twin.array.chips))].name,
+        "factor": float(rng.choice(_POWERS)),
+    },
+    "axis_swap": lambda rng, twin, magnitude, setting: {"channels": _distinguishable_pair(rng, twin)},
+    "sign_flip": lambda rng, twin, magnitude, setting: {"channel": str(rng.choice(twin.array.channels))},
+    "stuck_channel": lambda rng, twin, magnitude, setting: _stuck(rng, twin, setting),
+    "dropped_frames": lambda rng, twin, magnitude, setting: {"share": float(rng.uniform(0.002, 0.05))},
+}
+
+
+def _stuck(rng, twin, setting) -> dict[str, object]:  # type: ignore[no-untyped-def]
+    start = float(rng.uniform(0.1, 0.7) * setting.duration)
+    return {
+        "channel": str(rng.choice(twin.array.channels)),
+        "start_s": start,
+        "stop_s": start + float(rng.uniform(1.0, 8.0)),
+    }
+
+
+def _distinguishable_pair(rng: np.random.Generator, twin: Twin) -> list[str]:
+    """Draw two channels that read differently on a table; swapping twins leaves a perfect recording."""
+    array = twin.array
+    reading = np.column_stack([array.axes[:, 2], array.regression_matrix[:, 2], array.centripetal_matrix[:, 2]])
+    while True:
+        one, two = rng.choice(array.n_channels, size=2, replace=False)
+        if np.linalg.norm(reading[one] - reading[two]) > 1e-6:
+            return [array.channels[one], array.channels[two]]
