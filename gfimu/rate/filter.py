@@ -24,6 +24,7 @@ from gfimu.rate.recursion import (
     RecursionState,
     Tables,
     Tuning,
+    backward,
     forward,
     prepare,
 )
@@ -37,6 +38,7 @@ QUADRATURES = {"centred6": (6, 2), "centred4": (4, 1), "adams_moulton4": (4, 2),
 """Samples of the stencil and the interval of it that is integrated; what lies behind it is the filter's lag."""
 
 _CHUNK = 4096
+_SMOOTHER_BLOCK = 512
 _MOST_CHANNELS = 62
 
 
@@ -154,6 +156,7 @@ class RateFilter:
         self._blind = 0
         self._gaps = 0
         self._record = empty_record(0, *self._axes)
+        self._kept: list[RecursionState] = []
         self._last_time = -np.inf
 
     def _start(self) -> RecursionState:
@@ -218,8 +221,10 @@ class RateFilter:
         times = np.atleast_1d(np.asarray(t, dtype=float))
         rows = np.atleast_2d(np.asarray(readings, dtype=float))
         if rows.shape != (len(times), self.array.n_channels):
-            raise InputError(f"readings have shape {rows.shape}; {len(times)} times of array {self.array.name!r} need "
-                             f"({len(times)}, {self.array.n_channels})")
+            raise InputError(
+                f"readings have shape {rows.shape}; {len(times)} times of array {self.array.name!r} need "
+                f"({len(times)}, {self.array.n_channels})"
+            )
         turning = None if gyro is None else np.atleast_2d(np.asarray(gyro, dtype=float))
         if turning is not None and (not self._gyro or turning.shape != (len(times), 3)):
             raise InputError("gyro needs one row of three per sample, and a filter made with gyro=True")
@@ -240,6 +245,43 @@ class RateFilter:
         filled = self._advance(self._received, out, stamps, 0, closing=True)
         return self._estimate(out, stamps, filled)
 
+    def record_run(self, t: ArrayLike, readings: ArrayLike, gyro: ArrayLike | None = None) -> RateEstimate:
+        """Filter a whole recording at once, keeping what `run_back` needs; the filter's capacity must hold it."""
+        times = np.asarray(t, dtype=float)
+        rows = np.asarray(readings, dtype=float)
+        if rows.shape != (len(times), self.array.n_channels):
+            raise InputError(
+                f"readings have shape {rows.shape}; {len(times)} times of array {self.array.name!r} need "
+                f"({len(times)}, {self.array.n_channels})"
+            )
+        self._check_times(times)
+        self._take(times, rows, None if gyro is None else np.asarray(gyro, dtype=float))
+        out = empty_output(len(times))
+        stamps = np.empty(len(times))
+        self._kept = []
+        for start in range(0, len(times), _SMOOTHER_BLOCK):
+            self._kept.append(self.state.copy())
+            self._advance(min(start + _SMOOTHER_BLOCK, len(times)), out, stamps, start, closing=True)
+        return self._estimate(out, stamps, len(times))
+
+    def run_back(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Smooth the recording of `record_run`: rates (n, 3) and covariances (n, 3, 3)."""
+        n = self._done
+        omega, covariance = np.empty((n, 3)), np.empty((n, 6))
+        size = len(self._axes[0])
+        adjoint, curvature = np.zeros(size), np.zeros((size, size))
+        record = empty_record(_SMOOTHER_BLOCK, *self._axes)
+        ignored = empty_output(_SMOOTHER_BLOCK)
+        for number in range(len(self._kept) - 1, -1, -1):
+            first = number * _SMOOTHER_BLOCK
+            last = min(first + _SMOOTHER_BLOCK, n)
+            forward(
+                self._buffer, first, last, n, self._compiled_tables, self._tuning, self._kept[number].copy(), ignored,
+                -first, record, *self._axes,
+            )  # fmt: skip
+            backward(record, last - first, adjoint, curvature, omega, covariance, first, self._axes[0])
+        return omega, full_covariance(covariance)
+
     def _check_times(self, times: NDArray[np.float64]) -> None:
         if len(times) == 0:
             return
@@ -247,9 +289,7 @@ class RateFilter:
             raise InputError("sample times must be finite and increase; drop repeated or reordered samples")
         self._last_time = float(times[-1])
 
-    def _take(
-        self, t: NDArray[np.float64], readings: NDArray[np.float64], gyro: NDArray[np.float64] | None
-    ) -> None:
+    def _take(self, t: NDArray[np.float64], readings: NDArray[np.float64], gyro: NDArray[np.float64] | None) -> None:
         """Append samples to the buffer and reduce them to α and z."""
         data = self._buffer
         first = self._received

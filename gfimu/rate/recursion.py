@@ -29,8 +29,17 @@ from numpy.typing import NDArray
 from gfimu.rate.second_order import second_order
 from gfimu.rate.unrolled import step as _step_twelve
 
-__all__ = ["Record", "RecursionInput", "RecursionOutput", "RecursionState", "Tables", "Tuning", "backward", "forward",
-           "prepare"]
+__all__ = [
+    "Record",
+    "RecursionInput",
+    "RecursionOutput",
+    "RecursionState",
+    "Tables",
+    "Tuning",
+    "backward",
+    "forward",
+    "prepare",
+]
 
 _COMPILE: dict[str, Any] = {"cache": True, "error_model": "numpy", "fastmath": {"contract", "reassoc", "nsz"}}
 _UNIFORM = 1e-6
@@ -342,9 +351,7 @@ def forward(  # type: ignore[no-untyped-def]
         stepped = False
         noise_set = place if sensed else 0
         if inflated and sensed:
-            inflation = _inflation(
-                data.y[k], state, tuning, place == 0, x[0] * x[0] + x[1] * x[1] + x[2] * x[2]
-            )
+            inflation = _inflation(data.y[k], state, tuning, place == 0, x[0] * x[0] + x[1] * x[1] + x[2] * x[2])
         if state.counts[_STARTED] > 0:
             # Prediction, (1).
             step = data.t[k] - state.scalars[_TIME]
@@ -509,9 +516,7 @@ def forward(  # type: ignore[no-untyped-def]
             plain = place == 0
             measured_rows = d if plain else tables.null_count[place]
             sensitivity = tables.null_sensitivity[place]
-            slow = covariance[0, 0] + covariance[1, 1] + covariance[2, 2] > _SLOW * (
-                w0 * w0 + w1 * w1 + w2 * w2
-            )
+            slow = covariance[0, 0] + covariance[1, 1] + covariance[2, 2] > _SLOW * (w0 * w0 + w1 * w1 + w2 * w2)
             for i in range(measured_rows):
                 m = sensitivity[i]
                 h0 = 2.0 * w0 * m[0] + w1 * m[3] + w2 * m[4]

@@ -154,8 +154,9 @@ class ChannelTables:
     def __init__(self, array: AccelerometerArray, errors: SensorErrors) -> None:
         require_all_motions(array)
         if len(errors.noise_std) != array.n_channels:
-            raise InputError(f"noise_std holds {len(errors.noise_std)} numbers; array {array.name!r} has "
-                             f"{array.n_channels} channels")
+            raise InputError(
+                f"noise_std holds {len(errors.noise_std)} numbers; array {array.name!r} has {array.n_channels} channels"
+            )
         self.array = array
         self._variance = errors.noise_std**2
         self._length_scale = np.array([array.length_unit] * 3 + [1.0] * 3)

@@ -107,7 +107,9 @@ def source() -> str:
     _innovations(add)
     for i in rows:
         for r in states:
-            add(f"g{i}_{r} = h{i}_0 * {_p(0, r)} + h{i}_1 * {_p(1, r)} + h{i}_2 * {_p(2, r)} + {_p(_FIRST_BIAS + i, r)}")
+            add(
+                f"g{i}_{r} = h{i}_0 * {_p(0, r)} + h{i}_1 * {_p(1, r)} + h{i}_2 * {_p(2, r)} + {_p(_FIRST_BIAS + i, r)}"
+            )
     for i in rows:
         for j in range(i + 1):
             noise = f" + v{i}" if i == j else ""
