@@ -1,0 +1,155 @@
+"""Maximum likelihood: the rate of each sample on its own, at the Cramér–Rao bound.
+
+Minimises ‖z − M s(ω)‖² over ω by damped Gauss–Newton (Levenberg–Marquardt), with z white. The start is the best of the
+previous sample's rate and a few fixed directions, so arrays that see only some of the products of ω are served too.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike
+
+from gfimu.array import AccelerometerArray
+from gfimu.rate.null_readings import align_signs, null_readings
+from gfimu.rate.result import RateEstimate, SignDecision
+from gfimu.rate.sensing import SensorErrors
+
+__all__ = ["maximum_likelihood_rate"]
+
+_ITERATIONS = 60
+_CONVERGED = 1e-10
+# Seven directions, one of which is within 36° of any axis.
+_STARTS = np.array(
+    [[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1], [1, 1, -1], [1, -1, 1], [-1, 1, 1]], dtype=float
+) / np.sqrt([[1], [1], [1], [3], [3], [3], [3]])  # fmt: skip
+
+
+def maximum_likelihood_rate(
+    array: AccelerometerArray, t: ArrayLike, readings: ArrayLike, errors: SensorErrors, *, start_at_rest: bool = True
+) -> RateEstimate:
+    """Estimate the rate of each sample by maximum likelihood.
+
+    Parameters
+    ----------
+    array : AccelerometerArray
+        An array whose null space sees at least three products of ω.
+    t : array_like, shape (n,)
+        Sample times, s.
+    readings : array_like, shape (n, c)
+        Specific force, m/s².
+    errors : SensorErrors
+        Noise of the channels, and their range.
+    start_at_rest : bool
+        Whether constant readings at the start are rest, whose mean is removed as bias.
+
+    Returns
+    -------
+    RateEstimate
+        The sign is carried from sample to sample and never certain; ``nis`` is the remaining sum of squares.
+
+    Raises
+    ------
+    GeometryError
+        If the array sees fewer than three products.
+    """
+    null = null_readings(array, t, readings, errors, least_rank=3, start_at_rest=start_at_rest)
+    rank = int(np.linalg.matrix_rank(null.sensitivity, tol=1e-9))
+    # Rows beyond the rank see no product: only the first ones carry information.
+    left, strengths, right = np.linalg.svd(null.sensitivity)
+    compact = strengths[:rank, None] * right[:rank]  # (rank, 6)
+    omega, covariance, squares = _solve(null.z @ left[:, :rank], compact, _STARTS)
+    align_signs(null.t, null.alpha, omega)
+    freedom = np.where(np.isfinite(squares), max(rank - 3, 0), 0)
+    return RateEstimate(
+        "ml", null.t, omega, covariance, squares, freedom, null.rest, SignDecision("undecided", 0.0)
+    )  # fmt: skip
+
+
+@njit(cache=True, error_model="numpy")
+def _solve(z, m, starts):  # type: ignore[no-untyped-def]
+    """Solve each row of z (n, r); returns rates (n, 3), covariances (n, 3, 3) and sums of squares (n,)."""
+    n, rows = z.shape
+    omega = np.full((n, 3), np.nan)
+    covariance = np.full((n, 3, 3), np.nan)
+    squares = np.full(n, np.nan)
+    strength = np.sqrt((m * m).sum())
+    last = np.zeros(3)
+    residual = np.empty(rows)
+    slope = np.empty((rows, 3))
+    for k in range(n):
+        if not np.isfinite(z[k]).all():
+            continue
+        size = np.sqrt(np.sqrt((z[k] * z[k]).sum()) / strength)
+        best = last.copy()
+        cost = _residual(z[k], m, best, residual, slope)
+        for start in starts:
+            candidate = size * start
+            other = _residual(z[k], m, candidate, residual, slope)
+            if other < cost:
+                cost = other
+                best = candidate
+        best, cost = _descend(z[k], m, best, residual, slope)
+        _residual(z[k], m, best, residual, slope)
+        information = slope.T @ slope
+        omega[k] = best
+        squares[k] = cost
+        scale = np.trace(information)
+        if scale > 0.0 and np.linalg.det(information / scale) > 1e-12:
+            covariance[k] = np.linalg.inv(information)
+        else:
+            covariance[k] = np.diag(np.full(3, np.inf))
+            for a in range(3):
+                for b in range(3):
+                    if a != b:
+                        covariance[k, a, b] = 0.0
+        last = best
+    return omega, covariance, squares
+
+
+@njit(cache=True, error_model="numpy")
+def _residual(z, m, omega, residual, slope):  # type: ignore[no-untyped-def]
+    """Fill residual z − M s(ω) and slope M ∂s/∂ω; returns the sum of squares."""
+    x, y, w = omega
+    total = 0.0
+    for i in range(len(z)):
+        row = m[i]
+        slope[i, 0] = 2.0 * x * row[0] + y * row[3] + w * row[4]
+        slope[i, 1] = 2.0 * y * row[1] + x * row[3] + w * row[5]
+        slope[i, 2] = 2.0 * w * row[2] + x * row[4] + y * row[5]
+        residual[i] = z[i] - 0.5 * (slope[i, 0] * x + slope[i, 1] * y + slope[i, 2] * w)
+        total += residual[i] * residual[i]
+    return total
+
+
+@njit(cache=True, error_model="numpy")
+def _descend(z, m, start, residual, slope):  # type: ignore[no-untyped-def]
+    """Levenberg–Marquardt from ``start``."""
+    omega = start.copy()
+    cost = _residual(z, m, omega, residual, slope)
+    damping = 1e-3
+    for _ in range(_ITERATIONS):
+        normal = slope.T @ slope
+        gradient = slope.T @ residual
+        floor = 1e-12 * np.trace(normal) + 1e-30
+        accepted = False
+        for _ in range(12):
+            damped = normal.copy()
+            for a in range(3):
+                damped[a, a] += damping * normal[a, a] + floor
+            trial = omega + np.linalg.solve(damped, gradient)
+            other = _residual(z, m, trial, residual, slope)
+            if other <= cost:
+                accepted = True
+                break
+            damping *= 5.0
+        if not accepted:
+            _residual(z, m, omega, residual, slope)
+            break
+        done = cost - other <= _CONVERGED * cost
+        omega = trial
+        cost = other
+        damping = max(damping * 0.2, 1e-12)
+        if done:
+            break
+    return omega, cost
