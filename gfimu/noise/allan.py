@@ -1,0 +1,142 @@
+"""Allan deviation of a series, overlapping by default.
+
+Source: W. J. Riley, "Handbook of Frequency Stability Analysis", NIST SP 1065, 2008, eqs 8 and 11; IEEE Std 952.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gfimu.errors import InputError
+
+__all__ = ["FLICKER_FLOOR", "AllanDeviation", "allan_deviation", "averaging_factors"]
+
+Floats = NDArray[np.float64]
+
+FLICKER_FLOOR = float(np.sqrt(2.0 * np.log(2.0) / np.pi))
+"""Allan deviation of flicker noise over B: 0.664."""
+
+_PER_DECADE = 10
+_FEWEST = 9
+_BLOCK = 2048
+
+
+@dataclass(frozen=True)
+class AllanDeviation:
+    """Allan deviation of one series.
+
+    Parameters
+    ----------
+    factor : ndarray of int, shape (k,)
+        Samples per average, m.
+    tau : ndarray, shape (k,)
+        Averaging time, s.
+    deviation : ndarray, shape (k,)
+        Allan deviation, unit of the series.
+    n : int
+        Samples in the series.
+    rate : float
+        Sample rate, Hz.
+    overlapping : bool
+        Whether every starting sample was used.
+    """
+
+    factor: NDArray[np.int64]
+    tau: Floats
+    deviation: Floats
+    n: int
+    rate: float
+    overlapping: bool = True
+
+    @property
+    def variance(self) -> Floats:
+        """Allan variance, shape (k,)."""
+        return self.deviation**2
+
+    @property
+    def minimum(self) -> tuple[float, float]:
+        """Averaging time and deviation at the lowest point, s and unit of the series."""
+        place = int(np.argmin(self.deviation))
+        return float(self.tau[place]), float(self.deviation[place])
+
+    @property
+    def bias_instability(self) -> float:
+        """Bias instability read off the curve: its minimum over 0.664; an upper limit if the curve still falls."""
+        return self.minimum[1] / FLICKER_FLOOR
+
+
+def averaging_factors(n: int, *, per_decade: int = _PER_DECADE) -> NDArray[np.int64]:
+    """Averaging factors on a logarithmic grid, from 1 to a ninth of the series."""
+    largest = max(n // _FEWEST, 1)
+    count = int(np.ceil(np.log10(largest) * per_decade)) + 1
+    return np.unique(np.round(np.geomspace(1, largest, max(count, 1))).astype(np.int64))
+
+
+def allan_deviation(
+    values: ArrayLike, rate: float, *, factors: ArrayLike | None = None, overlapping: bool = True
+) -> AllanDeviation:
+    """Compute the Allan deviation of a series.
+
+    Parameters
+    ----------
+    values : array_like, shape (n,)
+        Evenly sampled series, such as a specific force at rest, m/s².
+    rate : float
+        Sample rate, Hz.
+    factors : array_like of int, optional
+        Samples per average; by default ten per decade up to a ninth of the series.
+    overlapping : bool
+        Use every starting sample (default) or only every m-th.
+
+    Returns
+    -------
+    AllanDeviation
+
+    Raises
+    ------
+    InputError
+        If the series is too short, has missing values, or a factor does not fit into it.
+    """
+    series = np.asarray(values, dtype=float)
+    if series.ndim != 1 or len(series) < 3:
+        raise InputError("an Allan deviation needs a series of three or more values")
+    if not np.isfinite(series).all():
+        raise InputError("an Allan deviation needs a series without gaps or missing values; take a stretch without")
+    if not rate > 0.0:
+        raise InputError(f"sample rate {rate:g} Hz must be positive")
+    m = averaging_factors(len(series)) if factors is None else np.atleast_1d(np.asarray(factors, dtype=np.int64))
+    if m.min() < 1 or 2 * m.max() > len(series):
+        raise InputError(
+            f"averaging factors must be 1 to half the series ({len(series) // 2}); got {m.min()}…{m.max()}"
+        )
+    phase = np.empty(len(series) + 1)
+    phase[0] = 0.0
+    np.cumsum(series - series.mean(), out=phase[1:])
+    phase /= rate
+    squares = np.array([_second_difference_square(phase, factor, 1 if overlapping else factor) for factor in m])
+    count = len(phase) - 2 * m if overlapping else np.array([len(range(0, len(phase) - 2 * k, k)) for k in m])
+    tau = m / rate
+    return AllanDeviation(m, tau, np.sqrt(squares / (2.0 * count)) / tau, len(series), float(rate), overlapping)
+
+
+@numba.njit(cache=True, fastmath={"reassoc", "contract"})
+def _second_difference_square(phase: Floats, m: int, stride: int) -> float:
+    """Sum of (x_{i+2m} − 2 x_{i+m} + x_i)² over i, in blocks so that rounding does not grow with length."""
+    total = 0.0
+    last = len(phase) - 2 * m
+    if stride == 1:
+        for begin in range(0, last, _BLOCK):
+            part = 0.0
+            for i in range(begin, min(begin + _BLOCK, last)):
+                second = phase[i + 2 * m] - 2.0 * phase[i + m] + phase[i]
+                part += second * second
+            total += part
+    else:
+        for i in range(0, last, stride):
+            second = phase[i + 2 * m] - 2.0 * phase[i + m] + phase[i]
+            total += second * second
+    return total

@@ -1,0 +1,146 @@
+"""Noise of every channel of a recording, from its longest stretch of rest."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gfimu.errors import InputError, unknown_name
+from gfimu.noise.identification import TERMS, NoiseModel, identify_noise
+from gfimu.recording import Recording
+from gfimu.rest import detect_rest
+
+__all__ = ["STRETCHES", "RecordingNoise", "recording_noise"]
+
+STRETCHES = ("rest", "all")
+"""Which samples to use: the longest rest without a gap, or everything up to the first gap."""
+
+
+@dataclass(frozen=True)
+class RecordingNoise:
+    """Noise models of the channels of a recording.
+
+    Parameters
+    ----------
+    models : mapping of str to NoiseModel
+        By channel; reference gyros as ``gyro_x`` … in rad/s.
+    unit : str
+        Unit of the readings: ``m_s2`` or ``lsb``; coefficients are in its terms.
+    rate : float
+        Sample rate, Hz.
+    start_s, duration_s : float
+        Stretch used, s.
+    """
+
+    models: Mapping[str, NoiseModel]
+    unit: str
+    rate: float
+    start_s: float
+    duration_s: float
+
+    @property
+    def accelerometers(self) -> dict[str, NoiseModel]:
+        """Models of the accelerometer channels."""
+        return {name: model for name, model in self.models.items() if not name.startswith("gyro")}
+
+    @property
+    def gyros(self) -> dict[str, NoiseModel]:
+        """Models of the reference gyro's axes."""
+        return {name: model for name, model in self.models.items() if name.startswith("gyro")}
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """Rows of a table for people: channel, each term with its interval, B read off the curve."""
+        rows = []
+        for channel, model in self.models.items():
+            cells = []
+            for symbol in TERMS:
+                term = model[symbol]
+                cells.append(
+                    f"{term.value:.4g} [{term.low:.3g}, {term.high:.3g}]" if term.found else f"< {term.high:.3g}"
+                )
+            rows.append((channel, *cells, f"{model.allan.bias_instability:.3g}"))
+        return rows
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return everything for machines; units stand in the keys' names of the contract's style."""
+        return {
+            "unit": self.unit,
+            "rate_hz": self.rate,
+            "start_s": self.start_s,
+            "duration_s": self.duration_s,
+            "channels": {
+                channel: {
+                    "terms": {
+                        symbol: {
+                            "name": term.name,
+                            "unit": term.unit,
+                            "found": term.found,
+                            "value": term.value,
+                            "low_95": term.low,
+                            "high_95": term.high,
+                            "std": term.std,
+                        }
+                        for symbol, term in model.terms.items()
+                    },
+                    "misfit": model.misfit,
+                    "bias_instability_from_minimum": model.allan.bias_instability,
+                    "minimum_tau_s": model.allan.minimum[0],
+                    "tau_s": model.allan.tau,
+                    "deviation": model.allan.deviation,
+                }
+                for channel, model in self.models.items()
+            },
+        }
+
+
+def recording_noise(
+    recording: Recording, *, stretch: str = "rest", rest_threshold: float | None = None, gyros: bool = True
+) -> RecordingNoise:
+    """Identify the noise of every channel of a recording.
+
+    Parameters
+    ----------
+    recording : Recording
+        Recording with a long rest.
+    stretch : {"rest", "all"}
+        Use the longest rest (default), or all samples up to the first gap.
+    rest_threshold : float, optional
+        Threshold of rest, reading unit squared; chosen by the data if not given.
+    gyros : bool
+        Include the reference gyro where there is one.
+
+    Raises
+    ------
+    InputError
+        If there is no rest, or a channel has missing samples or does not vary.
+    """
+    if stretch not in STRETCHES:
+        raise unknown_name("stretch", stretch, STRETCHES)
+    if stretch == "all":
+        gaps = recording.gaps
+        start, stop = 0, int(gaps[0]) + 1 if len(gaps) else len(recording)
+    else:
+        rest = detect_rest(recording, threshold=rest_threshold)
+        if len(rest) == 0:
+            raise InputError("no rest found; noise shows only while nothing moves: record at rest, or use all samples")
+        longest = int(np.argmax(rest.lengths))
+        start, stop = int(rest.start[longest]), int(rest.stop[longest])
+    part = recording.slice(start, stop)
+    series: dict[str, NDArray[np.float64]] = dict(zip(part.channels, part.readings.T, strict=True))
+    if gyros:
+        names = [f"gyro_{axis}" for axis in "xyz" if f"gyro_{axis}_rad_s" in part.reference]
+        series |= {name: part.reference[f"{name}_rad_s"] for name in names}
+    rate = recording.sample_rate
+    models = {}
+    for name, values in series.items():
+        if not np.isfinite(values).all():
+            raise InputError(f"channel {name} has missing samples in the stretch used; choose another run")
+        try:
+            models[name] = identify_noise(values, rate)
+        except InputError as error:
+            raise InputError(f"channel {name}: {error}") from None
+    return RecordingNoise(models, recording.unit, rate, float(part.t_s[0]), part.duration)
