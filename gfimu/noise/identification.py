@@ -7,7 +7,7 @@ overlapping estimates is used. It follows from the fitted spectrum (Gaussian noi
 
     cov(σ²_a, σ²_b) = (2/T) ∫ S(f)² |H_a(f)|² |H_b(f)|² df,   |H_m|² = 2 sin⁴(πfmδ) / (m² sin²(πfδ)).
 
-A term enters only when it improves the fit more than chance does at 0.1 %; the others get an upper limit.
+A term enters only when it improves the fit more than chance does at 0.01 %; the others get an upper limit.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ TERMS = {
 }
 """Terms by symbol: name and unit."""
 
-_ENTRY = 1e-3
+_ENTRY = 1e-4
 _SHORTEST = 200
 _PASSES = 4
 _FREQUENCIES = 4096
