@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any, Protocol
 
 from firmware_bridge.adxl345_device import TICKS_PER_SECOND, Adxl345, LineFault
@@ -90,7 +90,6 @@ class Board:
         self.last_access = ""
         self.resets = 0
         self.exceptions = 0
-        self.lose_exception: Callable[[int], bool] | None = None
         self._events: list[int] = []
         self._peripherals: list[Peripheral] = []
         self.accesses = 0
@@ -333,6 +332,22 @@ class Board:
             self.exceptions += 1
         if self.tracer is not None:
             self.tracer.exception(self.now, number, entered=entered)
+
+    def lose_interrupts(self, exception: int, every: int) -> None:
+        """Fault: let one in so many requests of an interrupt get lost, as a glitch on its way would."""
+        pend = self.nvic.pend
+        count = 0
+
+        def lossy(number: int) -> None:
+            nonlocal count
+            if number == exception:
+                count += 1
+                if count % every == 0:
+                    self.nvic.lines &= ~(1 << number)
+                    return
+            pend(number)
+
+        self.nvic.pend = lossy  # type: ignore[method-assign]
 
     def word(self, symbol: str) -> int:
         """Value of a 32-bit variable of the firmware."""

@@ -1,0 +1,155 @@
+"""Commands to the firmware, its replies and its identity (docs/frames.md)."""
+
+from __future__ import annotations
+
+import enum
+import struct
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from firmware_bridge.checksum import crc16
+from firmware_bridge.frames import FrameType
+from gfimu.errors import InputError
+
+__all__ = ["Command", "Identity", "Reply", "Result", "encode_command", "parse_message", "set_range", "set_rate"]
+
+COMMAND_SYNC = bytes((0xC3, 0x3C))
+RATE_CODE_AUTO = 0xFF
+_PAYLOADS = {3: "<HB", 4: "<BB", 5: "<B", 7: "<I"}
+
+
+class Command(enum.IntEnum):
+    """Commands of the host."""
+
+    START = 1
+    STOP = 2
+    SET_RATE = 3
+    SET_RANGE = 4
+    SELF_TEST = 5
+    IDENTIFY = 6
+    SET_BAUD = 7
+
+
+class Result(enum.IntEnum):
+    """What became of a command."""
+
+    DONE = 0
+    UNKNOWN_COMMAND = 1
+    BAD_LENGTH = 2
+    BAD_VALUE = 3
+    LINE_TOO_SLOW = 4
+
+
+@dataclass(frozen=True)
+class Reply:
+    """Answer to a command."""
+
+    command: int
+    result: Result
+
+
+@dataclass(frozen=True)
+class Identity:
+    """What a board says about itself.
+
+    Parameters
+    ----------
+    firmware : str
+        Version.
+    build_id : int
+        First 32 bits of the hash of the sources.
+    rate_hz : int
+        Sample rate, Hz.
+    rate_code, data_format : int
+        BW_RATE code and DATA_FORMAT of the chips.
+    baud : int
+        Bits per second.
+    present : tuple of bool
+        Which sensors answer.
+    reset_cause : str
+        Why the board started last.
+    streaming : bool
+        Whether it sends samples.
+    spi_khz : int
+        SPI clock, kHz.
+    dropped : int
+        Frames that the line could not take.
+    """
+
+    firmware: str
+    build_id: int
+    rate_hz: int
+    rate_code: int
+    data_format: int
+    baud: int
+    present: tuple[bool, ...]
+    reset_cause: str
+    streaming: bool
+    spi_khz: int
+    dropped: int
+
+    @property
+    def range_g(self) -> int:
+        """Range of the chips, in units of g."""
+        return 2 << (self.data_format & 3)
+
+    @property
+    def full_resolution(self) -> bool:
+        """Whether a count is 3.9 mg in every range."""
+        return bool(self.data_format & 8)
+
+    @property
+    def count_size(self) -> int:
+        """Size of a count as sent, in full-resolution counts."""
+        return 1 if self.full_resolution else self.range_g // 2
+
+
+def encode_command(command: int, *values: int) -> bytes:
+    """Encode a command with its values (docs/frames.md)."""
+    try:
+        payload = struct.pack(_PAYLOADS.get(command, "<"), *values)
+    except struct.error:
+        raise InputError(f"command {command} with {values}: a value is missing or out of range") from None
+    body = COMMAND_SYNC + bytes((command, len(payload))) + payload
+    return body + struct.pack("<H", crc16(body))
+
+
+def set_rate(rate_hz: int, code: int = RATE_CODE_AUTO) -> bytes:
+    """Encode the command for a sample rate, 10…3200 Hz, and the chips' BW_RATE code (by default the one that fits)."""
+    return encode_command(Command.SET_RATE, rate_hz, code)
+
+
+def set_range(range_g: int, *, full_resolution: bool = True) -> bytes:
+    """Encode the command for a range of ±2, 4, 8 or 16 g."""
+    if range_g not in {2, 4, 8, 16}:
+        raise InputError(f"range {range_g} g: the ADXL345 has 2, 4, 8 and 16")
+    return encode_command(Command.SET_RANGE, range_g.bit_length() - 2, int(full_resolution))
+
+
+def parse_message(packet: np.void) -> Reply | Identity | None:
+    """Read an identity or reply frame; None for other types."""
+    payload = np.asarray(packet["counts"], dtype="<i2").tobytes()
+    if packet["type"] == FrameType.REPLY:
+        result = payload[1] if payload[1] <= max(Result) else Result.UNKNOWN_COMMAND
+        return Reply(payload[0], Result(result))
+    if packet["type"] != FrameType.IDENTITY:
+        return None
+    fields: tuple[Any, ...] = struct.unpack("<4BHBBIBBBBIHH", payload)
+    _, major, minor, patch, rate, code, data_format, baud, present, cause, streaming, sensors, build, khz, drop = fields
+    causes = {1: "power-on", 2: "external", 4: "watchdog", 8: "brown-out"}
+    names = [name for bit, name in causes.items() if cause & bit]
+    return Identity(
+        f"{major}.{minor}.{patch}",
+        build,
+        rate,
+        code,
+        data_format,
+        baud,
+        tuple(bool(present >> k & 1) for k in range(sensors)),
+        ", ".join(names) or "software",
+        bool(streaming),
+        khz,
+        drop,
+    )
