@@ -1,0 +1,223 @@
+"""The cases of a study: which effects are hidden, how large, in what measurement, drawn from which seed."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from gfimu.errors import unknown_name
+from sim.effects import EFFECTS
+
+__all__ = ["EXOTICS", "OWN_SIGNATURE", "STUDIES", "Case", "study_cases"]
+
+SIZES = (15.0, 60.0, 300.0, 1500.0, 6000.0)
+"""Sizes as d′: from just detectable to gross."""
+
+SIZELESS = tuple(name for name, family in EFFECTS.items() if family.place in {"data", "noise"})
+"""Effects without a continuous size; the generators draw what occurs in practice."""
+
+EXOTICS = (
+    "stick_slip",
+    "cubic_channel",
+    "tone_on_one_channel",
+    "bias_jump",
+    "square_wave",
+    "magnetic_pickup",
+    "backlash",
+)
+"""Effects outside the library, known to the independent generator only."""
+
+OWN_SIGNATURE = (
+    "table_tilt",
+    "axis_wobble",
+    "channel_skew",
+    "cogging",
+    "clock_error",
+    "hysteresis",
+    "interference_tone",
+    "vibration_rectification",
+    "cross_axis",
+    "gain_drift",
+    "warm_up",
+    "bias_temperature",
+    "sensor_position",
+    "misalignment",
+    "scale_factor",
+    "tacho_ripple",
+)
+"""Effects that no other family of the library contains, so that "unknown" is right once they are taken out."""
+
+_NESTED = ("eccentricity", "mount_tilt", "gravity", "tacho_scale", "centrifugal_flex", "tacho_latency")
+
+
+@dataclass(frozen=True)
+class Case:
+    """One hidden world and its measurement.
+
+    Parameters
+    ----------
+    study : str
+        Name of the study it belongs to.
+    seed : int
+        Seed of everything that is drawn for it.
+    effects : tuple of str
+        Contract names of what is hidden (or an exotic effect's name).
+    size : float
+        Size of each, as d′ = √Σ(Δ/σ)².
+    duration, sample_rate : float
+        Length, s, and samples per second, Hz.
+    bias_instability_mg : float
+        Rms of the 1/f noise of a channel, thousandths of standard gravity.
+    tacho_noise : float
+        White noise of the tachometer, rad/s.
+    array : str
+        Name of the array.
+    residue : bool
+        Whether the nominal twin carries the residue of a calibration.
+    without : str
+        Effect taken out of the library, if any.
+    """
+
+    study: str
+    seed: int
+    effects: tuple[str, ...] = ()
+    size: float = 0.0
+    duration: float = 40.0
+    sample_rate: float = 100.0
+    bias_instability_mg: float = 0.15
+    tacho_noise: float = 0.02
+    array: str = "cube12"
+    residue: bool = False
+    without: str = ""
+
+    @property
+    def key(self) -> str:
+        """Name of the case within a file of outcomes."""
+        return f"{self.study}/{self.seed}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON form."""
+        return {**asdict(self), "effects": list(self.effects)}
+
+
+def _noise_of(number: int) -> dict[str, Any]:
+    """Return one of three noise levels in turn; the tool is told none of them."""
+    level = ((0.05, 0.02), (0.15, 0.02), (0.5, 0.02))[number % 3]
+    return {"bias_instability_mg": level[0], "tacho_noise": level[1]}
+
+
+def _singles() -> list[Case]:
+    pairs = [(name, size) for name in EFFECTS if name not in SIZELESS for size in SIZES]
+    pairs += [(name, 0.0) for name in SIZELESS for _ in SIZES]
+    return [
+        Case("singles", 10_000 + number, (name,), size, **_noise_of(number // 5 + number))
+        for number, (name, size) in enumerate(itertools.chain(pairs, pairs))
+    ]
+
+
+def _nulls() -> list[Case]:
+    return [
+        Case("nulls", 20_000 + 1000 * level + number, **_noise_of(level)) for number in range(200) for level in range(3)
+    ]
+
+
+def _threshold_nulls() -> list[Case]:
+    """Return runs on which the thresholds may be chosen; the figures come from ``nulls`` alone."""
+    return [
+        Case("threshold_nulls", 25_000 + 1000 * level + number, **_noise_of(level))
+        for number in range(100)
+        for level in range(3)
+    ]
+
+
+def _drawn_sets(study: str, first_seed: int, count: int, members: int) -> list[Case]:
+    rng = np.random.default_rng(first_seed)
+    names = list(EFFECTS)
+    cases = []
+    for number in range(count):
+        drawn = tuple(str(name) for name in rng.choice(names, size=members, replace=False))
+        size = float(np.exp(rng.uniform(np.log(60.0), np.log(1500.0))))
+        cases.append(Case(study, first_seed + number, drawn, size, **_noise_of(number)))
+    return cases
+
+
+def _pairs() -> list[Case]:
+    return _drawn_sets("pairs", 30_000, 120, 2)
+
+
+def _triples() -> list[Case]:
+    return _drawn_sets("triples", 40_000, 60, 3)
+
+
+def _residue() -> list[Case]:
+    cases = [Case("residue", 50_000 + number, residue=True, **_noise_of(number)) for number in range(30)]
+    names = [name for name in EFFECTS if name not in SIZELESS]
+    return cases + [
+        Case("residue", 50_100 + number, (name,), size, residue=True, **_noise_of(number))
+        for number, (size, name) in enumerate(itertools.product((300.0, 1500.0, 6000.0), names))
+    ]
+
+
+def _elsewhere(study: str, first_seed: int, settings: Mapping[str, Any], count: int = 24) -> list[Case]:
+    """Return cases away from the usual run: a third with nothing hidden, the rest with one effect."""
+    rng = np.random.default_rng(first_seed)
+    order = [str(name) for name in rng.permutation(list(EFFECTS))]
+    cases = []
+    for number in range(count):
+        hidden = () if number % 3 == 0 else (order[number % len(order)],)
+        size = float(rng.choice([60.0, 300.0, 1500.0])) if hidden and hidden[0] not in SIZELESS else 0.0
+        cases.append(Case(study, first_seed + number, hidden, size, **{**_noise_of(number), **settings}))
+    return cases
+
+
+def _left_out() -> list[Case]:
+    return [
+        Case("left_out", 80_000 + number, (name,), size, without=name, **_noise_of(number))
+        for number, (size, name) in enumerate(itertools.product((60.0, 200.0, 1000.0), OWN_SIGNATURE + _NESTED))
+    ]
+
+
+def _exotics() -> list[Case]:
+    return [
+        Case("exotics", 90_000 + number, (name,), size, **_noise_of(number))
+        for number, (size, _, name) in enumerate(itertools.product((60.0, 200.0, 1000.0), range(2), EXOTICS))
+    ]
+
+
+STUDIES: dict[str, Callable[[], list[Case]]] = {
+    "singles": _singles,
+    "nulls": _nulls,
+    "threshold_nulls": _threshold_nulls,
+    "pairs": _pairs,
+    "triples": _triples,
+    "residue": _residue,
+    "short_runs": lambda: _elsewhere("short_runs", 60_000, {"duration": 20.0}),
+    "long_runs": lambda: _elsewhere("long_runs", 61_000, {"duration": 600.0}, 12),
+    "slow_samples": lambda: _elsewhere("slow_samples", 62_000, {"sample_rate": 25.0}),
+    "fast_samples": lambda: _elsewhere("fast_samples", 63_000, {"sample_rate": 800.0}, 12),
+    "corners8": lambda: _elsewhere("corners8", 64_000, {"array": "corners8"}),
+    "three_plus_one": lambda: _elsewhere("three_plus_one", 65_000, {"array": "p3_three_plus_one"}),
+    "noisy_tacho": lambda: _elsewhere("noisy_tacho", 66_000, {"tacho_noise": 0.05}),
+    "left_out": _left_out,
+    "exotics": _exotics,
+}
+"""Every study by name; each call returns the same cases."""
+
+
+def study_cases(name: str, first: int | None = None) -> list[Case]:
+    """Return the cases of a study in a fixed shuffled order, so that its first few are already a fair sample.
+
+    Raises
+    ------
+    InputError
+        If there is no such study.
+    """
+    if name not in STUDIES:
+        raise unknown_name("study", name, STUDIES)
+    cases = STUDIES[name]()
+    order = np.random.default_rng(len(cases)).permutation(len(cases))
+    return [cases[place] for place in order[:first]]

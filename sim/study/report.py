@@ -1,0 +1,291 @@
+"""Tables and figures of a study from its outcomes: rates with intervals, confusion, detection, reliability."""
+
+from __future__ import annotations
+
+import itertools
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import beta
+
+from gfimu.atomic_file import write_text
+from sim.study.figures import draw_confusion, draw_detection, draw_reliability
+
+__all__ = ["Tally", "rate_with_interval", "score", "summarise", "write_report"]
+
+Outcome = Mapping[str, Any]
+
+
+def score(outcome: Outcome) -> dict[str, bool]:
+    """Judge one outcome.
+
+    Returns
+    -------
+    dict
+        ``exact``: the right names alone (nothing found where nothing is hidden). ``within``: every hidden effect is
+        among the names or among what is told as not distinguishable from them. ``wrong``: said to be explained, with a
+        name that is not hidden. ``named``, ``nothing``, ``unknown``, ``set``, ``error``: what was said.
+    """
+    hidden = set(outcome["effects"])
+    names = {cause["effect"] for cause in outcome["causes"]}
+    told = names.union(*(cause["rivals"] for cause in outcome["causes"]))
+    verdict = outcome["verdict"]
+    explained = verdict == "explained"
+    return {
+        "exact": (explained and names == hidden) if hidden else verdict == "nothing_found",
+        "within": (verdict in {"explained", "ambiguous"} and hidden <= told) if hidden else verdict == "nothing_found",
+        "wrong": explained and not names <= hidden,
+        "named": verdict in {"explained", "ambiguous"},
+        "set": verdict == "ambiguous",
+        "nothing": verdict == "nothing_found",
+        "unknown": verdict == "unknown",
+        "error": verdict == "error",
+    }
+
+
+def rate_with_interval(hits: int, cases: int) -> tuple[float, float, float]:
+    """Return a rate and its 95 % interval (Clopper & Pearson 1934)."""
+    low = float(beta.ppf(0.025, hits, cases - hits + 1)) if hits else 0.0
+    high = float(beta.ppf(0.975, hits + 1, cases - hits)) if hits < cases else 1.0
+    return (hits / cases if cases else float("nan")), low, high
+
+
+class Tally:
+    """Outcomes of one study.
+
+    Parameters
+    ----------
+    outcomes : sequence of mapping
+        Outcomes as `run_case` returns them.
+    """
+
+    def __init__(self, outcomes: Sequence[Outcome]) -> None:
+        self.outcomes = outcomes
+        self.scores = [score(outcome) for outcome in outcomes]
+
+    def __len__(self) -> int:
+        return len(self.outcomes)
+
+    def share(self, what: str) -> str:
+        """Return a rate in per cent with its interval, as text."""
+        hits = sum(entry[what] for entry in self.scores)
+        rate, low, high = rate_with_interval(hits, len(self))
+        return f"{100 * rate:.1f} ({100 * low:.0f}–{100 * high:.0f})"
+
+    def numbers(self, key: str) -> NDArray[np.float64]:
+        """Return the values of a number in the outcomes, where there is one."""
+        values = [outcome.get(key) for outcome in self.outcomes]
+        return np.array([value for value in values if value is not None], dtype=float)
+
+    def z(self) -> NDArray[np.float64]:
+        """Return |error|/std of all parameters of rightly named causes."""
+        return np.array(
+            [
+                abs(value)
+                for outcome, entry in zip(self.outcomes, self.scores, strict=True)
+                if entry["exact"]
+                for cause in outcome["causes"]
+                for value in cause["z"].values()
+            ]
+        )
+
+    def told(self, outcome: Outcome) -> str:
+        """Return what was said, in a word or two."""
+        words = {"nothing_found": "nothing", "unknown": "unknown", "error": "error"}
+        if outcome["verdict"] in words:
+            return words[outcome["verdict"]]
+        names = " + ".join(sorted({cause["effect"] for cause in outcome["causes"]}))
+        return f"one of {names}" if outcome["verdict"] == "ambiguous" else names
+
+
+def _by(outcomes: Iterable[Outcome], *keys: str) -> dict[tuple[Any, ...], list[Outcome]]:
+    groups: dict[tuple[Any, ...], list[Outcome]] = defaultdict(list)
+    for outcome in outcomes:
+        groups[tuple(outcome[key] for key in keys)].append(outcome)
+    return dict(groups)
+
+
+def _row(cells: Iterable[object]) -> str:
+    return "| " + " | ".join(str(cell) for cell in cells) + " |\n"
+
+
+def _table(header: Sequence[str], rows: Iterable[Iterable[object]]) -> str:
+    return _row(header) + _row(["---"] * len(header)) + "".join(_row(row) for row in rows) + "\n"
+
+
+def _quantile(values: NDArray[np.float64], q: float, form: str) -> str:
+    return format(float(np.quantile(values, q)), form) if len(values) else "–"
+
+
+def _overview(outcomes: Sequence[Outcome]) -> str:
+    header = (
+        "study",
+        "worlds from",
+        "hidden",
+        "runs",
+        "right alone %",
+        "right in the set %",
+        "wrong name %",
+        "a set %",
+        "nothing %",
+        "unknown %",
+        "crashed",
+        "excess removed, median / 10th",
+        "parameters within 3 std %",
+        "CPU s, median / 90th",
+    )
+    rows = []
+    for (study, source), group in sorted(_by(outcomes, "study", "source").items()):
+        for hidden, part in sorted(_by([{**o, "hidden": len(o["effects"])} for o in group], "hidden").items()):
+            tally = Tally(part)
+            removed = Tally([o for o, s in zip(tally.outcomes, tally.scores, strict=True) if s["named"]]).numbers(
+                "share_of_excess_removed"
+            )
+            z = tally.z()
+            rows.append(
+                (
+                    study,
+                    Path(source.partition(":")[0]).stem if ":" in source else source,
+                    hidden[0],
+                    len(tally),
+                    *(tally.share(what) for what in ("exact", "within", "wrong", "set", "nothing", "unknown")),
+                    sum(entry["error"] for entry in tally.scores),
+                    f"{_quantile(removed, 0.5, '.4f')} / {_quantile(removed, 0.1, '.3f')}",
+                    f"{100 * float(np.mean(z < 3)):.1f} of {len(z)}" if len(z) else "–",
+                    " / ".join(_quantile(tally.numbers("processor_s"), q, ".1f") for q in (0.5, 0.9)),
+                )
+            )
+    return _table(header, rows)
+
+
+def _noise_levels(outcomes: Sequence[Outcome]) -> str:
+    nulls = [outcome for outcome in outcomes if outcome["study"] == "nulls"]
+    rows = []
+    for (level, tacho), group in sorted(_by(nulls, "bias_instability_mg", "tacho_noise").items()):
+        tally = Tally(group)
+        rows.append((level, tacho, len(tally), tally.share("named"), tally.share("unknown")))
+    header = ("bias instability, mg", "tachometer noise, rad/s", "runs", "named %", "unknown %")
+    return "## Nothing hidden\n\n" + _table(header, rows) if rows else ""
+
+
+def _misses(outcomes: Sequence[Outcome]) -> str:
+    single = [outcome for outcome in outcomes if len(outcome["effects"]) == 1 and not outcome["without"]]
+    rows = []
+    for (effect,), group in sorted(_by([{**o, "effect": o["effects"][0]} for o in single], "effect").items()):
+        tally = Tally(group)
+        other = Counter(
+            f"{tally.told(outcome)} (d′ {outcome['size']:.0f})" if outcome["size"] else tally.told(outcome)
+            for outcome, entry in zip(tally.outcomes, tally.scores, strict=True)
+            if not entry["exact"]
+        )
+        told = "; ".join(f"{name} × {count}" if count > 1 else name for name, count in other.most_common())
+        rows.append((f"`{effect}`", len(tally), tally.share("exact"), tally.share("within"), told))
+    header = ("hidden", "runs", "right alone %", "right in the set %", "what was said otherwise")
+    return "## One effect hidden: what was said\n\n" + _table(header, rows) if rows else ""
+
+
+def _left_out(outcomes: Sequence[Outcome]) -> str:
+    outside = [outcome for outcome in outcomes if outcome["without"] or outcome["study"] == "exotics"]
+    rows = []
+    for (effect,), group in sorted(_by([{**o, "effect": o["effects"][0]} for o in outside], "effect").items()):
+        tally = Tally(group)
+        said = Counter(tally.told(outcome) for outcome in tally.outcomes)
+        rows.append(
+            (f"`{effect}`", len(tally), tally.share("unknown"), "; ".join(f"{k} × {v}" for k, v in said.most_common()))
+        )
+    header = ("hidden, not in the library", "runs", "unknown %", "said")
+    return "## Outside the library\n\n" + _table(header, rows) if rows else ""
+
+
+def _baselines(outcomes: Sequence[Outcome]) -> str:
+    rows = []
+    for (method, study), group in sorted(_by(outcomes, "method", "study").items()):
+        tally = Tally(group)
+        z = tally.z()
+        rows.append(
+            (
+                method,
+                study,
+                len(tally),
+                tally.share("exact"),
+                tally.share("wrong"),
+                f"{100 * float(np.mean(z < 1.96)):.0f} of {len(z)}" if len(z) else "–",
+                _quantile(tally.numbers("processor_s"), 0.5, ".1f"),
+            )
+        )
+    header = ("method", "study", "runs", "right alone %", "wrong name %", "95 % intervals cover %", "CPU s")
+    return "## Against simpler methods, same recordings\n\n" + _table(header, rows) if rows else ""
+
+
+def summarise(outcomes: Sequence[Outcome]) -> str:
+    """Return the tables as Markdown."""
+    own = [outcome for outcome in outcomes if "method" not in outcome]
+    rivals = [outcome for outcome in outcomes if "method" in outcome]
+    shared = {(outcome["key"], outcome["source"]) for outcome in rivals}
+    same = [{**outcome, "method": "gfimu"} for outcome in own if (outcome["key"], outcome["source"]) in shared]
+    return (
+        "## Overview\n\nRates in per cent with their 95 % intervals.\n\n"
+        + _overview(own)
+        + _noise_levels(own)
+        + _misses(own)
+        + _left_out(own)
+        + _baselines([*same, *rivals])
+    )
+
+
+def reliability(outcomes: Sequence[Outcome]) -> list[tuple[float, float, int]]:
+    """Return stated probability, observed frequency and number of causes per bin of probability."""
+    pairs = [
+        (float(cause["probability"]), cause["effect"] in outcome["effects"])
+        for outcome in outcomes
+        if not outcome["without"] and outcome["study"] != "exotics"
+        for cause in outcome["causes"]
+    ]
+    edges = np.array([0.0, 0.3, 0.5, 0.7, 0.9, 0.99, 1.0 + 1e-12])
+    bins = []
+    for low, high in itertools.pairwise(edges):
+        inside = [(stated, right) for stated, right in pairs if low <= stated < high]
+        if inside:
+            stated, right = np.mean(np.array(inside, dtype=float), axis=0)
+            bins.append((float(stated), float(right), len(inside)))
+    return bins
+
+
+def write_report(outcomes: Sequence[Outcome], folder: str | Path) -> list[Path]:
+    """Write ``diagnosis-study.md`` and its figures into a folder; return the files."""
+    place = Path(folder)
+    own = [outcome for outcome in outcomes if "method" not in outcome]
+    singles = [outcome for outcome in own if outcome["study"] == "singles"]
+    figures: list[tuple[str, str, Path]] = []
+    if singles:
+        by_size = [
+            (size, [score(outcome) for outcome in group])
+            for (size,), group in sorted(_by(singles, "size").items())
+            if size
+        ]
+        tally = Tally(singles)
+        confusion = [(outcome["effects"][0], tally.told(outcome)) for outcome in singles]
+        figures += [
+            ("detection", "Right name against size", draw_detection(by_size, place / "figures/study_detection.png")),
+            ("confusion", "Hidden against named", draw_confusion(confusion, place / "figures/study_confusion.png")),
+        ]
+    bins = reliability(own)
+    if bins:
+        figures.append(
+            ("reliability", "Stated against observed", draw_reliability(bins, place / "figures/study_reliability.png"))
+        )
+    text = (
+        "# Study of the diagnosis\n\n"
+        "Hidden worlds are drawn from fixed seeds; noise levels are not told to the tool. A size is "
+        "d′ = √Σ(Δ/σ)² over all channels and the tachometer with the drive known. Made by\n\n"
+        "```\npython -m sim.study run STUDY ... --out outcomes.jsonl\n"
+        "python -m sim.study report outcomes.jsonl --out docs\n```\n\n"
+        + summarise(outcomes)
+        + "".join(f"## {title}\n\n![{name}](figures/{path.name})\n\n" for name, title, path in figures)
+    )
+    write_text(place / "diagnosis-study.md", text.rstrip("\n") + "\n")
+    return [place / "diagnosis-study.md", *(path for _, _, path in figures)]

@@ -1,0 +1,107 @@
+"""Run the cases of a study through an executor and append their outcomes to a file that can be resumed."""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import os
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gfimu.errors import InputError
+from sim.study.cases import Case
+from sim.study.outcome import run_case
+
+__all__ = ["open_executor", "read_outcomes", "run_study"]
+
+_ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+@contextmanager
+def open_executor(workers: int, cluster: str = "") -> Iterator[Executor]:
+    """Open a process pool, or the executor of a Dask cluster at an address such as ``tcp://host:8786``."""
+    if cluster:
+        try:
+            from distributed import Client
+        except ImportError:
+            raise InputError('a cluster needs Dask: pip install "gfimu[cluster]"') from None
+        with Client(cluster) as client, client.get_executor() as executor:
+            yield executor
+        return
+    # Linear algebra on many threads collapses when every worker does it; NumPy reads this when it is first imported.
+    for variable in _ONE_THREAD:
+        os.environ.setdefault(variable, "1")
+    with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
+        yield pool
+
+
+def read_outcomes(path: str | Path) -> list[dict[str, Any]]:
+    """Read the outcomes of a study; a last line cut off by an interruption is left out."""
+    file = Path(path)
+    if not file.exists():
+        return []
+    outcomes = []
+    for line in file.read_text(encoding="utf-8").splitlines():
+        try:
+            outcomes.append(json.loads(line))
+        except json.JSONDecodeError:
+            continue
+    return outcomes
+
+
+def run_study(
+    cases: Sequence[Case],
+    out: str | Path,
+    executor: Executor,
+    *,
+    source: str = "",
+    work: Callable[[Case, str], dict[str, Any]] = run_case,
+    tell: Callable[[dict[str, Any]], None] | None = None,
+) -> int:
+    """Run the cases whose outcome is not yet in the file; return how many were run.
+
+    Parameters
+    ----------
+    cases : sequence of Case
+        The cases.
+    out : str or Path
+        File of outcomes, one line of JSON each; appended to.
+    executor : Executor
+        Where the cases run.
+    source : str
+        Generator of the worlds, as in `draw_world`.
+    work : callable
+        What is done with a case; by default it is diagnosed.
+    tell : callable, optional
+        Called with each outcome as it comes.
+    """
+    file = Path(out)
+    file.parent.mkdir(parents=True, exist_ok=True)
+    done = {(outcome["key"], outcome["source"]) for outcome in read_outcomes(file)}
+    open_cases = [case for case in cases if (case.key, source or "sim.campaign") not in done]
+    torn = file.exists() and file.stat().st_size > 0 and not file.read_bytes().endswith(b"\n")
+    with file.open("a", encoding="utf-8") as lines:
+        if torn:
+            lines.write("\n")
+        for future in as_completed([executor.submit(work, case, source) for case in open_cases]):
+            outcome = future.result()
+            lines.write(json.dumps(_finite(outcome), allow_nan=False) + "\n")
+            lines.flush()
+            if tell is not None:
+                tell(outcome)
+    return len(open_cases)
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {str(key): _finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(item) for item in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    return None if isinstance(value, float) and not np.isfinite(value) else value
