@@ -38,7 +38,7 @@ NO_TEMPERATURE = -(1 << 15)
 """Value of the temperature field while no sensor fills it."""
 
 SYNC = (0xA5, 0x5A)
-_HALF_WRAP = 1 << 31  # a time stamp that seems to jump further than this went back: the board started anew
+_LONGEST_GAP_OVER_WRAP_S = 10.0
 
 
 class FrameType(enum.IntEnum):
@@ -218,7 +218,7 @@ class Samples:
     Parameters
     ----------
     ticks : ndarray, shape (n,)
-        Board time, unwrapped, in ticks since the first sample of the segment's time base.
+        Board time, unwrapped, in ticks since the board started.
     sequence : ndarray, shape (n,)
         Sequence numbers as sent.
     counts : ndarray, shape (n, c)
@@ -226,9 +226,9 @@ class Samples:
     status : ndarray, shape (n,)
         Status bits (`Status`).
     lost_before : ndarray, shape (n,)
-        Samples lost between the sample before and this one; 0 at a new segment.
+        Samples lost between the sample before and this one; 0 where the board began to sample anew.
     segment : ndarray, shape (n,)
-        Number that grows by one whenever the board started anew: time and sequence begin again there.
+        Number that grows by one whenever the board started anew: its clock begins again there.
     """
 
     ticks: NDArray[np.int64]
@@ -307,10 +307,9 @@ class SampleDecoder:
         """Count an unfinished frame at the end of the stream as skipped."""
         self._scanner.finish()
 
-    def break_segment(self) -> None:
-        """Begin a new segment with the next sample: the connection was lost and time may have passed."""
+    def break_stream(self) -> None:
+        """Bytes before and after this point are not one stream: the connection was lost in between."""
         self._scanner.finish()
-        self._last = None
 
     def _number(self, packets: NDArray[Any]) -> Samples:
         """Unwrap time and sequence, count what is missing, find the places where the board started anew."""
@@ -323,16 +322,19 @@ class SampleDecoder:
             last_sequence, last_clock, last_ticks = self._last or (int(sequence[0]) - 1, int(clock[0]), int(clock[0]))
             steps = np.diff(sequence, prepend=last_sequence) & 0xFFFF
             spans = np.diff(clock, prepend=last_clock) & 0xFFFFFFFF
-            fresh[0] = self._last is None and self._samples > 0
             first = (status & Status.FIRST) != 0
-            odd = (steps != 1) | first | (spans >= _HALF_WRAP)
+            # A clock that went back has wrapped if that makes a short step; otherwise the board started anew.
+            back = np.diff(clock, prepend=last_clock) < 0
+            anew = back & (spans > _LONGEST_GAP_OVER_WRAP_S * self.format.clock_hz)
+            odd = (steps != 1) | first | anew
             odd[0] &= self._last is not None
             periods = _RecentPeriods(self._recent if self._last else [], spans, ~odd)
             for place in np.flatnonzero(odd).tolist():
-                gap = None if first[place] else _samples_in_gap(steps[place], spans[place], periods.before(place))
+                fresh[place] = anew[place]
+                known = not (first[place] or anew[place])
+                gap = _samples_in_gap(steps[place], spans[place], periods.before(place)) if known else None
                 if gap is None:
-                    fresh[place] = 1
-                    periods.start_anew(place)
+                    periods.start_anew(place)  # sampling began again, perhaps at another rate
                 else:
                     lost[place] = gap - 1
             self._recent = periods.before(n)
@@ -376,7 +378,7 @@ def _samples_in_gap(step: int, span: int, periods: list[int]) -> int | None:
 
     The sequence number knows the gap modulo 2¹⁶; the time stamp, divided by the sample period, knows the rest.
     """
-    if span >= _HALF_WRAP or step == 0:
+    if step == 0:
         return None
     if not periods:
         return int(step)

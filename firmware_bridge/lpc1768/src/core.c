@@ -31,6 +31,7 @@
 #define TRANSMIT_RING (FRAME_SLOTS * FRAME_BYTES)
 #define BITS_PER_FRAME (FRAME_BYTES * 10U)
 #define MICROSECONDS 1000000U
+#define SETTLE_SAMPLES 16U /* longest wait for the first conversions after a change of configuration */
 #define RETRY_US 20000U /* how often a missing sensor is looked for */
 
 _Static_assert((RECEIVE_RING & (RECEIVE_RING - 1U)) == 0U, "the receive ring is indexed with a mask");
@@ -47,6 +48,7 @@ static struct {
     /* sampling */
     bool streaming;
     bool first;
+    uint32_t settling; /* samples that may still be waited for */
     uint16_t sequence;
     uint16_t message_sequence;
     uint32_t last_sample_us;
@@ -224,6 +226,7 @@ static void configure_sensors(void)
 void core_start(void)
 {
     core.first = true;
+    core.settling = SETTLE_SAMPLES;
     core.sequence = 0U;
     core.streaming = true;
     core.last_sample_us = hal_time_us();
@@ -292,9 +295,9 @@ void core_sample(void)
         status |= STATUS_LATE;
     }
     core.last_sample_us = now_us;
-    core.sequence++;
     core.heartbeat++;
     if (frame == NULL) {
+        core.sequence++;
         core.dropped++;
         core.sticky |= STATUS_FRAMES_DROPPED;
         return;
@@ -302,6 +305,12 @@ void core_sample(void)
     for (uint32_t sensor = 0U; sensor < SENSOR_COUNT; sensor++) {
         status |= sample_sensor(sensor, &frame[HEADER_BYTES + (6U * sensor)]);
     }
+    if (((status & STATUS_STALE) != 0U) && (core.settling > 0U)) {
+        core.settling--; /* some sensor has not converted yet: there is no first sample */
+        return;
+    }
+    core.settling = 0U;
+    core.sequence++;
     if (core.first) {
         status |= STATUS_FIRST;
         core.first = false;

@@ -1,0 +1,121 @@
+"""A recording that can be read at any moment while it is being written.
+
+Samples are appended as lines of text, only whole lines in each write, and no write longer than a memory page: when the
+process is killed, the file ends behind a whole sample. `finish` puts the proper file in its place.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.csv as pa_csv
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from gfimu.atomic_file import atomic_path
+from gfimu.errors import InputError
+
+__all__ = ["Journal"]
+
+_PAGE = 4096
+_BLOCK_BYTES = 1 << 22
+
+
+class Journal:
+    """Appends samples to a file and turns it into a recording in the end.
+
+    Parameters
+    ----------
+    path : str or Path
+        ``.csv`` or ``.parquet``; until `finish` the file holds text under either name, which `Recording.read` reads.
+    channels : tuple of str
+        Names of the channels; their columns are raw counts, ``…_lsb``.
+    metadata : mapping
+        Metadata known at the start.
+
+    Raises
+    ------
+    InputError
+        If the extension is unknown or the file can't be written.
+    """
+
+    def __init__(self, path: str | Path, channels: tuple[str, ...], metadata: Mapping[str, Any]) -> None:
+        self.path = Path(path)
+        if self.path.suffix not in {".csv", ".parquet"}:
+            raise InputError(f"{path}: unknown recording format {self.path.suffix!r}; use .csv or .parquet")
+        self.samples = 0
+        self.columns = ["t_s", *(f"{channel}_lsb" for channel in channels), "status"]
+        lines = [f"# {key}: {json.dumps(value)}\n" for key, value in metadata.items()]
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            flags = os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_APPEND | getattr(os, "O_BINARY", 0)
+            self._file = os.open(self.path, flags, 0o666)
+        except OSError as error:
+            raise InputError(f"{path}: {error.strerror or error}; choose a file that can be written") from None
+        self._metadata = dict(metadata)
+        self._header = ",".join(self.columns) + "\n"
+        os.write(self._file, ("".join(lines) + self._header).encode())
+
+    def append(self, t_s: NDArray[np.float64], counts: NDArray[np.float64], status: NDArray[np.uint16]) -> None:
+        """Append samples: times (n,), s, counts (n, c) with NaN where missing, status bits (n,)."""
+        if not len(t_s):
+            return
+        columns: list[Any] = [pa.array(np.round(t_s, 7))]
+        missing = np.isnan(counts)
+        whole = np.where(missing, 0, counts).astype(np.int32)
+        for place in range(counts.shape[1]):
+            mask = missing[:, place]
+            columns.append(pa.array(whole[:, place], mask=mask if mask.any() else None))
+        columns.append(pa.array(status))
+        sink = io.BytesIO()
+        options = pa_csv.WriteOptions(include_header=False, quoting_style="none")
+        pa_csv.write_csv(pa.table(columns, names=self.columns), sink, options)
+        self._write(sink.getvalue())
+        self.samples += len(t_s)
+
+    def _write(self, text: bytes) -> None:
+        start = 0
+        while start < len(text):
+            end = len(text) if len(text) - start <= _PAGE else text.rfind(b"\n", start, start + _PAGE) + 1
+            os.write(self._file, text[start:end])
+            start = end
+
+    def finish(self, metadata: Mapping[str, Any]) -> None:
+        """Close the journal and replace it with the recording, with its final metadata; whole or not at all."""
+        os.close(self._file)
+        final = {**self._metadata, **metadata}
+        with self.path.open("rb") as journal, atomic_path(self.path) as temporary:
+            for line in journal:
+                if not line.startswith(b"#"):
+                    break
+            if self.path.suffix == ".csv":
+                self._finish_csv(journal, temporary, final)
+            else:
+                self._finish_parquet(journal, temporary, final)
+
+    def _finish_csv(self, journal: io.BufferedReader, target: Path, metadata: Mapping[str, Any]) -> None:
+        with target.open("wb") as file:
+            for key, value in metadata.items():
+                file.write(f"# {key}: {json.dumps(value)}\n".encode())
+            file.write(self._header.encode())
+            while block := journal.read(_BLOCK_BYTES):
+                file.write(block)
+
+    def _finish_parquet(self, journal: io.BufferedReader, target: Path, metadata: Mapping[str, Any]) -> None:
+        types = {name: pa.float64() if name == "t_s" else pa.int16() for name in self.columns}
+        types["status"] = pa.uint16()
+        schema = pa.schema(list(types.items()), metadata={b"gfimu": json.dumps(metadata).encode()})
+        with pq.ParquetWriter(target, schema, compression="zstd") as writer:
+            if not self.samples:
+                return
+            read = pa_csv.ReadOptions(column_names=self.columns, block_size=_BLOCK_BYTES)
+            convert = pa_csv.ConvertOptions(column_types=types, null_values=[""])
+            for batch in pa_csv.open_csv(journal, read_options=read, convert_options=convert):
+                writer.write_batch(batch)

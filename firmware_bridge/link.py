@@ -1,0 +1,187 @@
+"""The link to a board: a serial device, a pseudo-terminal or a TCP port; it comes back after an unplug."""
+
+from __future__ import annotations
+
+import contextlib
+import queue
+import threading
+import time
+from dataclasses import dataclass
+from types import TracebackType
+
+import serial
+
+from gfimu.errors import GfimuError, InputError
+
+__all__ = ["DEFAULT_BAUD", "Chunk", "Link"]
+
+DEFAULT_BAUD = 1_562_500
+_POLL_S = 0.05
+_READ_BYTES = 1 << 16
+_SOCKET_POLL_S = 0.005
+_QUEUE_CHUNKS = 4096
+_FIRST_RETRY_S, _LONGEST_RETRY_S = 0.1, 2.0
+
+
+@dataclass(frozen=True)
+class Chunk:
+    """Bytes as they came.
+
+    Parameters
+    ----------
+    data : bytes
+        The bytes; empty when only the break is to be told.
+    host_s : float
+        Host time (`time.monotonic`) at which they were read, s.
+    after_break : bool
+        Whether the connection was lost before them: what came before and what comes now are not one stream.
+    """
+
+    data: bytes
+    host_s: float
+    after_break: bool = False
+
+
+class Link:
+    """A connection that a thread reads, so that nothing is lost while the caller computes or writes.
+
+    When the caller falls behind by more than the queue holds, the thread waits: the bytes then stay in the operating
+    system's buffer and, on links with flow control, at the sender.
+
+    Parameters
+    ----------
+    port : str
+        Device (``/dev/ttyUSB0``, ``COM3``), pseudo-terminal, or ``socket://host:port``.
+    baud : int
+        Bits per second; without meaning on pseudo-terminals and sockets.
+    reconnect_s : float
+        How long to try again after the connection was lost, s.
+
+    Raises
+    ------
+    InputError
+        If the port can't be opened.
+    """
+
+    def __init__(self, port: str, *, baud: int = DEFAULT_BAUD, reconnect_s: float = 60.0) -> None:
+        self.port = port
+        self.breaks = 0
+        self._baud = baud
+        self._reconnect_s = reconnect_s
+        self._is_socket = port.startswith("socket://")
+        self._serial = self._open()
+        self._chunks: queue.Queue[Chunk | GfimuError | None] = queue.Queue(_QUEUE_CHUNKS)
+        self._closing = threading.Event()
+        self._writing = threading.Lock()
+        self._thread = threading.Thread(target=self._read, name=f"link {port}", daemon=True)
+        self._thread.start()
+
+    def __enter__(self) -> Link:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _open(self) -> serial.SerialBase:
+        try:
+            timeout = _SOCKET_POLL_S if self._is_socket else _POLL_S
+            return serial.serial_for_url(self.port, baudrate=self._baud, timeout=timeout, write_timeout=2.0)
+        except (serial.SerialException, OSError, ValueError) as error:
+            reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+            raise InputError(
+                f"{self.port}: can't be opened ({reason}); give a device, a pseudo-terminal or socket://host:port"
+            ) from None
+
+    def close(self) -> None:
+        """Stop reading and close the port."""
+        self._closing.set()
+        self._thread.join(5.0)
+        with contextlib.suppress(OSError, serial.SerialException):
+            self._serial.close()
+
+    def write(self, data: bytes) -> None:
+        """Send bytes to the board; they are dropped while the connection is lost."""
+        with self._writing, contextlib.suppress(OSError, serial.SerialException):
+            self._serial.write(data)
+
+    def set_baud(self, baud: int) -> None:
+        """Change the speed of this side of the line."""
+        self._baud = baud
+        with contextlib.suppress(OSError, serial.SerialException, ValueError):
+            self._serial.baudrate = baud
+
+    def read(self, timeout_s: float = 0.2) -> Chunk | None:
+        """Return the next bytes, or None when none came in time.
+
+        Raises
+        ------
+        GfimuError
+            When the connection was lost and did not come back.
+        """
+        try:
+            chunk = self._chunks.get(timeout=timeout_s)
+        except queue.Empty:
+            return None
+        if isinstance(chunk, GfimuError):
+            raise chunk
+        return chunk
+
+    @property
+    def backlog(self) -> int:
+        """Chunks that wait for the caller."""
+        return self._chunks.qsize()
+
+    def _read(self) -> None:
+        after_break = False
+        while not self._closing.is_set():
+            try:
+                data = self._read_some()
+            except (serial.SerialException, OSError, TypeError):  # pyserial: TypeError when closed while reading
+                if self._closing.is_set():
+                    return
+                self.breaks += 1
+                after_break = True
+                self._put(Chunk(b"", time.monotonic(), after_break=True))
+                if not self._come_back():
+                    return
+                continue
+            if data:
+                self._put(Chunk(data, time.monotonic(), after_break))
+                after_break = False
+
+    def _read_some(self) -> bytes:
+        """Bytes that are there, or an empty string after a short wait."""
+        if self._is_socket:  # does not tell how many bytes wait
+            return bytes(self._serial.read(_READ_BYTES))
+        data = bytes(self._serial.read(1))
+        return data + bytes(self._serial.read(min(self._serial.in_waiting, _READ_BYTES))) if data else data
+
+    def _put(self, chunk: Chunk | GfimuError) -> None:
+        while not self._closing.is_set():
+            try:
+                self._chunks.put(chunk, timeout=_POLL_S)
+            except queue.Full:
+                continue
+            return
+
+    def _come_back(self) -> bool:
+        """Try to open the port again until the patience ends."""
+        with contextlib.suppress(OSError, serial.SerialException):
+            self._serial.close()
+        give_up = time.monotonic() + self._reconnect_s
+        pause = _FIRST_RETRY_S
+        while not self._closing.is_set() and time.monotonic() < give_up:
+            if self._closing.wait(pause):
+                return False
+            pause = min(2 * pause, _LONGEST_RETRY_S)
+            try:
+                fresh = self._open()
+            except InputError:
+                continue
+            with self._writing:
+                self._serial = fresh
+            return True
+        self._put(GfimuError(f"{self.port}: the connection was lost and did not come back in {self._reconnect_s:g} s"))
+        return False

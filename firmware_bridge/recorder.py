@@ -1,0 +1,339 @@
+"""Recording from a port: bytes to samples to a file, with clocks, gaps and what the board says about itself."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import gfimu
+from firmware_bridge.clock import ClockFit, HostClock
+from firmware_bridge.commands import Command, Identity, Reply, encode_command, parse_message
+from firmware_bridge.frames import FrameFormat, SampleDecoder, Samples, Status, StreamCounts, frame_format
+from firmware_bridge.journal import Journal
+from firmware_bridge.link import Link
+from gfimu.array import AccelerometerArray
+from gfimu.errors import GfimuError, InputError
+from gfimu.model_files import find_model, read_toml
+
+__all__ = ["Batch", "RecordReport", "SampleClock", "record"]
+
+_FLUSH_S = 0.25
+_NO_READING = -(1 << 15)
+_SILENCE_S = 5.0
+_ANSWER_S = 1.5
+_IDENTIFY_EVERY_S = 1.0
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Samples as they go to the file and to whoever looks on.
+
+    Parameters
+    ----------
+    t_s : ndarray, shape (n,)
+        Time on the board's clock, s; strictly increasing through the whole recording.
+    counts : ndarray, shape (n, c)
+        Full-resolution counts; NaN where a chip did not answer.
+    status : ndarray, shape (n,)
+        Status bits.
+    """
+
+    t_s: NDArray[np.float64]
+    counts: NDArray[np.float64]
+    status: NDArray[np.uint16]
+
+
+@dataclass(frozen=True)
+class RecordReport:
+    """What was recorded.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    duration_s : float
+        From the first to the last sample, board time, s.
+    stream : StreamCounts
+        Samples, lost, corrupt, skipped bytes, restarts of the board.
+    breaks : int
+        Times the connection was lost.
+    clock : ClockFit or None
+        Board clock against host clock.
+    identity : Identity or None
+        What the board said about itself.
+    status_counts : dict of str to int
+        Samples per status bit.
+    """
+
+    path: Path
+    duration_s: float
+    stream: StreamCounts
+    breaks: int
+    clock: ClockFit | None
+    identity: Identity | None
+    status_counts: dict[str, int] = field(default_factory=dict)
+
+
+class SampleClock:
+    """Puts samples of all segments on one time axis that never goes back.
+
+    Within a segment time is the board's own. After a restart of the board, or a break of the connection, the new
+    segment is placed as much later as the host's clock says has passed: the gap shows in the file as it was.
+    """
+
+    def __init__(self, tick_hz: float) -> None:
+        self._tick_hz = tick_hz
+        self._segment: int | None = None
+        self._origin_s = 0.0
+        self._last_s = -np.inf
+        self._last_host_s = 0.0
+
+    def place(self, samples: Samples, host_s: float) -> NDArray[np.float64]:
+        """Times (n,), s, of samples that were read at host time ``host_s``."""
+        board = samples.ticks / self._tick_hz
+        times = np.empty(len(board))
+        for segment in np.unique(samples.segment).tolist():
+            rows = samples.segment == segment
+            mine = board[rows]
+            if segment != self._segment:
+                if self._segment is None:
+                    self._origin_s = 0.0
+                else:
+                    behind = float(board[-1] - mine[0])  # the newest sample arrived just now
+                    passed = max(host_s - behind - self._last_host_s, 0.0)
+                    step = float(np.median(np.diff(mine))) if len(mine) > 1 else 1e-3
+                    self._origin_s = self._last_s + max(passed, 2 * step) - float(mine[0])
+                self._segment = segment
+            times[rows] = mine + self._origin_s
+            self._last_s = float(times[rows][-1])
+            self._last_host_s = host_s - float(board[-1] - mine[-1])
+        return times
+
+
+class _Session:
+    """State of one recording."""
+
+    def __init__(self, form: FrameFormat, array: AccelerometerArray, out: Path, metadata: dict[str, Any]) -> None:
+        self.decoder = SampleDecoder(form.name)
+        self.clock = HostClock()
+        self.times = SampleClock(form.clock_hz)
+        self.identity: Identity | None = None
+        self.refused: list[Reply] = []
+        self.asked = False
+        self.journal: Journal | None = None
+        self.first_s: float | None = None
+        self.last_s = 0.0
+        self.status_counts: dict[str, int] = {}
+        self.waiting_for_board = form.name == "lpc1768"  # for its answer to the setup, which tells the scale
+        self.give_up_s = time.monotonic() + _ANSWER_S
+        self._form, self._array, self._out, self._metadata = form, array, out, metadata
+        self._waiting: list[Batch] = []
+        self._flushed_at = 0.0
+        self._segment = 0
+
+    def take(self, data: bytes, host_s: float) -> Batch | None:
+        """Decode bytes read at ``host_s``; return the samples they complete."""
+        samples = self.decoder.feed(data)
+        for packet in self.decoder.messages:
+            message = parse_message(packet)
+            if isinstance(message, Identity) and self.asked:
+                self.identity = message
+            elif isinstance(message, Reply):
+                self.asked |= message.command == Command.IDENTIFY
+                if message.result:
+                    self.refused.append(message)
+        self.decoder.messages.clear()
+        if not len(samples):
+            return None
+        if int(samples.segment[-1]) != self._segment:
+            self._segment = int(samples.segment[-1])
+            self.clock.restart()
+        self.clock.add(float(samples.ticks[-1]) / self._form.clock_hz, host_s)
+        counts = samples.counts.astype(float)
+        if self._form.name == "lpc1768":
+            counts[samples.counts == _NO_READING] = np.nan
+            counts *= self.identity.count_size if self.identity else 1
+        if self.waiting_for_board:
+            if self.identity is None and host_s < self.give_up_s:
+                return None
+            self.waiting_for_board = False
+        batch = Batch(self.times.place(samples, host_s), counts, samples.status)
+        for flag in Status:
+            number = int(np.count_nonzero(samples.status & flag))
+            if number:
+                name = (flag.name or "").lower()
+                self.status_counts[name] = self.status_counts.get(name, 0) + number
+        if self.first_s is None:
+            self.first_s = float(batch.t_s[0])
+        self.last_s = float(batch.t_s[-1])
+        self._waiting.append(batch)
+        return batch
+
+    def flush(self, now_s: float, *, force: bool = False) -> None:
+        """Write what waits, a few times a second."""
+        if not self._waiting or not (force or now_s - self._flushed_at >= _FLUSH_S):
+            return
+        if self.journal is None:
+            if self.identity is not None:
+                self._metadata["sample_rate_hz"] = self.identity.rate_hz
+                self._metadata["range_g"] = self.identity.range_g
+                self._metadata["firmware"] = self.identity.firmware
+            self.journal = Journal(self._out, self._array.channels, self._metadata)
+        parts = self._waiting
+        self._waiting = []
+        self._flushed_at = now_s
+        self.journal.append(
+            np.concatenate([part.t_s for part in parts]),
+            np.concatenate([part.counts for part in parts]),
+            np.concatenate([part.status for part in parts]),
+        )
+
+
+def record(
+    port: str,
+    out: str | Path,
+    *,
+    duration_s: float | None = None,
+    form: str = "lpc1768",
+    array: str = "",
+    baud: int = 1_562_500,
+    setup: tuple[bytes, ...] = (),
+    reconnect_s: float = 60.0,
+    on_batch: Callable[[Batch, StreamCounts], None] | None = None,
+    stop: Callable[[], bool] | None = None,
+) -> RecordReport:
+    """Record from a port until the time is up, ``stop`` says so, or Ctrl-C.
+
+    Parameters
+    ----------
+    port : str
+        Device, pseudo-terminal or ``socket://host:port``.
+    out : str or Path
+        ``.csv`` or ``.parquet``; can be read at any moment, at most half a second behind.
+    duration_s : float, optional
+        Length of the recording, s of board time; by default until stopped.
+    form : str
+        Frame format: ``lpc1768`` or ``mimu4444``.
+    array : str
+        Array file; by default the format's.
+    baud : int
+        Bits per second.
+    setup : tuple of bytes
+        Commands to send first (`firmware_bridge.commands`); sent again when the board started anew.
+    reconnect_s : float
+        How long to wait for a lost connection, s.
+    on_batch : callable, optional
+        Is given each batch and the totals so far.
+    stop : callable, optional
+        Asked often; True ends the recording.
+
+    Raises
+    ------
+    InputError
+        If the port can't be opened, or nothing that is a frame comes.
+    """
+    target = Path(out)
+    if target.suffix not in {".csv", ".parquet"}:
+        raise InputError(f"{out}: unknown recording format {target.suffix!r}; use .csv or .parquet")
+    layout = frame_format(form)
+    carried = AccelerometerArray.load(array or layout.array)
+    if carried.n_channels != len(layout.channels):
+        raise InputError(f"array {carried.name!r} has {carried.n_channels} channels, {form} {len(layout.channels)}")
+    part = carried.chips[0].part
+    metadata: dict[str, Any] = {
+        "array": carried.name,
+        "part": part,
+        "lsb_m_s2": float(read_toml(find_model("parts", part))["lsb_m_s2"]),
+        "port": port,
+        "format": form,
+        "started_utc": datetime.now(UTC).isoformat(timespec="milliseconds"),
+        "software_version": gfimu.__version__,
+    }
+    session = _Session(layout, carried, target, metadata)
+    with Link(port, baud=baud, reconnect_s=reconnect_s) as link:
+        trouble = _run(link, session, duration_s, setup if form == "lpc1768" else (), on_batch, stop)
+        breaks = link.breaks
+    session.flush(time.monotonic(), force=True)
+    session.decoder.finish()
+    if session.refused and not session.journal:
+        refusal = session.refused[0]
+        raise InputError(f"{port}: the board refused command {refusal.command}: {refusal.result.name.lower()}")
+    if session.journal is None:
+        if isinstance(trouble, GfimuError):
+            raise trouble
+        raise InputError(
+            f"{port}: no {form} frame came; check the port, the baud rate ({baud}) and --format "
+            f"({session.decoder.counts.skipped_bytes} bytes were no frames)"
+        )
+    counts = session.decoder.counts
+    fit = session.clock.fit()
+    session.journal.finish(
+        {
+            "frames_lost": counts.lost,
+            "frames_corrupt": counts.corrupt,
+            "bytes_skipped": counts.skipped_bytes,
+            "board_restarts": counts.restarts,
+            "connection_breaks": breaks,
+            "status_counts": session.status_counts,
+            **({} if fit is None else {"host_clock": fit.__dict__}),
+            **({} if trouble is None else {"ended_by": str(trouble)}),
+        }
+    )
+    duration = session.last_s - (session.first_s or 0.0)
+    return RecordReport(target, duration, counts, breaks, fit, session.identity, session.status_counts)
+
+
+def _run(
+    link: Link,
+    session: _Session,
+    duration_s: float | None,
+    setup: tuple[bytes, ...],
+    on_batch: Callable[[Batch, StreamCounts], None] | None,
+    stop: Callable[[], bool] | None,
+) -> BaseException | None:
+    """Read until the end; return what ended the recording early, if anything did."""
+    heard_at = asked_at = time.monotonic()
+    for command in setup:
+        link.write(command)
+    if session.decoder.format.name == "lpc1768":
+        link.write(encode_command(Command.IDENTIFY))
+    restarts = 0
+    try:
+        while not (stop is not None and stop()):
+            chunk = link.read()
+            now = time.monotonic()
+            if chunk is not None:
+                if chunk.after_break:
+                    session.decoder.break_stream()
+                batch = session.take(chunk.data, chunk.host_s)
+                if session.decoder.counts.restarts > restarts:
+                    restarts = session.decoder.counts.restarts
+                    for command in setup:
+                        link.write(command)
+                if batch is not None:
+                    heard_at = now
+                    if on_batch is not None:
+                        on_batch(batch, session.decoder.counts)
+            session.flush(now)
+            if session.refused and session.journal is None:
+                return None
+            if session.first_s is not None and duration_s is not None:
+                if session.last_s - session.first_s >= duration_s:
+                    return None
+            if session.first_s is None and now - heard_at > _SILENCE_S:
+                return None
+            if session.identity is None and now - asked_at > _IDENTIFY_EVERY_S:
+                asked_at = now
+                link.write(encode_command(Command.IDENTIFY))
+    except KeyboardInterrupt:
+        return None
+    except GfimuError as error:
+        return error
+    return None
