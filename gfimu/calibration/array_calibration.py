@@ -28,7 +28,7 @@ def calibrate_array(
     motion: Recording | None = None,
     fit_positions: bool | None = None,
     rest_threshold: float | None = None,
-    min_rest_s: float = 3.0,
+    min_rest_s: float = 2.0,
 ) -> Calibration:
     """Calibrate all chips of an array in one body frame, and their positions where there is motion.
 

@@ -21,6 +21,7 @@ from gfimu.calibration.result import Calibration, combine
 from gfimu.calibration.six_position import six_position
 from gfimu.calibration.twelve_position import twelve_position
 from gfimu.errors import InputError, unknown_name
+from gfimu.part import Part
 from gfimu.recording import Recording
 from gfimu.rest import detect_rest
 from gfimu.units import STANDARD_GRAVITY
@@ -148,4 +149,6 @@ def _nominal_scales(recording: Recording, chips: tuple[str, ...]) -> dict[str, f
         return dict.fromkeys(chips, 1.0)
     if "lsb_m_s2" in recording.metadata:
         return dict.fromkeys(chips, 1.0 / float(recording.metadata["lsb_m_s2"]))
+    if "part" in recording.metadata:
+        return dict.fromkeys(chips, 1.0 / Part.load(str(recording.metadata["part"])).lsb)
     return {}

@@ -12,7 +12,7 @@ from gfimu.errors import GfimuError, InputError
 
 __all__ = ["app", "main"]
 
-COMMAND_FILES = ("demo", "score", "simulate", "estimate", "convert", "drift", "view")
+COMMAND_FILES = ("demo", "score", "simulate", "estimate", "convert", "drift", "calibrate", "noise", "view")
 
 app = typer.Typer(
     name="gfimu",

@@ -36,6 +36,9 @@ def _estimate(
     rest_bias: Annotated[
         bool, typer.Option("--rest-bias", help="Read the biases off the first rest (table level) and take them off.")
     ] = False,
+    calibration: Annotated[
+        Path | None, typer.Option("--calibration", help="Calibration to apply first (JSON, from `gfimu calibrate`).")
+    ] = None,
     position: Annotated[bool, typer.Option("--position", help="Integrate to velocity and position too.")] = False,
     rrd: Annotated[Path | None, typer.Option("--rrd", help="Rerun recording to write.")] = None,
     json: JsonOption = False,
@@ -44,12 +47,18 @@ def _estimate(
 
     Example: gfimu estimate run.parquet --rest-bias --out estimate.parquet
     """
+    from gfimu.calibration.result import load_calibration
+    from gfimu.calibration.run_file import open_calibrated_run
     from gfimu.estimate_summary import summarise
     from gfimu.estimation import estimate
     from gfimu.recording_formats import open_run
     from gfimu.rest_bias import estimate_from_rest
 
-    recording, geometry = open_run(run, None if array is None else load_array(array))
+    drawing = None if array is None else load_array(array)
+    if calibration is None:
+        recording, geometry = open_run(run, drawing)
+    else:
+        recording, geometry = open_calibrated_run(run, load_calibration(calibration), drawing)
     solve = estimate_from_rest if rest_bias else estimate
     found = solve(recording, geometry, method=method, form=form, with_position=position)
     found.write(out)

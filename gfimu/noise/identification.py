@@ -28,13 +28,13 @@ __all__ = ["TERMS", "NoiseModel", "NoiseTerm", "identify_noise", "model_variance
 Floats = NDArray[np.float64]
 
 TERMS = {
-    "Q": ("quantisation", "m/s"),
-    "N": ("velocity random walk", "m/s²/√Hz"),
-    "B": ("bias instability", "m/s²"),
-    "K": ("acceleration random walk", "m/s²/√s"),
-    "R": ("ramp", "m/s³"),
+    "Q": ("quantisation", "·s"),
+    "N": ("velocity random walk", "/√Hz"),
+    "B": ("bias instability", ""),
+    "K": ("acceleration random walk", "/√s"),
+    "R": ("ramp", "/s"),
 }
-"""Terms by symbol: name and unit."""
+"""Terms by symbol: name, and unit of the coefficient after that of the readings."""
 
 _ENTRY = 1e-4
 _SHORTEST = 200
@@ -72,11 +72,6 @@ class NoiseTerm:
     def name(self) -> str:
         """Name of the term."""
         return TERMS[self.symbol][0]
-
-    @property
-    def unit(self) -> str:
-        """Unit of the coefficient."""
-        return TERMS[self.symbol][1]
 
 
 @dataclass(frozen=True)

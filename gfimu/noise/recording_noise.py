@@ -53,15 +53,13 @@ class RecordingNoise:
         return {name: model for name, model in self.models.items() if name.startswith("gyro")}
 
     def rows(self) -> list[tuple[str, ...]]:
-        """Rows of a table for people: channel, each term with its interval, B read off the curve."""
+        """Rows of a table for people: channel, each term ± its standard deviation or below its limit, B by the minimum."""
         rows = []
         for channel, model in self.models.items():
             cells = []
             for symbol in TERMS:
                 term = model[symbol]
-                cells.append(
-                    f"{term.value:.4g} [{term.low:.3g}, {term.high:.3g}]" if term.found else f"< {term.high:.3g}"
-                )
+                cells.append(f"{term.value:.3g}±{term.std:.1g}" if term.found else f"<{term.high:.2g}")
             rows.append((channel, *cells, f"{model.allan.bias_instability:.3g}"))
         return rows
 
@@ -77,7 +75,7 @@ class RecordingNoise:
                     "terms": {
                         symbol: {
                             "name": term.name,
-                            "unit": term.unit,
+                            "unit": ("rad_s" if channel.startswith("gyro") else self.unit) + TERMS[symbol][1],
                             "found": term.found,
                             "value": term.value,
                             "low_95": term.low,

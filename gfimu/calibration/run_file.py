@@ -1,0 +1,71 @@
+"""Opening a recording in the unit that a calibration works in."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from gfimu.array import AccelerometerArray
+from gfimu.calibration.imu_tk import read_text_triad
+from gfimu.calibration.result import Calibration
+from gfimu.column_file import open_columns
+from gfimu.mimu4444 import is_mimu4444, read_mimu4444
+from gfimu.recording import Recording
+from gfimu.recording_formats import open_run
+
+__all__ = ["open_calibrated", "open_calibrated_run", "open_uncalibrated"]
+
+_TEXT = (".txt", ".txt.gz")
+
+
+def open_uncalibrated(path: str | Path, *, array: AccelerometerArray | None = None) -> Recording:
+    """Read a recording to calibrate from: raw counts stay counts, other units become m/s².
+
+    CSV and Parquet recordings, MIMU4444 streams, and plain text of rows ``time x y z`` (``.txt``, ``.txt.gz``) as
+    raw counts of one triad.
+
+    Raises
+    ------
+    InputError
+        As `gfimu.Recording.read` and the importers.
+    """
+    return _open(path, array, None)
+
+
+def open_calibrated(
+    path: str | Path, calibration: Calibration, *, array: AccelerometerArray | None = None
+) -> Recording:
+    """Read a recording in the unit of a calibration and correct it.
+
+    Raises
+    ------
+    InputError
+        As `gfimu.Recording.read`, or if the calibration does not fit the recording.
+    """
+    return calibration.apply(_open(path, array, "lsb" if calibration.unit == "lsb" else "m_s2"))
+
+
+def open_calibrated_run(
+    path: str | Path, calibration: Calibration, array: AccelerometerArray | None = None
+) -> tuple[Recording, AccelerometerArray]:
+    """Read a recording with its array and correct both: readings by the error models, positions where fitted.
+
+    Raises
+    ------
+    InputError
+        As `gfimu.recording_formats.open_run`, or if the calibration does not fit the recording.
+    """
+    recording, geometry = open_run(path, array)
+    if calibration.unit == "lsb":
+        recording = Recording.read(path, array=geometry, unit="lsb")
+    return calibration.apply(recording), calibration.calibrated_array(geometry)
+
+
+def _open(path: str | Path, array: AccelerometerArray | None, unit: str | None) -> Recording:
+    if str(path).endswith(_TEXT) and Path(path).is_file():
+        return read_text_triad(path)
+    if is_mimu4444(path):
+        return read_mimu4444(path)
+    if unit is None:
+        names = open_columns(path).names
+        unit = "lsb" if any(name.endswith("_lsb") for name in names) else "m_s2"
+    return Recording.read(path, array=array, unit=unit)

@@ -1,0 +1,149 @@
+"""`gfimu calibrate`: sensitivity, bias and alignment of the chips from a recording at rest."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from gfimu.cli.array_option import load_array
+from gfimu.cli.output import JsonOption, print_json, print_paths, print_table
+
+if TYPE_CHECKING:
+    from gfimu.calibration.result import Calibration
+
+__all__ = ["register"]
+
+_METHOD_NAMES = "six-position, recursive, multi-position, twelve-position, array, gyro"
+_PAIRS = ("xy", "xz", "yz")
+_NOTABLE = 0.9
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command(name="calibrate")(_calibrate)
+
+
+def _calibrate(
+    method: Annotated[str, typer.Argument(help=f"Method: {_METHOD_NAMES}.")],
+    run: Annotated[
+        Path,
+        typer.Argument(help="Recording of static poses: .csv, .parquet, a MIMU4444 stream, or text rows time x y z."),
+    ],
+    out: Annotated[Path, typer.Option("--out", help="Calibration file to write (JSON).")],
+    array: Annotated[
+        str | None, typer.Option("--array", help="Array: a name or .toml file; else the recording's own.")
+    ] = None,
+    gravity: Annotated[float | None, typer.Option("--gravity", help="Local gravity, m/s².")] = None,
+    latitude: Annotated[float | None, typer.Option("--latitude", help="Latitude, degrees: gravity from it.")] = None,
+    height: Annotated[float, typer.Option("--height", help="Height above the ellipsoid, m.")] = 0.0,
+    parameters: Annotated[
+        int | None, typer.Option("--parameters", help="Per chip: 12 (full matrix) or 9 (triangular).")
+    ] = None,
+    input_kind: Annotated[
+        str, typer.Option("--input", help="What the method is given: averaged, raw or wavelet.")
+    ] = "averaged",
+    rest_threshold: Annotated[
+        float | None,
+        typer.Option("--rest-threshold", help="Threshold of rest, reading unit squared; else from the data."),
+    ] = None,
+    min_rest: Annotated[
+        float | None, typer.Option("--min-rest", help="Shortest pose, s; 1 by default, 2 for array.")
+    ] = None,
+    levelling_std: Annotated[
+        float | None, typer.Option("--levelling-std", help="Standard deviation of a pose's tilt per axis, rad.")
+    ] = None,
+    motion: Annotated[
+        Path | None, typer.Option("--motion", help="array: recording with the motion, if it is another one.")
+    ] = None,
+    picture: Annotated[Path | None, typer.Option("--picture", help="Picture to write (.png, .svg, .pdf).")] = None,
+    json: JsonOption = False,
+) -> None:
+    """Calibrate the accelerometers of a recording, each parameter with its standard deviation.
+
+    Example: gfimu calibrate multi-position poses.csv --latitude 52.3 --height 80 --out calibration.json
+    """
+    from gfimu.calibration.array_calibration import calibrate_array
+    from gfimu.calibration.methods import METHODS, calibrate, calibrate_gyro
+    from gfimu.calibration.run_file import open_uncalibrated
+    from gfimu.errors import unknown_name
+    from gfimu.recording_formats import open_run
+
+    if method not in {*METHODS, "array", "gyro"}:
+        raise unknown_name("calibration method", method, (*METHODS, "array", "gyro"))
+    drawing = None if array is None else load_array(array)
+    local_gravity = _gravity(gravity, latitude, height)
+    recording = open_uncalibrated(run, array=drawing)
+    if method == "array":
+        result = calibrate_array(
+            recording,
+            drawing or open_run(run)[1],
+            gravity=local_gravity,
+            motion=None if motion is None else open_uncalibrated(motion, array=drawing),
+            rest_threshold=rest_threshold,
+            min_rest_s=min_rest or 2.0,
+        )
+    elif method == "gyro":
+        result = calibrate_gyro(recording, rest_threshold=rest_threshold, min_rest_s=min_rest or 1.0)
+    else:
+        result = calibrate(
+            method,
+            recording,
+            gravity=local_gravity,
+            n_parameters=parameters,
+            input_kind=input_kind,
+            rest_threshold=rest_threshold,
+            min_rest_s=min_rest or 1.0,
+            levelling_std_rad=levelling_std,
+        )
+    result.save(out)
+    written = {"calibration": out}
+    if picture is not None:
+        from gfimu.calibration.pictures import calibration_picture
+
+        calibration_picture(picture, result, recording)
+        written["picture"] = picture
+    if json:
+        print_json(result.to_dict() | {"files": written})
+    else:
+        _print(result)
+        print_paths(written.items())
+
+
+def _gravity(gravity: float | None, latitude: float | None, height: float) -> float:
+    from gfimu.errors import InputError
+    from gfimu.gravity import local_gravity
+    from gfimu.units import STANDARD_GRAVITY
+
+    if gravity is not None and latitude is not None:
+        raise InputError("give --gravity or --latitude, not both")
+    if latitude is not None:
+        return local_gravity(latitude, height)
+    return STANDARD_GRAVITY if gravity is None else gravity
+
+
+def _print(result: Calibration) -> None:
+    print_table(
+        f"{result.method} calibration, unit {result.unit}", ("parameter", "value", "std", "unit"), result.rows()
+    )
+    # Correlation is news where magnitudes alone leave a rotation open, and only there.
+    pairs = [
+        (f"{chip} {pair.upper()} / {pair[::-1].upper()}", f"{result.correlation_of(first, second):+.4f}")
+        for chip in result.chips
+        for pair in _PAIRS
+        if (first := f"{chip}_M_{pair}") in result.names
+        and (second := f"{chip}_M_{pair[::-1]}") in result.names
+        and abs(result.correlation_of(first, second)) > _NOTABLE
+    ]
+    if pairs:
+        print_table("correlation of the misalignments", ("pair", "correlation"), pairs)
+    print_table(
+        "fit",
+        ("quantity", "value"),
+        [(key, value if isinstance(value, str) else f"{value:.6g}") for key, value in result.statistics.items()],
+    )
+    for text in result.statements:
+        typer.echo(f"note: {text}")
+    for text in result.warnings:
+        typer.echo(f"warning: {text}")

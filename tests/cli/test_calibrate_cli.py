@@ -1,0 +1,219 @@
+"""The commands calibrate and noise, and a calibration used by estimate, as a user types them."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gfimu import AccelerometerArray, Estimate, Recording, specific_force
+from gfimu.calibration.result import load_calibration
+from gfimu.gravity import local_gravity
+from gfimu.noise import white_noise
+
+CUBE = AccelerometerArray.load("cube12")
+GRAVITY = local_gravity(52.3, 80.0)
+DIRECTIONS = np.array(
+    [(x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1) if 0 < abs(x) + abs(y) + abs(z) < 3], float
+)
+DIRECTIONS /= np.linalg.norm(DIRECTIONS, axis=1, keepdims=True)
+
+
+class Sensors:
+    """Twelve channels with gain, cross-axis and bias errors, the mean rotation against the drawing being zero."""
+
+    def __init__(self, seed=1):
+        rng = np.random.default_rng(seed)
+        relative = np.eye(3) + rng.normal(0, 0.01, (4, 3, 3))
+        relative -= ((relative - relative.swapaxes(1, 2)) / 2).mean(axis=0)
+        self.gain = np.zeros((12, 12))
+        for chip in range(4):
+            block = slice(3 * chip, 3 * chip + 3)
+            self.gain[block, block] = relative[chip]
+        self.bias = rng.normal(0, 0.35, 12)
+        self.rng = rng
+
+    def read(self, true, sigma=0.02):
+        return true @ self.gain.T + self.bias + self.rng.normal(0, sigma, true.shape)
+
+
+@pytest.fixture
+def sensors():
+    return Sensors()
+
+
+@pytest.fixture
+def poses(tmp_path, sensors):
+    """Eighteen poses of 5 s with motion between them."""
+    parts = []
+    for number, direction in enumerate(DIRECTIONS):
+        parts.append(np.tile(GRAVITY * direction, (500, 1)))
+        following = DIRECTIONS[(number + 1) % len(DIRECTIONS)]
+        share = np.linspace(0, 1, 150)[:, None]
+        shake = 4 * np.sin(np.linspace(0, 25, 150))[:, None]
+        parts.append(GRAVITY * ((1 - share) * direction + share * following) + shake)
+    p = np.concatenate(parts)
+    true = specific_force(CUBE, p, np.zeros((1, 3)), np.zeros((1, 3)))
+    path = tmp_path / "poses.parquet"
+    Recording.from_arrays(np.arange(len(p)) / 100, sensors.read(true), CUBE).write(path)
+    return path
+
+
+@pytest.fixture
+def run(tmp_path, sensors):
+    """A table turned back and forth for 20 s."""
+    t = np.arange(2000) / 100
+    axis = np.array([[0.0, 0.0, 1.0]])
+    true = specific_force(CUBE, GRAVITY * axis, np.cos(t)[:, None] * axis, np.sin(t)[:, None] * axis)
+    path = tmp_path / "run.parquet"
+    Recording.from_arrays(t, sensors.read(true), CUBE, reference={"tacho_rad_s": np.sin(t)}).write(path)
+    return path
+
+
+@pytest.mark.parametrize("method", ["six-position", "recursive", "multi-position", "twelve-position", "array"])
+def test_every_method(gfimu_command, poses, method):
+    out = poses.with_name("calibration.json")
+    place = ("--latitude", 52.3, "--height", 80)
+    result = gfimu_command("calibrate", method, poses, *place, "--out", out, "--json")
+    assert (result.code, result.stderr) == (0, "")
+    answer = json.loads(result.stdout)
+    assert answer["method"] == method
+    assert answer["gravity_m_s2"] == pytest.approx(9.812484, abs=1e-5)
+    assert len(answer["parameters"]) == 4 * (9 if method == "multi-position" else 12)
+    assert all(parameter["std"] > 0 for parameter in answer["parameters"])
+    assert load_calibration(out).to_dict() == {key: answer[key] for key in answer if key != "files"}
+
+
+def test_table_notes_and_picture(gfimu_command, poses):
+    out, picture = poses.with_name("calibration.json"), poses.with_name("calibration.png")
+    options = ("--parameters", 12, "--gravity", GRAVITY, "--picture", picture)
+    result = gfimu_command("calibrate", "multi-position", poses, "--out", out, *options)
+    assert result.code == 0
+    for words in ("a1_M_xy", "a4_b_z", "XY / YX", "correlation", "rest_threshold_chosen_by", "note: 3 directions"):
+        assert words in result.stdout
+    assert picture.read_bytes()[:4] == b"\x89PNG"
+
+
+def test_calibration_takes_the_drift_off(gfimu_command, poses, run):
+    out = poses.with_name("calibration.json")
+    assert gfimu_command("calibrate", "array", poses, "--gravity", GRAVITY, "--out", out).code == 0
+    errors = {}
+    for name, options in (("raw", ()), ("calibrated", ("--calibration", out))):
+        estimate = run.with_name(f"{name}.parquet")
+        result = gfimu_command("estimate", run, "--out", estimate, *options, "--json")
+        assert (result.code, result.stderr) == (0, "")
+        errors[name] = abs(Estimate.read(estimate).omega[-1, 2] - np.sin(19.99))
+    assert errors["raw"] > 5.0  # rad/s after 20 s
+    assert errors["calibrated"] < 0.05 * errors["raw"]
+
+
+def test_positions_from_a_second_recording(gfimu_command, poses, run):
+    out = poses.with_name("calibration.json")
+    options = ("--motion", run, "--gravity", GRAVITY)
+    result = gfimu_command("calibrate", "array", poses, *options, "--out", out)
+    assert result.code == 0
+    assert "not determined: the z position of every chip" in result.stdout
+    fitted = load_calibration(out).calibrated_array(CUBE).chip_positions
+    np.testing.assert_allclose(fitted, CUBE.chip_positions, atol=2e-3)
+
+
+def test_raw_counts(gfimu_command, tmp_path, poses, run):
+    """The same with counts: the calibration says so and estimate reads counts for it."""
+    counts = []
+    for path in (poses, run):
+        recording = Recording.read(path)
+        scaled = np.round(recording.readings / 0.03824)
+        counts.append(path.with_name(f"counts_{path.name}"))
+        columns = {"t_s": recording.t_s}
+        columns |= {f"{channel}_lsb": scaled[:, i] for i, channel in enumerate(recording.channels)}
+        lines = [
+            ",".join(columns),
+            *(",".join(f"{v:.10g}" for v in row) for row in zip(*columns.values(), strict=True)),
+        ]
+        counts[-1] = counts[-1].with_suffix(".csv")
+        counts[-1].write_text("\n".join(lines))
+    out = tmp_path / "calibration.json"
+    options = ("--array", "cube12", "--gravity", GRAVITY, "--out", out)
+    assert gfimu_command("calibrate", "array", counts[0], *options).code == 0
+    assert load_calibration(out).unit == "lsb"
+    estimate = tmp_path / "estimate.parquet"
+    result = gfimu_command("estimate", counts[1], "--array", "cube12", "--calibration", out, "--out", estimate)
+    assert (result.code, result.stderr) == (0, "")
+    assert abs(Estimate.read(estimate).omega[-1, 2] - np.sin(19.99)) < 0.5
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (
+            ("seven-position", "POSES"),
+            "unknown calibration method 'seven-position'; valid: array, gyro, multi-position",
+        ),
+        (("multi-position", "RUN"), "no rest found"),
+        (("multi-position", "POSES", "--gravity", 9.81, "--latitude", 50), "give --gravity or --latitude"),
+        (("multi-position", "POSES", "--latitude", 95), "latitude 95° is outside"),
+        (("multi-position", "POSES", "--gravity", 1), "not one in m/s²"),
+        (("multi-position", "POSES", "--parameters", 10), "choose 12"),
+        (("multi-position", "POSES", "--input", "boiled"), "unknown input 'boiled'"),
+        (("gyro", "POSES"), "lacks gyro_x_rad_s"),
+        (("array", "POSES", "--array", "mimu4444"), "column m11"),
+        (("multi-position", "missing.csv"), "missing.csv"),
+    ],
+)
+def test_bad_input(gfimu_command, poses, run, arguments, message):
+    places = {"POSES": poses, "RUN": run}
+    out = poses.with_name("none.json")
+    words = [places.get(word, word) for word in arguments]
+    result = gfimu_command("calibrate", *words, "--out", out)
+    assert result.code == 2
+    assert message in result.stderr
+    assert result.stderr.count("\n") == 1
+    assert "Traceback" not in result.stderr
+    assert not out.exists()
+
+
+def test_estimate_refuses_a_file_that_is_no_calibration(gfimu_command, run):
+    bad = run.with_name("bad.json")
+    bad.write_text("{}")
+    result = gfimu_command("estimate", run, "--calibration", bad, "--out", run.with_name("estimate.parquet"))
+    assert result.code == 2
+    assert "not a calibration file" in result.stderr
+
+
+@pytest.fixture
+def still(tmp_path):
+    rng = np.random.default_rng(4)
+    readings = np.column_stack([white_noise(20_000, 100.0, N, rng) for N in (0.003, 0.003, 0.004)])
+    path = tmp_path / "still.csv"
+    Recording(np.arange(20_000) / 100, readings, ("a11", "a12", "a13")).write(path)
+    return path
+
+
+def test_noise(gfimu_command, still):
+    kalibr, picture = still.with_name("imu.yaml"), still.with_name("allan.png")
+    result = gfimu_command("noise", still, "--kalibr", kalibr, "--picture", picture, "--json")
+    assert (result.code, result.stderr) == (0, "")
+    answer = json.loads(result.stdout)
+    terms = answer["channels"]["a13"]["terms"]
+    assert terms["N"]["value"] == pytest.approx(0.004, rel=0.03)
+    assert terms["N"]["low_95"] < terms["N"]["value"] < terms["N"]["high_95"]
+    assert not terms["K"]["found"]
+    assert answer["rate_hz"] == pytest.approx(100.0)
+    assert "accelerometer_noise_density" in Path(kalibr).read_text()
+    assert picture.read_bytes()[:4] == b"\x89PNG"
+    table = gfimu_command("noise", still)
+    assert table.code == 0
+    for words in ("a13", "velocity random walk", "m/s²/√Hz", "0.004±"):
+        assert words in table.stdout
+
+
+def test_noise_bad_input(gfimu_command, still, tmp_path):
+    for arguments, message in (
+        ((tmp_path / "none.csv",), "none.csv"),
+        ((still, "--stretch", "some"), "unknown stretch 'some'"),
+        ((still, "--rest-threshold", 1e-12), "no rest found"),
+    ):
+        result = gfimu_command("noise", *arguments)
+        assert result.code == 2
+        assert message in result.stderr
+        assert result.stderr.count("\n") == 1
