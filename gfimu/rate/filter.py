@@ -1,391 +1,20 @@
-"""Rate filter: angular acceleration integrated, the null space of J as measurement.
-
-The filter knows its biases' uncertainty, recognises rest (`gfimu.rate.rest_test`), widens its uncertainty with the
-scale-factor and placement errors it was told of, leaves out channels that are missing, saturated or stuck, and bridges
-gaps. It takes samples one at a time or in blocks, with the same answer.
-
-Over an interval the angular acceleration is integrated as the polynomial through the neighbouring samples. The default
-takes three on each side: the estimate for a sample appears when two more have come (`RateFilter.lag`).
-"""
+"""Rate filter over a whole recording: the causal estimate."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from gfimu.array import AccelerometerArray
-from gfimu.errors import InputError, unknown_name
-from gfimu.rate.recursion import (
-    Record,
-    RecursionInput,
-    RecursionOutput,
-    RecursionState,
-    Tables,
-    Tuning,
-    backward,
-    forward,
-    prepare,
-)
-from gfimu.rate.rest_test import RestTest
-from gfimu.rate.result import ChannelReport, RateEstimate, full_covariance
-from gfimu.rate.sensing import ChannelTables, SensorErrors
+from gfimu.errors import InputError
+from gfimu.rate.kalman import FilterSettings, join, spread_rest
+from gfimu.rate.live import LiveRateFilter
+from gfimu.rate.result import RateEstimate
+from gfimu.rate.sensing import SensorErrors
 
-__all__ = ["QUADRATURES", "FilterSettings", "RateFilter", "filter_rate", "quadrature_weights"]
-
-QUADRATURES = {"centred6": (6, 2), "centred4": (4, 1), "adams_moulton4": (4, 2), "trapezoid": (2, 0)}
-"""Samples of the stencil and the interval of it that is integrated; what lies behind it is the filter's lag."""
-
-_CHUNK = 4096
-_SMOOTHER_BLOCK = 512
-_MOST_CHANNELS = 62
-
-
-@dataclass(frozen=True)
-class FilterSettings:
-    """How the filter starts and what it relies on.
-
-    Parameters
-    ----------
-    start_omega : ndarray, shape (3,)
-        Rate at the first sample, rad/s.
-    start_std : float
-        Its uncertainty, rad/s. The default is a start at rest.
-    quadrature : {"centred6", "centred4", "adams_moulton4", "trapezoid"}
-        Integration of α: two samples late and of sixth order, one late, not late, of second order.
-    rest : RestTest or None
-        Recognition of rest; None to never use it.
-    """
-
-    start_omega: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
-    start_std: float = 1e-3
-    quadrature: str = "centred6"
-    rest: RestTest | None = field(default_factory=RestTest)
-
-    def __post_init__(self) -> None:
-        if self.quadrature not in QUADRATURES:
-            raise unknown_name("quadrature", self.quadrature, QUADRATURES)
-        if np.shape(self.start_omega) != (3,) or not np.isfinite(self.start_omega).all():
-            raise InputError("start_omega must hold three numbers, rad/s")
-        if not (np.isfinite(self.start_std) and self.start_std > 0):
-            raise InputError(f"start_std = {self.start_std!r}: must be a positive number, rad/s")
-
-
-def quadrature_weights(points: int) -> NDArray[np.float64]:
-    """Integrals of Lagrange's polynomials through ``points`` even nodes over each interval, (points − 1, points)."""
-    nodes = np.arange(points, dtype=float)
-    vandermonde = nodes ** np.arange(points)[:, None]  # (power, node)
-    power = np.arange(1, points + 1)[:, None]
-    moments = (nodes[1:] ** power - nodes[:-1] ** power) / power  # (power, interval)
-    return np.linalg.solve(vandermonde, moments).T
-
-
-class RateFilter:
-    """The filter as a process: takes samples, gives estimates `lag` samples later.
-
-    Parameters
-    ----------
-    array : AccelerometerArray
-        An array that sees all six motions.
-    errors : SensorErrors
-        Errors of its sensors.
-    period : float
-        Nominal sample period, s.
-    settings : FilterSettings, optional
-        Start, quadrature, rest.
-    gyro : bool
-        Whether a gyro is fused.
-
-    Raises
-    ------
-    GeometryError
-        If the array can't see all six motions.
-    """
-
-    def __init__(
-        self,
-        array: AccelerometerArray,
-        errors: SensorErrors,
-        period: float,
-        settings: FilterSettings | None = None,
-        *,
-        gyro: bool = False,
-        likelihood: bool = False,
-        capacity: int = _CHUNK,
-    ) -> None:
-        if not (np.isfinite(period) and period > 0):
-            raise InputError(f"sample period {period!r} s: must be a positive number")
-        if array.n_channels > _MOST_CHANNELS:
-            raise InputError(f"array {array.name!r} has {array.n_channels} channels; at most {_MOST_CHANNELS}")
-        self.array = array
-        self.errors = errors
-        self.period = period
-        self.settings = settings or FilterSettings()
-        self.tables = ChannelTables(array, errors)
-        points, position = QUADRATURES[self.settings.quadrature]
-        self.lag = points - 2 - position
-        self._gyro = gyro
-        c, d = array.n_channels, self.tables.n_null
-        self._axes = ((0,) * (9 + d + 3 * gyro), (0,) * d, (0,) * (3 * gyro))
-        rest = self.settings.rest
-        self._tuning = Tuning(
-            period,
-            quadrature_weights(points),
-            position,
-            1.0 / errors.noise_std,
-            errors.scale_std**2,
-            errors.placement_std**2 * float(np.mean(1.0 / errors.noise_std**2)),
-            errors.gyro_noise_std**2,
-            rest.window(period) if rest else 0,
-            rest.rate_std**2 if rest else 1.0,
-            rest.limits(c, d, period) if rest else np.zeros(6),
-            likelihood,
-        )
-        self.state = self._start()
-        self._compiled_tables = self._tables()
-        self._history = points + 2 + self._tuning.rest_window
-        self._buffer = _buffer(capacity + self._history + points, c, d)
-        self._received = 0  # rows of the buffer that hold samples
-        self._done = 0  # rows of the buffer that are estimated
-        self._limits = errors.limits
-        self._stuck_after = errors.stuck_after or np.iinfo(np.int64).max
-        self._held = np.full(c, np.nan)
-        self._run = np.zeros(c, dtype=np.int64)
-        self._tally = np.zeros((3, c), dtype=np.int64)
-        self._blind = 0
-        self._gaps = 0
-        self._record = empty_record(0, *self._axes)
-        self._kept: list[RecursionState] = []
-        self._last_time = -np.inf
-
-    def _start(self) -> RecursionState:
-        """State before the first sample."""
-        c, d, n = self.array.n_channels, self.tables.n_null, len(self._axes[0])
-        x = np.zeros(n)
-        x[:3] = self.settings.start_omega
-        covariance = np.zeros((n, n))
-        covariance[:3, :3] = np.eye(3) * self.settings.start_std**2
-        covariance[3 : 6 + d, 3 : 6 + d] = self.tables.bias_covariance(self.errors.bias_std)
-        covariance[6 + d : n - 3, 6 + d : n - 3] = np.eye(n - 9 - d) * self.errors.gyro_bias_std**2
-        rest = self.settings.rest
-        settles = np.array([rest is not None and not x.any() and self.settings.start_std <= rest.largest_rate_std])
-        return RecursionState(
-            x, covariance, np.zeros(3), np.zeros(4, dtype=np.int64), settles, x.copy(), covariance.copy(),
-            np.zeros(c),
-        )  # fmt: skip
-
-    def _tables(self) -> Tables:
-        tables = self.tables
-        return Tables(
-            tables.alpha_bias, tables.alpha_leak, tables.alpha_noise, tables.null_sensitivity, tables.null_bias,
-            tables.null_count, tables.plain, tables.alpha_rows, tables.null_rows,
-        )  # fmt: skip
-
-    @property
-    def omega(self) -> NDArray[np.float64]:
-        """Latest estimate, shape (3,), rad/s."""
-        return self.state.x[:3].copy()
-
-    @property
-    def covariance(self) -> NDArray[np.float64]:
-        """Covariance of the latest estimate, shape (3, 3), (rad/s)²."""
-        return self.state.covariance[:3, :3].copy()
-
-    @property
-    def report(self) -> ChannelReport:
-        """What was wrong with the channels so far."""
-        missing, saturated, stuck = (
-            {name: int(count) for name, count in zip(self.array.channels, row, strict=True) if count}
-            for row in self._tally
-        )
-        return ChannelReport(missing, saturated, stuck, self._blind, self._gaps)
-
-    def push(self, t: ArrayLike, readings: ArrayLike, gyro: ArrayLike | None = None) -> RateEstimate:
-        """Take one sample or a block and return the estimates that are ready.
-
-        Parameters
-        ----------
-        t : array_like, shape (n,) or scalar
-            Sample times, s, later than all before.
-        readings : array_like, shape (n, c) or (c,)
-            Specific force, m/s²; NaN where a channel is missing.
-        gyro : array_like, shape (n, 3) or (3,), optional
-            Gyro readings in body axes, rad/s; NaN where saturated or missing.
-
-        Raises
-        ------
-        InputError
-            If the shapes don't fit or time does not increase.
-        """
-        times = np.atleast_1d(np.asarray(t, dtype=float))
-        rows = np.atleast_2d(np.asarray(readings, dtype=float))
-        if rows.shape != (len(times), self.array.n_channels):
-            raise InputError(
-                f"readings have shape {rows.shape}; {len(times)} times of array {self.array.name!r} need "
-                f"({len(times)}, {self.array.n_channels})"
-            )
-        turning = None if gyro is None else np.atleast_2d(np.asarray(gyro, dtype=float))
-        if turning is not None and (not self._gyro or turning.shape != (len(times), 3)):
-            raise InputError("gyro needs one row of three per sample, and a filter made with gyro=True")
-        self._check_times(times)
-        out = empty_output(len(times) + self._received - self._done)
-        stamps = np.empty(len(out.nis))
-        filled = 0
-        for start in range(0, len(times), _CHUNK):
-            part = slice(start, start + _CHUNK)
-            self._take(times[part], rows[part], None if turning is None else turning[part])
-            filled = self._advance(self._received - self.lag, out, stamps, filled)
-        return self._estimate(out, stamps, filled)
-
-    def finish(self) -> RateEstimate:
-        """Return the estimates of the last samples, for which no more neighbours will come."""
-        out = empty_output(self._received - self._done)
-        stamps = np.empty(len(out.nis))
-        filled = self._advance(self._received, out, stamps, 0, closing=True)
-        return self._estimate(out, stamps, filled)
-
-    def record_run(self, t: ArrayLike, readings: ArrayLike, gyro: ArrayLike | None = None) -> RateEstimate:
-        """Filter a whole recording at once, keeping what `run_back` needs; the filter's capacity must hold it."""
-        times = np.asarray(t, dtype=float)
-        rows = np.asarray(readings, dtype=float)
-        if rows.shape != (len(times), self.array.n_channels):
-            raise InputError(
-                f"readings have shape {rows.shape}; {len(times)} times of array {self.array.name!r} need "
-                f"({len(times)}, {self.array.n_channels})"
-            )
-        self._check_times(times)
-        self._take(times, rows, None if gyro is None else np.asarray(gyro, dtype=float))
-        out = empty_output(len(times))
-        stamps = np.empty(len(times))
-        self._kept = []
-        for start in range(0, len(times), _SMOOTHER_BLOCK):
-            self._kept.append(self.state.copy())
-            self._advance(min(start + _SMOOTHER_BLOCK, len(times)), out, stamps, start, closing=True)
-        return self._estimate(out, stamps, len(times))
-
-    def run_back(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Smooth the recording of `record_run`: rates (n, 3) and covariances (n, 3, 3)."""
-        n = self._done
-        omega, covariance = np.empty((n, 3)), np.empty((n, 6))
-        size = len(self._axes[0])
-        adjoint, curvature = np.zeros(size), np.zeros((size, size))
-        record = empty_record(_SMOOTHER_BLOCK, *self._axes)
-        ignored = empty_output(_SMOOTHER_BLOCK)
-        for number in range(len(self._kept) - 1, -1, -1):
-            first = number * _SMOOTHER_BLOCK
-            last = min(first + _SMOOTHER_BLOCK, n)
-            forward(
-                self._buffer, first, last, n, self._compiled_tables, self._tuning, self._kept[number].copy(), ignored,
-                -first, record, *self._axes,
-            )  # fmt: skip
-            backward(record, last - first, adjoint, curvature, omega, covariance, first, self._axes[0])
-        return omega, full_covariance(covariance)
-
-    def _check_times(self, times: NDArray[np.float64]) -> None:
-        if len(times) == 0:
-            return
-        if not np.isfinite(times).all() or times[0] <= self._last_time or np.any(times[1:] <= times[:-1]):
-            raise InputError("sample times must be finite and increase; drop repeated or reordered samples")
-        self._last_time = float(times[-1])
-
-    def _take(self, t: NDArray[np.float64], readings: NDArray[np.float64], gyro: NDArray[np.float64] | None) -> None:
-        """Append samples to the buffer and reduce them to α and z."""
-        data = self._buffer
-        first = self._received
-        if first + len(t) > len(data.t):
-            moved = max(self._done - self._history, 0)
-            for column in data:
-                column[: first - moved] = column[moved:first].copy()
-            first -= moved
-            self._done -= moved
-        last = first + len(t)
-        data.t[first:last] = t
-        data.y[first:last] = readings
-        data.gyro[first:last] = np.nan if gyro is None else gyro
-        self._received = last
-        self._prepare(first, last)
-
-    def _prepare(self, first: int, last: int) -> None:
-        data = self._buffer
-        reached = first
-        while True:
-            reached = prepare(
-                reached, last, self.period, self.tables.masks, self._compiled_tables, self._limits,
-                self._stuck_after, self._held, self._run, self._tally, data,
-            )  # fmt: skip
-            if reached == last:
-                break
-            self.tables.index(self._missing(data.y[reached]))
-            self._compiled_tables = self._tables()
-        if last - first == 1:
-            self._blind += int(data.channel_set[first] < 0)
-            self._gaps += int(first > 0 and data.t[first] - data.t[first - 1] > 1.5 * self.period)
-        else:
-            self._blind += int(np.count_nonzero(data.channel_set[first:last] < 0))
-            self._gaps += int(np.count_nonzero(np.diff(data.t[max(first - 1, 0) : last]) > 1.5 * self.period))
-
-    def _missing(self, row: NDArray[np.float64]) -> int:
-        """Bits of the channels that can't be used in a sample."""
-        bad = ~(np.abs(row) < self._limits) | ((row == self._held) & (self._run + 1 >= self._stuck_after))
-        return sum(1 << int(channel) for channel in np.flatnonzero(bad))
-
-    def _advance(
-        self, until: int, out: RecursionOutput, stamps: NDArray[np.float64], filled: int, *, closing: bool = False
-    ) -> int:
-        """Estimate the samples up to row ``until`` of the buffer; returns how many are in ``out`` now."""
-        if until <= self._done or (not closing and self._received < self._tuning.weights.shape[1]):
-            return filled
-        first, self._done = self._done, until
-        forward(
-            self._buffer, first, until, self._received, self._compiled_tables, self._tuning, self.state, out,
-            filled - first, self._record, *self._axes,
-        )  # fmt: skip
-        count = until - first
-        stamps[filled : filled + count] = self._buffer.t[first:until]
-        return filled + count
-
-    def _estimate(self, out: RecursionOutput, stamps: NDArray[np.float64], count: int) -> RateEstimate:
-        return RateEstimate(
-            "filter",
-            stamps[:count],
-            out.omega[:count],
-            full_covariance(out.covariance[:count]),
-            out.nis[:count],
-            out.dof[:count],
-            out.rest[:count],
-            bias=self.state.x[3:-3].copy(),
-            bias_covariance=self.state.covariance[3:-3, 3:-3].copy(),
-            channels=self.report,
-        )
-
-
-def empty_output(n: int) -> RecursionOutput:
-    """Arrays for the estimates of n samples."""
-    return RecursionOutput(
-        np.empty((n, 3)), np.empty((n, 6)), np.empty(n), np.empty(n, dtype=np.int64), np.empty(n),
-        np.zeros(n, dtype=np.bool_),
-    )  # fmt: skip
-
-
-def empty_record(
-    length: int, states: tuple[int, ...], null_axes: tuple[int, ...], gyro_axes: tuple[int, ...]
-) -> Record:
-    """Record for the backward pass over ``length`` samples."""
-    n, updates = len(states), 2 * len(null_axes) + len(gyro_axes) + 3
-    return Record(
-        np.empty((length, 3)), np.empty((length, 3, n)), np.empty((length, 3, n)), np.empty(length, dtype=np.int64),
-        np.empty((length, updates, n)), np.empty((length, updates, n)), np.empty((length, updates)),
-        np.empty((length, updates)),
-    )  # fmt: skip
-
-
-def _buffer(rows: int, n_channels: int, n_null: int) -> RecursionInput:
-    return RecursionInput(
-        np.zeros(rows), np.zeros((rows, n_channels)), np.zeros((rows, 3)), np.zeros((rows, n_null)),
-        np.zeros(rows, dtype=np.int64), np.full((rows, 3), np.nan), np.zeros(rows, dtype=np.int64),
-        np.zeros(rows, dtype=np.int64), np.zeros((rows, 3)),
-    )  # fmt: skip
+__all__ = ["filter_rate", "run_filter"]
 
 
 def filter_rate(
@@ -406,7 +35,7 @@ def filter_rate(
     t : array_like, shape (n,)
         Sample times, s.
     readings : array_like, shape (n, c)
-        Specific force, m/s².
+        Specific force, m/s²; NaN where a channel is missing.
     errors : SensorErrors
         Errors of the sensors.
     settings : FilterSettings, optional
@@ -417,35 +46,50 @@ def filter_rate(
     Returns
     -------
     RateEstimate
+        With an unknown start the whole run of the hypothesis that won; ``sign`` tells from when on that was certain.
+        Before the rate first stands clear of the biases it is zero give or take all that they allow.
 
     Raises
     ------
     InputError
         If the shapes don't fit, time does not increase or there are fewer than two samples.
+    GeometryError
+        If the array can't see all six motions, or can't find an unknown start.
     """
+    return run_filter(array, t, readings, errors, settings, gyro=gyro)[0]
+
+
+def run_filter(
+    array: AccelerometerArray,
+    t: ArrayLike,
+    readings: ArrayLike,
+    errors: SensorErrors,
+    settings: FilterSettings | None = None,
+    *,
+    gyro: ArrayLike | None = None,
+) -> tuple[RateEstimate, LiveRateFilter]:
+    """Like `filter_rate`; also returns the filter as it is at the end."""
     times = np.asarray(t, dtype=float)
     if times.ndim != 1 or len(times) < 2:
         raise InputError("the filter needs at least two samples; record longer")
-    process = RateFilter(array, errors, float(np.median(np.diff(times))), settings, gyro=gyro is not None)
-    parts = [process.push(times, readings, gyro), process.finish()]
-    return RateEstimate(
-        "filter",
-        np.concatenate([part.t_s for part in parts]),
-        np.concatenate([part.omega for part in parts]),
-        np.concatenate([part.covariance for part in parts]),
-        np.concatenate([part.nis for part in parts]),
-        np.concatenate([part.nis_dof for part in parts]),
-        spread_rest(np.concatenate([part.rest for part in parts]), process),
-        bias=parts[-1].bias,
-        bias_covariance=parts[-1].bias_covariance,
-        channels=process.report,
-    )
-
-
-def spread_rest(ends: NDArray[np.bool_], process: RateFilter) -> NDArray[np.bool_]:
-    """Mark every sample of the blocks of rest that end at ``ends``, shape (n,)."""
-    window = process.settings.rest.window(process.period) if process.settings.rest else 0
-    rest = np.zeros(len(ends), dtype=bool)
-    for end in np.flatnonzero(ends):
-        rest[max(end - window + 1, 0) : end + 1] = True
-    return rest
+    live = LiveRateFilter(array, errors, float(np.median(np.diff(times))), settings, gyro=gyro is not None)
+    pushed, _ = live.push_raw(times, readings, gyro)
+    if not live.hypotheses:  # never clear of the biases
+        return live.describe(pushed[0]), live
+    last, _ = live.finish_raw()
+    rest = live.settings.rest
+    window = rest.window(live.period) if rest else 0
+    tracks = []
+    for number, first in enumerate(pushed):
+        # Once decided within the block, only the winner goes on.
+        if len(last) == len(pushed):
+            tracks.append(join([first, last[number]]))
+        elif number == live.winner:
+            tracks.append(join([first, last[0]]))
+    if live.sign.state == "decided" and len(tracks) == 2:  # decided by the very last samples
+        tracks = [tracks[live.winner]]
+    results = [
+        replace(hypothesis.estimate(track), sign=live.sign, rest=spread_rest(track.columns.rest, window))
+        for hypothesis, track in zip(live.hypotheses, tracks, strict=True)
+    ]
+    return (results[0] if len(results) == 1 else replace(results[0], mirrored=results[1])), live

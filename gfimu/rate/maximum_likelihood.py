@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from gfimu.array import AccelerometerArray
 from gfimu.rate.null_readings import align_signs, null_readings
 from gfimu.rate.result import RateEstimate, SignDecision
 from gfimu.rate.sensing import SensorErrors
 
-__all__ = ["maximum_likelihood_rate"]
+__all__ = ["maximum_likelihood_rate", "rate_of_null_space"]
 
 _ITERATIONS = 60
 _CONVERGED = 1e-10
@@ -64,6 +64,12 @@ def maximum_likelihood_rate(
     return RateEstimate(
         "ml", null.t, omega, covariance, squares, freedom, null.rest, SignDecision("undecided", 0.0)
     )  # fmt: skip
+
+
+def rate_of_null_space(z: NDArray[np.float64], sensitivity: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rate (3,) that fits one sample z (d,) = M s(ω) + white noise best, up to the sign, with M of shape (d, 6)."""
+    omega, _, _ = _solve(z[None], np.ascontiguousarray(sensitivity), _STARTS)
+    return omega[0]
 
 
 @njit(cache=True, error_model="numpy")

@@ -90,6 +90,7 @@ class RecursionState(NamedTuple):
     x: NDArray[np.float64]  # (n,)
     covariance: NDArray[np.float64]  # (n, n)
     scalars: NDArray[np.float64]  # (3,)
+    mean_alpha: NDArray[np.float64]  # (3,) over the filter's memory
     counts: NDArray[np.int64]  # (4,)
     settles: NDArray[np.bool_]  # (1,) the run starts at rest
     block_x: NDArray[np.float64]  # (n,) state when the block began
@@ -124,6 +125,7 @@ class RecursionOutput(NamedTuple):
     dof: NDArray[np.int64]  # (N,)
     likelihood: NDArray[np.float64]  # (N,)
     rest: NDArray[np.bool_]  # (N,) a block of rest ended here
+    manoeuvre: NDArray[np.float64]  # (N,) recent α against its uncertainty, squared
 
 
 class Record(NamedTuple):
@@ -516,7 +518,10 @@ def forward(  # type: ignore[no-untyped-def]
             plain = place == 0
             measured_rows = d if plain else tables.null_count[place]
             sensitivity = tables.null_sensitivity[place]
-            slow = covariance[0, 0] + covariance[1, 1] + covariance[2, 2] > _SLOW * (w0 * w0 + w1 * w1 + w2 * w2)
+            # The very first sample of a start in the dark is linearised where it is fitted.
+            slow = (state.counts[_SAMPLES] > 0 or settles) and covariance[0, 0] + covariance[1, 1] + covariance[
+                2, 2
+            ] > _SLOW * (w0 * w0 + w1 * w1 + w2 * w2)
             for i in range(measured_rows):
                 m = sensitivity[i]
                 h0 = 2.0 * w0 * m[0] + w1 * m[3] + w2 * m[4]
@@ -643,6 +648,7 @@ def forward(  # type: ignore[no-untyped-def]
         out.rest[target] = rest
         if tuning.likelihood:
             out.likelihood[target] = -0.5 * (nis + np.log(determinant))
+            out.manoeuvre[target] = _manoeuvre(data.corrected[k], tables.alpha_noise[noise_set], tuning, state)
 
 
 @njit(**_COMPILE)
@@ -685,6 +691,20 @@ def _remember(record, row, place, h, ph, inverse, innovation):  # type: ignore[n
         record.gain[row, place, r] = ph[r] * inverse
     record.inverse[row, place] = inverse
     record.innovation[row, place] = innovation
+
+
+@njit(**_COMPILE)
+def _manoeuvre(alpha, noise, tuning, state):  # type: ignore[no-untyped-def]
+    """Average α over the filter's memory 1/|ω|; returns its largest component in standard deviations, squared."""
+    x = state.x
+    speed = np.sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2])
+    weight = min(max(speed * tuning.period, tuning.period), 0.25)
+    largest = 0.0
+    for a in range(3):
+        state.mean_alpha[a] += weight * (alpha[a] - x[3 + a] - state.mean_alpha[a])
+        spread = noise[a, a] * weight / (2.0 - weight) + state.covariance[3 + a, 3 + a]
+        largest = max(largest, state.mean_alpha[a] * state.mean_alpha[a] / spread)
+    return largest
 
 
 @njit(**_COMPILE)

@@ -8,12 +8,15 @@ per sample.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from gfimu.array import AccelerometerArray
 from gfimu.errors import InputError
-from gfimu.rate.filter import FilterSettings, RateFilter, spread_rest
+from gfimu.rate.filter import run_filter
+from gfimu.rate.kalman import FilterSettings, KalmanRateFilter, spread_rest
 from gfimu.rate.result import RateEstimate
 from gfimu.rate.sensing import SensorErrors
 
@@ -60,18 +63,55 @@ def smooth_rate(
     if times.ndim != 1 or len(times) < 2:
         raise InputError("the smoother needs at least two samples; record longer")
     period = float(np.median(np.diff(times)))
-    process = RateFilter(array, errors, period, settings, gyro=gyro is not None, capacity=len(times))
-    forward = process.record_run(times, readings, gyro)
+    rows = np.asarray(readings, dtype=float)
+    turning = None if gyro is None else np.asarray(gyro, dtype=float)
+    chosen = settings or FilterSettings()
+    if chosen.start_omega is not None:
+        return _smooth(array, times, rows, errors, chosen, turning, period)
+    # Unknown start: the filter judges the hypotheses by the whole run, then those that remain are smoothed.
+    filtered, live = run_filter(array, times, rows, errors, chosen, gyro=turning)
+    if not live.hypotheses:
+        return replace(filtered, method="smoother")
+    first = int(np.argmax(filtered.t_s >= live.started_at_s))
+    smoothed = [
+        replace(
+            _prepend(filtered, first, _smooth(
+                array, times[first:], rows[first:], errors, hypothesis.settings,
+                None if turning is None else turning[first:], period,
+            )),
+            sign=live.sign,
+        )  # fmt: skip
+        for hypothesis in live.hypotheses
+    ]
+    return smoothed[0] if len(smoothed) == 1 else replace(smoothed[0], mirrored=smoothed[1])
+
+
+def _prepend(waiting: RateEstimate, count: int, result: RateEstimate) -> RateEstimate:
+    """Put the first ``count`` samples of ``waiting``, from before the start, before a result."""
+    columns = {
+        name: np.concatenate([getattr(waiting, name)[:count], getattr(result, name)])
+        for name in ("t_s", "omega", "covariance", "nis", "nis_dof", "rest")
+    }
+    return replace(result, **columns)
+
+
+def _smooth(
+    array: AccelerometerArray,
+    t: NDArray[np.float64],
+    readings: NDArray[np.float64],
+    errors: SensorErrors,
+    settings: FilterSettings,
+    gyro: NDArray[np.float64] | None,
+    period: float,
+) -> RateEstimate:
+    """Smooth with a known start."""
+    process = KalmanRateFilter(array, errors, period, settings, gyro=gyro is not None, capacity=len(t))
+    forward = process.record_run(t, readings, gyro)
     omega, covariance = process.run_back()
-    return RateEstimate(
-        "smoother",
-        times,
-        omega,
-        covariance,
-        forward.nis,
-        forward.nis_dof,
-        spread_rest(forward.rest, process),
-        bias=forward.bias,
-        bias_covariance=forward.bias_covariance,
-        channels=forward.channels,
+    window = settings.rest.window(period) if settings.rest else 0
+    return replace(
+        process.estimate(forward, "smoother"),
+        omega=omega,
+        covariance=covariance,
+        rest=spread_rest(forward.columns.rest, window),
     )

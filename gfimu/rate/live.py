@@ -1,0 +1,203 @@
+"""The rate filter as data arrive: known or unknown start, one sample at a time or in blocks, with the same answer."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gfimu.array import AccelerometerArray
+from gfimu.errors import InputError
+from gfimu.rate.kalman import FilterOutput, FilterSettings, KalmanRateFilter, empty_output, join
+from gfimu.rate.result import ChannelReport, RateEstimate, SignDecision, full_covariance
+from gfimu.rate.sensing import SensorErrors
+from gfimu.rate.sign import InitialRate, SignTest
+
+__all__ = ["LiveRateFilter"]
+
+_UNKNOWN_STD = 3.0  # of an unknown start, in units of the rate found there
+_LEAST_STD = 3.0  # rad/s
+
+
+class LiveRateFilter:
+    """Rate filter for a stream of samples.
+
+    Parameters
+    ----------
+    array : AccelerometerArray
+        An array that sees all six motions.
+    errors : SensorErrors
+        Errors of its sensors.
+    period : float
+        Nominal sample period, s.
+    settings : FilterSettings, optional
+        Start, quadrature, rest. With ``start_omega=None`` two filters follow ω and −ω until the sign is decided.
+    gyro : bool
+        Whether gyro readings come along.
+
+    Raises
+    ------
+    GeometryError
+        If the array can't see all six motions, or can't find an unknown start.
+
+    Examples
+    --------
+    >>> live = LiveRateFilter(array, SensorErrors.from_parts(array, 100.0), 0.01)  # doctest: +SKIP
+    >>> for t, reading in stream:  # doctest: +SKIP
+    ...     estimate = live.push(t, reading)
+    """
+
+    def __init__(
+        self,
+        array: AccelerometerArray,
+        errors: SensorErrors,
+        period: float,
+        settings: FilterSettings | None = None,
+        *,
+        gyro: bool = False,
+    ) -> None:
+        self.array = array
+        self.errors = errors
+        self.period = period
+        self.settings = settings or FilterSettings()
+        self._gyro = gyro
+        self._sign = SignDecision()
+        self._test = SignTest()
+        self.hypotheses: list[KalmanRateFilter] = []
+        self._limit = np.inf
+        self.started_at_s = np.nan
+        if self.settings.start_omega is not None:
+            self.hypotheses = [KalmanRateFilter(array, errors, period, self.settings, gyro=gyro)]
+        else:
+            self._sign = SignDecision("undecided", 0.0)
+            self._initial = InitialRate(array, errors)
+
+    @property
+    def sign(self) -> SignDecision:
+        """Whether the sign of ω is certain."""
+        return self._sign
+
+    @property
+    def current(self) -> KalmanRateFilter:
+        """The filter whose estimates are returned: the winner, or while undecided the first of the two."""
+        if not self.hypotheses:
+            raise InputError("the rate has not stood clear of the biases yet; an unknown start needs that")
+        return self.hypotheses[0]
+
+    @property
+    def winner(self) -> int:
+        """Which hypothesis won, 0 or 1; 0 while undecided."""
+        return self._test.winner or 0
+
+    @property
+    def report(self) -> ChannelReport:
+        """What was wrong with the channels so far."""
+        return self.current.report if self.hypotheses else ChannelReport()
+
+    def push(self, t: ArrayLike, readings: ArrayLike, gyro: ArrayLike | None = None) -> RateEstimate:
+        """Take one sample or a block; returns the estimates that are ready (the last ones need two more samples).
+
+        Parameters
+        ----------
+        t : array_like, shape (n,) or scalar
+            Sample times, s, later than all before.
+        readings : array_like, shape (n, c) or (c,)
+            Specific force, m/s²; NaN where a channel is missing.
+        gyro : array_like, shape (n, 3) or (3,), optional
+            Gyro readings in body axes, rad/s; NaN where saturated or missing.
+
+        Raises
+        ------
+        InputError
+            If the shapes don't fit or time does not increase.
+        """
+        return self._result(*self.push_raw(t, readings, gyro))
+
+    def finish(self) -> RateEstimate:
+        """Return the estimates of the last samples, for which no more neighbours will come."""
+        return self._result(*self.finish_raw())
+
+    def push_raw(
+        self, t: ArrayLike, readings: ArrayLike, gyro: ArrayLike | None = None
+    ) -> tuple[list[FilterOutput], int | None]:
+        """Like `push`, with the outputs of all hypotheses, and the sample that decided if one did."""
+        times = np.atleast_1d(np.asarray(t, dtype=float))
+        rows = np.atleast_2d(np.asarray(readings, dtype=float))
+        turning = None if gyro is None else np.atleast_2d(np.asarray(gyro, dtype=float))
+        if self.hypotheses:
+            return self._judge([hypothesis.push(times, rows, turning) for hypothesis in self.hypotheses])
+        waiting, first = self._wait(times, rows)
+        outputs = [
+            join([waiting, hypothesis.push(times[first:], rows[first:], None if turning is None else turning[first:])])
+            for hypothesis in self.hypotheses
+        ]
+        return self._judge(outputs) if outputs else ([waiting], None)
+
+    def finish_raw(self) -> tuple[list[FilterOutput], int | None]:
+        """Like `finish`, with the outputs of all hypotheses, and the sample that decided if one did."""
+        if not self.hypotheses:
+            return [FilterOutput(np.empty(0), empty_output(0))], None
+        return self._judge([hypothesis.finish() for hypothesis in self.hypotheses])
+
+    def _wait(self, t: NDArray[np.float64], rows: NDArray[np.float64]) -> tuple[FilterOutput, int]:
+        """Wait for a sample to start from; returns what is known until then, and the place of that sample."""
+        if rows.shape != (len(t), self.array.n_channels):
+            raise InputError(f"readings have shape {rows.shape}; {len(t)} times of array {self.array.name!r} need "
+                             f"({len(t)}, {self.array.n_channels})")
+        columns = empty_output(len(t))
+        for column in (columns.omega, columns.covariance, columns.nis, columns.dof, columns.likelihood,
+                       columns.manoeuvre):  # fmt: skip
+            column[:] = 0
+        complete = (np.abs(rows) < self.errors.limits).all(axis=1)
+        for place in range(len(t)):
+            if complete[place]:
+                found, clear = self._initial.find(rows[place])
+                if clear:
+                    self._begin(found)
+                    self.started_at_s = float(t[place])
+                    return FilterOutput(t, columns).rows(slice(0, place)), place
+                self._limit = self._initial.limit(found)
+            columns.covariance[place, :3] = self._limit**2
+        return FilterOutput(t, columns), len(t)
+
+    def _begin(self, found: NDArray[np.float64]) -> None:
+        """Start both hypotheses."""
+        std = max(_UNKNOWN_STD * float(np.linalg.norm(found)), _LEAST_STD)
+        for sign in (1.0, -1.0):
+            start = replace(self.settings, start_omega=sign * found, start_std=std)
+            self.hypotheses.append(
+                KalmanRateFilter(self.array, self.errors, self.period, start, gyro=self._gyro, likelihood=True)
+            )
+
+    def _judge(self, outputs: list[FilterOutput]) -> tuple[list[FilterOutput], int | None]:
+        """Compare the hypotheses; once decided, drop the loser."""
+        if len(outputs) < 2:
+            return outputs, None
+        place = self._test.update(outputs[0].columns, outputs[1].columns)
+        ratio = self._test.log_likelihood_ratio
+        if place is None:
+            self._sign = SignDecision("undecided", ratio)
+        else:
+            self._sign = SignDecision("decided", abs(ratio), float(outputs[0].t[place]))
+            self.hypotheses = [self.hypotheses[self.winner]]
+        return outputs, place
+
+    def _result(self, outputs: list[FilterOutput], place: int | None) -> RateEstimate:
+        if not self.hypotheses:
+            return self.describe(outputs[0])
+        if len(outputs) == 1:
+            return replace(self.current.estimate(outputs[0]), sign=self._sign)
+        if place is not None:
+            parts = [outputs[0].rows(slice(0, place)), outputs[self.winner].rows(slice(place, None))]
+            return replace(self.current.estimate(join(parts)), sign=self._sign)
+        mirrored = replace(self.hypotheses[1].estimate(outputs[1]), sign=self._sign)
+        return replace(self.current.estimate(outputs[0]), sign=self._sign, mirrored=mirrored)
+
+    def describe(self, waiting: FilterOutput) -> RateEstimate:
+        """Turn output from before the start into a result."""
+        columns = waiting.columns
+        return RateEstimate(
+            "filter", waiting.t, columns.omega, full_covariance(columns.covariance), columns.nis, columns.dof,
+            columns.rest, self._sign,
+        )  # fmt: skip
