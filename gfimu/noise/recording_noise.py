@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -53,13 +54,17 @@ class RecordingNoise:
         return {name: model for name, model in self.models.items() if name.startswith("gyro")}
 
     def rows(self) -> list[tuple[str, ...]]:
-        """Rows of a table for people: channel, each term ± its standard deviation or below its limit, B by the minimum."""
+        """Rows of a table for people: channel, each term, and B by the minimum of the curve.
+
+        A term found is written with its standard deviation in units of the last digit, 0.00453(7); another one as
+        below its 95 % limit.
+        """
         rows = []
         for channel, model in self.models.items():
             cells = []
             for symbol in TERMS:
                 term = model[symbol]
-                cells.append(f"{term.value:.3g}±{term.std:.1g}" if term.found else f"<{term.high:.2g}")
+                cells.append(_concise(term.value, term.std) if term.found else f"<{term.high:.2g}")
             rows.append((channel, *cells, f"{model.allan.bias_instability:.3g}"))
         return rows
 
@@ -93,6 +98,12 @@ class RecordingNoise:
                 for channel, model in self.models.items()
             },
         }
+
+
+def _concise(value: float, std: float) -> str:
+    """Write a value with its standard deviation in units of its last digit: 0.00453(7)."""
+    decimals = max(-math.floor(math.log10(std)), 0)
+    return f"{value:.{decimals}f}({max(round(std * 10**decimals), 1)})"
 
 
 def recording_noise(
