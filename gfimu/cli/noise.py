@@ -58,9 +58,13 @@ def _noise(
     unit = {"m_s2": "m/s²"}.get(result.unit, result.unit)
     print_table(
         f"noise over {result.duration_s:.1f} s from {result.start_s:.1f} s, {result.rate:.4g} Hz, readings in {unit}",
-        ("channel", *TERMS, "B by minimum"),
+        ("channel", *result.shown, "B by minimum"),
         result.rows(),
-        note="; ".join(f"{symbol} {name}, {_times(unit, power)}" for symbol, (name, power) in TERMS.items())
+        note="; ".join(
+            f"{symbol} {name}, {_times(unit, power)}"
+            for symbol, (name, power) in TERMS.items()
+            if symbol in result.shown
+        )
         + "; <: not found, 95 % limit",
     )
     print_paths(written.items())

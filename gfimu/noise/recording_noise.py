@@ -53,18 +53,23 @@ class RecordingNoise:
         """Models of the reference gyro's axes."""
         return {name: model for name, model in self.models.items() if name.startswith("gyro")}
 
+    @property
+    def shown(self) -> tuple[str, ...]:
+        """Symbols of the terms worth a column: N, B, K, and others found on a channel."""
+        return tuple(
+            symbol for symbol in TERMS if symbol in "NBK" or any(model[symbol].found for model in self.models.values())
+        )
+
     def rows(self) -> list[tuple[str, ...]]:
-        """Rows of a table for people: channel, each term, and B by the minimum of the curve.
+        """Rows of a table for people: channel, each of the terms `shown`, and B by the minimum of the curve.
 
         A term found is written with its standard deviation in units of the last digit, 0.00453(7); another one as
         below its 95 % limit.
         """
         rows = []
         for channel, model in self.models.items():
-            cells = []
-            for symbol in TERMS:
-                term = model[symbol]
-                cells.append(_concise(term.value, term.std) if term.found else f"<{term.high:.2g}")
+            terms = [model[symbol] for symbol in self.shown]
+            cells = [_concise(term.value, term.std) if term.found else f"<{term.high:.2g}" for term in terms]
             rows.append((channel, *cells, f"{model.allan.bias_instability:.3g}"))
         return rows
 
