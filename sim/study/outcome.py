@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import importlib.util
+import importlib
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -107,14 +107,10 @@ def _load_function(source: str) -> Callable[..., Any]:
     path = Path(file)
     if not path.is_file():
         raise InputError(f"{source}: give the generator as FILE.py:FUNCTION with an existing file")
-    name = f"study_source_{path.stem}"
-    if name not in sys.modules:
-        spec = importlib.util.spec_from_file_location(name, path)
-        if spec is None or spec.loader is None:
-            raise InputError(f"{source}: not a Python file")
-        sys.modules[name] = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(sys.modules[name])
-    return getattr(sys.modules[name], function)
+    folder = str(path.resolve().parent)
+    if folder not in sys.path:
+        sys.path.insert(0, folder)
+    return getattr(importlib.import_module(path.stem), function)
 
 
 def run_case(case: Case, source: str = "") -> dict[str, Any]:
