@@ -98,7 +98,7 @@ class Adxl345Options:
 
 
 def format_count(raw: int, data_format: int, bw_rate: int) -> int:
-    """Data register value, 0…65535, of one raw conversion under DATA_FORMAT and BW_RATE."""
+    """Return the data register value, 0…65535, of one raw conversion under DATA_FORMAT and BW_RATE."""
     rng = data_format & 3
     full = data_format & FULL_RESOLUTION
     bits = 10 + rng if full else 10

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from multiprocessing.connection import Connection
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import Any, Self
 
 from firmware_bridge.adxl345_device import TICKS_PER_SECOND, Adxl345, Adxl345Options, LineFault
 from firmware_bridge.lpc1768.build import IMAGES, image_path
@@ -86,7 +86,7 @@ class BoardProcess:
         theirs.close()
         self._call("ready")
 
-    def __enter__(self) -> BoardProcess:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(

@@ -128,7 +128,7 @@ def set_range(range_g: int, *, full_resolution: bool = True) -> bytes:
     return encode_command(Command.SET_RANGE, range_g.bit_length() - 2, int(full_resolution))
 
 
-def parse_message(packet: np.void) -> Reply | Identity | None:
+def parse_message(packet: Any) -> Reply | Identity | None:
     """Read an identity or reply frame; None for other types."""
     payload = np.asarray(packet["counts"], dtype="<i2").tobytes()
     if packet["type"] == FrameType.REPLY:

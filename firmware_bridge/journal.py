@@ -111,7 +111,8 @@ class Journal:
     def _finish_parquet(self, journal: io.BufferedReader, target: Path, metadata: Mapping[str, Any]) -> None:
         types = {name: pa.float64() if name == "t_s" else pa.int16() for name in self.columns}
         types["status"] = pa.uint16()
-        schema = pa.schema(list(types.items()), metadata={b"gfimu": json.dumps(metadata).encode()})
+        described = {key.encode(): json.dumps(value).encode() for key, value in metadata.items()}
+        schema = pa.schema(list(types.items()), metadata=described)
         with pq.ParquetWriter(target, schema, compression="zstd") as writer:
             if not self.samples:
                 return

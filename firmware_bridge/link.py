@@ -8,6 +8,7 @@ import threading
 import time
 from dataclasses import dataclass
 from types import TracebackType
+from typing import Any, Self
 
 import serial
 
@@ -76,7 +77,7 @@ class Link:
         self._thread = threading.Thread(target=self._read, name=f"link {port}", daemon=True)
         self._thread.start()
 
-    def __enter__(self) -> Link:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(
@@ -84,7 +85,7 @@ class Link:
     ) -> None:
         self.close()
 
-    def _open(self) -> serial.SerialBase:
+    def _open(self) -> Any:
         try:
             timeout = _SOCKET_POLL_S if self._is_socket else _POLL_S
             return serial.serial_for_url(self.port, baudrate=self._baud, timeout=timeout, write_timeout=2.0)

@@ -96,7 +96,7 @@ class SampleClock:
         self._last_host_s = 0.0
 
     def place(self, samples: Samples, host_s: float) -> NDArray[np.float64]:
-        """Times (n,), s, of samples that were read at host time ``host_s``."""
+        """Return times (n,), s, of samples that were read at host time ``host_s``."""
         board = samples.ticks / self._tick_hz
         times = np.empty(len(board))
         for segment in np.unique(samples.segment).tolist():
@@ -324,9 +324,9 @@ def _run(
             session.flush(now)
             if session.refused and session.journal is None:
                 return None
-            if session.first_s is not None and duration_s is not None:
-                if session.last_s - session.first_s >= duration_s:
-                    return None
+            started = session.first_s is not None and duration_s is not None
+            if started and session.last_s - session.first_s >= duration_s:  # type: ignore[operator]
+                return None
             if session.first_s is None and now - heard_at > _SILENCE_S:
                 return None
             if session.identity is None and now - asked_at > _IDENTIFY_EVERY_S:

@@ -1,1 +1,1 @@
-"""The emulated LPC1768 board. Needs the extra `firmware`; runs in a process of its own (`firmware_bridge.board_process`)."""
+"""The emulated LPC1768 board; needs the extra `firmware` and runs in a process of its own (`board_process`)."""

@@ -47,10 +47,10 @@ class Tracer(Protocol):
     """Takes note of what happens on the board."""
 
     def access(self, ticks: int, peripheral: str, offset: int, value: int, *, write: bool) -> None:
-        """A register was read or written."""
+        """Note that a register was read or written."""
 
     def exception(self, ticks: int, number: int, *, entered: bool) -> None:
-        """An exception was entered or left."""
+        """Note that an exception was entered or left."""
 
 
 class Board:
@@ -231,13 +231,13 @@ class Board:
         return slot == last_slot and self.accesses == last_access + 1
 
     def wait_until(self, when: int) -> None:
-        """The program polls: skip to ``when``, or to the next event if that is earlier."""
+        """Let a polling program skip to ``when``, or to the next event if that is earlier."""
         self.now = max(self.now, min(when, self.until))
         if self.now >= self.until:
             self.service()
 
     def change_clock(self, cycle: int) -> None:
-        """The core clock or a peripheral divider changes; every counter goes on from its present count."""
+        """Change the core clock or a peripheral divider; every counter goes on from its present count."""
         for peripheral in self._peripherals if self._ready else ():
             peripheral.clock_will_change()
         self.cycle = cycle
@@ -347,7 +347,7 @@ class Board:
                     return
             pend(number)
 
-        self.nvic.pend = lossy  # type: ignore[method-assign]
+        self.nvic.pend = lossy  # type: ignore[method-assign,assignment]
 
     def word(self, symbol: str) -> int:
         """Value of a 32-bit variable of the firmware."""

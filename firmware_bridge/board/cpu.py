@@ -31,7 +31,7 @@ try:
 except ImportError:  # the extra is not installed; `require_unicorn` says so
     unicorn = None
 
-__all__ = ["Cpu", "require_unicorn"]
+__all__ = ["Cpu", "require_unicorn", "unicorn_parts"]
 
 FLASH_SIZE, RAM_BASE, RAM_SIZE, AHB_RAM_BASE, AHB_RAM_SIZE = 512 << 10, 0x10000000, 32 << 10, 0x2007C000, 32 << 10
 _EXC_RETURN = 0xFFFFFFF0
@@ -48,6 +48,12 @@ def require_unicorn() -> None:
     """Raise `InputError` that says what to install when the emulator is missing."""
     if unicorn is None:
         raise InputError("the board needs the emulator unicorn, which is not installed; pip install 'gfimu[firmware]'")
+
+
+def unicorn_parts() -> tuple[Any, Any, Any]:
+    """Return the emulator's package, its ARM constants and its binding; raises `InputError` without it."""
+    require_unicorn()
+    return unicorn, arm, binding
 
 
 class _Registers:

@@ -11,7 +11,7 @@ class CycleCounter(Peripheral):
     """CYCCNT counts core clock cycles while DWT_CTRL bit 0 is set."""
 
     def reset(self) -> None:
-        """Stopped, at zero."""
+        """Stop, at zero."""
         self.control = 0x40000000
         self.base = 0
         self.count = 0

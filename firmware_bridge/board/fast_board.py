@@ -17,9 +17,8 @@ from typing import Any
 import numpy as np
 
 from firmware_bridge.adxl345_device import Adxl345, LineFault
-from firmware_bridge.board import cpu as cpu_module
 from firmware_bridge.board.board import Board
-from firmware_bridge.board.cpu import AHB_RAM_BASE, AHB_RAM_SIZE, FLASH_SIZE, RAM_BASE, RAM_SIZE, Cpu
+from firmware_bridge.board.cpu import AHB_RAM_BASE, AHB_RAM_SIZE, FLASH_SIZE, RAM_BASE, RAM_SIZE, Cpu, unicorn_parts
 from firmware_bridge.board.faults import FaultKind
 from firmware_bridge.board.gpio import Gpio
 from firmware_bridge.board.nvic import Nvic
@@ -37,6 +36,12 @@ __all__ = ["FastBoard", "build_native"]
 _SOURCE = Path(__file__).resolve().parent / "native" / "board.c"
 _FLAGS = ("-std=gnu11", "-O2", "-g0", "-shared", "-fPIC", "-Wall", "-Wextra", "-Werror", "-fno-sanitize=undefined")
 _KINDS: dict[type[Peripheral], str] = {Nvic: "n", Timer: "t", Uart: "u", Ssp: "s", Gpio: "g", SysTick: "k"}
+_UNICORN_FUNCTIONS = (
+    "reg_read", "reg_write", "reg_read_batch", "reg_write_batch", "emu_start", "emu_stop", "mmio_map", "hook_add",
+)  # fmt: skip
+_UNICORN_REGISTERS = (
+    "R0", "R1", "R2", "R3", "R12", "LR", "XPSR", "SP", "CONTROL", "PC", "PRIMASK", "BASEPRI", "FAULTMASK", "MSP", "PSP",
+)  # fmt: skip
 _BIT_BAND = 62, 63  # numbers of the two bit-band aliases in call-backs
 _RUN_RESET, _RUN_UNICORN, _RUN_INTR, _RUN_STACKING = 1, 1000, 2000, 3000
 
@@ -260,10 +265,9 @@ class FastBoard(Board):
             self.shared.reset_requested = -1 if cause is None else cause
 
     def _map(self) -> None:
-        binding, arm = cpu_module.binding, cpu_module.arm
-        functions = ("reg_read", "reg_write", "reg_read_batch", "reg_write_batch")
-        functions += ("emu_start", "emu_stop", "mmio_map", "hook_add")
-        addresses = [ctypes.cast(getattr(binding.uclib, f"uc_{name}"), ctypes.c_void_p) for name in functions]
+        unicorn, arm, binding = unicorn_parts()
+        self._error = unicorn.UcError
+        addresses = [ctypes.cast(getattr(binding.uclib, f"uc_{name}"), ctypes.c_void_p) for name in _UNICORN_FUNCTIONS]
         api = (ctypes.c_void_p * len(addresses))(*[address.value for address in addresses])
         self._by_slot = dict(enumerate(self._peripherals))
         self._alias = dict(zip(_BIT_BAND, (self._bit_band(0x40000000), self._bit_band(0x20000000)), strict=True))
@@ -272,10 +276,10 @@ class FastBoard(Board):
             _WRITE(self._write_python),
             _EVENT(lambda slot: self._by_slot[slot].event()),
             _CONVERSIONS(self._conversions),
-            _PINS(lambda port, changed, levels: self.gpio_interrupts.pins_changed(port, changed, levels)),
+            _PINS(self.gpio_interrupts.pins_changed),
         ]
         call = (ctypes.c_void_p * 5)(*[ctypes.cast(item, ctypes.c_void_p).value for item in self._callbacks])
-        names = "R0 R1 R2 R3 R12 LR XPSR SP CONTROL PC PRIMASK BASEPRI FAULTMASK MSP PSP".split()
+        names = _UNICORN_REGISTERS
         ids = (ctypes.c_int32 * len(names))(*[getattr(arm, f"UC_ARM_REG_{name}") for name in names])
         handle = self.native.board_new(self.cpu.uc._uch, api, call, ids)
         self.shared = self.native.board_shared(handle).contents
@@ -302,10 +306,9 @@ class FastBoard(Board):
         self.uarts = [_FastUart(self, index) for index in range(4)]  # type: ignore[misc]
         self.gpio = _FastGpio(self)  # type: ignore[assignment]
 
-    @staticmethod
-    def _check(error: int) -> None:
+    def _check(self, error: int) -> None:
         if error:
-            raise cpu_module.unicorn.UcError(error)
+            raise self._error(error)
 
     def _give_memory(self) -> None:
         places = [
@@ -372,7 +375,7 @@ class FastBoard(Board):
         return [peripheral for peripheral in self._peripherals if type(peripheral) not in _KINDS]
 
     def change_clock(self, cycle: int) -> None:
-        """The core clock or a peripheral divider changes."""
+        """Change the core clock or a peripheral divider."""
         if not self._ready:
             self.cycle = cycle
             self.access_ticks = 4 * cycle

@@ -43,7 +43,7 @@ class FaultKind(enum.Enum):
         }.get(code, cls.OTHER)
 
 
-class BoardFault(GfimuError):
+class BoardFault(GfimuError):  # noqa: N818 - "fault" is the processor's word for it
     """The firmware did what the processor can't do.
 
     Attributes

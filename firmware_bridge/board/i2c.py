@@ -123,7 +123,7 @@ class I2c(Peripheral):
         self.board.schedule(self.slot, self.board.now + self._bits(bits))
 
     def event(self) -> None:
-        """A step on the bus is done."""
+        """End a step on the bus."""
         self.board.schedule(self.slot, NEVER)
         self._step_pending = False
         self.status = self._next_status

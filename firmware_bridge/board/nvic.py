@@ -94,7 +94,7 @@ class Nvic(Peripheral):
         self.active_mask |= 1 << exception
 
     def leave(self) -> None:
-        """The innermost active exception ends; a line that is still high makes it pending again."""
+        """End the innermost active exception; a line that is still high makes it pending again."""
         bit = 1 << self.active.pop()
         self.active_mask &= ~bit
         if self.lines & bit:

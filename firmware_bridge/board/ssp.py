@@ -164,7 +164,7 @@ class Ssp(Peripheral):
         self.board.schedule(self.slot, when if self.mask else NEVER)
 
     def event(self) -> None:
-        """A word is through, or words waited too long in the receive FIFO."""
+        """Note that a word is through, or that words waited too long in the receive FIFO."""
         self._update_interrupt()
 
     def clock_changed(self) -> None:

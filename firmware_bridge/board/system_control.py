@@ -30,7 +30,7 @@ class SystemControl(Peripheral):
         super().__init__(board, "syscon", 0x400FC000, 0x4000)
 
     def reset(self) -> None:
-        """Internal oscillator, PLL off; the reset cause adds up until the firmware clears it."""
+        """Start on the internal oscillator, PLL off; the reset cause adds up until the firmware clears it."""
         self.registers = {0x0C4: 0x042887DE}
         self._feed = 0
         self._pll_control = 0
@@ -64,7 +64,7 @@ class SystemControl(Peripheral):
             self.board.change_clock(cycle)
 
     def read(self, offset: int, size: int) -> int:
-        """Registers as written; status bits say ready and locked."""
+        """Return registers as written; status bits say ready and locked."""
         if offset == 0x088:
             multiplier, predivider = self._pll_setting
             lock = 1 << 26 if self._pll_control & 1 else 0

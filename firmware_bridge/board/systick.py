@@ -14,7 +14,7 @@ class SysTick(Peripheral):
     """Counts core clock cycles down from the reload value; wraps, and may raise its exception, every reload + 1."""
 
     def reset(self) -> None:
-        """Stopped, at zero."""
+        """Stop, at zero."""
         self.control = 0
         self.reload = 0
         self.flag = 0
@@ -62,7 +62,7 @@ class SysTick(Peripheral):
         self.board.schedule(self.slot, when)
 
     def event(self) -> None:
-        """The counter wraps."""
+        """Wrap: set the flag, raise the exception."""
         self.flag = _COUNT_FLAG
         self._set_wrap(self.wrap + (self.reload + 1) * self.board.cycle if self.reload else NEVER)
         if self.control & _INTERRUPT:

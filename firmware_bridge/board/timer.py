@@ -23,7 +23,7 @@ class Timer(Peripheral):
         super().__init__(board, name, base, irq=irq)
 
     def reset(self) -> None:
-        """Stopped, at zero."""
+        """Stop, at zero."""
         self.interrupts = 0
         self.control = 0
         self.prescale = 0
@@ -71,7 +71,7 @@ class Timer(Peripheral):
         self.board.schedule(self.slot, self.due)
 
     def event(self) -> None:
-        """The count reaches a match register."""
+        """Do what the match register that was reached asks for."""
         reached = self.match[self.due_match]
         self.start, self.start_count = self.due, reached
         clear = False

@@ -14,9 +14,10 @@ __all__ = ["Event", "EventList", "write_rrd", "write_vcd"]
 _PICOSECONDS = 1_000_000_000_000
 _NAMES = {2: "NMI", 3: "HardFault", 11: "SVCall", 14: "PendSV", 15: "SysTick"}
 _IRQS = (
-    "WDT TIMER0 TIMER1 TIMER2 TIMER3 UART0 UART1 UART2 UART3 PWM1 I2C0 I2C1 I2C2 SPI SSP0 SSP1 PLL0 RTC EINT0 EINT1 \
-EINT2 EINT3 ADC BOD USB CAN GPDMA I2S ETHERNET RIT MCPWM QEI PLL1 USBACT CANACT".split()
-)
+    "WDT", "TIMER0", "TIMER1", "TIMER2", "TIMER3", "UART0", "UART1", "UART2", "UART3", "PWM1", "I2C0", "I2C1", "I2C2",
+    "SPI", "SSP0", "SSP1", "PLL0", "RTC", "EINT0", "EINT1", "EINT2", "EINT3", "ADC", "BOD", "USB", "CAN", "GPDMA",
+    "I2S", "ETHERNET", "RIT", "MCPWM", "QEI", "PLL1", "USBACT", "CANACT",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)

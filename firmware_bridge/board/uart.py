@@ -32,7 +32,7 @@ class Uart(Peripheral):
         super().__init__(board, name, base, irq=irq)
 
     def reset(self) -> None:
-        """Registers at their reset values; bytes that have not left the line are lost."""
+        """Set registers to their reset values; bytes that have not left the line are lost."""
         self.cut_unsent()
         self.divisor, self.fraction = 1, 0x10
         self.interrupt_enable = self.line_control = self.fifo_control = self.scratch = self.errors = 0
@@ -88,7 +88,7 @@ class Uart(Peripheral):
         self.board.schedule(self.slot, self.planned)
 
     def event(self) -> None:
-        """A byte has arrived, the transmitter ran empty, or the receiver waited too long."""
+        """Take a byte that has arrived, or note that the transmitter ran empty or the receiver waited too long."""
         now = self.board.now
         while self.on_line and self.on_line[0][0] <= now:
             when, byte, errors = self.on_line.popleft()
@@ -219,7 +219,7 @@ class Uart(Peripheral):
         # The interrupt comes when the last byte moves to the shift register, but after a lone byte not before its
         # stop bit (UM10360 14.4.5).
         empty, lone = end - character, now + self._lone_byte
-        self.empty_at = empty if empty > lone else lone
+        self.empty_at = max(empty, lone)
         if self.planned > self.empty_at:
             self._plan()  # else the event that is planned already looks again
         if self.empty_pending:

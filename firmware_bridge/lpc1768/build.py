@@ -198,7 +198,7 @@ def _zig(*arguments: str, cwd: Path) -> str:
 
 
 def _with_boot_checksum(content: bytes) -> bytes:
-    """Fill word 7 of the vector table so that the first eight words sum to zero: the boot ROM asks for it (UM10360 32.3.1.1)."""
+    """Make the first eight words of the vector table sum to zero by its word 7 (boot ROM, UM10360 32.3.1.1)."""
     offset = ElfImage.parse(content, "image").file_offset(0)
     words = struct.unpack_from(f"<{_VECTORS_SUMMED}I", content, offset)
     patched = bytearray(content)
