@@ -18,6 +18,7 @@ from sim.adxl345 import SensorSettings
 from sim.data_sheet import DataSheet
 from sim.effects import Effect, make_effect
 from sim.motion import BodyMotion, SpinMotion
+from sim.pose_sequence import PoseSequence
 from sim.profiles import Chirp, Hold, Ramp, Segment, Sine, Tumble, spin_profile
 from sim.toml_table import TomlTable
 
@@ -121,7 +122,15 @@ def change_key(data: dict[str, Any], change: str) -> None:
 
 def _motion(table: TomlTable) -> tuple[SpinMotion | BodyMotion, float]:
     """Motion of the [motion] table, and its length where it has one of its own, s."""
-    kind = table.text("kind", "profile", choices=("profile", "rest", "tumble"))
+    kind = table.text("kind", "profile", choices=("profile", "rest", "tumble", "poses"))
+    if kind == "poses":
+        sequence = PoseSequence(
+            table.text("poses", PoseSequence.poses),
+            table.number("rest_s", PoseSequence.rest),
+            table.number("turn_s", PoseSequence.turn),
+        )
+        table.finish()
+        return sequence, sequence.duration
     if kind == "tumble":
         tumble = Tumble(
             rate=table.number("rate_rad_s", Tumble.rate),
