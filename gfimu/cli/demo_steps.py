@@ -211,6 +211,56 @@ def state_drift(demo: Demo) -> None:
     ]
 
 
+def calibrate_chips(demo: Demo) -> None:
+    """Calibrate the same chips from static poses and compare the drift."""
+    from dataclasses import replace
+
+    from gfimu.calibration.array_calibration import calibrate_array
+    from gfimu.estimation import estimate
+    from sim.pose_sequence import PoseSequence
+    from sim.scenarios import simulate
+
+    array, gravity = demo.scenario.array, demo.scenario.gravity
+    sequence = PoseSequence()
+    # The same seed draws the same chips.
+    poses = simulate(replace(demo.scenario, motion=sequence, duration=sequence.duration), seed=demo.seed)
+    calibration = calibrate_array(poses, array, gravity=gravity)
+    path = demo.out / "calibration.json"
+    calibration.save(path)
+    demo.written["calibration"] = path
+    early = int(np.searchsorted(demo.recording.t_s, demo.recording.t_s[0] + _DRIFT_SECONDS))
+    still = demo.recording.t_s < demo.bias.stop_s
+    true_position, true_omega = demo.truth("position", "m"), demo.truth("omega", "rad_s")
+    alpha, omega, drift = [], [], []
+    for recording in (demo.recording, calibration.apply(demo.recording)):
+        found = estimate(recording, array, with_position=True)
+        if found.position is None:
+            raise TypeError("the estimate holds no position")
+        alpha.append(float(np.rad2deg(np.linalg.norm(np.nanmean(found.alpha[still], axis=0)))))
+        omega.append(_rms(np.linalg.norm(found.omega - true_omega, axis=1)))
+        drift.append(float(np.hypot(*(found.position - (true_position - true_position[0]))[early, :2])))
+    demo.rows += [
+        Row(
+            f"calibrated from {calibration.statistics['poses']:.0f} poses: α seen at rest",
+            f"{alpha[1]:.1f} °/s²",
+            f"{alpha[0]:.0f} °/s² before",
+            {"alpha_before_deg_s2": alpha[0], "alpha_after_deg_s2": alpha[1]},
+        ),
+        Row(
+            "calibrated: angular rate, rms error",
+            f"{omega[1]:.2f} rad/s",
+            f"{omega[0]:.0f} rad/s before; no bias read at rest in either",
+            {"rmse_before_rad_s": omega[0], "rmse_after_rad_s": omega[1]},
+        ),
+        Row(
+            f"calibrated: position drift after {_DRIFT_SECONDS:.0f} s",
+            f"{drift[1]:.1f} m",
+            f"{drift[0]:.0f} m before",
+            {"drift_before_m": drift[0], "drift_after_m": drift[1]},
+        ),
+    ]
+
+
 def draw_run(demo: Demo) -> None:
     """Write the rerun recording."""
     from gfimu.visual import ExpectedDrift, write_run
@@ -242,6 +292,7 @@ STEPS: tuple[Callable[[Demo], None], ...] = (
     read_biases,
     estimate_motion,
     state_drift,
+    calibrate_chips,
     draw_run,
 )
 """The steps in their order; the first line of each docstring is what the command shows while it runs."""

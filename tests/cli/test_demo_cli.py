@@ -48,6 +48,16 @@ def test_the_drift_is_within_what_was_expected(demo):
             assert 0 < row["error_m"] < 3 * row["expected_m"]
 
 
+def test_calibration_takes_the_drift_off(demo):
+    seen = result(demo[1], "calibrated from 18 poses")
+    assert seen["alpha_before_deg_s2"] > 50
+    assert seen["alpha_after_deg_s2"] < 5
+    rate = result(demo[1], "calibrated: angular rate")
+    assert rate["rmse_after_rad_s"] < 0.05 * rate["rmse_before_rad_s"]
+    drift = result(demo[1], "calibrated: position drift")
+    assert drift["drift_after_m"] < 0.5 * drift["drift_before_m"]
+
+
 def test_the_files_it_names_are_there_and_can_be_read(demo):
     out, report, _ = demo
     recording = Recording.read(out / "run.parquet")
