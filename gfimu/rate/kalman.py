@@ -30,7 +30,7 @@ from gfimu.rate.recursion import (
     forward,
     prepare,
 )
-from gfimu.rate.rest_test import RestTest
+from gfimu.rate.rest_test import RUN_BLOCKS, RestTest
 from gfimu.rate.result import ChannelReport, RateEstimate, full_covariance
 from gfimu.rate.sensing import ChannelTables, SensorErrors
 
@@ -163,7 +163,8 @@ class KalmanRateFilter:
             errors.gyro_noise_std**2,
             rest.window(period) if rest else 0,
             rest.rate_std**2 if rest else 1.0,
-            rest.limits(c, d, period) if rest else np.zeros(6),
+            rest.entry_blocks(period) if rest else 1,
+            rest.limits(c, d, period) if rest else np.zeros(8),
             likelihood,
         )
         self.state = self._start()
@@ -196,9 +197,10 @@ class KalmanRateFilter:
         covariance[6 + d : n - 3, 6 + d : n - 3] = np.eye(n - 9 - d) * self.errors.gyro_bias_std**2
         rest = self.settings.rest
         settles = np.array([rest is not None and not x.any() and self.settings.start_std <= rest.largest_rate_std])
+        counts = np.array([0, 0, 0, 0, 0, int(settles[0])])  # a start at rest is rest to begin with
         return RecursionState(
-            x, covariance, np.zeros(3), np.zeros(3), np.zeros(4, dtype=np.int64), settles, x.copy(), covariance.copy(),
-            np.zeros(c),
+            x, covariance, np.zeros(3), np.zeros(3), counts, settles, x.copy(), covariance.copy(),
+            np.zeros(c), np.zeros((RUN_BLOCKS, 3)), np.zeros((RUN_BLOCKS, 3)), np.zeros((RUN_BLOCKS, 3, 3)),
         )  # fmt: skip
 
     def _tables(self) -> Tables:

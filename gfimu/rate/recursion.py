@@ -51,7 +51,7 @@ _MEMORY = 2.0  # length of the filter's memory in units of 1/|ω|
 # Places in RecursionState.scalars
 _TIME, _WALK, _LAST_GOOD = range(3)
 # Places in RecursionState.counts
-_STARTED, _BLOCK, _REST_BLOCKS, _SAMPLES = range(4)
+_STARTED, _BLOCK, _REST_BLOCKS, _SAMPLES, _RUN, _RESTING = range(6)
 
 
 class Tables(NamedTuple):
@@ -80,7 +80,8 @@ class Tuning(NamedTuple):
     gyro_variance: float  # (rad/s)²
     rest_window: int  # samples per block of the rest test; 0: no test
     rest_variance: float  # of the rate at rest, (rad/s)²
-    rest_limits: NDArray[np.float64]  # (6,) noise, halves, α, z, ω (all χ²), and largest variance of ω
+    rest_entry: int  # blocks in a row before rest begins anew
+    rest_limits: NDArray[np.float64]  # (8,) `gfimu.rate.rest_test.RestTest.limits`
     likelihood: bool
 
 
@@ -91,11 +92,14 @@ class RecursionState(NamedTuple):
     covariance: NDArray[np.float64]  # (n, n)
     scalars: NDArray[np.float64]  # (3,)
     mean_alpha: NDArray[np.float64]  # (3,) over the filter's memory
-    counts: NDArray[np.int64]  # (4,)
+    counts: NDArray[np.int64]  # (6,)
     settles: NDArray[np.bool_]  # (1,) the run starts at rest
     block_x: NDArray[np.float64]  # (n,) state when the block began
     block_covariance: NDArray[np.float64]  # (n, n)
     reference: NDArray[np.float64]  # (c,) mean reading while the biases were learned, m/s²
+    run_alpha: NDArray[np.float64]  # (r, 3) mean α of the last blocks that passed, ring
+    run_bias: NDArray[np.float64]  # (r, 3) its bias as known when each began
+    run_covariance: NDArray[np.float64]  # (r, 3, 3)
 
     def copy(self) -> RecursionState:
         """Return a state that shares nothing with this one."""
@@ -713,13 +717,20 @@ def _rest_block(data, k, tables, tuning, state):  # type: ignore[no-untyped-def]
     counts = state.counts
     window = tuning.rest_window
     if data.channel_set[k] != 0 or (counts[_BLOCK] > 0 and data.whole_run[k] == 0):
+        if counts[_BLOCK] > 0 and data.whole_run[k] == 0:  # who knows what happened in the gap
+            counts[_RUN] = 0
+            counts[_RESTING] = 0
         counts[_BLOCK] = 0
         return False
     counts[_BLOCK] += 1
     if counts[_BLOCK] < window:
         return False
     counts[_BLOCK] = 0
-    return _is_rest(data.y[k - window + 1 : k + 1], tables, tuning, state)
+    if not _is_rest(data.y[k - window + 1 : k + 1], tables, tuning, state):
+        counts[_RUN] = 0
+        counts[_RESTING] = 0
+        return False
+    return counts[_RESTING] > 0
 
 
 @njit(**_COMPILE)
@@ -775,11 +786,51 @@ def _is_rest(y, tables, tuning, state):  # type: ignore[no-untyped-def]
         spread_null = known[6 : 6 + d, 6 : 6 + d] + np.eye(d) / window
         if (np.linalg.solve(spread_null, null) * null).sum() > limits[3]:
             return False
-    blocks = state.counts[_REST_BLOCKS]
-    for i in range(c):
+    return _is_rest_run(mean, alpha, tables, tuning, state)
+
+
+@njit(**_COMPILE)
+def _is_rest_run(mean, alpha, tables, tuning, state):  # type: ignore[no-untyped-def]
+    """Test the blocks in a row that ended with this one, which passed; rest begins when they are enough."""
+    counts = state.counts
+    length = len(state.run_alpha)
+    place = counts[_RUN] % length
+    state.run_alpha[place] = alpha
+    state.run_alpha[place] += state.block_x[3:6]
+    state.run_bias[place] = state.block_x[3:6]
+    state.run_covariance[place] = state.block_covariance[3:6, 3:6]
+    counts[_RUN] += 1
+    run = counts[_RUN]
+    span = 2
+    while span <= min(run, length):
+        if _run_statistic(span, tables, tuning, state) > tuning.rest_limits[2]:
+            return False
+        span *= 2
+    if counts[_RESTING] == 0:
+        if run < tuning.rest_entry or _run_statistic(min(run, length), tables, tuning, state) > tuning.rest_limits[6]:
+            return True
+        known = state.covariance[:3, :3] + tuning.rest_variance * np.eye(3)
+        if (np.linalg.solve(known, state.x[:3]) * state.x[:3]).sum() > tuning.rest_limits[7]:
+            return True
+        counts[_RESTING] = 1
+    blocks = counts[_REST_BLOCKS]
+    for i in range(len(mean)):
         state.reference[i] += (mean[i] - state.reference[i]) / (blocks + 1)
-    state.counts[_REST_BLOCKS] = blocks + 1
+    counts[_REST_BLOCKS] = blocks + 1
     return True
+
+
+@njit(**_COMPILE)
+def _run_statistic(span, tables, tuning, state):  # type: ignore[no-untyped-def]
+    """Mean α of the last ``span`` blocks against its bias as known when they began."""
+    length = len(state.run_alpha)
+    run = state.counts[_RUN]
+    begin = (run - span) % length
+    difference = -state.run_bias[begin]
+    for number in range(run - span, run):
+        difference += state.run_alpha[number % length] / span
+    spread = state.run_covariance[begin] + tables.alpha_noise[0] / (span * tuning.rest_window)
+    return (np.linalg.solve(spread, difference) * difference).sum()
 
 
 @njit(**_COMPILE)

@@ -13,10 +13,15 @@ rate          ω when the block began against zero                              
 ============  ====================================================================  ==============
 
 Each is tested at a fifth of the stated false-alarm rate, so that a block at rest is missed in at most that share of
-cases. Turning steadily about the vertical changes no reading; it is told from rest by the null space (down to
-about √(3 σ_b/h), σ_b the uncertainty of the null-space bias) and by the rate that the filter remembers, which is why
-a block only counts if ω was known to ``largest_rate_std`` when it began. A start in the dark, with ω unknown, is
-never taken for rest.
+cases. The mean α of the last 2, 4, 8 … blocks in a row is tested as well, against its bias as known when they began:
+it shows a departure too slow for one block.
+
+Turning steadily about the vertical changes no reading; it is told from rest by the null space (down to about
+√(3 σ_b/h), σ_b the uncertainty of the null-space bias) and by the rate that the filter remembers, which is why a block
+only counts if ω was known to ``largest_rate_std`` when it began. A start in the dark, with ω unknown, is never taken
+for rest. And a rate that passes slowly through zero looks like rest for a while: after a motion, rest begins only when
+blocks have passed in a row for ``entry_s`` and neither their mean α nor the rate is farther from zero than rest
+explains at a level of 20 % and 5 %. Too strict costs another block of waiting; too lax would be a wrong rate.
 """
 
 from __future__ import annotations
@@ -30,7 +35,10 @@ from scipy.stats import chi2
 from gfimu.array import AccelerometerArray
 from gfimu.errors import InputError
 
-__all__ = ["RestTest", "constant_readings"]
+__all__ = ["RUN_BLOCKS", "RestTest", "constant_readings"]
+
+RUN_BLOCKS = 16
+"""Blocks over which the mean of α is followed."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +57,8 @@ class RestTest:
         A block counts only if ω was known at least this well when it began, rad/s.
     noise_margin : float
         The true noise may be larger than stated by this ratio.
+    entry_s : float
+        How long a body must be still after a motion before that counts as rest, s.
     """
 
     window_s: float = 0.5
@@ -56,11 +66,12 @@ class RestTest:
     rate_std: float = 1e-3
     largest_rate_std: float = 0.2
     noise_margin: float = 0.1
+    entry_s: float = 5.0
 
     def __post_init__(self) -> None:
         if not 0 < self.false_alarm < 1:
             raise InputError(f"false_alarm = {self.false_alarm!r}: must lie between 0 and 1")
-        for name in ("window_s", "rate_std", "largest_rate_std"):
+        for name in ("window_s", "rate_std", "largest_rate_std", "entry_s"):
             if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0):
                 raise InputError(f"{name} = {getattr(self, name)!r}: must be a positive number")
 
@@ -69,11 +80,15 @@ class RestTest:
         return max(4, round(self.window_s / period))
 
     def limits(self, n_channels: int, n_null: int, period: float) -> NDArray[np.float64]:
-        """Limits of scatter, halves, α, null space and rate, and the largest variance of ω, shape (6,)."""
+        """Limits of scatter, halves, α, null space and rate, the largest variance of ω, and α and ω at entry, (8,)."""
         freedom = np.array([n_channels * (self.window(period) - 1), n_channels, 3, max(n_null, 1), 3])
         largest = chi2.ppf(1.0 - self.false_alarm / len(freedom), freedom)
         largest[:2] *= (1.0 + self.noise_margin) ** 2
-        return np.append(largest, self.largest_rate_std**2)
+        return np.array([*largest, self.largest_rate_std**2, *chi2.ppf([0.8, 0.95], 3)])
+
+    def entry_blocks(self, period: float) -> int:
+        """Blocks in a row after which rest begins, at most `RUN_BLOCKS`."""
+        return min(max(1, round(self.entry_s / (self.window(period) * period))), RUN_BLOCKS)
 
 
 def constant_readings(

@@ -32,7 +32,7 @@ __all__ = ["THRESHOLD", "InitialRate", "SignTest"]
 THRESHOLD = 20.0
 """Logarithm of the likelihood ratio at which the sign counts as decided."""
 
-CLEAR = 8.0
+CLEAR = 50.0
 """Standard deviations by which a rate must stand clear of noise and biases to start from."""
 
 _SIGNIFICANT = 36.0  # of the averaged α, variances
