@@ -153,7 +153,7 @@ class Ride:
         return conversion_offsets(self.sensor(output_data_rate).settings, self._sheet)
 
     def references(self, t: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
-        """Return what the table's own instruments read at board times (n,), by column name; no table for a free body."""
+        """Return what other instruments read at board times (n,), by column name; a free body has no table."""
         columns = {"temperature_degC": self.temperature(t)}
         if not self.scenario.free:
             chance = np.random.default_rng([self.seed, 1])

@@ -12,7 +12,20 @@ from gfimu.errors import GfimuError, InputError
 
 __all__ = ["app", "main"]
 
-COMMAND_FILES = ("demo", "score", "simulate", "estimate", "convert", "drift", "calibrate", "noise", "view")
+COMMAND_FILES = (
+    "demo",
+    "score",
+    "simulate",
+    "estimate",
+    "convert",
+    "drift",
+    "design",
+    "calibrate",
+    "noise",
+    "record",
+    "firmware",
+    "view",
+)
 
 app = typer.Typer(
     name="gfimu",

@@ -1,0 +1,156 @@
+"""A look at a recording while it is made: the angular rate from the filter, as a line of text and in rerun."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from firmware_bridge.frames import StreamCounts
+from firmware_bridge.recorder import Batch
+from gfimu.array import AccelerometerArray
+from gfimu.errors import GfimuError
+from gfimu.rate.live import LiveRateFilter
+from gfimu.rate.sensing import SensorErrors
+
+__all__ = ["LiveView"]
+
+_VIEW_HZ = 100.0
+_TEXT_EVERY_S = 0.25
+
+
+class LiveView:
+    """Is given each batch of a recording; estimates the rate at up to 100 Hz.
+
+    Parameters
+    ----------
+    array : AccelerometerArray
+        The array.
+    lsb : float
+        Size of a count, m/s².
+    on_text : callable, optional
+        Is given a line of text a few times a second.
+    rrd : Path, optional
+        Write a rerun recording.
+    viewer : bool
+        Open the rerun viewer and send to it.
+    """
+
+    def __init__(
+        self,
+        array: AccelerometerArray,
+        lsb: float,
+        *,
+        on_text: Callable[[str], None] | None = None,
+        rrd: Path | None = None,
+        viewer: bool = False,
+    ) -> None:
+        self._array, self._lsb, self._on_text = array, lsb, on_text
+        self._filter: LiveRateFilter | None = None
+        self._sum = np.zeros(array.n_channels)
+        self._times: list[float] = []
+        self._group = 0
+        self._text_at = 0.0
+        self._seen = 0
+        self._first_s: float | None = None
+        self.omega = np.full(3, np.nan)
+        self._stream = _open_stream(rrd, viewer=viewer) if rrd is not None or viewer else None
+
+    def __call__(self, batch: Batch, counts: StreamCounts) -> None:
+        """Take one batch and the totals so far."""
+        if self._first_s is None:
+            self._first_s = float(batch.t_s[0])
+        self._seen += len(batch.t_s)
+        if self._group == 0:
+            span = float(batch.t_s[-1] - batch.t_s[0])
+            if len(batch.t_s) < 2 or span <= 0:
+                return
+            rate = (len(batch.t_s) - 1) / span
+            self._group = max(1, round(rate / _VIEW_HZ))
+            shown = rate / self._group
+            self._filter = LiveRateFilter(
+                self._array, SensorErrors.from_parts(self._array, float(shown)), float(1.0 / shown)
+            )
+        times, readings = self._averaged(batch)
+        if not len(times):
+            return
+        omega = self._estimate(times, readings)
+        if self._stream is not None:
+            _log(self._stream, self._array, times, readings, omega)
+        now = time.monotonic()
+        if self._on_text is not None and now - self._text_at >= _TEXT_EVERY_S:
+            self._text_at = now
+            self._on_text(self._line(batch, counts))
+
+    def _averaged(self, batch: Batch) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Means over groups of samples: times (m,) and readings (m, c), m/s²."""
+        times, readings = [], []
+        for t, row in zip(batch.t_s.tolist(), batch.counts * self._lsb, strict=True):
+            self._sum += row
+            self._times.append(t)
+            if len(self._times) == self._group:
+                times.append(sum(self._times) / self._group)
+                readings.append(self._sum / self._group)
+                self._sum = np.zeros(self._array.n_channels)
+                self._times.clear()
+        return np.array(times), np.array(readings).reshape(-1, self._array.n_channels)
+
+    def _estimate(self, times: NDArray[np.float64], readings: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Angular rate (m, 3) as far as it is ready, rad/s; the newest is kept."""
+        assert self._filter is not None
+        try:
+            result = self._filter.push(times, readings)
+        except GfimuError:
+            return np.empty((0, 3))
+        if len(result.omega):
+            self.omega = result.omega[-1]
+        return result.omega
+
+    def _line(self, batch: Batch, counts: StreamCounts) -> str:
+        elapsed = float(batch.t_s[-1]) - (self._first_s or 0.0)
+        rate = self._seen / elapsed if elapsed > 0 else 0.0
+        omega = " ".join(f"{value:+7.3f}" for value in self.omega)
+        return f"{elapsed:8.1f} s  {rate:6.1f} Hz  lost {counts.lost}  corrupt {counts.corrupt}  ω {omega} rad/s"
+
+    def close(self) -> None:
+        """End the rerun recording."""
+        if self._stream is not None:
+            self._stream.flush()
+            self._stream.disconnect()
+
+
+def _open_stream(rrd: Path | None, *, viewer: bool) -> Any:
+    import rerun as rr
+
+    stream = rr.RecordingStream("gfimu_record")
+    if viewer:
+        stream.spawn()
+    else:
+        assert rrd is not None
+        rrd.parent.mkdir(parents=True, exist_ok=True)
+        stream.save(rrd)
+    return stream
+
+
+def _log(
+    stream: Any,
+    array: AccelerometerArray,
+    times: NDArray[np.float64],
+    readings: NDArray[np.float64],
+    omega: NDArray[np.float64],
+) -> None:
+    """Send a batch to rerun, by columns."""
+    import rerun as rr
+
+    index = [rr.TimeColumn("t", duration=times)]
+    for place, channel in enumerate(array.channels):
+        rr.send_columns(f"readings/{channel}", index, rr.Scalars.columns(scalars=readings[:, place]), recording=stream)
+    if len(omega):
+        late = [rr.TimeColumn("t", duration=times[-len(omega) :] if len(omega) <= len(times) else times)]
+        shown = omega[-len(times) :]
+        for place, axis in enumerate("xyz"):
+            rr.send_columns(f"omega/{axis}", late, rr.Scalars.columns(scalars=shown[:, place]), recording=stream)
