@@ -45,8 +45,8 @@ class Quantity:
         View that shows it: time, rate, rate squared, acceleration, angle, temperature, reading.
     regressors : tuple of ndarray, each (n,) or (n, c)
         Functions of it that the residual is regressed on.
-    at : ndarray, shape (n,)
-        Where a plot puts each sample; of the reading, the average over the channels.
+    at : ndarray, shape (n,) or (n, c)
+        Where a plot puts each sample.
     """
 
     name: str
@@ -69,7 +69,7 @@ class Dependence:
         For the axis.
     view : str
         See `Quantity`.
-    centres : ndarray, shape (b,)
+    centres : ndarray, shape (b, c)
         Bins of the quantity.
     before, after : ndarray, shape (b, c)
         Mean residual per bin and channel, m/s²; NaN in bins with too few samples.
@@ -108,7 +108,7 @@ class Dependence:
 
 @dataclass(frozen=True)
 class Fingerprint:
-    """How strongly each channel follows each basic term, in standard deviations of chance, signed.
+    """How strongly each channel follows each basic term beside all others, in standard deviations of chance, signed.
 
     ``before`` and ``after`` have the shape (c, k): c channels, k terms.
     """
@@ -208,27 +208,23 @@ def fingerprint(
     after: NDArray[np.float64],
 ) -> Fingerprint:
     """Return the strength of each basic term in each channel before and after."""
-    since = run.t - run.t[0]
-    terms: dict[str, tuple[NDArray[np.float64], ...]] = {
-        "constant": (),
-        "t": (since,),
-        "ω": (run.rate,),
-        "ω²": (run.rate**2,),
-        "α": (run.acceleration,),
-        "ωα": (run.rate * run.acceleration,),
-        "cos θ": (np.cos(run.angle),),
-        "sin θ": (np.sin(run.angle),),
-        "cos 2θ": (np.cos(2 * run.angle),),
-        "sin 2θ": (np.sin(2 * run.angle),),
-        "reading": (run.before,),
-        "reading²": (run.before**2,),
+    terms: dict[str, NDArray[np.float64]] = {
+        "constant": np.ones_like(run.t),
+        "t": run.t - run.t.mean(),
+        "ω": run.rate,
+        "ω²": run.rate**2,
+        "ω⁴": run.rate**4,
+        "α": run.acceleration,
+        "ωα": run.rate * run.acceleration,
+        "cos θ": np.cos(run.angle),
+        "sin θ": np.sin(run.angle),
+        "cos 2θ": np.cos(2 * run.angle),
+        "sin 2θ": np.sin(2 * run.angle),
     }
     if run.temperature is not None and np.ptp(run.temperature) > 0:
-        terms["T"] = (run.temperature,)
-    scores = []
-    for residual in (before, after):
-        regressions = _Regressions(run.valid, gain, residual)
-        scores.append(np.column_stack([regressions.on(term).score for term in terms.values()]))  # (c, k)
+        terms["T"] = run.temperature - run.temperature.mean()
+    design = np.column_stack(list(terms.values()))  # (n, k)
+    scores = [_Regressions(run.valid, gain, residual).together(design) for residual in (before, after)]
     return Fingerprint(tuple(channels), tuple(terms), scores[0], scores[1])
 
 
@@ -272,6 +268,27 @@ class _Regressions:
             return out
         for channels in self.groups:
             self._fill(out, np.array(channels), regressors)
+        return out
+
+    def together(self, design: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Regress each channel on all columns (n, k) at once; returns each coefficient over its error, (c, k)."""
+        out = np.zeros((self.target.shape[1], design.shape[1]))
+        for channels in self.groups:
+            valid = self.valid[:, channels[0]]
+            scale = np.linalg.norm(design * valid[:, None], axis=0)
+            used = np.flatnonzero(scale > 1e-9 * np.sqrt(len(valid)))
+            if valid.sum() < max(_FEWEST_SAMPLES, 2 * design.shape[1]):
+                continue
+            columns = dct(design[:, used] * valid[:, None] / scale[used], type=2, norm="ortho", axis=0)
+            for channel in channels:
+                weighted = columns * self.weight[:, [channel]]
+                gram = columns.T @ weighted
+                covariance = np.linalg.inv(gram + 1e-9 * np.trace(gram) * np.eye(len(used)))
+                score = weighted.T @ self.target[:, channel]
+                coefficients = covariance @ score
+                left = max(float(self.power[channel]) - float(score @ coefficients), 0.0)
+                variance = max(1.0, left / max(int(valid.sum()) - len(used), 1))
+                out[channel, used] = coefficients / np.sqrt(covariance.diagonal() * variance)
         return out
 
     def _fill(self, out: _Regression, channels: NDArray[np.intp], regressors: Sequence[NDArray[np.float64]]) -> None:
@@ -336,15 +353,17 @@ def _names(channels: Sequence[str], chosen: NDArray[np.bool_], regression: _Regr
 def _binned(
     quantity: Quantity, valid: NDArray[np.bool_], residuals: Sequence[NDArray[np.float64]]
 ) -> tuple[NDArray[np.float64], list[NDArray[np.float64]]]:
-    """Mean of each residual in equal bins of a quantity, shape (b, c)."""
-    low, high = float(quantity.at.min()), float(quantity.at.max())
-    place = np.clip(((quantity.at - low) / max(high - low, 1e-300) * _BINS).astype(int), 0, _BINS - 1)
-    count = np.array([np.bincount(place, one, _BINS) for one in valid.T.astype(float)]).T  # (b, c)
+    """Centres of equal bins of a quantity, and the mean of each residual in them, all of shape (b, c)."""
+    at = np.broadcast_to(quantity.at.reshape(len(valid), -1), valid.shape)
+    low, high = at.min(axis=0), at.max(axis=0)
+    place = np.clip(((at - low) / np.maximum(high - low, 1e-300) * _BINS).astype(int), 0, _BINS - 1)  # (n, c)
+    channels = range(valid.shape[1])
+    count = np.column_stack([np.bincount(place[:, k], valid[:, k], _BINS) for k in channels])
     means = []
     for residual in residuals:
-        total = np.array([np.bincount(place, one, _BINS) for one in residual.T]).T
+        total = np.column_stack([np.bincount(place[:, k], residual[:, k], _BINS) for k in channels])
         means.append(np.where(count >= _FEWEST_IN_BIN, total / np.maximum(count, 1), np.nan))
-    return low + (high - low) * (np.arange(_BINS) + 0.5) / _BINS, means
+    return low + (high - low) * ((np.arange(_BINS) + 0.5) / _BINS)[:, None], means
 
 
 def _varies(quantity: Quantity) -> bool:

@@ -192,13 +192,13 @@ def _whiteness(
             names = [channels[k] for k in np.argsort(-np.abs(old_rho)) if coloured[k]]
             where = "every channel" if len(names) == len(channels) else listed(names)
             parts.append(
-                f"before, errors that follow each other are alike in {where} "
-                f"(correlation {old_rho[top]:.2f} in {channels[top]}), so something other than noise is in them"
+                f"before, the residual is not noise: neighbouring samples err alike in {where} "
+                f"(correlation {old_rho[top]:.2f} in {channels[top]})"
             )
         if still.any():
-            parts.append(f"after: still in {listed([channels[k] for k in np.flatnonzero(still)])}")
+            parts.append(f"after: still so in {listed([channels[k] for k in np.flatnonzero(still)])}")
         elif coloured.any():
-            parts.append("after: noise")
+            parts.append("after: it is")
         sentence = "; ".join(parts) + "."
         sentence = sentence[0].upper() + sentence[1:]
     return Whiteness(
