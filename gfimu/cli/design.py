@@ -1,0 +1,105 @@
+"""`gfimu design`: the experiment that best tells effects apart."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, cast
+
+import typer
+
+from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, progress
+
+if TYPE_CHECKING:
+    from gfimu.diagnosis.model import WorldModel
+    from gfimu.diagnosis.proposal import Proposal
+
+__all__ = ["register"]
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command(name="design")(_design)
+
+
+def _design(
+    twin: Annotated[str, typer.Option("--twin", help="Twin: a name or a file (.toml).")],
+    effects: Annotated[
+        list[str] | None, typer.Argument(metavar="[EFFECT]...", help="Effects to tell apart; or use --verdict.")
+    ] = None,
+    verdict: Annotated[
+        Path | None, typer.Option("--verdict", help="Take the effects of an ambiguous verdict (verdict.json).")
+    ] = None,
+    runs: Annotated[
+        list[Path] | None,
+        typer.Option("--run", help="Recording at hand, to be diagnosed together with the new one; may be repeated."),
+    ] = None,
+    max_rate: Annotated[float, typer.Option("--max-rate", metavar="RAD/S", help="Largest rate of the table.")] = 15.0,
+    max_acceleration: Annotated[
+        float, typer.Option("--max-acceleration", metavar="RAD/S²", help="Largest angular acceleration of the table.")
+    ] = 20.0,
+    duration: Annotated[float, typer.Option("--duration", metavar="S", help="Length of the recording.")] = 60.0,
+    upright: Annotated[bool, typer.Option("--upright", help="Never propose to mount the cube differently.")] = False,
+    evaluations: Annotated[int, typer.Option("--evaluations", min=1, help="How many profiles to try.")] = 150,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the search.")] = 0,
+    out: Annotated[Path | None, typer.Option("--out", help="Write the experiment as a scenario file (.toml).")] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Propose the table profile, or the mounting, that best tells effects apart.
+
+    Example: gfimu design tacho_scale sensor_position --twin cube12_turntable --max-rate 12 --out next.toml
+    """
+    import numpy as np
+
+    from gfimu.atomic_file import write_text
+    from gfimu.diagnosis.ambiguity import open_effects
+    from gfimu.diagnosis.design import MOUNTINGS, Limits, design
+    from gfimu.diagnosis.run import prepare_run
+    from gfimu.errors import InputError
+    from gfimu.recording import Recording
+    from sim.twin import Twin
+
+    if out is not None and out.suffix != ".toml":
+        raise InputError(f"{out}: a scenario file ends in .toml; name it so")
+    if (verdict is None) == (not effects):
+        raise InputError("name effects to tell apart, or give --verdict: one of the two")
+    loaded = Twin.load(twin)
+    model = cast("WorldModel", loaded)  # its effects are narrower than the protocol's
+    asked = open_effects(verdict, model) if verdict is not None else list(effects or [])
+    recorded = [prepare_run(Recording.read(run, array=model.array), model, name=str(run)) for run in runs or []]
+    with progress("designing", total=1.0) as advance:
+        proposal = design(
+            model,
+            asked,
+            limits=Limits(max_rate, max_acceleration, duration),
+            rng=np.random.default_rng(seed),
+            mountings={} if upright else MOUNTINGS,
+            recorded=recorded,
+            sample_rate=loaded.sample_rate,
+            evaluations=evaluations,
+            report=advance,
+        )
+    if out is not None:
+        write_text(out, proposal.to_toml())
+    if as_json:
+        print_json(proposal.to_dict() | {"files": {} if out is None else {"scenario": out}})
+        return
+    _print(proposal, at_hand=bool(recorded))
+    if out is not None:
+        print_paths([("scenario", out)])
+
+
+def _print(proposal: Proposal, *, at_hand: bool) -> None:
+    names = proposal.effects
+    print_table(
+        "Margin of each effect over each rival, nats",
+        ["effect", "rival", "recorded so far" if at_hand else "plain run", "with this experiment"],
+        [
+            [names[i], names[j], f"{proposal.before.nats[i, j]:.3g}", f"{proposal.after.nats[i, j]:.3g}"]
+            for i in range(len(names))
+            for j in range(len(names))
+            if i != j
+        ],
+        note="Expected log likelihood by which the effect, at its size, beats the best fit of the rival.",
+    )
+    print_table("Profile", ["", "piece"], list(enumerate(proposal.profile.in_words(), start=1)))
+    typer.echo(proposal.text)
