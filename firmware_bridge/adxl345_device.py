@@ -203,11 +203,19 @@ class Adxl345:
             self._data_ready = True
             self.next_conversion += due * self._period
             return
-        skipped = max(0, due - 2 * (_FIFO_DEPTH + 1))  # the FIFO can't remember these
-        for place in range(skipped, due):
-            sample = self._conversion(skipped if place == skipped else 0)
-            self.next_conversion += (skipped + 1 if place == skipped else 1) * self._period
+        filling = mode == FIFO or (mode == TRIGGER and self.triggered)
+        # Conversions that leave no trace: those that find a full FIFO, or those that newer ones push out.
+        stored = min(due, _FIFO_DEPTH + 1)
+        skip = 0 if filling else due - stored
+        for place in range(stored):
+            ahead = skip if place == 0 else 0
+            sample = self._conversion(ahead)
+            self.next_conversion += (ahead + 1) * self._period
             self._store(sample, mode)
+        if filling and due > stored:
+            self._block_place += due - stored
+            self.next_conversion += (due - stored) * self._period
+            self._overrun = True
 
     def _store(self, sample: tuple[int, int, int], mode: int) -> None:
         """Put one sample into the FIFO."""

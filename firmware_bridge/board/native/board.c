@@ -919,13 +919,20 @@ static void adxl_catch_up(struct board *b, struct adxl345 *d, ticks now)
         d->next_conversion += due * d->period;
         return;
     }
-    ticks skipped = due > 66 ? due - 66 : 0;
-    for (ticks place = skipped; place < due; place++) {
+    bool filling = mode == 1 || (mode == 3 && d->triggered);
+    ticks stored = due < 33 ? due : 33;
+    ticks skip = filling ? 0 : due - stored;
+    for (ticks place = 0; place < stored; place++) {
         int32_t sample[3];
-        ticks skip = place == skipped ? skipped : 0;
-        adxl_conversion(b, d, skip, sample);
-        d->next_conversion += (skip + 1) * d->period;
+        ticks ahead = place == 0 ? skip : 0;
+        adxl_conversion(b, d, ahead, sample);
+        d->next_conversion += (ahead + 1) * d->period;
         adxl_store(d, sample, mode);
+    }
+    if (filling && due > stored) {
+        d->block_place = (int)earlier(d->block_place + due - stored, d->block_count);
+        d->next_conversion += (due - stored) * d->period;
+        d->overrun = true;
     }
 }
 
