@@ -242,8 +242,9 @@ def analogue(readings, t, angle, rate, temperature, hidden):
         one = hidden["magnetic_pickup"]
         out[:, CHANNELS.index(one["channel"])] += one["coefficient_m_s"] * rate * np.sin(angle + one["phase_rad"])
     if "sensor_lag" in hidden:
-        decay = np.exp(-(t[1] - t[0]) / hidden["sensor_lag"]["time_constant_s"])
-        out = lfilter([1 - decay], [1, -decay], out, axis=0, zi=decay * out[:1])[0]
+        x = (t[1] - t[0]) / (2 * hidden["sensor_lag"]["time_constant_s"])  # bilinear transform of 1/(1 + τs)
+        gain, pole = x / (1 + x), (1 - x) / (1 + x)
+        out = lfilter([gain, gain], [1, -pole], out, axis=0, zi=(1 - gain) * out[:1])[0]
     if "hysteresis" in hidden:
         out = _play(out, hidden["hysteresis"]["width_m_s2"])
     for name in ("interference_tone", "tone_on_one_channel"):

@@ -93,7 +93,7 @@ def hide(seed, effects=(), size=300.0, **setting):
         hidden[name] = _sized(plain, plan, temperature, azimuth, name, unit, size)
     rig = rig_with(hidden, azimuth=azimuth)
     run = drive_table(command, rig, plan.duration, plan.step_s) if _differs(rig) else plain
-    t, readings, tacho = _noise_free(run, plan, temperature, hidden, rig, run.readings)
+    t, readings, tacho = noise_free(run, plan, temperature, hidden, rig, run.readings)
     columns = _measured(rng, plan, t, readings, tacho, temperature, hidden)
     reached = _distance(plain, plan, temperature, azimuth, hidden)
     return HiddenRun(columns, tuple(hidden.items()), reached)
@@ -125,20 +125,23 @@ def _sized(run, plan, temperature, azimuth, name, unit, size):
         factor *= ratio
         if abs(ratio - 1) < 0.03:
             break
-    return scaled(name, unit, float(factor))
+    found = scaled(name, unit, float(factor))
+    if name == "resonance":  # 1 is the whole inertia on the spring; more is no mounting any more
+        found["gain"] = min(found["gain"], 1.0)
+    return found
 
 
 def _distance(run, plan, temperature, azimuth, hidden):
     """d′ of what has a noise-free form, from readings by differenced positions."""
     rig = rig_with(hidden, azimuth=azimuth)
-    before = _noise_free(run, plan, temperature, {}, Rig())
-    after = _noise_free(run, plan, temperature, hidden, rig)
+    before = noise_free(run, plan, temperature, {}, Rig())
+    after = noise_free(run, plan, temperature, hidden, rig)
     sigma = np.hypot(WHITE, LSB / np.sqrt(12))
     channels = np.sum(((after[1] - before[1]) / sigma) ** 2)
     return float(np.sqrt(channels + np.sum(((after[2] - before[2]) / plan.tacho_noise_rad_s) ** 2)))
 
 
-def _noise_free(run, plan, temperature, hidden, rig, sensed=None):
+def noise_free(run, plan, temperature, hidden, rig, sensed=None):
     """Sample times, channels (n, 12) and tachometer (n,) without noise.
 
     ``sensed`` are MuJoCo's accelerometers; without them the readings come from differenced positions. What the table
