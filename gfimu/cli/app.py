@@ -18,6 +18,7 @@ COMMAND_FILES = (
     "simulate",
     "estimate",
     "convert",
+    "diagnose",
     "drift",
     "design",
     "calibrate",

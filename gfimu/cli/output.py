@@ -44,12 +44,14 @@ def print_json(value: Any) -> None:
     typer.echo(json.dumps(plain(value), indent=2, allow_nan=False))
 
 
-def print_table(title: str, header: Sequence[str], rows: Iterable[Sequence[object]], *, note: str = "") -> None:
-    """Print a table for people; numbers to the right."""
+def print_table(
+    title: str, header: Sequence[str], rows: Iterable[Sequence[object]], *, note: str = "", left: int = 1
+) -> None:
+    """Print a table for people: the first ``left`` columns hold words, numbers go to the right."""
     table = Table(title=title, title_justify="left", title_style="bold", caption=note or None)
     table.caption_justify = "left"
     for place, name in enumerate(header):
-        table.add_column(name, justify="left" if place == 0 else "right", overflow="fold")
+        table.add_column(name, justify="left" if place < left else "right", overflow="fold")
     for row in rows:
         table.add_row(*[str(cell) for cell in row])
     console.print(table)

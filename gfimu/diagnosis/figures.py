@@ -35,6 +35,7 @@ _CHANNELS = ("#d98200", "#2f7fc1", "#00896b", "#b4499a")
 _DIVERGING = "RdBu_r"
 _MOST_POINTS = 4000
 _DPI = 110
+_CHANCE = 3.0
 _SMOOTH_S = 0.15
 _STYLE = {
     "font.family": "sans-serif",
@@ -162,14 +163,20 @@ def fingerprint_figure(fingerprint: Fingerprint) -> str:
     with mpl.rc_context(_STYLE):
         figure = Figure(figsize=(11.0, 0.24 * count + 1.2), layout="constrained")
         pair = figure.subplots(1, 2, sharey=True)
-        norm = SymLogNorm(linthresh=4.0, vmin=-largest, vmax=largest)
+        norm = SymLogNorm(linthresh=_CHANCE, vmin=-largest, vmax=largest)
         for axis, values, title in zip(pair, (fingerprint.before, fingerprint.after), ("before", "after"), strict=True):
-            axis.imshow(values, cmap=_DIVERGING, norm=norm, aspect="auto", interpolation="nearest")
+            shown = np.where(np.abs(values) < _CHANCE, 0.0, values)
+            axis.imshow(shown, cmap=_DIVERGING, norm=norm, aspect="auto", interpolation="nearest")
             axis.set_xticks(range(terms), fingerprint.terms, rotation=40, ha="right")
             axis.set_yticks(range(count), fingerprint.channels)
             axis.set_title(title, loc="left", fontsize=10)
             axis.tick_params(length=0)
         bar = figure.colorbar(ScalarMappable(norm, _DIVERGING), ax=pair.tolist(), shrink=0.9, pad=0.01)
+        ticks = [tick for tick in (3, 10, 30, 100, 1000, 10_000) if tick <= largest]
+        bar.set_ticks(
+            [-tick for tick in ticks[::-1]] + ticks,
+            labels=[f"−{tick}" for tick in ticks[::-1]] + [f"{t}" for t in ticks],
+        )
         bar.set_label("standard deviations")
         return _svg(figure)
 

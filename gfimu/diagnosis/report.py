@@ -14,7 +14,7 @@ from gfimu.atomic_file import write_text
 from gfimu.diagnosis import figures
 from gfimu.diagnosis.residuals import ResidualViews, residual_views
 from gfimu.diagnosis.verdict import Diagnosis, NamedCause
-from gfimu.diagnosis.wording import gain_rows, headline, next_steps, odds, parameter_texts, percent, story, summary
+from gfimu.diagnosis.plain_words import gain_rows, headline, next_steps, odds, parameter_texts, percent, story, summary
 
 __all__ = ["report_html", "write_report"]
 

@@ -1,0 +1,100 @@
+"""The rerun recording of a diagnosis: measured and predicted channels, the reference, and the rig in 3-D."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from gfimu.diagnosis.verdict import Diagnosis, RunView
+from gfimu.diagnosis.plain_words import headline, next_steps, parameter_texts, percent, story
+from gfimu.recording import Recording
+from gfimu.visual import KnownMotion, Line, Plot, write_comparison
+from gfimu.visual.colours import COMMAND, MEASURED, PREDICTED_AFTER, PREDICTED_BEFORE
+from gfimu.visual.scene import Shape
+
+__all__ = ["write_picture"]
+
+_CUBE_CENTRE = (0.0, 0.0, 0.06)
+
+
+def write_picture(
+    path: str | Path,
+    diagnosis: Diagnosis,
+    *,
+    run: int = 0,
+    mounting: NDArray[np.float64] | None = None,
+    cube_centre: Sequence[float] = _CUBE_CENTRE,
+    shapes: Mapping[str, Sequence[Shape]] | None = None,
+) -> None:
+    """Write ``diagnosis.rrd`` for one run of a diagnosis.
+
+    Parameters
+    ----------
+    path : str or Path
+        File to write, ``.rrd``.
+    diagnosis : Diagnosis
+        The diagnosis.
+    run : int
+        Which of its runs.
+    mounting : ndarray, shape (3,), optional
+        Rotation vector from the cube as it stood to the table frame, rad; upright by default.
+    cube_centre : sequence of float, shape (3,)
+        Centre of the cube in the table frame, m.
+    shapes : mapping of str to sequence of Shape, optional
+        Shapes of ``base``, ``table`` and ``cube`` of the extended rig; a plain rig otherwise.
+    """
+    view = diagnosis.runs[run]
+    array = diagnosis.twin.array
+    readings = np.where(view.valid, view.measured, np.nan)
+    recording = Recording.from_arrays(view.t, readings, array)
+    turn = np.zeros(3) if mounting is None else mounting
+    write_comparison(
+        path,
+        recording,
+        array,
+        view.before,
+        view.after,
+        known=_motion(view, turn, np.asarray(cube_centre, dtype=float)),
+        plots=_plots(view),
+        shapes=shapes,
+        notes=_notes(diagnosis),
+        title=f"diagnosis of {view.name}: {diagnosis.verdict.replace('_', ' ')}",
+    )
+
+
+def _motion(view: RunView, mounting: NDArray[np.float64], centre: NDArray[np.float64]) -> KnownMotion:
+    """Motion of the cube with the drive as estimated, its centre carried round by the table."""
+    table = Rotation.from_rotvec(np.outer(view.angle, [0.0, 0.0, 1.0]))
+    attitude = table * Rotation.from_rotvec(mounting)
+    return KnownMotion(
+        "drive, estimated", view.t, attitude.as_quat(scalar_first=True), table.apply(centre), angle=view.angle
+    )
+
+
+def _plots(view: RunView) -> list[Plot]:
+    reference = np.where(np.isfinite(view.reference), view.reference, np.nan)
+    return [
+        Plot(
+            "reference that drives the table",
+            [
+                Line("measured", view.t, reference, MEASURED, 2.0),
+                Line("predicted before", view.t, view.reference_before, PREDICTED_BEFORE),
+                Line("predicted after", view.t, view.reference_after, PREDICTED_AFTER),
+            ],
+        ),
+        Plot("rate of the table, estimated, rad/s", [Line("ω", view.t, view.rate, COMMAND)], legend=False),
+        Plot("angular acceleration, estimated, rad/s²", [Line("α", view.t, view.acceleration, COMMAND)], legend=False),
+    ]
+
+
+def _notes(diagnosis: Diagnosis) -> str:
+    lines = [f"# {headline(diagnosis)}", "", story(diagnosis), ""]
+    for cause in diagnosis.causes:
+        sizes = "; ".join(f"{one.name} {one.value}" for one in parameter_texts(cause) if one.significant)
+        lines.append(f"- **{cause.effect}** {sizes} (probability {percent(cause.probability)})")
+    lines += ["", "**Next.**", *[f"- {step}" for step in next_steps(diagnosis)]]
+    return "\n".join(lines)
