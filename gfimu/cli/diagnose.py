@@ -91,7 +91,16 @@ def write_result(out: Path, found: Diagnosis, recording: Recording) -> dict[str,
 
 def print_diagnosis(found: Diagnosis) -> None:
     """Print a diagnosis for people."""
-    from gfimu.diagnosis.plain_words import gain_rows, headline, next_steps, odds, parameter_texts, percent, story, summary
+    from gfimu.diagnosis.plain_words import (
+        gain_rows,
+        headline,
+        next_steps,
+        odds,
+        parameter_texts,
+        percent,
+        story,
+        summary,
+    )
 
     console.print(f"[bold]{headline(found)}[/bold]", highlight=False)
     console.print(story(found), highlight=False)

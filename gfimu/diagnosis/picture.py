@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from gfimu.diagnosis.verdict import Diagnosis, RunView
 from gfimu.diagnosis.plain_words import headline, next_steps, parameter_texts, percent, story
+from gfimu.diagnosis.verdict import Diagnosis, RunView
 from gfimu.recording import Recording
 from gfimu.visual import KnownMotion, Line, Plot, write_comparison
 from gfimu.visual.colours import COMMAND, MEASURED, PREDICTED_AFTER, PREDICTED_BEFORE

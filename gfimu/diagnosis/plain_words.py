@@ -74,9 +74,12 @@ def headline(diagnosis: Diagnosis) -> str:
         case "unknown":
             return "Something real is missing in the simulation, and nothing in the library explains it."
         case "ambiguous":
-            return (
-                f"Something is missing in the simulation, but this recording can't tell which: {_joined(found, 'or')}."
-            )
+            contested = [cause for cause in diagnosis.causes if cause.not_distinguishable_from] or diagnosis.causes
+            names = dict.fromkeys(name for one in contested for name in (one.effect, *one.not_distinguishable_from))
+            candidates = _joined([_words(diagnosis, name) for name in names], "or")
+            text = f"Something is missing in the simulation, but this recording can't tell which: {candidates}."
+            certain = [_short(diagnosis, cause) for cause in diagnosis.causes if cause not in contested]
+            return f"Found: {_joined(certain)}. {text.replace('Something', 'Something else', 1)}" if certain else text
         case _ if len(found) == 1:
             return f"Found what the simulation leaves out: {found[0]}."
         case _:
@@ -92,9 +95,13 @@ def summary(diagnosis: Diagnosis, cause: NamedCause) -> str:
 
 def _short(diagnosis: Diagnosis, cause: NamedCause) -> str:
     """Return the summary up to its explanation, and the place."""
-    family = diagnosis.twin.families().get(cause.effect)
-    words = str(family.summary).split(":")[0] if family is not None else cause.effect.replace("_", " ")
+    words = _words(diagnosis, cause.effect)
     return f"{words} ({cause.place})" if cause.place else words
+
+
+def _words(diagnosis: Diagnosis, effect: str) -> str:
+    family = diagnosis.twin.families().get(effect)
+    return str(family.summary).split(":", maxsplit=1)[0] if family is not None else effect.replace("_", " ")
 
 
 def story(diagnosis: Diagnosis) -> str:
@@ -159,14 +166,15 @@ def next_steps(diagnosis: Diagnosis) -> list[str]:
     match diagnosis.verdict:
         case "nothing_found":
             steps.append(
-                "Keep the simulation as it is. A longer run, with faster ramps in both directions, would show smaller errors."
+                "Keep the simulation as it is. A longer run, with faster ramps in both directions, would show "
+                "smaller errors."
             )
         case "ambiguous":
             steps += [f"To tell the candidates apart, record: {remedy}." for remedy in remedies]
             steps.append("Give both recordings to one call of gfimu diagnose; it fits them together.")
         case "unknown":
             steps.append(
-                "Look at the residual views of the report for where the discrepancy sits; the surrogate term in twin.toml or "
+                "Look at the residual views of the report for where the discrepancy sits; the surrogate term in "
                 "verdict.json describes it, but does not name it."
             )
             steps.append("Record another run with another motion: what stays is in the rig or the sensors.")

@@ -12,9 +12,9 @@ from jinja2 import Environment, FileSystemLoader, select_autoescape
 import gfimu
 from gfimu.atomic_file import write_text
 from gfimu.diagnosis import figures
+from gfimu.diagnosis.plain_words import gain_rows, headline, next_steps, odds, parameter_texts, percent, story, summary
 from gfimu.diagnosis.residuals import ResidualViews, residual_views
 from gfimu.diagnosis.verdict import Diagnosis, NamedCause
-from gfimu.diagnosis.plain_words import gain_rows, headline, next_steps, odds, parameter_texts, percent, story, summary
 
 __all__ = ["report_html", "write_report"]
 
@@ -65,7 +65,7 @@ def _content(diagnosis: Diagnosis) -> Mapping[str, Any]:
         "tone": tone,
         "headline": headline(diagnosis),
         "story": story(diagnosis),
-        "sentences": diagnosis.sentences,
+        "sentences": diagnosis.sentences[1:],
         "figures_of_merit": _figures_of_merit(diagnosis),
         "causes": [_cause(diagnosis, cause) for cause in diagnosis.causes],
         "surrogate": dict(diagnosis.unexplained.surrogate),
