@@ -206,16 +206,16 @@ def _score(table: Distinguishability) -> float:
 
 
 def _never_parted(tables: Sequence[Distinguishability]) -> list[tuple[str, str]]:
-    """Return the pairs of which the first is explained in full by the second under every profile."""
-    unexplained = np.stack([np.nan_to_num(table.unexplained, nan=0.0) for table in tables])  # (profiles, k, k)
-    seen = np.stack([table.detectability for table in tables]).max(axis=0) > 1.0
+    """Return the pairs of which the first, well visible, is explained in full by the second under every profile."""
+    left = np.stack([table.energy for table in tables]).max(axis=0)  # (k, k)
+    whole = np.stack([table.detectability for table in tables]).max(axis=0) ** 2  # (k,)
     names = tables[0].effects
     count = range(len(names))
     return [
         (names[i], names[j])
         for i in count
         for j in count
-        if i != j and seen[i] and unexplained[:, i, j].max() < _INSEPARABLE
+        if i != j and whole[i] > 1.0 and left[i, j] < _INSEPARABLE * whole[i]
     ]
 
 

@@ -143,7 +143,7 @@ def test_slow_turning_leaves_tacho_scale_and_position_together(tables):
 
 
 # Fraction of an effect that a rival cannot explain, by excitation. The orders of magnitude follow from the geometry:
-# a constant is a constant at rest, gravity turns with a slow table, ω² grows with speed, another axis is up on the side.
+# a constant is one at rest, gravity turns with a slow table, ω² grows with speed, another axis is up on the side.
 CONFOUNDING = [
     ("table_tilt", "bias", "rest", 0, 1e-5),
     ("table_tilt", "bias", "slow", 0.9, 1),
