@@ -88,11 +88,11 @@ def pose_directions(means: Floats) -> Floats:
 
 def distinct_poses(directions: Floats) -> list[list[int]]:
     """Group poses that are within 8° of the first of their group; one list of pose numbers per distinct pose."""
+    same = (directions @ directions.T > np.cos(np.deg2rad(_SAME_POSE_DEG))).tolist()
     groups: list[list[int]] = []
-    limit = np.cos(np.deg2rad(_SAME_POSE_DEG))
-    for number, direction in enumerate(directions):
+    for number, like in enumerate(same):
         for group in groups:
-            if directions[group[0]] @ direction > limit:
+            if like[group[0]]:
                 group.append(number)
                 break
         else:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 __all__ = ["covariance_scale"]
 
@@ -33,7 +33,7 @@ def covariance_scale(variance_factor: float, redundancy: int) -> tuple[float, tu
     """
     if redundancy <= 0 or not math.isfinite(variance_factor):
         return 1.0, ()
-    if variance_factor <= chi2.ppf(1.0 - _SIGNIFICANCE, redundancy) / redundancy:
+    if variance_factor <= chdtri(redundancy, _SIGNIFICANCE) / redundancy:
         return 1.0, ()
     text = (
         f"the poses disagree with the model {math.sqrt(variance_factor):.1f} times more than their noise explains "

@@ -25,6 +25,7 @@ Condition = Callable[[Floats, Floats], tuple[Floats, Floats, Floats]]
 """f(x, l): parameters (u,) and observations (n, d) to the misclosures (n, r), A (n, r, u) and B (n, r, d)."""
 
 _RANK_TOLERANCE = 1e-9
+_NORMAL_LIMIT = 1e-8
 
 
 @dataclass(frozen=True)
@@ -106,39 +107,65 @@ def gauss_helmert(
     """
     x = np.array(parameters, dtype=float)
     raw = np.asarray(observations, dtype=float)  # (n, d)
-    n, d = raw.shape
-    q = np.broadcast_to(np.asarray(covariance, dtype=float), (n, d, d))
-    span = np.eye(len(x)) if basis is None else np.asarray(basis, dtype=float)
-    v = np.zeros_like(raw)
+    q = np.asarray(covariance, dtype=float)
+    span = None if basis is None else np.asarray(basis, dtype=float)
+    v: Floats | None = None
     for iteration in range(1, max_iterations + 1):
-        f, a, b = condition(x, raw + v)  # (n, r), (n, r, u), (n, r, d)
-        w = f - np.einsum("nrd,nd->nr", b, v)
-        bq = b @ q  # (n, r, d)
-        whiten = np.linalg.inv(np.linalg.cholesky(bq @ b.swapaxes(1, 2)))  # (B Q Bᵀ)⁻¹ = Lᵀ L, (n, r, r)
-        design = (whiten @ a @ span).reshape(-1, span.shape[1])
-        closure = (whiten @ w[..., None]).ravel()
-        step, cofactor, null = _solve(design, closure, minimum_norm)
-        dx = span @ step
+        f, a, b = condition(x, raw if v is None else raw + v)  # (n, r), (n, r, u), (n, r, d)
+        w = f if v is None else f - np.einsum("nrd,nd->nr", b, v)
+        bq = _times_covariance(b, q)  # (n, r, d)
+        root = _whitening(bq, b)  # (B Q Bᵀ)⁻¹ = Lᵀ L, (n, r, r)
+        design = _whitened(root, a)
+        if span is not None:
+            design = design @ span
+        closure = _whitened(root, w[..., None]).ravel()
+        step, cofactor, null = _solve(design.reshape(len(closure), -1), closure, minimum_norm)
+        dx = step if span is None else span @ step
         x += dx
-        rest = whiten @ (w + a @ dx)[..., None]  # whitened A dx + w, (n, r, 1)
-        new_v = -(bq.swapaxes(1, 2) @ (whiten.swapaxes(1, 2) @ rest))[..., 0]
-        if not (np.isfinite(x).all() and np.isfinite(new_v).all()):
-            break
-        std = np.sqrt(np.einsum("ij,jk,ik->i", span, cofactor, span))
+        full = cofactor if span is None else span @ cofactor @ span.T
+        std = np.sqrt(np.diag(full))
         settled = bool(np.all(np.abs(dx) <= np.maximum(tolerance * std, 1e-14 * np.abs(x))))
-        if move_observations:
-            noise = np.sqrt(np.einsum("ndd->nd", q))
-            settled = settled and bool(np.all(np.abs(new_v - v) <= 1e3 * tolerance * noise))
-            v = new_v
-        if settled or (not move_observations and iteration > 1 and np.all(np.abs(dx) <= 1e-9 * std)):
-            redundancy = len(closure) - (design.shape[1] - null.shape[1])
+        last = settled or (not move_observations and iteration > 1 and bool(np.all(np.abs(dx) <= 1e-9 * std)))
+        if move_observations or last:
+            rest = _whitened(root, (w + a @ dx)[..., None])  # whitened A dx + w, (n, r, 1)
+            new_v = -np.einsum("nrd,nr->nd", bq, _whitened(root.swapaxes(1, 2), rest)[..., 0])
+            if not np.isfinite(new_v).all():
+                break
+            if move_observations:
+                noise = np.sqrt(np.einsum("...dd->...d", q))
+                moved = np.abs(new_v if v is None else new_v - v)
+                last = settled and bool(np.all(moved <= 1e3 * tolerance * noise))
+                v = new_v
+        if not np.isfinite(x).all():
+            break
+        if last:
+            redundancy = len(closure) - (design.shape[-1] - null.shape[1])
             factor = float(np.sum(rest**2)) / redundancy if redundancy > 0 else np.nan
-            directions = np.linalg.qr(span @ null)[0]
-            return Adjustment(x, span @ cofactor @ span.T, new_v, factor, redundancy, directions, iteration)
+            directions = np.linalg.qr(null if span is None else span @ null)[0]
+            return Adjustment(x, full, new_v, factor, redundancy, directions, iteration)
     raise InputError(
         f"the adjustment did not settle in {max_iterations} iterations; the starting values are too far off, "
         "or some observations do not belong: check the poses and the gravity"
     )
+
+
+def _times_covariance(b: Floats, q: Floats) -> Floats:
+    """Return B Q, shape (n, r, d), for a covariance common to all groups or one of each."""
+    if q.ndim == 2:
+        return np.asarray((b.reshape(-1, b.shape[2]) @ q).reshape(b.shape), dtype=np.float64)
+    return b @ q
+
+
+def _whitening(bq: Floats, b: Floats) -> Floats:
+    """Inverse of the Cholesky factor of B Q Bᵀ, shape (n, r, r)."""
+    if b.shape[1] == 1:
+        return np.asarray(1.0 / np.sqrt(np.einsum("nrd,nrd->n", bq, b)), dtype=np.float64)[:, None, None]
+    return np.asarray(np.linalg.inv(np.linalg.cholesky(bq @ b.swapaxes(1, 2))), dtype=np.float64)
+
+
+def _whitened(root: Floats, matrix: Floats) -> Floats:
+    """Multiply each group's matrix by its root, which is a number where a group has one condition."""
+    return root * matrix if root.shape[1] == 1 else root @ matrix
 
 
 def _solve(design: Floats, closure: Floats, minimum_norm: bool) -> tuple[Floats, Floats, Floats]:
@@ -148,8 +175,17 @@ def _solve(design: Floats, closure: Floats, minimum_norm: bool) -> tuple[Floats,
     scale[scale == 0.0] = 1.0
     if minimum_norm:  # one common scale: the norm that is least is that of the parameters themselves
         scale[:] = scale.max()
+    scaled = design / scale
+    if not minimum_norm:
+        # Normal equations where they keep enough digits: the iteration corrects what they lose in the step.
+        normal = scaled.T @ scaled
+        values, vectors = np.linalg.eigh(normal)
+        if values[0] > _NORMAL_LIMIT * values[-1]:
+            root = vectors / np.sqrt(values) / scale[:, None]
+            cofactor = root @ root.T
+            return -cofactor @ (design.T @ closure), cofactor, np.empty((u, 0))
     triangle = np.zeros((u + 1, u + 1))
-    reduced = np.linalg.qr(np.column_stack([design / scale, closure]), mode="r")
+    reduced = np.linalg.qr(np.column_stack([scaled, closure]), mode="r")
     triangle[: len(reduced)] = reduced
     left, s, vt = np.linalg.svd(triangle[:u, :u])
     rank = int(np.sum(s > _RANK_TOLERANCE * s[0]))

@@ -118,17 +118,24 @@ def magnitude_condition(magnitude: float, gauge: str, *, squared: bool = False, 
         m = np.zeros((3, 3))
         m[rows, columns] = parameters[: len(elements)]
         w = np.linalg.inv(m)
-        a = (readings - parameters[len(elements) :]) @ w.T  # (n, 3)
-        norm = np.sqrt(np.einsum("nk,nk->n", a, a))
+        a = w @ (readings - parameters[len(elements) :]).T  # (3, n)
+        norm = np.sqrt(np.einsum("kn,kn->n", a, a))
+        slope = w.T @ a  # (3, n): ∂(½|a|²)/∂l = Wᵀ a
         if squared:
-            misclosure, slope = norm**2 - magnitude**2, 2.0 * (a @ w)
+            misclosure = norm**2 - magnitude**2
+            slope *= 2.0
         else:
-            misclosure, slope = norm - magnitude, (a @ w) / norm[:, None]  # ∂f/∂l = uᵀ W, (n, 3)
+            misclosure = norm - magnitude
+            slope /= norm
         # a = W (l − b): ∂a/∂M_ij = −W e_i a_j and ∂a/∂b = −W.
-        by_parameters = -np.concatenate([slope[:, rows] * a[:, columns], slope], axis=1)  # (n, u)
+        by_parameters = np.empty((len(elements) + 3, len(norm)))  # (u, n)
+        for row, (i, j) in enumerate(elements):
+            np.multiply(slope[i], a[j], out=by_parameters[row])
+        by_parameters[len(elements) :] = slope
+        np.negative(by_parameters, out=by_parameters)
         if unit_weight:
-            slope = slope / np.linalg.norm(slope, axis=1, keepdims=True)
-        return misclosure[:, None], by_parameters[:, None, :], slope[:, None, :]
+            slope = slope / np.sqrt(np.einsum("kn,kn->n", slope, slope))
+        return misclosure[:, None], by_parameters.T[:, None, :], slope.T[:, None, :]
 
     return condition
 

@@ -22,7 +22,7 @@ FLICKER_FLOOR = float(np.sqrt(2.0 * np.log(2.0) / np.pi))
 
 _PER_DECADE = 10
 _FEWEST = 9
-_BLOCK = 2048
+_BLOCK = 8192
 
 
 @dataclass(frozen=True)
@@ -117,26 +117,29 @@ def allan_deviation(
     phase[0] = 0.0
     np.cumsum(series - series.mean(), out=phase[1:])
     phase /= rate
-    squares = np.array([_second_difference_square(phase, factor, 1 if overlapping else factor) for factor in m])
-    count = len(phase) - 2 * m if overlapping else np.array([len(range(0, len(phase) - 2 * k, k)) for k in m])
+    if overlapping:
+        squares, count = _second_difference_squares(phase, m), len(phase) - 2 * m
+    else:
+        second = [phase[2 * k :: k] - 2.0 * phase[k:-k:k] + phase[: -2 * k : k] for k in m]
+        squares, count = np.array([x @ x for x in second]), np.array([len(x) for x in second])
     tau = m / rate
     return AllanDeviation(m, tau, np.sqrt(squares / (2.0 * count)) / tau, len(series), float(rate), overlapping)
 
 
 @numba.njit(cache=True, fastmath={"reassoc", "contract"})
-def _second_difference_square(phase: Floats, m: int, stride: int) -> float:
-    """Sum of (x_{i+2m} − 2 x_{i+m} + x_i)² over i, in blocks so that rounding does not grow with length."""
-    total = 0.0
-    last = len(phase) - 2 * m
-    if stride == 1:
-        for begin in range(0, last, _BLOCK):
+def _second_difference_squares(phase: Floats, factors: NDArray[np.int64]) -> Floats:
+    """Sums of (x_{i+2m} − 2 x_{i+m} + x_i)² over i, for every m.
+
+    All m share a block of i before the next one, so that a long series passes through the cache once and not once for
+    every m; sums of blocks also keep rounding from growing with length.
+    """
+    total = np.zeros(len(factors))
+    for begin in range(0, len(phase), _BLOCK):
+        for place in range(len(factors)):
+            m = factors[place]
             part = 0.0
-            for i in range(begin, min(begin + _BLOCK, last)):
+            for i in range(begin, min(begin + _BLOCK, len(phase) - 2 * m)):
                 second = phase[i + 2 * m] - 2.0 * phase[i + m] + phase[i]
                 part += second * second
-            total += part
-    else:
-        for i in range(0, last, stride):
-            second = phase[i + 2 * m] - 2.0 * phase[i + m] + phase[i]
-            total += second * second
+            total[place] += part
     return total
