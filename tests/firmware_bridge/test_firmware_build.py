@@ -1,0 +1,70 @@
+"""The committed images: what they were built from, and that building gives them again."""
+
+from __future__ import annotations
+
+import struct
+import tomllib
+
+import pytest
+
+from firmware_bridge.lpc1768 import build as firmware
+from firmware_bridge.lpc1768.build import IMAGES, build, check_image, compiler_version, image_path, source_hash
+from firmware_bridge.lpc1768.elf import ElfImage
+from gfimu.errors import GfimuError, InputError
+
+
+@pytest.mark.parametrize("name", IMAGES)
+def test_committed_image_is_the_recorded_one_from_these_sources(name: str) -> None:
+    found = check_image(name)
+    assert found["image_as_recorded"]
+    assert found["sources_as_recorded"]
+
+
+@pytest.mark.parametrize("name", IMAGES)
+def test_rebuilding_gives_the_same_bytes(name: str, tmp_path) -> None:
+    pytest.importorskip("ziglang", reason="the C compiler is in the extra 'firmware'")
+    recorded = tomllib.loads(image_path(name).with_suffix(".toml").read_text())["compiler"]
+    if compiler_version() != recorded:
+        pytest.skip(
+            f"the image was built by {recorded}, here is {compiler_version()}: other bytes from the same source"
+        )
+    report = build(name, tmp_path)
+    assert report.elf.read_bytes() == image_path(name).read_bytes()
+    assert report.binary.read_bytes() == image_path(name).with_suffix(".bin").read_bytes()
+
+
+def test_boot_checksum_and_flash_image() -> None:
+    words = struct.unpack("<8I", image_path().with_suffix(".bin").read_bytes()[:32])
+    assert sum(words) & 0xFFFFFFFF == 0  # the boot ROM's test (UM10360 32.3.1.1)
+    assert words[0] == 0x10008000
+    image = ElfImage.load(image_path())
+    assert image.symbol_at(words[1] & ~1) == "Reset_Handler"
+    assert image.symbol_at((words[1] & ~1) + 2) == "Reset_Handler+0x2"
+
+
+def test_definitions_change_image_and_source_hash(tmp_path) -> None:
+    pytest.importorskip("ziglang", reason="the C compiler is in the extra 'firmware'")
+    defines = {"GFIMU_SPI_HZ": "1000000U"}
+    assert source_hash("gfimu", defines) != source_hash("gfimu")
+    assert build("gfimu", tmp_path, defines=defines).sha256 != build("gfimu", tmp_path).sha256
+
+
+def test_errors_name_the_remedy(tmp_path, monkeypatch) -> None:
+    with pytest.raises(InputError, match="gfimu, selfcheck"):
+        image_path("blink")
+    with pytest.raises(InputError, match="not a 32-bit"):
+        ElfImage.parse(b"\x7fELF\x02\x01" + bytes(60), "wide.elf")
+    with pytest.raises(InputError, match="damaged"):
+        ElfImage.parse(image_path().read_bytes()[:60], "cut.elf")
+    with pytest.raises(InputError, match=r"missing\.elf"):
+        ElfImage.load(tmp_path / "missing.elf")
+    monkeypatch.setattr(firmware.importlib.util, "find_spec", lambda name: None)
+    with pytest.raises(InputError, match=r"pip install 'gfimu\[firmware\]'"):
+        build("gfimu", tmp_path)
+
+
+def test_compiler_errors_are_shown(tmp_path) -> None:
+    pytest.importorskip("ziglang", reason="the C compiler is in the extra 'firmware'")
+    with pytest.raises(GfimuError, match="out of the SSP's reach"):
+        build("gfimu", tmp_path, defines={"GFIMU_SPI_HZ": "1000U"})
+    assert not list(tmp_path.iterdir())

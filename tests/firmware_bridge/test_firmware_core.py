@@ -1,0 +1,264 @@
+"""The firmware's core, compiled for this computer, against the register-level chips."""
+
+from __future__ import annotations
+
+import ctypes
+
+import numpy as np
+import pytest
+
+pytest.importorskip("ziglang", reason="the C compiler is in the extra 'firmware'")
+
+from firmware_bridge.adxl345_device import TICKS_PER_SECOND, Adxl345, LineFault
+from firmware_bridge.checksum import crc16
+from firmware_bridge.commands import (
+    Command,
+    Identity,
+    Reply,
+    Result,
+    encode_command,
+    parse_message,
+    set_range,
+    set_rate,
+)
+from firmware_bridge.frames import SampleDecoder, Samples, Status
+from firmware_bridge.lpc1768.build import build_host_library
+
+US = TICKS_PER_SECOND // 1_000_000
+EXCHANGE = ctypes.CFUNCTYPE(None, ctypes.c_uint32, ctypes.POINTER(ctypes.c_uint16), ctypes.c_uint32)
+
+
+@pytest.fixture(scope="module")
+def library(tmp_path_factory):
+    return ctypes.CDLL(str(build_host_library(tmp_path_factory.mktemp("host"))))
+
+
+class Host:
+    """The core with four chips on its SPI; time moves when told to."""
+
+    def __init__(self, library, *, cause: int = 1, baud: int = 1_562_500) -> None:
+        self.library = library
+        self.now = 0
+        self.chips = [
+            Adxl345(lambda first, period, n, bw, k=k: np.tile([256 * (k + 1), -512, 65536], (n, 1))) for k in range(4)
+        ]
+        self.decoder = SampleDecoder()
+        self._callback = EXCHANGE(self._exchange)
+        library.host_set_exchange(self._callback)
+        self.advance(0)
+        library.host_init(cause, baud)
+
+    def _exchange(self, sensor, words, count) -> None:
+        chip = self.chips[sensor]
+        chip.select(self.now)
+        for k in range(count):
+            high = chip.transfer(words[k] >> 8, self.now)
+            low = chip.transfer(words[k] & 0xFF, self.now)
+            words[k] = high << 8 | low
+            self.now += 3 * US
+        chip.deselect(self.now)
+
+    def advance(self, microseconds: int) -> None:
+        self.now += microseconds * US
+        self.library.host_set_time_us(self.now // US)
+
+    def send(self, data: bytes) -> None:
+        for byte in data:
+            self.library.host_receive(byte)
+        self.library.host_poll()
+
+    def sample(self, count: int, period_us: int = 10_000, *, drain: bool = True) -> Samples:
+        for _ in range(count):
+            self.advance(period_us)
+            self.library.host_sample()
+            if drain:
+                self.drain()
+        return self.collected()
+
+    def drain(self) -> bytes:
+        taken = b""
+        place = ctypes.POINTER(ctypes.c_uint8)()
+        while count := self.library.host_peek(ctypes.byref(place)):
+            taken += ctypes.string_at(place, count)
+            self.library.host_taken(count)
+        self.parts = [*getattr(self, "parts", []), self.decoder.feed(taken)]
+        return taken
+
+    def collected(self) -> Samples:
+        self.drain()
+        parts, self.parts = self.parts, []
+        return Samples.join(parts)
+
+    def messages(self) -> list[Reply | Identity]:
+        self.drain()
+        found = [parse_message(packet) for packet in self.decoder.messages]
+        self.decoder.messages.clear()
+        return found
+
+
+@pytest.fixture
+def host(library) -> Host:
+    return Host(library)
+
+
+def test_crc_agrees_with_the_hosts(library) -> None:
+    for data in (b"", b"1", b"123456789", bytes(range(38))):
+        assert library.host_crc16(data, len(data)) == crc16(data)
+
+
+def test_rate_codes(library) -> None:
+    codes = {10: 10, 100: 10, 101: 11, 200: 11, 400: 12, 800: 13, 1000: 14, 1600: 14, 1601: 15, 3200: 15}
+    assert {rate: library.host_rate_code(rate) for rate in codes} == codes
+
+
+def test_it_announces_itself_and_configures_the_chips(host: Host) -> None:
+    host.library.host_poll()
+    (identity,) = host.messages()
+    assert identity.present == (True,) * 4
+    assert (identity.rate_hz, identity.baud, identity.range_g, identity.full_resolution) == (100, 1_562_500, 16, True)
+    assert identity.reset_cause == "power-on"
+    assert all(chip.registers[0x31] == 0x0B and chip.registers[0x2D] == 8 for chip in host.chips)
+
+
+def test_samples_carry_the_chips_counts_time_and_sequence(host: Host) -> None:
+    host.library.host_start()
+    assert host.library.host_timer_hz() == 100
+    samples = host.sample(8)
+    assert samples.counts[-1].tolist() == [1, -2, 256, 2, -2, 256, 3, -2, 256, 4, -2, 256]
+    assert samples.sequence.tolist() == list(range(len(samples)))
+    assert samples.status[0] & Status.FIRST
+    assert not samples.status[1:].any()
+    assert host.decoder.counts.corrupt == 0
+
+
+def test_no_frame_before_every_chip_has_converted(host: Host) -> None:
+    host.library.host_start()
+    assert len(host.sample(1, 5_000)) == 0  # 11.1 ms after the start the first conversion is there
+    first = host.sample(3)
+    assert first.sequence[0] == 0
+    assert first.counts[0, 2] == 256
+
+
+@pytest.mark.parametrize("fault", [LineFault.SILENT, LineFault.STUCK_LOW, LineFault.STUCK_HIGH])
+def test_a_sensor_that_fails_is_reported_and_taken_back(host: Host, fault: LineFault) -> None:
+    host.library.host_start()
+    host.sample(5)
+    host.messages()
+    host.chips[1].line_fault = fault
+    bad = host.sample(3)
+    assert all(Status(int(status)).missing_sensors == (2,) for status in bad.status)
+    assert (bad.counts[:, 3:6] == -32768).all()
+    host.library.host_poll()
+    assert host.messages()[-1].present == (True, False, True, True)
+    host.chips[1].line_fault = LineFault.NONE
+    good = host.sample(8)
+    assert good.counts[-1, 3:6].tolist() == [2, -2, 256]
+    host.library.host_poll()
+    assert host.messages()[-1].present == (True,) * 4
+
+
+def test_overrun_stale_and_late_are_reported(host: Host) -> None:
+    host.library.host_start()
+    host.sample(5)
+    late = host.sample(1, 35_000)
+    assert late.status[0] & Status.LATE
+    assert late.status[0] & Status.SENSOR_1_OVERRUN
+    stale = host.sample(1, 1_000)
+    assert stale.status[0] & Status.STALE
+
+
+def test_a_full_queue_drops_whole_frames_and_says_so(host: Host) -> None:
+    host.library.host_start()
+    host.sample(60, drain=False)
+    assert host.decoder.counts.corrupt == 0
+    after = host.sample(2)
+    assert after.status[0] & Status.FRAMES_DROPPED
+    assert host.decoder.counts.lost > 20
+    host.send(encode_command(Command.IDENTIFY))
+    assert host.messages()[-1].dropped == host.decoder.counts.lost
+
+
+COMMANDS = [
+    (set_rate(3200), Result.DONE),
+    (set_rate(3201), Result.BAD_VALUE),
+    (set_rate(9), Result.BAD_VALUE),
+    (set_rate(400, 16), Result.BAD_VALUE),
+    (encode_command(Command.SET_RANGE, 4, 1), Result.BAD_VALUE),
+    (set_range(2, full_resolution=False), Result.DONE),
+    (encode_command(Command.SELF_TEST, 2), Result.BAD_VALUE),
+    (encode_command(Command.SELF_TEST, 1), Result.DONE),
+    (encode_command(Command.SET_BAUD, 115_200), Result.DONE),
+    (encode_command(Command.SET_BAUD, 100), Result.BAD_VALUE),
+    (encode_command(Command.START), Result.DONE),
+    (encode_command(Command.STOP), Result.DONE),
+    (encode_command(99), Result.UNKNOWN_COMMAND),
+]
+
+
+@pytest.mark.parametrize(("command", "result"), COMMANDS)
+def test_every_command_is_answered(host: Host, command: bytes, result: Result) -> None:
+    host.library.host_start()
+    host.library.host_poll()
+    host.messages()
+    host.send(command)
+    replies = [message for message in host.messages() if isinstance(message, Reply)]
+    assert replies == [Reply(command[2], result)]
+
+
+def test_wrong_length_is_refused(host: Host) -> None:
+    body = b"\xc3\x3c" + bytes((Command.SELF_TEST, 2, 1, 1))
+    host.send(body + crc16(body).to_bytes(2, "little"))
+    assert Reply(Command.SELF_TEST, Result.BAD_LENGTH) in host.messages()
+
+
+def test_a_rate_the_line_cannot_carry_is_refused(library) -> None:
+    host = Host(library, baud=115_200)
+    host.send(set_rate(400))
+    assert Reply(Command.SET_RATE, Result.LINE_TOO_SLOW) in host.messages()
+    host.send(set_rate(200))
+    assert Reply(Command.SET_RATE, Result.DONE) in host.messages()
+
+
+def test_rate_and_range_reach_the_chips(host: Host) -> None:
+    host.library.host_start()
+    host.send(set_rate(800) + set_range(4))
+    assert all(chip.registers[0x2C] == 0x0D and chip.registers[0x31] == 0x09 for chip in host.chips)
+    assert host.library.host_timer_hz() == 800
+
+
+def test_baud_changes_only_after_the_reply_has_left(host: Host) -> None:
+    host.send(encode_command(Command.SET_BAUD, 115_200))
+    assert host.library.host_baud() == 1_562_500
+    assert Reply(Command.SET_BAUD, Result.DONE) in host.messages()
+    host.library.host_poll()
+    assert host.library.host_baud() == 115_200
+
+
+def test_commands_survive_garbage_and_damage(host: Host) -> None:
+    rng = np.random.default_rng(3)
+    good = encode_command(Command.IDENTIFY)
+    for _ in range(200):
+        host.send(rng.integers(0, 256, rng.integers(0, 30), dtype=np.uint8).tobytes())
+        host.messages()
+    host.send(bytes(20))
+    host.send(good)
+    host.library.host_poll()
+    assert any(isinstance(message, Identity) for message in host.messages())
+    damaged = bytearray(set_rate(3200))
+    damaged[5] ^= 1
+    host.send(bytes(damaged) + good)
+    replies = [m for m in host.messages() if isinstance(m, Reply)]
+    assert [reply.command for reply in replies] == [Command.IDENTIFY]
+
+
+def test_locks_are_released(host: Host) -> None:
+    host.library.host_start()
+    host.sample(3)
+    host.send(set_rate(200) + b"\xc3\x3c\xff")
+    assert host.library.host_lock_depth() == 0
+
+
+def test_watchdog_reset_is_told(library) -> None:
+    host = Host(library, cause=4)
+    host.library.host_start()
+    assert host.sample(4).status[0] & Status.WATCHDOG_RESET
