@@ -45,8 +45,8 @@ _COMPILE: dict[str, Any] = {"cache": True, "error_model": "numpy", "fastmath": {
 _UNIFORM = 1e-6
 _GAP = 1.5
 _WALK_MEMORY = 1.0  # s, over which the wandering of α is averaged
+_ERROR_MEMORY = 1.0  # s, for which a scale or placement error keeps its effect
 _SLOW = 1e-3  # tr P above this share of |ω|² switches the second-order terms on
-_MEMORY = 2.0  # length of the filter's memory in units of 1/|ω|
 
 # Places in RecursionState.scalars
 _TIME, _WALK, _LAST_GOOD = range(3)
@@ -298,11 +298,7 @@ def _inflation(y, state, tuning, present, omega_squared):  # type: ignore[no-unt
             change = (y[i] - state.reference[i]) * tuning.inverse_noise[i]
             total += change * change
     total = tuning.scale_variance * total / c + tuning.placement_variance * omega_squared * omega_squared
-    memory = 1.0 / tuning.period
-    speed = np.sqrt(omega_squared)
-    if speed * memory * tuning.period > _MEMORY:
-        memory = max(_MEMORY / (speed * tuning.period), 1.0)
-    return total * memory
+    return total * max(_ERROR_MEMORY / tuning.period, 1.0)
 
 
 @njit(**_COMPILE)
