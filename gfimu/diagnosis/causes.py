@@ -62,6 +62,8 @@ class Cause:
         Standard deviations of the shape parameters.
     log_prior : float
         Log prior probability of the effect at this place.
+    frozen : bool
+        Whether the shape is held.
     """
 
     family: EffectFamily
@@ -72,6 +74,7 @@ class Cause:
     coordinates: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     covariance: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))
     shape_std: Mapping[str, float] = field(default_factory=dict)
+    frozen: bool = False
 
     @property
     def name(self) -> str:
@@ -85,7 +88,9 @@ class Cause:
 
     @property
     def free_shape(self) -> dict[str, float]:
-        """Shape parameters that are refined: all but whole numbers."""
+        """Shape parameters that are refined: all but whole numbers, none when frozen."""
+        if self.frozen:
+            return {}
         return {key: value for key, value in self.shape.items() if key not in WHOLE_NUMBERS}
 
     def at(self, coordinates: NDArray[np.float64], shape: Mapping[str, float] | None = None) -> Cause:

@@ -15,11 +15,11 @@ from scipy.sparse import csr_array, diags_array
 from gfimu.diagnosis.model import SpinState
 from gfimu.diagnosis.run import Run
 
-__all__ = ["AngleSpline", "SplineState", "roughness_prior", "smooth_rate"]
+__all__ = ["ROUGHNESS_FACTOR", "AngleSpline", "SplineState", "roughness_prior", "smooth_rate"]
 
 _DEGREE = 4
 _SMOOTHEST = 5.0
-_ROUGHNESS_FACTOR = 6.0
+ROUGHNESS_FACTOR = 6.0
 _REMEMBERED = 6
 
 
@@ -73,6 +73,14 @@ class AngleSpline:
     def interval_centres(self) -> NDArray[np.float64]:
         """Return the centre of each knot interval, s."""
         return self.start + self.spacing * (np.arange(self.size - _DEGREE) + 0.5)
+
+    def through(self, t: NDArray[np.float64], state: SpinState) -> NDArray[np.float64]:
+        """Return the coefficients that come closest to a known motion at times ``t``."""
+        angle, rate, acceleration = self.matrices(t)
+        lhs = (1e4 * angle.T @ angle + 1e2 * rate.T @ rate + acceleration.T @ acceleration).toarray()
+        lhs[np.diag_indices_from(lhs)] += 1e-9 * lhs.diagonal().mean()
+        rhs = 1e4 * angle.T @ state.angle + 1e2 * rate.T @ state.rate + acceleration.T @ state.acceleration
+        return np.asarray(np.linalg.solve(lhs, rhs))
 
     def spin(self, coefficients: NDArray[np.float64]) -> _SplineSpin:
         """Return the motion with these coefficients."""
@@ -152,4 +160,4 @@ def roughness_prior(
         smooth = np.gradient(smooth, period)
     power = np.maximum(power - 1.5 * float(np.mean(smooth[50:-50] ** 2)), 0.0)
     at_knots = np.interp(spline.interval_centres(), run.t, power)
-    return factor * np.sqrt(_ROUGHNESS_FACTOR**2 * at_knots + _SMOOTHEST**2)
+    return factor * np.sqrt(ROUGHNESS_FACTOR**2 * at_knots + _SMOOTHEST**2)

@@ -6,14 +6,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 from gfimu.diagnosis.causes import Cause, effects_of_run
 from gfimu.diagnosis.coloured_noise import NoiseLevels, estimate_flicker, white_level
+from gfimu.diagnosis.drive import smooth_rate
 from gfimu.diagnosis.model import Effect, WorldModel
 from gfimu.diagnosis.refinement import Fit, refine
 from gfimu.diagnosis.run import Run
 from gfimu.diagnosis.search import search
-from gfimu.diagnosis.segment import Segment
+from gfimu.diagnosis.segment import Segment, difference_noise
 from gfimu.diagnosis.signatures import SignatureSet, hypotheses, plan_signatures, signature_columns
 
 __all__ = ["Explanation", "explain", "make_segments", "screen"]
@@ -26,7 +28,14 @@ _REFINED = 6
 _MOST_CAUSES = 4
 _CLOSE = 12.0
 _GROSS = 150.0
-_ITERATIONS = 12
+_FAIR_FIT = 1.6
+_RIVALS = 6
+_WORTH_REFINING = -6.0
+LEAST_ODDS = 9.0
+"""Log odds that a single cause needs against nothing: fixed on null runs that no reported figure uses."""
+LEAST_EXTRA_ODDS = 7.0
+"""Log odds that a further cause needs against the set without it."""
+_ITERATIONS = 7
 
 
 @dataclass(frozen=True)
@@ -41,6 +50,8 @@ class Explanation:
         Every other refined set, best first, under the same noise.
     nothing : Fit
         No cause at all, under the same noise.
+    without : dict of str to Fit
+        The best fit without each cause.
     segments : tuple of Segment
         The data with their drives at the best set.
     fixed : tuple of tuple of Effect
@@ -52,6 +63,7 @@ class Explanation:
     fit: Fit
     rivals: tuple[Fit, ...]
     nothing: Fit
+    without: dict[str, Fit]
     segments: tuple[Segment, ...]
     fixed: tuple[tuple[Effect, ...], ...]
     signatures: SignatureSet
@@ -67,8 +79,21 @@ def make_segments(model: WorldModel, runs: Sequence[Run]) -> list[Segment]:
     for index, run in enumerate(runs):
         pieces = max(1, round(run.duration / SEGMENT_DURATION))
         edges = np.linspace(0, len(run.t), pieces + 1).astype(int)
+        rate = smooth_rate(run, is_angle=model.drive_source == "angle")
+        turned = cumulative_trapezoid(rate, run.t, initial=0.0)
+        noise = difference_noise(run.reference[run.reference_valid])
         for start, stop in zip(edges[:-1], edges[1:], strict=True):
-            segments.append(Segment(model, run.rows(int(start), int(stop)), index, float(run.t[0])))
+            drift = noise * np.sqrt(run.sample_period * (run.t[start] - run.t[0]))
+            segments.append(
+                Segment(
+                    model,
+                    run.rows(int(start), int(stop)),
+                    index,
+                    float(run.t[0]),
+                    start_angle=float(turned[start]),
+                    start_angle_std=float(np.hypot(1e-4, 2.0 * drift)),
+                )
+            )
     return segments
 
 
@@ -141,6 +166,7 @@ def tune_drives(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[
     array = segments[0].model.array
     for segment, known, drive in zip(segments, fixed, fit.drives, strict=True):
         segment.coefficients = drive
+        segment.learn_roughness()
         segment.tune_roughness([*known, *effects_of_run(fit.causes, array, segment.index)])
 
 
@@ -170,20 +196,25 @@ def explain(
     tell = report or (lambda share, text: None)
     for segment in segments:
         segment.prepare_weights()
-    best = refine(segments, start, fixed, iterations=6 if start else 2)
+    best = refine(segments, start, fixed, iterations=6 if start else 0)
+    fitted = refine(segments, start, fixed, iterations=8)
+    observations = sum(int(segment.weight_mask.sum()) for segment in segments)
+    if fitted.objective < _FAIR_FIT * observations:
+        # The channels sharpen the drive unless something gross twists it.
+        tune_drives(segments, fitted, fixed)
+        best = fitted = refine(segments, start, fixed, drives=fitted.drives, iterations=8)
     tried: dict[frozenset[tuple[str, str]], Fit] = {}
     signatures = None
     settled_before = False
     for round_number in range(_ROUNDS):
         tell(0.1 + 0.8 * round_number / _ROUNDS, f"search {round_number + 1}")
         signatures = screen(segments, best, fixed, runs)
-        candidates, blocks = search(signatures, most=max(2, min(len(best.causes) + 1, _MOST_CAUSES)), keep=24)
+        candidates, singles, blocks = search(signatures, most=max(2, min(len(best.causes) + 1, _MOST_CAUSES)))
         fits = {best.key: best}
         gross = candidates[0].log_odds > _GROSS
         leading = candidates[:_REFINED]
         if gross and not settled_before:
             # A large effect is far from linear: the right cause may be well down the linear list.
-            singles = [candidate for candidate in candidates if len(candidate.members) == 1]
             leading = [*candidates[:3], *(one for one in singles[:_REFINED] if one not in candidates[:3])]
         for candidate in leading:
             causes = [
@@ -191,38 +222,74 @@ def explain(
                 for number, coordinates in zip(candidate.members, blocks.coordinates(candidate.members), strict=True)
             ]
             key = frozenset(cause.key for cause in causes)
-            close = candidate.log_odds > candidates[0].log_odds - _CLOSE
+            close = candidate.log_odds > max(candidates[0].log_odds - _CLOSE, _WORTH_REFINING)
             if key in fits or not (close or (gross and len(causes) == 1 and key not in tried)):
                 continue
             known = tried.get(key)
             if known is not None:
                 causes = list(known.causes)
             fits[key] = refine(segments, causes, fixed, drives=best.drives, iterations=_ITERATIONS)
+            if key not in tried and any("order" in cause.shape for cause in causes):
+                # Ripples locked to the angle lose their phase where the drive's angle has drifted.
+                other = refine(segments, causes, fixed, drives=fitted.drives, iterations=_ITERATIONS)
+                fits[key] = max(fits[key], other, key=_posterior)
         tried |= fits
         winner = max(fits.values(), key=lambda fit: fit.log_posterior)
         settled = winner.key == best.key
         best = winner
-        change = learn_noise(segments, best, fixed)
-        if settled:
-            tune_drives(segments, best, fixed)
-        best = refine(segments, best.causes, fixed, drives=best.drives, iterations=2)
+        learn_noise(segments, best, fixed)
+        tune_drives(segments, best, fixed)
+        best = refine(segments, best.causes, fixed, drives=best.drives, iterations=6)
         if settled and settled_before:
             break
         settled_before = settled
-    tell(0.9, "compare")
-    nothing = refine(segments, (), fixed, drives=best.drives, iterations=3) if best.causes else best
-    rivals = [
-        refine(segments, fit.causes, fixed, drives=best.drives, iterations=2)
-        for key, fit in tried.items()
-        if key != best.key and fit.causes and fit.log_posterior > best.log_posterior - _CLOSE - 10.0
+    tell(0.85, "prune")
+    best, without = prune(segments, best, fixed)
+    close = [
+        fit
+        for fit in sorted(tried.values(), key=_posterior, reverse=True)
+        if fit.key != best.key and fit.causes and fit.log_posterior > best.log_posterior - _CLOSE - 10.0
     ]
-    rivals.sort(key=_posterior, reverse=True)
-    assert signatures is not None
+    rivals = [refine(segments, fit.causes, fixed, drives=best.drives, iterations=6) for fit in close[:_RIVALS]]
+    rivals = [prune(segments, rival, fixed)[0] for rival in rivals if len(rival.causes) <= len(best.causes) + 1]
+    unique = {rival.key: rival for rival in rivals if rival.causes and rival.key != best.key}
+    better = max(unique.values(), key=_posterior, default=best)
+    if better.log_posterior > best.log_posterior:
+        unique[best.key] = best
+        best, without = prune(segments, better, fixed)
+        unique.pop(best.key, None)
+    tell(0.9, "compare")
+    nothing = refine(segments, (), fixed, drives=best.drives, iterations=8) if best.causes else best
+    for segment, drive in zip(segments, best.drives, strict=True):
+        segment.coefficients = drive
     return Explanation(
         best,
-        tuple(rivals),
+        tuple(sorted(unique.values(), key=_posterior, reverse=True)),
         nothing,
+        without,
         tuple(segments),
         tuple(tuple(known) for known in fixed),
-        signatures,
+        screen(segments, best, fixed, runs),
     )
+
+
+def prune(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]]) -> tuple[Fit, dict[str, Fit]]:
+    """Drop causes that the data hardly ask for; returns the fit and, by cause, the best fit without it."""
+    while True:
+        without = {
+            cause.name: refine(
+                segments,
+                [other for other in fit.causes if other.name != cause.name],
+                fixed,
+                drives=fit.drives,
+                iterations=8,
+            )
+            for cause in fit.causes
+        }
+        if not without:
+            return fit, without
+        weakest = max(without, key=lambda name: without[name].log_posterior)
+        needed = LEAST_ODDS if len(fit.causes) == 1 else LEAST_EXTRA_ODDS
+        if fit.log_posterior - without[weakest].log_posterior >= needed:
+            return fit, without
+        fit = without[weakest]

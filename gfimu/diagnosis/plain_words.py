@@ -39,6 +39,7 @@ _SIGNIFICANT = 2.0
 _THOUSANDTHS = ("rad", "m", "s")
 _SMALL = 0.1
 _MOST_DECIMALS = 5
+_MOST_DIGITS = 100
 
 
 @dataclass(frozen=True)
@@ -208,8 +209,10 @@ def odds(log_odds: float) -> str:
     if abs(log_odds) < math.log(1e4):
         ratio = f"{math.exp(abs(log_odds)):.2g}"
         ratio = f"{float(ratio):.0f}" if float(ratio) >= 10 else ratio
-    else:
+    elif abs(log_odds) < math.log(10.0) * _MOST_DIGITS:
         ratio = f"10{_superscript(round(abs(log_odds) / math.log(10)))}"
+    else:
+        return f"{'<' if log_odds < 0 else '>'} 1 : 10{_superscript(-_MOST_DIGITS if log_odds > 0 else _MOST_DIGITS)}"
     return f"1 : {ratio}" if log_odds <= 0 else f"{ratio} : 1"
 
 

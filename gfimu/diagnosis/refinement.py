@@ -23,6 +23,7 @@ __all__ = ["Fit", "refine"]
 _SHAPE_LIMIT = 0.3
 _SHAPE_PRIOR = 0.7
 _TOLERANCE = 0.02
+_DRIVE_TOLERANCE = 0.3
 _SMALLEST_POSITIVE = 1e-6
 
 
@@ -72,6 +73,7 @@ def refine(
     *,
     drives: Sequence[NDArray[np.float64]] | None = None,
     iterations: int = 6,
+    shapes: bool = True,
 ) -> Fit:
     """Fit a set of causes with the full simulation.
 
@@ -87,7 +89,11 @@ def refine(
         Starting drives.
     iterations : int
         Most Gauss–Newton steps.
+    shapes : bool
+        Whether shape parameters are fitted too.
     """
+    if not shapes:
+        causes = [replace(cause, frozen=True) for cause in causes]
     array = segments[0].model.array
     kept = [segment.coefficients for segment in segments]
     if drives is not None:
@@ -147,7 +153,7 @@ def _iterate(segments, causes, fixed, array, iterations) -> Fit:  # type: ignore
         causes = _moved(causes, step, array)
         drive_change = max(float(line.forward @ line.forward) for line in linear)
         gain = float(step @ (gram + np.diag(prior)) @ step) if len(step) else 0.0
-        if gain < _TOLERANCE and (drive_change < 1.0 or iteration >= 2):
+        if gain < _TOLERANCE and drive_change < _DRIVE_TOLERANCE:
             break
     return _result(causes, gram, score, objective, segments, array)
 

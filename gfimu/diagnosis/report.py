@@ -119,7 +119,7 @@ def _cause(diagnosis: Diagnosis, cause: NamedCause) -> Mapping[str, Any]:
         "parameters": parameters[:_MOST_PARAMETERS],
         "more": max(len(parameter_texts(cause)) - min(len(parameters), _MOST_PARAMETERS), 0),
         "probability": percent(cause.probability),
-        "why": cause.why,
+        "why": cause.why.removeprefix(summary(diagnosis, cause)).lstrip("; "),
         "alike": cause.not_distinguishable_from,
         "remedy": cause.would_be_separated_by,
     }

@@ -11,16 +11,18 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
-from gfimu.diagnosis.evidence import SCALES, log_evidence, posterior
+from gfimu.diagnosis.evidence import SCALES, log_evidence, log_evidence_each, posterior
 from gfimu.diagnosis.signatures import Hypothesis, SignatureSet
 
-__all__ = ["EXTRA_CAUSE", "Candidate", "search"]
+__all__ = ["EXTRA_CAUSE", "Blocks", "Candidate", "search"]
 
 EXTRA_CAUSE = float(np.log(0.3))
 """Log prior odds for each cause beyond the first."""
 _TOP_FAMILIES = 8
 _BEAM = 6
+_PARTNERS = 30
 
 
 @dataclass(frozen=True)
@@ -31,51 +33,60 @@ class Candidate:
     members: tuple[int, ...]
 
 
-class _Blocks:
-    """Gram blocks between hypotheses, computed once."""
+class Blocks:
+    """The normal equations by hypothesis."""
 
     def __init__(self, signatures: SignatureSet) -> None:
         self.signatures = signatures
         self.hypotheses = signatures.hypotheses
-        self._left: dict[int, NDArray[np.float64]] = {}
-        self._scores: dict[int, NDArray[np.float64]] = {}
-
-    def left(self, number: int) -> NDArray[np.float64]:
-        """Return Mᵀ G[columns, :], shape (k, P)."""
-        if number not in self._left:
+        self._one = np.array([h.mixing.shape[1] == 1 for h in self.hypotheses])
+        # Coordinates of the one-dimensional hypotheses in the columns, shape (P, count).
+        mixing = np.zeros((len(signatures.score), int(self._one.sum())))
+        for place, number in enumerate(np.flatnonzero(self._one)):
             hypothesis = self.hypotheses[number]
-            self._left[number] = hypothesis.mixing.T @ self.signatures.gram[hypothesis.signature.columns]
-        return self._left[number]
-
-    def score(self, number: int) -> NDArray[np.float64]:
-        """Return Mᵀ b, shape (k,)."""
-        if number not in self._scores:
-            hypothesis = self.hypotheses[number]
-            self._scores[number] = hypothesis.mixing.T @ self.signatures.score[hypothesis.signature.columns]
-        return self._scores[number]
+            mixing[hypothesis.signature.columns, place] = hypothesis.mixing[:, 0]
+        self._mixing = mixing
+        self._signs = np.array([bool(h.positive[0]) for h in self.hypotheses])[self._one]
+        self.log_prior = np.array([h.log_prior for h in self.hypotheses])
 
     def system(self, members: Sequence[int]) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
         """Return G, b and the signs of a set."""
-        rows = []
-        for one in members:
-            left = self.left(one)
-            rows.append(
-                np.hstack(
-                    [left[:, self.hypotheses[two].signature.columns] @ self.hypotheses[two].mixing for two in members]
-                )
-            )
-        gram = np.vstack(rows)
+        chosen = [self.hypotheses[number] for number in members]
+        columns = np.concatenate([h.signature.columns for h in chosen])
+        mixing = block_diag(*[h.mixing for h in chosen])
+        gram = mixing.T @ self.signatures.gram[np.ix_(columns, columns)] @ mixing
         return (
             0.5 * (gram + gram.T),
-            np.concatenate([self.score(number) for number in members]),
-            np.concatenate([self.hypotheses[number].positive for number in members]),
+            mixing.T @ self.signatures.score[columns],
+            np.concatenate([h.positive for h in chosen]),
         )
 
     def log_odds(self, members: Sequence[int]) -> float:
         """Return log evidence plus log prior of a set."""
-        gram, score, positive = self.system(members)
-        prior = sum(self.hypotheses[number].log_prior for number in members) + EXTRA_CAUSE * (len(members) - 1)
-        return log_evidence(gram, score, positive) + prior
+        prior = float(self.log_prior[list(members)].sum()) + EXTRA_CAUSE * (len(members) - 1)
+        return log_evidence(*self.system(members)) + prior
+
+    def log_odds_each(self, members: Sequence[int] = ()) -> NDArray[np.float64]:
+        """Return the log odds that every hypothesis adds to a set, the set's own sizes integrated out."""
+        gram, score = self.signatures.gram, self.signatures.score
+        if members:
+            chosen = [self.hypotheses[number] for number in members]
+            columns = np.concatenate([h.signature.columns for h in chosen])
+            mixing = block_diag(*[h.mixing for h in chosen])
+            inner, right, _ = self.system(members)
+            left = gram[:, columns] @ mixing  # (P, k)
+            gain = np.linalg.solve(inner + np.eye(len(right)) / SCALES[-1] ** 2, left.T)
+            gram = gram - left @ gain
+            score = score - gain.T @ right
+        values = np.empty(len(self.hypotheses))
+        information = np.einsum("pk,pk->k", self._mixing, gram @ self._mixing)
+        values[self._one] = log_evidence_each(np.maximum(information, 0.0), self._mixing.T @ score, self._signs)
+        for number in np.flatnonzero(~self._one):
+            hypothesis = self.hypotheses[number]
+            columns = hypothesis.signature.columns
+            part = hypothesis.mixing.T @ gram[np.ix_(columns, columns)] @ hypothesis.mixing
+            values[number] = log_evidence(part, hypothesis.mixing.T @ score[columns], hypothesis.positive)
+        return values + self.log_prior
 
     def coordinates(self, members: Sequence[int]) -> list[NDArray[np.float64]]:
         """Return the fitted coordinates of each member of a set."""
@@ -86,7 +97,9 @@ class _Blocks:
         return np.split(mean, ends[:-1])
 
 
-def search(signatures: SignatureSet, *, most: int = 2, keep: int = 12) -> tuple[list[Candidate], _Blocks]:
+def search(
+    signatures: SignatureSet, *, most: int = 2, keep: int = 12
+) -> tuple[list[Candidate], list[Candidate], Blocks]:
     """Score all single effects and, from the leading ones, larger sets.
 
     Parameters
@@ -100,35 +113,33 @@ def search(signatures: SignatureSet, *, most: int = 2, keep: int = 12) -> tuple[
 
     Returns
     -------
-    list of Candidate
+    candidates : list of Candidate
         Best first; sets of the same effects at other places are kept only once.
+    singles : list of Candidate
+        Every effect alone at its best place and shape, best first.
+    blocks : Blocks
+        The normal equations by hypothesis.
     """
-    blocks = _Blocks(signatures)
-    singles = [Candidate(blocks.log_odds((number,)), (number,)) for number in range(len(signatures.hypotheses))]
-    singles.sort(key=lambda candidate: -candidate.log_odds)
-    every = list(singles)
-    front = _distinct(singles, signatures.hypotheses, _TOP_FAMILIES)
-    best_of_family = _distinct(singles, signatures.hypotheses, len(signatures.hypotheses))
+    blocks = Blocks(signatures)
+    alone = blocks.log_odds_each()
+    ranked = [Candidate(float(alone[number]), (int(number),)) for number in np.argsort(-alone)]
+    singles = _distinct(ranked, signatures.hypotheses, len(ranked))
+    every = list(ranked)
+    front = singles[:_TOP_FAMILIES]
     for _ in range(1, most):
         grown: dict[tuple[int, ...], Candidate] = {}
         for candidate in front:
             taken = {signatures.hypotheses[number].name for number in candidate.members}
-            partners = [one.members[0] for one in best_of_family] + [one.members[0] for one in singles[:80]]
-            for number in dict.fromkeys(_all_places(partners, signatures.hypotheses)):
-                if signatures.hypotheses[number].name in taken:
-                    continue
-                members = tuple(sorted((*candidate.members, number)))
-                if members not in grown:
+            added = blocks.log_odds_each(candidate.members) + candidate.log_odds + EXTRA_CAUSE
+            for number in np.argsort(-added)[:_PARTNERS]:
+                members = tuple(sorted((*candidate.members, int(number))))
+                if signatures.hypotheses[number].name not in taken and members not in grown:
                     grown[members] = Candidate(blocks.log_odds(members), members)
         larger = sorted(grown.values(), key=lambda candidate: -candidate.log_odds)
-        every += larger[: 10 * keep]
+        every += larger
         front = _distinct(larger, signatures.hypotheses, _BEAM)
     every.sort(key=lambda candidate: -candidate.log_odds)
-    return _distinct(every, signatures.hypotheses, keep), blocks
-
-
-def _all_places(numbers: Sequence[int], hypotheses: Sequence[Hypothesis]) -> list[int]:
-    return list(range(len(hypotheses))) if len(hypotheses) < 500 else list(numbers)
+    return _distinct(every, signatures.hypotheses, keep), singles, blocks
 
 
 def _distinct(candidates: Sequence[Candidate], hypotheses: Sequence[Hypothesis], count: int) -> list[Candidate]:

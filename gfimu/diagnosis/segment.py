@@ -15,19 +15,20 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.ndimage import uniform_filter1d
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
 from scipy.sparse import csr_array, diags_array, vstack
 
 from gfimu.diagnosis.coloured_noise import CosineBasis, NoiseLevels
-from gfimu.diagnosis.drive import AngleSpline, SplineState, roughness_prior
+from gfimu.diagnosis.drive import ROUGHNESS_FACTOR, AngleSpline, SplineState, roughness_prior
 from gfimu.diagnosis.model import Effect, Spin, SpinState, WorldModel
 from gfimu.diagnosis.run import Run
 
-__all__ = ["Linearisation", "Segment"]
+__all__ = ["Linearisation", "Segment", "difference_noise"]
 
 KNOT_SPACING = 0.05
-_START_ANGLE_STD = 1e-4
 _DEGREE = 4
+_KNOWN_ANGLE_STD = 5e-3
 _STATE_STEPS = (1e-5, 1e-4, 1e-3)
 
 
@@ -69,10 +70,22 @@ class Segment:
         Number of the run it belongs to.
     start : float
         Time at which the whole run began, s.
+    start_angle, start_angle_std : float
+        Table angle at the first sample and its standard deviation, rad.
     """
 
-    def __init__(self, model: WorldModel, run: Run, index: int, start: float) -> None:
+    def __init__(
+        self,
+        model: WorldModel,
+        run: Run,
+        index: int,
+        start: float,
+        *,
+        start_angle: float = 0.0,
+        start_angle_std: float = 1e-4,
+    ) -> None:
         self.model, self.run, self.index, self.start = model, run, index, start
+        self.start_angle, self.start_angle_std = start_angle, start_angle_std
         period = run.sample_period
         spacing = max(KNOT_SPACING, 4 * period)
         self.spline = AngleSpline(run.t[0] - 2 * spacing, run.t[-1] + 2 * spacing, spacing)
@@ -81,15 +94,16 @@ class Segment:
         self.weight_mask = np.column_stack([run.valid, run.reference_valid])  # (n, c + 1)
         self.levels = self._starting_levels()
         self.drive_factor = 2.0
+        self._learned = np.zeros(self.spline.size - _DEGREE)
         self._set_roughness()
-        self.coefficients = self._starting_drive()
+        self.coefficients = self._reference_drive = self._starting_drive()
 
     # -- starting values -------------------------------------------------------------------------------------
 
     def _starting_levels(self) -> NoiseLevels:
         expected = self.model.expected_noise(1.0 / self.run.sample_period)
         reference = self.run.reference[self.run.reference_valid]
-        white = np.append(expected.white, _difference_noise(reference))
+        white = np.append(expected.white, difference_noise(reference))
         return NoiseLevels(white, np.append(np.full(len(expected.white), 2e-3), 0.0))
 
     def _set_roughness(self) -> None:
@@ -101,8 +115,11 @@ class Segment:
             factor=self.drive_factor,
         )
         rows = self.spline.roughness_rows()
+        std = np.maximum(std, self.drive_factor * self._learned)
         scaled = diags_array(1.0 / std) @ rows
-        begin = self.spline.matrices(self.run.t[:1])[0] / _START_ANGLE_STD
+        begin = self.spline.matrices(self.run.t[:1])[0] / self.start_angle_std
+        self._rough = csr_array(scaled)
+        self._begin = csr_array(begin)
         self.prior = csr_array(scaled.T @ scaled)
         if not self.is_angle:
             self.prior = csr_array(self.prior + begin.T @ begin)
@@ -115,7 +132,29 @@ class Segment:
         observe = angle if self.is_angle else rate
         lhs = (observe.T @ weight @ observe + self.prior).toarray()
         lhs[np.diag_indices_from(lhs)] *= 1 + 1e-12
-        return np.asarray(cho_solve(cho_factor(lhs, lower=True), observe.T @ (weight @ run.reference)))
+        rhs = observe.T @ (weight @ run.reference)
+        if not self.is_angle:
+            rhs = rhs + self._begin.T @ np.array([self.start_angle / self.start_angle_std])
+        return np.asarray(cho_solve(cho_factor(lhs, lower=True), rhs))
+
+    def adopt(self, whole: Segment) -> None:
+        """Take noise levels, roughness and drive from a segment of which this is a part."""
+        self.levels = whole.levels
+        self.drive_factor = whole.drive_factor
+        centres = self.spline.interval_centres()
+        self._learned = np.interp(centres, whole.spline.interval_centres(), whole._learned)
+        state = whole.spline.spin(whole.coefficients).at(self.run.t)
+        self.start_angle, self.start_angle_std = float(state.angle[0]), _KNOWN_ANGLE_STD
+        self._set_roughness()
+        self.coefficients = self.spline.through(self.run.t, state)
+        self.prepare_weights()
+
+    def learn_roughness(self) -> None:
+        """Take the roughness from the present drive, which knows the corners of ramps better than the reference."""
+        third = self.spline.roughness_rows() @ self.coefficients
+        window = max(int(0.3 / self.spline.spacing), 3)
+        self._learned = ROUGHNESS_FACTOR * np.sqrt(uniform_filter1d(third**2, window, mode="nearest"))
+        self._set_roughness()
 
     def tune_roughness(self, effects: Sequence[Effect]) -> None:
         """Pick the scale of the roughness prior by marginal likelihood, the drive integrated out."""
@@ -150,6 +189,10 @@ class Segment:
         )
         return np.column_stack([channels, reference])
 
+    def reference_prediction(self, effects: Sequence[Effect]) -> NDArray[np.float64]:
+        """Predict channels and reference, shape (n, c + 1), with the drive that the reference alone gives."""
+        return self.predict(effects, self.spline.spin(self._reference_drive))
+
     def residual(self, effects: Sequence[Effect]) -> NDArray[np.float64]:
         """Return measured minus predicted, shape (n, c + 1); zero where invalid."""
         measured = np.column_stack([self.run.readings, self.run.reference])
@@ -159,18 +202,24 @@ class Segment:
 
     def prepare_weights(self) -> None:
         """Compute the noise weights for the present levels."""
-        self._share = self.basis.corrections(self.levels)  # (K, c + 1)
-        self._cosines = self.basis.matrix(len(self._share))  # (n, K)
+        self.share = self.basis.corrections(self.levels)  # (K, c + 1)
+        self.cosines = self.basis.matrix(len(self.share))  # (n, K)
         self.inverse_variance = 1.0 / self.levels.white**2
 
     def linearise(self, effects: Sequence[Effect]) -> Linearisation:
         """Linearise about effects and the present drive, and eliminate the drive."""
         residual = self.residual(effects)
         jacobian = self._jacobian(effects)
-        rhs = -(self.prior @ self.coefficients)
-        objective = -float(self.coefficients @ rhs)
-        slow = self._cosines.T @ residual  # (K, c + 1)
-        damped = self._share * slow
+        # Differences first: the quadratic form of the coefficients would lose ten digits.
+        rough = self._rough @ self.coefficients
+        rhs = -(self._rough.T @ rough)
+        objective = float(rough @ rough)
+        if not self.is_angle:
+            off = self._begin @ self.coefficients - self.start_angle / self.start_angle_std
+            rhs = rhs - self._begin.T @ off
+            objective += float(off @ off)
+        slow = self.cosines.T @ residual  # (K, c + 1)
+        damped = self.share * slow
         objective += float(self.inverse_variance @ (np.sum(residual**2, axis=0) - np.sum(slow * damped, axis=0)))
         weighted, slow_rows = [], []
         for column, matrix in enumerate(jacobian):
@@ -178,8 +227,8 @@ class Segment:
                 continue
             deviation = np.sqrt(self.inverse_variance[column])
             weighted.append(matrix * deviation)
-            slow_jacobian = (matrix.T @ self._cosines).T  # (K, m)
-            slow_rows.append(np.sqrt(self._share[:, [column]]) * deviation * slow_jacobian)
+            slow_jacobian = (matrix.T @ self.cosines).T  # (K, m)
+            slow_rows.append(np.sqrt(self.share[:, [column]]) * deviation * slow_jacobian)
             rhs += self.inverse_variance[column] * (
                 matrix.T @ residual[:, column] - slow_jacobian.T @ damped[:, column]
             )
@@ -188,6 +237,8 @@ class Segment:
         low = np.concatenate(slow_rows)
         lhs -= low.T @ low
         lhs[np.diag_indices_from(lhs)] *= 1 + 1e-12
+        # A vanishing coupling keeps far entries of the factor out of the denormal range, where LAPACK crawls.
+        lhs += 1e-14 * float(np.mean(lhs.diagonal()))
         factor = np.linalg.cholesky(lhs)
         forward = solve_triangular(factor, rhs, lower=True, check_finite=False)
         return Linearisation(residual, jacobian, factor, forward, objective - float(forward @ forward))
@@ -230,14 +281,14 @@ class Segment:
             if len(used) == 0:
                 continue
             part = mine[used].T  # (n, P)
-            weight, share = self.inverse_variance[column], self._share[:, column]
-            slow = self._cosines.T @ part  # (K, P)
+            weight, share = self.inverse_variance[column], self.share[:, column]
+            slow = self.cosines.T @ part  # (K, P)
             damped = share[:, None] * slow
             gram[np.ix_(used, used)] += weight * (part.T @ part - slow.T @ damped)
             residual = linear.residual[:, column]
-            score[used] += weight * (part.T @ residual - damped.T @ (self._cosines.T @ residual))
+            score[used] += weight * (part.T @ residual - damped.T @ (self.cosines.T @ residual))
             if matrix.nnz:
-                cross[:, used] += weight * (matrix.T @ part - (matrix.T @ self._cosines) @ damped)
+                cross[:, used] += weight * (matrix.T @ part - (matrix.T @ self.cosines) @ damped)
         eliminated = solve_triangular(linear.factor, cross, lower=True, check_finite=False)
         gram -= eliminated.T @ eliminated
         score -= eliminated.T @ linear.forward
@@ -262,8 +313,8 @@ class Segment:
         for column, matrix in enumerate(linear.jacobian):
             if matrix.nnz:
                 left[:, column] -= matrix @ step
-        slow = self._cosines.T @ left
-        return (left - self._cosines @ (self._share * slow)) * self.inverse_variance
+        slow = self.cosines.T @ left
+        return (left - self.cosines @ (self.share * slow)) * self.inverse_variance
 
 
 class _Moved:
@@ -279,8 +330,8 @@ class _Moved:
         return SplineState(*parts)
 
 
-def _difference_noise(reference: NDArray[np.float64]) -> float:
-    """White noise of a smooth reference from its third differences (robust)."""
+def difference_noise(reference: NDArray[np.float64]) -> float:
+    """Return the white noise of a smooth reference from its third differences (robust)."""
     third = np.diff(reference, n=3)
     spread = 1.4826 * float(np.median(np.abs(third - np.median(third)))) / np.sqrt(20.0)
     floor = 1e-4 * float(np.std(reference)) + 1e-6

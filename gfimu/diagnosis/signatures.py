@@ -25,6 +25,8 @@ _SCANNED = ("interference_tone", "cogging", "tacho_ripple", "resonance")
 _PEAKS = {"interference_tone": 2, "cogging": 4, "tacho_ripple": 3, "resonance": 5}
 _DAMPINGS = (0.01, 0.03, 0.1)
 _RESTRICTED = 0.5
+_ANGLES = frozenset({"direction_rad"})
+_SHAPE_BOUNDS = {"damping_ratio": (1e-3, 0.3)}
 
 
 @dataclass(frozen=True)
@@ -102,6 +104,8 @@ def plan_signatures(
             penalty = next(-cause.log_prior for cause in base if cause.name == name)
         elif name in _SCANNED:
             shapes, looked = _scan(name, segments, linear)
+            if name == "resonance":
+                shapes = [*shapes, *family.shapes(duration, rate)]
             penalty = float(np.log(looked))
         else:
             shapes = family.shapes(duration, rate)
@@ -198,7 +202,10 @@ def cause_columns(
 
 def shape_moved(key: str, value: float, step: float) -> float:
     """Move a shape parameter by a step in its natural coordinate: log, or linear for angles."""
-    return value + step if key in {"direction_rad"} else value * float(np.exp(step))
+    if key in _ANGLES:
+        return value + step
+    low, high = _SHAPE_BOUNDS.get(key, (0.0, np.inf))
+    return float(np.clip(value * np.exp(step), low, high))
 
 
 def hypotheses(signatures: Sequence[Signature], array: AccelerometerArray, runs: int) -> list[Hypothesis]:

@@ -1,258 +1,65 @@
-"""Wording: a diagnosis in plain words, the same on the terminal and in the report."""
+"""The verdict in words that a person who has never seen the project understands."""
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
+from collections.abc import Sequence
 
-from gfimu.diagnosis.verdict import Diagnosis, NamedCause
-from gfimu.units import STANDARD_GRAVITY
+import numpy as np
 
-__all__ = [
-    "ParameterText",
-    "gain_rows",
-    "headline",
-    "next_steps",
-    "odds",
-    "parameter_texts",
-    "percent",
-    "story",
-    "summary",
-]
+from gfimu.diagnosis.verdict import Gain, NamedCause, Residual, Unexplained
 
-_UNITS = {
-    "_m_s2_rts": "m/s²/√s",
-    "_s2_rad2": "s²/rad²",
-    "_m_s2_K": "m/s²/K",
-    "_rad_s2": "rad/s²",
-    "_rad_s": "rad/s",
-    "_m_s2": "m/s²",
-    "_s2_m": "s²/m",
-    "_1_s": "1/s",
-    "_rad": "rad",
-    "_hz": "Hz",
-    "_s": "s",
-    "_m": "m",
-}
-_ALONE = {key.lstrip("_"): unit for key, unit in _UNITS.items()}
-_SIGNIFICANT = 2.0
-_THOUSANDTHS = ("rad", "m", "s")
-_SMALL = 0.1
-_MOST_DECIMALS = 5
+__all__ = ["verdict_sentences"]
 
 
-@dataclass(frozen=True)
-class ParameterText:
-    """One parameter as people read it.
-
-    Parameters
-    ----------
-    name : str
-        Key without its unit: ``"x"``, ``"a11"``, ``"frequency"``.
-    value : str
-        Value ± standard deviation with unit.
-    familiar : str
-        The same in the unit people think in (degrees, millimetres, mg), or empty.
-    significant : bool
-        Whether it differs from zero by more than twice its standard deviation.
-    """
-
-    name: str
-    value: str
-    familiar: str
-    significant: bool
-
-
-def headline(diagnosis: Diagnosis) -> str:
-    """Return the verdict in one sentence."""
-    found = [_short(diagnosis, cause) for cause in diagnosis.causes]
-    match diagnosis.verdict:
-        case "nothing_found":
-            return "Nothing is wrong with the simulation that this recording could show."
-        case "unknown" if found:
-            return f"Found: {_joined(found)}. Something else is real too, and nothing in the library explains it."
-        case "unknown":
-            return "Something real is missing in the simulation, and nothing in the library explains it."
-        case "ambiguous":
-            return (
-                f"Something is missing in the simulation, but this recording can't tell which: {_joined(found, 'or')}."
+def verdict_sentences(
+    verdict: str,
+    causes: Sequence[NamedCause],
+    residual: Residual,
+    gain: Gain,
+    unexplained: Unexplained,
+    withdrawn: Sequence[str],
+) -> tuple[str, ...]:
+    """Return the verdict in sentences, the most important first."""
+    words = [_headline(verdict, causes, unexplained)]
+    words += [f"{cause.effect}: {cause.why}." for cause in causes if cause.why]
+    for cause in causes:
+        if cause.not_distinguishable_from and verdict != "ambiguous":
+            words.append(
+                f"{', '.join(cause.not_distinguishable_from)} could imitate {cause.effect} in this data but would need "
+                f"a coincidence; {cause.would_be_separated_by} would settle it."
             )
-        case _ if len(found) == 1:
-            return f"Found what the simulation leaves out: {found[0]}."
-        case _:
-            return f"Found {_count(len(found))} things that the simulation leaves out: {_joined(found)}."
-
-
-def summary(diagnosis: Diagnosis, cause: NamedCause) -> str:
-    """Return what is wrong according to a cause, in the effect's own words, and where."""
-    family = diagnosis.twin.families().get(cause.effect)
-    words = str(family.summary) if family is not None else cause.effect.replace("_", " ")
-    return f"{words} ({cause.place})" if cause.place else words
-
-
-def _short(diagnosis: Diagnosis, cause: NamedCause) -> str:
-    """Return the summary up to its explanation, and the place."""
-    family = diagnosis.twin.families().get(cause.effect)
-    words = str(family.summary).split(":")[0] if family is not None else cause.effect.replace("_", " ")
-    return f"{words} ({cause.place})" if cause.place else words
-
-
-def story(diagnosis: Diagnosis) -> str:
-    """Return what was compared and how much the verdict improves it, for a reader who knows nothing of it."""
-    residual, gain = diagnosis.residual, diagnosis.gain
-    count = len(diagnosis.twin.array.channels)
-    before, after, floor = residual.rms_before, residual.rms_after, residual.noise_floor
-    text = (
-        f"A simulation of the rig predicted what its {count} accelerometer channels should have read. "
-        f"It misses the measurement by {before:.3g} m/s² rms; the sensors' own noise is {floor:.3g} m/s². "
-    )
-    if diagnosis.verdict == "nothing_found":
-        return text + "No cause in the library, and no pattern of any other kind, predicts the data better than chance."
-    if diagnosis.causes:
-        what = (
-            "either of these" if diagnosis.verdict == "ambiguous" else "this" if len(diagnosis.causes) == 1 else "these"
+    if causes:
+        words.append(
+            f"The residual falls from {residual.rms_before:.3g} to {residual.rms_after:.3g} m/s²; "
+            f"the noise alone is {residual.noise_floor:.3g} m/s²."
         )
-        text += f"With {what} put into the simulation it misses by {after:.3g} m/s²"
-        text += ", which is noise. " if after < 1.05 * floor else ". "
-    if math.isfinite(gain.share_of_excess_removed):
-        text += (
-            f"On data that the fit never saw ({gain.held_out}), {percent(gain.share_of_excess_removed)} of the error "
-            "beyond noise is gone. "
+    if gain.held_out and np.isfinite(gain.share_of_excess_removed):
+        words.append(
+            f"On data the fit never saw ({gain.held_out}), {gain.share_of_excess_removed:.1%} of the excess is gone."
         )
-    if diagnosis.unexplained.significant:
-        text += f"Left unexplained: {diagnosis.unexplained.signature}. "
-    return text.strip()
+    if unexplained.significant and verdict != "unknown":
+        words.append(f"Something is left that nothing in the library explains: {unexplained.signature}.")
+    words += [f"{name} was withdrawn: it did not predict held-out data." for name in withdrawn]
+    return tuple(words)
 
 
-def parameter_texts(cause: NamedCause) -> list[ParameterText]:
-    """Return the parameters of a cause as people read them; those that are zero and unknown are left out."""
-    texts = []
-    for key, value in cause.parameters.items():
-        name, unit = _split(key)
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            plain = ", ".join(map(str, value)) if isinstance(value, list | tuple) else str(value)
-            texts.append(ParameterText(name, plain, "", significant=True))
-            continue
-        std = cause.std.get(key)
-        if value == 0 and not std:
-            continue
-        certain = std is None or not math.isfinite(std) or abs(value) > _SIGNIFICANT * std
-        texts.append(ParameterText(name, _with_std(value, std, unit), _familiar(value, std, unit), certain))
-    return texts
+def _headline(verdict: str, causes: Sequence[NamedCause], unexplained: Unexplained) -> str:
+    names = _listed([cause.effect for cause in causes])
+    if verdict == "nothing_found":
+        return "The simulation agrees with the measurement: nothing was found beyond the sensors' own noise."
+    if verdict == "explained":
+        return f"The simulation is wrong because of {names}."
+    if verdict == "ambiguous":
+        contested = [cause for cause in causes if cause.not_distinguishable_from]
+        by = next((cause.would_be_separated_by for cause in contested if cause.would_be_separated_by), "")
+        return (
+            f"The simulation is wrong, but this data cannot tell {_listed([c.effect for c in contested], 'from')} apart; "
+            f"{by} would."
+        )
+    return f"The simulation is wrong in a way that nothing in the library explains: {unexplained.signature}."
 
 
-def gain_rows(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:
-    """Return what the extension is worth on held-out data: what, before, after."""
-    gain = diagnosis.gain
-    rows = [
-        ("prediction error, rms", _number(gain.rms_before, "m/s²"), _number(gain.rms_after, "m/s²")),
-        ("rate error, rms", _number(gain.rate_rmse_before, "rad/s"), _number(gain.rate_rmse_after, "rad/s")),
-        ("position drift", _number(gain.drift_before, "m"), _number(gain.drift_after, "m")),
-    ]
-    return [row for row in rows if row[1] or row[2]]
-
-
-def next_steps(diagnosis: Diagnosis) -> list[str]:
-    """Return what to do next, most useful first."""
-    steps = []
-    remedies = dict.fromkeys(cause.would_be_separated_by for cause in diagnosis.causes if cause.would_be_separated_by)
-    match diagnosis.verdict:
-        case "nothing_found":
-            steps.append(
-                "Keep the simulation as it is. A longer run with faster ramps in both directions would see less."
-            )
-        case "ambiguous":
-            steps += [f"To tell the candidates apart, record: {remedy}." for remedy in remedies]
-            steps.append("Give both recordings to one call of gfimu diagnose; it fits them together.")
-        case "unknown":
-            steps.append(
-                "Look at the residual views below for where the discrepancy sits; the surrogate term in twin.toml or "
-                "verdict.json describes it, but does not name it."
-            )
-            steps.append("Record another run with another motion: what stays is in the rig or the sensors.")
-        case _:
-            steps.append("Confirm on another recording: gfimu diagnose OTHER --twin twin.toml should find nothing.")
-            steps.append("Correct the rig or calibrate it, or keep twin.toml as the simulation from now on.")
-    if diagnosis.verdict == "explained":
-        for cause in diagnosis.causes:
-            if cause.not_distinguishable_from:
-                others = _joined(list(cause.not_distinguishable_from), "or")
-                remedy = f" To be sure, record: {cause.would_be_separated_by}." if cause.would_be_separated_by else ""
-                steps.append(f"{cause.effect} is the simplest story; {others} would fit these data as well.{remedy}")
-    if not diagnosis.gain.held_out and diagnosis.verdict != "nothing_found":
-        steps.append("Record a second run: with --held-out its gain is measured on data that the fit never saw.")
-    return [step.strip() for step in steps]
-
-
-def percent(share: float) -> str:
-    """Return a share in percent, never rounded up to certainty."""
-    if not math.isfinite(share):
-        return "–"
-    if 0.999 < share < 1.0:
-        return "> 99.9 %"
-    return f"{100 * share:.3g} %"
-
-
-def odds(log_odds: float) -> str:
-    """Return log odds against the verdict as people say them: ``"1 : 20"``, ``"1 : 10⁵²"``."""
-    if not math.isfinite(log_odds):
-        return "–"
-    if abs(log_odds) < math.log(1e4):
-        ratio = f"{math.exp(abs(log_odds)):.2g}"
-        ratio = f"{float(ratio):.0f}" if float(ratio) >= 10 else ratio
-    else:
-        ratio = f"10{_superscript(round(abs(log_odds) / math.log(10)))}"
-    return f"1 : {ratio}" if log_odds <= 0 else f"{ratio} : 1"
-
-
-def _split(key: str) -> tuple[str, str]:
-    if key in _ALONE:
-        return "value", _ALONE[key]
-    for suffix, unit in _UNITS.items():
-        if key.endswith(suffix):
-            return key.removesuffix(suffix).replace("_", " "), unit
-    return key.replace("_", " "), ""
-
-
-def _with_std(value: float, std: float | None, unit: str) -> str:
-    """Return value ± standard deviation, in thousandths of its unit where it is small."""
-    scale = max(abs(value), std or 0.0)
-    if unit in _THOUSANDTHS and scale < _SMALL:
-        value, std, unit = 1e3 * value, None if std is None else 1e3 * std, f"m{unit}"
-    if std is None or not math.isfinite(std) or std <= 0:
-        text = f"{value:.4g}"
-    else:
-        decimals = max(1 - math.floor(math.log10(std)), 0)
-        if decimals > _MOST_DECIMALS and abs(value) < _SMALL:
-            power = math.floor(math.log10(max(abs(value), std)))
-            return f"({_with_std(value / 10**power, std / 10**power, '')})·10{_superscript(power)} {unit}".strip()
-        text = f"{value:.{decimals}f} ± {std:.{decimals}f}"
-    return f"{text} {unit}".strip().replace("-", "−")
-
-
-def _superscript(power: int) -> str:
-    return str(power).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
-
-
-def _familiar(value: float, std: float | None, unit: str) -> str:
-    factors = {"rad": (180 / math.pi, "°"), "m/s²": (1e3 / STANDARD_GRAVITY, "mg"), "rad/s": (30 / math.pi, "rpm")}
-    if not unit and abs(value) < _SMALL:
-        factors[""] = (100.0, "%")
-    if unit not in factors:
-        return ""
-    factor, name = factors[unit]
-    return _with_std(factor * value, None if std is None else factor * std, name)
-
-
-def _number(value: float, unit: str) -> str:
-    return f"{value:.3g} {unit}" if math.isfinite(value) else ""
-
-
-def _count(number: int) -> str:
-    return {2: "two", 3: "three", 4: "four"}.get(number, str(number))
-
-
-def _joined(parts: list[str], word: str = "and") -> str:
-    if len(parts) < 2:
-        return "".join(parts)
-    return f"{', '.join(parts[:-1])} {word} {parts[-1]}" if len(parts) > 2 else f"{parts[0]} {word} {parts[1]}"
+def _listed(names: Sequence[str], last: str = "and") -> str:
+    if len(names) < 2:
+        return "".join(names)
+    return f"{', '.join(names[:-1])} {last} {names[-1]}"

@@ -297,23 +297,24 @@ class _Disturbed:
     """
 
     def __init__(self, motion, t, disturbance) -> None:  # type: ignore[no-untyped-def]
-        self._motion = motion
-        self._grid = np.arange(t[0], t[-1] + 2 * _FINE_STEP, _FINE_STEP)
+        self._motion, self._disturbance = motion, disturbance
+        step = 0.5 * _FINE_STEP
+        self._grid = np.arange(t[0], t[-1] + 2 * step, step)
         push = disturbance(motion.at(self._grid))
-        decay = np.exp(-_FINE_STEP / _SPEED_LOOP_TIME)
+        decay = np.exp(-step / _SPEED_LOOP_TIME)
         mean = 0.5 * (push[1:] + push[:-1]) * (_SPEED_LOOP_TIME * (1 - decay))
         rate = np.concatenate([[0.0], lfilter([1.0], [1.0, -decay], mean)])
         self._rate = rate
-        self._acceleration = push - rate / _SPEED_LOOP_TIME
-        self._angle = np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]))]) * _FINE_STEP
+        self._angle = np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]))]) * step
 
     def at(self, t: NDArray[np.float64]) -> SpinState:
         """State of the disturbed spin."""
         spin = self._motion.at(t)
+        rate = np.interp(t, self._grid, self._rate)
         return SpinState(
             spin.angle + np.interp(t, self._grid, self._angle),
-            spin.rate + np.interp(t, self._grid, self._rate),
-            spin.acceleration + np.interp(t, self._grid, self._acceleration),
+            spin.rate + rate,
+            spin.acceleration + self._disturbance(spin) - rate / _SPEED_LOOP_TIME,
         )
 
 
@@ -327,26 +328,29 @@ class Resonance(Effect):
 
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
-        """One participation; 1 is the whole inertia behind one spring."""
-        return (Size("gain", 0.3),)
+        """Participation (1 is the whole inertia behind one spring) and its part in quadrature."""
+        return (Size("gain", 0.3), Size("quadrature_gain", 0.1))
+
+    @classmethod
+    def patterns(cls, array: AccelerometerArray) -> tuple[Pattern, ...]:
+        """Return an undamped-spring mode, or one with any phase."""
+        return (Pattern("", np.array([[1.0], [0.0]])), Pattern("any phase", np.eye(2)))
 
     @classmethod
     def shapes(cls, duration: float, sample_rate: float) -> tuple[dict[str, float], ...]:
         """Return frequencies up to the Nyquist frequency and two dampings."""
         top = 0.45 * sample_rate
-        frequencies = np.geomspace(2.0, max(top, 2.5), 24)
-        return tuple(
-            {"frequency_hz": float(f), "damping_ratio": zeta} for f in frequencies for zeta in (0.01, 0.04, 0.15)
-        )
+        frequencies = np.geomspace(2.0, max(top, 2.5), 16)
+        return tuple({"frequency_hz": float(f), "damping_ratio": zeta} for f in frequencies for zeta in (0.02, 0.1))
 
     def apply(self, world: World) -> World:
-        """Let the cube twist against the table: φ'' + 2ζω₀φ' + ω₀²φ = −gain·α."""
-        gain = self.value("gain")
+        """Let the cube twist against the table: φ'' + 2ζω₀φ' + ω₀²φ = −α, of which gain·φ'' + quadrature·ω₀φ' is seen."""
+        gain, quadrature = self.value("gain"), self.value("quadrature_gain")
         natural = 2 * np.pi * self.value("frequency_hz", 10.0)
         damping = self.value("damping_ratio", 0.03)
 
         def step(motion: SpinMotion, t: NDArray[np.float64]) -> SpinMotion:
-            return _Twisting(motion, t, gain, natural, damping)
+            return _Twisting(motion, t, (gain, quadrature), natural, damping)
 
         return world.changed(mount_steps=(*world.mount_steps, step))
 
@@ -354,19 +358,23 @@ class Resonance(Effect):
 class _Twisting:
     """Spin of a cube on a torsion spring upon a spinning table."""
 
-    def __init__(self, motion, t, gain: float, natural: float, damping: float) -> None:  # type: ignore[no-untyped-def]
+    def __init__(self, motion, t, gains: tuple[float, float], natural: float, damping: float) -> None:  # type: ignore[no-untyped-def]
         self._motion = motion
         step = _FINE_STEP if natural < _SLOW_MODE else 0.5 * _FINE_STEP
         self._grid = np.arange(t[0], t[-1] + 2 * step, step)
-        push = -gain * motion.at(self._grid).acceleration
+        push = -motion.at(self._grid).acceleration
         push = push - push[0]  # steady before the first sample
         system = (np.array([[0.0, 1.0], [-(natural**2), -2 * damping * natural]]), np.array([[0.0], [1.0]]))
         outputs = (np.eye(2), np.zeros((2, 1)))
         a, b, c, d, _ = cont2discrete((*system, *outputs), step, method="foh")
         poles = np.array([1.0, -np.trace(a), np.linalg.det(a)])
         twist, twist_rate = (lfilter(_numerator(a, b, c[[row]], d[[row]], poles), poles, push) for row in range(2))
-        self._angle, self._rate = twist, twist_rate
-        self._acceleration = push - natural**2 * twist - 2 * damping * natural * twist_rate
+        twist_acceleration = push - natural**2 * twist - 2 * damping * natural * twist_rate
+        gain, quadrature = gains
+        delayed = natural * np.concatenate([[0.0], np.cumsum(0.5 * (twist[1:] + twist[:-1]))]) * step
+        self._angle = gain * twist + quadrature * delayed
+        self._rate = gain * twist_rate + quadrature * natural * twist
+        self._acceleration = gain * twist_acceleration + quadrature * natural * twist_rate
 
     def at(self, t: NDArray[np.float64]) -> SpinState:
         """State of the cube's spin."""

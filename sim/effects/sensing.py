@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 from scipy.signal import lfilter
 
 from gfimu.array import AccelerometerArray
@@ -256,28 +256,32 @@ class SensorLag(Effect):
 
 
 def _low_pass(readings: NDArray[np.float64], t: NDArray[np.float64], tau: float) -> NDArray[np.float64]:
-    """First-order low pass of samples joined by straight lines, steady before the first sample."""
-    period = float(np.median(np.diff(t)))
-    x = period / tau
-    decay = np.exp(-x)
-    # (1 − e⁻ˣ)/x loses digits for small x.
-    mean_decay = -np.expm1(-x) / x
-    now, before = 1.0 - mean_decay, mean_decay - decay
-    start = readings[:1] * (1.0 - now)
-    return np.asarray(lfilter([now, before], [1.0, -decay], readings, axis=0, zi=start)[0])
+    """First-order low pass of samples joined by a cubic spline, steady before the first sample.
+
+    With D = d/dt, τDy + y = f has on each cubic piece of f the particular solution P = f − τDf + τ²D²f − τ³D³f.
+    Straight lines between samples are too coarse: at 100 Hz they miss 4 % of what 3 ms of lag do at 3 Hz.
+    """
+    spline = CubicSpline(t, readings)
+    steps = np.diff(t)[:, None]
+    slope, bend = spline(t, 1), spline(t, 2)
+    smooth = readings - tau * slope + tau**2 * bend
+    jerk = tau**3 * np.diff(bend, axis=0) / steps  # constant over a piece
+    decay = np.exp(-float(np.median(steps)) / tau)
+    driven = (smooth[1:] - jerk) - decay * (smooth[:-1] - jerk)
+    later, _ = lfilter([1.0], [1.0, -decay], driven, axis=0, zi=decay * readings[:1])
+    return np.vstack([readings[:1], later])
 
 
-@dataclass(frozen=True)
-class _Play:
-    width: float
-
-    def __call__(self, readings: NDArray[np.float64], context: SampleContext) -> NDArray[np.float64]:
-        out = np.empty_like(readings)
-        state = readings[0].copy()
-        for row, value in enumerate(readings):
-            np.clip(state, value - self.width, value + self.width, out=state)
-            out[row] = state
-        return out
+@njit(cache=True)
+def _play(readings: NDArray[np.float64], width: float) -> NDArray[np.float64]:
+    """Play operator of half-width ``width`` on every column."""
+    out = np.empty_like(readings)
+    for column in range(readings.shape[1]):
+        state = readings[0, column]
+        for row in range(readings.shape[0]):
+            state = min(max(state, readings[row, column] - width), readings[row, column] + width)
+            out[row, column] = state
+    return out
 
 
 class Hysteresis(Effect):
@@ -302,9 +306,11 @@ class Hysteresis(Effect):
         """Add lost · (play − reading)/width, the play of half-width ``width_m_s2``."""
         lost = self.value("lost_m_s2")
         width = max(self.value("width_m_s2", abs(lost)), 1e-9)
-        play = _Play(width)
         return _with_step(
-            world, lambda readings, context: readings + (lost / width) * (play(readings, context) - readings)
+            world,
+            lambda readings, context: (
+                readings + (lost / width) * (_play(np.ascontiguousarray(readings), width) - readings)
+            ),
         )
 
 

@@ -1,0 +1,278 @@
+"""Adequacy: is anything left after the named causes, and what does it depend on?
+
+A generic basis of the motion, the angle and time, per channel, is tested by the same evidence as the named effects,
+with the drive and the named causes projected out; narrow lines, noise that changes with the motion, and isolated
+spikes have tests of their own, as the generic basis is blind to them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
+from scipy.stats import chi2
+
+from gfimu.diagnosis.causes import effects_of_run
+from gfimu.diagnosis.evidence import log_evidence, log_evidence_each
+from gfimu.diagnosis.model import Effect
+from gfimu.diagnosis.refinement import Fit
+from gfimu.diagnosis.segment import Linearisation, Segment
+from gfimu.diagnosis.signatures import cause_columns
+
+__all__ = ["LEFT_OVER_ODDS", "LeftOver", "generic_basis", "left_over"]
+
+LEFT_OVER_ODDS = 10.0
+"""Log odds from which what is left is called significant: fixed on null runs that no reported figure uses."""
+_UNIT = 0.03
+_STEPS = 8
+_SLOW = 10
+_ORDERS = (1, 2, 3, 4, 6, 8, 12)
+
+
+@dataclass(frozen=True)
+class LeftOver:
+    """The strongest term that is left.
+
+    Parameters
+    ----------
+    log_odds : float
+        Log odds against chance, all that was looked at accounted for.
+    signature : str
+        Channels and dependence, in words.
+    surrogate : dict of str to float
+        Coefficients of the data-driven term, m/s² per unit basis function, by ``"channel: basis function"``.
+    """
+
+    log_odds: float
+    signature: str
+    surrogate: dict[str, float]
+
+
+def generic_basis(segment: Segment) -> tuple[list[str], NDArray[np.float64]]:
+    """Return names and values (n, k) of smooth functions of rate, acceleration, angle and time, of unit rms."""
+    state = segment.spline.spin(segment.coefficients).at(segment.run.t)
+    rate = state.rate / max(float(np.abs(state.rate).max()), 1e-6)
+    acceleration = state.acceleration / max(float(np.abs(state.acceleration).max()), 1e-6)
+    jerk = np.gradient(acceleration)
+    jerk = jerk / max(float(np.abs(jerk).max()), 1e-12)
+    turning = np.abs(state.rate) > 0.05
+    time = (segment.run.t - segment.run.t[0]) / max(segment.run.duration, 1e-9)
+    functions = {
+        "rate": rate,
+        "rate²": rate**2,
+        "rate³": rate**3,
+        "rate⁴": rate**4,
+        "|rate|": np.abs(rate),
+        "sign of rate": np.sign(rate) * turning,
+        "angular acceleration": acceleration,
+        "acceleration²": acceleration**2,
+        "|acceleration|": np.abs(acceleration),
+        "rate × acceleration": rate * acceleration,
+        "rate² × acceleration": rate**2 * acceleration,
+        "jerk": jerk,
+        "time × rate²": time * rate**2,
+        "time × acceleration": time * acceleration,
+        "turning": turning.astype(float),
+        "rate⁶": rate**6,
+    }
+    for order in _ORDERS:
+        for name, wave in (("sine", np.sin), ("cosine", np.cos)):
+            functions[f"{order} per revolution ({name})"] = wave(order * state.angle) * turning
+            functions[f"{order} per revolution × rate ({name})"] = wave(order * state.angle) * rate
+            functions[f"{order} per revolution × rate² ({name})"] = wave(order * state.angle) * rate**2
+    for mode in range(1, _SLOW + 1):
+        functions[f"slow time ({mode} half-waves)"] = np.cos(np.pi * mode * time)
+    for step in range(1, 2 * _STEPS):
+        functions[f"step at {step / (2 * _STEPS):.0%} of the run"] = (time > step / (2 * _STEPS)) - 0.5
+    values = np.column_stack(list(functions.values()))
+    values = values - values.mean(axis=0)
+    size = np.sqrt(np.mean(values**2, axis=0))
+    return list(functions), values * (_UNIT / np.maximum(size, 1e-9)) * (size > 1e-6)
+
+
+def left_over(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]], spikes: int) -> LeftOver:
+    """Find the strongest thing that the named causes leave unexplained.
+
+    Parameters
+    ----------
+    segments : sequence of Segment
+        The data, drives at the fit.
+    fit : Fit
+        The named causes.
+    fixed : sequence of sequence of Effect
+        Effects known beforehand, per segment.
+    spikes : int
+        Isolated samples that the integrity check took out.
+    """
+    channels = segments[0].model.array.channels
+    candidates = [_basis_terms(segments, fit, fixed, channels)]
+    lines = [_lines(segment, fit, known, channels) for segment, known in zip(segments, fixed, strict=True)]
+    candidates += [max(lines, key=lambda found: found.log_odds)]
+    candidates.append(_changing_noise(segments, fit, fixed))
+    if spikes > max(3, 1e-4 * sum(segment.weight_mask.size for segment in segments)):
+        candidates.append(LeftOver(10.0 * spikes, f"{spikes} isolated samples far off their neighbours", {}))
+    return max(candidates, key=lambda found: found.log_odds)
+
+
+def _basis_terms(
+    segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]], channels: Sequence[str]
+) -> LeftOver:
+    """Score every basis function on every channel, on all channels, and every channel on all functions."""
+    gram, score, names = None, None, []
+    for segment, known in zip(segments, fixed, strict=True):
+        line = segment.linearise([*known, *effects_of_run(fit.causes, segment.model.array, segment.index)])
+        names, basis = generic_basis(segment)
+        part, right, cross = _channelwise(segment, line, basis)
+        named = cause_columns(segment, fit.causes, known, shapes=True)
+        if named.shape[1]:
+            part, right = _project_out(segment, line, basis, cross, part, right, named)
+        gram = part if gram is None else gram + part
+        score = right if score is None else score + right
+    assert gram is not None
+    assert score is not None
+    count = len(names)
+    observed = len(channels)
+    total = count * observed
+    diagonal = np.maximum(gram.diagonal(), 0.0)
+    usable = diagonal > 1e-9
+    single = log_evidence_each(diagonal, score, np.zeros(total, dtype=bool)) - np.log(total)
+    single[~usable] = -np.inf
+    best = int(np.argmax(single))
+    found = LeftOver(float(single[best]), f"channel {channels[best // count]} depends on {names[best % count]}", {})
+    chosen = [best]
+    for function in range(count):
+        places = np.arange(observed) * count + function
+        value = log_evidence(gram[np.ix_(places, places)], score[places]) - np.log(count)
+        if value > found.log_odds + 2.0:
+            strong = [channels[c] for c in np.argsort(-np.abs(score[places] / np.sqrt(diagonal[places] + 1e-9)))[:4]]
+            found = LeftOver(
+                float(value), f"several channels (strongest {', '.join(strong)}) depend on {names[function]}", {}
+            )
+            chosen = list(places)
+    for channel in range(observed):
+        places = np.arange(channel * count, (channel + 1) * count)
+        value = log_evidence(gram[np.ix_(places, places)], score[places]) - np.log(observed)
+        if value > found.log_odds + 5.0:
+            top = places[int(np.argmax(single[places]))]
+            found = LeftOver(
+                float(value),
+                f"channel {channels[channel]} depends on the motion or time in a way nothing in the library has "
+                f"(strongest: {names[top % count]})",
+                {},
+            )
+            chosen = list(places)
+    inner = gram[np.ix_(chosen, chosen)] + np.eye(len(chosen)) * 1e-2
+    values = np.linalg.solve(inner, score[chosen])
+    surrogate = {
+        f"{channels[place // count]}: {names[place % count]}": float(value * _UNIT)
+        for place, value in zip(chosen, values, strict=True)
+        if abs(value) > 1e-3
+    }
+    return LeftOver(found.log_odds, found.signature, surrogate)
+
+
+def _channelwise(
+    segment: Segment, line: Linearisation, basis: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return G, b and X of one set of basis functions on each channel, drive marginalised."""
+    count = basis.shape[1]
+    observed = len(line.jacobian) - 1
+    gram = np.zeros((count * observed, count * observed))
+    score = np.zeros(count * observed)
+    cross = np.zeros((segment.spline.size, count * observed))
+    cosines, share = segment.cosines, segment.share
+    for channel in range(observed):
+        part = basis * segment.weight_mask[:, [channel]]
+        weight = segment.inverse_variance[channel]
+        slow = cosines.T @ part
+        damped = share[:, [channel]] * slow
+        places = slice(channel * count, (channel + 1) * count)
+        residual = line.residual[:, channel]
+        gram[places, places] = weight * (part.T @ part - slow.T @ damped)
+        score[places] = weight * (part.T @ residual - damped.T @ (cosines.T @ residual))
+        matrix = line.jacobian[channel]
+        if matrix.nnz:
+            cross[:, places] = weight * (matrix.T @ part - (matrix.T @ cosines) @ damped)
+    eliminated = solve_triangular(line.factor, cross, lower=True, check_finite=False)
+    gram -= eliminated.T @ eliminated
+    score -= eliminated.T @ line.forward
+    return gram, score, eliminated
+
+
+def _project_out(segment, line, basis, eliminated, gram, score, named):  # type: ignore[no-untyped-def]
+    """Make the basis orthogonal to the named causes' columns."""
+    inner, right, crossed = segment.whitened_products(line, named)
+    count = basis.shape[1]
+    mixed = np.zeros((named.shape[1], gram.shape[0]))
+    for channel in range(len(line.jacobian) - 1):
+        places = slice(channel * count, (channel + 1) * count)
+        columns = named[channel]  # (K, n)
+        if not columns.any():
+            continue
+        part = basis * segment.weight_mask[:, [channel]]
+        slow = segment.cosines.T @ part
+        weight = segment.inverse_variance[channel]
+        mixed[:, places] = weight * (
+            columns @ part - (columns @ segment.cosines) @ (segment.share[:, [channel]] * slow)
+        )
+    mixed -= crossed.T @ eliminated
+    gain = np.linalg.solve(inner + np.eye(len(right)) * 1e-6 * (1 + inner.diagonal().mean()), mixed)
+    return gram - mixed.T @ gain, score - gain.T @ right
+
+
+def _left(segment: Segment, fit: Fit, known: Sequence[Effect]) -> NDArray[np.float64]:
+    """Return the residual in units of white noise, shape (n, c)."""
+    residual = segment.residual([*known, *effects_of_run(fit.causes, segment.model.array, segment.index)])
+    return residual[:, :-1] / segment.levels.white[:-1]
+
+
+def _lines(segment: Segment, fit: Fit, known: Sequence[Effect], channels: Sequence[str]) -> LeftOver:
+    """Test for narrow lines on one channel or on all, by the maximum of the periodogram."""
+    left = _left(segment, fit, known)
+    n = len(left)
+    power = np.abs(np.fft.rfft(left, 2 * n, axis=0)) ** 2 / n
+    frequency = np.fft.rfftfreq(2 * n, segment.run.sample_period)
+    # Below this the slow noise and the drive have freedom of their own.
+    power[frequency < max(1.0, 4.0 / segment.run.duration)] = 0.0
+    level = np.median(power[frequency >= 1.0], axis=0) / np.log(2.0)
+    power = power / np.maximum(level, 0.7)
+    channel = int(np.argmax(power.max(axis=0)))
+    place = int(np.argmax(power[:, channel]))
+    one = float(power[place, channel]) - np.log(n * left.shape[1])
+    summed = power.sum(axis=1)
+    peak = int(np.argmax(summed))
+    every = -float(chi2.logsf(2 * summed[peak], 2 * left.shape[1])) - np.log(n)
+    if one >= every:
+        text = f"channel {channels[channel]} has a tone at {frequency[place]:.3f} Hz"
+        return LeftOver(one, text, {f"{channels[channel]}: tone at {frequency[place]:.4f} Hz": 1.0})
+    return LeftOver(every, f"several channels share a tone at {frequency[peak]:.3f} Hz", {})
+
+
+def _changing_noise(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]]) -> LeftOver:
+    """Test whether the noise level follows the rate, the acceleration or time."""
+    best = LeftOver(-np.inf, "", {})
+    for segment, known in zip(segments, fixed, strict=True):
+        left = np.diff(_left(segment, fit, known), n=2, axis=0) / np.sqrt(6.0)
+        use = segment.weight_mask[1:-1, :-1]
+        power = np.where(use, left**2, 0.0).sum(axis=1) / np.maximum(use.sum(axis=1), 1)
+        state = segment.spline.spin(segment.coefficients).at(segment.run.t[1:-1])
+        for name, value in (
+            ("the rate", np.abs(state.rate)),
+            ("the angular acceleration", np.abs(state.acceleration)),
+            ("time", segment.run.t[1:-1]),
+        ):
+            order = np.argsort(value, kind="stable")
+            means = np.array([power[part].mean() for part in np.array_split(order, 6)])
+            # Second differences of white noise: the mean square has about n/1.8 degrees of freedom per channel.
+            freedom = len(order) / 6 * use.shape[1] / 1.8
+            spread = means / means.mean()
+            statistic = float(freedom / 2 * np.sum((spread - 1) ** 2))
+            # A change below ten per cent in power is within what a part's own noise does.
+            if np.ptp(spread) > 0.25:
+                odds = -float(chi2.logsf(statistic, 5)) - np.log(3.0)
+                if odds > best.log_odds:
+                    best = LeftOver(odds, f"the noise of all channels changes with {name}", {})
+    return best

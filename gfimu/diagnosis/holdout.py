@@ -1,0 +1,169 @@
+"""Held-out data: does the extension predict what the fit never saw, and what is it worth there?
+
+With a second recording the causes are fitted to the first and judged on the second. With one, each half in turn is
+predicted from the other. The drive of the held-out stretch is always unknown and marginalised.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import cumulative_trapezoid
+
+from gfimu.diagnosis.causes import Cause, effects_of_run
+from gfimu.diagnosis.drive import smooth_rate
+from gfimu.diagnosis.model import Effect
+from gfimu.diagnosis.refinement import Fit, refine
+from gfimu.diagnosis.segment import Segment
+from gfimu.diagnosis.verdict import Gain
+
+__all__ = ["Holdout", "gate_gains", "held_out_gain", "split_segments"]
+
+
+@dataclass(frozen=True)
+class Holdout:
+    """Pairs of (fitted stretches, held-out stretches) with the effects known beforehand in each."""
+
+    train: list[Segment]
+    train_fixed: list[list[Effect]]
+    test: list[Segment]
+    test_fixed: list[list[Effect]]
+
+
+def split_segments(segments: Sequence[Segment], fixed: Sequence[Sequence[Effect]]) -> list[Holdout]:
+    """Split every segment into halves and pair them both ways."""
+    halves: list[list[Segment]] = [[], []]
+    known: list[list[list[Effect]]] = [[], []]
+    for segment, effects in zip(segments, fixed, strict=True):
+        middle = len(segment.run.t) // 2
+        for place, (start, stop) in enumerate(((0, middle), (middle, len(segment.run.t)))):
+            half = Segment(segment.model, segment.run.rows(start, stop), segment.index, segment.start)
+            half.adopt(segment)
+            halves[place].append(half)
+            known[place].append(list(effects))
+    return [Holdout(halves[0], known[0], halves[1], known[1]), Holdout(halves[1], known[1], halves[0], known[0])]
+
+
+def gate_gains(fit: Fit, without: dict[str, Fit], pairs: Sequence[Holdout]) -> dict[str, float]:
+    """Return the log predictive gain of each cause on the held-out halves, the other causes kept.
+
+    The whole run is whitened as one block for the joint evidence, so that slow noise common to both halves does not
+    count as a repetition.
+    """
+    gains = {}
+    whole = fit.log_evidence
+    for name, other in without.items():
+        joint = whole - other.log_evidence
+        parts = []
+        for pair in pairs:
+            full = _evidence_of(pair.train, fit.causes, pair.train_fixed)
+            rest = _evidence_of(pair.train, other.causes, pair.train_fixed)
+            parts.append(joint - (full - rest))
+        gains[name] = float(np.mean(parts))
+    return gains
+
+
+def _evidence_of(segments: Sequence[Segment], causes: Sequence[Cause], fixed: Sequence[Sequence[Effect]]) -> float:
+    return refine(segments, causes, fixed, iterations=2, shapes=False).log_evidence
+
+
+def held_out_gain(causes: Sequence[Cause], pairs: Sequence[Holdout], constant: Sequence[Effect], *, label: str) -> Gain:
+    """Measure what the causes, fitted on one part, are worth on the other.
+
+    Parameters
+    ----------
+    causes : sequence of Cause
+        The causes; their shapes are kept, their sizes refitted on each training part.
+    pairs : sequence of Holdout
+        Which part is fitted and which is predicted.
+    constant : sequence of Effect
+        Causes that are not refitted (wiring, ranges).
+    label : str
+        What was held out.
+    """
+    before, after, floor, count = 0.0, 0.0, 0.0, 0
+    likelihoods: list[NDArray[np.float64]] = []
+    rates: list[tuple[float, float]] = []
+    drifts: list[tuple[float, float]] = []
+    for pair in pairs:
+        trained = refine(pair.train, causes, pair.train_fixed, iterations=4, shapes=False)
+        for segment, known in zip(pair.test, pair.test_fixed, strict=True):
+            array = segment.model.array
+            effects = [*known, *effects_of_run(trained.causes, array, segment.index)]
+            nominal = [effect for effect in known if effect not in constant]
+            plain = segment.residual(nominal)[:, :-1]
+            kept = segment.coefficients
+            plain_likelihood = _scaled(segment, nominal)
+            segment.coefficients = kept
+            extended_likelihood = _scaled(segment, effects)
+            left = segment.residual(effects)[:, :-1]
+            use = segment.weight_mask[:, :-1]
+            before += float(np.sum(plain[use] ** 2))
+            after += float(np.sum(left[use] ** 2))
+            variance = segment.levels.white[:-1] ** 2 + 0.6 * segment.levels.flicker[:-1] ** 2
+            floor += float(np.sum(use * variance))
+            count += int(use.sum())
+            likelihoods.append(0.5 * _blocks(plain_likelihood - extended_likelihood, segment))
+            rate, drift = _motion_errors(segment, nominal, effects)
+            rates.append(rate)
+            drifts.append(drift)
+            segment.coefficients = kept
+    if count == 0:
+        return Gain()
+    excess = (before - floor) / count
+    share = 1.0 - (after - floor) / (before - floor) if excess > 0.02 * floor / count else float("nan")
+    blocks = np.concatenate(likelihoods)
+    return Gain(
+        label,
+        float(np.sqrt(before / count)),
+        float(np.sqrt(after / count)),
+        float(min(share, 1.0)),
+        float(blocks.mean()),
+        float(blocks.std(ddof=1) / np.sqrt(len(blocks))) if len(blocks) > 1 else float("nan"),
+        *(float(np.sqrt(np.mean(np.square(column)))) for column in zip(*rates, strict=True)),
+        *(float(np.mean(column)) for column in zip(*drifts, strict=True)),
+    )
+
+
+def _scaled(segment: Segment, effects: Sequence[Effect]) -> NDArray[np.float64]:
+    """Move the drive to its posterior under these effects; return the summed squares per sample in white noise."""
+    for _ in range(2):
+        segment.move_drive(segment.linearise(effects))
+    scaled = segment.residual(effects) / segment.levels.white
+    return np.asarray(np.sum(scaled**2, axis=1))
+
+
+def _blocks(values: NDArray[np.float64], segment: Segment) -> NDArray[np.float64]:
+    """Return means over blocks of a second."""
+    size = max(int(1.0 / segment.run.sample_period), 1)
+    whole = len(values) // size * size
+    return np.asarray(values[:whole].reshape(-1, size).mean(axis=1)) if whole else values[:1]
+
+
+def _motion_errors(
+    segment: Segment, nominal: Sequence[Effect], effects: Sequence[Effect]
+) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Rate against the reference and position drift, with readings as they are and corrected by the extension."""
+    run = segment.run
+    pseudo_inverse = np.linalg.pinv(segment.model.array.regression_matrix)
+    reference = smooth_rate(run, is_angle=segment.is_angle)
+    believed = segment.predict(nominal)[:, :-1]
+    correction = segment.predict(effects)[:, :-1] - believed
+    measured = np.where(run.valid, run.readings, believed + correction)
+    truth = segment.spline.spin(segment.coefficients).at(run.t)
+    results = []
+    for readings in (measured, measured - correction):
+        alpha = (readings - believed) @ pseudo_inverse.T
+        rate = reference[0] + cumulative_trapezoid(alpha[:, 2] + truth.acceleration, run.t, initial=0.0)
+        error = alpha[:, 3:]
+        cos, sin = np.cos(truth.angle), np.sin(truth.angle)
+        world = np.column_stack(
+            [cos * error[:, 0] - sin * error[:, 1], sin * error[:, 0] + cos * error[:, 1], error[:, 2]]
+        )
+        velocity = cumulative_trapezoid(world, run.t, axis=0, initial=0.0)
+        position = cumulative_trapezoid(velocity, run.t, axis=0, initial=0.0)
+        results.append((float(np.sqrt(np.mean((rate - reference) ** 2))), float(np.linalg.norm(position[-1]))))
+    return (results[0][0], results[1][0]), (results[0][1], results[1][1])

@@ -1,0 +1,105 @@
+"""Stochastic effects: biases that wander as a random walk, and more white noise than the part should have."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from gfimu.diagnosis.causes import effects_of_run
+from gfimu.diagnosis.coloured_noise import NoiseLevels, estimate_flicker
+from gfimu.diagnosis.model import Effect
+from gfimu.diagnosis.refinement import Fit
+from gfimu.diagnosis.segment import Segment
+
+__all__ = ["WALK_ODDS", "noise_log_determinant", "walk_strength", "white_factor"]
+
+WALK_ODDS = 10.0
+"""Log odds that a random walk needs over bias instability alone."""
+_WEAKEST_WALK = 3e-3
+_WALK_GRID = np.geomspace(2e-3, 0.5, 28)
+_LARGEST_USUAL_FLICKER = 1.5 * 9.80665e-3
+_MEDIAN_FACTOR = 1.3
+_EVERY_FACTOR = 1.15
+
+
+def walk_strength(
+    segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]]
+) -> tuple[float, float, float]:
+    """Fit a random walk common to all channels to what a fit leaves.
+
+    Returns
+    -------
+    strength : float
+        m/s² per √s.
+    std : float
+        Standard deviation of the strength.
+    log_odds : float
+        Against bias instability of at most 1.5 mg without a walk.
+    """
+    array = segments[0].model.array
+    totals = np.zeros(len(_WALK_GRID))
+    without = 0.0
+    for segment, known, drive in zip(segments, fixed, fit.drives, strict=True):
+        kept, segment.coefficients = segment.coefficients, drive
+        left = segment.residual([*known, *effects_of_run(fit.causes, array, segment.index)])[:, :-1]
+        segment.coefficients = kept
+        coefficients = segment.basis.transform(left)
+        white = segment.levels.white[:-1]
+        slow = coefficients[1 : len(segment.basis.frequency)] ** 2
+        shape, walk = segment.basis.flicker_spectrum[1:], segment.basis.walk_spectrum[1:]
+
+        def likelihood(
+            flicker: np.ndarray,
+            strength: float,
+            slow=slow,
+            shape=shape,
+            walk=walk,
+            white=white,  # type: ignore[no-untyped-def]
+        ) -> float:
+            spectrum = white**2 + np.outer(shape, flicker**2) + (walk * strength**2)[:, None]
+            return float(-0.5 * np.sum(np.log(spectrum) + slow / spectrum))
+
+        usual = np.minimum(estimate_flicker(coefficients, white, segment.basis), _LARGEST_USUAL_FLICKER)
+        without += likelihood(usual, 0.0)
+        for place, strength in enumerate(_WALK_GRID):
+            flicker = np.minimum(estimate_flicker(coefficients, white, segment.basis, strength), _LARGEST_USUAL_FLICKER)
+            totals[place] += likelihood(flicker, float(strength))
+    best = int(np.argmax(totals))
+    weight = np.exp(totals - totals[best])
+    mean = float(weight @ _WALK_GRID / weight.sum())
+    std = float(np.sqrt(weight @ (_WALK_GRID - mean) ** 2 / weight.sum()))
+    odds = float(totals[best] - without)
+    return (mean, max(std, 0.05 * mean), odds) if mean > _WEAKEST_WALK else (mean, std, 0.0)
+
+
+def noise_log_determinant(segments: Sequence[Segment]) -> float:
+    """Return −½ log det of the channels' noise covariance, to compare fits under different noise."""
+    total = 0.0
+    for segment in segments:
+        levels: NoiseLevels = segment.levels
+        white = levels.white[:-1] ** 2
+        spectrum = (
+            white
+            + np.outer(segment.basis.flicker_spectrum, levels.flicker[:-1] ** 2)
+            + (segment.basis.walk_spectrum * levels.walk**2)[:, None]
+        )
+        total -= 0.5 * float(np.sum(np.log(spectrum)) + (len(segment.run.t) - len(spectrum)) * np.sum(np.log(white)))
+    return total
+
+
+def white_factor(segments: Sequence[Segment]) -> tuple[float, float] | None:
+    """Return how much more white noise the chips have than the model expects, and its standard deviation.
+
+    None where the level is within what parts of a kind differ by.
+    """
+    segment = segments[0]
+    expected = segment.model.expected_noise(1.0 / segment.run.sample_period)
+    measured = segment.levels.white[:-1]
+    ratio = measured / expected.white
+    if np.median(ratio) < _MEDIAN_FACTOR or ratio.min() < _EVERY_FACTOR:
+        return None
+    rounding = expected.quantum**2 / 12.0
+    factors = np.sqrt((measured**2 - rounding) / np.maximum(expected.white**2 - rounding, 1e-12))
+    factor = float(np.median(factors))
+    return factor, factor / np.sqrt(len(segment.run.t) * len(ratio) / 4.0) + 0.01 * factor
