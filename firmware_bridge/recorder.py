@@ -120,7 +120,9 @@ class SampleClock:
 class _Session:
     """State of one recording."""
 
-    def __init__(self, form: FrameFormat, array: AccelerometerArray, out: Path, metadata: dict[str, Any]) -> None:
+    def __init__(
+        self, form: FrameFormat, array: AccelerometerArray, out: Path, metadata: dict[str, Any], *, has_setup: bool
+    ) -> None:
         self.decoder = SampleDecoder(form.name)
         self.clock = HostClock()
         self.times = SampleClock(form.clock_hz)
@@ -134,6 +136,8 @@ class _Session:
         self.waiting_for_board = form.name == "lpc1768"  # for its answer to the setup, which tells the scale
         self.give_up_s = time.monotonic() + _ANSWER_S
         self._form, self._array, self._out, self._metadata = form, array, out, metadata
+        self._has_setup = has_setup
+        self._held: list[tuple[Samples, float]] = []
         self._waiting: list[Batch] = []
         self._flushed_at = 0.0
         self._segment = 0
@@ -156,14 +160,32 @@ class _Session:
             self._segment = int(samples.segment[-1])
             self.clock.restart()
         self.clock.add(float(samples.ticks[-1]) / self._form.clock_hz, host_s)
+        if self.waiting_for_board:
+            self._held.append((samples, host_s))
+            if self.identity is None and host_s < self.give_up_s:
+                return None
+            return self.release()
+        return self._accept(samples, host_s)
+
+    def release(self) -> Batch | None:
+        """Take the samples that were held back until the board's answer told their scale."""
+        self.waiting_for_board = False
+        held, self._held = self._held, []
+        if not held:
+            return None
+        samples = Samples.join([part for part, _ in held])
+        if self.identity is not None and self._has_setup:
+            began = np.flatnonzero(samples.status & Status.FIRST)
+            start = int(began[-1]) if len(began) else 0  # what came before was not as asked for
+            samples = Samples(*(getattr(samples, name)[start:] for name in Samples.__dataclass_fields__))
+        return self._accept(samples, held[-1][1])
+
+    def _accept(self, samples: Samples, host_s: float) -> Batch:
+        """Scale samples and place them in time."""
         counts = samples.counts.astype(float)
         if self._form.name == "lpc1768":
             counts[samples.counts == _NO_READING] = np.nan
             counts *= self.identity.count_size if self.identity else 1
-        if self.waiting_for_board:
-            if self.identity is None and host_s < self.give_up_s:
-                return None
-            self.waiting_for_board = False
         batch = Batch(self.times.place(samples, host_s), counts, samples.status)
         for flag in Status:
             number = int(np.count_nonzero(samples.status & flag))
@@ -256,10 +278,11 @@ def record(
         "started_utc": datetime.now(UTC).isoformat(timespec="milliseconds"),
         "software_version": gfimu.__version__,
     }
-    session = _Session(layout, carried, target, metadata)
+    session = _Session(layout, carried, target, metadata, has_setup=bool(setup))
     with Link(port, baud=baud, reconnect_s=reconnect_s) as link:
         trouble = _run(link, session, duration_s, setup if form == "lpc1768" else (), on_batch, stop)
         breaks = link.breaks
+    session.release()
     session.flush(time.monotonic(), force=True)
     session.decoder.finish()
     if session.refused and not session.journal:
@@ -321,6 +344,8 @@ def _run(
                     heard_at = now
                     if on_batch is not None:
                         on_batch(batch, session.decoder.counts)
+            if session.waiting_for_board and now >= session.give_up_s:
+                session.release()
             session.flush(now)
             if session.refused and session.journal is None:
                 return None

@@ -1,0 +1,50 @@
+"""Board clock against host clock: the true line lies within the stated uncertainty, late bytes do not bend it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from firmware_bridge.clock import HostClock
+
+
+def arrivals(seed: int, *, seconds: int = 120, rate_error: float = 40e-6, offset: float = 1000.0):
+    rng = np.random.default_rng(seed)
+    board = np.arange(0, seconds, 0.02)
+    latency = rng.exponential(0.004, len(board)) + 0.001
+    latency[rng.random(len(board)) < 0.02] += rng.exponential(0.3)  # the reader was busy
+    return board, board * (1 + rate_error) + offset + latency
+
+
+def test_line_is_found_within_its_uncertainty() -> None:
+    inside = 0
+    for seed in range(40):
+        clock = HostClock()
+        for board, host in zip(*arrivals(seed), strict=True):
+            clock.add(board, host)
+        fit = clock.fit()
+        assert fit is not None
+        assert abs(fit.rate_error - 40e-6) < 5e-6
+        assert abs(fit.to_host(60.0) - (60.0 * (1 + 40e-6) + 1000.0 + 0.001)) < 0.001
+        inside += abs(fit.rate_error - 40e-6) < 2 * fit.rate_error_std
+    assert inside >= 32  # of 40; 95 % expected, binomial P(< 32) below 1e-3 even at 90 %
+
+
+def test_outliers_do_not_bend_the_line() -> None:
+    clock = HostClock()
+    for k, (board, host) in enumerate(zip(*arrivals(1), strict=True)):
+        stuck = 1000 <= k < 1500  # ten seconds in which every byte came a second late
+        clock.add(board, host + (1.0 if stuck else 0.0))
+    fit = clock.fit()
+    assert fit is not None
+    assert abs(fit.rate_error - 40e-6) < 2e-5
+
+
+def test_memory_stays_small_and_few_arrivals_give_no_line() -> None:
+    clock = HostClock()
+    clock.add(0.0, 5.0)
+    assert clock.fit() is None
+    for k in range(100_000):
+        clock.add(k * 1e-3, k * 1e-3 + 5.0)
+    assert len(clock._points) <= 102
+    clock.restart()
+    assert clock.fit() is None
