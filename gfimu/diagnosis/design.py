@@ -16,7 +16,7 @@ from gfimu.diagnosis.distinguishability import (
     Distinguishability,
     PlannedRun,
     distinguishability,
-    information,
+    normal_equations,
     plan_contenders,
 )
 from gfimu.diagnosis.engine import make_segments
@@ -174,7 +174,7 @@ class _Plan:
         )
         # Recordings at hand are the same under every profile.
         known = make_segments(bench.model, bench.recorded)
-        self._known = information(known, self._signatures)
+        self._known = normal_equations(known, self._signatures)[0]
 
     def table(self, profile: TableProfile | None, sample_rate: float | None = None) -> Distinguishability:
         """Return what a profile adds to the recordings at hand; None: those alone."""
@@ -187,7 +187,7 @@ class _Plan:
                 run.segment(bench.model, len(bench.recorded) + place, bench.sample_rate)
                 for place, run in enumerate(runs)
             ]
-            gram = gram + information(segments, self._signatures)
+            gram = gram + normal_equations(segments, self._signatures)[0]
         return distinguishability(gram, self._contenders)
 
     def final(self, profile: TableProfile | None) -> Distinguishability:

@@ -34,7 +34,8 @@ __all__ = [
     "Distinguishability",
     "PlannedRun",
     "distinguishability",
-    "information",
+    "gained_log_likelihood",
+    "normal_equations",
     "plan_contenders",
     "predict_distinguishability",
 ]
@@ -300,16 +301,19 @@ def _shapes(
     return own, [dict(grid[place]) for place in spread if dict(grid[place]) != own]
 
 
-def information(segments: Sequence[Segment], signatures: Sequence[Signature]) -> NDArray[np.float64]:
-    """Return the normal equations G, shape (P, P), of signatures over all segments, the drive marginalised."""
+def normal_equations(
+    segments: Sequence[Segment], signatures: Sequence[Signature]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return G (P, P) and b (P,) of signatures over all segments, the drive marginalised."""
     count = 1 + max(int(signature.columns[-1]) for signature in signatures)
-    gram = np.zeros((count, count))
+    gram, score = np.zeros((count, count)), np.zeros(count)
     for segment in segments:
         segment.prepare_weights()
         columns, numbers = signature_columns(segment, signatures, (), ())
-        part, _, _ = segment.whitened_products(segment.linearise(()), columns)
+        part, part_score, _ = segment.whitened_products(segment.linearise(()), columns)
         gram[np.ix_(numbers, numbers)] += part
-    return 0.5 * (gram + gram.T)
+        score[numbers] += part_score
+    return 0.5 * (gram + gram.T), score
 
 
 def predict_distinguishability(
@@ -334,4 +338,36 @@ def predict_distinguishability(
         runs=len(runs),
     )
     segments = [run.segment(model, index) for index, run in enumerate(runs)]
-    return distinguishability(information(segments, signatures), contenders)
+    return distinguishability(normal_equations(segments, signatures)[0], contenders)
+
+
+def gained_log_likelihood(
+    model: WorldModel, effects: Sequence[str | Effect], runs: Sequence[Run]
+) -> NDArray[np.float64]:
+    """Return what the best fit of each kind of effect gains on recordings, shape (k,), nats.
+
+    The difference of two entries is the margin that `Distinguishability.nats` predicts, if the effect with the larger
+    one is there; it scatters with variance 2D, and a rival of m sizes fits noise worth about m/2 nats. Effects are
+    taken as linear in their sizes, and as of either sign.
+
+    Parameters
+    ----------
+    model : WorldModel
+        The simulation.
+    effects : sequence of str or Effect
+        Effects; of one that is given with its sizes only the kind and shape count.
+    runs : sequence of Run
+        The recordings.
+    """
+    duration, period = max(run.duration for run in runs), min(run.sample_period for run in runs)
+    signatures, contenders = plan_contenders(
+        model, effects, duration=duration, sample_rate=1.0 / period, runs=len(runs)
+    )
+    segments = [Segment(model, run, index, float(run.t[0])) for index, run in enumerate(runs)]
+    gram, score = normal_equations(segments, signatures)
+    gains = []
+    for contender in contenders:
+        mine = contender.columns
+        precision = gram[np.ix_(mine, mine)] + np.eye(len(mine)) / SCALES[-1] ** 2
+        gains.append(0.5 * float(score[mine] @ np.linalg.solve(precision, score[mine])))
+    return np.array(gains)

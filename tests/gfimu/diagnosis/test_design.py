@@ -9,12 +9,16 @@ from hypothesis import strategies as st
 
 from gfimu.diagnosis.ambiguity import open_effects
 from gfimu.diagnosis.design import Limits, design
-from gfimu.diagnosis.distinguishability import PlannedRun, distinguishability, information, plan_contenders
+from gfimu.diagnosis.distinguishability import (
+    PlannedRun,
+    distinguishability,
+    gained_log_likelihood,
+    normal_equations,
+    plan_contenders,
+)
 from gfimu.diagnosis.profile_search import plain_profile, profile_of, starting_points
 from gfimu.diagnosis.proposal import SEPARATED
 from gfimu.diagnosis.run import prepare_run
-from gfimu.diagnosis.segment import Segment
-from gfimu.diagnosis.signatures import signature_columns
 from gfimu.errors import InputError
 from sim.campaign import Measurement, measure, random_profile
 from sim.effects import make_effect
@@ -87,7 +91,7 @@ def test_a_design_beats_the_plain_run_and_every_start(twin, flex_or_quadratic):
     signatures, contenders = plan_contenders(twin, [flex, "quadratic"], duration=30.0, sample_rate=50.0)
     for point in starting_points(np.random.default_rng(1), 12):
         run = PlannedRun(profile_of(point, LIMITS), LIMITS.duration)
-        table = distinguishability(information([run.segment(twin, 0)], signatures), contenders)
+        table = distinguishability(normal_equations([run.segment(twin, 0)], signatures)[0], contenders)
         assert table.least_nats <= flex_or_quadratic.after.least_nats * 1.05  # found at half the sample rate
 
 
@@ -167,27 +171,10 @@ def test_limits_are_positive_numbers(bad):
         Limits(bad, 20.0, 60.0)
 
 
-def log_likelihood_ratio(twin, effect, rival, recordings, k=30.0):
-    """Log likelihood of the best fit of an effect's kind over that of a rival's kind, given recordings."""
-    runs = [prepare_run(recording, twin) for recording in recordings]
-    signatures, contenders = plan_contenders(
-        twin, [effect, rival], duration=runs[0].duration, sample_rate=100.0, runs=len(runs)
-    )
-    count = 1 + max(int(signature.columns[-1]) for signature in signatures)
-    gram, score = np.zeros((count, count)), np.zeros(count)
-    for index, run in enumerate(runs):
-        segment = Segment(twin, run, index, 0.0)
-        segment.prepare_weights()
-        columns, numbers = signature_columns(segment, signatures, (), ())
-        part, b, _ = segment.whitened_products(segment.linearise(()), columns)
-        gram[np.ix_(numbers, numbers)] += part
-        score[numbers] += b
-    best = []
-    for contender in contenders:
-        mine = contender.columns
-        prior = np.eye(len(mine)) / k**2
-        best.append(0.5 * score[mine] @ np.linalg.solve(gram[np.ix_(mine, mine)] + prior, score[mine]))
-    return best[0] - best[1]
+def margin(twin, effect, rival, recordings):
+    """Log likelihood of the best fit of an effect's kind over that of a rival's kind."""
+    one, other = gained_log_likelihood(twin, [effect, rival], [prepare_run(each, twin) for each in recordings])
+    return one - other
 
 
 def test_a_proposed_profile_separates_in_the_simulator_as_predicted(twin, flex_or_quadratic):
@@ -195,7 +182,7 @@ def test_a_proposed_profile_separates_in_the_simulator_as_predicted(twin, flex_o
     setting = Measurement(duration=LIMITS.duration)
     plain, designed = (
         [
-            log_likelihood_ratio(
+            margin(
                 twin,
                 "centrifugal_flex",
                 "quadratic",
@@ -208,9 +195,9 @@ def test_a_proposed_profile_separates_in_the_simulator_as_predicted(twin, flex_o
     for measured, predicted in ((plain, flex_or_quadratic.before), (designed, flex_or_quadratic.after)):
         # The wide rival (12 sizes) fits noise worth about 6 ± 2.5 nats; the effect (one size) about half a nat. The
         # margin itself has variance 2D. Mean of three runs, three standard deviations; levels of noise are not told.
-        margin = predicted.nats[0, 1]
-        spread = 3 * np.sqrt((2 * margin + 6) / 3)
-        assert abs(np.mean(measured) - (margin - 5.5)) < spread + 0.1 * margin
+        nats = predicted.nats[0, 1]
+        spread = 3 * np.sqrt((2 * nats + 6) / 3)
+        assert abs(np.mean(measured) - (nats - 5.5)) < spread + 0.1 * nats
     assert min(designed) > max(SEPARATED, *plain)
 
 
@@ -230,8 +217,8 @@ def test_a_proposed_mounting_separates_in_the_simulator(twin, off_axis):
     # The cube is put down anew on its side, so its eccentricity is another one.
     first = record([make_effect("eccentricity", {"x_m": 5e-4, "y_m": -3e-4})], (0, 0, 0), 1)
     second = record([make_effect("eccentricity", {"x_m": -2e-4, "y_m": 6e-4})], off_axis.mounting, 2)
-    alone = log_likelihood_ratio(twin, "eccentricity", "sensor_position", [first])
-    together = log_likelihood_ratio(twin, "eccentricity", "sensor_position", [first, second])
+    alone = margin(twin, "eccentricity", "sensor_position", [first])
+    together = margin(twin, "eccentricity", "sensor_position", [first, second])
     assert abs(alone) < SEPARATED
     assert together > SEPARATED
 
@@ -269,7 +256,7 @@ def test_a_random_profile_is_a_start_like_any_other(twin):
     # The search is not needed for easy pairs: any lively motion separates them, and the design does no worse.
     lively = PlannedRun(random_profile(np.random.default_rng(2), 30.0), 30.0)
     signatures, contenders = plan_contenders(twin, ["table_tilt", "bias"], duration=30.0, sample_rate=50.0)
-    usual = distinguishability(information([lively.segment(twin, 0)], signatures), contenders).least_nats
+    usual = distinguishability(normal_equations([lively.segment(twin, 0)], signatures)[0], contenders).least_nats
     proposal = design(
         twin, ["table_tilt", "bias"], limits=LIMITS, rng=np.random.default_rng(0), mountings={}, evaluations=9
     )

@@ -10,8 +10,11 @@ from gfimu.diagnosis.distinguishability import (
     Contender,
     PlannedRun,
     distinguishability,
+    normal_equations,
+    plan_contenders,
     predict_distinguishability,
 )
+from gfimu.diagnosis.signatures import signature_columns
 from gfimu.diagnosis.table_profile import Leg, TableProfile
 from gfimu.errors import InputError
 from sim.effects import make_effect
@@ -188,11 +191,26 @@ def test_lag_of_the_channels_and_of_the_reference_have_opposite_signs(twin):
     assert table.unexplained[0, 1] > 0.99
 
 
-def test_the_margin_does_not_depend_on_the_time_step_of_the_prediction(twin):
-    # Same power density of the noise: a coarser step may only lose what is faster than it.
-    runs = [PlannedRun(FULL, DURATION, rate) for rate in (50.0, 100.0)]
-    coarse, fine = (predict_distinguishability(twin, ["tacho_scale", "sensor_position"], [run]) for run in runs)
-    assert fine.nats[0, 1] == pytest.approx(2 * coarse.nats[0, 1], rel=0.2)  # white noise per sample: twice the samples
+def test_the_drive_is_marginalised_to_the_digits_that_a_margin_needs(twin):
+    # A tachometer of wrong gain moves the whole drive by its share: a large step that leaves little behind, so that
+    # normal equations lose digits first here. Truth: orthogonal projection on drive and rival, no normal equations.
+    ramps = profile((0, 1), (15, 1.5), (15, 16), (0, 1.5))
+    run = PlannedRun(ramps, 20.0, 100.0, bias_instability=0.0)
+    signatures, contenders = plan_contenders(twin, ["tacho_scale", "sensor_position"], duration=20.0, sample_rate=100.0)
+    segment = run.segment(twin, 0)
+    gram = normal_equations([segment], signatures)[0]
+    columns, _ = signature_columns(segment, signatures, (), ())  # (c + 1, P, n)
+    weight = np.sqrt(segment.inverse_variance)
+    drive = np.vstack([matrix.toarray() * w for matrix, w in zip(segment.linearise(()).jacobian, weight, strict=True)])
+    values, vectors = np.linalg.eigh(segment.prior.toarray())
+    prior = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
+    wanted = np.concatenate([part.T * w for part, w in zip(columns, weight, strict=True)])  # (n (c + 1), P)
+    rival = wanted[:, [1, 2, 4, 5, 7, 8, 10, 11]]  # heights change nothing
+    system = np.block([[drive, rival], [prior, np.zeros((len(prior), rival.shape[1]))]])
+    target = np.concatenate([wanted[:, 0], np.zeros(len(prior))])
+    left = target - system @ np.linalg.lstsq(system, target, rcond=1e-15)[0]
+    table = distinguishability(gram, contenders, largest_rival=np.inf)
+    assert table.energy[0, 1] == pytest.approx(left @ left, rel=0.01)
 
 
 def test_weakest_pair(tables):
