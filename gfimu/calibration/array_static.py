@@ -17,7 +17,7 @@ from scipy.linalg import null_space
 
 from gfimu.array import AccelerometerArray
 from gfimu.calibration.coverage import check_magnitude_coverage, fit_sphere, pose_directions
-from gfimu.calibration.fit_quality import covariance_scale
+from gfimu.calibration.fit_quality import covariance_scale, odd_poses
 from gfimu.calibration.gauss_helmert import Condition, gauss_helmert
 from gfimu.calibration.observations import Observations
 from gfimu.calibration.result import Calibration, parameter_names
@@ -59,8 +59,9 @@ def array_static(observations: Observations, array: AccelerometerArray, *, gravi
     check_magnitude_coverage(pose_directions(means[:, :3]))
     start = _start(means, axes, array, gravity)
     gauge = _rotation_gauge(axes)  # (3, u)
+    condition = _same_specific_force(axes, gravity)
     adjustment = gauss_helmert(
-        _same_specific_force(axes, gravity),
+        condition,
         start,
         observations.readings,
         observations.row_covariance,
@@ -68,6 +69,10 @@ def array_static(observations: Observations, array: AccelerometerArray, *, gravi
         tolerance=1e-8,
     )
     scale, warnings = covariance_scale(adjustment.variance_factor, adjustment.redundancy)
+    f, _, b = condition(adjustment.parameters, means)
+    spread = observations.covariance / np.bincount(observations.pose)[:, None, None]
+    weight = np.linalg.inv(b @ spread @ b.swapaxes(1, 2))
+    misfit = np.einsum("pr,prs,ps->p", f, weight, f) / f.shape[1]
     names = [name for chip in array.chips for name in parameter_names(chip.name, "array")]
     statement = (
         "a common rotation of all chips changes nothing at rest: the body frame is the one in which the mean rotation "
@@ -84,7 +89,7 @@ def array_static(observations: Observations, array: AccelerometerArray, *, gravi
         adjustment.cofactor * scale,
         _common_rotations(adjustment.parameters, axes),
         statements=(statement,),
-        warnings=warnings,
+        warnings=(*warnings, *odd_poses(misfit, observations.start_s)),
     )
     body = body_specific_force(result, array, means)
     magnitude = np.linalg.norm(body.mean(axis=1), axis=1) - gravity

@@ -128,7 +128,7 @@ def allan_deviation(
 
 @numba.njit(cache=True, fastmath={"reassoc", "contract"})
 def _second_difference_squares(phase: Floats, factors: NDArray[np.int64]) -> Floats:
-    """Sums of (x_{i+2m} − 2 x_{i+m} + x_i)² over i, for every m.
+    """Return the sums of (x_{i+2m} − 2 x_{i+m} + x_i)² over i, for every m.
 
     All m share a block of i before the next one, so that a long series passes through the cache once and not once for
     every m; sums of blocks also keep rounding from growing with length.

@@ -1,7 +1,5 @@
 """Synthetic triads with a known truth, and the real recording."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -25,8 +23,5 @@ def triad():
 
 
 @pytest.fixture
-def xsens_file():
-    path = Path(__file__).resolve().parents[3] / ".." / "shared" / "data" / "xsens" / "xsens_acc.txt.gz"
-    if not path.is_file():
-        pytest.skip("the Xsens recording is not beside the project (../shared/data/xsens)")
-    return path
+def xsens_file(shared_data):
+    return shared_data / "xsens" / "xsens_acc.txt.gz"

@@ -1,7 +1,6 @@
 """Array calibration: chips in one body frame, positions from motion, observability, the MIMU4444 recordings."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -90,6 +89,16 @@ def test_calibrated_cube_has_no_apparent_alpha(mti):
     assert np.abs(alpha).max() < 0.05
     raw = np.stack([check.means[:, 3 * i : 3 * i + 3] / 25 @ chip.axes for i, chip in enumerate(array.chips)], axis=1)
     assert np.sqrt(np.mean(apparent_alpha(array, raw) ** 2)) > 1.0
+
+
+def test_a_pose_in_the_warm_up_is_named():
+    array = AccelerometerArray.load("cube12")
+    rng = np.random.default_rng(11)
+    observations = poses_of(array, chips_in_gauge(array, rng), MULTI, rng, 0.001)
+    assert array_static(observations, array, gravity=GRAVITY).warnings == ()
+    observations.readings[0] += rng.normal(0, 0.02, 12)
+    warnings = array_static(observations, array, gravity=GRAVITY).warnings
+    assert any("far worse than the others: 1 (0.0 s)" in text for text in warnings)
 
 
 def test_wrong_drawing_is_named():
@@ -224,18 +233,13 @@ def test_motion_refusals():
         calibrate_array(replace(recording, readings=recording.readings[:, :11], channels=array.channels[:11]), array)
 
 
-MIMU = Path(__file__).resolve().parents[3] / ".." / "shared" / "data" / "mimu4444"
-
-
 @pytest.fixture(scope="module")
-def mimu():
+def mimu(shared_data):
     """Both recordings with their averaged poses and calibrations (g = 9.81, as their authors took it)."""
-    if not (MIMU / "exp_1.bin.gz").is_file():
-        pytest.skip("the MIMU4444 recordings are not beside the project (../shared/data/mimu4444)")
     array = AccelerometerArray.load("mimu4444")
     runs = []
     for number in (1, 2):
-        recording = read_mimu4444(MIMU / f"exp_{number}.bin.gz")
+        recording = read_mimu4444(shared_data / "mimu4444" / f"exp_{number}.bin.gz")
         rest, _ = without_moved_poses(recording, detect_rest(recording, min_duration_s=5.0))
         poses = averaged_poses(recording, rest)
         runs.append((recording, poses, array_static(poses, array, gravity=9.81)))
