@@ -20,6 +20,7 @@ from gfimu.errors import InputError
 __all__ = ["PseudoTerminal", "ServeReport", "TcpPort", "VirtualPort", "open_port", "serve"]
 
 _SLICE_S = 0.01
+_FAST_SLICE_S = 0.1
 _READ_BYTES = 4096
 _PORTS = range(65536)
 
@@ -227,7 +228,7 @@ def serve(
     patience = patience_s if patience_s is not None else (0.0 if realtime else _SLICE_S)
     with _Interrupted():
         while (end is None or now < end) and not (stop is not None and stop()):
-            target = now + round(_SLICE_S * TICKS_PER_SECOND)
+            target = now + round((_SLICE_S if realtime else _FAST_SLICE_S) * TICKS_PER_SECOND)
             now = board.run_until(target if end is None else min(target, end))
             data, _ = board.take_sent()
             taken = 0

@@ -312,6 +312,7 @@ void core_sample(void)
     core.settling = 0U;
     core.sequence++;
     if (core.first) {
+        status &= ~STATUS_ALL_OVERRUNS; /* conversions since the chips were set up are not missed samples */
         status |= STATUS_FIRST;
         core.first = false;
     }

@@ -43,6 +43,7 @@ enum result {
 
 #define STATUS_MISSING(sensor) (1U << (sensor))
 #define STATUS_OVERRUN(sensor) (1U << (4U + (sensor)))
+#define STATUS_ALL_OVERRUNS (0xFU << 4)
 #define STATUS_LATE (1U << 8)
 #define STATUS_FRAMES_DROPPED (1U << 9)
 #define STATUS_SELF_TEST (1U << 10)
