@@ -6,8 +6,9 @@ measured by sensors with data-sheet noise, quantisation, bias instability and a 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -126,7 +127,7 @@ def measure(
     white = np.sqrt(expected.white**2 - expected.quantum**2 / 12.0) * world.noise_factor
     readings = readings + white * rng.standard_normal(readings.shape)
     level = setting.bias_instability * np.exp(0.3 * rng.standard_normal(readings.shape[1]))
-    readings += bias_instability(rng, *readings.shape, 1.0) * level
+    readings += bias_instability(rng, readings.shape[0], readings.shape[1], 1.0) * level
     if world.bias_walk:
         step = world.bias_walk / np.sqrt(setting.sample_rate)
         readings += np.cumsum(step * rng.standard_normal(readings.shape), axis=0)
@@ -184,6 +185,8 @@ def hidden_effect(
     direction = pattern.mixing @ rng.standard_normal(pattern.mixing.shape[1])
     direction = direction * np.array([size.prior_std for size in sizes])
     direction = np.where([size.positive for size in sizes], np.abs(direction), direction)
+    if name == "resonance":
+        direction = np.array([abs(direction[0]), 0.0])
     scale = 1.0
     for _ in range(8):
         reached = detectability(twin, [family.from_sizes(twin.array, scale * direction, shape)], motion, setting)
@@ -194,6 +197,9 @@ def hidden_effect(
         scale *= float(ratio)
         if abs(ratio - 1) < 0.02:
             break
+    if name == "resonance":
+        # A participation beyond 1 is no mounting any more.
+        scale = min(scale, 1.0 / max(direction[0], 1e-12))
     return family.from_sizes(twin.array, scale * direction, shape)
 
 
@@ -220,7 +226,7 @@ def _saturation(rng, twin, magnitude, setting) -> dict[str, object]:  # type: ig
     return {"limit_m_s2": max(top, 1.05 * twin.gravity)}
 
 
-_DISCRETE: Mapping[str, object] = {
+_DISCRETE: Mapping[str, Callable[..., dict[str, Any]]] = {
     "noise": lambda rng, twin, magnitude, setting: {"factor": float(rng.uniform(1.5, 4.0))},
     "bias_random_walk": lambda rng, twin, magnitude, setting: {"strength_m_s2_rts": float(rng.uniform(0.7, 6.0) * _MG)},
     "saturation": _saturation,

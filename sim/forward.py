@@ -82,7 +82,7 @@ def rigid_readings(world: World, spin: SpinState, geometry: TableGeometry | None
 def _nodding_readings(
     world: World, spin: SpinState, placed: TableGeometry, up: NDArray[np.float64], stretch: NDArray[np.float64] | float
 ) -> NDArray[np.float64]:
-    """Readings when the axis nods: the angular rate has parts across the axis."""
+    """Return the readings when the axis nods: the angular rate has parts across the axis."""
     theta, rate, acceleration = spin.angle, spin.rate, spin.acceleration
     nod = world.nod
     along = np.array([np.cos(nod.direction), np.sin(nod.direction), 0.0])
@@ -148,6 +148,6 @@ def reference(world: World, motion: SpinMotion, t: NDArray[np.float64]) -> NDArr
         motion = step(motion, t)
     spin = motion.at(t - world.tacho_delay)
     reading = spin.rate
-    for step in world.reference_steps:
-        reading = step(reading, spin)
+    for change in world.reference_steps:
+        reading = change(reading, spin)
     return reading

@@ -19,7 +19,6 @@ from gfimu.model_files import find_model, read_toml
 from gfimu.units import STANDARD_GRAVITY
 from sim import forward
 from sim.effects import EFFECTS, Effect, apply_effects, make_effect
-from sim.motion import SpinMotion
 from sim.world import World
 
 __all__ = ["Twin"]
@@ -161,10 +160,10 @@ class Twin:
 
     def predict(
         self,
-        spin: SpinMotion,
+        spin: Any,
         t: NDArray[np.float64],
         *,
-        effects: Sequence[Effect] = (),
+        effects: Sequence[Any] = (),
         temperature: NDArray[np.float64] | None = None,
         mounting: NDArray[np.float64] | None = None,
         start: float | None = None,
@@ -195,7 +194,7 @@ class Twin:
                     readings = step(t, readings, rng)
         return readings
 
-    def sample_times(self, t: NDArray[np.float64], effects: Sequence[Effect] = ()) -> NDArray[np.float64]:
+    def sample_times(self, t: NDArray[np.float64], effects: Sequence[Any] = ()) -> NDArray[np.float64]:
         """Return the true time that each chip's reading and, last, the reference belong to, shape (n, k + 1)."""
         world = self.world(effects)
         times = world.chip_times(t)
@@ -220,7 +219,7 @@ class Twin:
         white = np.sqrt(np.maximum(analogue, 0.0) * factor**2 + quantum**2 / 12.0)
         return ExpectedNoise(white, quantum, self.range_g * STANDARD_GRAVITY)
 
-    def extended(self, effects: Sequence[Effect]) -> Twin:
+    def extended(self, effects: Sequence[Any]) -> Twin:
         """Return the twin with these effects added to its own."""
         return replace(self, effects=(*self.effects, *effects))
 

@@ -1,4 +1,4 @@
-"""Adequacy: is anything left after the named causes, and what does it depend on?
+"""Adequacy: whether anything is left after the named causes, and what it depends on.
 
 A generic basis of the motion, the angle and time, per channel, is tested by the same evidence as the named effects,
 with the drive and the named causes projected out; narrow lines, noise that changes with the motion, and isolated
@@ -121,7 +121,9 @@ def _basis_terms(
     segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]], channels: Sequence[str]
 ) -> LeftOver:
     """Score every basis function on every channel, on all channels, and every channel on all functions."""
-    gram, score, names = None, None, []
+    gram: NDArray[np.float64] | None = None
+    score: NDArray[np.float64] | None = None
+    names: list[str] = []
     for segment, known in zip(segments, fixed, strict=True):
         line = segment.linearise([*known, *effects_of_run(fit.causes, segment.model.array, segment.index)])
         names, basis = generic_basis(segment)
@@ -202,7 +204,15 @@ def _channelwise(
     return gram, score, eliminated
 
 
-def _project_out(segment, line, basis, eliminated, gram, score, named):  # type: ignore[no-untyped-def]
+def _project_out(
+    segment: Segment,
+    line: Linearisation,
+    basis: NDArray[np.float64],
+    eliminated: NDArray[np.float64],
+    gram: NDArray[np.float64],
+    score: NDArray[np.float64],
+    named: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Make the basis orthogonal to the named causes' columns."""
     inner, right, crossed = segment.whitened_products(line, named)
     count = basis.shape[1]

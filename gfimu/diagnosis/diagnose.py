@@ -23,12 +23,12 @@ from gfimu.diagnosis.naming import (
     probabilities,
     rival_list,
 )
-from gfimu.diagnosis.wording import verdict_sentences
 from gfimu.diagnosis.refinement import Fit
 from gfimu.diagnosis.run import Run, prepare_run
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.stochastic import WALK_ODDS, noise_log_determinant, walk_strength, white_factor
 from gfimu.diagnosis.verdict import Diagnosis, Gain, NamedCause, Residual, RunView, Unexplained
+from gfimu.diagnosis.wording import verdict_sentences
 from gfimu.errors import InputError
 from gfimu.recording import Recording
 

@@ -68,7 +68,7 @@ class AngleSpline:
             rows = self.size - order - 1
             step = diags_array([-1.0, 1.0], offsets=[0, 1], shape=(rows, rows + 1)).tocsr() / self.spacing
             matrix = step @ matrix
-        return csr_array(matrix)
+        return csr_array(matrix, dtype=np.float64)
 
     def interval_centres(self) -> NDArray[np.float64]:
         """Return the centre of each knot interval, s."""
@@ -126,7 +126,7 @@ def smooth_rate(run: Run, *, is_angle: bool, width: float = 0.1) -> NDArray[np.f
 def roughness_prior(
     run: Run, spline: AngleSpline, *, is_angle: bool, reference_noise: float, factor: float = 1.0
 ) -> NDArray[np.float64]:
-    """Standard deviation of the third derivative of the rate per knot interval, rad/s⁴.
+    """Return the standard deviation of the third derivative of the rate per knot interval, rad/s⁴.
 
     Loose on ramps and stiff on plateaus, so that a ripple at constant speed is a discrepancy and not a motion.
 

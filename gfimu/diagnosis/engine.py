@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
@@ -82,7 +83,7 @@ def make_segments(model: WorldModel, runs: Sequence[Run]) -> list[Segment]:
         rate = smooth_rate(run, is_angle=model.drive_source == "angle")
         turned = cumulative_trapezoid(rate, run.t, initial=0.0)
         noise = difference_noise(run.reference[run.reference_valid])
-        for start, stop in zip(edges[:-1], edges[1:], strict=True):
+        for start, stop in pairwise(edges):
             drift = noise * np.sqrt(run.sample_period * (run.t[start] - run.t[0]))
             segments.append(
                 Segment(
@@ -245,12 +246,12 @@ def explain(
         settled_before = settled
     tell(0.85, "prune")
     best, without = prune(segments, best, fixed)
-    close = [
+    near = [
         fit
         for fit in sorted(tried.values(), key=_posterior, reverse=True)
         if fit.key != best.key and fit.causes and fit.log_posterior > best.log_posterior - _CLOSE - 10.0
     ]
-    rivals = [refine(segments, fit.causes, fixed, drives=best.drives, iterations=6) for fit in close[:_RIVALS]]
+    rivals = [refine(segments, fit.causes, fixed, drives=best.drives, iterations=6) for fit in near[:_RIVALS]]
     rivals = [prune(segments, rival, fixed)[0] for rival in rivals if len(rival.causes) <= len(best.causes) + 1]
     unique = {rival.key: rival for rival in rivals if rival.causes and rival.key != best.key}
     better = max(unique.values(), key=_posterior, default=best)

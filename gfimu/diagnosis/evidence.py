@@ -28,7 +28,7 @@ def posterior(
     """Posterior mean (k,) and covariance (k, k) of coordinates with prior N(0, scale²)."""
     information = gram + np.eye(len(score)) / scale**2
     covariance = np.linalg.inv(information)
-    return covariance @ score, covariance
+    return np.asarray(covariance @ score), np.asarray(covariance)
 
 
 def log_evidence_each(
@@ -72,7 +72,7 @@ def log_evidence(
             inverse, _ = lapack.dpotri(factor, lower=1)
             inverse = np.tril(inverse) + np.tril(inverse, -1).T
             mean = inverse @ (score * scale)
-            for sign in np.flatnonzero(positive):
+            for sign in np.flatnonzero(positive if positive is not None else []):
                 value += float(log_ndtr(mean[sign] / np.sqrt(inverse[sign, sign]))) + np.log(2.0)
         values[place] = value
     return float(logsumexp(values + _SCALE_WEIGHTS))

@@ -1,4 +1,4 @@
-"""Held-out data: does the extension predict what the fit never saw, and what is it worth there?
+"""Held-out data: whether the extension predicts what the fit never saw, and what it is worth there.
 
 With a second recording the causes are fitted to the first and judged on the second. With one, each half in turn is
 predicted from the other. The drive of the held-out stretch is always unknown and marginalised.

@@ -268,7 +268,8 @@ def _merged_flips(
     if len(flips) < 2:
         return found
     names = [str(item[1]["channel"]) for item in flips]
-    merged = ("sign_flip", {"channel": names}, f"{', '.join(names)} read the negative of what they should")
+    sentence = f"{', '.join(names)} read the negative of what they should"
+    merged: tuple[str, dict[str, object], str] = ("sign_flip", {"channel": names}, sentence)
     return [item for item in found if item[0] != "sign_flip"] + [merged]
 
 

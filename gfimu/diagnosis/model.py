@@ -61,12 +61,12 @@ class Pattern(Protocol):
 class Effect(Protocol):
     """One effect with its parameters."""
 
-    name: Any
-    summary: Any
-    place: Any
-    separated_by: Any
-    per_run: Any
-    parameters: dict[str, Any]
+    @property
+    def name(self) -> str: ...  # noqa: D102
+    @property
+    def place(self) -> str: ...  # noqa: D102
+    @property
+    def parameters(self) -> dict[str, Any]: ...  # noqa: D102
 
     def size_values(self, array: AccelerometerArray) -> NDArray[np.float64]:
         """Return the linear coordinates."""
@@ -80,11 +80,14 @@ class Effect(Protocol):
 class EffectFamily(Protocol):
     """A kind of effect: its coordinates, places, shapes and how to build one."""
 
-    name: Any
-    summary: Any
-    place: Any
-    separated_by: Any
-    per_run: Any
+    @property
+    def name(self) -> str: ...  # noqa: D102
+    @property
+    def summary(self) -> str: ...  # noqa: D102
+    @property
+    def separated_by(self) -> str: ...  # noqa: D102
+    @property
+    def per_run(self) -> bool: ...  # noqa: D102
 
     def __call__(self, parameters: Mapping[str, Any]) -> Effect:
         """Build an effect from its contract parameters."""

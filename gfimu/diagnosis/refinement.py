@@ -143,7 +143,7 @@ def _iterate(segments, causes, fixed, array, iterations) -> Fit:  # type: ignore
         prior, pull = _prior(causes)
         step = np.linalg.solve(gram + np.diag(prior), score + pull) if len(score) else np.zeros(0)
         step = _limited(causes, step)
-        moves = []
+        moves: list[NDArray[np.float64]] = []
         before = [segment.coefficients for segment in segments]
         for segment, line, product in zip(segments, linear, products, strict=True):
             segment.move_drive(line, product[2], step)
@@ -160,7 +160,8 @@ def _iterate(segments, causes, fixed, array, iterations) -> Fit:  # type: ignore
 
 def _places(causes: Sequence[Cause]) -> tuple[NDArray[np.intp], list[tuple[int, str, int]]]:
     """Return the places of the coordinates, and (cause, key, place) of the shapes, in the columns."""
-    coordinates, shapes = [], []
+    coordinates: list[int] = []
+    shapes: list[tuple[int, str, int]] = []
     place = 0
     for number, cause in enumerate(causes):
         coordinates += range(place, place + len(cause.coordinates))

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.ndimage import uniform_filter1d
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
+from scipy.ndimage import uniform_filter1d
 from scipy.sparse import csr_array, diags_array, vstack
 
 from gfimu.diagnosis.coloured_noise import CosineBasis, NoiseLevels

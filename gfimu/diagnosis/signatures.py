@@ -26,7 +26,7 @@ _PEAKS = {"interference_tone": 2, "cogging": 4, "tacho_ripple": 3, "resonance": 
 _DAMPINGS = (0.01, 0.03, 0.1)
 _RESTRICTED = 0.5
 _ANGLES = frozenset({"direction_rad"})
-_SHAPE_BOUNDS = {"damping_ratio": (1e-3, 0.3)}
+_SHAPE_BOUNDS = {"damping_ratio": (1e-3, 0.3), "time_constant_s": (1.0, 1e5), "width_m_s2": (1e-3, 20.0)}
 
 
 @dataclass(frozen=True)
@@ -163,7 +163,7 @@ def _disjoint(reach: NDArray[np.bool_] | None, count: int) -> list[list[int]]:
         for members, taken in groups:
             if not (taken & reach[size]).any():
                 members.append(size)
-                taken |= reach[size]
+                np.logical_or(taken, reach[size], out=taken)
                 break
         else:
             groups.append(([size], reach[size].copy()))
@@ -270,7 +270,7 @@ def _scan_tones(segments: Sequence[Segment], linear: Sequence[Linearisation]) ->
 def _scan_resonances(
     segments: Sequence[Segment], linear: Sequence[Linearisation]
 ) -> tuple[list[dict[str, float]], int]:
-    """Ring modes of every frequency and damping with the drive and correlate with what is left of the tangential part."""
+    """Ring modes of every frequency and damping with the drive; correlate with what is left along the tangent."""
     period = segments[0].run.sample_period
     top = 0.45 / period
     modes = []

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gfimu.diagnosis.causes import effects_of_run
 from gfimu.diagnosis.coloured_noise import NoiseLevels, estimate_flicker
@@ -47,30 +48,24 @@ def walk_strength(
         coefficients = segment.basis.transform(left)
         white = segment.levels.white[:-1]
         slow = coefficients[1 : len(segment.basis.frequency)] ** 2
-        shape, walk = segment.basis.flicker_spectrum[1:], segment.basis.walk_spectrum[1:]
-
-        def likelihood(
-            flicker: np.ndarray,
-            strength: float,
-            slow=slow,
-            shape=shape,
-            walk=walk,
-            white=white,  # type: ignore[no-untyped-def]
-        ) -> float:
-            spectrum = white**2 + np.outer(shape, flicker**2) + (walk * strength**2)[:, None]
-            return float(-0.5 * np.sum(np.log(spectrum) + slow / spectrum))
+        shape, drift = segment.basis.flicker_spectrum[1:], segment.basis.walk_spectrum[1:]
 
         usual = np.minimum(estimate_flicker(coefficients, white, segment.basis), _LARGEST_USUAL_FLICKER)
-        without += likelihood(usual, 0.0)
+        without += _whittle(slow, white**2 + np.outer(shape, usual**2))
         for place, strength in enumerate(_WALK_GRID):
             flicker = np.minimum(estimate_flicker(coefficients, white, segment.basis, strength), _LARGEST_USUAL_FLICKER)
-            totals[place] += likelihood(flicker, float(strength))
+            totals[place] += _whittle(slow, white**2 + np.outer(shape, flicker**2) + (drift * strength**2)[:, None])
     best = int(np.argmax(totals))
     weight = np.exp(totals - totals[best])
     mean = float(weight @ _WALK_GRID / weight.sum())
     std = float(np.sqrt(weight @ (_WALK_GRID - mean) ** 2 / weight.sum()))
     odds = float(totals[best] - without)
     return (mean, max(std, 0.05 * mean), odds) if mean > _WEAKEST_WALK else (mean, std, 0.0)
+
+
+def _whittle(power: NDArray[np.float64], spectrum: NDArray[np.float64]) -> float:
+    """Return the Whittle log likelihood of squared cosine coefficients (K, c)."""
+    return float(-0.5 * np.sum(np.log(spectrum) + power / spectrum))
 
 
 def noise_log_determinant(segments: Sequence[Segment]) -> float:

@@ -52,14 +52,12 @@ def _headline(verdict: str, causes: Sequence[NamedCause], unexplained: Unexplain
     if verdict == "ambiguous":
         contested = [cause for cause in causes if cause.not_distinguishable_from]
         by = next((cause.would_be_separated_by for cause in contested if cause.would_be_separated_by), "")
-        return (
-            f"The simulation is wrong, but this data cannot tell {_listed([c.effect for c in contested], 'from')} apart; "
-            f"{by} would."
-        )
+        which = _listed([cause.effect for cause in contested])
+        return f"The simulation is wrong, but this data cannot tell {which} apart; {by} would."
     return f"The simulation is wrong in a way that nothing in the library explains: {unexplained.signature}."
 
 
-def _listed(names: Sequence[str], last: str = "and") -> str:
+def _listed(names: Sequence[str]) -> str:
     if len(names) < 2:
         return "".join(names)
-    return f"{', '.join(names[:-1])} {last} {names[-1]}"
+    return f"{', '.join(names[:-1])} and {names[-1]}"

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.signal import cont2discrete, lfilter
 from scipy.spatial.transform import Rotation
 
@@ -296,7 +297,12 @@ class _Disturbed:
     The rate error obeys δω' = disturbance − δω/τ with the speed loop's time constant τ.
     """
 
-    def __init__(self, motion, t, disturbance) -> None:  # type: ignore[no-untyped-def]
+    def __init__(
+        self,
+        motion: SpinMotion,
+        t: NDArray[np.float64],
+        disturbance: Callable[[SpinState], NDArray[np.float64]],
+    ) -> None:
         self._motion, self._disturbance = motion, disturbance
         step = 0.5 * _FINE_STEP
         self._grid = np.arange(t[0], t[-1] + 2 * step, step)
@@ -307,8 +313,9 @@ class _Disturbed:
         self._rate = rate
         self._angle = np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]))]) * step
 
-    def at(self, t: NDArray[np.float64]) -> SpinState:
+    def at(self, t: ArrayLike) -> SpinState:
         """State of the disturbed spin."""
+        t = np.asarray(t, dtype=float)
         spin = self._motion.at(t)
         rate = np.interp(t, self._grid, self._rate)
         return SpinState(
@@ -344,7 +351,7 @@ class Resonance(Effect):
         return tuple({"frequency_hz": float(f), "damping_ratio": zeta} for f in frequencies for zeta in (0.02, 0.1))
 
     def apply(self, world: World) -> World:
-        """Let the cube twist against the table: φ'' + 2ζω₀φ' + ω₀²φ = −α, of which gain·φ'' + quadrature·ω₀φ' is seen."""
+        """Let the cube twist: φ'' + 2ζω₀φ' + ω₀²φ = −α, of which gain·φ'' + quadrature·ω₀φ' is seen."""
         gain, quadrature = self.value("gain"), self.value("quadrature_gain")
         natural = 2 * np.pi * self.value("frequency_hz", 10.0)
         damping = self.value("damping_ratio", 0.03)
@@ -358,7 +365,14 @@ class Resonance(Effect):
 class _Twisting:
     """Spin of a cube on a torsion spring upon a spinning table."""
 
-    def __init__(self, motion, t, gains: tuple[float, float], natural: float, damping: float) -> None:  # type: ignore[no-untyped-def]
+    def __init__(
+        self,
+        motion: SpinMotion,
+        t: NDArray[np.float64],
+        gains: tuple[float, float],
+        natural: float,
+        damping: float,
+    ) -> None:
         self._motion = motion
         step = _FINE_STEP if natural < _SLOW_MODE else 0.5 * _FINE_STEP
         self._grid = np.arange(t[0], t[-1] + 2 * step, step)
@@ -376,8 +390,9 @@ class _Twisting:
         self._rate = gain * twist_rate + quadrature * natural * twist
         self._acceleration = gain * twist_acceleration + quadrature * natural * twist_rate
 
-    def at(self, t: NDArray[np.float64]) -> SpinState:
+    def at(self, t: ArrayLike) -> SpinState:
         """State of the cube's spin."""
+        t = np.asarray(t, dtype=float)
         spin = self._motion.at(t)
         return SpinState(
             spin.angle + np.interp(t, self._grid, self._angle),
@@ -386,7 +401,13 @@ class _Twisting:
         )
 
 
-def _numerator(a, b, c, d, poles) -> NDArray[np.float64]:  # type: ignore[no-untyped-def]
+def _numerator(
+    a: NDArray[np.float64],
+    b: NDArray[np.float64],
+    c: NDArray[np.float64],
+    d: NDArray[np.float64],
+    poles: NDArray[np.float64],
+) -> NDArray[np.float64]:
     """Numerator of a second-order discrete transfer function from its first Markov parameters."""
     markov = [d.item(), (c @ b).item(), (c @ a @ b).item()]
     return np.array(

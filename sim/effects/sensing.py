@@ -10,8 +10,8 @@ from scipy.signal import lfilter
 
 from gfimu.array import AccelerometerArray
 from gfimu.units import STANDARD_GRAVITY
-from sim.effects.base import Effect, Pattern, Size, channel_patterns, chip_patterns
-from sim.world import SampleContext, SensingStep, World
+from sim.effects.base import Effect, Pattern, Size, channel_patterns
+from sim.world import SensingStep, World
 
 __all__ = [
     "Bias",
