@@ -1,4 +1,4 @@
-"""The wheel is whole: the models, the firmware sources and every package are in it, and it runs without the checkout."""
+"""The wheel is whole: models, firmware sources and every package are in it, and it runs without the checkout."""
 
 from __future__ import annotations
 
