@@ -160,6 +160,7 @@ class KalmanRateFilter:
             1.0 / errors.noise_std,
             errors.scale_std**2,
             errors.placement_std**2 * float(np.mean(1.0 / errors.noise_std**2)),
+            errors.timing_std**2,
             errors.gyro_noise_std**2,
             rest.window(period) if rest else 0,
             rest.rate_std**2 if rest else 1.0,
@@ -199,7 +200,7 @@ class KalmanRateFilter:
         settles = np.array([rest is not None and not x.any() and self.settings.start_std <= rest.largest_rate_std])
         counts = np.array([0, 0, 0, 0, 0, int(settles[0])])  # a start at rest is rest to begin with
         return RecursionState(
-            x, covariance, np.zeros(3), np.zeros(3), counts, settles, x.copy(), covariance.copy(),
+            x, covariance, np.zeros(5), np.zeros(3), counts, settles, x.copy(), covariance.copy(),
             np.zeros(c), np.zeros((RUN_BLOCKS, 3)), np.zeros((RUN_BLOCKS, 3)), np.zeros((RUN_BLOCKS, 3, 3)),
         )  # fmt: skip
 

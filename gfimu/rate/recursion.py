@@ -46,10 +46,13 @@ _UNIFORM = 1e-6
 _GAP = 1.5
 _WALK_MEMORY = 1.0  # s, over which the wandering of α is averaged
 _ERROR_MEMORY = 1.0  # s, for which a scale or placement error keeps its effect
+_FOURTH_OF_NOISE = 70.0  # variance of the fourth and fifth difference of white noise of unit variance
+_FIFTH_OF_NOISE = 252.0
+_ROUGH_SHARE = 1.0 / (12.0 * 70.0)  # (Δt² × variance of the step)/12 by the fifth difference of a random walk
 _SLOW = 1e-3  # tr P above this share of |ω|² switches the second-order terms on
 
 # Places in RecursionState.scalars
-_TIME, _WALK, _LAST_GOOD = range(3)
+_TIME, _WALK, _LAST_GOOD, _FOURTH, _FIFTH = range(5)
 # Places in RecursionState.counts
 _STARTED, _BLOCK, _REST_BLOCKS, _SAMPLES, _RUN, _RESTING = range(6)
 
@@ -77,6 +80,7 @@ class Tuning(NamedTuple):
     inverse_noise: NDArray[np.float64]  # (c,) 1/σ, s²/m
     scale_variance: float  # of the scale factors
     placement_variance: float  # over σ² of a channel, 1/(m/s²)² m²
+    timing_variance: float  # of a channel's sampling time, s²
     gyro_variance: float  # (rad/s)²
     rest_window: int  # samples per block of the rest test; 0: no test
     rest_variance: float  # of the rate at rest, (rad/s)²
@@ -90,7 +94,7 @@ class RecursionState(NamedTuple):
 
     x: NDArray[np.float64]  # (n,)
     covariance: NDArray[np.float64]  # (n, n)
-    scalars: NDArray[np.float64]  # (3,)
+    scalars: NDArray[np.float64]  # (5,)
     mean_alpha: NDArray[np.float64]  # (3,) over the filter's memory
     counts: NDArray[np.int64]  # (6,)
     settles: NDArray[np.bool_]  # (1,) the run starts at rest
@@ -289,16 +293,49 @@ def _correct(alpha, tables, place, x, omega0, omega1, omega2, out):  # type: ign
 
 
 @njit(**_COMPILE)
-def _inflation(y, state, tuning, present, omega_squared):  # type: ignore[no-untyped-def]
-    """Variance of the scale and placement errors against the noise, as white noise over the filter's memory."""
-    c = len(y)
-    total = 0.0
+def _inflation(data, k, state, tuning, omega_squared):  # type: ignore[no-untyped-def]
+    """Variance of scale, placement and timing errors against the noise; lasting ones count as white over a second."""
+    c = data.y.shape[1]
+    changed = 0.0
+    moved = 0.0
     for i in range(c):
-        if present or y[i] != 0.0:
-            change = (y[i] - state.reference[i]) * tuning.inverse_noise[i]
-            total += change * change
-    total = tuning.scale_variance * total / c + tuning.placement_variance * omega_squared * omega_squared
-    return total * max(_ERROR_MEMORY / tuning.period, 1.0)
+        if data.y[k, i] == 0.0:  # a missing channel
+            continue
+        change = (data.y[k, i] - state.reference[i]) * tuning.inverse_noise[i]
+        changed += change * change
+        if k > 0 and data.y[k - 1, i] != 0.0:
+            slope = (data.y[k, i] - data.y[k - 1, i]) * tuning.inverse_noise[i]
+            moved += slope * slope
+    lasting = tuning.scale_variance * changed / c + tuning.placement_variance * omega_squared * omega_squared
+    if k > 0:
+        step = data.t[k] - data.t[k - 1]
+        moved *= tuning.timing_variance / (c * step * step)
+    return lasting * max(_ERROR_MEMORY / tuning.period, 1.0) + moved
+
+
+@njit(**_COMPILE)
+def _undersampled(alpha, start, noise_power, forget, scalars):  # type: ignore[no-untyped-def]
+    """Variance of α per axis that the polynomial through its samples does not follow.
+
+    Differences of a well-sampled signal shrink with their order; where the fifth is larger than the fourth, the noise
+    taken off, α changes by itself between samples. Then its integral over an interval is as uncertain as a random
+    walk's between two known ends.
+    """
+    fourth = 0.0
+    fifth = 0.0
+    for a in range(3):
+        d0 = alpha[start, a] - 4.0 * alpha[start + 1, a] + 6.0 * alpha[start + 2, a]
+        d0 += alpha[start + 4, a] - 4.0 * alpha[start + 3, a]
+        d1 = alpha[start + 1, a] - 4.0 * alpha[start + 2, a] + 6.0 * alpha[start + 3, a]
+        d1 += alpha[start + 5, a] - 4.0 * alpha[start + 4, a]
+        fourth += 0.5 * (d0 * d0 + d1 * d1)
+        fifth += (d1 - d0) * (d1 - d0)
+    scalars[_FOURTH] += forget * (fourth - scalars[_FOURTH])
+    scalars[_FIFTH] += forget * (fifth - scalars[_FIFTH])
+    excess = scalars[_FIFTH] - 2.0 * _FIFTH_OF_NOISE * noise_power
+    if excess <= 0.0 or excess < scalars[_FOURTH] - _FOURTH_OF_NOISE * noise_power:
+        return 0.0
+    return excess * _ROUGH_SHARE / 3.0
 
 
 @njit(**_COMPILE)
@@ -338,7 +375,7 @@ def forward(  # type: ignore[no-untyped-def]
     noise_of_all = tables.alpha_noise[0]
     sensitivity_of_all = tables.null_sensitivity[0]
     noise_power = noise_of_all[0, 0] + noise_of_all[1, 1] + noise_of_all[2, 2]
-    inflated = tuning.scale_variance + tuning.placement_variance > 0.0
+    inflated = tuning.scale_variance + tuning.placement_variance + tuning.timing_variance > 0.0
     forget = min(1.0, tuning.period / _WALK_MEMORY)
     forget_rate = forget / (3.0 * tuning.period)
     for k in range(first, last):
@@ -353,7 +390,7 @@ def forward(  # type: ignore[no-untyped-def]
         stepped = False
         noise_set = place if sensed else 0
         if inflated and sensed:
-            inflation = _inflation(data.y[k], state, tuning, place == 0, x[0] * x[0] + x[1] * x[1] + x[2] * x[2])
+            inflation = _inflation(data, k, state, tuning, x[0] * x[0] + x[1] * x[1] + x[2] * x[2])
         if state.counts[_STARTED] > 0:
             # Prediction, (1).
             step = data.t[k] - state.scalars[_TIME]
@@ -365,6 +402,11 @@ def forward(  # type: ignore[no-untyped-def]
             s1 = 0.0
             s2 = 0.0
             if even:
+                if points == 6:
+                    rough = _undersampled(alpha, start, noise_power, forget, state.scalars) * step * step
+                    if rough > 0.0:
+                        for a in range(3):
+                            covariance[a, a] += rough
                 left = k - 1 - start
                 for j in range(points):
                     weight = step * even_weights[left, j]

@@ -24,12 +24,12 @@ from gfimu.array import AccelerometerArray
 from gfimu.errors import InputError
 from gfimu.kinematics import require_all_motions
 from gfimu.model_files import find_model, read_toml
+from gfimu.part import white_noise_std
 
 __all__ = ["ChannelTables", "SensorErrors"]
 
 _RANK_TOLERANCE = 1e-9
 _WEAK = 0.1  # products seen more weakly than this share of the best are not used to clean α
-_REFERENCE_RATE = 100.0  # Hz, at which parts state their noise in LSB rms
 _EQUAL_READINGS = 1e-7  # probability per sample at which equal readings count as a stuck channel
 
 
@@ -47,6 +47,8 @@ class SensorErrors:
         Uncertainty of the scale factors, a ratio (0.01 is 1 %).
     placement_std : float
         Uncertainty of the positions, m.
+    timing_std : float
+        How far a channel's sampling times are from the stated ones, independently from sample to sample, s.
     full_range : ndarray, shape (c,)
         Readings at or beyond ± this are saturated, m/s².
     stuck_after : int
@@ -61,6 +63,7 @@ class SensorErrors:
     bias_std: NDArray[np.float64]
     scale_std: float = 0.0
     placement_std: float = 0.0
+    timing_std: float = 0.0
     full_range: NDArray[np.float64] | None = None
     stuck_after: int = 0
     gyro_noise_std: float = 0.005
@@ -73,7 +76,7 @@ class SensorErrors:
                 raise InputError(f"{name} must hold one number per channel, none negative, m/s²")
         if np.any(self.noise_std <= 0):
             raise InputError("noise_std must be positive for every channel; a real sensor has noise, m/s²")
-        for name in ("scale_std", "placement_std", "gyro_noise_std", "gyro_bias_std"):
+        for name in ("scale_std", "placement_std", "timing_std", "gyro_noise_std", "gyro_bias_std"):
             if not (np.isfinite(getattr(self, name)) and getattr(self, name) >= 0):
                 raise InputError(f"{name} = {getattr(self, name)!r}: must be a number ≥ 0")
 
@@ -94,7 +97,7 @@ class SensorErrors:
     def from_parts(cls, array: AccelerometerArray, sample_rate: float, **others: Any) -> SensorErrors:
         """Take the errors from the data sheets of the array's parts (``models/parts``).
 
-        White noise is the part's LSB rms at 100 Hz times √(rate/100 Hz), with the quantisation step's Δ²/12 added;
+        White noise is the part's (`gfimu.part.white_noise_std`), with the quantisation step's Δ²/12 added;
         bias is the typical deviation at switch-on. Other fields by name.
 
         Raises
@@ -102,16 +105,17 @@ class SensorErrors:
         InputError
             If a part is unknown.
         """
-        noise, bias, limit, stuck = [], [], [], 0
+        bias, limit, steps = [], [], []
+        rms = white_noise_std(array, sample_rate)
         for chip in array.chips:
             part = read_toml(find_model("parts", chip.part))
-            lsb = float(part["lsb_m_s2"])
-            axes = len(chip.axes)
-            rms = np.array(part["noise_lsb_rms_100_hz"])[:axes] * lsb * np.sqrt(sample_rate / _REFERENCE_RATE)
-            noise.append(np.sqrt(rms**2 + lsb**2 / 12.0))
+            lsb, axes = float(part["lsb_m_s2"]), len(chip.axes)
             bias.append(np.array(part["offset_std_m_s2"])[:axes])
             limit.append(np.full(axes, float(part["full_range_m_s2"]) - lsb))
-            stuck = max(stuck, _equal_run(float(rms.min()) / lsb))
+            steps.append(np.full(axes, lsb))
+        step = np.concatenate(steps)
+        noise = [np.sqrt(rms**2 + step**2 / 12.0)]
+        stuck = _equal_run(float((rms / step).min()))
         fields = {"full_range": np.concatenate(limit), "stuck_after": stuck} | others
         if "noise_std" in fields:
             noise = [np.broadcast_to(np.asarray(fields.pop("noise_std"), dtype=float), (array.n_channels,))]
