@@ -9,6 +9,7 @@ from recordings import pose_recording
 from scipy.linalg import null_space
 from scipy.spatial.transform import Rotation
 
+import gfimu.calibration.array_motion as array_motion_module
 from gfimu.array import AccelerometerArray
 from gfimu.calibration.array_calibration import calibrate_array
 from gfimu.calibration.array_motion import array_motion, motion_reference
@@ -160,6 +161,17 @@ def normalised_errors(make, array, rng):
     variance, axes = np.linalg.eigh(determined.T @ result.covariance @ determined)
     error = np.concatenate([result.positions.ravel(), result.biases.ravel()]) - truth
     return axes.T @ determined.T @ error / np.sqrt(variance), result
+
+
+def test_derivative_of_the_centripetal_field():
+    rng = np.random.default_rng(12)
+    omega, r = rng.normal(size=(5, 3)), rng.normal(size=(4, 3))
+    field = array_motion_module._gradient
+    exact = array_motion_module._rate_derivative(omega, r)  # (n, k, 3, 3)
+    for axis in range(3):
+        step = 1e-6 * np.eye(3)[axis]
+        ends = [np.einsum("nij,kj->nki", field(omega + sign * step, 0 * omega), r) for sign in (1, -1)]
+        np.testing.assert_allclose((ends[0] - ends[1]) / 2e-6, exact[..., axis], atol=1e-8)
 
 
 @pytest.mark.parametrize("make", [turntable, tumble])

@@ -92,10 +92,13 @@ def test_recursive_is_usable_while_data_arrive(triad):
 
 def test_recursive_and_six_position_agree_to_first_order(triad):
     observations = simulate(triad, FACES, np.random.default_rng(6), sigma=1e-5)
+    observations.covariance[:3] *= 4.0  # up and down weighted differently: bias and scale correlate
     one = six_position(observations, gravity=GRAVITY)
     other = recursive(observations, gravity=GRAVITY)
     np.testing.assert_allclose(one.values, other.values, atol=1e-7)
     np.testing.assert_allclose(one.std, other.std, rtol=0.05)
+    assert one.correlation_of("a1_M_xx", "a1_b_x") > 0.3
+    np.testing.assert_allclose(one.correlation, other.correlation, atol=0.05)
 
 
 def test_uniform_multi_position_equals_scipy(triad):
