@@ -46,6 +46,7 @@ _PUBLIC = {
     "calibrate_array": "gfimu.calibration.array_calibration",
     "centripetal_agreement": "gfimu.estimate_summary",
     "closed_form": "gfimu.kinematics",
+    "design": "gfimu.diagnosis.design",
     "drift_budget": "gfimu.drift",
     "equivalent_rate_drift": "gfimu.drift",
     "estimate_from_rest": "gfimu.rest_bias",

@@ -101,5 +101,6 @@ def _print(proposal: Proposal, *, at_hand: bool) -> None:
         ],
         note="Expected log likelihood by which the effect, at its size, beats the best fit of the rival.",
     )
-    print_table("Profile", ["", "piece"], list(enumerate(proposal.profile.in_words(), start=1)))
+    pieces = proposal.profile.in_words()
+    print_table("Profile", ["piece"], [[f"{number}. {piece}"] for number, piece in enumerate(pieces, start=1)])
     typer.echo(proposal.text)

@@ -18,6 +18,7 @@ _LEGS = 8
 _PARAMETERS = 3 * _LEGS + 5
 _SHORTEST_RAMP = 0.25
 _SHORTEST_REVERSAL = 0.1
+_SHORTEST_HOLD = 0.2
 _GENTLEST = 6.0  # times the shortest ramp that the acceleration allows
 _TIME_STEP = 0.01
 _RATE_STEP = 1e-3
@@ -80,6 +81,7 @@ def profile_of(parameters: NDArray[np.float64], limits: Limits) -> TableProfile:
     ramps = ramps + (gentle - ramps) * min(1.0, room / max(gentle.sum() - ramps.sum(), 1e-9))
     weights = table[:count, 2] + 1e-3
     holds = max(time - ramps.sum(), 0.0) * weights / weights.sum()
+    holds[holds < _SHORTEST_HOLD] = 0.0
 
     legs = [Leg(0.0, rest)]
     for leg in range(count):

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from gfimu.diagnosis.ambiguity import open_effects
 from gfimu.diagnosis.design import Limits, design
+from gfimu.diagnosis.diagnose import diagnose
 from gfimu.diagnosis.distinguishability import (
     PlannedRun,
     distinguishability,
@@ -261,3 +262,29 @@ def test_a_random_profile_is_a_start_like_any_other(twin):
         twin, ["table_tilt", "bias"], limits=LIMITS, rng=np.random.default_rng(0), mountings={}, evaluations=9
     )
     assert proposal.after.least_nats > 0.5 * usual > SEPARATED
+
+
+def test_from_an_open_verdict_to_a_closed_one(twin, tmp_path):
+    gravity = make_effect("gravity", {"delta_m_s2": 0.03})
+    setting = Measurement(duration=10.0)
+    first = measure(np.random.default_rng(1), twin, [gravity], setting)
+    verdict = diagnose([first], twin)
+    assert {"bias", "scale_factor"} <= set(verdict.causes[0].not_distinguishable_from)
+    verdict.write(tmp_path)
+
+    effects = open_effects(tmp_path, twin)
+    proposal = design(
+        twin,
+        effects,
+        limits=Limits(rate=15.0, acceleration=20.0, duration=10.0),
+        rng=np.random.default_rng(0),
+        recorded=[prepare_run(first, twin)],
+        evaluations=6,
+    )
+    mounting = np.array(proposal.mounting)
+    assert mounting.any()
+    second = measure(np.random.default_rng(2), twin, [gravity], setting, motion=proposal.profile, mounting=mounting)
+    closed = diagnose([first, second], twin)
+    assert [cause.effect for cause in closed.causes] == ["gravity"]
+    assert closed.causes[0].not_distinguishable_from == ()
+    assert closed.causes[0].parameters["delta_m_s2"] == pytest.approx(0.03, abs=5 * closed.causes[0].std["delta_m_s2"])
