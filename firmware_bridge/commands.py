@@ -13,10 +13,22 @@ from firmware_bridge.checksum import crc16
 from firmware_bridge.frames import FrameType
 from gfimu.errors import InputError
 
-__all__ = ["Command", "Identity", "Reply", "Result", "encode_command", "parse_message", "set_range", "set_rate"]
+__all__ = [
+    "RATE_CODE_AUTO",
+    "Command",
+    "Identity",
+    "Reply",
+    "Result",
+    "encode_command",
+    "parse_message",
+    "set_range",
+    "set_rate",
+]
 
 COMMAND_SYNC = bytes((0xC3, 0x3C))
 RATE_CODE_AUTO = 0xFF
+"""Let the firmware choose the chips' output data rate."""
+
 _PAYLOADS = {3: "<HB", 4: "<BB", 5: "<B", 7: "<I"}
 
 

@@ -11,7 +11,15 @@ import numpy as np
 import gfimu
 from firmware_bridge.adxl345_device import TICKS_PER_SECOND, Adxl345Options
 from firmware_bridge.board_process import BoardProcess
-from firmware_bridge.commands import Command, Identity, encode_command, parse_message, set_range, set_rate
+from firmware_bridge.commands import (
+    RATE_CODE_AUTO,
+    Command,
+    Identity,
+    encode_command,
+    parse_message,
+    set_range,
+    set_rate,
+)
 from firmware_bridge.frames import SampleDecoder, Samples, StreamCounts
 from firmware_bridge.physics import RidePhysics, Scene
 from gfimu.errors import InputError
@@ -61,6 +69,7 @@ def record_virtual(
     rate_hz: int = 100,
     range_g: int = 16,
     full_resolution: bool = True,
+    rate_code: int = RATE_CODE_AUTO,
     image: str | Path = "gfimu",
     chips: Sequence[Adxl345Options] | None = None,
     fast: bool | None = None,
@@ -75,8 +84,8 @@ def record_virtual(
         Where the board is (`sim.ride.Ride`).
     duration_s : float
         Virtual time, s.
-    rate_hz, range_g, full_resolution
-        What the host asks of the firmware.
+    rate_hz, range_g, full_resolution, rate_code
+        What the host asks of the firmware; ``rate_code`` is the chips' BW_RATE.
     image : str or Path
         Firmware.
     chips : sequence of Adxl345Options, optional
@@ -95,7 +104,7 @@ def record_virtual(
     physics = RidePhysics(scene)
     with BoardProcess(physics, image=image, chips=options, fast=fast, lose_every=lose_every) as board:
         board.run_for(_BOOT_S)
-        board.receive(set_range(range_g, full_resolution=full_resolution) + set_rate(rate_hz))
+        board.receive(set_range(range_g, full_resolution=full_resolution) + set_rate(rate_hz, rate_code))
         board.receive(encode_command(Command.IDENTIFY))
         now = board.run_for(_SETUP_S)
         decoder.feed(board.take_sent()[0])  # samples from before the board was set up

@@ -8,6 +8,9 @@
 #ifndef GFIMU_BUILD_ID
 #define GFIMU_BUILD_ID 0U
 #endif
+#ifndef GFIMU_CHIP_GAP_US
+#define GFIMU_CHIP_GAP_US 0U /* pause between two chips; on purpose wrong, to see what that does to the data */
+#endif
 #ifndef GFIMU_BOOT_RATE_HZ
 #define GFIMU_BOOT_RATE_HZ 100U
 #endif
@@ -304,6 +307,11 @@ void core_sample(void)
     }
     for (uint32_t sensor = 0U; sensor < SENSOR_COUNT; sensor++) {
         status |= sample_sensor(sensor, &frame[HEADER_BYTES + (6U * sensor)]);
+#if GFIMU_CHIP_GAP_US
+        uint32_t since_us = hal_time_us();
+        while ((hal_time_us() - since_us) < GFIMU_CHIP_GAP_US) {
+        }
+#endif
     }
     if (((status & STATUS_STALE) != 0U) && (core.settling > 0U)) {
         core.settling--; /* some sensor has not converted yet: there is no first sample */
