@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from gfimu.diagnosis.verdict import Diagnosis, NamedCause
+import numpy as np
+
+from gfimu.diagnosis.verdict import Diagnosis, NamedCause, RunView
 from gfimu.units import STANDARD_GRAVITY
 
 __all__ = [
@@ -114,6 +116,9 @@ def story(diagnosis: Diagnosis) -> str:
         f"A simulation of the rig predicted what its {count} accelerometer channels should have read. "
         f"It misses the measurement by {before:.3g} m/s² rms; the sensors' own noise is {floor:.3g} m/s². "
     )
+    silent = sorted({channel for run in diagnosis.runs for channel in _silent(diagnosis, run)})
+    if silent:
+        text += f"Left out for want of a usable sample: {_joined(silent)}. "
     if diagnosis.verdict == "nothing_found":
         return text + "No cause in the library, and no pattern of any other kind, predicts the data better than chance."
     if diagnosis.causes:
@@ -130,6 +135,12 @@ def story(diagnosis: Diagnosis) -> str:
     if diagnosis.unexplained.significant:
         text += f"Left unexplained: {diagnosis.unexplained.signature}. "
     return text.strip()
+
+
+def _silent(diagnosis: Diagnosis, run: RunView) -> list[str]:
+    """Return the channels of a run without a single usable sample."""
+    alive = np.asarray(run.valid.any(axis=0))
+    return [name for name, good in zip(diagnosis.twin.array.channels, alive, strict=True) if not good]
 
 
 def parameter_texts(cause: NamedCause) -> list[ParameterText]:
@@ -187,7 +198,9 @@ def next_steps(diagnosis: Diagnosis) -> list[str]:
             if cause.not_distinguishable_from:
                 others = _joined(list(cause.not_distinguishable_from), "or")
                 remedy = f" To be sure, record: {cause.would_be_separated_by}." if cause.would_be_separated_by else ""
-                steps.append(f"{cause.effect} is the simplest story; {others} would fit these data as well.{remedy}")
+                steps.append(
+                    f"{cause.effect} is the simplest story; by a coincidence {others} could imitate it here.{remedy}"
+                )
     if not diagnosis.gain.held_out and diagnosis.verdict != "nothing_found":
         steps.append("Record a second run: with --held-out its gain is measured on data that the fit never saw.")
     return [step.strip() for step in steps]

@@ -57,7 +57,8 @@ def report_html(diagnosis: Diagnosis) -> str:
 def _content(diagnosis: Diagnosis) -> Mapping[str, Any]:
     channels = diagnosis.twin.array.channels
     bias_instability = float(diagnosis.noise.get("bias_instability_m_s2", 0.0))
-    views = [residual_views(run, channels, bias_instability=bias_instability) for run in diagnosis.runs]
+    seen = [run for run in diagnosis.runs if run.valid.any()]
+    views = [residual_views(run, channels, bias_instability=bias_instability) for run in seen]
     label, tone = _VERDICTS[diagnosis.verdict]
     return {
         "version": gfimu.__version__,
@@ -68,7 +69,7 @@ def _content(diagnosis: Diagnosis) -> Mapping[str, Any]:
         "sentences": diagnosis.sentences[1:],
         "figures_of_merit": _figures_of_merit(diagnosis),
         "causes": [_cause(diagnosis, cause) for cause in diagnosis.causes],
-        "surrogate": dict(diagnosis.unexplained.surrogate),
+        "surrogate": dict(diagnosis.unexplained.surrogate) if diagnosis.unexplained.significant else {},
         "unexplained": diagnosis.unexplained,
         "rivals": diagnosis.rivals[:_MOST_RIVALS],
         "gain": diagnosis.gain,
@@ -83,13 +84,16 @@ def _content(diagnosis: Diagnosis) -> Mapping[str, Any]:
                 "duration": run.t[-1] - run.t[0],
                 "fastest": float(np.abs(run.rate).max()),
                 "lost": int((~run.valid.any(axis=1)).sum()),
+                "dead": [
+                    name for name, alive in zip(channels, run.valid.any(axis=0).tolist(), strict=True) if not alive
+                ],
                 "picture": figures.before_after_figure(run, view.size),
                 "sentences": view.sentences,
             }
-            for run, view in zip(diagnosis.runs, views, strict=True)
+            for run, view in zip(seen, views, strict=True)
         ],
         "views": _views(diagnosis, views[0]) if views else [],
-        "channels_picture": figures.channels_figure(diagnosis.runs[0], views[0].size) if views else "",
+        "channels_picture": figures.channels_figure(seen[0], views[0].size) if views else "",
         "fingerprint": figures.fingerprint_figure(views[0].fingerprint) if views else "",
     }
 
@@ -98,7 +102,7 @@ def _figures_of_merit(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:
     """Return the numbers of the first screen: value, unit, what it is."""
     residual, gain = diagnosis.residual, diagnosis.gain
     merits = [(f"{residual.rms_before:.3g}", "m/s²", "prediction error, simulation as given")]
-    if diagnosis.causes or diagnosis.unexplained.surrogate:
+    if diagnosis.causes:
         merits.append((f"{residual.rms_after:.3g}", "m/s²", "prediction error, extended"))
     merits.append((f"{residual.noise_floor:.3g}", "m/s²", "the sensors' own noise"))
     if np.isfinite(gain.share_of_excess_removed):
