@@ -26,7 +26,7 @@ def _demo(
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of everything left to chance.")] = 1,
     json: JsonOption = False,
 ) -> None:
-    """Run the paper's experiment in simulation: geometry, recording, estimate, drift, picture.
+    """Run the paper's experiment in simulation: geometry, recording, estimate, drift, picture, diagnosis.
 
     Example: gfimu demo --out demo
     """
@@ -56,3 +56,4 @@ def _demo(
     )
     print_paths(demo.written.items())
     console.print(f"look at it with: gfimu view {demo.written['rerun recording']}", highlight=False, soft_wrap=True)
+    console.print(f"and open {demo.written['diagnosis report']} in a browser", highlight=False, soft_wrap=True)
