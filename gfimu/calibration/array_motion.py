@@ -131,10 +131,11 @@ def motion_reference(recording: Recording, *, omega_std: float | None = None) ->
         smooth = savgol_filter(filled, window, 3)
         alpha = savgol_filter(filled, window, 3, deriv=1, delta=recording.sample_period)
         noise = float(np.nanstd(tacho - smooth))
-        rate_std = max(noise * np.sqrt(savgol_coeffs(window, 3)[window // 2]), 1e-9)
+        rate_std = max(noise, 1e-9)
         slope = savgol_coeffs(window, 3, deriv=1, delta=recording.sample_period)
-        alpha_std = max(noise * float(np.linalg.norm(slope)), 1e-6)
-        kind, omega = "turntable", np.column_stack([np.zeros((len(smooth), 2)), smooth])
+        # Slopes within one window share their errors: together they count as one.
+        alpha_std = max(noise * float(np.linalg.norm(slope)) * np.sqrt(window), 1e-6)
+        kind, omega = "turntable", np.column_stack([np.zeros((len(tacho), 2)), tacho])
     else:
         raise InputError(
             "positions need a reference of the rotation: the recording has neither tacho_rad_s nor gyro_x/y/z_rad_s"

@@ -8,7 +8,7 @@ another unit than those it was made from.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -361,12 +361,19 @@ def combine(calibrations: Sequence[Calibration]) -> Calibration:
         values=np.concatenate([item.values for item in calibrations]),
         covariance=covariance,
         null_space=null_space,
-        statements=_merged(item.statements for item in calibrations),
-        warnings=_merged(tuple(f"{item.chips[0]}: {text}" for text in item.warnings) for item in calibrations),
+        statements=_merged({item.chips[0]: item.statements for item in calibrations}),
+        warnings=_merged({item.chips[0]: item.warnings for item in calibrations}),
         statistics=statistics,
     )
 
 
-def _merged(texts: Iterable[tuple[str, ...]]) -> tuple[str, ...]:
-    """Join the sentences of several chips, once each."""
-    return tuple(dict.fromkeys(text for group in texts for text in group))
+def _merged(texts: Mapping[str, tuple[str, ...]]) -> tuple[str, ...]:
+    """Join the sentences of several chips: once where all say the same, else with the chip's name."""
+    groups = list(texts.values())
+    return tuple(
+        dict.fromkeys(
+            text if all(text in group for group in groups) else f"{chip}: {text}"
+            for chip, group in texts.items()
+            for text in group
+        )
+    )

@@ -55,7 +55,7 @@ def open_calibrated_run(
         As `gfimu.recording_formats.open_run`, or if the calibration does not fit the recording.
     """
     recording, geometry = open_run(path, array)
-    if calibration.unit == "lsb":
+    if calibration.unit == "lsb" and not is_mimu4444(path):
         recording = Recording.read(path, array=geometry, unit="lsb")
     return calibration.apply(recording), calibration.calibrated_array(geometry)
 
