@@ -314,13 +314,8 @@ def _inflation(data, k, state, tuning, omega_squared):  # type: ignore[no-untype
 
 
 @njit(**_COMPILE)
-def _undersampled(alpha, start, noise_power, forget, scalars):  # type: ignore[no-untyped-def]
-    """Variance of α per axis that the polynomial through its samples does not follow.
-
-    Differences of a well-sampled signal shrink with their order; where the fifth is larger than the fourth, the noise
-    taken off, α changes by itself between samples. Then its integral over an interval is as uncertain as a random
-    walk's between two known ends.
-    """
+def _follow_differences(alpha, start, forget, scalars):  # type: ignore[no-untyped-def]
+    """Average the squares of the fourth and fifth differences of α over the last second."""
     fourth = 0.0
     fifth = 0.0
     for a in range(3):
@@ -332,6 +327,16 @@ def _undersampled(alpha, start, noise_power, forget, scalars):  # type: ignore[n
         fifth += (d1 - d0) * (d1 - d0)
     scalars[_FOURTH] += forget * (fourth - scalars[_FOURTH])
     scalars[_FIFTH] += forget * (fifth - scalars[_FIFTH])
+
+
+@njit(**_COMPILE)
+def _undersampled(noise_power, scalars):  # type: ignore[no-untyped-def]
+    """Variance of α per axis that the polynomial through its samples does not follow.
+
+    Differences of a well-sampled signal shrink with their order; where the fifth is larger than the fourth, the noise
+    taken off, α changes by itself between samples. Then its integral over an interval is as uncertain as a random
+    walk's between two known ends.
+    """
     excess = scalars[_FIFTH] - 2.0 * _FIFTH_OF_NOISE * noise_power
     if excess <= 0.0 or excess < scalars[_FOURTH] - _FOURTH_OF_NOISE * noise_power:
         return 0.0
@@ -396,17 +401,20 @@ def forward(  # type: ignore[no-untyped-def]
             step = data.t[k] - state.scalars[_TIME]
             half = 0.5 * step
             start = min(max(k - 1 - tuning.position, 0), closing - points)
-            even = plain_set and start >= 0 and data.uniform_run[start + points - 1] >= points - 1
+            regular = start >= 0 and data.uniform_run[start + points - 1] >= points - 1
+            even = plain_set and regular
+            if points == 6:
+                if start >= 0 and data.whole_run[start + points - 1] >= points - 1:
+                    _follow_differences(alpha, start, forget, state.scalars)
+                rough = _undersampled(noise_power, state.scalars) * step * step
+                if rough > 0.0:
+                    for a in range(3):
+                        covariance[a, a] += rough
             clean = True
             s0 = 0.0
             s1 = 0.0
             s2 = 0.0
             if even:
-                if points == 6:
-                    rough = _undersampled(alpha, start, noise_power, forget, state.scalars) * step * step
-                    if rough > 0.0:
-                        for a in range(3):
-                            covariance[a, a] += rough
                 left = k - 1 - start
                 for j in range(points):
                     weight = step * even_weights[left, j]
