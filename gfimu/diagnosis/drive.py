@@ -68,11 +68,11 @@ class AngleSpline:
             rows = self.size - order - 1
             step = diags_array([-1.0, 1.0], offsets=[0, 1], shape=(rows, rows + 1)).tocsr() / self.spacing
             matrix = step @ matrix
-        return csr_array(matrix, dtype=np.float64)
+        return csr_array(matrix)
 
     def interval_centres(self) -> NDArray[np.float64]:
         """Return the centre of each knot interval, s."""
-        return self.start + self.spacing * (np.arange(self.size - _DEGREE) + 0.5)
+        return np.asarray(self.start + self.spacing * (np.arange(self.size - _DEGREE) + 0.5), dtype=np.float64)
 
     def through(self, t: NDArray[np.float64], state: SpinState) -> NDArray[np.float64]:
         """Return the coefficients that come closest to a known motion at times ``t``."""
@@ -80,7 +80,7 @@ class AngleSpline:
         lhs = (1e4 * angle.T @ angle + 1e2 * rate.T @ rate + acceleration.T @ acceleration).toarray()
         lhs[np.diag_indices_from(lhs)] += 1e-9 * lhs.diagonal().mean()
         rhs = 1e4 * angle.T @ state.angle + 1e2 * rate.T @ state.rate + acceleration.T @ state.acceleration
-        return np.asarray(np.linalg.solve(lhs, rhs))
+        return np.asarray(np.linalg.solve(lhs, rhs), dtype=np.float64)
 
     def spin(self, coefficients: NDArray[np.float64]) -> _SplineSpin:
         """Return the motion with these coefficients."""

@@ -37,6 +37,7 @@ LEAST_ODDS = 9.0
 LEAST_EXTRA_ODDS = 7.0
 """Log odds that a further cause needs against the set without it."""
 _ITERATIONS = 7
+_STEADY_NOISE = 0.1
 
 
 @dataclass(frozen=True)
@@ -238,10 +239,10 @@ def explain(
         winner = max(fits.values(), key=lambda fit: fit.log_posterior)
         settled = winner.key == best.key
         best = winner
-        learn_noise(segments, best, fixed)
+        change = learn_noise(segments, best, fixed)
         tune_drives(segments, best, fixed)
         best = refine(segments, best.causes, fixed, drives=best.drives, iterations=6)
-        if settled and settled_before:
+        if settled and (settled_before or change < _STEADY_NOISE):
             break
         settled_before = settled
     tell(0.85, "prune")

@@ -11,19 +11,22 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.causes import Cause, effects_of_run
 from gfimu.diagnosis.evidence import SCALES, log_evidence
 from gfimu.diagnosis.model import Effect
 from gfimu.diagnosis.search import EXTRA_CAUSE
 from gfimu.diagnosis.segment import Segment
-from gfimu.diagnosis.signatures import cause_columns, shape_moved
+from gfimu.diagnosis.signatures import ANGLES, cause_columns, shape_moved
 
 __all__ = ["Fit", "refine"]
 
 _SHAPE_LIMIT = 0.3
 _SHAPE_PRIOR = 0.7
 _TOLERANCE = 0.02
-_DRIVE_TOLERANCE = 0.3
+_DRIVE_SHARE = 0.1
+_UPHILL = 0.5
+_SHARES = (1.0, 0.3, 0.08)
 _SMALLEST_POSITIVE = 1e-6
 
 
@@ -94,68 +97,91 @@ def refine(
     """
     if not shapes:
         causes = [replace(cause, frozen=True) for cause in causes]
-    array = segments[0].model.array
     kept = [segment.coefficients for segment in segments]
-    if drives is not None:
-        for segment, drive in zip(segments, drives, strict=True):
-            segment.coefficients = drive
     try:
-        return _iterate(segments, list(causes), fixed, array, iterations)
+        start = _State(tuple(causes), tuple(kept if drives is None else drives))
+        return _result(segments, _descend(segments, fixed, start, iterations))
     finally:
         for segment, drive in zip(segments, kept, strict=True):
             segment.coefficients = drive
 
 
-def _iterate(segments, causes, fixed, array, iterations) -> Fit:  # type: ignore[no-untyped-def]
-    previous: tuple[float, list[Cause], list[NDArray[np.float64]]] | None = None
-    step_scale = 1.0
-    pending: tuple[NDArray[np.float64], list] | None = None
-    for iteration in range(iterations + 1):
-        linear, products = [], []
-        for segment, known in zip(segments, fixed, strict=True):
-            effects = [*known, *effects_of_run(causes, array, segment.index)]
-            line = segment.linearise(effects)
-            columns = cause_columns(segment, causes, known, shapes=True)
-            linear.append(line)
-            products.append(segment.whitened_products(line, columns))
-        objective = sum(line.objective for line in linear)
-        penalty = _prior_energy(causes)
-        if previous is not None and objective + penalty > previous[0] + 1e-3 * abs(previous[0]) + 5.0 and pending:
-            # The step went uphill: go back and take a quarter of it.
-            step_scale *= 0.25
-            if step_scale < 0.01 or iteration == iterations:
-                causes = previous[1]
-                for segment, drive in zip(segments, previous[2], strict=True):
-                    segment.coefficients = drive
-                pending = None
-                if step_scale < 0.01:
-                    iterations = iteration
-                continue
-            causes = _moved(previous[1], step_scale * pending[0], array)
-            for segment, drive, move in zip(segments, previous[2], pending[1], strict=True):
-                segment.coefficients = drive + step_scale * move
-            continue
-        step_scale = min(1.0, 2 * step_scale)
-        gram = sum(product[0] for product in products)
-        score = sum(product[1] for product in products)
-        if iteration == iterations or not segments:
+@dataclass(frozen=True)
+class _State:
+    """Causes and drives of every segment."""
+
+    causes: tuple[Cause, ...]
+    drives: tuple[NDArray[np.float64], ...]
+
+
+@dataclass(frozen=True)
+class _Point:
+    """A state with its normal equations and the Gauss–Newton step from it."""
+
+    state: _State
+    objective: float
+    gram: NDArray[np.float64]
+    score: NDArray[np.float64]
+    step: NDArray[np.float64]
+    moves: tuple[NDArray[np.float64], ...]
+    expected: float
+
+    @property
+    def value(self) -> float:
+        """What is minimised: misfit and prior energy."""
+        return self.objective + _prior_energy(self.state.causes)
+
+    def moved(self, scale: float, array: AccelerometerArray) -> _State:
+        """Return the state after a share of the step."""
+        drives = tuple(drive + scale * move for drive, move in zip(self.state.drives, self.moves, strict=True))
+        return _State(_moved(self.state.causes, scale * self.step, array), drives)
+
+
+def _descend(segments: Sequence[Segment], fixed: Sequence[Sequence[Effect]], start: _State, iterations: int) -> _Point:
+    """Take Gauss–Newton steps, shortened where they go uphill, until nothing is gained."""
+    array = segments[0].model.array
+    point = _evaluate(segments, fixed, start)
+    for _ in range(iterations):
+        if point.expected < _TOLERANCE:
             break
-        prior, pull = _prior(causes)
-        step = np.linalg.solve(gram + np.diag(prior), score + pull) if len(score) else np.zeros(0)
-        step = _limited(causes, step)
-        moves: list[NDArray[np.float64]] = []
-        before = [segment.coefficients for segment in segments]
-        for segment, line, product in zip(segments, linear, products, strict=True):
-            segment.move_drive(line, product[2], step)
-            moves.append(segment.coefficients - before[len(moves)])
-        previous = (objective + penalty, causes, before)
-        pending = (step, moves)
-        causes = _moved(causes, step, array)
-        drive_change = max(float(line.forward @ line.forward) for line in linear)
-        gain = float(step @ (gram + np.diag(prior)) @ step) if len(step) else 0.0
-        if gain < _TOLERANCE and drive_change < _DRIVE_TOLERANCE:
+        for scale in _SHARES:
+            trial = _evaluate(segments, fixed, point.moved(scale, array))
+            if trial.value <= point.value + _UPHILL:
+                break
+        else:
             break
-    return _result(causes, gram, score, objective, segments, array)
+        point = trial
+    return point
+
+
+def _evaluate(segments: Sequence[Segment], fixed: Sequence[Sequence[Effect]], state: _State) -> _Point:
+    """Linearise every segment about a state and solve for the step of causes and drives."""
+    lines, products = [], []
+    for segment, known, drive in zip(segments, fixed, state.drives, strict=True):
+        segment.coefficients = drive
+        line = segment.linearise([*known, *effects_of_run(state.causes, segment.model.array, segment.index)])
+        lines.append(line)
+        products.append(segment.whitened_products(line, cause_columns(segment, state.causes, known, shapes=True)))
+    gram = np.sum([product[0] for product in products], axis=0)
+    score = np.sum([product[1] for product in products], axis=0)
+    precision, pull = _prior(state.causes)
+    information = gram + np.diag(precision)
+    step = np.linalg.solve(information, score + pull) if len(score) else np.zeros(0)
+    step = _limited(state.causes, step)
+    moves = tuple(
+        segment.drive_step(line, product[2], step)
+        for segment, line, product in zip(segments, lines, products, strict=True)
+    )
+    return _Point(
+        state,
+        sum(line.objective for line in lines),
+        gram,
+        score,
+        step,
+        moves,
+        # What the step promises, and how far the drives still are from their best.
+        float(step @ information @ step) + _DRIVE_SHARE * sum(float(line.forward @ line.forward) for line in lines),
+    )
 
 
 def _places(causes: Sequence[Cause]) -> tuple[NDArray[np.intp], list[tuple[int, str, int]]]:
@@ -195,7 +221,7 @@ def _limited(causes: Sequence[Cause], step: NDArray[np.float64]) -> NDArray[np.f
     return limited
 
 
-def _moved(causes, step, array) -> list[Cause]:  # type: ignore[no-untyped-def]
+def _moved(causes: Sequence[Cause], step: NDArray[np.float64], array: AccelerometerArray) -> tuple[Cause, ...]:
     moved = []
     place = 0
     for cause in causes:
@@ -208,36 +234,30 @@ def _moved(causes, step, array) -> list[Cause]:  # type: ignore[no-untyped-def]
             shape[key] = shape_moved(key, value, float(step[place]))
             place += 1
         moved.append(cause.at(coordinates, shape))
-    return moved
+    return tuple(moved)
 
 
-def _result(causes, gram, score, objective, segments, array) -> Fit:  # type: ignore[no-untyped-def]
-    coordinates, shapes = _places(causes)
-    values = np.concatenate([cause.coordinates for cause in causes]) if causes else np.zeros(0)
-    information = gram + np.diag(_prior(causes)[0]) if len(gram) else gram
-    covariance = np.linalg.inv(information) if len(gram) else gram
-    done = []
-    for number, cause in enumerate(causes):
-        before = sum(len(c.coordinates) for c in causes[:number])
-        mine = coordinates[before : before + len(cause.coordinates)]
-        stds = {key: float(np.sqrt(covariance[p, p])) for owner, key, p in shapes if owner == number}
-        scaled = {key: std if key == "direction_rad" else std * abs(cause.shape[key]) for key, std in stds.items()}
-        done.append(replace(cause, covariance=covariance[np.ix_(mine, mine)], shape_std=scaled))
-    inner = gram[np.ix_(coordinates, coordinates)] if len(gram) else np.zeros((0, 0))
-    total = (score[coordinates] if len(score) else np.zeros(0)) + inner @ values
-    positive = np.concatenate([cause.positive(array) for cause in causes]) if causes else np.zeros(0, dtype=bool)
-    if causes:
-        nothing = objective + 2 * float(score[coordinates] @ values) + float(values @ inner @ values)
-        evidence = -0.5 * nothing + log_evidence(inner, total, positive)
-    else:
-        evidence = -0.5 * objective
+def _result(segments: Sequence[Segment], point: _Point) -> Fit:
+    """Return the fit at a point: covariances, and Laplace's evidence relative to no effect."""
+    array = segments[0].model.array
+    causes, gram, score = point.state.causes, point.gram, point.score
     prior = sum(cause.log_prior for cause in causes) + EXTRA_CAUSE * max(len(causes) - 1, 0)
-    return Fit(
-        tuple(done),
-        evidence,
-        evidence + prior,
-        objective,
-        tuple(segment.coefficients for segment in segments),
-        inner,
-        total,
-    )
+    if not causes:
+        evidence = -0.5 * point.objective
+        empty = np.zeros((0, 0))
+        return Fit((), evidence, evidence + prior, point.objective, point.state.drives, empty, np.zeros(0))
+    coordinates, shapes = _places(causes)
+    values = np.concatenate([cause.coordinates for cause in causes])
+    covariance = np.asarray(np.linalg.inv(gram + np.diag(_prior(causes)[0])), dtype=np.float64)
+    inner = gram[np.ix_(coordinates, coordinates)]
+    total = score[coordinates] + inner @ values
+    positive = np.concatenate([cause.positive(array) for cause in causes])
+    nothing = point.objective + 2 * float(score[coordinates] @ values) + float(values @ inner @ values)
+    evidence = -0.5 * nothing + log_evidence(inner, total, positive)
+    done = []
+    ends = np.cumsum([len(cause.coordinates) for cause in causes])
+    for number, (cause, mine) in enumerate(zip(causes, np.split(coordinates, ends[:-1]), strict=True)):
+        stds = {key: float(np.sqrt(covariance[p, p])) for owner, key, p in shapes if owner == number}
+        scaled = {key: std if key in ANGLES else std * abs(cause.shape[key]) for key, std in stds.items()}
+        done.append(replace(cause, covariance=covariance[np.ix_(mine, mine)], shape_std=scaled))
+    return Fit(tuple(done), evidence, evidence + prior, point.objective, point.state.drives, inner, total)

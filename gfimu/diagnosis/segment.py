@@ -89,6 +89,8 @@ class Segment:
         period = run.sample_period
         spacing = max(KNOT_SPACING, 4 * period)
         self.spline = AngleSpline(run.t[0] - 2 * spacing, run.t[-1] + 2 * spacing, spacing)
+        signs = (-1.0) ** np.arange(self.spline.size)
+        self._alternating = np.outer(signs, signs)
         self.basis = CosineBasis(len(run.t), period)
         self.is_angle = model.drive_source == "angle"
         self.weight_mask = np.column_stack([run.valid, run.reference_valid])  # (n, c + 1)
@@ -131,7 +133,7 @@ class Segment:
         weight = diags_array(run.reference_valid / self.levels.white[-1] ** 2)
         observe = angle if self.is_angle else rate
         lhs = (observe.T @ weight @ observe + self.prior).toarray()
-        lhs[np.diag_indices_from(lhs)] *= 1 + 1e-12
+        lhs[np.diag_indices_from(lhs)] *= 1 + 1e-14
         rhs = observe.T @ (weight @ run.reference)
         if not self.is_angle:
             rhs = rhs + self._begin.T @ np.array([self.start_angle / self.start_angle_std])
@@ -236,9 +238,9 @@ class Segment:
         lhs = (self.prior + stacked.T @ stacked).toarray()
         low = np.concatenate(slow_rows)
         lhs -= low.T @ low
-        lhs[np.diag_indices_from(lhs)] *= 1 + 1e-12
-        # A vanishing coupling keeps far entries of the factor out of the denormal range, where LAPACK crawls.
-        lhs += 1e-14 * float(np.mean(lhs.diagonal()))
+        # A vanishing coupling keeps far entries of the factor out of the denormal range, where LAPACK crawls; its
+        # sign alternates, as a constant one would hold the mean angle, which the data hardly fix.
+        lhs += 1e-14 * float(np.mean(lhs.diagonal())) * self._alternating
         factor = np.linalg.cholesky(lhs)
         forward = solve_triangular(factor, rhs, lower=True, check_finite=False)
         return Linearisation(residual, jacobian, factor, forward, objective - float(forward @ forward))
@@ -294,17 +296,16 @@ class Segment:
         score -= eliminated.T @ linear.forward
         return gram, score, eliminated
 
-    def move_drive(
-        self,
-        linear: Linearisation,
-        eliminated: NDArray[np.float64] | None = None,
-        step: NDArray[np.float64] | None = None,
-    ) -> None:
-        """Move the drive to its posterior mean, given the step of the signatures' coordinates."""
-        right = linear.forward if eliminated is None or step is None else linear.forward - eliminated @ step
-        self.coefficients = self.coefficients + solve_triangular(
-            linear.factor, right, lower=True, trans=1, check_finite=False
-        )
+    def drive_step(
+        self, linear: Linearisation, eliminated: NDArray[np.float64], step: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Return the step of the drive to its posterior mean, given the step of the signatures' coordinates."""
+        right = linear.forward - eliminated @ step
+        return np.asarray(solve_triangular(linear.factor, right, lower=True, trans=1, check_finite=False))
+
+    def move_drive(self, linear: Linearisation) -> None:
+        """Move the drive to its posterior mean."""
+        self.coefficients = self.coefficients + self.drive_step(linear, np.zeros((self.spline.size, 0)), np.zeros(0))
 
     def whitened_residual(self, linear: Linearisation) -> NDArray[np.float64]:
         """Return W(r − Jδ) with δ the drive's posterior step, shape (n, c + 1): for scans over tones and orders."""

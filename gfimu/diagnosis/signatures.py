@@ -18,14 +18,23 @@ from gfimu.diagnosis.causes import Cause, Signature, effects_of_run, per_run_mix
 from gfimu.diagnosis.model import Effect, EffectFamily
 from gfimu.diagnosis.segment import Linearisation, Segment
 
-__all__ = ["Hypothesis", "SignatureSet", "cause_columns", "hypotheses", "plan_signatures", "signature_columns"]
+__all__ = [
+    "ANGLES",
+    "Hypothesis",
+    "SignatureSet",
+    "cause_columns",
+    "hypotheses",
+    "plan_signatures",
+    "signature_columns",
+]
 
 _ORDERS = np.arange(1.0, 37.0)
 _SCANNED = ("interference_tone", "cogging", "tacho_ripple", "resonance")
 _PEAKS = {"interference_tone": 2, "cogging": 4, "tacho_ripple": 3, "resonance": 5}
 _DAMPINGS = (0.01, 0.03, 0.1)
 _RESTRICTED = 0.5
-_ANGLES = frozenset({"direction_rad"})
+ANGLES = frozenset({"direction_rad"})
+"""Shape parameters that are angles; the others move in proportion."""
 _SHAPE_BOUNDS = {"damping_ratio": (1e-3, 0.3), "time_constant_s": (1.0, 1e5), "width_m_s2": (1e-3, 20.0)}
 
 
@@ -202,7 +211,7 @@ def cause_columns(
 
 def shape_moved(key: str, value: float, step: float) -> float:
     """Move a shape parameter by a step in its natural coordinate: log, or linear for angles."""
-    if key in _ANGLES:
+    if key in ANGLES:
         return value + step
     low, high = _SHAPE_BOUNDS.get(key, (0.0, np.inf))
     return float(np.clip(value * np.exp(step), low, high))

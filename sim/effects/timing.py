@@ -74,7 +74,7 @@ class TachoScale(Effect):
     name = "tacho_scale"
     summary = "the reference has a wrong gain"
     place = "reference"
-    separated_by = "the cube remounted on its side, so that other arms are in play"
+    separated_by = "fast ramps: a wrong gain of the reference scales the centripetal and tangential parts unlike"
 
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
