@@ -9,7 +9,7 @@ import numpy as np
 
 from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.adequacy import LEFT_OVER_ODDS, LeftOver, left_over
-from gfimu.diagnosis.causes import effects_of_run
+from gfimu.diagnosis.causes import Cause, effects_of_run
 from gfimu.diagnosis.engine import LEAST_EXTRA_ODDS, Explanation, explain, make_segments, prune
 from gfimu.diagnosis.holdout import Holdout, gate_gains, held_out_gain, split_segments
 from gfimu.diagnosis.integrity import IntegrityReport, check_integrity
@@ -39,6 +39,7 @@ Report = Callable[[float, str], None]
 LEAST_GAIN = 2.0
 """Log predictive gain on held-out halves below which a cause is withdrawn."""
 _DOMINANT = 0.1
+_INEXACTNESS = 2.5e-3
 _WIRING = ("axis_swap", "sign_flip", "wrong_range")
 _SLOW = frozenset(
     {"bias", "warm_up", "bias_temperature", "gain_drift", "scale_factor", "quadratic", "gravity", "cross_axis"}
@@ -216,7 +217,8 @@ def _verdict(
     rivals = conflicting(explanation)
     named = _named(explanation, fit, likely, array)
     removed = explanation.nothing.objective - fit.objective
-    significant = left.log_odds > LEFT_OVER_ODDS
+    # No model is exact: what is left must also stand out against what the causes explain.
+    significant = left.log_odds > max(LEFT_OVER_ODDS, _INEXACTNESS * removed)
     dominant = significant and 2 * left.log_odds > _DOMINANT * max(removed, 0.0)
     runs = tuple(_view(prepared, number, explanation, found) for number in range(len(prepared.runs)))
     extension = [cause.effect(array) for cause in fit.causes] if not dominant else []
@@ -270,11 +272,23 @@ def _named(explanation: Explanation, fit: Fit, likely: dict[str, float], array: 
             cause.pattern,
             tuple(same),
             str(cause.family.separated_by) if same else "",
-            describe(cause, array, share),
+            describe(cause, array, share) + _other_runs(cause, array, len({s.index for s in explanation.segments})),
             odds,
         )
         entries.append((float(sum(value**2 for value in share.values())), entry))
     return [entry for _, entry in sorted(entries, key=lambda pair: -pair[0])]
+
+
+def _other_runs(cause: Cause, array: AccelerometerArray, runs: int) -> str:
+    """Tell the sizes in the other runs of a cause that each mounting has anew."""
+    if not cause.family.per_run or runs < 2:
+        return ""
+    parts = []
+    for run in range(1, runs):
+        values, _ = cause_parameters(cause, array, run)
+        numbers = ", ".join(f"{key} = {value:.3g}" for key, value in values.items() if isinstance(value, float))
+        parts.append(f"run {run + 1}: {numbers}")
+    return f"; the values are those of the first run ({'; '.join(parts)})"
 
 
 def _mutual(named: Sequence[NamedCause], fit: Fit, rivals: Sequence[Fit]) -> tuple[NamedCause, ...]:

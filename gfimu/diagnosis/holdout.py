@@ -84,7 +84,8 @@ def held_out_gain(causes: Sequence[Cause], pairs: Sequence[Holdout], constant: S
     label : str
         What was held out.
     """
-    before, after, floor, count = 0.0, 0.0, 0.0, 0
+    before, after, count = 0.0, 0.0, 0
+    scaled_before, scaled_after, floor = 0.0, 0.0, 0.0
     likelihoods: list[NDArray[np.float64]] = []
     rates: list[tuple[float, float]] = []
     drifts: list[tuple[float, float]] = []
@@ -103,8 +104,10 @@ def held_out_gain(causes: Sequence[Cause], pairs: Sequence[Holdout], constant: S
             use = segment.weight_mask[:, :-1]
             before += float(np.sum(plain[use] ** 2))
             after += float(np.sum(left[use] ** 2))
-            variance = segment.levels.white[:-1] ** 2 + 0.6 * segment.levels.flicker[:-1] ** 2
-            floor += float(np.sum(use * variance))
+            scaled_before += float(plain_likelihood.sum())
+            scaled_after += float(extended_likelihood.sum())
+            ratio = 1.0 + 0.6 * (segment.levels.flicker / segment.levels.white) ** 2
+            floor += float(np.sum(segment.weight_mask * ratio))
             count += int(use.sum())
             likelihoods.append(0.5 * _blocks(plain_likelihood - extended_likelihood, segment))
             rate, drift = _motion_errors(segment, nominal, effects)
@@ -113,8 +116,10 @@ def held_out_gain(causes: Sequence[Cause], pairs: Sequence[Holdout], constant: S
             segment.coefficients = kept
     if count == 0:
         return Gain()
-    excess = (before - floor) / count
-    share = 1.0 - (after - floor) / (before - floor) if excess > 0.02 * floor / count else float("nan")
+    # In units of the noise, channels and reference together: a wrong reference shows in the channels only through
+    # the drive, which each model fits as well as it can.
+    excess = scaled_before - floor
+    share = 1.0 - max(scaled_after - floor, 0.0) / excess if excess > 0.02 * floor else float("nan")
     blocks = np.concatenate(likelihoods)
     return Gain(
         label,

@@ -98,6 +98,11 @@ def prepare_run(recording: Recording, model: WorldModel, *, name: str = "run") -
             f"{name}: {len(recording)} samples over {recording.duration:.1f} s are too short to diagnose; "
             f"record at least {MINIMUM_DURATION:.0f} s and {_MINIMUM_SAMPLES} samples, better 40 s"
         )
+    if model.drive_source not in _REFERENCE_COLUMNS:
+        raise InputError(
+            f"{name}: a twin driven by {model.drive_source!r} (a free body) can't be diagnosed yet; "
+            f"use one of {', '.join(_REFERENCE_COLUMNS)}"
+        )
     column = _REFERENCE_COLUMNS[model.drive_source]
     if column not in recording.reference:
         have = [source for source, key in _REFERENCE_COLUMNS.items() if key in recording.reference]
