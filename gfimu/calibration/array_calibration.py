@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from gfimu.array import AccelerometerArray
-from gfimu.calibration.array_motion import ArrayMotion, array_motion, motion_reference
+from gfimu.calibration.array_motion import ArrayMotion, array_motion
 from gfimu.calibration.array_static import array_static
 from gfimu.calibration.faults import check_gravity, check_readings, without_moved_poses
+from gfimu.calibration.motion_reference import motion_reference
 from gfimu.calibration.observations import averaged_poses
 from gfimu.calibration.result import Calibration
 from gfimu.errors import InputError

@@ -16,50 +16,19 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import savgol_coeffs, savgol_filter
 
 from gfimu.array import AccelerometerArray
-from gfimu.errors import InputError, UnitError
+from gfimu.calibration.motion_observability import describe_null_space
+from gfimu.calibration.motion_reference import MotionReference
+from gfimu.errors import UnitError
 from gfimu.recording import Recording
-from gfimu.rest import detect_rest
 
-__all__ = ["ArrayMotion", "MotionReference", "array_motion", "motion_reference"]
+__all__ = ["ArrayMotion", "array_motion"]
 
 Floats = NDArray[np.float64]
 
-_STANDING_RATE = 0.5
-_LONGEST = 3000
-_SMOOTHING_S = 0.3
 _RANK_TOLERANCE = 1e-9
 _ITERATIONS = 20
-
-
-@dataclass(frozen=True)
-class MotionReference:
-    """What a reference tells about the rotation at the samples used.
-
-    Parameters
-    ----------
-    kind : {"turntable", "gyro"}
-        ``turntable``: spin about body z only, from the tachometer; ``gyro``: any rotation.
-    rows : ndarray of int, shape (n,)
-        Samples of the recording in motion and with a reference.
-    omega : ndarray, shape (n, 3)
-        Reference rate, rad/s.
-    omega_std : float
-        Its standard deviation, rad/s.
-    alpha : ndarray, shape (n,)
-        Derivative of the turntable's rate, rad/s²; zero for a gyro.
-    alpha_std : float
-        Its standard deviation; infinite for a gyro.
-    """
-
-    kind: str
-    rows: NDArray[np.intp]
-    omega: Floats
-    omega_std: float
-    alpha: Floats
-    alpha_std: float
 
 
 @dataclass(frozen=True)
@@ -101,64 +70,6 @@ class ArrayMotion:
         """Standard deviation of the positions, m, shape (k, 3); of the determined part only."""
         count = self.positions.size
         return np.asarray(np.sqrt(np.diag(self.covariance)[:count]).reshape(-1, 3), dtype=np.float64)
-
-
-def motion_reference(recording: Recording, *, omega_std: float | None = None) -> MotionReference:
-    """Take the reference of the rotation from a recording: its gyro if it has one, else its tachometer.
-
-    Parameters
-    ----------
-    recording : Recording
-        With ``gyro_x_rad_s`` … or ``tacho_rad_s``.
-    omega_std : float, optional
-        Standard deviation of the reference, rad/s; by default from its scatter about a smooth curve (tachometer) or
-        0.05 rad/s (gyro).
-
-    Raises
-    ------
-    InputError
-        If there is neither, or nothing moves.
-    """
-    names = [f"gyro_{axis}_rad_s" for axis in "xyz"]
-    if all(name in recording.reference for name in names):
-        omega = np.column_stack([recording.reference[name] for name in names])
-        omega = omega - _rate_at_rest(recording, omega)
-        kind, alpha, alpha_std, rate_std = "gyro", np.zeros(len(omega)), np.inf, 0.05
-    elif "tacho_rad_s" in recording.reference:
-        tacho = recording.reference["tacho_rad_s"]
-        window = max(round(_SMOOTHING_S * recording.sample_rate) | 1, 7)
-        filled = np.interp(recording.t_s, recording.t_s[np.isfinite(tacho)], tacho[np.isfinite(tacho)])
-        smooth = savgol_filter(filled, window, 3)
-        alpha = savgol_filter(filled, window, 3, deriv=1, delta=recording.sample_period)
-        noise = float(np.nanstd(tacho - smooth))
-        rate_std = max(noise, 1e-9)
-        slope = savgol_coeffs(window, 3, deriv=1, delta=recording.sample_period)
-        # Slopes within one window share their errors: together they count as one.
-        alpha_std = max(noise * float(np.linalg.norm(slope)) * np.sqrt(window), 1e-6)
-        kind, omega = "turntable", np.column_stack([np.zeros((len(tacho), 2)), tacho])
-    else:
-        raise InputError(
-            "positions need a reference of the rotation: the recording has neither tacho_rad_s nor gyro_x/y/z_rad_s"
-        )
-    moving = np.linalg.norm(omega, axis=1) > _STANDING_RATE
-    rows = np.flatnonzero(moving & np.isfinite(omega).all(axis=1) & np.isfinite(recording.readings).all(axis=1))
-    if len(rows) < 100:
-        raise InputError(
-            f"only {len(rows)} samples turn faster than {_STANDING_RATE} rad/s; turn the array to find positions"
-        )
-    if len(rows) > _LONGEST:
-        rows = rows[np.linspace(0, len(rows) - 1, _LONGEST).astype(int)]
-    return MotionReference(kind, rows, omega[rows], omega_std or rate_std, alpha[rows], alpha_std)
-
-
-def _rate_at_rest(recording: Recording, omega: Floats) -> Floats:
-    """Mean of the gyro over the rests of the recording, its bias; zero if there is no rest."""
-    rest = detect_rest(recording)
-    rows = [omega[start:stop] for start, stop in zip(rest.start, rest.stop, strict=True)]
-    if not rows:
-        return np.zeros(3)
-    still = np.concatenate(rows)
-    return np.asarray(np.nanmean(still, axis=0)) if np.nanmax(still.std(axis=0)) < _STANDING_RATE else np.zeros(3)
 
 
 def array_motion(recording: Recording, array: AccelerometerArray, reference: MotionReference) -> ArrayMotion:
@@ -226,57 +137,6 @@ def array_motion(recording: Recording, array: AccelerometerArray, reference: Mot
         len(y),
         reference.kind,
     )
-
-
-def describe_null_space(null_space: Floats, array: AccelerometerArray) -> tuple[str, ...]:
-    """Put the undetermined directions into words.
-
-    Parameters
-    ----------
-    null_space : ndarray, shape (3k + c, m)
-        Directions of positions (chip by chip) and biases.
-    array : AccelerometerArray
-        The array.
-
-    Returns
-    -------
-    tuple of str
-        First how many combinations are undetermined, then each known pattern that lies in that space.
-    """
-    k, c = len(array.chips), array.n_channels
-    found = null_space.shape[1]
-    if not found:
-        return ("all positions and biases are determined by this motion",)
-    total = 3 * k + c
-    texts = [
-        f"{found} of {total} combinations of positions and biases are not determined by this motion; they stay put"
-    ]
-    basis = np.linalg.qr(null_space / np.linalg.norm(null_space, axis=0))[0]
-    patterns: list[tuple[str, Floats]] = []
-    for axis in range(3):
-        shift = np.zeros((k, 3))
-        shift[:, axis] = 1.0
-        patterns.append((f"a common shift of all positions along {'xyz'[axis]}", np.r_[shift.ravel(), np.zeros(c)]))
-    for axis, name in enumerate("xyz"):
-        single = []
-        for chip in range(k):
-            one = np.zeros(3 * k + c)
-            one[3 * chip + axis] = 1.0
-            single.append(_inside(basis, one))
-        if all(single):
-            patterns = [item for item in patterns if not item[0].endswith(f"along {name}")]
-            texts.append(f"not determined: the {name} position of every chip")
-    for axis in range(3):
-        for column, meaning in ((axis, "angular acceleration α"), (3 + axis, "specific force p")):
-            bias = array.regression_matrix[:, column]
-            patterns.append((f"biases that look like the {meaning}_{'xyz'[axis]}", np.r_[np.zeros(3 * k), bias]))
-    texts.extend(f"not determined: {name}" for name, pattern in patterns if _inside(basis, pattern))
-    return tuple(texts)
-
-
-def _inside(basis: Floats, direction: Floats) -> bool:
-    unit = direction / np.linalg.norm(direction)
-    return bool(np.linalg.norm(basis.T @ unit) > 1.0 - 1e-6)
 
 
 def _typical_rate2(omega: Floats) -> float:

@@ -11,10 +11,11 @@ from scipy.spatial.transform import Rotation
 import gfimu.calibration.array_motion as array_motion_module
 from gfimu.array import AccelerometerArray
 from gfimu.calibration.array_calibration import calibrate_array
-from gfimu.calibration.array_motion import array_motion, motion_reference
+from gfimu.calibration.array_motion import array_motion
 from gfimu.calibration.array_static import apparent_alpha, array_static, body_specific_force, disagreement
 from gfimu.calibration.error_model import ErrorModel
 from gfimu.calibration.faults import without_moved_poses
+from gfimu.calibration.motion_reference import motion_reference
 from gfimu.calibration.observations import Observations, averaged_poses
 from gfimu.errors import InputError, UnitError
 from gfimu.kinematics import specific_force
