@@ -242,6 +242,7 @@ def _svg(figure: Figure) -> str:
     text = buffer.getvalue()
     text = text[text.index("<svg") :]
     text = re.sub(r"<metadata>.*?</metadata>", "", text, count=1, flags=re.DOTALL)
+    text = re.sub(r'(<image\b[^>]*?) id="[^"]*"', r"\1", text)  # equal pictures would share one name
     # Several figures share one page: their definitions must not share names; the size follows the page.
     tag = f"f{zlib.crc32(text.encode()):08x}"
     text = re.sub(r'(\bid="|url\(#|href="#)', rf"\g<1>{tag}_", text)
