@@ -105,7 +105,10 @@ def format_count(raw: int, data_format: int, bw_rate: int) -> int:
     shift = 8 if full else 8 + rng
     count = (raw + (1 << (shift - 1))) >> shift
     limit = 1 << (bits - 1)
-    count = max(-limit, min(limit - 1, count))
+    if count >= limit:
+        count = limit - 1
+    elif count < -limit:
+        count = -limit
     if (bw_rate & 15) >= 14 and (full or rng == 0):
         count &= ~1  # at 3200 and 1600 Hz the LSB is always 0
     if data_format & LEFT_JUSTIFY:
@@ -144,6 +147,9 @@ class Adxl345:
         self._data_ready = False
         self._overrun = False
         self._out = (0, 0, 0)
+        self._word_axis = -1
+        self._word = 0
+        self._deaf_host = self.options.wires == 3
         self._shown = 0
         self._pop_done = 0
         self._block: list[list[int]] = []
@@ -266,9 +272,13 @@ class Adxl345:
     def _read(self, address: int, now: int) -> int:
         if DATAX0 <= address <= DATAZ1:
             self._reading = True
-            data_format = self.registers[DATA_FORMAT] if self.options.stuck_range is None else self.options.stuck_range
-            word = format_count(self._out[(address - DATAX0) >> 1], data_format, self.registers[BW_RATE])
-            return word >> 8 if address & 1 else word & 0xFF
+            stuck = self.options.stuck_range
+            data_format = self.registers[DATA_FORMAT] if stuck is None else stuck
+            axis = (address - DATAX0) >> 1
+            if axis != self._word_axis:  # both bytes of a value are of one reading
+                self._word_axis = axis
+                self._word = format_count(self._out[axis], data_format, self.registers[BW_RATE])
+            return self._word >> 8 if address & 1 else self._word & 0xFF
         if self._reading and address == DATAZ1 + 1:
             self._end_of_read(now)
         if address == INT_SOURCE:
@@ -306,6 +316,9 @@ class Adxl345:
         elif address == POWER_CTL and (old ^ value) & (MEASURE | SLEEP | 3):
             waking = value & MEASURE and not old & MEASURE
             self._restart(now + _TURN_ON_TICKS if waking else now)
+        elif address == DATA_FORMAT:
+            # A chip in 3-wire mode on four wires, or the other way round, drives a line the host does not listen to.
+            self._deaf_host = bool(value & THREE_WIRE) != (self.options.wires == 3)
         elif address == FIFO_CTL and value >> 6 != old >> 6:
             if value >> 6 == BYPASS:
                 self.fifo.clear()
@@ -329,30 +342,29 @@ class Adxl345:
 
     def transfer(self, value: int, now: int) -> int:
         """Exchange one byte: bit 7 of the first is read, bit 6 multiple bytes."""
-        if self.line_fault == LineFault.SILENT:
+        fault = self.line_fault
+        if fault and fault == LineFault.SILENT:
             return _FLOATING
-        answer = self._exchange(value, now)
-        if self.line_fault:
-            return 0 if self.line_fault == LineFault.STUCK_LOW else _FLOATING
-        # A chip in 3-wire mode on four wires, or the other way round, drives a line that the host does not listen to.
-        if bool(self.registers[DATA_FORMAT] & THREE_WIRE) != (self.options.wires == 3):
-            return _FLOATING
-        return answer
-
-    def _exchange(self, value: int, now: int) -> int:
-        if self._command is None:
+        command = self._command
+        if command is None:
             self._command = value
             self._address = value & 0x3F
+            self._word_axis = -1
             self.catch_up(now)
             self._show(now)
-            return 0
-        address = self._address
-        if self._command & 0x40:
-            self._address = (address + 1) & 0x3F
-        if self._command & 0x80:
-            return self._read(address, now)
-        self._write(address, value, now)
-        return 0
+            answer = 0
+        else:
+            address = self._address
+            if command & 0x40:
+                self._address = (address + 1) & 0x3F
+            if command & 0x80:
+                answer = self._read(address, now)
+            else:
+                self._write(address, value, now)
+                answer = 0
+        if fault:
+            return 0 if fault == LineFault.STUCK_LOW else _FLOATING
+        return _FLOATING if self._deaf_host else answer
 
     # I2C
 
@@ -369,6 +381,7 @@ class Adxl345:
             self._end_of_read(now)
         self.catch_up(now)
         self._show(now)
+        self._word_axis = -1
         self._selected = True
         if not address_byte & 1:
             self._command = None

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import signal
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
@@ -279,8 +282,15 @@ def record(
         "software_version": gfimu.__version__,
     }
     session = _Session(layout, carried, target, metadata, has_setup=bool(setup))
-    with Link(port, baud=baud, reconnect_s=reconnect_s) as link:
-        trouble = _run(link, session, duration_s, setup if form == "lpc1768" else (), on_batch, stop)
+    with Link(port, baud=baud, reconnect_s=reconnect_s) as link, _ask_to_stop() as asked:
+        trouble = _run(
+            link,
+            session,
+            duration_s,
+            setup if form == "lpc1768" else (),
+            on_batch,
+            lambda: asked() or (stop is not None and stop()),
+        )
         breaks = link.breaks
     session.release()
     session.flush(time.monotonic(), force=True)
@@ -313,14 +323,30 @@ def record(
     return RecordReport(target, duration, counts, breaks, fit, session.identity, session.status_counts)
 
 
+@contextmanager
+def _ask_to_stop() -> Iterator[Callable[[], bool]]:
+    """Turn Ctrl-C and a polite kill into a question, so that neither strikes in the middle of a write."""
+    asked = threading.Event()
+    if threading.current_thread() is not threading.main_thread():
+        yield asked.is_set
+        return
+    numbers = (signal.SIGINT, signal.SIGTERM)
+    before = [signal.signal(number, lambda *_: asked.set()) for number in numbers]
+    try:
+        yield asked.is_set
+    finally:
+        for number, handler in zip(numbers, before, strict=True):
+            signal.signal(number, handler)
+
+
 def _run(
     link: Link,
     session: _Session,
     duration_s: float | None,
     setup: tuple[bytes, ...],
     on_batch: Callable[[Batch, StreamCounts], None] | None,
-    stop: Callable[[], bool] | None,
-) -> BaseException | None:
+    stop: Callable[[], bool],
+) -> GfimuError | None:
     """Read until the end; return what ended the recording early, if anything did."""
     heard_at = asked_at = time.monotonic()
     for command in setup:
@@ -329,7 +355,7 @@ def _run(
         link.write(encode_command(Command.IDENTIFY))
     restarts = 0
     try:
-        while not (stop is not None and stop()):
+        while not stop():
             chunk = link.read()
             now = time.monotonic()
             if chunk is not None:
@@ -357,8 +383,6 @@ def _run(
             if session.identity is None and now - asked_at > _IDENTIFY_EVERY_S:
                 asked_at = now
                 link.write(encode_command(Command.IDENTIFY))
-    except KeyboardInterrupt:
-        return None
     except GfimuError as error:
         return error
     return None

@@ -76,7 +76,6 @@ class Board:
     _cpu_class = Cpu
 
     def __init__(self, image: ElfImage, sensors: Sequence[Adxl345] = (), *, tracer: Tracer | None = None) -> None:
-        self.image = image
         self.sensors = list(sensors)
         self.tracer = tracer
         self.now = 0
@@ -87,7 +86,6 @@ class Board:
         self.reset_cause: int | None = None
         self.stopped = False
         self.sleeping = False
-        self.last_access = ""
         self.resets = 0
         self.exceptions = 0
         self._events: list[int] = []
@@ -190,6 +188,11 @@ class Board:
             peripheral.write(address - peripheral.base, value, 4)
         else:
             self.cpu.poke(address, value.to_bytes(4, "little"))
+
+    @property
+    def image(self) -> ElfImage:
+        """The firmware."""
+        return self.cpu.image
 
     # Time
 

@@ -341,7 +341,7 @@ class Cpu:
                 board.alarm = -1 if nvic.pending else min(board.until, limit)
             error = start(handle, ctypes.c_uint64(self.pc), never, zero, none)
             if error:
-                raise self._fault(FaultKind.of(error), board.last_access)
+                raise self._fault(FaultKind.of(error), "")
             if self._exception_return:
                 self._exception_return = False
                 self.leave()

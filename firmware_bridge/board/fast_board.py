@@ -403,7 +403,7 @@ class FastBoard(Board):
             elif result >= _RUN_INTR:
                 raise self.cpu._fault(FaultKind.UNDEFINED, f"processor exception {result - _RUN_INTR}")
             else:
-                raise self.cpu._fault(FaultKind.of(result - _RUN_UNICORN), self.last_access)
+                raise self.cpu._fault(FaultKind.of(result - _RUN_UNICORN), "")
 
     def set_line_fault(self, sensor: int, fault: LineFault) -> None:
         """Break or mend the line between a sensor (from 0) and the processor."""

@@ -135,8 +135,9 @@ class Ssp(Peripheral):
         elif self.selected is None or self.control0 & _MODE_3 != _MODE_3:
             answer = _FLOATING
         elif self.bits == 16:
-            high = self.selected.transfer(value >> 8, start)
-            answer = high << 8 | self.selected.transfer(value & 0xFF, start + 8 * self.bit)
+            transfer = self.selected.transfer
+            answer = transfer(value >> 8, start) << 8
+            answer |= transfer(value & 0xFF, start + 8 * self.bit)
         elif self.bits == 8:
             answer = self.selected.transfer(value & 0xFF, start)
         else:

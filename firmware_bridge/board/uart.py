@@ -219,8 +219,8 @@ class Uart(Peripheral):
         # The interrupt comes when the last byte moves to the shift register, but after a lone byte not before its
         # stop bit (UM10360 14.4.5).
         empty, lone = end - character, now + self._lone_byte
-        self.empty_at = max(empty, lone)
-        if self.planned > self.empty_at:
+        self.empty_at = empty = max(empty, lone)
+        if self.planned > empty:
             self._plan()  # else the event that is planned already looks again
         if self.empty_pending:
             self.empty_pending = False

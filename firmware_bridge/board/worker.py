@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from array import array
 from collections.abc import Sequence
 from pathlib import Path
@@ -25,6 +26,8 @@ class Worker:
         image = ElfImage.load(path)
         self._events = EventList() if trace else None
         self._board: Board = FastBoard(image, sensors) if fast else Board(image, sensors, tracer=self._events)
+        gc.freeze()
+        gc.disable()  # nothing that a board does while it runs makes cycles
         if lose_every:
             self._board.lose_interrupts(_TIMER0, lose_every)
 

@@ -39,6 +39,7 @@ PUBLIC uint32_t host_crc16(const uint8_t *bytes, uint32_t count) { return core_c
 PUBLIC uint32_t host_rate_code(uint32_t rate_hz) { return adxl345_rate_code(rate_hz); }
 
 void hal_spi_exchange(uint32_t sensor, uint16_t *words, uint32_t count) { exchange(sensor, words, count); }
+void hal_spi_burst(uint32_t sensor, uint16_t words[HAL_BURST_WORDS]) { exchange(sensor, words, HAL_BURST_WORDS); }
 uint32_t hal_spi_khz(void) { return 5000U; }
 uint32_t hal_time_us(void) { return time_us; }
 void hal_timer_start(uint32_t rate_hz) { timer_hz = rate_hz; }

@@ -17,7 +17,6 @@
 #define FIFO_BYPASS 0x00U
 #define RATE_CODE_100_HZ 0x0AU
 
-#define BURST_WORDS 5U
 
 static void write_register(uint32_t sensor, uint32_t address, uint8_t value)
 {
@@ -48,13 +47,13 @@ bool adxl345_configure(uint32_t sensor, uint8_t data_format, uint8_t bw_rate)
 bool adxl345_read(uint32_t sensor, uint8_t data_format, struct adxl345_reading *reading)
 {
     /* Bytes on the wire: command, 0x30 INT_SOURCE, 0x31 DATA_FORMAT, 0x32..0x37 data, 0x38 FIFO_CTL. */
-    uint16_t words[BURST_WORDS];
+    uint16_t words[HAL_BURST_WORDS];
     words[0] = (uint16_t)(READ | MULTIPLE | (REGISTER_INT_SOURCE << 8));
     words[1] = 0U;
     words[2] = 0U;
     words[3] = 0U;
     words[4] = 0U;
-    hal_spi_exchange(sensor, words, BURST_WORDS);
+    hal_spi_burst(sensor, words);
     reading->int_source = (uint8_t)words[0];
     /* Data come low byte first, so each value straddles two words. */
     reading->counts[0] = (int16_t)(uint16_t)((words[1] & 0xFFU) | (words[2] & 0xFF00U));

@@ -90,6 +90,20 @@ void hal_spi_exchange(uint32_t sensor, uint16_t *words, uint32_t count)
     FIO2SET = 1U << sensor;
 }
 
+void hal_spi_burst(uint32_t sensor, uint16_t words[HAL_BURST_WORDS])
+{
+    FIO2CLR = 1U << sensor;
+    for (uint32_t i = 0U; i < HAL_BURST_WORDS; i++) {
+        SSP1DR = words[i];
+    }
+    while ((SSP1SR & SSP_SR_BUSY) != 0U) {
+    }
+    for (uint32_t i = 0U; i < HAL_BURST_WORDS; i++) {
+        words[i] = (uint16_t)SSP1DR;
+    }
+    FIO2SET = 1U << sensor;
+}
+
 uint32_t hal_spi_khz(void)
 {
     return CORE_HZ / (SSP_PRESCALER * SSP_DIVIDER) / 1000U;
@@ -187,11 +201,15 @@ static void fill_transmitter(void)
 {
     const uint8_t *bytes;
     uint32_t count = core_transmit_peek(&bytes);
-    if (count > UART_FIFO_BYTES) {
+    if (count >= UART_FIFO_BYTES) {
         count = UART_FIFO_BYTES;
-    }
-    for (uint32_t i = 0U; i < count; i++) {
-        U0THR = bytes[i];
+        for (uint32_t i = 0U; i < UART_FIFO_BYTES; i++) { /* a constant count: the compiler unrolls this one */
+            U0THR = bytes[i];
+        }
+    } else {
+        for (uint32_t i = 0U; i < count; i++) {
+            U0THR = bytes[i];
+        }
     }
     core_transmit_taken(count);
     transmitting = (count != 0U);

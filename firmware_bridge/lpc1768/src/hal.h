@@ -8,6 +8,10 @@
 /* Select one sensor, exchange 16-bit words (at most 8) in place, deselect it. */
 void hal_spi_exchange(uint32_t sensor, uint16_t *words, uint32_t count);
 
+/* The same for HAL_BURST_WORDS words, the longest loop of a sample. */
+#define HAL_BURST_WORDS 5U
+void hal_spi_burst(uint32_t sensor, uint16_t words[HAL_BURST_WORDS]);
+
 /* SPI clock, kHz. */
 uint32_t hal_spi_khz(void);
 

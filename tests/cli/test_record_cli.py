@@ -1,0 +1,119 @@
+"""`gfimu record` and `gfimu firmware` as a user runs them."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from firmware_bridge import board_process
+from gfimu.recording import Recording
+
+pytestmark = pytest.mark.skipif(not board_process.emulator_available(), reason="the emulator is in the extra")
+GFIMU = Path(sys.executable).parent / "gfimu"
+
+
+def test_run_to_a_file(gfimu_command, tmp_path) -> None:
+    out = tmp_path / "run.parquet"
+    result = gfimu_command(
+        "firmware", "run", "--scenario", "rest", "--duration", "2", "--rate", "200", "--out", out, "--json"
+    )
+    assert result.code == 0
+    found = json.loads(result.stdout)
+    assert found["stream"]["lost"] == 0
+    assert found["identity"]["rate_hz"] == 200
+    recording = Recording.read(out)
+    assert recording.sample_rate == pytest.approx(200)
+    assert "tacho_rad_s" in recording.reference
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals on Windows")
+def test_run_behind_a_port_and_record_from_it(tmp_path) -> None:
+    board = subprocess.Popen(
+        [GFIMU, "firmware", "run", "--scenario", "rest", "--port", "pty", "--duration", "60"],
+        stdout=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    try:
+        assert board.stdout is not None
+        line = board.stdout.readline()
+        device = line.split()[2].rstrip(";")
+        assert device.startswith("/dev/")
+        out = tmp_path / "run.csv"
+        command = [GFIMU, "record", "--port", device, "--out", out, "--duration", "2", "--rate", "800", "--json"]
+        command += ["--rrd", tmp_path / "live.rrd"]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
+    finally:
+        board.kill()
+        board.wait()
+    found = json.loads(done.stdout)
+    assert found["stream"]["lost"] == found["stream"]["corrupt"] == 0
+    assert found["identity"]["rate_hz"] == 800
+    assert len(Recording.read(out)) >= 1600
+    assert (tmp_path / "live.rrd").read_bytes()[:3] == b"RRF"
+
+
+def test_build_and_trace(gfimu_command, tmp_path) -> None:
+    result = gfimu_command("firmware", "build", "selfcheck", "--out", tmp_path / "image", "--json")
+    assert result.code == 0
+    assert Path(json.loads(result.stdout)["elf"]).is_file()
+    result = gfimu_command("firmware", "trace", "--out", tmp_path / "t.vcd", "--duration", "0.02", "--json")
+    assert json.loads(result.stdout)["exceptions"] > 0
+
+
+BAD = [
+    (("firmware", "run"), "--port"),
+    (("firmware", "run", "--port", "com7"), "pty, tcp:PORT"),
+    (("firmware", "run", "--scenario", "nowhere", "--port", "pty"), "paper_run"),
+    (("firmware", "run", "--out", "run.txt"), ".csv or .parquet"),
+    (("firmware", "build", "blink"), "selfcheck"),
+    (("firmware", "build", "--define", "X Y"), "NAME=VALUE"),
+    (("firmware", "trace", "--out", "t.txt"), ".vcd or .rrd"),
+    (("record", "--port", "/dev/nothing", "--out", "run.csv"), "can't be opened"),
+    (("record", "--port", "/dev/nothing", "--out", "run.txt"), ".csv or .parquet"),
+    (("record", "--port", "/dev/nothing", "--out", "run.csv", "--range", "3"), "2, 4, 8 and 16"),
+    (("record", "--port", "/dev/nothing", "--out", "run.csv", "--format", "nmea"), "mimu4444"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "remedy"), BAD)
+def test_bad_input_is_one_line_and_code_2(gfimu_command, tmp_path, monkeypatch, arguments, remedy) -> None:
+    monkeypatch.chdir(tmp_path)
+    result = gfimu_command(*arguments)
+    assert result.code == 2
+    assert remedy in result.stderr
+    assert result.stderr.strip().count("\n") == 0
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_interrupted_recording_is_whole(tmp_path) -> None:
+    from firmware_bridge.virtual_port import TcpPort
+
+    port = TcpPort(0)
+    out = tmp_path / "run.parquet"
+    process = subprocess.Popen([GFIMU, "record", "--port", port.name, "--out", out, "--json"], stdout=subprocess.PIPE)
+    try:
+        from firmware_bridge.frames import encode_samples
+
+        end = time.monotonic() + 30
+        number = 0
+        while time.monotonic() < end and (not out.exists() or number < 3000):
+            port.read()
+            port.write(
+                encode_samples(
+                    range(number, number + 80), [k * 1250 for k in range(number, number + 80)], [[0] * 12] * 80
+                ),
+                1.0,
+            )
+            number += 80
+            time.sleep(0.05)
+        process.send_signal(2)
+        assert process.wait(20) == 0
+    finally:
+        process.kill()
+        port.close()
+    assert out.read_bytes()[:4] == b"PAR1"
+    assert len(Recording.read(out)) > 0
