@@ -26,7 +26,10 @@ from gfimu.navigation import level, navigate
 from gfimu.part import white_noise_std
 from gfimu.rate.feedback import integrate_rate_recursively
 from gfimu.rate.integration import integrate_rate
+from gfimu.rate.kalman import FilterSettings
+from gfimu.rate.methods import RATE_METHODS, estimate_rate
 from gfimu.rate.problem import RateMethod, RateProblem, RateSolution
+from gfimu.rate.sensing import SensorErrors
 from gfimu.recording import Recording
 
 __all__ = ["METHODS", "Estimate", "estimate"]
@@ -146,10 +149,11 @@ def estimate(
     *,
     method: str = "integrate",
     form: str = "auto",
-    omega0: ArrayLike = (0.0, 0.0, 0.0),
+    omega0: ArrayLike | None = (0.0, 0.0, 0.0),
     quaternion0: ArrayLike | None = None,
     noise_std: ArrayLike | None = None,
     with_position: bool = False,
+    fuse_gyro: bool = False,
 ) -> Estimate:
     """Estimate p, α, ω, attitude and table angle at every sample of a recording.
 
@@ -163,8 +167,8 @@ def estimate(
         Method for the angular rate, one of `METHODS`.
     form : {"auto", "linear", "joint", "recursive"}
         How readings turn into α and p; see `gfimu.linear_solution`.
-    omega0 : array_like, shape (3,)
-        Angular rate at the first sample, body axes, rad/s.
+    omega0 : array_like, shape (3,), or None
+        Angular rate at the first sample, body axes, rad/s; None if it isn't known (``filter`` and ``smoother`` only).
     quaternion0 : array_like, shape (4,), optional
         Attitude (w, x, y, z) at the first sample. By default the recording's mounting, or without one the attitude
         that levels the mean of p over the first second, with heading zero; good if the origin is not accelerated then.
@@ -172,6 +176,8 @@ def estimate(
         Standard deviation of one sample of each channel, m/s²; by default from the parts' data sheets.
     with_position : bool
         Whether to integrate p to velocity and position as well, from rest at the origin.
+    fuse_gyro : bool
+        Whether ``filter`` and ``smoother`` use the recording's gyro as well.
 
     Raises
     ------
@@ -183,8 +189,12 @@ def estimate(
     if method not in METHODS:
         raise unknown_name("method", method, METHODS)
     readings = recording.for_array(array)
-    rate0 = np.asarray(omega0, dtype=float)
-    if rate0.shape != (3,) or not np.isfinite(rate0).all():
+    rate0 = None if omega0 is None else np.asarray(omega0, dtype=float)
+    if rate0 is None and method not in {"filter", "smoother"}:
+        raise InputError(f"method {method!r} needs the rate at the start; use filter or smoother for an unknown one")
+    if fuse_gyro and method not in {"filter", "smoother"}:
+        raise InputError(f"method {method!r} can't use a gyro; use filter or smoother")
+    if rate0 is not None and (rate0.shape != (3,) or not np.isfinite(rate0).all()):
         raise InputError(f"omega0 is {omega0!r}; it must hold three finite numbers, in rad/s")
     noise = white_noise_std(array, recording.sample_rate) if noise_std is None else np.asarray(noise_std, dtype=float)
     noise = np.broadcast_to(noise, array.n_channels)
@@ -193,7 +203,8 @@ def estimate(
     if not usable.any():
         raise InputError("no sample has enough channels for p and alpha; check the recording for missing readings")
 
-    rate = METHODS[method](RateProblem(array, recording.t_s, readings, noise, linear, rate0))
+    gyro = _gyro(recording) if fuse_gyro else None
+    rate = METHODS[method](RateProblem(array, recording.t_s, readings, noise, linear, rate0, gyro))
     motion = linear.with_omega(rate.omega)
     alpha, p = motion[:, :3], motion[:, 3:]
     start = (
@@ -221,6 +232,7 @@ def estimate(
             "array": array.name,
             "method": method,
             "form": linear.form,
+            **rate.remarks,
             "mounting_rotvec_rad": recording.mounting_rotvec.tolist(),
             "format_version": FORMAT_VERSION,
             "software_version": __version__,
@@ -231,18 +243,44 @@ def estimate(
 def _integrate(problem: RateProblem) -> RateSolution:
     """Integrate α from the first sample (paper, step 10 d); the variance of white noise adds up."""
     linear, t = problem.linear, problem.t_s
+    start = np.zeros(3) if problem.omega0 is None else problem.omega0
     alpha = linear.motion[:, :3]
     leakage = linear.leakage[:, :3]
     if leakage.any():
-        omega = integrate_rate_recursively(t, alpha, leakage, linear.pattern, problem.omega0)
+        omega = integrate_rate_recursively(t, alpha, leakage, linear.pattern, start)
     else:
-        omega = integrate_rate(t, alpha, problem.omega0)
+        omega = integrate_rate(t, alpha, start)
     return RateSolution(
         omega, np.sqrt(_integrated_variance(t, np.where(np.isnan(omega), np.nan, linear.alpha_variance)))
     )
 
 
-METHODS: dict[str, RateMethod] = {"integrate": _integrate}
+def _by_rate_method(method: str) -> RateMethod:
+    """Adapt a method of `gfimu.rate.methods`, with the sensors' errors from their data sheets."""
+
+    def solve(problem: RateProblem) -> RateSolution:
+        rate = 1.0 / float(np.median(np.diff(problem.t_s)))
+        errors = SensorErrors.from_parts(problem.array, rate, noise_std=problem.noise_std)
+        settings = FilterSettings(start_omega=problem.omega0)
+        found = estimate_rate(
+            problem.array, problem.t_s, problem.readings, errors, method=method, settings=settings, gyro=problem.gyro
+        )
+        remarks = {
+            "sign": found.sign.state,
+            "sign_decided_at_s": found.sign.decided_at_s if np.isfinite(found.sign.decided_at_s) else None,
+            "mean_normalised_innovation_squared": found.mean_nis if np.isfinite(found.mean_nis) else None,
+            "share_at_rest": float(found.rest.mean()),
+            "channels": found.channels.to_dict(),
+        }
+        return RateSolution(found.omega, np.where(np.isfinite(found.std), found.std, np.nan), remarks)
+
+    return solve
+
+
+METHODS: dict[str, RateMethod] = {
+    "integrate": _integrate,
+    **{name: _by_rate_method(name) for name in RATE_METHODS if name != "integrate"},
+}
 """Methods for the angular rate, by name."""
 
 
@@ -261,6 +299,15 @@ def _integrated_variance(t: NDArray[np.float64], variance: NDArray[np.float64]) 
     result[valid] = np.maximum(passed + last, 0.0)
     result[np.argmax(valid)] = 0.0
     return result
+
+
+def _gyro(recording: Recording) -> NDArray[np.float64]:
+    """Return the recording's gyro, shape (n, 3), rad/s."""
+    names = [f"gyro_{axis}_rad_s" for axis in _AXES]
+    missing = [name for name in names if name not in recording.reference]
+    if missing:
+        raise InputError(f"the recording has no {', '.join(missing)}; record a gyro, or estimate without one")
+    return np.column_stack([recording.reference[name] for name in names])
 
 
 def _initial_attitude(

@@ -29,7 +29,9 @@ def _estimate(
         str | None,
         typer.Option("--array", help="Array: a name, a .toml file or MJCF sites (.xml); else the recording's own."),
     ] = None,
-    method: Annotated[str, typer.Option("--method", help="Method for the angular rate.")] = "integrate",
+    method: Annotated[
+        str, typer.Option("--method", help="Angular rate by: integrate, algebraic, ml, filter or smoother.")
+    ] = "integrate",
     form: Annotated[
         str, typer.Option("--form", help="How readings turn into p and α: auto, linear, joint or recursive.")
     ] = "auto",
@@ -39,13 +41,17 @@ def _estimate(
     calibration: Annotated[
         Path | None, typer.Option("--calibration", help="Calibration to apply first (JSON, from `gfimu calibrate`).")
     ] = None,
+    unknown_start: Annotated[
+        bool, typer.Option("--unknown-start", help="The run may start spinning (filter, smoother).")
+    ] = False,
+    gyro: Annotated[bool, typer.Option("--gyro", help="Fuse the recording's gyro (filter, smoother).")] = False,
     position: Annotated[bool, typer.Option("--position", help="Integrate to velocity and position too.")] = False,
     rrd: Annotated[Path | None, typer.Option("--rrd", help="Rerun recording to write.")] = None,
     json: JsonOption = False,
 ) -> None:
     """Estimate p, α, ω, attitude and table angle from a recording.
 
-    Example: gfimu estimate run.parquet --rest-bias --out estimate.parquet
+    Example: gfimu estimate run.parquet --method filter --rest-bias --out estimate.parquet
     """
     from gfimu.calibration.result import load_calibration
     from gfimu.calibration.run_file import open_calibrated_run
@@ -60,7 +66,15 @@ def _estimate(
     else:
         recording, geometry = open_calibrated_run(run, load_calibration(calibration), drawing)
     solve = estimate_from_rest if rest_bias else estimate
-    found = solve(recording, geometry, method=method, form=form, with_position=position)
+    found = solve(
+        recording,
+        geometry,
+        method=method,
+        form=form,
+        omega0=None if unknown_start else (0.0, 0.0, 0.0),
+        fuse_gyro=gyro,
+        with_position=position,
+    )
     found.write(out)
     written = {"estimate": out}
     if rrd is not None:

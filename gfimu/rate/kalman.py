@@ -19,22 +19,23 @@ from numpy.typing import ArrayLike, NDArray
 
 from gfimu.array import AccelerometerArray
 from gfimu.errors import InputError, unknown_name
-from gfimu.rate.recursion import (
-    Record,
-    RecursionInput,
-    RecursionOutput,
-    RecursionState,
-    Tables,
-    Tuning,
-    backward,
-    forward,
-    prepare,
-)
+from gfimu.rate.backward import backward
+from gfimu.rate.preparation import prepare
+from gfimu.rate.recursion import forward
+from gfimu.rate.recursion_data import Record, RecursionInput, RecursionOutput, RecursionState, Tables, Tuning
 from gfimu.rate.rest_test import RUN_BLOCKS, RestTest
 from gfimu.rate.result import ChannelReport, RateEstimate, full_covariance
 from gfimu.rate.sensing import ChannelTables, SensorErrors
 
-__all__ = ["QUADRATURES", "FilterOutput", "FilterSettings", "KalmanRateFilter", "join", "quadrature_weights", "spread_rest"]
+__all__ = [
+    "QUADRATURES",
+    "FilterOutput",
+    "FilterSettings",
+    "KalmanRateFilter",
+    "join",
+    "quadrature_weights",
+    "spread_rest",
+]
 
 QUADRATURES = {"centred6": (6, 2), "centred4": (4, 1), "adams_moulton4": (4, 2), "trapezoid": (2, 0)}
 """Samples of the stencil and the interval of it that is integrated; what lies behind it is the filter's lag."""
@@ -83,7 +84,7 @@ class FilterOutput(NamedTuple):
 
     def rows(self, part: slice) -> FilterOutput:
         """Return some of the samples, as views."""
-        return FilterOutput(self.t[part], RecursionOutput(*(column[part] for column in self.columns)))
+        return FilterOutput(self.t[part], RecursionOutput._make(column[part] for column in self.columns))
 
 
 def join(parts: Sequence[FilterOutput]) -> FilterOutput:
@@ -92,7 +93,7 @@ def join(parts: Sequence[FilterOutput]) -> FilterOutput:
         return parts[0]
     columns = zip(*(part.columns for part in parts), strict=True)
     return FilterOutput(
-        np.concatenate([part.t for part in parts]), RecursionOutput(*(np.concatenate(column) for column in columns))
+        np.concatenate([part.t for part in parts]), RecursionOutput._make(np.concatenate(column) for column in columns)
     )
 
 
@@ -102,7 +103,7 @@ def quadrature_weights(points: int) -> NDArray[np.float64]:
     vandermonde = nodes ** np.arange(points)[:, None]  # (power, node)
     power = np.arange(1, points + 1)[:, None]
     moments = (nodes[1:] ** power - nodes[:-1] ** power) / power  # (power, interval)
-    return np.linalg.solve(vandermonde, moments).T
+    return np.asarray(np.linalg.solve(vandermonde, moments).T, dtype=float)
 
 
 class KalmanRateFilter:

@@ -143,13 +143,15 @@ class LiveRateFilter:
     def _wait(self, t: NDArray[np.float64], rows: NDArray[np.float64]) -> tuple[FilterOutput, int]:
         """Wait for a sample to start from; returns what is known until then, and the place of that sample."""
         if rows.shape != (len(t), self.array.n_channels):
-            raise InputError(f"readings have shape {rows.shape}; {len(t)} times of array {self.array.name!r} need "
-                             f"({len(t)}, {self.array.n_channels})")
+            raise InputError(
+                f"readings have shape {rows.shape}; {len(t)} times of array {self.array.name!r} need "
+                f"({len(t)}, {self.array.n_channels})"
+            )
         columns = empty_output(len(t))
         for column in (columns.omega, columns.covariance, columns.nis, columns.dof, columns.likelihood,
                        columns.manoeuvre):  # fmt: skip
             column[:] = 0
-        complete = (np.abs(rows) < self.errors.limits).all(axis=1)
+        complete = np.all(np.abs(rows) < self.errors.limits, axis=1)
         for place in range(len(t)):
             if complete[place]:
                 found, clear = self._initial.find(rows[place])

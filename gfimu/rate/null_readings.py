@@ -76,8 +76,10 @@ def null_readings(
     times = np.asarray(t, dtype=float)
     rows = np.asarray(readings, dtype=float)
     if times.ndim != 1 or len(times) < 2 or rows.shape != (len(times), array.n_channels):
-        raise InputError(f"times have shape {times.shape} and readings {rows.shape}; array {array.name!r} needs one "
-                         f"row of {array.n_channels} per time, two at least")
+        raise InputError(
+            f"times have shape {times.shape} and readings {rows.shape}; array {array.name!r} needs one "
+            f"row of {array.n_channels} per time, two at least"
+        )
     if not np.isfinite(times).all() or np.any(np.diff(times) <= 0):
         raise InputError("sample times must be finite and increase; drop repeated or reordered samples")
     tables = ChannelTables(array, errors)
@@ -101,15 +103,18 @@ def null_readings(
 
 
 def align_signs(t: NDArray[np.float64], alpha: NDArray[np.float64], omega: NDArray[np.float64]) -> None:
-    """Give each ω (n, 3) the sign that is nearer to the sample before, carried on by α; in place.
+    """Give each ω (n, 3) the sign that is nearer to the integral of α; in place.
 
-    Noise flips it now and then, for good, when ω passes zero: a single sample can't tell ω from −ω.
+    The integral is drawn to the ω so signed within its time constant 1/|ω|, so that it does not drift away. A single
+    sample can't tell ω from −ω: after a slow passage through zero the sign may be wrong for good.
     """
-    last, time = np.zeros(3), t[0]
+    carried, time = np.zeros(3), t[0]
     for k in range(len(t)):
+        step, time = t[k] - time, t[k]
+        if np.isfinite(alpha[k]).all():
+            carried = carried + step * alpha[k]
         if not np.isfinite(omega[k]).all():
             continue
-        push = alpha[k] if np.isfinite(alpha[k]).all() else np.zeros(3)
-        if omega[k] @ (last + (t[k] - time) * push) < 0:
+        if omega[k] @ carried < 0:
             omega[k] = -omega[k]
-        last, time = omega[k], t[k]
+        carried = carried + min(1.0, step * float(np.linalg.norm(omega[k]))) * (omega[k] - carried)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Protocol
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,8 +31,10 @@ class RateProblem:
         Standard deviation of one sample of each channel, m/s².
     linear : LinearSolution
         The part of α and p that is linear in the readings, and what ω adds to it.
-    omega0 : ndarray, shape (3,)
-        Angular rate at the first sample, body axes, rad/s.
+    omega0 : ndarray, shape (3,), or None
+        Angular rate at the first sample, body axes, rad/s; None if unknown.
+    gyro : ndarray, shape (n, 3), optional
+        Gyro to fuse, rad/s; NaN where it is saturated or missing.
     """
 
     array: AccelerometerArray
@@ -39,15 +42,20 @@ class RateProblem:
     readings: NDArray[np.float64]
     noise_std: NDArray[np.float64]
     linear: LinearSolution
-    omega0: NDArray[np.float64]
+    omega0: NDArray[np.float64] | None
+    gyro: NDArray[np.float64] | None = None
 
 
 @dataclass(frozen=True)
 class RateSolution:
-    """Angular rate in body axes and its standard deviation, rad/s, each of shape (n, 3); NaN where not found."""
+    """Angular rate in body axes and its standard deviation, rad/s, each of shape (n, 3); NaN where not found.
+
+    ``remarks`` are figures and sentences about how it was found, by name, for the estimate's metadata.
+    """
 
     omega: NDArray[np.float64]
     omega_std: NDArray[np.float64]
+    remarks: Mapping[str, Any] = field(default_factory=dict)
 
 
 class RateMethod(Protocol):

@@ -1,4 +1,4 @@
-"""Test for rest: is a block of samples consistent with a body that doesn't turn?
+"""Test for rest: whether a block of samples is consistent with a body that doesn't turn.
 
 A block of W samples is taken for rest if none of five statistics is larger than rest explains:
 
@@ -76,18 +76,18 @@ class RestTest:
                 raise InputError(f"{name} = {getattr(self, name)!r}: must be a positive number")
 
     def window(self, period: float) -> int:
-        """Samples per block, at least four."""
+        """Return the samples per block, at least four."""
         return max(4, round(self.window_s / period))
 
     def limits(self, n_channels: int, n_null: int, period: float) -> NDArray[np.float64]:
-        """Limits of scatter, halves, α, null space and rate, the largest variance of ω, and α and ω at entry, (8,)."""
+        """Return the limits of the five statistics, the largest variance of ω, and of α and ω at entry, shape (8,)."""
         freedom = np.array([n_channels * (self.window(period) - 1), n_channels, 3, max(n_null, 1), 3])
         largest = chi2.ppf(1.0 - self.false_alarm / len(freedom), freedom)
         largest[:2] *= (1.0 + self.noise_margin) ** 2
         return np.array([*largest, self.largest_rate_std**2, *chi2.ppf([0.8, 0.95], 3)])
 
     def entry_blocks(self, period: float) -> int:
-        """Blocks in a row after which rest begins, at most `RUN_BLOCKS`."""
+        """Return how many blocks in a row begin a rest, at most `RUN_BLOCKS`."""
         return min(max(1, round(self.entry_s / (self.window(period) * period))), RUN_BLOCKS)
 
 

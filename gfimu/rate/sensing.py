@@ -98,7 +98,7 @@ class SensorErrors:
         """Take the errors from the data sheets of the array's parts (``models/parts``).
 
         White noise is the part's (`gfimu.part.white_noise_std`), with the quantisation step's Δ²/12 added;
-        bias is the typical deviation at switch-on. Other fields by name.
+        bias is the typical deviation at switch-on. Other fields by name; ``noise_std`` is the white part.
 
         Raises
         ------
@@ -116,9 +116,10 @@ class SensorErrors:
         step = np.concatenate(steps)
         noise = [np.sqrt(rms**2 + step**2 / 12.0)]
         stuck = _equal_run(float((rms / step).min()))
-        fields = {"full_range": np.concatenate(limit), "stuck_after": stuck} | others
+        fields: dict[str, Any] = {"full_range": np.concatenate(limit), "stuck_after": stuck} | others
         if "noise_std" in fields:
-            noise = [np.broadcast_to(np.asarray(fields.pop("noise_std"), dtype=float), (array.n_channels,))]
+            white = np.broadcast_to(np.asarray(fields.pop("noise_std"), dtype=float), (array.n_channels,))
+            noise = [np.sqrt(white**2 + step**2 / 12.0)]
         if "bias_std" in fields:
             bias = [np.broadcast_to(np.asarray(fields.pop("bias_std"), dtype=float), (array.n_channels,))]
         return cls(np.concatenate(noise), np.concatenate(bias), **fields)

@@ -1,4 +1,4 @@
-"""Starting while already spinning: which of ω and −ω?
+"""Starting while already spinning: which of ω and −ω it is.
 
 Centripetal readings are the same for ω and −ω, so a start in the dark is followed by two filters that begin at
 opposite rates. What tells them apart is α: if ω grows while α points along it, the sign was right. The ratio of the
@@ -24,7 +24,7 @@ from gfimu.array import AccelerometerArray
 from gfimu.bounds import omega_products_jacobian
 from gfimu.errors import GeometryError
 from gfimu.rate.maximum_likelihood import rate_of_null_space
-from gfimu.rate.recursion import RecursionOutput
+from gfimu.rate.recursion_data import RecursionOutput
 from gfimu.rate.sensing import ChannelTables, SensorErrors
 
 __all__ = ["THRESHOLD", "InitialRate", "SignTest"]

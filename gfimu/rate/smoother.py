@@ -9,6 +9,7 @@ per sample.
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -73,22 +74,18 @@ def smooth_rate(
     if not live.hypotheses:
         return replace(filtered, method="smoother")
     first = int(np.argmax(filtered.t_s >= live.started_at_s))
+    tail = None if turning is None else turning[first:]
     smoothed = [
-        replace(
-            _prepend(filtered, first, _smooth(
-                array, times[first:], rows[first:], errors, hypothesis.settings,
-                None if turning is None else turning[first:], period,
-            )),
-            sign=live.sign,
-        )  # fmt: skip
+        _smooth(array, times[first:], rows[first:], errors, hypothesis.settings, tail, period)
         for hypothesis in live.hypotheses
     ]
+    smoothed = [replace(_prepend(filtered, first, result), sign=live.sign) for result in smoothed]
     return smoothed[0] if len(smoothed) == 1 else replace(smoothed[0], mirrored=smoothed[1])
 
 
 def _prepend(waiting: RateEstimate, count: int, result: RateEstimate) -> RateEstimate:
     """Put the first ``count`` samples of ``waiting``, from before the start, before a result."""
-    columns = {
+    columns: dict[str, Any] = {
         name: np.concatenate([getattr(waiting, name)[:count], getattr(result, name)])
         for name in ("t_s", "omega", "covariance", "nis", "nis_dof", "rest")
     }

@@ -20,7 +20,7 @@ _FIRST_BIAS = 6
 _WIDTH = 118
 
 _HEADER = '''"""One step of the twelve-axis filter without loops. Written by ``python -m gfimu.rate.unroll``."""
-# ruff: noqa
+# ruff: noqa: E702
 # fmt: off
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ def step(x, p, turned, t, noise, inflation, m, z, k, slow):  # type: ignore[no-u
     """Predict and update x (15,) and p (15, 15); returns Σ e²/S and det S.
 
     ``turned`` (3,) is the integral of α over the interval of length ``t``, ``noise`` (3, 3) the covariance of α,
-    ``inflation`` the further noise in units of it, ``m`` (6, 6) and row ``k`` of ``z`` the null space; while tr P > ``slow``
-    |ω|² the update is of second order.
+    ``inflation`` the further noise in units of it, ``m`` (6, 6) and row ``k`` of ``z`` the null space; while
+    tr P > ``slow`` |ω|² the update is of second order.
     """
 '''
 
@@ -55,7 +55,7 @@ def _predict(add: Callable[[str], None]) -> None:
         add(f"x{a} += turned[{a}] - t * x{3 + a} + half * x{first_noise + a}")
         add(f"x{first_noise + a} = 0.0")
     for a in range(3):
-        for r in range(3, STATES):  # d = the change of the rows of ω
+        for r in [*range(3, first_noise), *range(first_noise + a, STATES)]:  # d = the change of the rows of ω
             add(f"d{a}_{r} = half * {_p(first_noise + a, r)} - t * {_p(3 + a, r)}")
     for a in range(3):
         for b in range(a, 3):
@@ -123,8 +123,8 @@ def source() -> str:
             add(f"e{i} -= l{i}_{j} * e{j}")
             for r in states:
                 add(f"g{i}_{r} -= l{i}_{j} * g{j}_{r}")
-        pivot = "".join(f" - l{i}_{k} * l{i}_{k}" for k in range(i))
-        add(f"l{i}_{i} = l{i}_{i}{pivot}")
+        if i:
+            add(f"l{i}_{i} -= " + " + ".join(f"l{i}_{k} * l{i}_{k}" for k in range(i)))
         add(f"determinant *= l{i}_{i}")
         add(f"l{i}_{i} = 1.0 / np.sqrt(l{i}_{i})")  # the reciprocal pivot
         add(f"e{i} *= l{i}_{i}")

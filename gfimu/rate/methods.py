@@ -1,0 +1,138 @@
+"""All estimators of the angular rate behind one call.
+
+=============  ==========================================  =======================  ==========================
+method         uses                                        sign of ω                error in steady turning
+=============  ==========================================  =======================  ==========================
+``integrate``  α                                           from the start           grows with √t, and with
+                                                                                    b t of what bias is left
+``algebraic``  null space, sample by sample                by continuity            σ_α/|ω| × 1.0 … 1.22
+``ml``         null space, sample by sample                by continuity            σ_α/|ω|
+``filter``     α, null space, rest, gyro; samples so far   start, or manoeuvre      σ_α √(Δt/|ω|)
+``smoother``   the same, all samples                       start, or manoeuvre      σ_α √(Δt/2|ω|)
+=============  ==========================================  =======================  ==========================
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gfimu.array import AccelerometerArray
+from gfimu.errors import InputError, unknown_name
+from gfimu.rate.algebraic import algebraic_rate
+from gfimu.rate.filter import filter_rate
+from gfimu.rate.integration import integrate_rate
+from gfimu.rate.kalman import FilterSettings
+from gfimu.rate.maximum_likelihood import maximum_likelihood_rate
+from gfimu.rate.null_readings import null_readings
+from gfimu.rate.result import RateEstimate
+from gfimu.rate.sensing import ChannelTables, SensorErrors
+from gfimu.rate.smoother import smooth_rate
+
+__all__ = ["RATE_METHODS", "estimate_rate"]
+
+
+def estimate_rate(
+    array: AccelerometerArray,
+    t: ArrayLike,
+    readings: ArrayLike,
+    errors: SensorErrors,
+    *,
+    method: str = "filter",
+    settings: FilterSettings | None = None,
+    gyro: ArrayLike | None = None,
+) -> RateEstimate:
+    """Estimate the angular rate of a recording.
+
+    Parameters
+    ----------
+    array : AccelerometerArray
+        The array, with c channels.
+    t : array_like, shape (n,)
+        Sample times, s.
+    readings : array_like, shape (n, c)
+        Specific force, m/s²; NaN where a channel is missing.
+    errors : SensorErrors
+        Errors of the sensors; `SensorErrors.from_parts` takes them from data sheets.
+    method : {"integrate", "algebraic", "ml", "filter", "smoother"}
+        See the module's table.
+    settings : FilterSettings, optional
+        Start of the run, quadrature, recognition of rest. The per-sample methods and the integration take their
+        biases from a leading rest if the start is at rest.
+    gyro : array_like, shape (n, 3), optional
+        Gyro that ``filter`` and ``smoother`` fuse, rad/s; NaN where saturated.
+
+    Raises
+    ------
+    InputError
+        If the method is unknown, can't use a gyro or an unknown start, or the data don't fit.
+    GeometryError
+        If the array can't see what the method needs.
+    """
+    if method not in RATE_METHODS:
+        raise unknown_name("method", method, RATE_METHODS)
+    chosen = settings or FilterSettings()
+    if method in {"filter", "smoother"}:
+        solve = filter_rate if method == "filter" else smooth_rate
+        return solve(array, t, readings, errors, chosen, gyro=gyro)
+    if gyro is not None:
+        raise InputError(f"method {method!r} can't use a gyro; use filter or smoother")
+    return _SIMPLE[method](array, t, readings, errors, chosen)
+
+
+def _integrate(
+    array: AccelerometerArray, t: ArrayLike, readings: ArrayLike, errors: SensorErrors, settings: FilterSettings
+) -> RateEstimate:
+    """Integrate α (GF-IMU paper, step 10 d) with the mean over a leading rest as bias."""
+    if settings.start_omega is None:
+        raise InputError("method 'integrate' needs the rate at the start; use filter or smoother for an unknown one")
+    if ChannelTables(array, errors).alpha_leak[0].any():
+        raise InputError(
+            f"array {array.name!r} leaves products of the rate in α; use filter, or gfimu.estimation.estimate, which "
+            "feeds the rate back"
+        )
+    at_rest = not np.any(settings.start_omega)
+    null = null_readings(array, t, readings, errors, least_rank=0, start_at_rest=at_rest)
+    omega = integrate_rate(null.t, null.alpha, settings.start_omega)
+    noise = ChannelTables(array, errors).alpha_noise[0]
+    period = float(np.median(np.diff(null.t)))
+    turned = (null.t - null.t[0])[:, None, None]
+    spread = ChannelTables(array, errors).bias_covariance(errors.bias_std)[:3, :3]
+    if null.rest.any():
+        spread = noise / int(null.rest.sum())
+    covariance = settings.start_std**2 * np.eye(3) + noise * period * turned + spread * turned**2
+    n = len(null.t)
+    return RateEstimate(
+        "integrate", null.t, omega, covariance, np.full(n, np.nan), np.zeros(n, dtype=np.int64), null.rest
+    )
+
+
+def _per_sample(
+    solve: Callable[..., RateEstimate],
+) -> Callable[[AccelerometerArray, ArrayLike, ArrayLike, SensorErrors, FilterSettings], RateEstimate]:
+    def run(
+        array: AccelerometerArray, t: ArrayLike, readings: ArrayLike, errors: SensorErrors, settings: FilterSettings
+    ) -> RateEstimate:
+        start: NDArray[np.float64] | None = settings.start_omega
+        at_rest = start is not None and not np.any(start)
+        found = solve(array, t, readings, errors, start_at_rest=at_rest)
+        if start is not None and np.any(start):  # a known rate at the start settles the sign there
+            known = np.flatnonzero(np.isfinite(found.omega).all(axis=1))
+            if known.size and found.omega[known[0]] @ start < 0:
+                found = replace(found, omega=-found.omega)
+        return found
+
+    return run
+
+
+_SIMPLE = {
+    "integrate": _integrate,
+    "algebraic": _per_sample(algebraic_rate),
+    "ml": _per_sample(maximum_likelihood_rate),
+}
+
+RATE_METHODS = ("integrate", "algebraic", "ml", "filter", "smoother")
+"""Names of the methods."""

@@ -1,0 +1,132 @@
+"""Test for rest within the rate filter, block by block (`gfimu.rate.rest_test` says what is tested)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from gfimu.rate.recursion_data import BLOCK, COMPILE, REST_BLOCKS, RESTING, RUN
+
+__all__ = ["rest_block"]
+
+
+@njit(**COMPILE)
+def rest_block(data, k, tables, tuning, state):  # type: ignore[no-untyped-def]
+    """Count sample k into the block; at the block's end test for rest (`gfimu.rate.rest_test`)."""
+    counts = state.counts
+    window = tuning.rest_window
+    if data.channel_set[k] != 0 or (counts[BLOCK] > 0 and data.whole_run[k] == 0):
+        if counts[BLOCK] > 0 and data.whole_run[k] == 0:  # who knows what happened in the gap
+            counts[RUN] = 0
+            counts[RESTING] = 0
+        counts[BLOCK] = 0
+        return False
+    counts[BLOCK] += 1
+    if counts[BLOCK] < window:
+        return False
+    counts[BLOCK] = 0
+    if not _is_rest(data.y[k - window + 1 : k + 1], tables, tuning, state):
+        counts[RUN] = 0
+        counts[RESTING] = 0
+        return False
+    return counts[RESTING] > 0
+
+
+@njit(**COMPILE)
+def _is_rest(y, tables, tuning, state):  # type: ignore[no-untyped-def]
+    """Test the block of readings y (window, c) against the hypothesis of rest."""
+    window, c = y.shape
+    d = tables.null_rows.shape[1]
+    first = window // 2
+    second = window - first
+    limits = tuning.rest_limits
+    # ω when the block began: known, and not far from zero.
+    known = state.block_covariance
+    for a in range(3):
+        if known[a, a] > limits[5]:
+            return False
+        if state.block_x[a] ** 2 > limits[4] * (known[a, a] + tuning.rest_variance):  # never less than the full χ²
+            return False
+    # Scatter within the block, and its second half against its first.
+    mean = np.empty(c)
+    scatter = 0.0
+    halves = 0.0
+    for i in range(c):
+        origin = y[0, i]
+        early = 0.0
+        squares = 0.0
+        for j in range(first):
+            change = y[j, i] - origin
+            early += change
+            squares += change * change
+        late = 0.0
+        for j in range(first, window):
+            change = y[j, i] - origin
+            late += change
+            squares += change * change
+        total = early + late
+        weight = tuning.inverse_noise[i] * tuning.inverse_noise[i]
+        mean[i] = origin + total / window
+        scatter += weight * (squares - total * total / window)
+        difference = late / second - early / first
+        halves += weight * difference * difference
+    if scatter > limits[0] or halves / (1.0 / first + 1.0 / second) > limits[1]:
+        return False
+    consistent = np.linalg.solve(known[:3, :3] + tuning.rest_variance * np.eye(3), state.block_x[:3])
+    if (consistent * state.block_x[:3]).sum() > limits[4]:
+        return False
+    # Means against the biases known when the block began.
+    alpha = tables.alpha_rows[0] @ mean - state.block_x[3:6]
+    spread = known[3:6, 3:6] + tables.alpha_noise[0] / window
+    if (np.linalg.solve(spread, alpha) * alpha).sum() > limits[2]:
+        return False
+    if d > 0:
+        null = tables.null_rows[0] @ mean - state.block_x[6 : 6 + d]
+        spread_null = known[6 : 6 + d, 6 : 6 + d] + np.eye(d) / window
+        if (np.linalg.solve(spread_null, null) * null).sum() > limits[3]:
+            return False
+    return _is_rest_run(mean, alpha, tables, tuning, state)
+
+
+@njit(**COMPILE)
+def _is_rest_run(mean, alpha, tables, tuning, state):  # type: ignore[no-untyped-def]
+    """Test the blocks in a row that ended with this one, which passed; rest begins when they are enough."""
+    counts = state.counts
+    length = len(state.run_alpha)
+    place = counts[RUN] % length
+    state.run_alpha[place] = alpha
+    state.run_alpha[place] += state.block_x[3:6]
+    state.run_bias[place] = state.block_x[3:6]
+    state.run_covariance[place] = state.block_covariance[3:6, 3:6]
+    counts[RUN] += 1
+    run = counts[RUN]
+    span = 2
+    while span <= min(run, length):
+        if _run_statistic(span, tables, tuning, state) > tuning.rest_limits[2]:
+            return False
+        span *= 2
+    if counts[RESTING] == 0:
+        if run < tuning.rest_entry or _run_statistic(min(run, length), tables, tuning, state) > tuning.rest_limits[6]:
+            return True
+        known = state.covariance[:3, :3] + tuning.rest_variance * np.eye(3)
+        if (np.linalg.solve(known, state.x[:3]) * state.x[:3]).sum() > tuning.rest_limits[7]:
+            return True
+        counts[RESTING] = 1
+    blocks = counts[REST_BLOCKS]
+    for i in range(len(mean)):
+        state.reference[i] += (mean[i] - state.reference[i]) / (blocks + 1)
+    counts[REST_BLOCKS] = blocks + 1
+    return True
+
+
+@njit(**COMPILE)
+def _run_statistic(span, tables, tuning, state):  # type: ignore[no-untyped-def]
+    """Mean α of the last ``span`` blocks against its bias as known when they began."""
+    length = len(state.run_alpha)
+    run = state.counts[RUN]
+    begin = (run - span) % length
+    difference = -state.run_bias[begin]
+    for number in range(run - span, run):
+        difference += state.run_alpha[number % length] / span
+    spread = state.run_covariance[begin] + tables.alpha_noise[0] / (span * tuning.rest_window)
+    return (np.linalg.solve(spread, difference) * difference).sum()
