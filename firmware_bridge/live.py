@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import queue
+import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -24,7 +26,9 @@ _TEXT_EVERY_S = 0.25
 
 
 class LiveView:
-    """Is given each batch of a recording; estimates the rate at up to 100 Hz.
+    """Is given each batch of a recording; estimates the rate at up to 100 Hz, in a thread of its own.
+
+    The recording never waits for the view: the filter is compiled on first use, which takes a while.
 
     Parameters
     ----------
@@ -59,9 +63,19 @@ class LiveView:
         self._first_s: float | None = None
         self.omega = np.full(3, np.nan)
         self._stream = _open_stream(rrd, viewer=viewer) if rrd is not None or viewer else None
+        self._batches: queue.SimpleQueue[tuple[Batch, StreamCounts] | None] = queue.SimpleQueue()
+        self._thread = threading.Thread(target=self._work, name="live view", daemon=True)
+        self._thread.start()
 
     def __call__(self, batch: Batch, counts: StreamCounts) -> None:
-        """Take one batch and the totals so far."""
+        """Take one batch and the totals so far; returns at once."""
+        self._batches.put((batch, counts))
+
+    def _work(self) -> None:
+        while (item := self._batches.get()) is not None:
+            self._show(*item)
+
+    def _show(self, batch: Batch, counts: StreamCounts) -> None:
         if self._first_s is None:
             self._first_s = float(batch.t_s[0])
         self._seen += len(batch.t_s)
@@ -117,7 +131,9 @@ class LiveView:
         return f"{elapsed:8.1f} s  {rate:6.1f} Hz  lost {counts.lost}  corrupt {counts.corrupt}  ω {omega} rad/s"
 
     def close(self) -> None:
-        """End the rerun recording."""
+        """Show what still waits and end the rerun recording."""
+        self._batches.put(None)
+        self._thread.join()
         if self._stream is not None:
             self._stream.flush()
             self._stream.disconnect()
