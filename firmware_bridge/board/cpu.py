@@ -14,7 +14,7 @@ import struct
 from typing import TYPE_CHECKING, Any
 
 from firmware_bridge.board.faults import BoardFault, FaultKind
-from firmware_bridge.board.nvic import HARD_FAULT, SVCALL
+from firmware_bridge.board.nvic import SVCALL, UNMASKABLE
 from gfimu.errors import InputError
 
 if TYPE_CHECKING:
@@ -28,6 +28,10 @@ try:
 
     # Called without releasing the interpreter's lock: taking it again in every call-back would cost more than the call.
     _LIBRARY = ctypes.PyDLL(None, handle=binding.uclib._handle)
+    _LIBRARY.uc_emu_start.argtypes = (
+        ctypes.c_void_p, ctypes.c_uint64, ctypes.c_uint64, ctypes.c_uint64, ctypes.c_size_t,
+    )  # fmt: skip
+    _LIBRARY.uc_emu_stop.argtypes = (ctypes.c_void_p,)
 except ImportError:  # the extra is not installed; `require_unicorn` says so
     unicorn = None
 
@@ -41,7 +45,6 @@ _FRAME_BYTES = 32
 _STACK_ALIGNED = 1 << 9
 _SWI, _PREFETCH_ABORT, _EXCEPTION_EXIT = 2, 3, 8
 _IT_BITS = 0x0600FC00
-_PRIMASK = 123  # UC_ARM_REG_PRIMASK, read once per block while an interrupt is held back
 
 
 def require_unicorn() -> None:
@@ -122,8 +125,6 @@ class Cpu:
         )  # fmt: skip
         self._entry = _Registers(self._handle, [r.UC_ARM_REG_SP, r.UC_ARM_REG_XPSR, r.UC_ARM_REG_LR])
         self._masks = _Registers(self._handle, [r.UC_ARM_REG_PRIMASK, r.UC_ARM_REG_BASEPRI, r.UC_ARM_REG_FAULTMASK])
-        self._primask_value = ctypes.c_uint32()
-        self._primask_place = ctypes.byref(self._primask_value)
         self._pc = _Registers(self._handle, [r.UC_ARM_REG_PC])
         self._callbacks: list[Any] = []
         self._install_hooks()
@@ -147,6 +148,9 @@ class Cpu:
             raise unicorn.UcError(error)
 
     def _memory_at(self, address: int, count: int) -> tuple[mmap.mmap, int]:
+        ram = self.memory[RAM_BASE]
+        if RAM_BASE <= address <= RAM_BASE + RAM_SIZE - count:
+            return ram, address - RAM_BASE
         for base, memory in self.memory.items():
             if base <= address and address + count <= base + len(memory):
                 return memory, address - base
@@ -232,17 +236,21 @@ class Cpu:
 
     def _deliverable(self) -> int:
         """Exception to enter now, 0 if none; sets the alarm for the next look."""
-        board = self.board
-        exception = board.nvic.best() if board.nvic.pending else 0
-        if exception > HARD_FAULT and (self._primask() & 1 or board.nvic.masked(exception, *self._masks.read())):
-            board.alarm = -1  # look at every block until the mask is gone
-            return 0
-        board.alarm = min(board.until, self.limit)
+        board, nvic = self.board, self.board.nvic
+        exception = 0
+        if nvic.pending & nvic.enabled:
+            primask, basepri, faultmask = self._masks.read()
+            unmaskable = nvic.pending & UNMASKABLE
+            if primask & 1 and not unmaskable:
+                board.alarm = -1  # look at every block until the mask is gone
+                return 0
+            exception = nvic.best()
+            if exception and nvic.masked(exception, primask, basepri, faultmask):
+                board.alarm = -1
+                return 0
+        until, limit = board.until, self.limit
+        board.alarm = until if until < limit else limit  # noqa: FURB136 - this runs twenty times a sample
         return exception
-
-    def _primask(self) -> int:
-        _LIBRARY.uc_reg_read(self._handle, _PRIMASK, self._primask_place)
-        return self._primask_value.value
 
     def _on_intr(self, _: Any, number: int, __: Any) -> None:
         pc = self._pc.read()[0]
@@ -325,8 +333,6 @@ class Cpu:
         board, nvic = self.board, self.board.nvic
         start, handle, pc_register = _LIBRARY.uc_emu_start, self._handle, self._pc
         self.limit = limit
-        never = ctypes.c_uint64(_UNTIL)
-        zero, none = ctypes.c_uint64(0), ctypes.c_size_t(0)
         board.alarm = -1
         while board.now < limit:
             if board.now >= board.until:
@@ -339,7 +345,7 @@ class Cpu:
                 self._next_exception = 0
                 self.enter(exception)
                 board.alarm = -1 if nvic.pending else min(board.until, limit)
-            error = start(handle, ctypes.c_uint64(self.pc), never, zero, none)
+            error = start(handle, self.pc, _UNTIL, 0, 0)
             if error:
                 raise self._fault(FaultKind.of(error), "")
             if self._exception_return:

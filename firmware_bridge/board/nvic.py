@@ -9,10 +9,11 @@ from firmware_bridge.board.peripheral import Peripheral
 if TYPE_CHECKING:
     from firmware_bridge.board.board import Board
 
-__all__ = ["FIRST_IRQ", "PENDSV", "SVCALL", "SYSTICK", "Nvic"]
+__all__ = ["FIRST_IRQ", "PENDSV", "SVCALL", "SYSTICK", "UNMASKABLE", "Nvic"]
 
 NMI, HARD_FAULT, SVCALL, PENDSV, SYSTICK, FIRST_IRQ = 2, 3, 11, 14, 15, 16
 EXCEPTIONS = 16 + 35
+UNMASKABLE = 1 << NMI | 1 << HARD_FAULT
 THREAD_PRIORITY = 256
 _ALWAYS_ENABLED = (1 << FIRST_IRQ) - 1
 _EXISTING = (1 << EXCEPTIONS) - 1
