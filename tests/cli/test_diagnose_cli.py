@@ -1,0 +1,201 @@
+"""`gfimu diagnose`: what it leaves behind, hard input that still gets a verdict, bad input that gets one line."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gfimu import AccelerometerArray, Recording
+from sim.campaign import Measurement, measure, random_profile
+from sim.effects import make_effect
+from sim.motion import SplineSpin
+from sim.scenarios import Scenario, simulate
+from sim.twin import Twin
+
+TWIN = "cube12_turntable"
+FILES = {"verdict.json", "twin.toml", "report.html", "diagnosis.rrd"}
+SETTING = Measurement(duration=16.0)
+
+
+@pytest.fixture(scope="module")
+def ordinary() -> Recording:
+    """A run of a world with nothing wrong in it."""
+    return measure(np.random.default_rng(5), Twin.load(TWIN), (), SETTING)
+
+
+@pytest.fixture(scope="module")
+def eccentric(tmp_path_factory):
+    """A run of calibrated sensors on a cube 3 mm and −2 mm off the axis, simulated in MuJoCo; 20 s of it."""
+    path = tmp_path_factory.mktemp("runs") / "eccentric.parquet"
+    scenario = Scenario.load("eccentric_mount", changes=["sensor.errors=false"])
+    recording = simulate(scenario, seed=3)
+    recording.slice(0, 2000).write(path)
+    return path
+
+
+def test_a_hidden_cause_is_found_told_and_written(gfimu_command, eccentric, tmp_path):
+    out = tmp_path / "made" / "diagnosis"
+    done = gfimu_command("diagnose", eccentric, "--twin", TWIN, "--out", out)
+    assert done.code == 0, done.stderr
+    assert "Found what the simulation leaves out: the whole cube is off the table's axis." in " ".join(
+        done.stdout.split()
+    )
+    assert "eccentricity" in done.stdout
+    assert "before" in done.stdout
+    assert {file.name for file in out.iterdir()} == FILES
+    for name in FILES:
+        assert name in done.stdout.replace("\n", "")
+    verdict = json.loads((out / "verdict.json").read_text())
+    assert verdict["verdict"] == "explained"
+    (cause,) = verdict["causes"]
+    assert cause["effect"] == "eccentricity"
+    for key, true in (("x_m", 0.003), ("y_m", -0.002)):
+        found = cause["parameters"][key]
+        assert found["value"] == pytest.approx(true, abs=4 * found["std"])
+    residual = verdict["residual"]
+    assert set(residual["before_by_channel"]) == set(AccelerometerArray.load("cube12").channels)
+    assert residual["rms_after"] < 1.05 * residual["noise_floor"] < residual["rms_before"]
+
+    # The extended twin loads back and simulates; with it the same data hold nothing more.
+    again = gfimu_command("diagnose", eccentric, "--twin", out / "twin.toml", "--out", tmp_path / "again", "--json")
+    assert again.code == 0, again.stderr
+    report = json.loads(again.stdout)
+    assert report["verdict"] == "nothing_found"
+    assert report["causes"] == []
+    assert set(report["files"]) == {"verdict", "extended twin", "report", "rerun recording"}
+    assert gfimu_command("simulate", out / "twin.toml", "--out", tmp_path / "again.parquet").code == 0
+
+
+def test_an_array_file_moves_with_the_twin(gfimu_command, ordinary, tmp_path):
+    (tmp_path / "mine.toml").write_text(AccelerometerArray.load("cube12").to_toml().replace('"cube12"', '"mine"'))
+    (tmp_path / "twin.toml").write_text('array = "mine.toml"\n')
+    ordinary.write(tmp_path / "run.parquet")
+    out = tmp_path / "out"
+    done = gfimu_command("diagnose", tmp_path / "run.parquet", "--twin", tmp_path / "twin.toml", "--out", out, "--json")
+    assert done.code == 0, done.stderr
+    assert json.loads(done.stdout)["verdict"] == "nothing_found"
+    assert Twin.load(out / "twin.toml").array.name == "mine"
+
+
+def rest() -> Recording:
+    still = SplineSpin.through(np.arange(-2.0, 20.0, 0.01), np.zeros(2200))
+    return measure(np.random.default_rng(6), Twin.load(TWIN), (), SETTING, motion=still)
+
+
+def dead_channel(recording: Recording, value: float) -> Recording:
+    readings = recording.readings.copy()
+    readings[:, 4] = value
+    return replace(recording, readings=readings)
+
+
+def slow_tacho(recording: Recording) -> Recording:
+    tacho = recording.reference["tacho_rad_s"].copy()
+    tacho[np.arange(len(tacho)) % 2 != 0] = np.nan
+    return replace(recording, reference={**recording.reference, "tacho_rad_s": tacho})
+
+
+def lost_frames(recording: Recording) -> Recording:
+    kept = np.delete(np.arange(len(recording)), np.random.default_rng(1).choice(np.arange(1, 1500), 30, replace=False))
+    reference = {key: value[kept] for key, value in recording.reference.items()}
+    return replace(recording, t_s=recording.t_s[kept], readings=recording.readings[kept], reference=reference)
+
+
+def clipped(recording: Recording) -> Recording:
+    motion = random_profile(np.random.default_rng(7), SETTING.duration)
+    effect = make_effect("saturation", {"limit_m_s2": 10.4})
+    return measure(np.random.default_rng(8), Twin.load(TWIN), (effect,), SETTING, motion=motion)
+
+
+HARD = {
+    "no rotation": (lambda recording: rest(), "nothing_found", set()),
+    "a channel that reads zero": (lambda recording: dead_channel(recording, 0.0), "explained", {"stuck_channel"}),
+    "tachometer at half the rate": (slow_tacho, "nothing_found", set()),
+    "lost frames": (lost_frames, "explained", {"dropped_frames"}),
+    "saturated": (clipped, "explained", {"saturation"}),
+    "axes swapped": (
+        lambda recording: replace(recording, readings=recording.readings[:, [1, 0, *range(2, 12)]]),
+        "explained",
+        {"axis_swap"},
+    ),
+}
+
+
+@pytest.mark.parametrize(("change", "verdict", "causes"), HARD.values(), ids=HARD)
+def test_hard_input_gets_a_verdict(gfimu_command, ordinary, tmp_path, monkeypatch, change, verdict, causes):
+    # The report has tests of its own and takes longer than the diagnosis.
+    monkeypatch.setattr("gfimu.diagnosis.folder.write_report", lambda path, diagnosis: path.write_text("report"))
+    change(ordinary).write(tmp_path / "run.parquet")
+    done = gfimu_command("diagnose", tmp_path / "run.parquet", "--twin", TWIN, "--out", tmp_path / "out", "--json")
+    assert done.code == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert (found["verdict"], {cause["effect"] for cause in found["causes"]}) == (verdict, causes), found["sentences"]
+    assert {file.name for file in (tmp_path / "out").iterdir()} == FILES
+
+
+def test_a_dead_channel_is_named_in_the_report(gfimu_command, ordinary, tmp_path):
+    dead_channel(ordinary, np.nan).write(tmp_path / "run.parquet")
+    done = gfimu_command("diagnose", tmp_path / "run.parquet", "--twin", TWIN, "--out", tmp_path / "out")
+    assert done.code == 0, done.stderr
+    assert "Nothing is wrong with the simulation" in done.stdout
+    assert "Left out for want of a usable sample: a22." in " ".join(done.stdout.split())
+    assert "a22" in re.sub(r"<svg.*?</svg>", "", (tmp_path / "out" / "report.html").read_text(), flags=re.DOTALL)
+
+
+def renamed(recording: Recording) -> Recording:
+    return replace(recording, channels=tuple(name.replace("a", "m") for name in recording.channels))
+
+
+BAD = {
+    "too short": (lambda recording: recording.slice(0, 150), ["too short", "record at least"]),
+    "no drive column": (lambda recording: replace(recording, reference={}), ["tacho_rad_s is missing", "drive source"]),
+    "drive column empty": (
+        lambda recording: replace(recording, reference={"tacho_rad_s": np.full(len(recording), np.nan)}),
+        ["tacho_rad_s", "fewer than 20 values"],
+    ),
+    "another drive there": (
+        lambda recording: replace(recording, reference={"command_rad_s": recording.reference["tacho_rad_s"]}),
+        ["set source = 'command'"],
+    ),
+    "no reading at all": (
+        lambda recording: replace(recording, readings=np.full_like(recording.readings, np.nan)),
+        ["no channel has a value"],
+    ),
+    "wrong array": (renamed, ["a11_m_s2", "missing", "name the array"]),
+}
+
+
+@pytest.mark.parametrize(("change", "words"), BAD.values(), ids=BAD)
+def test_bad_recording(gfimu_command, ordinary, tmp_path, change, words):
+    change(ordinary).write(tmp_path / "run.parquet")
+    done = gfimu_command("diagnose", tmp_path / "run.parquet", "--twin", TWIN, "--out", tmp_path / "out")
+    assert done.code == 2
+    assert done.stdout == ""
+    assert done.stderr.startswith("gfimu: ")
+    assert done.stderr.count("\n") == 1
+    for word in ["run.parquet", *words]:
+        assert word in done.stderr
+    assert [file.name for file in tmp_path.iterdir()] == ["run.parquet"]
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--twin", "cube13", "--out", "out"], ["unknown twin 'cube13'", TWIN]),
+        (["--twin", "none/twin.toml", "--out", "out"], ["none/twin.toml", "no such file"]),
+        (["--twin", TWIN, "--out", "run.parquet"], ["run.parquet", "choose a folder"]),
+        (["--twin", TWIN, "--out", "out", "--held-out", "gone.csv"], ["gone.csv", "no such file"]),
+    ],
+)
+def test_bad_option(gfimu_command, ordinary, tmp_path, monkeypatch, options, words):
+    monkeypatch.chdir(tmp_path)
+    ordinary.write("run.parquet")
+    done = gfimu_command("diagnose", "run.parquet", *options)
+    assert done.code == 2
+    assert done.stdout == ""
+    for word in words:
+        assert word in done.stderr
+    assert [file.name for file in tmp_path.iterdir()] == ["run.parquet"]
