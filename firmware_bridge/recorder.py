@@ -30,7 +30,8 @@ __all__ = ["Batch", "RecordReport", "SampleClock", "record"]
 _FLUSH_S = 0.25
 _NO_READING = -(1 << 15)
 _SILENCE_S = 5.0
-_ANSWER_S = 1.5
+_ANSWER_S = 0.5  # samples wait so long for the board to tell their scale
+_SETUP_ANSWER_S = 3.0  # and so long if they will be left out because the board was not set up yet
 _IDENTIFY_EVERY_S = 1.0
 
 
@@ -137,7 +138,7 @@ class _Session:
         self.last_s = 0.0
         self.status_counts: dict[str, int] = {}
         self.waiting_for_board = form.name == "lpc1768"  # for its answer to the setup, which tells the scale
-        self.give_up_s = time.monotonic() + _ANSWER_S
+        self.give_up_s = time.monotonic() + (_SETUP_ANSWER_S if has_setup else _ANSWER_S)
         self._form, self._array, self._out, self._metadata = form, array, out, metadata
         self._has_setup = has_setup
         self._held: list[tuple[Samples, float]] = []
