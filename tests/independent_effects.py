@@ -49,7 +49,11 @@ DRAWS = {
     "eccentricity": lambda rng, run: _two(rng, "_m", 1e-3),
     "mount_tilt": lambda rng, run: _two(rng, "_rad", 5e-3),
     "table_tilt": lambda rng, run: _two(rng, "_rad", 3e-3),
-    "axis_wobble": lambda rng, run: {"amplitude_rad": 1e-3, "phase_rad": _phase(rng)},
+    "axis_wobble": lambda rng, run: {
+        "amplitude_rad": 1e-3,
+        "phase_rad": _phase(rng),
+        "direction_rad": float(rng.uniform(0, np.pi)),
+    },
     "gravity": lambda rng, run: {"delta_m_s2": 0.02 * _sign(rng)},
     "cogging": lambda rng, run: {
         "amplitude_rad_s2": 1.0,
@@ -134,6 +138,7 @@ EXOTICS = {
 
 SHAPE_KEYS = {
     "phase_rad",
+    "direction_rad",
     "order",
     "frequency_hz",
     "damping_ratio",
@@ -185,7 +190,7 @@ def _chip_vectors(parameters, unit):
     return np.array([[parameters.get(f"a{chip}_{axis}{unit}", 0.0) for axis in "xyz"] for chip in range(1, 5)])
 
 
-def rig_with(hidden, *, azimuth=0.0):
+def rig_with(hidden):
     """The rig that has the mechanical effects in it."""
     get = lambda name: hidden.get(name, {})  # noqa: E731
     tilt, mount, off = get("table_tilt"), get("mount_tilt"), get("eccentricity")
@@ -200,7 +205,7 @@ def rig_with(hidden, *, azimuth=0.0):
         torsion_hz=mode.get("frequency_hz", 12.0),
         torsion_damping=mode.get("damping_ratio", 0.03),
         cogging=(ripple.get("amplitude_rad_s2", 0.0), ripple.get("order", 1.0), ripple.get("phase_rad", 0.0)),
-        wobble=(nod.get("amplitude_rad", 0.0), nod.get("phase_rad", 0.0), azimuth),
+        wobble=(nod.get("amplitude_rad", 0.0), nod.get("phase_rad", 0.0), nod.get("direction_rad", 0.0)),
         stretch=get("centrifugal_flex").get("stretch_s2_rad2", 0.0),
     )
 

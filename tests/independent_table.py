@@ -170,14 +170,17 @@ def differenced_readings(rig, t, angle, rate):
 
 
 def random_command(rng, duration, top=15.0):
-    """Draw a commanded rate: S-curves between held speeds, smooth random waypoints, or plateaus with chirps."""
+    """Draw a commanded rate: S-curves between held speeds, smooth random waypoints, or plateaus with chirps.
+
+    The table rests for the first 0.3 s, so that its angle is zero at the first sample.
+    """
     kind = rng.integers(3)
     fine = np.arange(-2.0, duration + 2.0, 1e-3)
     if kind == 1:
-        knots = np.cumsum(rng.uniform(0.8, 2.5, int(duration) + 10)) - 2.0
+        knots = np.concatenate([[-2.0, 0.3], 0.3 + np.cumsum(rng.uniform(0.8, 2.5, int(duration) + 10))])
         rates = rng.uniform(-top, top, len(knots))
         rates[rng.random(len(knots)) < 0.15] = 0.0
-        rates[knots < 0.3] = 0.0
+        rates[:2] = 0.0
         profile = PchipInterpolator(knots, rates)(np.clip(fine, knots[0], knots[-1]))
         return CubicSpline(fine, gaussian_filter1d(profile, 60.0))
     profile, now, rate = np.zeros_like(fine), 0.5, 0.0

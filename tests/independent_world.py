@@ -84,18 +84,17 @@ def hide(seed, effects=(), size=300.0, **setting):
     plain = drive_table(command, Rig(), plan.duration, plan.step_s)
     plan = Setting(**{**setting, "top": float(np.abs(plain.readings).max())})
     temperature = _draw_temperature(rng, plan.duration)
-    azimuth = float(rng.uniform(0, np.pi))
     hidden = {}
     for name in effects:
         unit = (DRAWS | EXOTICS)[name](rng, plan)
         if name == "resonance":  # the mode's twist comes from a table that has this mode
             plain = drive_table(command, rig_with({name: unit}), plan.duration, plan.step_s)
-        hidden[name] = _sized(plain, plan, temperature, azimuth, name, unit, size)
-    rig = rig_with(hidden, azimuth=azimuth)
+        hidden[name] = _sized(plain, plan, temperature, name, unit, size)
+    rig = rig_with(hidden)
     run = drive_table(command, rig, plan.duration, plan.step_s) if _differs(rig) else plain
     t, readings, tacho = noise_free(run, plan, temperature, hidden, rig, run.readings)
     columns = _measured(rng, plan, t, readings, tacho, temperature, hidden)
-    reached = _distance(plain, plan, temperature, azimuth, hidden)
+    reached = _distance(plain, plan, temperature, hidden)
     return HiddenRun(columns, tuple(hidden.items()), reached)
 
 
@@ -110,7 +109,7 @@ def _differs(rig):
     )
 
 
-def _sized(run, plan, temperature, azimuth, name, unit, size):
+def _sized(run, plan, temperature, name, unit, size):
     """Scale an effect's parameters until it is ``size`` large."""
     if name in SIZELESS:
         return unit
@@ -120,7 +119,7 @@ def _sized(run, plan, temperature, azimuth, name, unit, size):
         return scaled(name, unit, size * np.hypot(WHITE[0], LSB / np.sqrt(12)) / force)
     factor = 1.0
     for _ in range(6):
-        reached = _distance(run, plan, temperature, azimuth, {name: scaled(name, unit, factor)})
+        reached = _distance(run, plan, temperature, {name: scaled(name, unit, factor)})
         ratio = np.clip(size / max(reached, 1e-9), 1e-2, 1e2)
         factor *= ratio
         if abs(ratio - 1) < 0.03:
@@ -131,9 +130,9 @@ def _sized(run, plan, temperature, azimuth, name, unit, size):
     return found
 
 
-def _distance(run, plan, temperature, azimuth, hidden):
+def _distance(run, plan, temperature, hidden):
     """d′ of what has a noise-free form, from readings by differenced positions."""
-    rig = rig_with(hidden, azimuth=azimuth)
+    rig = rig_with(hidden)
     before = noise_free(run, plan, temperature, {}, Rig())
     after = noise_free(run, plan, temperature, hidden, rig)
     sigma = np.hypot(WHITE, LSB / np.sqrt(12))

@@ -173,14 +173,19 @@ def z_scores(cause: NamedCause, truth: Mapping[str, Any]) -> dict[str, float]:
 
     A parameter that the verdict leaves out is compared as zero, where a standard deviation is given for it.
     """
+    # A nod about the opposite direction with the opposite phase is the same nod.
+    turned = float(cause.parameters.get("direction_rad", 0.0)) - float(truth.get("direction_rad", 0.0))
+    opposite = np.pi if np.cos(turned) < 0 else 0.0
     scores = {}
     for key, std in cause.std.items():
         estimate, true = cause.parameters.get(key, 0.0), truth.get(key, 0.0)
         if not isinstance(estimate, int | float) or not isinstance(true, int | float) or not std or std <= 0:
             continue
         error = float(estimate) - float(true)
-        if key.endswith("phase_rad"):
-            error = (error + np.pi) % _TURN - np.pi
+        if key == "phase_rad":
+            error = (error + opposite + np.pi) % _TURN - np.pi
+        elif key == "direction_rad":
+            error = (error + np.pi / 2) % np.pi - np.pi / 2
         scores[key] = error / std
     return scores
 

@@ -195,7 +195,9 @@ def test_the_mujoco_rig_carries_it_and_agrees_with_the_analytic_model(name, cube
 TORSION = """
 <mujoco>
   <compiler angle="radian"/>
-  <option timestep="0.0005" integrator="RK4" gravity="0 0 -9.80665"><flag contact="disable" eulerdamp="disable"/></option>
+  <option timestep="0.0005" integrator="RK4" gravity="0 0 -9.80665">
+    <flag contact="disable" eulerdamp="disable"/>
+  </option>
   <worldbody>
     <body name="table">
       <joint name="shaft" type="hinge" axis="0 0 1" armature="1000"/>
