@@ -197,9 +197,11 @@ class Twin:
     def sample_times(self, t: NDArray[np.float64], effects: Sequence[Any] = ()) -> NDArray[np.float64]:
         """Return the true time that each chip's reading and, last, the reference belong to, shape (n, k + 1)."""
         world = self.world(effects)
-        times = world.chip_times(t)
-        lag = sum(e.value("time_constant_s") for e in (*self.effects, *effects) if e.name == "sensor_lag")
-        return np.column_stack([times - lag, t - world.tacho_delay])
+        return np.column_stack([world.chip_times(t), t - world.tacho_delay])
+
+    def sensing_lag(self, effects: Sequence[Any] = ()) -> float:
+        """Return the time constant of the sensing chain's first-order lag, s."""
+        return float(sum(e.value("time_constant_s") for e in (*self.effects, *effects) if e.name == "sensor_lag"))
 
     def expected_noise(self, sample_rate: float) -> ExpectedNoise:
         """Return white noise and quantisation of the part at a sample rate, as the data sheet has them."""

@@ -152,7 +152,7 @@ def roughness_prior(
     rate = smooth_rate(run, is_angle=is_angle)
     third = np.gradient(np.gradient(np.gradient(rate, period), period), period)
     window = max(int(0.3 / period), 3)
-    power = uniform_filter1d(third**2, window, mode="nearest")
+    power = np.maximum(uniform_filter1d(third**2, window, mode="nearest"), 0.0)
     # What white noise of the reference alone gives after the same smoothing and differentiation.
     noise = np.random.default_rng(0).standard_normal(4096) * reference_noise
     smooth = gaussian_filter1d(noise, max(0.05 / period, 0.5))

@@ -172,6 +172,10 @@ class WorldModel(Protocol):
         """Return the true time that each chip's reading and, last, the reference belong to, shape (n, k + 1)."""
         ...
 
+    def sensing_lag(self, effects: Sequence[Effect] = ()) -> float:
+        """Return the time constant of the sensing chain's first-order lag, s; zero where it has none."""
+        ...
+
     def expected_noise(self, sample_rate: float) -> ExpectedNoise:
         """Return the noise it expects at a sample rate."""
         ...

@@ -27,6 +27,7 @@ from gfimu.diagnosis.run import Run
 __all__ = ["Linearisation", "Segment", "difference_noise"]
 
 KNOT_SPACING = 0.05
+TIME_MARGIN = 0.5
 _DEGREE = 4
 _KNOWN_ANGLE_STD = 5e-3
 _STATE_STEPS = (1e-5, 1e-4, 1e-3)
@@ -88,7 +89,9 @@ class Segment:
         self.start_angle, self.start_angle_std = start_angle, start_angle_std
         period = run.sample_period
         spacing = max(KNOT_SPACING, 4 * period)
-        self.spline = AngleSpline(run.t[0] - 2 * spacing, run.t[-1] + 2 * spacing, spacing)
+        # Late chips and fast clocks ask for the motion beyond the ends of the run.
+        margin = max(TIME_MARGIN, 2 * spacing)
+        self.spline = AngleSpline(run.t[0] - margin, run.t[-1] + margin, spacing)
         signs = (-1.0) ** np.arange(self.spline.size)
         self._alternating = np.outer(signs, signs)
         self.basis = CosineBasis(len(run.t), period)
@@ -155,7 +158,7 @@ class Segment:
         """Take the roughness from the present drive, which knows the corners of ramps better than the reference."""
         third = self.spline.roughness_rows() @ self.coefficients
         window = max(int(0.3 / self.spline.spacing), 3)
-        self._learned = ROUGHNESS_FACTOR * np.sqrt(uniform_filter1d(third**2, window, mode="nearest"))
+        self._learned = ROUGHNESS_FACTOR * np.sqrt(np.maximum(uniform_filter1d(third**2, window, mode="nearest"), 0.0))
         self._set_roughness()
 
     def tune_roughness(self, effects: Sequence[Effect]) -> None:
@@ -253,14 +256,19 @@ class Segment:
             moved = self.predict(effects, _Moved(spin, place, step))
             slopes.append(np.where(self.weight_mask, (moved - base) / step, 0.0))
         times = self.model.sample_times(self.run.t, effects)
+        lag = self.model.sensing_lag(effects)
+        delayed = _lag_matrix(len(times), lag / self.run.sample_period) if lag > 0 else None
         chips = np.append(self.model.array.chip_of_channel, times.shape[1] - 1)
-        cache: dict[bytes, tuple[csr_array, csr_array, csr_array]] = {}
+        cache: dict[bytes, tuple[csr_array, ...]] = {}
         matrices = []
         for column, chip in enumerate(chips):
             at = times[:, chip]
-            key = at.tobytes()
+            sensed = bool(chip < times.shape[1] - 1)
+            key = at.tobytes() + bytes([sensed])
             if key not in cache:
                 cache[key] = self.spline.matrices(at)
+                if delayed is not None and sensed:
+                    cache[key] = tuple(csr_array(delayed @ matrix) for matrix in cache[key])
             total = csr_array((len(at), self.spline.size))
             for slope, matrix in zip(slopes, cache[key], strict=True):
                 mine = slope[:, column]
@@ -329,6 +337,18 @@ class _Moved:
         parts = [state.angle, state.rate, state.acceleration]
         parts[self._place] = parts[self._place] + self._step
         return SplineState(*parts)
+
+
+def _lag_matrix(n: int, samples: float) -> csr_array:
+    """Return the first-order lag of ``samples`` sample periods as a matrix (n, n), inputs joined by straight lines."""
+    x = 1.0 / samples
+    decay = np.exp(-x)
+    mean_decay = -np.expm1(-x) / x
+    length = min(int(np.ceil(12.0 * samples)) + 2, n)
+    response = np.empty(length)
+    response[0] = 1.0 - mean_decay
+    response[1:] = (decay * (1.0 - mean_decay) + mean_decay - decay) * decay ** np.arange(length - 1)
+    return csr_array(diags_array(list(response), offsets=[-k for k in range(length)], shape=(n, n)))
 
 
 def difference_noise(reference: NDArray[np.float64]) -> float:
