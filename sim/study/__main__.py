@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from gfimu.errors import GfimuError
+from sim.study.baselines import METHODS
 from sim.study.cases import STUDIES, study_cases
 from sim.study.report import summarise, write_report
 from sim.study.runner import open_executor, read_outcomes, run_study
@@ -27,7 +28,7 @@ def _run(options: argparse.Namespace) -> None:
     with open_executor(options.workers, options.cluster) as executor:
         for study in options.studies:
             cases = study_cases(study, options.first)
-            run_study(cases, options.out, executor, source=options.world, tell=_print_outcome)
+            run_study(cases, options.out, executor, source=options.world, method=options.method, tell=_print_outcome)
 
 
 def _report(options: argparse.Namespace) -> None:
@@ -50,6 +51,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     run.add_argument("--workers", type=int, default=2)
     run.add_argument("--cluster", default="", help="address of a Dask scheduler")
     run.add_argument("--world", default="", help="FILE.py:FUNCTION of another generator of worlds")
+    run.add_argument("--method", default="", choices=["", *METHODS], help="a simpler method instead of the diagnosis")
     run.set_defaults(work=_run)
     report = commands.add_parser("report", help="tables and figures from outcomes")
     report.add_argument("outcomes", nargs="+")

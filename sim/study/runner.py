@@ -8,12 +8,14 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from gfimu.errors import InputError
+from sim.study.baselines import run_baseline
 from sim.study.cases import Case
 from sim.study.outcome import run_case
 
@@ -60,7 +62,7 @@ def run_study(
     executor: Executor,
     *,
     source: str = "",
-    work: Callable[[Case, str], dict[str, Any]] = run_case,
+    method: str = "",
     tell: Callable[[dict[str, Any]], None] | None = None,
 ) -> int:
     """Run the cases whose outcome is not yet in the file; return how many were run.
@@ -75,15 +77,16 @@ def run_study(
         Where the cases run.
     source : str
         Generator of the worlds, as in `draw_world`.
-    work : callable
-        What is done with a case; by default it is diagnosed.
+    method : str
+        A simpler method instead of the diagnosis (`sim.study.baselines.METHODS`).
     tell : callable, optional
         Called with each outcome as it comes.
     """
     file = Path(out)
     file.parent.mkdir(parents=True, exist_ok=True)
-    done = {(outcome["key"], outcome["source"]) for outcome in read_outcomes(file)}
-    open_cases = [case for case in cases if (case.key, source or "sim.campaign") not in done]
+    work = partial(run_baseline, method) if method else run_case
+    done = {(outcome["key"], outcome["source"], outcome.get("method", "")) for outcome in read_outcomes(file)}
+    open_cases = [case for case in cases if (case.key, source or "sim.campaign", method) not in done]
     torn = file.exists() and file.stat().st_size > 0 and not file.read_bytes().endswith(b"\n")
     with file.open("a", encoding="utf-8") as lines:
         if torn:
