@@ -223,7 +223,7 @@ def fingerprint(
     }
     if run.temperature is not None and np.ptp(run.temperature) > 0:
         terms["T"] = run.temperature - run.temperature.mean()
-    design = np.column_stack(list(terms.values()))  # (n, k)
+    design = np.nan_to_num(np.column_stack(list(terms.values())))  # (n, k); a free body has no angle
     scores = [_Regressions(run.valid, gain, residual).together(design) for residual in (before, after)]
     return Fingerprint(tuple(channels), tuple(terms), scores[0], scores[1])
 

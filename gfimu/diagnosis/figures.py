@@ -34,6 +34,7 @@ _BEFORE, _AFTER, _NOISE, _INK, _PALE = "#d64545", "#1f9d6b", "#8a8f98", "#22262e
 _CHANNELS = ("#d98200", "#2f7fc1", "#00896b", "#b4499a")
 _DIVERGING = "RdBu_r"
 _MOST_POINTS = 4000
+_MOST_FREQUENCIES = 1200
 _DPI = 110
 _CHANCE = 3.0
 _SMOOTH_S = 0.15
@@ -120,9 +121,12 @@ def spectrum_figure(spectrum: ResidualSpectrum) -> str:
     with mpl.rc_context(_STYLE):
         figure = Figure(figsize=(5.4, 2.5), layout="constrained")
         axis = figure.subplots()
-        axis.plot(spectrum.at, spectrum.noise, color=_NOISE, linewidth=1.0, linestyle="--", label="noise")
+        group = max(1, len(spectrum.at) // _MOST_FREQUENCIES)
+        starts = np.arange(0, len(spectrum.at), group)
+        axis.plot(spectrum.at[starts], spectrum.noise[starts], color=_NOISE, linestyle="--", label="noise")
         for values, colour, label in ((spectrum.before, _BEFORE, "before"), (spectrum.after, _AFTER, "after")):
-            axis.plot(spectrum.at, values, color=colour, linewidth=0.9, label=label, rasterized=len(values) > 3000)
+            peaks = np.maximum.reduceat(values, starts)  # a line must not vanish between the points drawn
+            axis.plot(spectrum.at[starts], peaks, color=colour, linewidth=0.9, label=label)
         axis.set_yscale("log")
         if spectrum.unit == "Hz":
             axis.set_xscale("log")
@@ -146,8 +150,8 @@ def whiteness_figure(whiteness: Whiteness) -> str:
             (pair[0], whiteness.cumulative_before, _BEFORE, "before"),
             (pair[1], whiteness.cumulative_after, _AFTER, "after"),
         ):
-            line = frequency / frequency[-1]
-            axis.fill_between(frequency, line - band, line + band, color=_PALE, alpha=0.6, linewidth=0)
+            ends, line = frequency[[0, -1]], np.array([0.0, 1.0])
+            axis.fill_between(ends, line - band, line + band, color=_PALE, alpha=0.6, linewidth=0)
             axis.plot(frequency[::step], curves[::step], color=colour, linewidth=0.8, rasterized=True)
             axis.set_title(title, loc="left", fontsize=9.5, pad=3)
             axis.set_xlabel("frequency, Hz")

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import fields, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +21,8 @@ from gfimu.visual.scene import Shape
 __all__ = ["write_picture"]
 
 _CUBE_CENTRE = (0.0, 0.0, 0.06)
+_MOST_SAMPLES = 20_000
+_PER_CHANNEL = ("white",)
 
 
 def write_picture(
@@ -47,7 +51,7 @@ def write_picture(
     shapes : mapping of str to sequence of Shape, optional
         Shapes of ``base``, ``table`` and ``cube`` of the extended rig; a plain rig otherwise.
     """
-    view = diagnosis.runs[run]
+    view, every = _thinned(diagnosis.runs[run])
     array = diagnosis.twin.array
     readings = np.where(view.valid, view.measured, np.nan)
     recording = Recording.from_arrays(view.t, readings, array)
@@ -61,13 +65,28 @@ def write_picture(
         known=_motion(view, turn, np.asarray(cube_centre, dtype=float)),
         plots=_plots(view),
         shapes=shapes,
-        notes=_notes(diagnosis),
+        notes=_notes(diagnosis) + (f"\n\nThe run is long: every {every}th sample is shown." if every > 1 else ""),
         title=f"diagnosis of {view.name}: {diagnosis.verdict.replace('_', ' ')}",
     )
 
 
-def _motion(view: RunView, mounting: NDArray[np.float64], centre: NDArray[np.float64]) -> KnownMotion:
-    """Motion of the cube with the drive as estimated, its centre carried round by the table."""
+def _thinned(view: RunView) -> tuple[RunView, int]:
+    """Keep every k-th sample of a long run, so that the file can be opened; returns k too."""
+    every = -(-len(view.t) // _MOST_SAMPLES)
+    if every == 1:
+        return view, 1
+    kept: dict[str, Any] = {
+        item.name: value[::every] if isinstance(value := getattr(view, item.name), np.ndarray) else value
+        for item in fields(view)
+        if item.name not in _PER_CHANNEL
+    }
+    return replace(view, **kept), every
+
+
+def _motion(view: RunView, mounting: NDArray[np.float64], centre: NDArray[np.float64]) -> KnownMotion | None:
+    """Motion of the cube with the drive as estimated, its centre carried round by the table; None of a free body."""
+    if not np.isfinite(view.angle).all():
+        return None
     table = Rotation.from_rotvec(np.outer(view.angle, [0.0, 0.0, 1.0]))
     attitude = table * Rotation.from_rotvec(mounting)
     return KnownMotion(

@@ -85,7 +85,7 @@ def _content(diagnosis: Diagnosis) -> Mapping[str, Any]:
                 "fastest": float(np.abs(run.rate).max()),
                 "lost": int((~run.valid.any(axis=1)).sum()),
                 "dead": [
-                    name for name, alive in zip(channels, run.valid.any(axis=0).tolist(), strict=True) if not alive
+                    name for name, alive in zip(channels, np.asarray(run.valid.any(axis=0)), strict=True) if not alive
                 ],
                 "picture": figures.before_after_figure(run, view.size),
                 "sentences": view.sentences,
