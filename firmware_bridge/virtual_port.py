@@ -22,6 +22,8 @@ __all__ = ["PseudoTerminal", "ServeReport", "TcpPort", "VirtualPort", "open_port
 _SLICE_S = 0.01
 _FAST_SLICE_S = 0.1
 _READ_BYTES = 4096
+_BUFFER_BYTES = 1 << 18
+_NOBODY_S = 1.0
 _PORTS = range(65536)
 
 
@@ -180,6 +182,44 @@ class ServeReport:
     received: int
 
 
+class _Buffer:
+    """Bytes on their way to the host."""
+
+    def __init__(self, port: VirtualPort) -> None:
+        self._port = port
+        self._bytes = bytearray()
+        self._moved_at = time.monotonic()
+        self.sent = 0
+        self.refused = 0
+
+    @property
+    def waiting(self) -> bool:
+        """Whether bytes wait."""
+        return bool(self._bytes)
+
+    def put(self, data: bytes) -> None:
+        """Append bytes."""
+        self._bytes += data
+
+    def pass_on(self, timeout_s: float) -> None:
+        """Hand the host what it takes."""
+        if not self._bytes:
+            return
+        taken = self._port.write(bytes(self._bytes), timeout_s)
+        del self._bytes[:taken]
+        self.sent += taken
+        if taken:
+            self._moved_at = time.monotonic()
+
+    def forget(self) -> None:
+        """Lose the newest bytes beyond the buffer's size, or all when nobody reads."""
+        idle = time.monotonic() - self._moved_at > _NOBODY_S
+        excess = len(self._bytes) - (0 if idle else _BUFFER_BYTES)
+        if excess > 0:
+            del self._bytes[-excess:]
+            self.refused += excess
+
+
 class _Interrupted:
     """Ends a loop at Ctrl-C without a traceback."""
 
@@ -197,7 +237,6 @@ def serve(
     *,
     duration_s: float | None = None,
     realtime: bool = True,
-    patience_s: float | None = None,
     stop: Callable[[], bool] | None = None,
     on_progress: Callable[[float], None] | None = None,
 ) -> ServeReport:
@@ -212,10 +251,8 @@ def serve(
     duration_s : float, optional
         Virtual time to run, s.
     realtime : bool
-        Keep pace with the clock on the wall; otherwise run as fast as the host reads.
-    patience_s : float, optional
-        How long the line waits for a host that does not read, s: in real time not at all (a UART has no flow control,
-        the bytes are lost), otherwise without end.
+        Keep pace with the clock on the wall: a host that reads late finds up to 256 KiB buffered, as a serial driver
+        does, and what exceeds that, or nobody reads for a second, is lost. Otherwise run as fast as the host reads.
     stop : callable, optional
         Asked often; True ends the run.
     on_progress : callable, optional
@@ -223,22 +260,19 @@ def serve(
     """
     began = time.monotonic()
     first = now = board.now
-    sent = refused = received = 0
+    received = 0
     end = None if duration_s is None else first + round(duration_s * TICKS_PER_SECOND)
-    patience = patience_s if patience_s is not None else (0.0 if realtime else _SLICE_S)
+    line = _Buffer(port)
     with _Interrupted():
         while (end is None or now < end) and not (stop is not None and stop()):
             target = now + round((_SLICE_S if realtime else _FAST_SLICE_S) * TICKS_PER_SECOND)
             now = board.run_until(target if end is None else min(target, end))
-            data, _ = board.take_sent()
-            taken = 0
-            while taken < len(data):
-                part = port.write(data[taken:], patience)
-                taken += part
-                if part == 0 and (realtime or patience_s is not None or (stop is not None and stop())):
-                    break
-            sent += taken
-            refused += len(data) - taken
+            line.put(board.take_sent()[0])
+            line.pass_on(0.0 if realtime else _SLICE_S)
+            while not realtime and line.waiting and not (stop is not None and stop()):
+                line.pass_on(_SLICE_S)
+            if realtime:
+                line.forget()
             asked = port.read()
             if asked:
                 board.receive(asked)
@@ -248,4 +282,4 @@ def serve(
             ahead = (now - first) / TICKS_PER_SECOND - (time.monotonic() - began)
             if realtime and ahead > 0:
                 time.sleep(ahead)
-    return ServeReport((now - first) / TICKS_PER_SECOND, time.monotonic() - began, sent, refused, received)
+    return ServeReport((now - first) / TICKS_PER_SECOND, time.monotonic() - began, line.sent, line.refused, received)

@@ -32,6 +32,24 @@ full_resolution = {full}
 """
 
 
+SWINGING = """
+name = "swinging"
+array = "cube12"
+sample_rate_hz = 100.0
+[motion]
+kind = "profile"
+segment = [
+  { kind = "hold", duration_s = 2.0 },
+  { kind = "sine", amplitude_rad_s = 6.0, frequency_hz = 0.8, duration_s = 20.0 },
+  { kind = "hold", duration_s = 2.0 },
+]
+[sensor]
+errors = false
+[reference]
+tacho_noise_std_rad_s = 0.005
+"""
+
+
 def ride() -> Ride:
     return Ride(Scenario.load("paper_run", changes=["sensor.errors=false"]), seed=1)
 
@@ -60,6 +78,8 @@ def test_interrupts_dropped_now_and_then(tmp_path: Path) -> None:
 def test_chips_read_one_after_another(tmp_path: Path) -> None:
     pytest.importorskip("ziglang", reason="the C compiler is in the extra 'firmware'")
     image = build("gfimu", tmp_path, defines={"GFIMU_CHIP_GAP_US": "2000U"}).elf
-    run = record_virtual(ride(), 30.0, rate_hz=100, rate_code=12, image=image)
+    scenario = tmp_path / "swinging.toml"
+    scenario.write_text(SWINGING)
+    run = record_virtual(Ride(scenario, seed=1), 24.0, rate_hz=100, rate_code=12, image=image)
     found = diagnosed(run.recording, tmp_path)
     assert "channel_skew" in [cause.effect for cause in found.causes]
