@@ -135,7 +135,7 @@ def quantities(run: RunView) -> list[Quantity]:
             "m/s²",
             "reading",
             (run.before, run.before**2),
-            run.before.mean(axis=1),
+            run.before,
         ),
     ]
     if run.temperature is not None:

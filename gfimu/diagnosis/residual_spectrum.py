@@ -123,12 +123,18 @@ def time_spectrum(
         )
         for one in standard
     ]
-    looks = n // 2
-    sentence = _sentence("{:.4g} Hz", "a line at a fixed frequency", channels, lines)
     return ResidualSpectrum(
-        "Hz", "amplitude density, m/s²/√Hz", frequency, densities[0], densities[1], noise, lines[0], lines[1],
-        looks, sentence,
-    )  # fmt: skip
+        unit="Hz",
+        quantity="amplitude density, m/s²/√Hz",
+        at=frequency,
+        before=densities[0],
+        after=densities[1],
+        noise=noise,
+        line_before=lines[0],
+        line_after=lines[1],
+        looks=n // 2,
+        sentence=_sentence("{:.4g} Hz", "a line at a fixed frequency", channels, lines),
+    )
 
 
 def order_spectrum(
@@ -147,7 +153,7 @@ def order_spectrum(
     turns = (stop - start) / (2 * np.pi)
     if not np.isfinite(turns) or turns < _FEWEST_TURNS:
         return None
-    cells = int(np.ceil(turns * _CELLS_PER_TURN)) + 1
+    cells = _CELLS_PER_TURN * int(np.ceil(turns + 1e-9))  # whole turns, so that whole orders are on the grid
     place = ((run.angle - start) / (2 * np.pi) * _CELLS_PER_TURN).astype(int)
     # Each sample counts by the angle it covers: ∫ r exp(−inθ) |dθ|; a table at rest adds nothing.
     weight = np.abs(run.rate)[:, None] * run.valid  # (n, c)
@@ -179,9 +185,17 @@ def order_spectrum(
     if tone is not None and tone.significant and loudest and tone.amplitude.max() > loudest.amplitude.max():
         sentence = ""
     return ResidualSpectrum(
-        "cycles per revolution", "amplitude, m/s²", np.asarray(orders[shown], dtype=float), np.asarray(old), np.asarray(new), noise, placed[0],
-        placed[1], int(shown.sum()), sentence,
-    )  # fmt: skip
+        unit="cycles per revolution",
+        quantity="amplitude, m/s²",
+        at=np.asarray(orders[shown], dtype=float),
+        before=np.asarray(old),
+        after=np.asarray(new),
+        noise=noise,
+        line_before=placed[0],
+        line_after=placed[1],
+        looks=int(shown.sum()),
+        sentence=sentence,
+    )
 
 
 def _strongest_line(
