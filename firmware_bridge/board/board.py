@@ -8,6 +8,7 @@ from typing import Any, Protocol
 from firmware_bridge.adxl345_device import TICKS_PER_SECOND, Adxl345, LineFault
 from firmware_bridge.board.cpu import Cpu
 from firmware_bridge.board.dwt import CycleCounter
+from firmware_bridge.board.gpdma import Gpdma
 from firmware_bridge.board.gpio import Gpio, GpioInterrupts
 from firmware_bridge.board.i2c import I2c
 from firmware_bridge.board.nvic import Nvic
@@ -38,7 +39,6 @@ _STORED = (
     ("mcpwm", 0x400B8000, 0x1000),
     ("qei", 0x400BC000, 0x1000),
     ("ethernet", 0x50000000, 0x4000),
-    ("gpdma", 0x50004000, 0x4000),
     ("usb", 0x5000C000, 0x4000),
 )
 
@@ -128,6 +128,7 @@ class Board:
         self.cycle_counter = CycleCounter(self, "dwt", 0xE0001000)
         for name, base, size in _STORED:
             StoredRegisters(self, name, base, size)
+        Gpdma(self)
         self.i2cs[0].devices = list(self.sensors)
 
     def _map(self) -> None:
@@ -161,12 +162,12 @@ class Board:
 
         def read(offset: int, size: int) -> int:
             address, bit = place(offset)
-            return self._read_word(address) >> bit & 1
+            return self.read_bus(address) >> bit & 1
 
         def write(offset: int, value: int, size: int) -> None:
             address, bit = place(offset)
-            old = self._read_word(address)
-            self._write_word(address, old & ~(1 << bit) | (value & 1) << bit)
+            old = self.read_bus(address)
+            self.write_bus(address, old & ~(1 << bit) | (value & 1) << bit)
 
         return read, write
 
@@ -176,18 +177,20 @@ class Board:
                 return peripheral
         return None
 
-    def _read_word(self, address: int) -> int:
+    def read_bus(self, address: int, size: int = 4) -> int:
+        """Read memory or a register as another bus master does: without the processor and its time."""
         peripheral = self._peripheral_at(address)
         if peripheral is not None:
-            return peripheral.read(address - peripheral.base, 4)
-        return int.from_bytes(self.cpu.peek(address, 4), "little")
+            return peripheral.read(address - peripheral.base, size)
+        return int.from_bytes(self.cpu.peek(address, size), "little")
 
-    def _write_word(self, address: int, value: int) -> None:
+    def write_bus(self, address: int, value: int, size: int = 4) -> None:
+        """Write memory or a register as another bus master does."""
         peripheral = self._peripheral_at(address)
         if peripheral is not None:
-            peripheral.write(address - peripheral.base, value, 4)
+            peripheral.write(address - peripheral.base, value, size)
         else:
-            self.cpu.poke(address, value.to_bytes(4, "little"))
+            self.cpu.poke(address, (value & ((1 << 8 * size) - 1)).to_bytes(size, "little"))
 
     @property
     def image(self) -> ElfImage:

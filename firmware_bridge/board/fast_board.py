@@ -337,18 +337,20 @@ class FastBoard(Board):
         block = np.ascontiguousarray(self.sensors[sensor].source(first, period, count, bw_rate), dtype=np.int32)
         ctypes.memmove(out, block.ctypes.data, block.nbytes)
 
-    def _read_word(self, address: int) -> int:
+    def read_bus(self, address: int, size: int = 4) -> int:
+        """Read memory or a register as another bus master does."""
         peripheral = self._peripheral_at(address)
         if peripheral is not None and type(peripheral) in _KINDS:
             return int(self.native.board_access(self.handle, address, 0, 0))
-        return super()._read_word(address)
+        return super().read_bus(address, size)
 
-    def _write_word(self, address: int, value: int) -> None:
+    def write_bus(self, address: int, value: int, size: int = 4) -> None:
+        """Write memory or a register as another bus master does."""
         peripheral = self._peripheral_at(address)
         if peripheral is not None and type(peripheral) in _KINDS:
             self.native.board_access(self.handle, address, value, 1)
         else:
-            super()._write_word(address, value)
+            super().write_bus(address, value, size)
 
     def schedule(self, slot: int, when: int) -> None:
         """Wake a peripheral at ``when``."""

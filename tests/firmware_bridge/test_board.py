@@ -104,10 +104,11 @@ def test_an_image_that_is_not_ours(make_board, compile_image, kind: str) -> None
         "capture_stop": 2399, "basepri_held": 2, "uart1_received": 5, "uart1_line": 0, "ssp0_echo": 0xA7,
         "i2c_devid": 0xE5, "i2c_missing": 0xFFFF, "gpio_rising": 1 << 10, "gpio_falling": 1 << 10, "bitband_pin": 1,
         "bitband_ram": 1 << 7, "ahb_word": 1, "level_count": 3, "svc_number": 42, "psp_used": 0x600D,
-        "pendsv_order": 12,
+        "pendsv_order": 12, "dma_done": 2, "dma_sum": 8 * 0x1000 + 28,
     }  # fmt: skip
     assert {name: found[name] for name in expected} == expected
     assert board.cpu.peek(board.image.symbols["uart1_text"], 5) == b"hello"
+    assert board.uarts[1].take_sent()[0] == b"world"
 
 
 FAULTY = {

@@ -12,7 +12,7 @@ extern uint32_t _ebss;
 
 volatile uint32_t done, cycles_per_us, timer2_matches, systicks, uart1_received, uart1_line, ssp0_echo, i2c_devid;
 volatile uint32_t gpio_rising, gpio_falling, bitband_pin, bitband_ram, svc_number, pendsv_order, psp_used, nested_order;
-volatile uint32_t basepri_held, icsr_active, level_count, capture_stop, i2c_missing, pll_hz_ok, ahb_word;
+volatile uint32_t basepri_held, icsr_active, level_count, capture_stop, i2c_missing, pll_hz_ok, ahb_word, dma_done, dma_sum;
 volatile uint8_t uart1_text[16];
 static uint32_t thread_stack[64];
 
@@ -33,6 +33,11 @@ void UART1_Handler(void)
     if (cause == 0x04 || cause == 0x0C)
         while (REG(0x40010014) & 1)
             uart1_text[uart1_received++ & 15] = (uint8_t)REG(0x40010000);
+}
+void DMA_Handler(void)
+{
+    dma_done++;
+    REG(0x50004008) = REG(0x50004004);
 }
 void EINT3_Handler(void)
 {
@@ -219,6 +224,36 @@ int main(void)
     while (level_count < 3)
         idle();
 
+    /* DMA: one linked list of two items copies words in the AHB RAM; then five bytes go out of UART1. */
+    static const char hello[] = "world";
+    static volatile uint32_t list[4];
+    volatile uint32_t *ahb = (volatile uint32_t *)0x2007C100;
+    for (uint32_t i = 0; i < 8; i++)
+        ahb[i] = 0x1000 + i;
+    list[0] = 0x2007C110;
+    list[1] = 0x2007C210;
+    list[2] = 0;
+    list[3] = 4 | 2u << 18 | 2u << 21 | 3u << 26 | 1u << 31;
+    REG(0x50004030) = 1;
+    REG(0x50004100) = 0x2007C100;
+    REG(0x50004104) = 0x2007C200;
+    REG(0x50004108) = (uint32_t)list;
+    REG(0x5000410C) = 4 | 2u << 18 | 2u << 21 | 3u << 26;
+    REG(0xE000E100) = 1u << 26;
+    REG(0x50004110) = 1 | 1u << 15;
+    while (!dma_done)
+        idle();
+    dma_sum = 0;
+    for (uint32_t i = 0; i < 8; i++)
+        dma_sum += ((volatile uint32_t *)0x2007C200)[i];
+    REG(0x50004120) = (uint32_t)hello;
+    REG(0x50004124) = 0x40010000;
+    REG(0x50004128) = 0;
+    REG(0x5000412C) = 5 | 1u << 26 | 1u << 31;
+    REG(0x50004130) = 1 | 10u << 6 | 1u << 11 | 1u << 15;
+    while (dma_done < 2)
+        idle();
+
     /* The thread on its own stack asks the supervisor; PendSV follows after it. */
     __asm volatile("msr psp, %0" ::"r"(&thread_stack[64]));
     __asm volatile("msr control, %0\n isb" ::"r"(2));
@@ -241,4 +276,5 @@ __attribute__((section(".isr_vector"), used)) static const vector vectors[16 + 3
     (vector)(&_estack), Reset_Handler, Fault_Handler, Fault_Handler, Fault_Handler, Fault_Handler, Fault_Handler, NULL,
     NULL, NULL, NULL, SVC_Handler, Fault_Handler, NULL, PendSV_Handler, SysTick_Handler,
     [16 + 3] = TIMER2_Handler, [16 + 4] = TIMER3_Handler, [16 + 6] = UART1_Handler, [16 + 21] = EINT3_Handler,
+    [16 + 26] = DMA_Handler,
 };
