@@ -47,7 +47,7 @@ class Setting:
 
 @dataclass(frozen=True)
 class HiddenRun:
-    """Columns of the file, and apart from them what is hidden and its d′ (as far as it leaves the table's motion)."""
+    """Columns of the file, and apart from them what is hidden and the d′ of the least of it."""
 
     columns: dict
     truth: tuple
@@ -80,7 +80,8 @@ def hide(seed, effects=(), size=300.0, **setting):
     """
     rng = np.random.default_rng([seed, 77])
     plan = Setting(**setting)
-    command = random_command(rng, plan.duration)
+    top = 25.0 if "saturation" in effects else 15.0  # rad/s: something has to reach the limit
+    command = random_command(rng, plan.duration, top)
     plain = drive_table(command, Rig(), plan.duration, plan.step_s)
     plan = Setting(**{**setting, "top": float(np.abs(plain.readings).max())})
     temperature = _draw_temperature(rng, plan.duration)
@@ -94,8 +95,17 @@ def hide(seed, effects=(), size=300.0, **setting):
     run = drive_table(command, rig, plan.duration, plan.step_s) if _differs(rig) else plain
     t, readings, tacho = noise_free(run, plan, temperature, hidden, rig, run.readings)
     columns = _measured(rng, plan, t, readings, tacho, temperature, hidden)
-    reached = _distance(plain, plan, temperature, hidden)
-    return HiddenRun(columns, tuple(hidden.items()), reached)
+    least = min((_reached(plain, plan, temperature, name, hidden[name], size) for name in hidden), default=np.inf)
+    return HiddenRun(columns, tuple(hidden.items()), least)
+
+
+def _reached(run, plan, temperature, name, parameters, size):
+    """d′ of one effect, infinite for those without a noise-free form; what wiring does is never small."""
+    if name == "cogging":
+        return size
+    if name == "saturation":
+        return float(np.linalg.norm(np.maximum(np.abs(run.readings[::10]) - parameters["limit_m_s2"], 0.0) / WHITE))
+    return np.inf if name in SIZELESS else _distance(run, plan, temperature, {name: parameters})
 
 
 def _differs(rig):

@@ -68,6 +68,7 @@ def run_baseline(method: str, case: Case, source: str = "") -> dict[str, Any]:
         "source": source or "sim.campaign",
         "method": method,
         **case.to_dict(),
+        "reached": world.reached,
         "verdict": "explained" if causes else "nothing_found",
         "causes": causes,
         "wall_s": time.perf_counter() - wall,

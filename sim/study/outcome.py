@@ -17,7 +17,7 @@ from gfimu.diagnosis.verdict import Diagnosis, NamedCause
 from gfimu.errors import InputError
 from gfimu.recording import Recording
 from gfimu.units import STANDARD_GRAVITY
-from sim.campaign import Measurement, hidden_effect, measure, random_profile
+from sim.campaign import Measurement, detectability, hidden_effect, measure, random_profile
 from sim.effects import Effect, make_effect
 from sim.study.cases import Case
 from sim.twin import Twin
@@ -26,15 +26,22 @@ __all__ = ["HiddenWorld", "draw_world", "outcome_of", "run_case"]
 
 _MG = STANDARD_GRAVITY / 1000.0
 _TURN = 2 * np.pi
+_WITHOUT_NOISE_FREE_FORM = frozenset(
+    {"noise", "bias_random_walk", "coarse_resolution", "stuck_channel", "dropped_frames"}
+)
 
 
 @dataclass(frozen=True)
 class HiddenWorld:
-    """A recording, the twin to diagnose it with, and what is hidden: contract names and parameters."""
+    """A recording, the twin to diagnose it with, and what is hidden: contract names and parameters.
+
+    ``reached`` is the d′ of the least hidden effect that has a noise-free form, infinite where none has.
+    """
 
     recording: Recording
     twin: Twin
     truth: tuple[tuple[str, Mapping[str, Any]], ...]
+    reached: float
 
 
 @dataclass(frozen=True)
@@ -83,7 +90,13 @@ def draw_world(case: Case, source: str = "") -> HiddenWorld:
     hidden = [hidden_effect(rng, twin, name, motion, case.size, setting) for name in case.effects]
     residue = calibration_residue(rng, twin.array) if case.residue else []
     recording = measure(rng, twin, [*residue, *hidden], setting, motion=motion)
-    return HiddenWorld(recording, twin, tuple((effect.name, effect.parameters) for effect in hidden))
+    sizes = [
+        detectability(twin, [effect], motion, setting)
+        for effect in hidden
+        if effect.name not in _WITHOUT_NOISE_FREE_FORM
+    ]
+    truth = tuple((effect.name, effect.parameters) for effect in hidden)
+    return HiddenWorld(recording, twin, truth, min(sizes, default=np.inf))
 
 
 def _foreign_world(case: Case, twin: Twin, source: str) -> HiddenWorld:
@@ -99,7 +112,7 @@ def _foreign_world(case: Case, twin: Twin, source: str) -> HiddenWorld:
     columns = {name: np.asarray(values) for name, values in run.columns.items()}
     readings = np.column_stack([columns.pop(f"{channel}_m_s2") for channel in twin.array.channels])
     recording = Recording.from_arrays(columns.pop("t_s"), readings, twin.array, reference=columns)
-    return HiddenWorld(recording, twin, tuple(run.truth))
+    return HiddenWorld(recording, twin, tuple(run.truth), run.detectability)
 
 
 def _load_function(source: str) -> Callable[..., Any]:
@@ -133,7 +146,8 @@ def run_case(case: Case, source: str = "") -> dict[str, Any]:
     else:
         found = outcome_of(diagnosis, world.truth)
     times = {"wall_s": time.perf_counter() - wall, "processor_s": time.process_time() - processor}
-    return {"key": case.key, "source": source or "sim.campaign", **case.to_dict(), **found, **times}
+    reached = {"reached": world.reached}
+    return {"key": case.key, "source": source or "sim.campaign", **case.to_dict(), **reached, **found, **times}
 
 
 def outcome_of(diagnosis: Diagnosis, truth: Sequence[tuple[str, Mapping[str, Any]]]) -> dict[str, Any]:

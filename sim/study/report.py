@@ -15,9 +15,12 @@ from scipy.stats import beta
 from gfimu.atomic_file import write_text
 from sim.study.figures import draw_confusion, draw_detection, draw_reliability
 
-__all__ = ["Tally", "rate_with_interval", "score", "summarise", "write_report"]
+__all__ = ["Tally", "rate_with_interval", "score", "summarise", "visible", "write_report"]
 
 Outcome = Mapping[str, Any]
+
+LEAST_VISIBLE = 7.0
+"""Size d′ below which an effect is at or below the information limit."""
 
 
 def score(outcome: Outcome) -> dict[str, bool]:
@@ -45,6 +48,12 @@ def score(outcome: Outcome) -> dict[str, bool]:
         "unknown": verdict == "unknown",
         "error": verdict == "error",
     }
+
+
+def visible(outcome: Outcome) -> bool:
+    """Whether what is hidden can be seen in the recording at all."""
+    reached = outcome.get("reached")
+    return reached is None or reached >= LEAST_VISIBLE
 
 
 def rate_with_interval(hits: int, cases: int) -> tuple[float, float, float]:
@@ -223,12 +232,15 @@ def _baselines(outcomes: Sequence[Outcome]) -> str:
 
 def summarise(outcomes: Sequence[Outcome]) -> str:
     """Return the tables as Markdown."""
-    own = [outcome for outcome in outcomes if "method" not in outcome]
-    rivals = [outcome for outcome in outcomes if "method" in outcome]
+    seen = [outcome for outcome in outcomes if visible(outcome)]
+    own = [outcome for outcome in seen if "method" not in outcome]
+    rivals = [outcome for outcome in seen if "method" in outcome]
     shared = {(outcome["key"], outcome["source"]) for outcome in rivals}
     same = [{**outcome, "method": "gfimu"} for outcome in own if (outcome["key"], outcome["source"]) in shared]
     return (
-        "## Overview\n\nRates in per cent with their 95 % intervals.\n\n"
+        "## Overview\n\nRates in per cent with their 95 % intervals. "
+        f"Left out: {len(outcomes) - len(seen)} runs in which what was drawn shows with d′ below {LEAST_VISIBLE:g} "
+        "(a clipping level that is never reached, a mode that is hardly rung).\n\n"
         + _overview(own)
         + _noise_levels(own)
         + _misses(own)
@@ -258,7 +270,7 @@ def reliability(outcomes: Sequence[Outcome]) -> list[tuple[float, float, int]]:
 def write_report(outcomes: Sequence[Outcome], folder: str | Path) -> list[Path]:
     """Write ``diagnosis-study.md`` and its figures into a folder; return the files."""
     place = Path(folder)
-    own = [outcome for outcome in outcomes if "method" not in outcome]
+    own = [outcome for outcome in outcomes if "method" not in outcome and visible(outcome)]
     singles = [outcome for outcome in own if outcome["study"] == "singles"]
     figures: list[tuple[str, str, Path]] = []
     if singles:
