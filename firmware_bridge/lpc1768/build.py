@@ -40,7 +40,7 @@ IMAGES: dict[str, tuple[str, ...]] = {
 """Images and the C files that make them."""
 
 _FLAGS = (
-    "-target", "thumb-freestanding-eabi", "-mcpu=cortex_m3", "-mthumb", "-std=c11", "-O2", "-g0",
+    "-target", "thumb-freestanding-eabi", "-mcpu=cortex_m3", "-mthumb", "-std=c11", "-O2", "-flto", "-g0",
     "-ffreestanding", "-fno-builtin", "-fno-sanitize=undefined", "-fno-unwind-tables",
     "-fno-asynchronous-unwind-tables", "-ffunction-sections", "-fdata-sections",
     "-Wall", "-Wextra", "-Wconversion", "-Werror", "-nostdlib",
