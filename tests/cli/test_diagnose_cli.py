@@ -105,7 +105,7 @@ def lost_frames(recording: Recording) -> Recording:
 
 
 def clipped(recording: Recording) -> Recording:
-    motion = random_profile(np.random.default_rng(7), SETTING.duration, top_rate=25.0)  # up to 31 m/s²
+    motion = random_profile(np.random.default_rng(17), SETTING.duration, top_rate=25.0)  # up to 27 m/s²
     effect = make_effect("saturation", {"limit_m_s2": 12.0})
     return measure(np.random.default_rng(8), Twin.load(TWIN), (effect,), SETTING, motion=motion)
 
