@@ -29,6 +29,7 @@ LEFT_OVER_ODDS = 10.0
 _UNIT = 0.03
 _STEPS = 8
 _SLOW = 10
+_LEAST_ROWS = 300
 _ORDERS = (1, 2, 3, 4, 6, 8, 12)
 
 
@@ -266,9 +267,15 @@ def _changing_noise(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Seque
     best = LeftOver(-np.inf, "", {})
     for segment, known in zip(segments, fixed, strict=True):
         left = np.diff(_left(segment, fit, known), n=2, axis=0) / np.sqrt(6.0)
-        use = segment.weight_mask[1:-1, :-1]
-        power = np.where(use, left**2, 0.0).sum(axis=1) / np.maximum(use.sum(axis=1), 1)
-        state = segment.spline.spin(segment.coefficients).at(segment.run.t[1:-1])
+        valid = segment.weight_mask[:, :-1]
+        use = valid[:-2] & valid[1:-1] & valid[2:]
+        rows = use.any(axis=1)
+        if rows.sum() < _LEAST_ROWS:
+            continue
+        use, left = use[rows], left[rows]
+        power = np.where(use, left**2, 0.0).sum(axis=1) / use.sum(axis=1)
+        times = segment.run.t[1:-1][rows]
+        state = segment.spline.spin(segment.coefficients).at(times)
         for name, value in (
             ("the rate", np.abs(state.rate)),
             ("the angular acceleration", np.abs(state.acceleration)),

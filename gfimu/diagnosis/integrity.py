@@ -24,6 +24,7 @@ _RANGE_FACTORS = (1 / 16, 1 / 8, 1 / 4, 1 / 2, 2.0, 4.0, 8.0, 16.0)
 _REMOVED = 0.7
 _SIGNIFICANT_RMS = 12.0
 _SPIKE = 8.0
+_LEAST_CODES = 4
 
 
 @dataclass(frozen=True)
@@ -136,7 +137,7 @@ def _clipping(run: Run, prediction: NDArray[np.float64], quantum: float, expecte
     levels = []
     for channel in range(run.readings.shape[1]):
         mine = run.readings[run.valid[:, channel], channel]
-        if len(mine) < 50:
+        if len(mine) < 50 or len(np.unique(mine)) < _LEAST_CODES:
             continue
         sigma = expected.white[channel]
         for sign in (1.0, -1.0):

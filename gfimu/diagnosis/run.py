@@ -127,6 +127,8 @@ def prepare_run(recording: Recording, model: WorldModel, *, name: str = "run") -
     valid = np.zeros(full.shape, dtype=bool)
     valid[place] = np.isfinite(readings)
     full[~valid] = 0.0
+    if valid.sum() < _MINIMUM_SAMPLES:
+        raise InputError(f"{name}: hardly any channel has a reading; check the recording's channel columns")
     reference = np.zeros(n)
     reference_valid = np.zeros(n, dtype=bool)
     reference[place] = drive

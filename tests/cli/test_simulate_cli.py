@@ -47,7 +47,7 @@ def test_rerun_recording_beside_it(gfimu_command, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["papr_run"], "unknown scenario 'papr_run'; valid: driven_run"),
+        (["papr_run"], "unknown scenario 'papr_run'; valid: calibration_poses"),
         (["missing.toml"], "missing.toml: no such file"),
         (["paper_run", "--set", "sensor.rang_g=8"], "unknown key 'rang_g'"),
         (["paper_run", "--set", "sample_rate_hz=fast"], "must be a finite number"),
