@@ -29,7 +29,7 @@ LEFT_OVER_ODDS = 10.0
 _UNIT = 0.03
 _STEPS = 8
 _SLOW = 10
-_LEAST_ROWS = 300
+_FEWEST_DIFFERENCES = 200
 _ORDERS = (1, 2, 3, 4, 6, 8, 12)
 
 
@@ -267,26 +267,25 @@ def _changing_noise(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Seque
     best = LeftOver(-np.inf, "", {})
     for segment, known in zip(segments, fixed, strict=True):
         left = np.diff(_left(segment, fit, known), n=2, axis=0) / np.sqrt(6.0)
-        valid = segment.weight_mask[:, :-1]
-        use = valid[:-2] & valid[1:-1] & valid[2:]
-        rows = use.any(axis=1)
-        if rows.sum() < _LEAST_ROWS:
-            continue
-        use, left = use[rows], left[rows]
-        power = np.where(use, left**2, 0.0).sum(axis=1) / use.sum(axis=1)
-        times = segment.run.t[1:-1][rows]
-        state = segment.spline.spin(segment.coefficients).at(times)
+        mask = segment.weight_mask[:, :-1]
+        use = mask[1:-1] & mask[:-2] & mask[2:]  # a second difference needs three samples
+        power, count = np.where(use, left**2, 0.0).sum(axis=1), use.sum(axis=1)
+        state = segment.spline.spin(segment.coefficients).at(segment.run.t[1:-1])
         for name, value in (
             ("the rate", np.abs(state.rate)),
             ("the angular acceleration", np.abs(state.acceleration)),
             ("time", segment.run.t[1:-1]),
         ):
             order = np.argsort(value, kind="stable")
-            means = np.array([power[part].mean() for part in np.array_split(order, 6)])
+            parts = np.array_split(order, 6)
+            counts = np.array([count[part].sum() for part in parts])
+            if counts.min() < _FEWEST_DIFFERENCES:
+                continue
+            means = np.array([power[part].sum() for part in parts]) / counts
             # Second differences of white noise: the mean square has about n/1.8 degrees of freedom per channel.
-            freedom = len(order) / 6 * use.shape[1] / 1.8
+            freedom = counts / 1.8
             spread = means / means.mean()
-            statistic = float(freedom / 2 * np.sum((spread - 1) ** 2))
+            statistic = float(np.sum(freedom / 2 * (spread - 1) ** 2))
             # A change below ten per cent in power is within what a part's own noise does.
             if np.ptp(spread) > 0.25:
                 odds = -float(chi2.logsf(statistic, 5)) - np.log(3.0)

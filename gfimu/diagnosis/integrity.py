@@ -24,7 +24,6 @@ _RANGE_FACTORS = (1 / 16, 1 / 8, 1 / 4, 1 / 2, 2.0, 4.0, 8.0, 16.0)
 _REMOVED = 0.7
 _SIGNIFICANT_RMS = 12.0
 _SPIKE = 8.0
-_LEAST_CODES = 4
 
 
 @dataclass(frozen=True)
@@ -86,7 +85,10 @@ def check_integrity(model: WorldModel, run: Run, prediction: NDArray[np.float64]
             f"all readings are multiples of {step:.4g} m/s², not of {expected.quantum:.4g} m/s²",
         )
     quantum = max(step or 0.0, expected.quantum)
-    run, wiring = _wiring(model, run, prediction, expected.white, known)
+    limit = _clipping(run, prediction, quantum, expected)
+    at_limit = np.abs(run.readings) >= (np.inf if limit is None else limit - 0.6 * quantum)
+    # Clipped readings look like those of a chip in a wider range.
+    wiring = _wiring(model, replace(run, valid=run.valid & ~at_limit), prediction, expected.white, known)
     for name, parameters, sentence in wiring:
         add(name, parameters, sentence)
     rewired = [effect for effect in effects if effect.name in {"axis_swap", "sign_flip", "wrong_range"}]
@@ -137,8 +139,8 @@ def _clipping(run: Run, prediction: NDArray[np.float64], quantum: float, expecte
     levels = []
     for channel in range(run.readings.shape[1]):
         mine = run.readings[run.valid[:, channel], channel]
-        if len(mine) < 50 or len(np.unique(mine)) < _LEAST_CODES:
-            continue
+        if len(mine) < 50 or np.ptp(mine) < 2 * quantum:
+            continue  # a channel that holds one value is dead, not clipped
         sigma = expected.white[channel]
         for sign in (1.0, -1.0):
             top = float((sign * mine).max())
@@ -180,15 +182,19 @@ def _frozen(
 
 def _spikes(run: Run, white: NDArray[np.float64], quantum: float) -> NDArray[np.bool_]:
     """Mark isolated samples far off the median of their five neighbours."""
-    smooth = median_filter(run.readings, size=(5, 1), mode="nearest")
-    jump = np.abs(run.readings - smooth)
-    rough = median_filter(np.abs(np.diff(run.readings, axis=0, prepend=run.readings[:1])), size=(9, 1), mode="nearest")
+    readings = run.readings.copy()
+    for column, valid in zip(readings.T, run.valid.T, strict=True):
+        if valid.any():  # a gap is no neighbour
+            column[~valid] = np.interp(run.t[~valid], run.t[valid], column[valid])
+    smooth = median_filter(readings, size=(5, 1), mode="nearest")
+    jump = np.abs(readings - smooth)
+    rough = median_filter(np.abs(np.diff(readings, axis=0, prepend=readings[:1])), size=(9, 1), mode="nearest")
     return run.valid & (jump > _SPIKE * np.maximum(white, 0.5 * quantum) + 6 * rough)
 
 
 def _wiring(
     model: WorldModel, run: Run, prediction: NDArray[np.float64], white: NDArray[np.float64], known: set[str]
-) -> tuple[Run, list[tuple[str, dict[str, object], str]]]:
+) -> list[tuple[str, dict[str, object], str]]:
     """Find exchanged and inverted channels and chips in another range, the clearest first."""
     names = model.array.channels
     found: list[tuple[str, dict[str, object], str]] = []
@@ -248,7 +254,7 @@ def _wiring(
         _, name, parameters, sentence, prediction = max(options, key=lambda option: option[0])
         found.append((name, parameters, sentence))
         known = known | {name} if name != "sign_flip" else known
-    return run, _merged_flips(found)
+    return _merged_flips(found)
 
 
 def _misfits(run: Run, prediction: NDArray[np.float64], white: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -103,6 +103,8 @@ def prepare_run(recording: Recording, model: WorldModel, *, name: str = "run") -
             f"{name}: a twin driven by {model.drive_source!r} (a free body) can't be diagnosed yet; "
             f"use one of {', '.join(_REFERENCE_COLUMNS)}"
         )
+    if not np.isfinite(readings).any():
+        raise InputError(f"{name}: no channel has a value; record the channels of array {model.array.name!r}")
     column = _REFERENCE_COLUMNS[model.drive_source]
     if column not in recording.reference:
         have = [source for source, key in _REFERENCE_COLUMNS.items() if key in recording.reference]
@@ -127,8 +129,6 @@ def prepare_run(recording: Recording, model: WorldModel, *, name: str = "run") -
     valid = np.zeros(full.shape, dtype=bool)
     valid[place] = np.isfinite(readings)
     full[~valid] = 0.0
-    if valid.sum() < _MINIMUM_SAMPLES:
-        raise InputError(f"{name}: hardly any channel has a reading; check the recording's channel columns")
     reference = np.zeros(n)
     reference_valid = np.zeros(n, dtype=bool)
     reference[place] = drive

@@ -355,5 +355,5 @@ def difference_noise(reference: NDArray[np.float64]) -> float:
     """Return the white noise of a smooth reference from its third differences (robust)."""
     third = np.diff(reference, n=3)
     spread = 1.4826 * float(np.median(np.abs(third - np.median(third)))) / np.sqrt(20.0)
-    floor = 1e-4 * float(np.std(reference)) + 1e-6
+    floor = 1e-4 * float(np.std(reference)) + 1e-4
     return max(spread, floor)
