@@ -54,6 +54,7 @@ _RAW_PER_OFFSET_STEP = 4 * RAW_PER_COUNT  # OFSx: 15.6 mg = 4 counts of 3.9 mg, 
 _POP_TICKS = 5 * TICKS_PER_SECOND // 1_000_000
 _TURN_ON_TICKS = 11 * TICKS_PER_SECOND // 10_000  # τ + 1.1 ms from standby to the first sample
 _SLOWEST_PERIOD = 1024 * TICKS_PER_SECOND // 100  # rate code 0: 0.09765625 Hz
+_NO_AXIS = 99  # no value is being read
 _FLOATING = 0xFF  # what the host reads from a line that nobody drives
 
 
@@ -147,7 +148,7 @@ class Adxl345:
         self._data_ready = False
         self._overrun = False
         self._out = (0, 0, 0)
-        self._word_axis = -1
+        self._word_axis = _NO_AXIS
         self._word = 0
         self._deaf_host = self.options.wires == 3
         self._shown = 0
@@ -349,7 +350,7 @@ class Adxl345:
         if command is None:
             self._command = value
             self._address = value & 0x3F
-            self._word_axis = -1
+            self._word_axis = _NO_AXIS
             self.catch_up(now)
             self._show(now)
             answer = 0
@@ -358,7 +359,11 @@ class Adxl345:
             if command & 0x40:
                 self._address = (address + 1) & 0x3F
             if command & 0x80:
-                answer = self._read(address, now)
+                # The second byte of a value, the most frequent case, needs no look at the registers.
+                if address & 1 and (address - DATAX0) >> 1 == self._word_axis:
+                    answer = self._word >> 8
+                else:
+                    answer = self._read(address, now)
             else:
                 self._write(address, value, now)
                 answer = 0
@@ -381,7 +386,7 @@ class Adxl345:
             self._end_of_read(now)
         self.catch_up(now)
         self._show(now)
-        self._word_axis = -1
+        self._word_axis = _NO_AXIS
         self._selected = True
         if not address_byte & 1:
             self._command = None

@@ -42,6 +42,7 @@ _EXC_RETURN = 0xFFFFFFF0
 _UNTIL = 0xFFFFFFF0  # never reached: emulation ends by WFI, by a stop or by an exception return
 _ENTRY_CYCLES = 12
 _FRAME_BYTES = 32
+_STACK_FRAME = struct.Struct("<8I")
 _STACK_ALIGNED = 1 << 9
 _SWI, _PREFETCH_ABORT, _EXCEPTION_EXIT = 2, 3, 8
 _IT_BITS = 0x0600FC00
@@ -110,6 +111,7 @@ class Cpu:
             (AHB_RAM_BASE, AHB_RAM_SIZE, unicorn.UC_PROT_ALL),
         ):
             self._map_memory(base, size, rights)
+        self._flash, self._ram = self.memory[0], self.memory[RAM_BASE]
         for segment in image.segments:
             self.poke(segment.address, segment.data)
         r = arm
@@ -148,9 +150,8 @@ class Cpu:
             raise unicorn.UcError(error)
 
     def _memory_at(self, address: int, count: int) -> tuple[mmap.mmap, int]:
-        ram = self.memory[RAM_BASE]
         if RAM_BASE <= address <= RAM_BASE + RAM_SIZE - count:
-            return ram, address - RAM_BASE
+            return self._ram, address - RAM_BASE
         for base, memory in self.memory.items():
             if base <= address and address + count <= base + len(memory):
                 return memory, address - base
@@ -282,7 +283,7 @@ class Cpu:
         padding = sp & 4
         frame = sp - _FRAME_BYTES - padding
         status = (xpsr & ~_STACK_ALIGNED) | (_STACK_ALIGNED if padding else 0)
-        self.poke(frame, struct.pack("<8I", r0, r1, r2, r3, r12, lr, self.pc & ~1, status))
+        self.poke(frame, _STACK_FRAME.pack(r0, r1, r2, r3, r12, lr, self.pc & ~1, status))
         process_stack = not nvic.active and control & 2
         entry = self._entry
         entry.values[0] = frame
@@ -294,7 +295,9 @@ class Cpu:
         nvic.enter(exception)
         board.now += _ENTRY_CYCLES * board.cycle
         board.note_exception(exception, entered=True)
-        self.pc = struct.unpack("<I", self.peek(nvic.vtor + 4 * exception, 4))[0] | 1
+        vector = nvic.vtor + 4 * exception
+        table = self._flash[vector : vector + 4] if vector < FLASH_SIZE else self.peek(vector, 4)
+        self.pc = int.from_bytes(table, "little") | 1
 
     def leave(self) -> None:
         """Exception return (ARMv7-M ARM B1.5.8)."""
@@ -309,7 +312,7 @@ class Cpu:
             sp = self.uc.reg_read(arm.UC_ARM_REG_PSP)
         else:
             sp = self._core.read()[7]
-        r0, r1, r2, r3, r12, lr, pc, status = struct.unpack("<8I", self.peek(sp, _FRAME_BYTES))
+        r0, r1, r2, r3, r12, lr, pc, status = _STACK_FRAME.unpack(self.peek(sp, _FRAME_BYTES))
         after = sp + _FRAME_BYTES + (4 if status & _STACK_ALIGNED else 0)
         values = self._unstack.values
         values[1], values[2], values[3], values[4], values[5], values[6] = r0, r1, r2, r3, r12, lr

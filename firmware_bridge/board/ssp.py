@@ -72,7 +72,13 @@ class Ssp(Peripheral):
     def read(self, offset: int, size: int) -> int:
         """SSP registers."""
         if offset == 0x08:
-            return self._pop()
+            words = self.words
+            if not words or words[0][0] > self.board.now:
+                return 0
+            value = words.popleft()[1]
+            if self.mask:
+                self._update_interrupt()
+            return value
         if offset == 0x0C:
             return self._status()
         self._update_raw()
@@ -84,14 +90,6 @@ class Ssp(Peripheral):
             0x18: self.raw,
             0x1C: self.raw & self.mask,
         }.get(offset, 0)
-
-    def _pop(self) -> int:
-        if not self.words or self.words[0][0] > self.board.now:
-            return 0
-        value = self.words.popleft()[1]
-        if self.mask:
-            self._update_interrupt()
-        return value
 
     def _status(self) -> int:
         if self.done > self.board.now and self.board.spinning(self.slot):
