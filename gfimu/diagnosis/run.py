@@ -15,6 +15,7 @@ __all__ = ["Run", "prepare_run"]
 
 MINIMUM_DURATION = 4.0
 _MINIMUM_SAMPLES = 80
+_MOVING = 8.0
 _REFERENCE_COLUMNS = {"tacho": "tacho_rad_s", "angle": "angle_rad", "command": "command_rad_s"}
 
 
@@ -115,6 +116,7 @@ def prepare_run(recording: Recording, model: WorldModel, *, name: str = "run") -
     drive = np.asarray(recording.reference[column], dtype=float)
     if np.isfinite(drive).sum() < 20:
         raise InputError(f"{name}: column {column} has fewer than 20 values; record the reference with the channels")
+    _refuse_dead_reference(readings, drive, column, model, recording.sample_rate, name)
     period = recording.sample_period
     steps = np.diff(recording.t_s)
     place = np.concatenate([[0], np.cumsum(np.maximum(1, np.rint(steps / period).astype(int)))])
@@ -151,3 +153,24 @@ def prepare_run(recording: Recording, model: WorldModel, *, name: str = "run") -
         longest_gap=float(steps.max()) if len(steps) else 0.0,
         name=name,
     )
+
+
+def _refuse_dead_reference(
+    readings: NDArray[np.float64],
+    drive: NDArray[np.float64],
+    column: str,
+    model: WorldModel,
+    sample_rate: float,
+    name: str,
+) -> None:
+    """Refuse a reference that stands still to the last digit while most channels move far beyond their noise."""
+    known = drive[np.isfinite(drive)]
+    if np.ptp(known) > 0.0:
+        return
+    white = model.expected_noise(sample_rate).white
+    spread = [float(np.nanstd(column)) if np.isfinite(column).any() else 0.0 for column in readings.T]
+    if np.median(np.array(spread) / white) > _MOVING:
+        raise InputError(
+            f"{name}: column {column} is {known[0]:g} throughout although the channels move; "
+            "check that the reference was connected"
+        )
