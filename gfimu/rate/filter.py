@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gfimu.array import AccelerometerArray
-from gfimu.errors import InputError
+from gfimu.errors import GeometryError, InputError
 from gfimu.rate.kalman import FilterSettings, join, spread_rest
 from gfimu.rate.live import LiveRateFilter
 from gfimu.rate.result import RateEstimate
 from gfimu.rate.sensing import SensorErrors
 
-__all__ = ["filter_rate", "run_filter"]
+__all__ = ["filter_rate", "require_finite", "run_filter"]
 
 
 def filter_rate(
@@ -59,6 +59,22 @@ def filter_rate(
     return run_filter(array, t, readings, errors, settings, gyro=gyro)[0]
 
 
+def require_finite(array: AccelerometerArray, result: RateEstimate) -> None:
+    """Refuse an estimate that ran away.
+
+    Raises
+    ------
+    GeometryError
+        If the rate is not finite everywhere: the array leaves products of ω in α that its null space doesn't see.
+    """
+    broken = ~np.isfinite(result.omega).all(axis=1)
+    if broken.any():
+        raise GeometryError(
+            f"the rate ran away at t = {result.t_s[int(np.argmax(broken))]:.4g} s: array {array.name!r} leaves products "
+            "of the rate in α, which feed back on themselves; turn slower, or use an array whose null space sees them"
+        )
+
+
 def run_filter(
     array: AccelerometerArray,
     t: ArrayLike,
@@ -72,6 +88,8 @@ def run_filter(
     times = np.asarray(t, dtype=float)
     if times.ndim != 1 or len(times) < 2:
         raise InputError("the filter needs at least two samples; record longer")
+    if not np.isfinite(times).all() or np.any(np.diff(times) <= 0):
+        raise InputError("sample times must be finite and increase; drop repeated or reordered samples")
     live = LiveRateFilter(array, errors, float(np.median(np.diff(times))), settings, gyro=gyro is not None)
     pushed, _ = live.push_raw(times, readings, gyro)
     if not live.hypotheses:  # never clear of the biases
@@ -92,4 +110,6 @@ def run_filter(
         replace(hypothesis.estimate(track), sign=live.sign, rest=spread_rest(track.columns.rest, window))
         for hypothesis, track in zip(live.hypotheses, tracks, strict=True)
     ]
+    for result in results:
+        require_finite(array, result)
     return (results[0] if len(results) == 1 else replace(results[0], mirrored=results[1])), live

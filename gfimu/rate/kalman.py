@@ -166,7 +166,7 @@ class KalmanRateFilter:
             rest.window(period) if rest else 0,
             rest.rate_std**2 if rest else 1.0,
             rest.entry_blocks(period) if rest else 1,
-            rest.limits(c, d, period) if rest else np.zeros(8),
+            np.array([rest.limits(c, d, period), rest.limits(c, d, period, first=True)]) if rest else np.zeros((2, 8)),
             likelihood,
         )
         self.state = self._start()

@@ -67,7 +67,12 @@ class LiveRateFilter:
         self.hypotheses: list[KalmanRateFilter] = []
         self._limit = np.inf
         self.started_at_s = np.nan
+        # A start at rest that doesn't look like rest leaves the sign in doubt: the bias of α was not learned.
+        self._unproven = 0
         if self.settings.start_omega is not None:
+            rest = self.settings.rest
+            if rest is not None and not np.any(self.settings.start_omega):
+                self._unproven = rest.window(period)
             self.hypotheses = [KalmanRateFilter(array, errors, period, self.settings, gyro=gyro)]
         else:
             self._sign = SignDecision("undecided", 0.0)
@@ -175,6 +180,7 @@ class LiveRateFilter:
     def _judge(self, outputs: list[FilterOutput]) -> tuple[list[FilterOutput], int | None]:
         """Compare the hypotheses; once decided, drop the loser."""
         if len(outputs) < 2:
+            self._prove(outputs[0].columns.rest)
             return outputs, None
         place = self._test.update(outputs[0].columns, outputs[1].columns)
         ratio = self._test.log_likelihood_ratio
@@ -184,6 +190,14 @@ class LiveRateFilter:
             self._sign = SignDecision("decided", abs(ratio), float(outputs[0].t[place]))
             self.hypotheses = [self.hypotheses[self.winner]]
         return outputs, place
+
+    def _prove(self, rest: NDArray[np.bool_]) -> None:
+        """See whether the first block of a start at rest is rest."""
+        if self._unproven > 0:
+            first = rest[: self._unproven]
+            self._unproven = 0 if first.any() else self._unproven - len(first)
+            if self._unproven == 0 and not first.any() and len(first):
+                self._sign = SignDecision("undecided", 0.0)
 
     def _result(self, outputs: list[FilterOutput], place: int | None) -> RateEstimate:
         if not self.hypotheses:

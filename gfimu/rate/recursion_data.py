@@ -46,7 +46,7 @@ class Tuning(NamedTuple):
     rest_window: int  # samples per block of the rest test; 0: no test
     rest_variance: float  # of the rate at rest, (rad/s)²
     rest_entry: int  # blocks in a row before rest begins anew
-    rest_limits: NDArray[np.float64]  # (8,) `gfimu.rate.rest_test.RestTest.limits`
+    rest_limits: NDArray[np.float64]  # (2, 8) `gfimu.rate.rest_test.RestTest.limits`; row 1 for the first block
     likelihood: bool
 
 

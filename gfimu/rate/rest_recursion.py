@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from gfimu.rate.recursion_data import BLOCK, COMPILE, REST_BLOCKS, RESTING, RUN
+from gfimu.rate.recursion_data import BLOCK, COMPILE, REST_BLOCKS, RESTING, RUN, SAMPLES
 
 __all__ = ["rest_block"]
 
@@ -39,11 +39,11 @@ def _is_rest(y, tables, tuning, state):  # type: ignore[no-untyped-def]
     d = tables.null_rows.shape[1]
     first = window // 2
     second = window - first
-    limits = tuning.rest_limits
+    limits = tuning.rest_limits[1 if state.counts[SAMPLES] < window else 0]
     # ω when the block began: known, and not far from zero.
     known = state.block_covariance
     for a in range(3):
-        if known[a, a] > limits[5]:
+        if not known[a, a] <= limits[5]:  # nor if it is NaN
             return False
         if state.block_x[a] ** 2 > limits[4] * (known[a, a] + tuning.rest_variance):  # never less than the full χ²
             return False
@@ -102,14 +102,17 @@ def _is_rest_run(mean, alpha, tables, tuning, state):  # type: ignore[no-untyped
     run = counts[RUN]
     span = 2
     while span <= min(run, length):
-        if _run_statistic(span, tables, tuning, state) > tuning.rest_limits[2]:
+        if _run_statistic(span, tables, tuning, state) > tuning.rest_limits[0, 2]:
             return False
         span *= 2
     if counts[RESTING] == 0:
-        if run < tuning.rest_entry or _run_statistic(min(run, length), tables, tuning, state) > tuning.rest_limits[6]:
+        if (
+            run < tuning.rest_entry
+            or _run_statistic(min(run, length), tables, tuning, state) > tuning.rest_limits[0, 6]
+        ):
             return True
         known = state.covariance[:3, :3] + tuning.rest_variance * np.eye(3)
-        if (np.linalg.solve(known, state.x[:3]) * state.x[:3]).sum() > tuning.rest_limits[7]:
+        if (np.linalg.solve(known, state.x[:3]) * state.x[:3]).sum() > tuning.rest_limits[0, 7]:
             return True
         counts[RESTING] = 1
     blocks = counts[REST_BLOCKS]

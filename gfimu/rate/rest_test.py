@@ -50,7 +50,8 @@ class RestTest:
     window_s : float
         Length of a block, s.
     false_alarm : float
-        Largest probability that a block at rest is not recognised.
+        Largest probability that a block at rest is not recognised; a hundredth of it for the first block of a run that
+        is said to start at rest, because everything after hangs on that.
     rate_std : float
         How far from zero the rate may be at rest, rad/s (standard deviation).
     largest_rate_std : float
@@ -63,7 +64,7 @@ class RestTest:
 
     window_s: float = 0.5
     false_alarm: float = 0.01
-    rate_std: float = 1e-3
+    rate_std: float = 5e-3
     largest_rate_std: float = 0.2
     noise_margin: float = 0.1
     entry_s: float = 5.0
@@ -79,10 +80,11 @@ class RestTest:
         """Return the samples per block, at least four."""
         return max(4, round(self.window_s / period))
 
-    def limits(self, n_channels: int, n_null: int, period: float) -> NDArray[np.float64]:
+    def limits(self, n_channels: int, n_null: int, period: float, *, first: bool = False) -> NDArray[np.float64]:
         """Return the limits of the five statistics, the largest variance of ω, and of α and ω at entry, shape (8,)."""
+        false_alarm = self.false_alarm / 100.0 if first else self.false_alarm
         freedom = np.array([n_channels * (self.window(period) - 1), n_channels, 3, max(n_null, 1), 3])
-        largest = chi2.ppf(1.0 - self.false_alarm / len(freedom), freedom)
+        largest = chi2.ppf(1.0 - false_alarm / len(freedom), freedom)
         largest[:2] *= (1.0 + self.noise_margin) ** 2
         return np.array([*largest, self.largest_rate_std**2, *chi2.ppf([0.8, 0.95], 3)])
 

@@ -19,7 +19,8 @@ class SignDecision:
     Parameters
     ----------
     state : {"known", "decided", "undecided"}
-        ``known``: the start was known, so the sign was never in doubt.
+        ``known``: the start was known, so the sign was never in doubt. ``undecided`` after a start at rest: the
+        readings at the start were not those of rest, so what followed may have either sign.
     log_likelihood_ratio : float
         Of the estimate against its mirror image where the decision fell (or at the end, undecided).
     decided_at_s : float

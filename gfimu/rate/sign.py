@@ -32,12 +32,15 @@ __all__ = ["THRESHOLD", "InitialRate", "SignTest"]
 THRESHOLD = 20.0
 """Logarithm of the likelihood ratio at which the sign counts as decided."""
 
-CLEAR = 50.0
-"""Standard deviations by which a rate must stand clear of noise and biases to start from."""
+CLEAR = 25.0
+"""Standard deviations by which a rate must stand clear of the biases to start from: they don't average out."""
+
+_CLEAR_OF_NOISE = 5.0  # standard deviations of a single sample, noise and biases together
 
 _SIGNIFICANT = 36.0  # of the averaged α, variances
 _FITTING = 1.5  # the winner's normalised innovations squared per degree of freedom during the manoeuvre, at most
-_RATIO, _SQUARES, _FREEDOM = 0, slice(1, 3), 3
+_TINY = 1e-9
+_RATIO = 0
 
 
 @dataclass
@@ -114,15 +117,21 @@ class InitialRate:
         # Biases count as noise here: the rows are weighted by both.
         total = np.eye(tables.n_null) + tables.bias_covariance(errors.bias_std)[3:, 3:]
         white = np.linalg.inv(np.linalg.cholesky(total))
+        biases = total - (1.0 - _TINY) * np.eye(tables.n_null)
+        self._against_bias = np.linalg.inv(np.linalg.cholesky(biases)) @ tables.null_sensitivity[0]
         self._rows = white @ tables.null_rows[0]
         self._sensitivity = np.ascontiguousarray(white @ tables.null_sensitivity[0])
 
     def find(self, readings: NDArray[np.float64]) -> tuple[NDArray[np.float64], bool]:
         """Rate (3,), rad/s, that fits a complete sample (c,) best, and whether it stands clear of the biases."""
         omega = rate_of_null_space(self._rows @ readings, self._sensitivity)
-        slope = self._sensitivity @ omega_products_jacobian(omega)
-        least = float(np.linalg.eigvalsh(slope.T @ slope)[0])
-        return omega, bool(least * (omega @ omega) > CLEAR**2)
+        clear = all(
+            float(np.linalg.svd(sensitivity @ omega_products_jacobian(omega), compute_uv=False)[-1])
+            * float(np.linalg.norm(omega))
+            > least
+            for sensitivity, least in ((self._sensitivity, _CLEAR_OF_NOISE), (self._against_bias, CLEAR))
+        )
+        return omega, clear
 
     def limit(self, omega: NDArray[np.float64]) -> float:
         """How fast a body can turn whose sample gave ``omega``, rad/s (standard deviation of each component)."""

@@ -16,9 +16,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from gfimu.array import AccelerometerArray
 from gfimu.errors import InputError
-from gfimu.rate.filter import run_filter
+from gfimu.rate.filter import require_finite, run_filter
 from gfimu.rate.kalman import FilterSettings, KalmanRateFilter, spread_rest
-from gfimu.rate.result import RateEstimate
+from gfimu.rate.result import RateEstimate, SignDecision
 from gfimu.rate.sensing import SensorErrors
 
 __all__ = ["smooth_rate"]
@@ -63,12 +63,17 @@ def smooth_rate(
     times = np.asarray(t, dtype=float)
     if times.ndim != 1 or len(times) < 2:
         raise InputError("the smoother needs at least two samples; record longer")
+    if not np.isfinite(times).all() or np.any(np.diff(times) <= 0):
+        raise InputError("sample times must be finite and increase; drop repeated or reordered samples")
     period = float(np.median(np.diff(times)))
     rows = np.asarray(readings, dtype=float)
     turning = None if gyro is None else np.asarray(gyro, dtype=float)
     chosen = settings or FilterSettings()
     if chosen.start_omega is not None:
-        return _smooth(array, times, rows, errors, chosen, turning, period)
+        smoothed_run = _smooth(array, times, rows, errors, chosen, turning, period)
+        window = chosen.rest.window(period) if chosen.rest else 0
+        doubtful = 0 < window <= len(times) and not np.any(chosen.start_omega) and not smoothed_run.rest[:window].any()
+        return replace(smoothed_run, sign=SignDecision("undecided", 0.0)) if doubtful else smoothed_run
     # Unknown start: the filter judges the hypotheses by the whole run, then those that remain are smoothed.
     filtered, live = run_filter(array, times, rows, errors, chosen, gyro=turning)
     if not live.hypotheses:
@@ -104,6 +109,7 @@ def _smooth(
     """Smooth with a known start."""
     process = KalmanRateFilter(array, errors, period, settings, gyro=gyro is not None, capacity=len(t))
     forward = process.record_run(t, readings, gyro)
+    require_finite(array, process.estimate(forward))
     omega, covariance = process.run_back()
     window = settings.rest.window(period) if settings.rest else 0
     return replace(

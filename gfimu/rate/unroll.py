@@ -89,7 +89,7 @@ def _innovations(add: Callable[[str], None]) -> None:
     add(f"second = {_p(0, 0)} + {_p(1, 1)} + {_p(2, 2)} > slow * (x0 * x0 + x1 * x1 + x2 * x2)")
     for i in range(N_NULL):
         add("if second:")
-        add(f"    c{i}, w{i} = second_order(m[{i}], {spread})")
+        add(f"    c{i}, w{i} = second_order(m[{i}], h{i}_0, h{i}_1, h{i}_2, {spread})")
         add(f"    e{i} -= c{i}")
         add(f"    v{i} += w{i}")
 

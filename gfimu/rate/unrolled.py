@@ -92,27 +92,27 @@ def step(x, p, turned, t, noise, inflation, m, z, k, slow):  # type: ignore[no-u
     e5 = z[k, 5] - 0.5 * (h5_0 * x0 + h5_1 * x1 + h5_2 * x2) - x11; v5 = factor
     second = p0_0 + p1_1 + p2_2 > slow * (x0 * x0 + x1 * x1 + x2 * x2)
     if second:
-        c0, w0 = second_order(m[0], p0_0, p0_1, p0_2, p1_1, p1_2, p2_2)
+        c0, w0 = second_order(m[0], h0_0, h0_1, h0_2, p0_0, p0_1, p0_2, p1_1, p1_2, p2_2)
         e0 -= c0
         v0 += w0
     if second:
-        c1, w1 = second_order(m[1], p0_0, p0_1, p0_2, p1_1, p1_2, p2_2)
+        c1, w1 = second_order(m[1], h1_0, h1_1, h1_2, p0_0, p0_1, p0_2, p1_1, p1_2, p2_2)
         e1 -= c1
         v1 += w1
     if second:
-        c2, w2 = second_order(m[2], p0_0, p0_1, p0_2, p1_1, p1_2, p2_2)
+        c2, w2 = second_order(m[2], h2_0, h2_1, h2_2, p0_0, p0_1, p0_2, p1_1, p1_2, p2_2)
         e2 -= c2
         v2 += w2
     if second:
-        c3, w3 = second_order(m[3], p0_0, p0_1, p0_2, p1_1, p1_2, p2_2)
+        c3, w3 = second_order(m[3], h3_0, h3_1, h3_2, p0_0, p0_1, p0_2, p1_1, p1_2, p2_2)
         e3 -= c3
         v3 += w3
     if second:
-        c4, w4 = second_order(m[4], p0_0, p0_1, p0_2, p1_1, p1_2, p2_2)
+        c4, w4 = second_order(m[4], h4_0, h4_1, h4_2, p0_0, p0_1, p0_2, p1_1, p1_2, p2_2)
         e4 -= c4
         v4 += w4
     if second:
-        c5, w5 = second_order(m[5], p0_0, p0_1, p0_2, p1_1, p1_2, p2_2)
+        c5, w5 = second_order(m[5], h5_0, h5_1, h5_2, p0_0, p0_1, p0_2, p1_1, p1_2, p2_2)
         e5 -= c5
         v5 += w5
     g0_0 = h0_0 * p0_0 + h0_1 * p0_1 + h0_2 * p0_2 + p0_6; g0_1 = h0_0 * p0_1 + h0_1 * p1_1 + h0_2 * p1_2 + p1_6

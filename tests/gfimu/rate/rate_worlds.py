@@ -9,6 +9,11 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from gfimu.array import AccelerometerArray, Chip
+from gfimu.bounds import posterior_rate_bound
+from gfimu.rate.filter import filter_rate
+from gfimu.rate.rest_test import RestTest
+from gfimu.rate.sensing import SensorErrors
+from gfimu.rate.smoother import smooth_rate
 
 GRAVITY = 9.80665
 LSB = 0.0039 * GRAVITY
@@ -62,11 +67,13 @@ def tumble(rate: float, speed: float, duration: float = 30.0) -> Motion:
 
     size = speed
     for _ in range(8):  # the torque turns with the body: find the impulse that ends at the wanted speed
-        reached = np.linalg.norm(solve_ivp(euler, (0, 5), np.zeros(3), args=(size,), rtol=1e-6, atol=1e-6,
-                                           max_step=0.2).y[:, -1])
+        reached = np.linalg.norm(
+            solve_ivp(euler, (0, 5), np.zeros(3), args=(size,), rtol=1e-6, atol=1e-6, max_step=0.2).y[:, -1]
+        )
         size *= speed / reached
-    solution = solve_ivp(euler, (0, duration), np.zeros(3), method="DOP853", t_eval=t, args=(size,), rtol=1e-11,
-                         atol=1e-11, max_step=0.1)
+    solution = solve_ivp(
+        euler, (0, duration), np.zeros(3), method="DOP853", t_eval=t, args=(size,), rtol=1e-11, atol=1e-11, max_step=0.1
+    )
     omega = solution.y.T
     alpha = np.array([euler(time, w, size) for time, w in zip(t, omega, strict=True)])
     return Motion(t, omega, alpha, np.zeros_like(omega))
@@ -100,3 +107,72 @@ def measure(array, motion, rng, *, bias=TURN_ON_BIAS, scale=0.0, quantise=True):
 def total_noise_std(array, rate):
     """Noise per channel with the quantisation step's."""
     return np.sqrt(noise_std(array, rate) ** 2 + LSB**2 / 12)
+
+
+def sensor_errors(array, rate, **others):
+    """What the estimators are told about these sensors."""
+    fields = {"full_range": np.full(array.n_channels, 16 * GRAVITY - LSB), "stuck_after": 40} | others
+    return SensorErrors.uniform(array, total_noise_std(array, rate), TURN_ON_BIAS, **fields)
+
+
+@dataclass(frozen=True)
+class Study:
+    """Errors of many runs of one scenario, and the bounds."""
+
+    motion: Motion
+    error: dict  # method: (runs, n, 3)
+    std: dict  # method: (runs, n, 3)
+    bound: dict  # method: (n, 3)
+    nees: dict  # method: (runs, n)
+    nis: np.ndarray  # (runs, n)
+    dof: np.ndarray
+
+    def turning(self, share=0.5):
+        """Samples at more than half the top speed, after the first block of the rest test."""
+        speed = np.linalg.norm(self.motion.omega, axis=1)
+        return (speed > share * speed.max()) & (self.motion.t > 0.6)
+
+    def ratio(self, method, rows):
+        return rms(self.error[method][:, rows]) / rms(self.bound[method][rows])
+
+
+def rms(values):
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+def study(array, motion, runs, *, seed=0, methods=("filter", "smoother"), **measurement):
+    """Filter and smooth ``runs`` independent measurements of a motion."""
+    rate = 1 / (motion.t[1] - motion.t[0])
+    errors = sensor_errors(array, rate)
+    solve = {"filter": filter_rate, "smoother": smooth_rate}
+    error, std, nees = ({method: [] for method in methods} for _ in range(3))
+    nis, dof = [], []
+    for run in range(runs):
+        values = measure(array, motion, np.random.default_rng([seed, run]), **measurement)
+        for method in methods:
+            found = solve[method](array, motion.t, values, errors)
+            difference = found.omega - motion.omega
+            error[method].append(difference)
+            std[method].append(found.std)
+            nees[method].append(
+                np.einsum("ni,ni->n", difference, np.linalg.solve(found.covariance, difference[..., None])[..., 0])
+            )
+        nis.append(found.nis)
+        dof.append(found.nis_dof)
+    window = RestTest().window(1 / rate)
+    ends = np.zeros(len(motion.t), dtype=bool)
+    ends[window - 1 :: window] = found.rest[window - 1 :: window]  # rest as the last run recognised it
+    bound = {
+        method: np.sqrt(
+            np.diagonal(
+                posterior_rate_bound(
+                    array, motion.t, motion.omega, errors, rest=ends, rest_std=RestTest().rate_std,
+                    smoother=method == "smoother",
+                ),
+                axis1=1, axis2=2,
+            )
+        )
+        for method in methods
+    }  # fmt: skip
+    stack = lambda parts: {method: np.array(values) for method, values in parts.items()}  # noqa: E731
+    return Study(motion, stack(error), stack(std), bound, stack(nees), np.array(nis), np.array(dof))

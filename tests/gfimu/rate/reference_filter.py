@@ -1,0 +1,96 @@
+"""The rate filter as a plain numpy loop, and the Rauch–Tung–Striebel smoother by the book: the compiled ones must
+agree with them. No rest, no faults, even sampling, a six-point stencil throughout."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gfimu.rate.sensing import ChannelTables
+
+
+def centred_weights(points=6):
+    """Integral over each interval of the polynomial through even nodes."""
+    table = np.empty((points - 1, points))
+    for j in range(points):
+        others = [i for i in range(points) if i != j]
+        basis = np.poly(others) / np.prod([j - i for i in others])
+        integral = np.polyint(basis)
+        table[:, j] = np.diff(np.polyval(integral, np.arange(points)))
+    return table
+
+
+def products(omega):
+    x, y, z = omega
+    return np.array([x * x, y * y, z * z, x * y, x * z, y * z])
+
+
+def slopes(omega):
+    x, y, z = omega
+    return np.array([[2 * x, 0, 0], [0, 2 * y, 0], [0, 0, 2 * z], [y, x, 0], [z, 0, x], [0, z, y]])
+
+
+def reference_filter(array, t, readings, errors, *, start_std=1e-3, keep=False):
+    """ω (n, 3), covariance (n, 3, 3) and NIS (n,); with ``keep`` also predicted and filtered states and transitions."""
+    tables = ChannelTables(array, errors)
+    rows, sensitivity, noise = tables.null_rows[0], tables.null_sensitivity[0], tables.alpha_noise[0]
+    d = len(rows)
+    n = 9 + d
+    alpha, z = readings @ tables.alpha_rows[0].T, readings @ rows.T
+    weights = centred_weights()
+    forms = [
+        np.array([[m[0], m[3] / 2, m[4] / 2], [m[3] / 2, m[1], m[5] / 2], [m[4] / 2, m[5] / 2, m[2]]])
+        for m in sensitivity
+    ]
+    period = t[1] - t[0]
+    x, p = np.zeros(n), np.zeros((n, n))
+    p[:3, :3] = np.eye(3) * start_std**2
+    p[3 : 6 + d, 3 : 6 + d] = tables.bias_covariance(errors.bias_std)
+    out = []
+    for k in range(len(t)):
+        half = period / 2 if k else 0.0
+        f = np.eye(n)
+        f[-3:, -3:] = 0
+        g = np.vstack([half * np.eye(3), np.zeros((n - 6, 3)), np.eye(3)])
+        if k:
+            f[:3, 3:6] = -period * np.eye(3)
+            f[:3, -3:] = half * np.eye(3)
+            first = min(max(k - 3, 0), len(t) - 6)
+            x = f @ x
+            x[:3] += period * weights[k - 1 - first] @ alpha[first : first + 6]
+            p = f @ p @ f.T
+        p = p + g @ noise @ g.T
+        predicted = (x.copy(), p.copy())
+        omega, spread = x[:3].copy(), p[:3, :3]
+        h = np.zeros((d, n))
+        h[:, :3] = sensitivity @ slopes(omega)
+        h[:, 6 : 6 + d] = np.eye(d)
+        expected = sensitivity @ products(omega) + x[6 : 6 + d]
+        r = np.ones(d)
+        if k and np.trace(spread) > 1e-3 * omega @ omega:  # the first sample is linearised where it is fitted
+            expected += [np.trace(b @ spread) for b in forms]
+            linear = np.einsum("ia,ab,ib->i", h[:, :3], spread, h[:, :3])
+            r += np.minimum([2 * np.trace(b @ spread @ b @ spread) for b in forms], 4 * linear)
+        s = h @ p @ h.T + np.diag(r)
+        gain = np.linalg.solve(s, h @ p).T
+        e = z[k] - expected
+        x = x + gain @ e
+        p = p - gain @ s @ gain.T
+        out.append((x[:3].copy(), p[:3, :3].copy(), e @ np.linalg.solve(s, e), predicted, (x.copy(), p.copy()), f))
+    omega, covariance, nis, predicted, filtered, transitions = (list(column) for column in zip(*out, strict=True))
+    result = np.array(omega), np.array(covariance), np.array(nis)
+    return (*result, predicted, filtered, transitions) if keep else result
+
+
+def reference_smoother(predicted, filtered, transitions):
+    """Rauch–Tung–Striebel with the full state, backwards."""
+    x, p = filtered[-1]
+    omega, covariance = [x[:3]], [p[:3, :3]]
+    for k in range(len(filtered) - 2, -1, -1):
+        before, spread = filtered[k]
+        ahead, ahead_spread = predicted[k + 1]
+        gain = np.linalg.solve(ahead_spread, transitions[k + 1] @ spread).T
+        x = before + gain @ (x - ahead)
+        p = spread + gain @ (p - ahead_spread) @ gain.T
+        omega.append(x[:3])
+        covariance.append(p[:3, :3])
+    return np.array(omega[::-1]), np.array(covariance[::-1])
