@@ -19,6 +19,13 @@ __all__ = ["Tally", "rate_with_interval", "score", "summarise", "visible", "writ
 
 Outcome = Mapping[str, Any]
 
+INSEPARABLE = (
+    frozenset({"bias", "scale_factor", "quadratic", "cross_axis", "gravity"}),
+    frozenset({"mount_tilt", "misalignment"}),
+    frozenset({"eccentricity", "sensor_position"}),
+)
+"""Effects that one upright run can't tell apart on channels that see constant gravity, or that contain each other."""
+
 LEAST_VISIBLE = 7.0
 """Size d′ below which an effect is at or below the information limit."""
 
@@ -31,15 +38,19 @@ def score(outcome: Outcome) -> dict[str, bool]:
     dict
         ``exact``: the right names alone (nothing found where nothing is hidden). ``within``: every hidden effect is
         among the names or among what is told as not distinguishable from them. ``wrong``: said to be explained, with a
-        name that is not hidden. ``named``, ``nothing``, ``unknown``, ``set``, ``error``: what was said.
+        name that is not hidden. ``fair``: exact, or a set of effects that one upright run truly can't tell apart, the
+        hidden one among them. ``named``, ``nothing``, ``unknown``, ``set``, ``error``: what was said.
     """
     hidden = set(outcome["effects"])
     names = {cause["effect"] for cause in outcome["causes"]}
     told = names.union(*(cause["rivals"] for cause in outcome["causes"]))
     verdict = outcome["verdict"]
     explained = verdict == "explained"
+    exact = (explained and names == hidden) if hidden else verdict == "nothing_found"
+    same = verdict == "ambiguous" and hidden <= told and any(told <= group for group in INSEPARABLE)
     return {
-        "exact": (explained and names == hidden) if hidden else verdict == "nothing_found",
+        "exact": exact,
+        "fair": exact or same,
         "within": (verdict in {"explained", "ambiguous"} and hidden <= told) if hidden else verdict == "nothing_found",
         "wrong": explained and not names <= hidden,
         "named": verdict in {"explained", "ambiguous"},
@@ -137,7 +148,8 @@ def _overview(outcomes: Sequence[Outcome]) -> str:
         "hidden",
         "runs",
         "right alone %",
-        "right in the set %",
+        "or one of an inseparable set %",
+        "right in any set %",
         "wrong name %",
         "a set %",
         "nothing %",
@@ -161,7 +173,7 @@ def _overview(outcomes: Sequence[Outcome]) -> str:
                     Path(source.partition(":")[0]).stem if ":" in source else source,
                     hidden[0],
                     len(tally),
-                    *(tally.share(what) for what in ("exact", "within", "wrong", "set", "nothing", "unknown")),
+                    *(tally.share(what) for what in ("exact", "fair", "within", "wrong", "set", "nothing", "unknown")),
                     sum(entry["error"] for entry in tally.scores),
                     f"{_quantile(removed, 0.5, '.4f')} / {_quantile(removed, 0.1, '.3f')}",
                     f"{100 * float(np.mean(z < 3)):.1f} of {len(z)}" if len(z) else "–",
