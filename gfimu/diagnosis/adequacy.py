@@ -94,7 +94,9 @@ def generic_basis(segment: Segment) -> tuple[list[str], NDArray[np.float64]]:
     return list(functions), values * (_UNIT / np.maximum(size, 1e-9)) * (size > 1e-6)
 
 
-def left_over(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]], spikes: int) -> LeftOver:
+def left_over(
+    segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]], spikes: int, *, rounded: bool = False
+) -> LeftOver:
     """Find the strongest thing that the named causes leave unexplained.
 
     Parameters
@@ -107,12 +109,15 @@ def left_over(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Ef
         Effects known beforehand, per segment.
     spikes : int
         Isolated samples that the integrity check took out.
+    rounded : bool
+        Whether readings are clipped or so coarse that their rounding follows the motion.
     """
     channels = segments[0].model.array.channels
     candidates = [_basis_terms(segments, fit, fixed, channels)]
     lines = [_lines(segment, fit, known, channels) for segment, known in zip(segments, fixed, strict=True)]
     candidates += [max(lines, key=lambda found: found.log_odds)]
-    candidates.append(_changing_noise(segments, fit, fixed))
+    if not rounded:
+        candidates.append(_changing_noise(segments, fit, fixed))
     if spikes > max(3, 1e-4 * sum(segment.weight_mask.size for segment in segments)):
         candidates.append(LeftOver(10.0 * spikes, f"{spikes} isolated samples far off their neighbours", {}))
     return max(candidates, key=lambda found: found.log_odds)
@@ -248,6 +253,13 @@ def _lines(segment: Segment, fit: Fit, known: Sequence[Effect], channels: Sequen
     frequency = np.fft.rfftfreq(2 * n, segment.run.sample_period)
     # Below this the slow noise and the drive have freedom of their own.
     power[frequency < max(1.0, 4.0 / segment.run.duration)] = 0.0
+    levels = segment.levels
+    colour = np.ones_like(power)
+    slow = np.minimum((frequency * 2 * n * segment.run.sample_period).astype(int), len(segment.basis.frequency) - 1)
+    extra = np.outer(segment.basis.flicker_spectrum, levels.flicker[:-1] ** 2)
+    extra += (segment.basis.walk_spectrum * levels.walk**2)[:, None]
+    colour += (extra / levels.white[:-1] ** 2)[slow]
+    power = power / colour
     level = np.median(power[frequency >= 1.0], axis=0) / np.log(2.0)
     power = power / np.maximum(level, 0.7)
     channel = int(np.argmax(power.max(axis=0)))

@@ -40,6 +40,7 @@ LEAST_GAIN = 2.0
 """Log predictive gain on held-out halves below which a cause is withdrawn."""
 _DOMINANT = 0.1
 _INEXACTNESS = 2.5e-3
+_ROUNDING = ("coarse_resolution", "saturation")
 _WIRING = ("axis_swap", "sign_flip", "wrong_range")
 _SLOW = frozenset(
     {"bias", "warm_up", "bias_temperature", "gain_drift", "scale_factor", "quadratic", "gravity", "cross_axis"}
@@ -89,7 +90,9 @@ def diagnose(
     tell(0.92, "hold out")
     pairs, label = _holdouts(explanation, prepared, held_out, model)
     explanation, withdrawn = _gate(explanation, pairs)
-    left = left_over(explanation.segments, explanation.fit, explanation.fixed, prepared.spikes)
+    left = left_over(
+        explanation.segments, explanation.fit, explanation.fixed, prepared.spikes, rounded=prepared.rounded
+    )
     tell(0.97, "measure the gain")
     gain = _gain(prepared, explanation, pairs, label)
     return _verdict(prepared, model, explanation, walk, left, gain, withdrawn)
@@ -122,6 +125,11 @@ class _Prepared:
             why.update(checked.why)
             spikes += checked.spikes
         return cls(runs, effects, why, spikes)
+
+    @property
+    def rounded(self) -> bool:
+        """Whether readings are clipped or coarse, so that their error follows the motion."""
+        return any(effect.name in _ROUNDING for effects in self.effects for effect in effects)
 
     def segments(self, model: WorldModel) -> tuple[list[Segment], list[list[Effect]]]:
         """Return the segments and the effects known in each."""

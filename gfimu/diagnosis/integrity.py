@@ -170,7 +170,9 @@ def _frozen(
         change = np.flatnonzero((np.abs(np.diff(mine)) > 1e-12) | ~run.valid[1:, channel])
         edges = np.concatenate([[-1], change, [len(mine) - 1]])
         lengths = np.diff(edges)
-        usual = np.median(np.abs(np.diff(mine[run.valid[:, channel]]))) if run.valid[:, channel].sum() > 10 else 0.0
+        # How much the channel usually changes: away from the stretches in question.
+        alive = np.repeat(lengths <= _LONGEST_EQUAL, lengths) & run.valid[:, channel]
+        usual = float(np.median(np.abs(np.diff(mine[alive])))) if alive.sum() > 10 else 0.0
         for place in np.flatnonzero(lengths > _LONGEST_EQUAL):
             start, stop = int(edges[place]) + 1, int(edges[place + 1]) + 1
             at_limit = limit is not None and abs(mine[start]) >= limit - 0.6 * quantum

@@ -336,12 +336,12 @@ class Resonance(Effect):
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
         """Participation (1 is the whole inertia behind one spring) and its part in quadrature."""
-        return (Size("gain", 0.3), Size("quadrature_gain", 0.1))
+        return (Size("gain", 0.3, positive=True), Size("quadrature_gain", 0.1))
 
     @classmethod
     def patterns(cls, array: AccelerometerArray) -> tuple[Pattern, ...]:
-        """Return an undamped-spring mode, or one with any phase."""
-        return (Pattern("", np.array([[1.0], [0.0]])), Pattern("any phase", np.eye(2)))
+        """Return a mode whose part in quadrature is nothing, as a spring and a damper give it."""
+        return (Pattern("", np.array([[1.0], [0.0]])),)
 
     @classmethod
     def shapes(cls, duration: float, sample_rate: float) -> tuple[dict[str, float], ...]:
