@@ -17,6 +17,7 @@ COMMAND_FILES = (
     "score",
     "simulate",
     "estimate",
+    "live",
     "convert",
     "diagnose",
     "drift",

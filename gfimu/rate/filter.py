@@ -70,8 +70,8 @@ def require_finite(array: AccelerometerArray, result: RateEstimate) -> None:
     broken = ~np.isfinite(result.omega).all(axis=1)
     if broken.any():
         raise GeometryError(
-            f"the rate ran away at t = {result.t_s[int(np.argmax(broken))]:.4g} s: array {array.name!r} leaves products "
-            "of the rate in α, which feed back on themselves; turn slower, or use an array whose null space sees them"
+            f"the rate ran away at t = {result.t_s[int(np.argmax(broken))]:.4g} s: array {array.name!r} leaves "
+            "products of the rate in α, which feed back on themselves; turn slower, or use an array whose null space sees them"
         )
 
 

@@ -278,9 +278,17 @@ def forward(  # type: ignore[no-untyped-def]
                 variances[i] = 1.0 + inflation
                 if slow:
                     mean, wider = second_order(
-                        m, h0, h1, h2, covariance[0, 0], covariance[0, 1], covariance[0, 2], covariance[1, 1], covariance[1, 2],
+                        m,
+                        h0,
+                        h1,
+                        h2,
+                        covariance[0, 0],
+                        covariance[0, 1],
+                        covariance[0, 2],
+                        covariance[1, 1],
+                        covariance[1, 2],
                         covariance[2, 2],
-                    )  # fmt: skip
+                    )
                     innovations[i] -= mean
                     variances[i] += wider
                 if plain:

@@ -23,11 +23,11 @@ def along(omega, n, period, *, bias=0.0, **options):
 
 
 def test_sigma_alpha():
-    assert SIGMA == pytest.approx(NOISE / (np.sqrt(8) * 0.05))
+    assert pytest.approx(NOISE / (np.sqrt(8) * 0.05)) == SIGMA
 
 
 def test_dead_reckoning_at_rest():
-    """With ω = 0 a sample tells nothing: the variance is what α integrates to, the trapezoid of white noise and bias."""
+    """With ω = 0 a sample tells nothing: the variance is what α integrates to, by the trapezoid."""
     period, n, bias = 0.01, 400, 0.1
     t, bound = along([0, 0, 0], n, period, bias=bias, start_std=0.02)
     spread = (bias / (np.sqrt(8) * 0.05)) ** 2

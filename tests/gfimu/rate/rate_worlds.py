@@ -55,7 +55,7 @@ def turntable(rate: float, speed: float, duration: float = 30.0) -> Motion:
 
 
 def tumble(rate: float, speed: float, duration: float = 30.0) -> Motion:
-    """Rest 2 s, spun up by a smooth torque within 3 s, then free of torque, moments of inertia 1:2:3, falling freely."""
+    """Rest 2 s, spun up by a smooth torque within 3 s, then torque-free with moments of inertia 1:2:3, in free fall."""
     t = np.arange(round(duration * rate)) / rate
     inertia = np.array([1.0, 2.0, 3.0])
     direction = np.array([0.5, 1.0, 0.4])

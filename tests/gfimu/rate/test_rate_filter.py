@@ -136,7 +136,7 @@ def test_gap_in_time(run):
 
 
 def test_jittered_times(run):
-    motion, _, errors = run
+    _, _, errors = run
     fine = tumble(10_000.0, 12.0, duration=8.0)
     rng = np.random.default_rng(5)
     rows = np.arange(0, len(fine.t) - 100, 100) + rng.integers(0, 30, 799)
@@ -252,11 +252,12 @@ def test_bad_input(run):
         SensorErrors.uniform(CUBE, 0.0)
     with pytest.raises(InputError, match="valid: adams_moulton4"):
         FilterSettings(quadrature="simpson")
+    flat = AccelerometerArray.load("p1_face_diagonals")
+    flat_errors = SensorErrors.uniform(flat, 0.03)
     with pytest.raises(GeometryError, match="sees 0 of the six products"):
-        flat = AccelerometerArray.load("p1_face_diagonals")
-        estimate_rate(flat, motion.t, values[:, :6], SensorErrors.uniform(flat, 0.03), method="algebraic")
+        estimate_rate(flat, motion.t, values[:, :6], flat_errors, method="algebraic")
     with pytest.raises(GeometryError, match="can't find an unknown rate"):
-        LiveRateFilter(flat, SensorErrors.uniform(flat, 0.03), 0.01, FilterSettings(start_omega=None))
+        LiveRateFilter(flat, flat_errors, 0.01, FilterSettings(start_omega=None))
 
 
 def test_tables_of_a_smaller_set_of_channels():

@@ -105,7 +105,7 @@ def crossing(slope):
     """From rest up to 1.2 rad/s, then at ``slope`` rad/s² through zero to −1.2 rad/s."""
     length = 2.4 / slope
     t = np.arange(round((10 + length + 3) * RATE)) / RATE
-    up, rise = smooth_step(t, 2, 6)
+    _, rise = smooth_step(t, 2, 6)
     eased = np.clip(np.minimum(t - 8, 9 + length - t), 0, 1)
     alpha_z = 1.2 * rise - slope * 0.5 * (1 - np.cos(np.pi * eased))
     omega_z = np.concatenate([[0], np.cumsum(alpha_z[1:] + alpha_z[:-1]) / 2 / RATE])

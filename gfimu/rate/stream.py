@@ -1,0 +1,171 @@
+"""Live filtering of a text stream: CSV lines in, one line of estimate per sample out."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from gfimu.array import AccelerometerArray
+from gfimu.errors import InputError
+from gfimu.rate.kalman import FilterSettings
+from gfimu.rate.live import LiveRateFilter
+from gfimu.rate.result import RateEstimate
+from gfimu.rate.sensing import SensorErrors
+from gfimu.units import READING_UNITS
+
+__all__ = ["StreamLayout", "filter_stream"]
+
+_GYRO = ("gyro_x_rad_s", "gyro_y_rad_s", "gyro_z_rad_s")
+
+
+@dataclass(frozen=True)
+class StreamLayout:
+    """Where the columns of a stream are.
+
+    Parameters
+    ----------
+    time : int
+        Column of ``t_s``.
+    channels : tuple of int
+        Columns of the array's channels, in its order.
+    factors : tuple of float
+        Factor of each to m/s².
+    gyro : tuple of int
+        Columns of the gyro; empty without one.
+    width : int
+        Number of columns.
+    """
+
+    time: int
+    channels: tuple[int, ...]
+    factors: tuple[float, ...]
+    gyro: tuple[int, ...]
+    width: int
+
+    @classmethod
+    def from_header(cls, names: list[str], array: AccelerometerArray) -> StreamLayout:
+        """Find the columns by their names, unit included, as in a recording's CSV file.
+
+        Raises
+        ------
+        InputError
+            If a column is missing or its unit is not one that needs no sensitivity.
+        """
+        columns = [name.strip() for name in names]
+        if "t_s" not in columns:
+            start = ",".join(columns)[:80]
+            raise InputError(f"the stream's first line lacks t_s; it must name the columns, and reads {start!r}")
+        places, factors = [], []
+        for channel in array.channels:
+            found = [name for name in columns if name.rpartition("_")[0] == channel or name == f"{channel}_m_s2"]
+            if not found:
+                raise InputError(f"the stream lacks channel {channel} of array {array.name!r}, as {channel}_m_s2")
+            unit = found[0][len(channel) + 1 :]
+            factor = READING_UNITS.get(unit)
+            if factor is None:
+                raise InputError(f"column {found[0]!r}: unit must be m_s2, g or mg in a stream")
+            places.append(columns.index(found[0]))
+            factors.append(factor)
+        gyro = tuple(columns.index(name) for name in _GYRO) if all(name in columns for name in _GYRO) else ()
+        return cls(columns.index("t_s"), tuple(places), tuple(factors), gyro, len(columns))
+
+
+def filter_stream(
+    lines: Iterable[str],
+    array: AccelerometerArray,
+    errors: SensorErrors,
+    period: float,
+    settings: FilterSettings | None = None,
+    *,
+    fuse_gyro: bool = False,
+) -> Iterator[str]:
+    """Filter a stream of CSV lines, sample by sample.
+
+    The first line that is no comment names the columns (``t_s``, ``a11_m_s2`` …). Each estimate is one JSON line:
+    ``t_s``, ``omega_rad_s``, ``omega_std_rad_s``, ``nis`` and its degrees of freedom, ``rest`` where a block of rest
+    ended, ``sign``, and ``fault`` where something was wrong with the line or its channels. A line that can't be read
+    is reported and skipped.
+
+    Parameters
+    ----------
+    lines : iterable of str
+        The stream.
+    array : AccelerometerArray
+        The array.
+    errors : SensorErrors
+        Errors of its sensors.
+    period : float
+        Nominal sample period, s.
+    settings : FilterSettings, optional
+        Start, quadrature, rest.
+    fuse_gyro : bool
+        Whether to use the stream's gyro columns.
+
+    Yields
+    ------
+    str
+        JSON lines.
+
+    Raises
+    ------
+    InputError
+        If the first line doesn't name the columns.
+    """
+    live = LiveRateFilter(array, errors, period, settings, gyro=fuse_gyro)
+    layout: StreamLayout | None = None
+    reported: dict[str, Any] = live.report.to_dict()
+    for line in lines:
+        if not line.strip() or line.startswith("#"):
+            continue
+        cells = next(csv.reader([line]))
+        if layout is None:
+            layout = StreamLayout.from_header(cells, array)
+            if fuse_gyro and not layout.gyro:
+                raise InputError(f"the stream lacks {', '.join(_GYRO)}; send them, or leave --gyro out")
+            continue
+        try:
+            values = _numbers(cells, layout)
+            readings = values[list(layout.channels)] * layout.factors
+            gyro = values[list(layout.gyro)] if fuse_gyro else None
+            found = live.push(values[layout.time], readings, gyro)
+        except InputError as error:
+            yield json.dumps({"fault": str(error)})
+            continue
+        faults = live.report.to_dict()
+        news = {key: value for key, value in faults.items() if value != reported[key]}
+        reported = faults
+        yield from _lines(found, news)
+    yield from _lines(live.finish(), {})
+
+
+def _numbers(cells: list[str], layout: StreamLayout) -> np.ndarray:
+    """Numbers of one line; an empty cell is a missing reading."""
+    if len(cells) != layout.width:
+        raise InputError(f"line has {len(cells)} columns, the first line {layout.width}; skipped")
+    try:
+        return np.array([float(cell) if cell.strip() else np.nan for cell in cells])
+    except ValueError as error:
+        raise InputError(f"{error}; line skipped") from None
+
+
+def _lines(found: RateEstimate, faults: dict[str, Any]) -> Iterator[str]:
+    std = found.std
+    for k in range(len(found)):
+        record: dict[str, Any] = {
+            "t_s": float(found.t_s[k]),
+            "omega_rad_s": found.omega[k].tolist(),
+            "omega_std_rad_s": std[k].tolist() if np.isfinite(std[k]).all() else None,
+            "nis": float(found.nis[k]),
+            "nis_dof": int(found.nis_dof[k]),
+            "sign": found.sign.state,
+        }
+        if found.rest[k]:
+            record["rest"] = True
+        if faults and k == len(found) - 1:
+            record["fault"] = faults
+        yield json.dumps(record)
