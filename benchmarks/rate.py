@@ -4,8 +4,8 @@
     python benchmarks/rate.py --runs 60        with the runs of the study
     python benchmarks/rate.py --speed          throughput and latency only
 
-Worlds are those of the tests (``tests/gfimu/rate/rate_worlds.py``): data-sheet noise of the ADXL345, 3.9 mg steps, 35 mg
-of turn-on bias, a cube of 10 cm, or of 6 cm where that would leave ±16 g. Errors are RMS per axis while the body turns
+Worlds are those of the tests (``tests/gfimu/rate/rate_worlds.py``): data-sheet noise of the ADXL345, 3.9 mg steps,
+35 mg of turn-on bias, a cube of 10 cm, or of 6 cm where that would leave ±16 g. Errors are RMS per axis while the body turns
 at more than half its top speed. The per-sample methods and the integration take their biases from the 2 s of rest at
 the start; per-sample estimates are given the true sign, and are set against the per-sample Cramér–Rao bound. Speeds are
 CPU time on one core, the numpy loop and the compiled filter in one run.
@@ -24,14 +24,14 @@ from rich.table import Table
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "gfimu" / "rate"))
 
-from rate_worlds import Motion, cube, measure, rms, sensor_errors, tumble, turntable  # noqa: E402
-from reference_filter import reference_filter  # noqa: E402
+from rate_worlds import Motion, cube, measure, rms, sensor_errors, tumble, turntable
+from reference_filter import reference_filter
 
-from gfimu.bounds import posterior_rate_bound, rate_bound  # noqa: E402
-from gfimu.rate.kalman import FilterSettings, KalmanRateFilter  # noqa: E402
-from gfimu.rate.live import LiveRateFilter  # noqa: E402
-from gfimu.rate.methods import RATE_METHODS, estimate_rate  # noqa: E402
-from gfimu.rate.rest_test import RestTest  # noqa: E402
+from gfimu.bounds import posterior_rate_bound, rate_bound
+from gfimu.rate.kalman import FilterSettings, KalmanRateFilter
+from gfimu.rate.live import LiveRateFilter
+from gfimu.rate.methods import RATE_METHODS, estimate_rate
+from gfimu.rate.rest_test import RestTest
 
 SCENARIOS = [
     *[(turntable, speed, rate) for rate in (100.0, 800.0) for speed in (0.0, 0.1, 1.0, 10.0)],

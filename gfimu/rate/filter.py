@@ -71,7 +71,7 @@ def require_finite(array: AccelerometerArray, result: RateEstimate) -> None:
     if broken.any():
         raise GeometryError(
             f"the rate ran away at t = {result.t_s[int(np.argmax(broken))]:.4g} s: array {array.name!r} leaves "
-            "products of the rate in α, which feed back on themselves; turn slower, or use an array whose null space sees them"
+            "products of the rate in α, which feed back on themselves; turn slower, or use an array that sees them"
         )
 
 

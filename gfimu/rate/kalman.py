@@ -10,6 +10,7 @@ takes three on each side: the estimate for a sample appears when two more have c
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -24,7 +25,7 @@ from gfimu.rate.preparation import prepare
 from gfimu.rate.recursion import forward
 from gfimu.rate.recursion_data import Record, RecursionInput, RecursionOutput, RecursionState, Tables, Tuning
 from gfimu.rate.rest_test import RUN_BLOCKS, RestTest
-from gfimu.rate.result import ChannelReport, RateEstimate, full_covariance
+from gfimu.rate.result import ChannelReport, RateEstimate, SignDecision, full_covariance
 from gfimu.rate.sensing import ChannelTables, SensorErrors
 
 __all__ = [
@@ -225,6 +226,8 @@ class KalmanRateFilter:
     @property
     def report(self) -> ChannelReport:
         """What was wrong with the channels so far."""
+        if not self._tally.any():
+            return ChannelReport(samples_without_alpha=self._blind, gaps=self._gaps)
         missing, saturated, stuck = (
             {name: int(count) for name, count in zip(self.array.channels, row, strict=True) if count}
             for row in self._tally
@@ -312,6 +315,9 @@ class KalmanRateFilter:
     def _check_times(self, times: NDArray[np.float64]) -> None:
         if len(times) == 0:
             return
+        if len(times) == 1 and self._last_time < times[0] < math.inf:  # one sample at a time: no array operations
+            self._last_time = float(times[0])
+            return
         if not np.isfinite(times).all() or times[0] <= self._last_time or np.any(times[1:] <= times[:-1]):
             raise InputError("sample times must be finite and increase; drop repeated or reordered samples")
         self._last_time = float(times[-1])
@@ -375,7 +381,13 @@ class KalmanRateFilter:
     def _empty(self, n: int) -> tuple[RecursionOutput, NDArray[np.float64]]:
         return empty_output(n), np.empty(n)
 
-    def estimate(self, output: FilterOutput, method: str = "filter") -> RateEstimate:
+    def estimate(
+        self,
+        output: FilterOutput,
+        method: str = "filter",
+        sign: SignDecision | None = None,
+        mirrored: RateEstimate | None = None,
+    ) -> RateEstimate:
         """Turn output into a result, with the state as it is now."""
         columns = output.columns
         return RateEstimate(
@@ -386,6 +398,8 @@ class KalmanRateFilter:
             columns.nis,
             columns.dof,
             columns.rest,
+            sign or SignDecision(),
+            mirrored,
             bias=self.state.x[3:-3].copy(),
             bias_covariance=self.state.covariance[3:-3, 3:-3].copy(),
             channels=self.report,

@@ -203,12 +203,12 @@ class LiveRateFilter:
         if not self.hypotheses:
             return self.describe(outputs[0])
         if len(outputs) == 1:
-            return replace(self.current.estimate(outputs[0]), sign=self._sign)
+            return self.current.estimate(outputs[0], sign=self._sign)
         if place is not None:
             parts = [outputs[0].rows(slice(0, place)), outputs[self.winner].rows(slice(place, None))]
-            return replace(self.current.estimate(join(parts)), sign=self._sign)
-        mirrored = replace(self.hypotheses[1].estimate(outputs[1]), sign=self._sign)
-        return replace(self.current.estimate(outputs[0]), sign=self._sign, mirrored=mirrored)
+            return self.current.estimate(join(parts), sign=self._sign)
+        mirrored = self.hypotheses[1].estimate(outputs[1], sign=self._sign)
+        return self.current.estimate(outputs[0], sign=self._sign, mirrored=mirrored)
 
     def describe(self, waiting: FilterOutput) -> RateEstimate:
         """Turn output from before the start into a result."""

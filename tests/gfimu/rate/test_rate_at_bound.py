@@ -2,8 +2,8 @@
 
 Data-sheet noise, 3.9 mg steps and 35 mg of turn-on bias; a cube of 10 cm, or of 6 cm where that would leave ±16 g.
 The ratio is taken while the body turns at more than half its top speed: at rest the rate is known from the rest test,
-which is no random measurement, and near zero a bound by the slope of ω² does not hold. All scenarios with 60 runs, at 800 Hz too:
-``pytest -m study tests/gfimu/rate``.
+which is no random measurement, and near zero a bound by the slope of ω² does not hold. All scenarios with 60 runs, at
+800 Hz too: ``pytest -m study tests/gfimu/rate``.
 """
 
 from __future__ import annotations
