@@ -25,8 +25,8 @@ from sim.world import SampleContext
 
 __all__ = ["Ride"]
 
-GRID_HZ = 2000.0
-_SEGMENT = 8000  # grid points per batch
+GRID_HZ = 1000.0
+_SEGMENT = 4000  # grid points per batch
 _MARGIN = 16  # points on either side, so that a spline's ends do not show
 
 

@@ -332,13 +332,6 @@ class Board:
                 selected = sensor
         self.ssps[1].selected = selected
 
-    def note_exception(self, number: int, *, entered: bool) -> None:
-        """Count an exception and tell the tracer."""
-        if entered:
-            self.exceptions += 1
-        if self.tracer is not None:
-            self.tracer.exception(self.now, number, entered=entered)
-
     def lose_interrupts(self, exception: int, every: int) -> None:
         """Fault: let one in so many requests of an interrupt get lost, as a glitch on its way would."""
         pend = self.nvic.pend

@@ -294,7 +294,9 @@ class Cpu:
             self.uc.reg_write(arm.UC_ARM_REG_CONTROL, control & ~2)
         nvic.enter(exception)
         board.now += _ENTRY_CYCLES * board.cycle
-        board.note_exception(exception, entered=True)
+        board.exceptions += 1
+        if board.tracer is not None:
+            board.tracer.exception(board.now, exception, entered=True)
         vector = nvic.vtor + 4 * exception
         table = self._flash[vector : vector + 4] if vector < FLASH_SIZE else self.peek(vector, 4)
         self.pc = int.from_bytes(table, "little") | 1
@@ -327,7 +329,8 @@ class Cpu:
             self._unstack.write()
         self.pc = pc | 1
         board.now += _ENTRY_CYCLES * board.cycle
-        board.note_exception(ended, entered=False)
+        if board.tracer is not None:
+            board.tracer.exception(board.now, ended, entered=False)
 
     # Running
 

@@ -39,6 +39,7 @@ class Nvic(Peripheral):
         self.priority = [0] * 64
         self.priority[NMI], self.priority[HARD_FAULT] = -2, -1
         self.group_mask = 0xFF
+        self.running = THREAD_PRIORITY
         self.vtor = 0
         self._priority_group = 0
         self._stored: dict[int, int] = {0xD14: 0x200}
@@ -61,9 +62,9 @@ class Nvic(Peripheral):
         self.pending |= 1 << exception
         self.board.alarm = -1  # look at the next block
 
-    def execution_priority(self) -> int:
-        """Priority of what runs now, without the mask registers."""
-        return self._group(self.active[-1]) if self.active else THREAD_PRIORITY
+    def _set_running(self) -> None:
+        """Note the priority of what runs now, without the mask registers."""
+        self.running = self._group(self.active[-1]) if self.active else THREAD_PRIORITY
 
     def _group(self, exception: int) -> int:
         priority = self.priority[exception]
@@ -72,13 +73,17 @@ class Nvic(Peripheral):
     def best(self) -> int:
         """Pending and enabled exception that would preempt what runs now; 0 if none."""
         waiting = self.pending & self.enabled
-        best = 0
+        if not waiting:
+            return 0
+        best = (waiting & -waiting).bit_length() - 1
+        waiting &= waiting - 1
         while waiting:
             number = (waiting & -waiting).bit_length() - 1
             waiting &= waiting - 1
-            if not best or self.priority[number] < self.priority[best]:
+            if self.priority[number] < self.priority[best]:
                 best = number
-        return best if best and self._group(best) < self.execution_priority() else 0
+        priority = self.priority[best]
+        return best if (priority & self.group_mask if priority > 0 else priority) < self.running else 0
 
     def masked(self, exception: int, primask: int, basepri: int, faultmask: int) -> bool:
         """Tell whether the mask registers hold an exception back."""
@@ -93,11 +98,13 @@ class Nvic(Peripheral):
         self.pending &= ~(1 << exception)
         self.active.append(exception)
         self.active_mask |= 1 << exception
+        self._set_running()
 
     def leave(self) -> None:
         """End the innermost active exception; a line that is still high makes it pending again."""
         bit = 1 << self.active.pop()
         self.active_mask &= ~bit
+        self._set_running()
         if self.lines & bit:
             self.pending |= bit
 
@@ -176,6 +183,7 @@ class Nvic(Peripheral):
             self._write_reset_control(value)
         else:
             self._stored[offset & ~3] = value
+        self._set_running()  # priorities or groups may be others now
         self.board.alarm = -1
 
     def _set_priorities(self, first: int, value: int, size: int) -> None:
