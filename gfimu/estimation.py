@@ -31,6 +31,7 @@ from gfimu.rate.methods import RATE_METHODS, estimate_rate
 from gfimu.rate.problem import RateMethod, RateProblem, RateSolution
 from gfimu.rate.sensing import SensorErrors
 from gfimu.recording import Recording
+from gfimu.rest_navigation import navigate_with_rest
 
 __all__ = ["METHODS", "Estimate", "estimate"]
 
@@ -215,7 +216,13 @@ def estimate(
     quaternion = integrate_attitude(recording.t_s, rate.omega, alpha, start)
     mounting = Rotation.from_rotvec(recording.mounting_rotvec)
     axis = mounting.inv().apply([0.0, 0.0, 1.0])  # the table's axis in body axes
-    travelled = navigate(recording.t_s, p, quaternion) if with_position else None
+    travelled = None
+    if rate.rest is not None and rate.rest.any():  # gravity shows the tilt there, and the velocity is zero
+        levelled = navigate_with_rest(recording.t_s, p, quaternion, rate.rest)
+        quaternion = levelled.quaternion
+        travelled = levelled if with_position else None
+    elif with_position:
+        travelled = navigate(recording.t_s, p, quaternion)
     return Estimate(
         t_s=recording.t_s,
         p=p,
@@ -272,7 +279,7 @@ def _by_rate_method(method: str) -> RateMethod:
             "share_at_rest": float(found.rest.mean()),
             "channels": found.channels.to_dict(),
         }
-        return RateSolution(found.omega, np.where(np.isfinite(found.std), found.std, np.nan), remarks)
+        return RateSolution(found.omega, np.where(np.isfinite(found.std), found.std, np.nan), found.rest, remarks)
 
     return solve
 
