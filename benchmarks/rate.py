@@ -7,8 +7,8 @@
 Worlds are those of the tests (``tests/gfimu/rate/rate_worlds.py``): data-sheet noise of the ADXL345, 3.9 mg steps,
 35 mg of turn-on bias, a cube of 10 cm, or of 6 cm where that would leave ±16 g. Errors are RMS per axis while the body
 turns at more than half its top speed. The per-sample methods and the integration take their biases from the 2 s of
-rest at the start; per-sample estimates are given the true sign, and are set against the per-sample Cramér–Rao bound. Speeds are
-CPU time on one core, the numpy loop and the compiled filter in one run.
+rest at the start; per-sample estimates are given the true sign, and are set against the per-sample Cramér–Rao bound.
+Speeds are CPU time on one core, the numpy loop and the compiled filter in one run.
 """
 
 from __future__ import annotations

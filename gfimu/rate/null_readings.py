@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gfimu.array import AccelerometerArray
 from gfimu.errors import GeometryError, InputError
-from gfimu.rate.rest_test import constant_readings
+from gfimu.rate.rest_test import RestTest, constant_readings
 from gfimu.rate.sensing import ChannelTables, SensorErrors
 
 __all__ = ["NullReadings", "align_signs", "null_readings"]
@@ -94,8 +94,11 @@ def null_readings(
     z = complete @ tables.null_rows[0].T
     rest = np.zeros(len(times), dtype=bool)
     if start_at_rest:
-        constant = constant_readings(array, rows, errors.noise_std, float(np.median(np.diff(times))))
-        rest[: len(constant) if constant.all() else int(np.argmin(constant))] = True
+        period = float(np.median(np.diff(times)))
+        constant = constant_readings(array, rows, errors.noise_std, period)
+        length = len(constant) if constant.all() else int(np.argmin(constant))
+        block = RestTest().window(period)
+        rest[: length - block if length > block else length] = True  # the last block may be the start of a slow motion
         if rest.any():
             alpha = alpha - alpha[rest].mean(axis=0)
             z = z - z[rest].mean(axis=0)

@@ -50,7 +50,8 @@ class RateProblem:
 class RateSolution:
     """Angular rate in body axes and its standard deviation, rad/s, each of shape (n, 3); NaN where not found.
 
-    ``rest`` marks the samples recognised as rest, where the method does that. ``remarks`` are figures and sentences about how it was found, by name, for the estimate's metadata.
+    ``rest`` marks the samples recognised as rest, where the method does that. ``remarks`` are figures and sentences
+    about how it was found, by name, for the estimate's metadata.
     """
 
     omega: NDArray[np.float64]

@@ -1,0 +1,127 @@
+"""Draw the figures of ``rate.md`` and print the numbers it quotes: ``python docs/make_rate_figures.py [DIR]``."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import matplotlib as mpl
+
+mpl.use("Agg")
+import matplotlib.pyplot as plt
+import numpy as np
+from numpy.typing import NDArray
+
+from gfimu.array import AccelerometerArray
+from gfimu.bounds import alpha_std, rate_bound_isotropic, steady_rate_bound
+from gfimu.drift import equivalent_rate_drift
+from gfimu.estimation import Estimate
+from gfimu.rate.kalman import FilterSettings
+from gfimu.rate.methods import RATE_METHODS, estimate_rate
+from gfimu.rate.sensing import SensorErrors
+from gfimu.recording import Recording
+from gfimu.rest_bias import estimate_from_rest
+from sim.scenarios import Scenario, simulate
+
+RATE = 100.0
+CUBE = AccelerometerArray.load("cube12")
+COLOURS = dict(zip(RATE_METHODS, ("0.45", "tab:green", "tab:olive", "tab:orange", "tab:blue"), strict=True))
+
+
+def steady_error(speed: float, noise: float, seed: int) -> dict[str, float]:
+    """RMSE per axis of each method in steady turning about z that began 2 s after the start, biases calibrated."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(round(24 * RATE)) / RATE
+    u = np.clip((t - 2) / 4, 0, 1)
+    omega = np.zeros((len(t), 3))
+    omega[:, 2] = speed * (u - np.sin(2 * np.pi * u) / (2 * np.pi))
+    alpha = np.zeros_like(omega)
+    alpha[:, 2] = speed * (1 - np.cos(2 * np.pi * u)) / 4
+    readings = alpha @ CUBE.regression_matrix[:, :3].T + omega[:, 2:] ** 2 @ CUBE.centripetal_matrix[:, 2:3].T
+    readings += noise * rng.standard_normal(readings.shape)
+    errors = SensorErrors.uniform(CUBE, noise)
+    steady = t > 8
+    found = {}
+    for method in RATE_METHODS:
+        estimate = estimate_rate(CUBE, t, readings, errors, method=method, settings=FilterSettings(rest=None)).omega
+        signs = np.where(np.sum(estimate * omega, axis=1) < 0, -1.0, 1.0)[:, None]
+        error = (estimate * signs if method in {"algebraic", "ml"} else estimate) - omega
+        found[method] = float(np.sqrt(np.mean(error[steady] ** 2)))
+    return found
+
+
+def draw_bounds(folder: Path) -> Path:
+    """Error of each method against speed, with the bounds drawn in."""
+    noise = 0.03
+    sigma = float(alpha_std(CUBE, noise)[0])
+    speeds = np.geomspace(0.3, 50, 7)
+    errors = [[steady_error(speed, noise, seed) for seed in range(3)] for speed in speeds]
+    figure, axes = plt.subplots(figsize=(7.2, 4.4), layout="constrained")
+    fine = np.geomspace(0.2, 60, 200)
+    for label, bound, style in (
+        ("Cramér–Rao, one sample", rate_bound_isotropic(sigma, fine), "k:"),
+        ("posterior, samples so far", steady_rate_bound(sigma, 1 / RATE, fine), "k--"),
+        ("posterior, all samples", steady_rate_bound(sigma, 1 / RATE, fine, smoother=True), "k-"),
+    ):
+        axes.plot(fine, np.sqrt((2 * bound[0] ** 2 + bound[1] ** 2) / 3), style, lw=1, label=label)
+    for method in RATE_METHODS:
+        values = [np.sqrt(np.mean([run[method] ** 2 for run in runs])) for runs in errors]
+        axes.plot(speeds, values, "o", color=COLOURS[method], ms=5, label=method)
+    axes.set(xscale="log", yscale="log", xlabel="|ω|, rad/s", ylabel="RMSE of ω per axis, rad/s")
+    axes.set_title("cube12, 100 Hz, 0.03 m/s² of noise, no bias: steady turning, 2 to 18 s after it began", fontsize=9)
+    axes.grid(visible=True, which="both", alpha=0.2)
+    axes.legend(fontsize=8, ncols=2)
+    path = folder / "rate_bounds.png"
+    figure.savefig(path, dpi=110)
+    plt.close(figure)
+    return path
+
+
+def paper_run() -> tuple[Recording, dict[str, Estimate]]:
+    """The paper's run, biases read off at the first rest, by integration, filter and smoother."""
+    recording = simulate(Scenario.load("paper_run"), seed=1)
+    estimates = {
+        method: estimate_from_rest(recording, CUBE, method=method, with_position=True)
+        for method in ("integrate", "filter", "smoother")
+    }
+    return recording, estimates
+
+
+def truth(recording: Recording) -> NDArray[np.float64]:
+    """True rate of a simulated recording, shape (n, 3)."""
+    return np.column_stack([np.asarray(recording.extra[f"truth_omega_{axis}_rad_s"], dtype=float) for axis in "xyz"])
+
+
+def draw_paper_run(folder: Path) -> Path:
+    """Error of the rate along the paper's run with ±2σ bands; prints the drift table."""
+    recording, estimates = paper_run()
+    omega = truth(recording)
+    figure, axes = plt.subplots(3, 1, figsize=(7.2, 5.6), sharex=True, layout="constrained")
+    print("method      rate error at 30 s, °/h    position error at 30 s, m    equivalent rate drift, °/h")
+    for axis, (method, found) in zip(axes, estimates.items(), strict=True):
+        error = found.omega - omega
+        for component, colour in zip(range(3), ("tab:red", "tab:green", "tab:blue"), strict=True):
+            axis.plot(found.t_s, error[:, component], color=colour, lw=0.7, label="xyz"[component])
+        band = 2 * found.omega_std.max(axis=1)
+        axis.fill_between(found.t_s, -band, band, color="0.85", label="±2σ")
+        axis.set(ylabel=f"{method}\nerror, rad/s", ylim=(-0.5, 0.5) if method == "integrate" else (-0.15, 0.15))
+        position = float(np.linalg.norm(found.position[-1])) if found.position is not None else np.nan
+        rate = float(np.degrees(np.linalg.norm(error[-1])) * 3600)
+        drift = float(equivalent_rate_drift(position, 30.0))
+        print(f"{method:<10}  {rate:>24.0f}  {position:>25.1f}  {drift:>27.0f}")
+    axes[0].legend(fontsize=7, ncols=4)
+    axes[-1].set_xlabel("t, s")
+    path = folder / "rate_paper_run.png"
+    figure.savefig(path, dpi=110)
+    plt.close(figure)
+    return path
+
+
+def main(folder: Path) -> list[Path]:
+    """Draw all figures into ``folder``."""
+    folder.mkdir(parents=True, exist_ok=True)
+    return [draw_bounds(folder), draw_paper_run(folder)]
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent / "figures")
