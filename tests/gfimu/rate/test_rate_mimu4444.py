@@ -20,7 +20,7 @@ from gfimu.rate.smoother import smooth_rate
 
 DARK = FilterSettings(start_omega=None)
 START_S = 550.0  # amid the motion of recording 2
-DISAGREEMENT = 1e-3  # s, of the chips' sampling times: their disagreement over the slope of the readings
+DISAGREEMENT = 1.5e-3  # s, of the chips' sampling times: with it the innovations are as large as they should be
 
 
 @pytest.fixture(scope="module")
@@ -60,6 +60,8 @@ def test_rate_against_the_gyros_from_a_cold_start(motion, solve):
     assert speed > 20
     assert median < 5.0
     assert flipped < 0.03
+    assert found.sign.state == "decided"
+    assert found.mean_nis == pytest.approx(1, abs=0.15)
     # The error is what undersampling and the chips' clocks explain: median of χ²(3) is 2.4.
     assert 0.8 < square < 5
 
@@ -87,5 +89,5 @@ def test_estimate_goes_on_through_gyro_saturation(motion):
     # Beyond the range of a gyro axis (35 rad/s) the estimate says so.
     assert np.median(np.abs(found.omega[holes]).max(axis=1)) > 28
     median, flipped, _, _ = compare(found, gyro)
-    assert median < 1.0
+    assert median < 1.2
     assert flipped < 0.005
