@@ -32,6 +32,11 @@ from typing import Any
 __version__ = "0.1.0"
 
 _PUBLIC = {
+    "LiveRateFilter": "gfimu.rate.live",
+    "RateEstimate": "gfimu.rate.result",
+    "SensorErrors": "gfimu.rate.sensing",
+    "estimate_rate": "gfimu.rate.methods",
+    "posterior_rate_bound": "gfimu.bounds",
     "AccelerometerArray": "gfimu.array",
     "Calibration": "gfimu.calibration.result",
     "Chip": "gfimu.array",
