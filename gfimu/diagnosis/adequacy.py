@@ -25,7 +25,7 @@ from gfimu.diagnosis.signatures import cause_columns
 __all__ = ["LEFT_OVER_ODDS", "LeftOver", "generic_basis", "left_over"]
 
 LEFT_OVER_ODDS = 10.0
-"""Log odds from which what is left is called significant: fixed on null runs that no reported figure uses."""
+"""Log odds from which what is left is called significant; provisional until a study of null runs fixes it."""
 _UNIT = 0.03
 _STEPS = 8
 _SLOW = 10

@@ -33,7 +33,7 @@ _FAIR_FIT = 1.6
 _RIVALS = 6
 _WORTH_REFINING = -6.0
 LEAST_ODDS = 9.0
-"""Log odds that a single cause needs against nothing: fixed on null runs that no reported figure uses."""
+"""Log odds that a single cause needs against nothing; provisional until a study of null runs fixes it."""
 LEAST_EXTRA_ODDS = 7.0
 """Log odds that a further cause needs against the set without it."""
 _ITERATIONS = 7
