@@ -54,7 +54,7 @@ class LeftOver:
 
 def generic_basis(segment: Segment) -> tuple[list[str], NDArray[np.float64]]:
     """Return names and values (n, k) of smooth functions of rate, acceleration, angle and time, of unit rms."""
-    state = segment.spline.spin(segment.coefficients).at(segment.run.t)
+    state = segment.spin.at(segment.run.t)
     rate = state.rate / max(float(np.abs(state.rate).max()), 1e-6)
     acceleration = state.acceleration / max(float(np.abs(state.acceleration).max()), 1e-6)
     jerk = np.gradient(acceleration)
@@ -187,7 +187,7 @@ def _channelwise(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Return G, b and X of one set of basis functions on each channel, drive marginalised."""
     count = basis.shape[1]
-    observed = len(line.jacobian) - 1
+    observed = line.jacobian.observations - 1
     gram = np.zeros((count * observed, count * observed))
     score = np.zeros(count * observed)
     cross = np.zeros((segment.spline.size, count * observed))
@@ -201,9 +201,9 @@ def _channelwise(
         residual = line.residual[:, channel]
         gram[places, places] = weight * (part.T @ part - slow.T @ damped)
         score[places] = weight * (part.T @ residual - damped.T @ (cosines.T @ residual))
-        matrix = line.jacobian[channel]
-        if matrix.nnz:
-            cross[:, places] = weight * (matrix.T @ part - (matrix.T @ cosines) @ damped)
+        matrix = line.jacobian.channel(channel)
+        slow_jacobian = np.tensordot(line.jacobian.loading[:, channel], line.slow, axes=1)  # (m, K)
+        cross[:, places] = weight * (matrix.T @ part - slow_jacobian @ damped)
     eliminated = solve_triangular(line.factor, cross, lower=True, check_finite=False)
     gram -= eliminated.T @ eliminated
     score -= eliminated.T @ line.forward
@@ -223,7 +223,7 @@ def _project_out(
     inner, right, crossed = segment.whitened_products(line, named)
     count = basis.shape[1]
     mixed = np.zeros((named.shape[1], gram.shape[0]))
-    for channel in range(len(line.jacobian) - 1):
+    for channel in range(line.jacobian.observations - 1):
         places = slice(channel * count, (channel + 1) * count)
         columns = named[channel]  # (K, n)
         if not columns.any():
@@ -282,7 +282,7 @@ def _changing_noise(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Seque
         mask = segment.weight_mask[:, :-1]
         use = mask[1:-1] & mask[:-2] & mask[2:]  # a second difference needs three samples
         power, count = np.where(use, left**2, 0.0).sum(axis=1), use.sum(axis=1)
-        state = segment.spline.spin(segment.coefficients).at(segment.run.t[1:-1])
+        state = segment.spin.at(segment.run.t[1:-1])
         for name, value in (
             ("the rate", np.abs(state.rate)),
             ("the angular acceleration", np.abs(state.acceleration)),

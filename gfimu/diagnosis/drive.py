@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import BSpline
 from scipy.ndimage import gaussian_filter1d, uniform_filter1d
 from scipy.sparse import csr_array, diags_array
 
@@ -18,9 +17,13 @@ from gfimu.diagnosis.run import Run
 __all__ = ["ROUGHNESS_FACTOR", "AngleSpline", "SplineState", "roughness_prior", "smooth_rate"]
 
 _DEGREE = 4
+# Coefficients of 1, u, … u⁴ of the five basis functions on a knot interval, uniform knots (de Boor 1978, ch. X).
+_QUARTIC = (
+    np.array([[1, -4, 6, -4, 1], [11, -12, -6, 12, -4], [11, 12, -6, -12, 6], [1, 4, 6, 4, -4], [0, 0, 0, 0, 1]]) / 24.0
+)
 _SMOOTHEST = 5.0
 ROUGHNESS_FACTOR = 6.0
-_REMEMBERED = 6
+_REMEMBERED = 8
 
 
 class SplineState:
@@ -49,26 +52,68 @@ class AngleSpline:
         self.start, self.stop = start, stop
         self.knots = start + self.spacing * np.arange(-_DEGREE, intervals + _DEGREE + 1)
         self.size = intervals + _DEGREE
-        self._first = diags_array([-1.0, 1.0], offsets=[0, 1], shape=(self.size - 1, self.size)).tocsr() / self.spacing
-        inner = diags_array([-1.0, 1.0], offsets=[0, 1], shape=(self.size - 2, self.size - 1)).tocsr() / self.spacing
-        self._second = inner @ self._first
+        self._known: dict[bytes, tuple[NDArray[np.intp], NDArray[np.float64]]] = {}
+
+    def local(self, t: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+        """Return the first coefficient (n,) that matters at each time, and what angle, rate and acceleration take
+        from it and the four after it, shape (3, n, 5); constant rate beyond the ends.
+        """  # noqa: D205
+        # The same few time axes are asked for thousands of times.
+        key = t.tobytes()
+        if key not in self._known:
+            if len(self._known) >= _REMEMBERED:
+                self._known.pop(next(iter(self._known)))
+            self._known[key] = self._local(t)
+        return self._known[key]
+
+    def _local(self, t: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+        inside = np.clip(t, self.start, self.stop)
+        place = (inside - self.start) / self.spacing
+        first = np.clip(place.astype(np.intp), 0, self.size - _DEGREE - 1)
+        powers = np.vander(place - first, _DEGREE + 1, increasing=True)  # (n, 5)
+        degrees = np.arange(1.0, _DEGREE + 1)
+        once = _QUARTIC[:, 1:] * degrees  # derivative of each basis function
+        twice = once[:, 1:] * degrees[:-1]
+        values = np.stack(
+            [
+                powers @ _QUARTIC.T,
+                powers[:, :-1] @ once.T / self.spacing,
+                powers[:, :-2] @ twice.T / self.spacing**2,
+            ]
+        )
+        beyond = t - inside
+        if beyond.any():
+            values[0] += values[1] * beyond[:, None]
+        return first, values
+
+    def matrix(self, t: NDArray[np.float64], slopes: NDArray[np.float64]) -> csr_array:
+        """Return the matrix (n, m) from the coefficients to Σ slopes · (angle, rate, acceleration) at times ``t``.
+
+        Parameters
+        ----------
+        t : ndarray, shape (n,)
+            Times, s.
+        slopes : ndarray, shape (3, n)
+            Weights of angle, rate and acceleration at each time.
+        """
+        first, values = self.local(t)
+        data = np.einsum("sn,snj->nj", slopes, values)
+        columns = first[:, None] + np.arange(_DEGREE + 1)
+        ends = np.arange(0, data.size + 1, _DEGREE + 1)
+        return csr_array((data.ravel(), columns.ravel(), ends), shape=(len(t), self.size))
 
     def matrices(self, t: NDArray[np.float64]) -> tuple[csr_array, csr_array, csr_array]:
         """Return matrices (n, m) from the coefficients to angle, rate and acceleration at times ``t``."""
-        at = np.clip(t, self.start, self.stop)
-        angle = csr_array(BSpline.design_matrix(at, self.knots, _DEGREE))
-        rate = csr_array(BSpline.design_matrix(at, self.knots[1:-1], _DEGREE - 1)) @ self._first
-        acceleration = csr_array(BSpline.design_matrix(at, self.knots[2:-2], _DEGREE - 2)) @ self._second
-        return angle, csr_array(rate), csr_array(acceleration)
+        one = np.eye(3)[:, :, None] * np.ones(len(t))  # (3, 3, n)
+        return self.matrix(t, one[0]), self.matrix(t, one[1]), self.matrix(t, one[2])
 
     def roughness_rows(self) -> csr_array:
         """Return the matrix from the coefficients to the third derivative of the rate per knot interval, rad/s⁴."""
-        matrix = self._second
-        for order in (2, 3):
-            rows = self.size - order - 1
-            step = diags_array([-1.0, 1.0], offsets=[0, 1], shape=(rows, rows + 1)).tocsr() / self.spacing
-            matrix = step @ matrix
-        return csr_array(matrix)
+        # The fourth derivative of a quartic on uniform knots is the fourth difference of its coefficients.
+        rows = self.size - _DEGREE
+        fourth = [1.0, -4.0, 6.0, -4.0, 1.0]
+        matrix = diags_array(fourth, offsets=list(range(_DEGREE + 1)), shape=(rows, self.size))
+        return csr_array(matrix / self.spacing**_DEGREE)
 
     def interval_centres(self) -> NDArray[np.float64]:
         """Return the centre of each knot interval, s."""
@@ -91,10 +136,7 @@ class _SplineSpin:
     """Motion of a table as a spline."""
 
     def __init__(self, spline: AngleSpline, coefficients: NDArray[np.float64]) -> None:
-        self._spline = spline
-        self._angle = BSpline(spline.knots, coefficients, _DEGREE)
-        self._rate = self._angle.derivative()
-        self._acceleration = self._rate.derivative()
+        self._spline, self._coefficients = spline, coefficients
         self._known: dict[bytes, SplineState] = {}
 
     def at(self, t: ArrayLike) -> SpinState:
@@ -105,13 +147,11 @@ class _SplineSpin:
         if key not in self._known:
             if len(self._known) >= _REMEMBERED:
                 self._known.pop(next(iter(self._known)))
-            self._known[key] = self._evaluate(times)
+            first, values = self._spline.local(np.atleast_1d(times))
+            local = self._coefficients[first[:, None] + np.arange(_DEGREE + 1)]  # (n, 5)
+            state = np.einsum("snj,nj->sn", values, local).reshape(3, *times.shape)
+            self._known[key] = SplineState(*state)
         return self._known[key]
-
-    def _evaluate(self, times: NDArray[np.float64]) -> SplineState:
-        inside = np.clip(times, self._spline.start, self._spline.stop)
-        rate = self._rate(inside)
-        return SplineState(self._angle(inside) + rate * (times - inside), rate, self._acceleration(inside))
 
 
 def smooth_rate(run: Run, *, is_angle: bool, width: float = 0.1) -> NDArray[np.float64]:

@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lapack
-from scipy.special import log_ndtr, logsumexp
+from scipy.special import log_ndtr
 
 __all__ = ["SCALES", "log_evidence", "log_evidence_each", "posterior"]
 
@@ -40,7 +40,7 @@ def log_evidence_each(
     values = 0.5 * scale**2 * score**2 / total - 0.5 * np.log(total)
     sign = log_ndtr(scale * score / np.sqrt(total)) + np.log(2.0)
     values = values + np.where(positive, sign, 0.0)
-    return np.asarray(logsumexp(values + _SCALE_WEIGHTS[:, None], axis=0))
+    return np.asarray(np.logaddexp.reduce(values + _SCALE_WEIGHTS[:, None], axis=0))
 
 
 def log_evidence(
@@ -75,4 +75,4 @@ def log_evidence(
             for sign in np.flatnonzero(positive if positive is not None else []):
                 value += float(log_ndtr(mean[sign] / np.sqrt(inverse[sign, sign]))) + np.log(2.0)
         values[place] = value
-    return float(logsumexp(values + _SCALE_WEIGHTS))
+    return float(np.logaddexp.reduce(values + _SCALE_WEIGHTS))

@@ -17,10 +17,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
 from scipy.ndimage import uniform_filter1d
-from scipy.sparse import csr_array, diags_array, vstack
+from scipy.sparse import csr_array, diags_array
 
 from gfimu.diagnosis.coloured_noise import CosineBasis, NoiseLevels
 from gfimu.diagnosis.drive import ROUGHNESS_FACTOR, AngleSpline, SplineState, roughness_prior
+from gfimu.diagnosis.drive_jacobian import DriveJacobian, lag_matrix
 from gfimu.diagnosis.model import Effect, Spin, SpinState, WorldModel
 from gfimu.diagnosis.run import Run
 
@@ -41,8 +42,10 @@ class Linearisation:
     ----------
     residual : ndarray, shape (n, c + 1)
         Measured minus predicted; zero where invalid.
-    jacobian : list of csr_array, each (n, m)
+    jacobian : DriveJacobian
         Derivative of each observation with respect to the drive's coefficients.
+    slow : ndarray, shape (R, m, K)
+        The same in the cosines of slow noise.
     factor : ndarray, shape (m, m)
         Lower Cholesky factor L of H.
     forward : ndarray, shape (m,)
@@ -52,7 +55,8 @@ class Linearisation:
     """
 
     residual: NDArray[np.float64]
-    jacobian: list[csr_array]
+    jacobian: DriveJacobian
+    slow: NDArray[np.float64]
     factor: NDArray[np.float64]
     forward: NDArray[np.float64]
     objective: float
@@ -102,6 +106,16 @@ class Segment:
         self._learned = np.zeros(self.spline.size - _DEGREE)
         self._set_roughness()
         self.coefficients = self._reference_drive = self._starting_drive()
+
+    @property
+    def coefficients(self) -> NDArray[np.float64]:
+        """The drive's spline coefficients, shape (m,)."""
+        return self._coefficients
+
+    @coefficients.setter
+    def coefficients(self, values: NDArray[np.float64]) -> None:
+        self._coefficients = values
+        self.spin = self.spline.spin(values)
 
     # -- starting values -------------------------------------------------------------------------------------
 
@@ -185,7 +199,7 @@ class Segment:
     def predict(self, effects: Sequence[Effect], spin: Spin | None = None) -> NDArray[np.float64]:
         """Predict channels and reference, shape (n, c + 1)."""
         channels, reference = self.model.predict(
-            self.spline.spin(self.coefficients) if spin is None else spin,
+            self.spin if spin is None else spin,
             self.run.t,
             effects=effects,
             temperature=self.run.temperature,
@@ -200,8 +214,11 @@ class Segment:
 
     def residual(self, effects: Sequence[Effect]) -> NDArray[np.float64]:
         """Return measured minus predicted, shape (n, c + 1); zero where invalid."""
+        return self._residual(self.predict(effects))
+
+    def _residual(self, predicted: NDArray[np.float64]) -> NDArray[np.float64]:
         measured = np.column_stack([self.run.readings, self.run.reference])
-        return np.where(self.weight_mask, measured - self.predict(effects), 0.0)
+        return np.where(self.weight_mask, measured - predicted, 0.0)
 
     # -- normal equations --------------------------------------------------------------------------------------
 
@@ -213,8 +230,9 @@ class Segment:
 
     def linearise(self, effects: Sequence[Effect]) -> Linearisation:
         """Linearise about effects and the present drive, and eliminate the drive."""
-        residual = self.residual(effects)
-        jacobian = self._jacobian(effects)
+        predicted = self.predict(effects)
+        residual = self._residual(predicted)
+        jacobian = self._jacobian(effects, predicted)
         # Differences first: the quadratic form of the coefficients would lose ten digits.
         rough = self._rough @ self.coefficients
         rhs = -(self._rough.T @ rough)
@@ -223,59 +241,40 @@ class Segment:
             off = self._begin @ self.coefficients - self.start_angle / self.start_angle_std
             rhs = rhs - self._begin.T @ off
             objective += float(off @ off)
-        slow = self.cosines.T @ residual  # (K, c + 1)
-        damped = self.share * slow
-        objective += float(self.inverse_variance @ (np.sum(residual**2, axis=0) - np.sum(slow * damped, axis=0)))
-        weighted, slow_rows = [], []
-        for column, matrix in enumerate(jacobian):
-            if matrix.nnz == 0:
-                continue
-            deviation = np.sqrt(self.inverse_variance[column])
-            weighted.append(matrix * deviation)
-            slow_jacobian = (matrix.T @ self.cosines).T  # (K, m)
-            slow_rows.append(np.sqrt(self.share[:, [column]]) * deviation * slow_jacobian)
-            rhs += self.inverse_variance[column] * (
-                matrix.T @ residual[:, column] - slow_jacobian.T @ damped[:, column]
-            )
-        stacked = vstack(weighted, format="csr")
-        lhs = (self.prior + stacked.T @ stacked).toarray()
-        low = np.concatenate(slow_rows)
+        slow_residual = self.cosines.T @ residual  # (K, c + 1)
+        damped = self.share * slow_residual
+        weights = self.inverse_variance
+        objective += float(weights @ (np.sum(residual**2, axis=0) - np.sum(slow_residual * damped, axis=0)))
+        rhs += jacobian.backward((residual - self.cosines @ damped) * weights)
+        slow = jacobian.slow(self.cosines)
+        lhs = (self.prior + jacobian.information()).toarray()
+        low = jacobian.slow_rows(slow, self.share, weights)
         lhs -= low.T @ low
         # A vanishing coupling keeps far entries of the factor out of the denormal range, where LAPACK crawls; its
         # sign alternates, as a constant one would hold the mean angle, which the data hardly fix.
         lhs += 1e-14 * float(np.mean(lhs.diagonal())) * self._alternating
         factor = np.linalg.cholesky(lhs)
         forward = solve_triangular(factor, rhs, lower=True, check_finite=False)
-        return Linearisation(residual, jacobian, factor, forward, objective - float(forward @ forward))
+        return Linearisation(residual, jacobian, slow, factor, forward, objective - float(forward @ forward))
 
-    def _jacobian(self, effects: Sequence[Effect]) -> list[csr_array]:
-        spin = self.spline.spin(self.coefficients)
-        base = self.predict(effects)
-        slopes = []
+    def _jacobian(self, effects: Sequence[Effect], base: NDArray[np.float64]) -> DriveJacobian:
+        """Differentiate the prediction ``base`` with respect to the drive's state and chain with the spline."""
+        spin = self.spin
+        slopes = np.empty((3, *base.shape))
         for place, step in enumerate(_STATE_STEPS):
             moved = self.predict(effects, _Moved(spin, place, step))
-            slopes.append(np.where(self.weight_mask, (moved - base) / step, 0.0))
+            slopes[place] = np.where(self.weight_mask, (moved - base) / step, 0.0)
         times = self.model.sample_times(self.run.t, effects)
         lag = self.model.sensing_lag(effects)
-        delayed = _lag_matrix(len(times), lag / self.run.sample_period) if lag > 0 else None
+        delay = None
+        if lag > 0:
+            matrix = lag_matrix(len(times), lag / self.run.sample_period)
+
+            def delay(part: csr_array) -> csr_array:
+                return csr_array(matrix @ part)
+
         chips = np.append(self.model.array.chip_of_channel, times.shape[1] - 1)
-        cache: dict[bytes, tuple[csr_array, ...]] = {}
-        matrices = []
-        for column, chip in enumerate(chips):
-            at = times[:, chip]
-            sensed = bool(chip < times.shape[1] - 1)
-            key = at.tobytes() + bytes([sensed])
-            if key not in cache:
-                cache[key] = self.spline.matrices(at)
-                if delayed is not None and sensed:
-                    cache[key] = tuple(csr_array(delayed @ matrix) for matrix in cache[key])
-            total = csr_array((len(at), self.spline.size))
-            for slope, matrix in zip(slopes, cache[key], strict=True):
-                mine = slope[:, column]
-                if np.any(np.abs(mine) > 1e-12):
-                    total = total + diags_array(mine) @ matrix
-            matrices.append(csr_array(total))
-        return matrices
+        return DriveJacobian.build(self.spline, slopes, times, chips, self.inverse_variance, delay)
 
     def whitened_products(
         self, linear: Linearisation, signatures: NDArray[np.float64]
@@ -284,21 +283,23 @@ class Segment:
         count = signatures.shape[1]
         gram = np.zeros((count, count))
         score = np.zeros(count)
-        cross = np.zeros((self.spline.size, count))
-        for column, matrix in enumerate(linear.jacobian):
+        weights = self.inverse_variance
+        damped = np.zeros((len(weights), count, len(self.share)))  # (c + 1, P, K)
+        for column, weight in enumerate(weights):
             mine = signatures[column]  # (P, n)
             used = np.flatnonzero(mine.any(axis=1))
             if len(used) == 0:
                 continue
             part = mine[used].T  # (n, P)
-            weight, share = self.inverse_variance[column], self.share[:, column]
             slow = self.cosines.T @ part  # (K, P)
-            damped = share[:, None] * slow
-            gram[np.ix_(used, used)] += weight * (part.T @ part - slow.T @ damped)
+            damped[column, used] = (self.share[:, [column]] * slow).T
+            gram[np.ix_(used, used)] += weight * (part.T @ part - slow.T @ damped[column, used].T)
             residual = linear.residual[:, column]
-            score[used] += weight * (part.T @ residual - damped.T @ (self.cosines.T @ residual))
-            if matrix.nnz:
-                cross[:, used] += weight * (matrix.T @ part - (matrix.T @ self.cosines) @ damped)
+            score[used] += weight * (part.T @ residual - damped[column, used] @ (self.cosines.T @ residual))
+        every = range(len(weights))
+        cross = linear.jacobian.correlate(every, signatures, weights)  # (m, P)
+        for r, slow in enumerate(linear.slow):
+            cross -= slow @ np.tensordot(linear.jacobian.loading[r] * weights, damped, axes=1).T
         eliminated = solve_triangular(linear.factor, cross, lower=True, check_finite=False)
         gram -= eliminated.T @ eliminated
         score -= eliminated.T @ linear.forward
@@ -318,10 +319,7 @@ class Segment:
     def whitened_residual(self, linear: Linearisation) -> NDArray[np.float64]:
         """Return W(r − Jδ) with δ the drive's posterior step, shape (n, c + 1): for scans over tones and orders."""
         step = solve_triangular(linear.factor, linear.forward, lower=True, trans=1, check_finite=False)
-        left = linear.residual.copy()
-        for column, matrix in enumerate(linear.jacobian):
-            if matrix.nnz:
-                left[:, column] -= matrix @ step
+        left = linear.residual - linear.jacobian.forward(step)
         slow = self.cosines.T @ left
         return (left - self.cosines @ (self.share * slow)) * self.inverse_variance
 
@@ -337,18 +335,6 @@ class _Moved:
         parts = [state.angle, state.rate, state.acceleration]
         parts[self._place] = parts[self._place] + self._step
         return SplineState(*parts)
-
-
-def _lag_matrix(n: int, samples: float) -> csr_array:
-    """Return the first-order lag of ``samples`` sample periods as a matrix (n, n), inputs joined by straight lines."""
-    x = 1.0 / samples
-    decay = np.exp(-x)
-    mean_decay = -np.expm1(-x) / x
-    length = min(int(np.ceil(12.0 * samples)) + 2, n)
-    response = np.empty(length)
-    response[0] = 1.0 - mean_decay
-    response[1:] = (decay * (1.0 - mean_decay) + mean_decay - decay) * decay ** np.arange(length - 1)
-    return csr_array(diags_array(list(response), offsets=[-k for k in range(length)], shape=(n, n)))
 
 
 def difference_noise(reference: NDArray[np.float64]) -> float:

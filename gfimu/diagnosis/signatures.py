@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import bilinear, lfilter
+from scipy.signal import lfilter
 
 from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.causes import Cause, Signature, effects_of_run, per_run_mixing
@@ -249,7 +249,7 @@ def _scan(
     power = np.zeros(len(_ORDERS))
     for segment, line in zip(segments, linear, strict=True):
         left = segment.whitened_residual(line)
-        state = segment.spline.spin(segment.coefficients).at(segment.run.t)
+        state = segment.spin.at(segment.run.t)
         if name == "cogging":
             per_acceleration = _acceleration_pattern(segment)
             signal = left[:, :-1] @ per_acceleration
@@ -292,7 +292,7 @@ def _scan_resonances(
         pattern = _acceleration_pattern(segment)
         weight = float(np.sum(pattern**2 * segment.inverse_variance[:-1]))
         signal = segment.whitened_residual(line)[:, :-1] @ pattern
-        push = segment.spline.spin(segment.coefficients).at(segment.run.t).acceleration
+        push = segment.spin.at(segment.run.t).acceleration
         for place, (frequency, damping) in enumerate(modes):
             ring = _ring(push, frequency, damping, period)
             power[place] += float(ring @ signal)
@@ -311,8 +311,14 @@ def _scan_resonances(
 
 def _ring(push: NDArray[np.float64], frequency: float, damping: float, period: float) -> NDArray[np.float64]:
     """Acceleration of a mode against its base, by the bilinear transform with the frequency pre-warped."""
-    natural = 2 / period * np.tan(np.pi * frequency * period)
-    numerator, denominator = bilinear([1.0, 0.0, 0.0], [1.0, 2 * damping * natural, natural**2], 1 / period)
+    # s²/(s² + 2ζω₀s + ω₀²) at s = (2/T)(1 − z⁻¹)/(1 + z⁻¹), in units of 2/T.
+    natural = np.tan(np.pi * frequency * period)
+    numerator = [1.0, -2.0, 1.0]
+    denominator = [
+        1.0 + 2 * damping * natural + natural**2,
+        2.0 * (natural**2 - 1.0),
+        1.0 - 2 * damping * natural + natural**2,
+    ]
     return np.asarray(lfilter(numerator, denominator, push - push[0]))
 
 

@@ -201,7 +201,8 @@ def test_the_drive_is_marginalised_to_the_digits_that_a_margin_needs(twin):
     gram = normal_equations([segment], signatures)[0]
     columns, _ = signature_columns(segment, signatures, (), ())  # (c + 1, P, n)
     weight = np.sqrt(segment.inverse_variance)
-    drive = np.vstack([matrix.toarray() * w for matrix, w in zip(segment.linearise(()).jacobian, weight, strict=True)])
+    jacobian = segment.linearise(()).jacobian
+    drive = np.vstack([jacobian.channel(column).toarray() * w for column, w in enumerate(weight)])
     values, vectors = np.linalg.eigh(segment.prior.toarray())
     prior = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
     wanted = np.concatenate([part.T * w for part, w in zip(columns, weight, strict=True)])  # (n (c + 1), P)

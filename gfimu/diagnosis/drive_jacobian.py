@@ -1,0 +1,161 @@
+"""Derivative of the observations with respect to the drive's coefficients, shared between channels.
+
+Channels that are sampled together see the drive through few functions of time (arm times acceleration, arm times
+rate squared, gravity's turn), so that J_c = Σ_r V_cr J_r with r far fewer than the channels. Everything that is
+eliminated against the drive is summed over channels first and multiplied by the few J_r.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array, diags_array, vstack
+
+from gfimu.diagnosis.drive import AngleSpline
+
+__all__ = ["DriveJacobian"]
+
+_LEAST_SHARE = 1e-14
+_Delay = Callable[[csr_array], csr_array]
+
+
+@dataclass(frozen=True)
+class DriveJacobian:
+    """Derivative (n, m) of every observation, factored.
+
+    Parameters
+    ----------
+    parts : tuple of csr_array, each (n, m)
+        J_r.
+    loading : ndarray, shape (R, c + 1)
+        V: J_c = Σ_r loading[r, c] · parts[r].
+    """
+
+    parts: tuple[csr_array, ...]
+    loading: NDArray[np.float64]
+
+    @classmethod
+    def build(
+        cls,
+        spline: AngleSpline,
+        slopes: NDArray[np.float64],
+        times: NDArray[np.float64],
+        chips: NDArray[np.intp],
+        weights: NDArray[np.float64],
+        delay: _Delay | None = None,
+    ) -> DriveJacobian:
+        """Factor the derivative.
+
+        Parameters
+        ----------
+        spline : AngleSpline
+            The drive's spline.
+        slopes : ndarray, shape (3, n, c + 1)
+            Derivative of each observation with respect to angle, rate and acceleration.
+        times : ndarray, shape (n, k + 1)
+            When each chip and, last, the reference is sampled, s.
+        chips : ndarray of int, shape (c + 1,)
+            Column of ``times`` of each observation.
+        weights : ndarray, shape (c + 1,)
+            One over the variance of each observation; the factors are orthonormal under it.
+        delay : callable, optional
+            Applies the sensing chain's lag to a matrix (n, m); the reference has none.
+        """
+        groups: dict[tuple[bytes, bool], list[int]] = {}
+        for column, chip in enumerate(chips):
+            sensed = bool(chip < times.shape[1] - 1)
+            groups.setdefault((times[:, chip].tobytes(), sensed), []).append(column)
+        parts: list[csr_array] = []
+        loadings: list[NDArray[np.float64]] = []
+        for (_, sensed), columns in groups.items():
+            root = np.sqrt(weights[columns])
+            mine = slopes[:, :, columns] * root  # (3, n, C)
+            gram = np.einsum("snc,snd->cd", mine, mine)
+            power, vectors = np.linalg.eigh(gram)
+            kept = vectors[:, power > _LEAST_SHARE * max(float(power[-1]), 1e-30)]
+            functions = mine @ kept  # (3, n, R)
+            for place in range(kept.shape[1]):
+                part = spline.matrix(times[:, chips[columns[0]]], functions[:, :, place])
+                parts.append(delay(part) if delay is not None and sensed else part)
+                row = np.zeros(len(chips))
+                row[columns] = kept[:, place] / root
+                loadings.append(row)
+        return cls(tuple(parts), np.array(loadings).reshape(len(parts), len(chips)))
+
+    def channel(self, column: int) -> csr_array:
+        """Return J_c, shape (n, m)."""
+        used = np.flatnonzero(self.loading[:, column])
+        if len(used) == 0:
+            return csr_array(self.parts[0].shape)
+        return csr_array(sum(self.loading[r, column] * self.parts[r] for r in used))
+
+    def forward(self, step: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return J δ of every observation, shape (n, c + 1)."""
+        return np.asarray(np.column_stack([part @ step for part in self.parts]) @ self.loading)
+
+    def backward(self, weighted: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return Σ_c J_cᵀ z_c of values (n, c + 1), shape (m,)."""
+        combined = weighted @ self.loading.T  # (n, R)
+        return np.asarray(sum(part.T @ combined[:, r] for r, part in enumerate(self.parts)))
+
+    def correlate(
+        self, columns: Sequence[int], values: NDArray[np.float64], weights: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Return Σ_c w_c J_cᵀ A_c of columns (C, P, n) of the observations ``columns``, shape (m, P)."""
+        total = np.zeros((self.parts[0].shape[1], values.shape[1]))
+        for r, part in enumerate(self.parts):
+            share = self.loading[r, columns] * weights[columns]
+            used = np.flatnonzero(share)
+            if len(used):
+                total += part.T @ np.tensordot(share[used], values[used], axes=1).T
+        return total
+
+    def information(self) -> csr_array:
+        """Return Σ_c w_c J_cᵀJ_c under the weights it was built with, shape (m, m)."""
+        stacked = vstack(self.parts, format="csr")
+        return csr_array(stacked.T @ stacked)
+
+    def slow(self, cosines: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return J_rᵀC of cosines (n, K), shape (R, m, K)."""
+        return np.stack([part.T @ cosines for part in self.parts])
+
+    def slow_rows(
+        self, slow: NDArray[np.float64], share: NDArray[np.float64], weights: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Return rows whose Gram matrix is Σ_ck w_c share_kc (J_cᵀC)_k (J_cᵀC)_kᵀ, shape (R·K, m).
+
+        Parameters
+        ----------
+        slow : ndarray, shape (R, m, K)
+            ``slow(cosines)``.
+        share : ndarray, shape (K, c + 1)
+            Correction of each cosine in each observation.
+        weights : ndarray, shape (c + 1,)
+            One over the variance of each observation.
+        """
+        mixed = np.einsum("rc,kc,sc->krs", self.loading * weights, share, self.loading)  # (K, R, R)
+        power, vectors = np.linalg.eigh(mixed)
+        roots = vectors * np.sqrt(np.maximum(power, 0.0))[:, None, :]  # S_k = roots rootsᵀ
+        rows = np.einsum("krq,rmk->qkm", roots, slow, optimize=True)
+        return np.asarray(rows.reshape(-1, slow.shape[1]))
+
+    @cached_property
+    def observations(self) -> int:
+        """Number of observations, the reference included."""
+        return int(self.loading.shape[1])
+
+
+def lag_matrix(n: int, samples: float) -> csr_array:
+    """Return the first-order lag of ``samples`` sample periods as a matrix (n, n), inputs joined by straight lines."""
+    x = 1.0 / samples
+    decay = np.exp(-x)
+    mean_decay = -np.expm1(-x) / x
+    length = min(int(np.ceil(12.0 * samples)) + 2, n)
+    response = np.empty(length)
+    response[0] = 1.0 - mean_decay
+    response[1:] = (decay * (1.0 - mean_decay) + mean_decay - decay) * decay ** np.arange(length - 1)
+    return csr_array(diags_array(list(response), offsets=[-k for k in range(length)], shape=(n, n)))

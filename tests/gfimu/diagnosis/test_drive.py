@@ -1,0 +1,84 @@
+"""The drive's spline and the factored derivative, against scipy's splines and dense algebra."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.interpolate import BSpline
+
+from gfimu.diagnosis.drive import AngleSpline
+from gfimu.diagnosis.drive_jacobian import DriveJacobian, lag_matrix
+
+
+@pytest.fixture
+def spline():
+    return AngleSpline(-0.3, 4.1, 0.05)
+
+
+def test_states_are_those_of_the_same_spline_in_scipy(spline):
+    rng = np.random.default_rng(1)
+    coefficients = rng.standard_normal(spline.size)
+    t = np.sort(rng.uniform(-0.3, 4.1, 300))
+    angle = BSpline(spline.knots, coefficients, 4)
+    state = spline.spin(coefficients).at(t)
+    assert_allclose(state.angle, angle(t), rtol=0, atol=1e-12)
+    assert_allclose(state.rate, angle.derivative()(t), rtol=0, atol=1e-10)
+    assert_allclose(state.acceleration, angle.derivative(2)(t), rtol=0, atol=1e-8)
+    for matrix, order in zip(spline.matrices(t), range(3), strict=True):
+        assert_allclose(matrix @ coefficients, angle.derivative(order)(t) if order else angle(t), atol=1e-8)
+
+
+def test_the_motion_goes_on_at_constant_rate_beyond_the_ends(spline):
+    state = spline.spin(np.linspace(0.0, 3.0, spline.size) ** 2).at(np.array([4.1, 4.6]))
+    assert state.rate[1] == pytest.approx(state.rate[0])
+    assert state.angle[1] == pytest.approx(state.angle[0] + 0.5 * state.rate[0])
+
+
+def test_roughness_is_the_fourth_derivative_of_the_angle(spline):
+    coefficients = np.random.default_rng(2).standard_normal(spline.size)
+    fourth = BSpline(spline.knots, coefficients, 4).derivative(4)
+    assert_allclose(spline.roughness_rows() @ coefficients, fourth(spline.interval_centres()), rtol=1e-6)
+
+
+@pytest.mark.parametrize("lagged", [False, True])
+def test_factored_derivative_is_the_plain_one(spline, lagged):
+    rng = np.random.default_rng(3)
+    n, channels = 200, 7
+    t = np.linspace(0.0, 4.0, n)
+    times = np.column_stack([t, t + 1e-3, t])  # two chips and the reference
+    chips = np.array([0, 0, 0, 1, 1, 1, 2])
+    rate = np.sin(t)
+    slopes = np.zeros((3, n, channels))
+    slopes[2] = rng.standard_normal(channels)
+    slopes[1] = np.outer(rate, rng.standard_normal(channels))
+    slopes[:, :, -1] = np.array([0.0, 1.0, 0.0])[:, None]
+    weights = rng.uniform(0.5, 2.0, channels)
+    lag = lag_matrix(n, 2.0)
+    delay = (lambda part: (lag @ part).tocsr()) if lagged else None
+    jacobian = DriveJacobian.build(spline, slopes, times, chips, weights, delay)
+    assert len(jacobian.parts) == 5  # two functions per chip, one of the reference
+    plain = []
+    for channel, chip in enumerate(chips):
+        matrix = sum(
+            slope[:, [channel]] * part.toarray()
+            for slope, part in zip(slopes, spline.matrices(times[:, chip]), strict=True)
+        )
+        plain.append(lag @ matrix if lagged and channel < 6 else matrix)
+    for channel, matrix in enumerate(plain):
+        assert_allclose(jacobian.channel(channel).toarray(), matrix, atol=1e-6)
+    stacked = np.array(plain)  # (c, n, m)
+    assert_allclose(jacobian.information().toarray(), np.einsum("c,cni,cnj->ij", weights, stacked, stacked), atol=1e-5)
+    step, values = rng.standard_normal(spline.size), rng.standard_normal((n, channels))
+    assert_allclose(jacobian.forward(step), np.einsum("cnm,m->nc", stacked, step), atol=1e-6)
+    assert_allclose(jacobian.backward(values), np.einsum("cnm,nc->m", stacked, values), atol=1e-6)
+    columns = rng.standard_normal((channels, 4, n))
+    assert_allclose(
+        jacobian.correlate(range(channels), columns, weights),
+        np.einsum("c,cnm,cpn->mp", weights, stacked, columns),
+        atol=1e-5,
+    )
+    cosines, share = rng.standard_normal((n, 3)), rng.uniform(0.0, 1.0, (3, channels))
+    rows = jacobian.slow_rows(jacobian.slow(cosines), share, weights)
+    slow = np.einsum("cnm,nk->ckm", stacked, cosines)
+    assert_allclose(rows.T @ rows, np.einsum("c,kc,cki,ckj->ij", weights, share, slow, slow), atol=1e-5)
