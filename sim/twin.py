@@ -140,7 +140,12 @@ class Twin:
         """Return the text of the twin file."""
         return tomli_w.dumps(self.to_dict())
 
-    def world(self, effects: Sequence[Effect] = (), mounting: NDArray[np.float64] | None = None) -> World:
+    def world(
+        self,
+        effects: Sequence[Effect] = (),
+        mounting: NDArray[np.float64] | None = None,
+        start: float | None = None,
+    ) -> World:
         """Return the world that the twin believes in, with more effects added.
 
         Parameters
@@ -149,9 +154,13 @@ class Twin:
             Effects beyond the twin's own.
         mounting : ndarray, shape (3,), optional
             Rotation vector by which the cube was turned from upright before the run, rad.
+        start : float, optional
+            Board time at which the recording began, s; by default the first time asked for.
         """
         turned = np.zeros(3) if mounting is None else mounting
-        nominal = World(self.array, gravity=self.gravity, cube_offset=self.cube_offset, mount_rotvec=turned)
+        nominal = World(
+            self.array, gravity=self.gravity, cube_offset=self.cube_offset, mount_rotvec=turned, start=start
+        )
         return apply_effects(nominal, (*self.effects, *effects))
 
     def families(self) -> Mapping[str, type[Effect]]:
@@ -173,7 +182,7 @@ class Twin:
         Wiring, ranges and clipping are applied to the prediction; noise, quantisation, frozen and lost samples are
         not, as they have no noise-free form.
         """
-        world = self.world(effects, mounting).changed(start=start)
+        world = self.world(effects, mounting, start)
         readings = forward.channels(world, spin, t, temperature)
         if world.data_steps:
             readings = self._digital(readings, (*self.effects, *effects), world, t)

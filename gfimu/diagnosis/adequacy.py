@@ -245,21 +245,20 @@ def _left(segment: Segment, fit: Fit, known: Sequence[Effect]) -> NDArray[np.flo
     return residual[:, :-1] / segment.levels.white[:-1]
 
 
+def _whitened(segment: Segment, left: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Take the excess of slow noise out in its own basis, where a wandering bias has no jump between its ends."""
+    share = 1.0 - np.sqrt(1.0 - segment.share[:, :-1])
+    return np.asarray(left - segment.cosines @ (share * (segment.cosines.T @ left)))
+
+
 def _lines(segment: Segment, fit: Fit, known: Sequence[Effect], channels: Sequence[str]) -> LeftOver:
     """Test for narrow lines on one channel or on all, by the maximum of the periodogram."""
-    left = _left(segment, fit, known)
+    left = _whitened(segment, _left(segment, fit, known))
     n = len(left)
     power = np.abs(np.fft.rfft(left, 2 * n, axis=0)) ** 2 / n
     frequency = np.fft.rfftfreq(2 * n, segment.run.sample_period)
     # Below this the slow noise and the drive have freedom of their own.
     power[frequency < max(1.0, 4.0 / segment.run.duration)] = 0.0
-    levels = segment.levels
-    colour = np.ones_like(power)
-    slow = np.minimum((frequency * 2 * n * segment.run.sample_period).astype(int), len(segment.basis.frequency) - 1)
-    extra = np.outer(segment.basis.flicker_spectrum, levels.flicker[:-1] ** 2)
-    extra += (segment.basis.walk_spectrum * levels.walk**2)[:, None]
-    colour += (extra / levels.white[:-1] ** 2)[slow]
-    power = power / colour
     level = np.median(power[frequency >= 1.0], axis=0) / np.log(2.0)
     power = power / np.maximum(level, 0.7)
     channel = int(np.argmax(power.max(axis=0)))

@@ -37,7 +37,7 @@ __all__ = ["diagnose"]
 Report = Callable[[float, str], None]
 
 LEAST_GAIN = 2.0
-"""Log predictive gain on held-out halves below which a cause is withdrawn."""
+"""Log predictive gain on held-out blocks below which a cause is withdrawn."""
 _DOMINANT = 0.1
 _INEXACTNESS = 2.5e-3
 _ROUNDING = ("coarse_resolution", "saturation")
@@ -181,7 +181,9 @@ def _holdouts(
 ) -> tuple[list[Holdout], str]:
     """Pair fitted and held-out data: other recordings where given, halves otherwise."""
     if not held_out:
-        return split_segments(explanation.segments, explanation.fixed), "halves of the recording, each from the other"
+        return split_segments(
+            explanation.segments, explanation.fixed
+        ), "blocks of the recording, odd and even from each other"
     other = _Prepared.build(held_out, model, [f"held out {n + 1}" for n in range(len(held_out))])
     segments, known = other.segments(model)
     for segment in segments:

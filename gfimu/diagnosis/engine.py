@@ -38,6 +38,7 @@ LEAST_EXTRA_ODDS = 7.0
 """Log odds that a further cause needs against the set without it."""
 _ITERATIONS = 7
 _STEADY_NOISE = 0.1
+_LEAST_VALID = 0.01
 
 
 @dataclass(frozen=True)
@@ -139,7 +140,9 @@ def learn_noise(
         coefficients.append(segment.basis.transform(left))
         # Above this frequency the drive has no freedom to follow the noise.
         slowest = 0.6 / segment.spline.spacing
-        whites.append(white_level(coefficients[-1], slowest, segment.run.sample_period))
+        level = white_level(coefficients[-1], slowest, segment.run.sample_period)
+        # Missing samples stand as zeros, as where the reference comes at a lower rate.
+        whites.append(level / np.sqrt(np.maximum(segment.weight_mask.mean(axis=0), _LEAST_VALID)))
     for index in {segment.index for segment in segments}:
         mine = [place for place, segment in enumerate(segments) if segment.index == index]
         white = np.sqrt(np.mean([whites[place] ** 2 for place in mine], axis=0))

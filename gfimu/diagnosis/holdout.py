@@ -1,13 +1,14 @@
 """Held-out data: whether the extension predicts what the fit never saw, and what it is worth there.
 
-With a second recording the causes are fitted to the first and judged on the second. With one, each half in turn is
-predicted from the other. The drive of the held-out stretch is always unknown and marginalised.
+With a second recording the causes are fitted to the first and judged on the second. With one, it is cut into blocks of
+some seconds, and the odd and the even blocks are predicted from each other. The drive of the held-out stretch is always unknown and marginalised.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +21,11 @@ from gfimu.diagnosis.refinement import Fit, refine
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.verdict import Gain
 
-__all__ = ["Holdout", "gate_gains", "held_out_gain", "split_segments"]
+__all__ = ["BLOCK_DURATION", "Holdout", "gate_gains", "held_out_gain", "split_segments"]
+
+BLOCK_DURATION = 8.0
+"""About how long a held-out block is, s."""
+_ITERATIONS = 8
 
 
 @dataclass(frozen=True)
@@ -34,23 +39,24 @@ class Holdout:
 
 
 def split_segments(segments: Sequence[Segment], fixed: Sequence[Sequence[Effect]]) -> list[Holdout]:
-    """Split every segment into halves and pair them both ways."""
-    halves: list[list[Segment]] = [[], []]
+    """Split every segment into blocks, alternately of one part and of the other, and pair the parts both ways."""
+    parts: list[list[Segment]] = [[], []]
     known: list[list[list[Effect]]] = [[], []]
     for segment, effects in zip(segments, fixed, strict=True):
-        middle = len(segment.run.t) // 2
-        for place, (start, stop) in enumerate(((0, middle), (middle, len(segment.run.t)))):
-            half = Segment(segment.model, segment.run.rows(start, stop), segment.index, segment.start)
-            half.adopt(segment)
-            halves[place].append(half)
-            known[place].append(list(effects))
-    return [Holdout(halves[0], known[0], halves[1], known[1]), Holdout(halves[1], known[1], halves[0], known[0])]
+        pairs = max(1, round(segment.run.duration / (2 * BLOCK_DURATION)))
+        edges = np.linspace(0, len(segment.run.t), 2 * pairs + 1).astype(int)
+        for place, (start, stop) in enumerate(pairwise(edges)):
+            block = Segment(segment.model, segment.run.rows(int(start), int(stop)), segment.index, segment.start)
+            block.adopt(segment)
+            parts[place % 2].append(block)
+            known[place % 2].append(list(effects))
+    return [Holdout(parts[0], known[0], parts[1], known[1]), Holdout(parts[1], known[1], parts[0], known[0])]
 
 
 def gate_gains(fit: Fit, without: dict[str, Fit], pairs: Sequence[Holdout]) -> dict[str, float]:
-    """Return the log predictive gain of each cause on the held-out halves, the other causes kept.
+    """Return the log predictive gain of each cause on the held-out blocks, the other causes kept.
 
-    The whole run is whitened as one block for the joint evidence, so that slow noise common to both halves does not
+    The whole run is whitened as one block for the joint evidence, so that slow noise common to both parts does not
     count as a repetition.
     """
     gains = {}
@@ -135,8 +141,7 @@ def held_out_gain(causes: Sequence[Cause], pairs: Sequence[Holdout], constant: S
 
 def _scaled(segment: Segment, effects: Sequence[Effect]) -> NDArray[np.float64]:
     """Move the drive to its posterior under these effects; return the summed squares per sample in white noise."""
-    for _ in range(2):
-        segment.move_drive(segment.linearise(effects))
+    segment.coefficients = refine([segment], (), [effects], iterations=_ITERATIONS).drives[0]
     scaled = segment.residual(effects) / segment.levels.white
     return np.asarray(np.sum(scaled**2, axis=1))
 

@@ -15,6 +15,8 @@ __all__ = ["Run", "prepare_run"]
 
 MINIMUM_DURATION = 4.0
 _MINIMUM_SAMPLES = 80
+_REPEATING = 0.3
+_DIFFERING = 0.5
 _MOVING = 8.0
 _REFERENCE_COLUMNS = {"tacho": "tacho_rad_s", "angle": "angle_rad", "command": "command_rad_s"}
 
@@ -113,7 +115,7 @@ def prepare_run(recording: Recording, model: WorldModel, *, name: str = "run") -
             f"{name}: column {column} is missing, but the twin's drive source is {model.drive_source!r}; "
             + (f"set source = {have[0]!r} in the twin's [drive]" if have else "record a tachometer, angle or command")
         )
-    drive = np.asarray(recording.reference[column], dtype=float)
+    drive = _without_repeats(np.asarray(recording.reference[column], dtype=float))
     if np.isfinite(drive).sum() < 20:
         raise InputError(f"{name}: column {column} has fewer than 20 values; record the reference with the channels")
     _refuse_dead_reference(readings, drive, column, model, recording.sample_rate, name)
@@ -153,6 +155,22 @@ def prepare_run(recording: Recording, model: WorldModel, *, name: str = "run") -
         longest_gap=float(steps.max()) if len(steps) else 0.0,
         name=name,
     )
+
+
+def _without_repeats(reference: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Leave out values that a slower reference repeats until its next reading comes.
+
+    Repeats are told from a coarse reference by how many different values there are.
+    """
+    known = np.flatnonzero(np.isfinite(reference))
+    values = reference[known]
+    repeated = np.concatenate([[False], np.diff(values) == 0.0])
+    fresh = values[~repeated]
+    if repeated.mean() < _REPEATING or len(np.unique(fresh)) < _DIFFERING * len(fresh):
+        return reference
+    out = reference.copy()
+    out[known[repeated]] = np.nan
+    return out
 
 
 def _refuse_dead_reference(

@@ -162,10 +162,11 @@ class Segment:
         self.drive_factor = whole.drive_factor
         centres = self.spline.interval_centres()
         self._learned = np.interp(centres, whole.spline.interval_centres(), whole._learned)
-        state = whole.spline.spin(whole.coefficients).at(self.run.t)
-        self.start_angle, self.start_angle_std = float(state.angle[0]), _KNOWN_ANGLE_STD
+        self.start_angle, self.start_angle_std = float(whole.spin.at(self.run.t[:1]).angle[0]), _KNOWN_ANGLE_STD
         self._set_roughness()
-        self.coefficients = self.spline.through(self.run.t, state)
+        # Beyond the ends too: late chips ask for the motion there.
+        reach = np.arange(self.spline.start, self.spline.stop, self.run.sample_period)
+        self.coefficients = self.spline.through(reach, whole.spin.at(reach))
         self.prepare_weights()
 
     def learn_roughness(self) -> None:
