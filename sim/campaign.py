@@ -131,7 +131,10 @@ def measure(
     if world.bias_walk:
         step = world.bias_walk / np.sqrt(setting.sample_rate)
         readings += np.cumsum(step * rng.standard_normal(readings.shape), axis=0)
-    readings = expected.quantum * np.round(readings / expected.quantum)
+    # The converter rounds once: a coarser step takes the place of the part's own.
+    steps = [effect.value("step_m_s2") for effect in effects if effect.name == "coarse_resolution"]
+    quantum = max(steps, default=expected.quantum)
+    readings = quantum * np.round(readings / quantum)
     for data_step in world.data_steps:
         readings = data_step(t, readings, rng)
     tacho = forward.reference(world, spin, t) + setting.tacho_noise * rng.standard_normal(len(t))

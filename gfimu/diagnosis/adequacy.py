@@ -193,7 +193,7 @@ def _channelwise(
     cross = np.zeros((segment.spline.size, count * observed))
     cosines, share = segment.cosines, segment.share
     for channel in range(observed):
-        part = basis * segment.weight_mask[:, [channel]]
+        part = basis * segment.row_weight[:, [channel]]
         weight = segment.inverse_variance[channel]
         slow = cosines.T @ part
         damped = share[:, [channel]] * slow
@@ -228,7 +228,7 @@ def _project_out(
         columns = named[channel]  # (K, n)
         if not columns.any():
             continue
-        part = basis * segment.weight_mask[:, [channel]]
+        part = basis * segment.row_weight[:, [channel]]
         slow = segment.cosines.T @ part
         weight = segment.inverse_variance[channel]
         mixed[:, places] = weight * (
@@ -241,7 +241,7 @@ def _project_out(
 
 def _left(segment: Segment, fit: Fit, known: Sequence[Effect]) -> NDArray[np.float64]:
     """Return the residual in units of white noise, shape (n, c)."""
-    residual = segment.residual([*known, *effects_of_run(fit.causes, segment.model.array, segment.index)])
+    residual = segment.working_residual([*known, *effects_of_run(fit.causes, segment.model.array, segment.index)])
     return residual[:, :-1] / segment.levels.white[:-1]
 
 

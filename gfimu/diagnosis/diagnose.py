@@ -134,6 +134,10 @@ class _Prepared:
     def segments(self, model: WorldModel) -> tuple[list[Segment], list[list[Effect]]]:
         """Return the segments and the effects known in each."""
         segments = make_segments(model, self.runs)
+        for segment in segments:
+            for effect in self.effects[segment.index]:
+                if effect.name == "coarse_resolution":
+                    segment.round_to(float(effect.parameters["step_m_s2"]))
         return segments, [_acting(self.effects[segment.index]) for segment in segments]
 
 
@@ -406,7 +410,7 @@ def _residual(runs: Sequence[RunView], explanation: Explanation) -> Residual:
     after = np.where(use, measured - np.concatenate([run.after for run in runs]), 0.0)
     count = np.maximum(use.sum(axis=0), 1)
     levels = explanation.segments[0].levels
-    floor = levels.white[:-1] ** 2 + 0.6 * levels.flicker[:-1] ** 2
+    floor = levels.white[:-1] ** 2 + 0.6 * levels.flicker[:-1] ** 2 + explanation.segments[0].rounding ** 2 / 12.0
     return Residual(
         float(np.sqrt(np.sum(before**2) / count.sum())),
         float(np.sqrt(np.sum(after**2) / count.sum())),

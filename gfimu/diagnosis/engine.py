@@ -136,13 +136,14 @@ def learn_noise(
         effects = [*known, *effects_of_run(fit.causes, array, segment.index)]
         line = segment.linearise(effects)
         segment.move_drive(line)
-        left = segment.residual(effects)
+        left = segment.working_residual(effects)
         coefficients.append(segment.basis.transform(left))
         # Above this frequency the drive has no freedom to follow the noise.
         slowest = 0.6 / segment.spline.spacing
         level = white_level(coefficients[-1], slowest, segment.run.sample_period)
         # Missing samples stand as zeros, as where the reference comes at a lower rate.
-        whites.append(level / np.sqrt(np.maximum(segment.weight_mask.mean(axis=0), _LEAST_VALID)))
+        level = level / np.sqrt(np.maximum(segment.weight_mask.mean(axis=0), _LEAST_VALID))
+        whites.append(segment.noise_before_rounding(effects, level))
     for index in {segment.index for segment in segments}:
         mine = [place for place, segment in enumerate(segments) if segment.index == index]
         white = np.sqrt(np.mean([whites[place] ** 2 for place in mine], axis=0))

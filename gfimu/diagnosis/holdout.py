@@ -142,7 +142,7 @@ def held_out_gain(causes: Sequence[Cause], pairs: Sequence[Holdout], constant: S
 def _scaled(segment: Segment, effects: Sequence[Effect]) -> NDArray[np.float64]:
     """Move the drive to its posterior under these effects; return the summed squares per sample in white noise."""
     segment.coefficients = refine([segment], (), [effects], iterations=_ITERATIONS).drives[0]
-    scaled = segment.residual(effects) / segment.levels.white
+    scaled = segment.working_residual(effects) / segment.levels.white
     return np.asarray(np.sum(scaled**2, axis=1))
 
 

@@ -132,6 +132,12 @@ class ExpectedNoise:
     quantum: float
     full_scale: float
 
+    @property
+    def analogue(self) -> NDArray[np.float64]:
+        """White noise before quantisation, shape (c,), m/s²."""
+        power = self.white**2
+        return np.asarray(np.sqrt(np.maximum(power - self.quantum**2 / 12.0, 0.01 * power)))
+
 
 class WorldModel(Protocol):
     """A simulation that can be wrong."""

@@ -23,6 +23,7 @@ from gfimu.diagnosis.coloured_noise import CosineBasis, NoiseLevels
 from gfimu.diagnosis.drive import ROUGHNESS_FACTOR, AngleSpline, SplineState, roughness_prior
 from gfimu.diagnosis.drive_jacobian import DriveJacobian, lag_matrix
 from gfimu.diagnosis.model import Effect, Spin, SpinState, WorldModel
+from gfimu.diagnosis.rounding import COARSE, rounded_likelihood, rounding_noise
 from gfimu.diagnosis.run import Run
 
 __all__ = ["Linearisation", "Segment", "difference_noise"]
@@ -101,7 +102,10 @@ class Segment:
         self.basis = CosineBasis(len(run.t), period)
         self.is_angle = model.drive_source == "angle"
         self.weight_mask = np.column_stack([run.valid, run.reference_valid])  # (n, c + 1)
+        self.row_weight = self.weight_mask.astype(float)
+        self.rounding = 0.0
         self.levels = self._starting_levels()
+        self.round_to(model.expected_noise(1.0 / period).quantum)
         self.drive_factor = 2.0
         self._learned = np.zeros(self.spline.size - _DEGREE)
         self._set_roughness()
@@ -159,7 +163,7 @@ class Segment:
     def adopt(self, whole: Segment) -> None:
         """Take noise levels, roughness and drive from a segment of which this is a part."""
         self.levels = whole.levels
-        self.drive_factor = whole.drive_factor
+        self.drive_factor, self.rounding = whole.drive_factor, whole.rounding
         centres = self.spline.interval_centres()
         self._learned = np.interp(centres, whole.spline.interval_centres(), whole._learned)
         self.start_angle, self.start_angle_std = float(whole.spin.at(self.run.t[:1]).angle[0]), _KNOWN_ANGLE_STD
@@ -215,11 +219,40 @@ class Segment:
 
     def residual(self, effects: Sequence[Effect]) -> NDArray[np.float64]:
         """Return measured minus predicted, shape (n, c + 1); zero where invalid."""
-        return self._residual(self.predict(effects))
-
-    def _residual(self, predicted: NDArray[np.float64]) -> NDArray[np.float64]:
         measured = np.column_stack([self.run.readings, self.run.reference])
-        return np.where(self.weight_mask, measured - predicted, 0.0)
+        return np.where(self.weight_mask, measured - self.predict(effects), 0.0)
+
+    def working_residual(self, effects: Sequence[Effect]) -> NDArray[np.float64]:
+        """Return the residual as the normal equations take it, shape (n, c + 1).
+
+        The plain one, unless readings are so coarse that each has a weight of its own (`rounded_likelihood`).
+        """
+        return self._weigh(self.residual(effects))[0]
+
+    def _weigh(self, residual: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
+        """Set the weight of every sample; return the working residual and what its squares lack of the deviance."""
+        if not self.rounding:
+            return residual, 0.0
+        sigma = self.levels.white[:-1]
+        rounded = rounded_likelihood(residual[:, :-1], self.rounding, sigma)
+        self.row_weight = np.column_stack([rounded.weight, np.ones(len(residual))]) * self.weight_mask
+        working = np.column_stack([rounded.residual, residual[:, -1]]) * self.weight_mask
+        lacking = (rounded.deviance - (rounded.residual / sigma) ** 2) * self.weight_mask[:, :-1]
+        return working, float(lacking.sum())
+
+    def round_to(self, quantum: float) -> None:
+        """Tell that readings are rounded to steps of ``quantum`` m/s² after the noise, where that is coarse."""
+        analogue = self.model.expected_noise(1.0 / self.run.sample_period).analogue
+        if quantum > COARSE * float(np.median(analogue)):
+            self.rounding = quantum
+            self.set_levels(NoiseLevels(np.append(analogue, self.levels.white[-1]), self.levels.flicker))
+
+    def noise_before_rounding(self, effects: Sequence[Effect], level: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Replace the channels' white noise in ``level`` by what it was before a coarse rounding, shape (c + 1,)."""
+        if not self.rounding:
+            return level
+        error = np.where(self.weight_mask, self.residual(effects), np.nan)[:, :-1]
+        return np.append(rounding_noise(error, self.rounding, self.levels.white[:-1]), level[-1])
 
     # -- normal equations --------------------------------------------------------------------------------------
 
@@ -232,12 +265,13 @@ class Segment:
     def linearise(self, effects: Sequence[Effect]) -> Linearisation:
         """Linearise about effects and the present drive, and eliminate the drive."""
         predicted = self.predict(effects)
-        residual = self._residual(predicted)
+        measured = np.column_stack([self.run.readings, self.run.reference])
+        residual, objective = self._weigh(np.where(self.weight_mask, measured - predicted, 0.0))
         jacobian = self._jacobian(effects, predicted)
         # Differences first: the quadratic form of the coefficients would lose ten digits.
         rough = self._rough @ self.coefficients
         rhs = -(self._rough.T @ rough)
-        objective = float(rough @ rough)
+        objective += float(rough @ rough)
         if not self.is_angle:
             off = self._begin @ self.coefficients - self.start_angle / self.start_angle_std
             rhs = rhs - self._begin.T @ off
@@ -264,7 +298,7 @@ class Segment:
         slopes = np.empty((3, *base.shape))
         for place, step in enumerate(_STATE_STEPS):
             moved = self.predict(effects, _Moved(spin, place, step))
-            slopes[place] = np.where(self.weight_mask, (moved - base) / step, 0.0)
+            slopes[place] = (moved - base) / step * self.row_weight
         times = self.model.sample_times(self.run.t, effects)
         lag = self.model.sensing_lag(effects)
         delay = None

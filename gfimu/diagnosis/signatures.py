@@ -139,7 +139,7 @@ def signature_columns(
         block = segment.index if len(signature.columns) > count else 0
         numbers.append(signature.columns[block * count : (block + 1) * count])
     rows = nominal.shape[0]
-    mask = segment.weight_mask.T  # (c + 1, n)
+    mask = segment.row_weight.T  # (c + 1, n)
     out = np.zeros((nominal.shape[1], sum(len(part) for part in numbers), rows))
     place = 0
     for signature in signatures:
@@ -206,7 +206,7 @@ def cause_columns(
                 columns.append((segment.predict([*others, effect]) - nominal) / 1e-3)
     if not columns:
         return np.zeros((nominal.shape[1], 0, nominal.shape[0]))
-    return np.stack([column.T for column in columns], axis=1) * segment.weight_mask.T[:, None, :]
+    return np.stack([column.T for column in columns], axis=1) * segment.row_weight.T[:, None, :]
 
 
 def shape_moved(key: str, value: float, step: float) -> float:

@@ -43,7 +43,7 @@ def walk_strength(
     without = 0.0
     for segment, known, drive in zip(segments, fixed, fit.drives, strict=True):
         kept, segment.coefficients = segment.coefficients, drive
-        left = segment.residual([*known, *effects_of_run(fit.causes, array, segment.index)])[:, :-1]
+        left = segment.working_residual([*known, *effects_of_run(fit.causes, array, segment.index)])[:, :-1]
         segment.coefficients = kept
         coefficients = segment.basis.transform(left)
         white = segment.levels.white[:-1]
@@ -91,10 +91,10 @@ def white_factor(segments: Sequence[Segment]) -> tuple[float, float] | None:
     segment = segments[0]
     expected = segment.model.expected_noise(1.0 / segment.run.sample_period)
     measured = segment.levels.white[:-1]
-    ratio = measured / expected.white
+    ratio = measured / (expected.analogue if segment.rounding else expected.white)
     if np.median(ratio) < _MEDIAN_FACTOR or ratio.min() < _EVERY_FACTOR:
         return None
-    rounding = expected.quantum**2 / 12.0
-    factors = np.sqrt((measured**2 - rounding) / np.maximum(expected.white**2 - rounding, 1e-12))
+    analogue = measured if segment.rounding else np.sqrt(np.maximum(measured**2 - expected.quantum**2 / 12.0, 0.0))
+    factors = analogue / np.maximum(expected.analogue, 1e-6)
     factor = float(np.median(factors))
     return factor, factor / np.sqrt(len(segment.run.t) * len(ratio) / 4.0) + 0.01 * factor

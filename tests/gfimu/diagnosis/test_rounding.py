@@ -1,0 +1,42 @@
+"""Likelihood of coarsely rounded readings: derivatives by finite differences, and recovery of a mean and a noise."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.stats import norm
+
+from gfimu.diagnosis.rounding import rounded_likelihood, rounding_noise
+
+
+@pytest.mark.parametrize("quantum", [0.5, 3.0, 10.0])
+def test_deviance_and_derivatives(quantum):
+    error = np.linspace(-2.5 * quantum, 2.5 * quantum, 41)[:, None] + 0.013
+    sigma, step = 0.7, 1e-4
+    found = rounded_likelihood(error, quantum, sigma)
+    near = np.abs(error) < quantum / 2 + 4 * sigma
+    likelihood = norm.cdf((error + quantum / 2) / sigma) - norm.cdf((error - quantum / 2) / sigma)
+    assert_allclose(found.deviance[near], -2 * np.log(likelihood[near]), rtol=1e-9, atol=1e-12)
+    up, down = (rounded_likelihood(error + sign * step, quantum, sigma).deviance for sign in (1, -1))
+    # The prediction x falls as the error grows: d(−2 log p)/dx = −(up − down)/2h.
+    slope = -(up - down) / (2 * step)
+    assert_allclose(-2 * found.residual * found.weight / sigma**2, slope, atol=2e-5)
+    curvature = (up - 2 * found.deviance + down) / step**2 / 2 * sigma**2
+    steep = found.weight > 0.05
+    assert_allclose(found.weight[steep] ** 2, curvature[steep], atol=1e-5)
+
+
+def test_mean_and_noise_are_recovered_from_coarse_readings():
+    # Steps of four standard deviations: the sample mean of the rounded readings is far off, the likelihood's is not.
+    rng = np.random.default_rng(5)
+    n, sigma, quantum, mean = 4000, 0.25, 1.0, 0.38
+    readings = np.round((mean + sigma * rng.standard_normal((n, 1))) / quantum) * quantum
+    x = np.full(1, 0.2)
+    for _ in range(30):
+        found = rounded_likelihood(readings - x, quantum, sigma)
+        x = x + (found.weight * found.residual).sum(axis=0) / (found.weight**2).sum(axis=0)
+    std = sigma / np.sqrt((found.weight**2).sum())
+    assert abs(readings.mean() - mean) > 5 * std
+    assert abs(x[0] - mean) < 4 * std
+    assert_allclose(rounding_noise(readings - mean, quantum, np.array([0.4])), sigma, rtol=0.12)
