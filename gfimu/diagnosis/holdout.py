@@ -1,7 +1,8 @@
 """Held-out data: whether the extension predicts what the fit never saw, and what it is worth there.
 
 With a second recording the causes are fitted to the first and judged on the second. With one, it is cut into blocks of
-some seconds, and the odd and the even blocks are predicted from each other. The drive of the held-out stretch is always unknown and marginalised.
+some seconds, and the odd and the even blocks are predicted from each other. The drive of the held-out stretch is
+always unknown and marginalised.
 """
 
 from __future__ import annotations

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-from scipy.signal import cont2discrete, lfilter
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from gfimu.array import AccelerometerArray
 from sim.effects.base import Effect, Pattern, Size, chip_patterns
-from sim.motion import SpinMotion, SpinState
+from sim.effects.table_dynamics import RippledSpin, TwistingSpin
+from sim.motion import SpinMotion
 from sim.world import Nod, World
 
 __all__ = [
@@ -29,10 +28,6 @@ __all__ = [
 ]
 
 _DEGREE = np.pi / 180.0
-_FINE_STEP = 2e-3
-_SPEED_LOOP_TIME = 0.5
-_REST_RATE = 0.3
-_SLOW_MODE = 90.0
 
 
 class Misalignment(Effect):
@@ -276,53 +271,12 @@ class Cogging(Effect):
 
     def apply(self, world: World) -> World:
         """Add the ripple to the table's motion."""
-        amplitude, order = self.value("amplitude_rad_s2"), self.value("order", 1.0)
-        phase = self.value("phase_rad")
-
-        def ripple(spin: SpinState) -> NDArray[np.float64]:
-            # At rest the bearing's friction holds the table, so that the ripple turns nothing.
-            turning = spin.rate**2 / (spin.rate**2 + _REST_RATE**2)
-            torque = amplitude * turning * np.sin(order * spin.angle + phase)
-            return np.asarray(torque)
+        ripple = (self.value("amplitude_rad_s2"), self.value("order", 1.0), self.value("phase_rad"))
 
         def step(motion: SpinMotion, t: NDArray[np.float64]) -> SpinMotion:
-            return _Disturbed(motion, t, ripple)
+            return RippledSpin(motion, t, *ripple)
 
         return world.changed(motion_steps=(*world.motion_steps, step))
-
-
-class _Disturbed:
-    """Spin of a speed-controlled table under a disturbing angular acceleration.
-
-    The rate error obeys δω' = disturbance − δω/τ with the speed loop's time constant τ.
-    """
-
-    def __init__(
-        self,
-        motion: SpinMotion,
-        t: NDArray[np.float64],
-        disturbance: Callable[[SpinState], NDArray[np.float64]],
-    ) -> None:
-        self._motion, self._disturbance = motion, disturbance
-        step = 0.5 * _FINE_STEP
-        self._grid = np.arange(t[0], t[-1] + 2 * step, step)
-        push = disturbance(motion.at(self._grid))
-        decay = np.exp(-step / _SPEED_LOOP_TIME)
-        mean = 0.5 * (push[1:] + push[:-1]) * (_SPEED_LOOP_TIME * (1 - decay))
-        rate = np.concatenate([[0.0], lfilter([1.0], [1.0, -decay], mean)])
-        self._rate = rate
-        self._angle = np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]))]) * step
-
-    def at(self, t: ArrayLike) -> SpinState:
-        """State of the disturbed spin."""
-        t = np.asarray(t, dtype=float)
-        spin = self._motion.at(t)
-        rate = np.interp(t, self._grid, self._rate)
-        return SpinState(
-            spin.angle + np.interp(t, self._grid, self._angle),
-            spin.rate + rate,
-            spin.acceleration + self._disturbance(spin) - rate / _SPEED_LOOP_TIME,
-        )
 
 
 class Resonance(Effect):
@@ -335,13 +289,8 @@ class Resonance(Effect):
 
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
-        """Participation (1 is the whole inertia behind one spring) and its part in quadrature."""
-        return (Size("gain", 0.3, positive=True), Size("quadrature_gain", 0.1))
-
-    @classmethod
-    def patterns(cls, array: AccelerometerArray) -> tuple[Pattern, ...]:
-        """Return a mode whose part in quadrature is nothing, as a spring and a damper give it."""
-        return (Pattern("", np.array([[1.0], [0.0]])),)
+        """Participation: 1 is the whole inertia behind one spring."""
+        return (Size("gain", 0.3, positive=True),)
 
     @classmethod
     def shapes(cls, duration: float, sample_rate: float) -> tuple[dict[str, float], ...]:
@@ -351,65 +300,10 @@ class Resonance(Effect):
         return tuple({"frequency_hz": float(f), "damping_ratio": zeta} for f in frequencies for zeta in (0.02, 0.1))
 
     def apply(self, world: World) -> World:
-        """Let the cube twist: φ'' + 2ζω₀φ' + ω₀²φ = −α, of which gain·φ'' + quadrature·ω₀φ' is seen."""
-        gain, quadrature = self.value("gain"), self.value("quadrature_gain")
-        natural = 2 * np.pi * self.value("frequency_hz", 10.0)
-        damping = self.value("damping_ratio", 0.03)
+        """Let the cube twist."""
+        mode = (self.value("gain"), 2 * np.pi * self.value("frequency_hz", 10.0), self.value("damping_ratio", 0.03))
 
         def step(motion: SpinMotion, t: NDArray[np.float64]) -> SpinMotion:
-            return _Twisting(motion, t, (gain, quadrature), natural, damping)
+            return TwistingSpin(motion, t, *mode)
 
         return world.changed(mount_steps=(*world.mount_steps, step))
-
-
-class _Twisting:
-    """Spin of a cube on a torsion spring upon a spinning table."""
-
-    def __init__(
-        self,
-        motion: SpinMotion,
-        t: NDArray[np.float64],
-        gains: tuple[float, float],
-        natural: float,
-        damping: float,
-    ) -> None:
-        self._motion = motion
-        step = _FINE_STEP if natural < _SLOW_MODE else 0.5 * _FINE_STEP
-        self._grid = np.arange(t[0], t[-1] + 2 * step, step)
-        push = -motion.at(self._grid).acceleration
-        push = push - push[0]  # steady before the first sample
-        system = (np.array([[0.0, 1.0], [-(natural**2), -2 * damping * natural]]), np.array([[0.0], [1.0]]))
-        outputs = (np.eye(2), np.zeros((2, 1)))
-        a, b, c, d, _ = cont2discrete((*system, *outputs), step, method="foh")
-        poles = np.array([1.0, -np.trace(a), np.linalg.det(a)])
-        twist, twist_rate = (lfilter(_numerator(a, b, c[[row]], d[[row]], poles), poles, push) for row in range(2))
-        twist_acceleration = push - natural**2 * twist - 2 * damping * natural * twist_rate
-        gain, quadrature = gains
-        delayed = natural * np.concatenate([[0.0], np.cumsum(0.5 * (twist[1:] + twist[:-1]))]) * step
-        self._angle = gain * twist + quadrature * delayed
-        self._rate = gain * twist_rate + quadrature * natural * twist
-        self._acceleration = gain * twist_acceleration + quadrature * natural * twist_rate
-
-    def at(self, t: ArrayLike) -> SpinState:
-        """State of the cube's spin."""
-        t = np.asarray(t, dtype=float)
-        spin = self._motion.at(t)
-        return SpinState(
-            spin.angle + np.interp(t, self._grid, self._angle),
-            spin.rate + np.interp(t, self._grid, self._rate),
-            spin.acceleration + np.interp(t, self._grid, self._acceleration),
-        )
-
-
-def _numerator(
-    a: NDArray[np.float64],
-    b: NDArray[np.float64],
-    c: NDArray[np.float64],
-    d: NDArray[np.float64],
-    poles: NDArray[np.float64],
-) -> NDArray[np.float64]:
-    """Numerator of a second-order discrete transfer function from its first Markov parameters."""
-    markov = [d.item(), (c @ b).item(), (c @ a @ b).item()]
-    return np.array(
-        [markov[0], markov[1] + poles[1] * markov[0], markov[2] + poles[1] * markov[1] + poles[2] * markov[0]]
-    )
