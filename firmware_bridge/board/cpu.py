@@ -297,7 +297,8 @@ class Cpu:
         padding = sp & 4
         frame = sp - _FRAME_BYTES - padding
         status = (xpsr & ~_STACK_ALIGNED) | (_STACK_ALIGNED if padding else 0)
-        self.poke(frame, _STACK_FRAME.pack(r0, r1, r2, r3, r12, lr, self.pc & ~1, status))
+        memory, offset = self._memory_at(frame, _FRAME_BYTES)
+        _STACK_FRAME.pack_into(memory, offset, r0, r1, r2, r3, r12, lr, self.pc & ~1, status)
         process_stack = not nvic.active and control & 2
         entry = self._entry
         entry.values[0] = frame
@@ -328,7 +329,7 @@ class Cpu:
             sp = self.uc.reg_read(arm.UC_ARM_REG_PSP)
         else:
             sp = self._exit.values[1]
-        r0, r1, r2, r3, r12, lr, pc, status = _STACK_FRAME.unpack(self.peek(sp, _FRAME_BYTES))
+        r0, r1, r2, r3, r12, lr, pc, status = _STACK_FRAME.unpack_from(*self._memory_at(sp, _FRAME_BYTES))
         after = sp + _FRAME_BYTES + (4 if status & _STACK_ALIGNED else 0)
         values = self._unstack.values
         values[1], values[2], values[3], values[4], values[5], values[6] = r0, r1, r2, r3, r12, lr

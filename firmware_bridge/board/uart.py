@@ -181,7 +181,7 @@ class Uart(Peripheral):
                 self.divisor = self.divisor & 0xFF00 | value & 0xFF
                 self._set_character()
             else:
-                self._send(value & 0xFF)
+                self._send(value)
         elif offset == 0x04:
             if self.line_control & 0x80:
                 self.divisor = self.divisor & 0xFF | (value & 0xFF) << 8
@@ -212,7 +212,7 @@ class Uart(Peripheral):
         elif empty > now + (_DEPTH if self.fifo_control & 1 else 1) * character:
             return  # the FIFO is full: the byte is lost
         self.sent_end = end = empty + character
-        self.sent.append(byte)
+        self.sent.append(byte & 0xFF)
         self.sent_at.append(end)
         # The interrupt comes when the last byte moves to the shift register, but after a lone byte not before its
         # stop bit (UM10360 14.4.5).
