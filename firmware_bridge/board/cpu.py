@@ -49,7 +49,7 @@ _SWI, _PREFETCH_ABORT, _EXCEPTION_EXIT = 2, 3, 8
 _IT_BITS = 0x0600FC00
 
 # Unicorn's call-backs, with arguments that nobody looks at taken as one byte, which Python need not allocate, and
-# those at the end left out.
+# those at the end left out. Sound where these arguments come in registers: on the 64-bit machines that MuJoCo runs on.
 _UNUSED = ctypes.c_uint8
 _MMIO_READ = ctypes.CFUNCTYPE(ctypes.c_uint64, _UNUSED, ctypes.c_uint32, ctypes.c_uint32)
 _MMIO_WRITE = ctypes.CFUNCTYPE(None, _UNUSED, ctypes.c_uint32, ctypes.c_uint32, ctypes.c_uint32)
