@@ -160,6 +160,7 @@ class Adxl345:
         self._address = 0
         self._reading = False
         self._period = self._sample_period()
+        self._set_added()
 
     # Conversions
 
@@ -189,14 +190,15 @@ class Adxl345:
             self._block = self.source(first, self._period, BLOCK, self.registers[BW_RATE]).tolist()
             place = 0
         self._block_place = place + 1
+        x, y, z = self._block[place]
+        added = self._added
+        return x + added[0], y + added[1], z + added[2]
+
+    def _set_added(self) -> None:
+        """Work out what the offset registers and the self-test add to a raw conversion."""
         offsets = self.registers[OFSX : OFSX + 3]
         shift = self.self_test_raw if self.registers[DATA_FORMAT] & SELF_TEST else (0, 0, 0)
-        x, y, z = self._block[place]
-        return (
-            x + _signed(offsets[0]) * _RAW_PER_OFFSET_STEP + shift[0],
-            y + _signed(offsets[1]) * _RAW_PER_OFFSET_STEP + shift[1],
-            z + _signed(offsets[2]) * _RAW_PER_OFFSET_STEP + shift[2],
-        )
+        self._added = [_signed(byte) * _RAW_PER_OFFSET_STEP + by for byte, by in zip(offsets, shift, strict=True)]
 
     def catch_up(self, now: int) -> None:
         """Do the conversions that are due by ``now``."""
@@ -312,6 +314,7 @@ class Adxl345:
             return
         old = self.registers[address]
         self.registers[address] = value
+        self._set_added()
         if address == BW_RATE:
             self._restart(now)
         elif address == POWER_CTL and (old ^ value) & (MEASURE | SLEEP | 3):

@@ -77,6 +77,7 @@ _PUBLIC = {
     "score": "gfimu.scoring",
     "specific_force": "gfimu.kinematics",
     "summarise": "gfimu.estimate_summary",
+    "update_array_calibration": "gfimu.calibration.array_calibration",
 }
 
 __all__ = ["__version__"]

@@ -320,17 +320,19 @@ class Board:
         """Chip-selects go to the sensors; the highest selected one answers."""
         if port != _SPI_SELECT_PORT:
             return
-        selected = None
-        for number, sensor in enumerate(self.sensors):
-            bit = 1 << number
-            if changed & bit:
-                if levels & bit:
-                    sensor.deselect(self.now)
-                else:
-                    sensor.select(self.now)
-            if not levels & bit:
-                selected = sensor
-        self.ssps[1].selected = selected
+        sensors = self.sensors
+        wired = (1 << len(sensors)) - 1
+        changed &= wired
+        while changed:
+            bit = changed & -changed
+            changed ^= bit
+            sensor = sensors[bit.bit_length() - 1]
+            if levels & bit:
+                sensor.deselect(self.now)
+            else:
+                sensor.select(self.now)
+        low = ~levels & wired
+        self.ssps[1].selected = sensors[low.bit_length() - 1] if low else None
 
     def lose_interrupts(self, exception: int, every: int) -> None:
         """Fault: let one in so many requests of an interrupt get lost, as a glitch on its way would."""

@@ -11,6 +11,7 @@ from __future__ import annotations
 import ctypes
 import mmap
 import struct
+from array import array
 from typing import TYPE_CHECKING, Any
 
 from firmware_bridge.board.faults import BoardFault, FaultKind
@@ -47,6 +48,14 @@ _STACK_ALIGNED = 1 << 9
 _SWI, _PREFETCH_ABORT, _EXCEPTION_EXIT = 2, 3, 8
 _IT_BITS = 0x0600FC00
 
+# Unicorn's call-backs, with arguments that nobody looks at taken as one byte, which Python need not allocate, and
+# those at the end left out. Sound where these arguments come in registers: on the 64-bit machines that MuJoCo runs on.
+_UNUSED = ctypes.c_uint8
+_MMIO_READ = ctypes.CFUNCTYPE(ctypes.c_uint64, _UNUSED, ctypes.c_uint32, ctypes.c_uint32)
+_MMIO_WRITE = ctypes.CFUNCTYPE(None, _UNUSED, ctypes.c_uint32, ctypes.c_uint32, ctypes.c_uint32)
+_BLOCK_HOOK = ctypes.CFUNCTYPE(None, _UNUSED, _UNUSED, ctypes.c_uint32)
+_INTERRUPT_HOOK = ctypes.CFUNCTYPE(None, _UNUSED, ctypes.c_uint32)
+
 
 def require_unicorn() -> None:
     """Raise `InputError` that says what to install when the emulator is missing."""
@@ -66,17 +75,18 @@ class _Registers:
     def __init__(self, handle: Any, names: list[int]) -> None:
         count = len(names)
         self._handle, self._count = handle, count
+        self._read, self._write = _LIBRARY.uc_reg_read_batch, _LIBRARY.uc_reg_write_batch
         self._names = (ctypes.c_int32 * count)(*names)
-        self.values = (ctypes.c_uint32 * count)()
-        address = ctypes.addressof(self.values)
+        self.values = array("I", [0] * count)
+        address, _ = self.values.buffer_info()
         self._places = (ctypes.c_void_p * count)(*[address + 4 * k for k in range(count)])
 
-    def read(self) -> Any:
-        _LIBRARY.uc_reg_read_batch(self._handle, self._names, self._places, self._count)
+    def read(self) -> array[int]:
+        self._read(self._handle, self._names, self._places, self._count)
         return self.values
 
     def write(self) -> None:
-        _LIBRARY.uc_reg_write_batch(self._handle, self._names, self._places, self._count)
+        self._write(self._handle, self._names, self._places, self._count)
 
 
 class Cpu:
@@ -126,7 +136,9 @@ class Cpu:
              r.UC_ARM_REG_LR, r.UC_ARM_REG_XPSR],
         )  # fmt: skip
         self._entry = _Registers(self._handle, [r.UC_ARM_REG_SP, r.UC_ARM_REG_XPSR, r.UC_ARM_REG_LR])
-        self._masks = _Registers(self._handle, [r.UC_ARM_REG_PRIMASK, r.UC_ARM_REG_BASEPRI, r.UC_ARM_REG_FAULTMASK])
+        self._primask = _Registers(self._handle, [r.UC_ARM_REG_PRIMASK])
+        self._masks = _Registers(self._handle, [r.UC_ARM_REG_BASEPRI, r.UC_ARM_REG_FAULTMASK])
+        self._exit = _Registers(self._handle, [r.UC_ARM_REG_PC, r.UC_ARM_REG_SP])
         self._pc = _Registers(self._handle, [r.UC_ARM_REG_PC])
         self._callbacks: list[Any] = []
         self._install_hooks()
@@ -171,8 +183,8 @@ class Cpu:
 
     def _install_hooks(self) -> None:
         """Ask Unicorn to call before every block and at every processor exception."""
-        self._hook(unicorn.UC_HOOK_INTR, binding.HOOK_INTR_CFUNC(self._on_intr))
-        self._hook(unicorn.UC_HOOK_BLOCK, binding.HOOK_CODE_CFUNC(self._block_hook()))
+        self._hook(unicorn.UC_HOOK_INTR, _INTERRUPT_HOOK(self._on_intr))
+        self._hook(unicorn.UC_HOOK_BLOCK, _BLOCK_HOOK(self._block_hook()))
 
     def _hook(self, kind: int, callback: Any) -> None:
         self._callbacks.append(callback)
@@ -191,21 +203,21 @@ class Cpu:
         """Send accesses to an address range to ``read(offset, size)`` and ``write(offset, value, size)``."""
         board = self.board
 
-        def on_read(_: Any, offset: int, width: int, __: Any) -> int:
-            board.now += board.access_ticks
+        def on_read(_: int, offset: int, width: int) -> int:
+            board.now = now = board.now + board.access_ticks
             board.accesses += 1
-            if board.now >= board.until:
+            if now >= board.until:
                 board.service()
             return read(offset, width) & 0xFFFFFFFF
 
-        def on_write(_: Any, offset: int, width: int, value: int, __: Any) -> None:
-            board.now += board.access_ticks
+        def on_write(_: int, offset: int, width: int, value: int) -> None:
+            board.now = now = board.now + board.access_ticks
             board.accesses += 1
-            if board.now >= board.until:
+            if now >= board.until:
                 board.service()
             write(offset, value, width)
 
-        callbacks = binding.MMIO_READ_CFUNC(on_read), binding.MMIO_WRITE_CFUNC(on_write)
+        callbacks = _MMIO_READ(on_read), _MMIO_WRITE(on_write)
         self._callbacks += callbacks
         error = _LIBRARY.uc_mmio_map(
             self._handle, ctypes.c_uint64(base), ctypes.c_size_t(size), callbacks[0], None, callbacks[1], None
@@ -216,12 +228,15 @@ class Cpu:
     def _block_hook(self) -> Any:
         board, stop, handle = self.board, _LIBRARY.uc_emu_stop, self._handle
 
-        def on_block(_: Any, __: int, size: int, ___: Any) -> None:
-            if board.now >= board.alarm and self._must_stop():
-                board.stopped = True
-                stop(handle)
-                return
-            board.now += (size >> 1) * board.cycle  # about one cycle per half-word of code
+        def on_block(_: int, __: int, size: int) -> None:
+            now = board.now
+            if now >= board.alarm:
+                if self._must_stop():
+                    board.stopped = True
+                    stop(handle)
+                    return
+                now = board.now
+            board.now = now + (size >> 1) * board.cycle  # about one cycle per half-word of code
 
         return on_block
 
@@ -240,21 +255,20 @@ class Cpu:
         board, nvic = self.board, self.board.nvic
         exception = 0
         if nvic.pending & nvic.enabled:
-            primask, basepri, faultmask = self._masks.read()
-            unmaskable = nvic.pending & UNMASKABLE
-            if primask & 1 and not unmaskable:
+            primask = self._primask.read()[0]
+            if primask & 1 and not nvic.pending & UNMASKABLE:
                 board.alarm = -1  # look at every block until the mask is gone
                 return 0
             exception = nvic.best()
-            if exception and nvic.masked(exception, primask, basepri, faultmask):
+            if exception and nvic.masked(exception, primask, *self._masks.read()):
                 board.alarm = -1
                 return 0
         until, limit = board.until, self.limit
         board.alarm = until if until < limit else limit  # noqa: FURB136 - this runs twenty times a sample
         return exception
 
-    def _on_intr(self, _: Any, number: int, __: Any) -> None:
-        pc = self._pc.read()[0]
+    def _on_intr(self, _: int, number: int) -> None:
+        pc = self._exit.read()[0]
         if number == _EXCEPTION_EXIT or (number == _PREFETCH_ABORT and pc >= _EXC_RETURN):
             self._exception_return = True
             self._returned_to = pc
@@ -283,7 +297,8 @@ class Cpu:
         padding = sp & 4
         frame = sp - _FRAME_BYTES - padding
         status = (xpsr & ~_STACK_ALIGNED) | (_STACK_ALIGNED if padding else 0)
-        self.poke(frame, _STACK_FRAME.pack(r0, r1, r2, r3, r12, lr, self.pc & ~1, status))
+        memory, offset = self._memory_at(frame, _FRAME_BYTES)
+        _STACK_FRAME.pack_into(memory, offset, r0, r1, r2, r3, r12, lr, self.pc & ~1, status)
         process_stack = not nvic.active and control & 2
         entry = self._entry
         entry.values[0] = frame
@@ -313,8 +328,8 @@ class Cpu:
             self.uc.reg_write(arm.UC_ARM_REG_SP, self.uc.reg_read(arm.UC_ARM_REG_SP))
             sp = self.uc.reg_read(arm.UC_ARM_REG_PSP)
         else:
-            sp = self._core.read()[7]
-        r0, r1, r2, r3, r12, lr, pc, status = _STACK_FRAME.unpack(self.peek(sp, _FRAME_BYTES))
+            sp = self._exit.values[1]
+        r0, r1, r2, r3, r12, lr, pc, status = _STACK_FRAME.unpack_from(*self._memory_at(sp, _FRAME_BYTES))
         after = sp + _FRAME_BYTES + (4 if status & _STACK_ALIGNED else 0)
         values = self._unstack.values
         values[1], values[2], values[3], values[4], values[5], values[6] = r0, r1, r2, r3, r12, lr

@@ -55,8 +55,9 @@ class Gpio(Peripheral):
         port, register = offset >> 5, offset & 0x1C
         if port >= PORTS:
             return
-        lane = ((1 << 8 * size) - 1) << 8 * (offset & 3)
-        bits = value << 8 * (offset & 3) & lane
+        shift = 8 * (offset & 3)
+        lane = ((1 << 8 * size) - 1) << shift
+        bits = value << shift & lane
         free = ~self.mask[port]
         if register == 0x18:
             self.latch[port] |= bits & free

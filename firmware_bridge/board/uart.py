@@ -181,7 +181,7 @@ class Uart(Peripheral):
                 self.divisor = self.divisor & 0xFF00 | value & 0xFF
                 self._set_character()
             else:
-                self._send(value & 0xFF)
+                self._send(value)
         elif offset == 0x04:
             if self.line_control & 0x80:
                 self.divisor = self.divisor & 0xFF | (value & 0xFF) << 8
@@ -206,20 +206,20 @@ class Uart(Peripheral):
             self._set_character()
 
     def _send(self, byte: int) -> None:
-        now, end, character = self.board.now, self.sent_end, self.character
-        if end <= now:
-            end = now + character
-        elif end <= now + (_DEPTH if self.fifo_control & 1 else 1) * character:
-            end += character
-        else:
+        now, empty, character = self.board.now, self.sent_end, self.character
+        if empty <= now:
+            empty = now
+        elif empty > now + (_DEPTH if self.fifo_control & 1 else 1) * character:
             return  # the FIFO is full: the byte is lost
-        self.sent_end = end
-        self.sent.append(byte)
+        self.sent_end = end = empty + character
+        self.sent.append(byte & 0xFF)
         self.sent_at.append(end)
         # The interrupt comes when the last byte moves to the shift register, but after a lone byte not before its
         # stop bit (UM10360 14.4.5).
-        empty, lone = end - character, now + self._lone_byte
-        self.empty_at = empty = max(empty, lone)
+        lone = now + self._lone_byte
+        if empty < lone:  # noqa: PLR1730 - a call of max costs more, forty times a sample
+            empty = lone
+        self.empty_at = empty
         if self.planned > empty:
             self._plan()  # else the event that is planned already looks again
         if self.empty_pending:

@@ -9,16 +9,17 @@ import numpy as np
 from gfimu.array import AccelerometerArray
 from gfimu.calibration.array_motion import ArrayMotion, array_motion
 from gfimu.calibration.array_static import array_static
+from gfimu.calibration.array_update import array_update
 from gfimu.calibration.faults import check_gravity, check_readings, without_moved_poses
 from gfimu.calibration.motion_reference import motion_reference
-from gfimu.calibration.observations import averaged_poses
+from gfimu.calibration.observations import Observations, averaged_poses
 from gfimu.calibration.result import Calibration
 from gfimu.errors import InputError
 from gfimu.recording import Recording
-from gfimu.rest import detect_rest
+from gfimu.rest import Rest, detect_rest
 from gfimu.units import STANDARD_GRAVITY
 
-__all__ = ["calibrate_array"]
+__all__ = ["calibrate_array", "update_array_calibration"]
 
 
 def calibrate_array(
@@ -62,20 +63,12 @@ def calibrate_array(
         If the poses or the motion do not suffice, or the data are faulty.
     """
     warnings = list(check_gravity(gravity))
-    ordered = _in_array_order(recording, array)
-    rest = detect_rest(ordered, threshold=rest_threshold, min_duration_s=min_rest_s)
-    warnings += check_readings(ordered, rest)
-    rest, moved = without_moved_poses(ordered, rest)
-    warnings += moved
-    result = array_static(averaged_poses(ordered, rest), array, gravity=gravity)
+    ordered, rest, poses, found = _poses(recording, array, rest_threshold, min_rest_s)
+    result = array_static(poses, array, gravity=gravity)
     result = replace(
         result,
-        warnings=(*warnings, *result.warnings),
-        statistics={
-            **result.statistics,
-            "rest_threshold": rest.threshold,
-            "rest_threshold_chosen_by": "data" if rest.chosen_by_data else "user",
-        },
+        warnings=(*warnings, *found, *result.warnings),
+        statistics={**result.statistics, **_threshold(rest)},
     )
     moving = result.apply(ordered if motion is None else _in_array_order(motion, array))
     if fit_positions is False:
@@ -87,6 +80,72 @@ def calibrate_array(
             raise
         return replace(result, statements=(*result.statements, f"positions are as drawn: {error}"))
     return _with_positions(result, array, array_motion(moving, array, reference))
+
+
+def update_array_calibration(
+    calibration: Calibration,
+    recording: Recording,
+    array: AccelerometerArray,
+    *,
+    turn_on_std_m_s2: float = 0.03,
+    bias_walk_m_s2_rt_s: float = 0.0,
+    rest_threshold: float | None = None,
+    min_rest_s: float = 2.0,
+) -> Calibration:
+    """Carry an array's calibration over to a later run whose biases changed at power-on, from a few poses of it.
+
+    Parameters
+    ----------
+    calibration : Calibration
+        Result of `calibrate_array` on an earlier run.
+    recording : Recording
+        The later run, with one pose or more at rest; they need not be level.
+    array : AccelerometerArray
+        The drawing.
+    turn_on_std_m_s2 : float
+        Standard deviation of a bias from one power-on to the next, m/s².
+    bias_walk_m_s2_rt_s : float
+        Random walk of a bias between poses, m/s²/√s.
+    rest_threshold : float, optional
+        Threshold of rest, reading unit squared; chosen by the data if not given.
+    min_rest_s : float
+        Shortest pose, s.
+
+    Returns
+    -------
+    Calibration
+        As `gfimu.calibration.array_update.array_update`.
+
+    Raises
+    ------
+    InputError
+        If the calibration is not of this array, there is no rest, or the data are faulty.
+    UnitError
+        If the recording is in another unit than the calibration.
+    """
+    _, rest, poses, found = _poses(recording, array, rest_threshold, min_rest_s)
+    result = array_update(
+        calibration, poses, array, turn_on_std_m_s2=turn_on_std_m_s2, bias_walk_m_s2_rt_s=bias_walk_m_s2_rt_s
+    )
+    return replace(result, warnings=(*found, *result.warnings), statistics={**result.statistics, **_threshold(rest)})
+
+
+def _poses(
+    recording: Recording, array: AccelerometerArray, rest_threshold: float | None, min_rest_s: float
+) -> tuple[Recording, Rest, Observations, list[str]]:
+    """Find the poses: recording in the array's order, rest, averaged poses, and warnings."""
+    ordered = _in_array_order(recording, array)
+    rest = detect_rest(ordered, threshold=rest_threshold, min_duration_s=min_rest_s)
+    warnings = list(check_readings(ordered, rest))
+    rest, moved = without_moved_poses(ordered, rest)
+    return ordered, rest, averaged_poses(ordered, rest), [*warnings, *moved]
+
+
+def _threshold(rest: Rest) -> dict[str, float | str]:
+    return {
+        "rest_threshold": rest.threshold,
+        "rest_threshold_chosen_by": "data" if rest.chosen_by_data else "user",
+    }
 
 
 def _in_array_order(recording: Recording, array: AccelerometerArray) -> Recording:

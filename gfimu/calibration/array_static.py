@@ -23,7 +23,7 @@ from gfimu.calibration.observations import Observations
 from gfimu.calibration.result import Calibration, parameter_names
 from gfimu.errors import InputError
 
-__all__ = ["apparent_alpha", "array_static", "body_specific_force", "disagreement"]
+__all__ = ["apparent_alpha", "array_static", "body_specific_force", "disagreement", "same_specific_force"]
 
 Floats = NDArray[np.float64]
 
@@ -59,7 +59,7 @@ def array_static(observations: Observations, array: AccelerometerArray, *, gravi
     check_magnitude_coverage(pose_directions(means[:, :3]))
     start = _start(means, axes, array, gravity)
     gauge = _rotation_gauge(axes)  # (3, u)
-    condition = _same_specific_force(axes, gravity)
+    condition = same_specific_force(axes, gravity)
     adjustment = gauss_helmert(
         condition,
         start,
@@ -171,8 +171,16 @@ def _rotation_gauge(axes: Floats) -> Floats:
     return rows
 
 
-def _same_specific_force(axes: Floats, gravity: float) -> Condition:
-    """Build the conditions |a_1| − g = 0 and a_i − a_1 = 0 with their Jacobians."""
+def same_specific_force(axes: Floats, gravity: float) -> Condition:
+    """Build the conditions |a_1| − g = 0 and a_i − a_1 = 0 of `array_static` with their Jacobians.
+
+    Parameters
+    ----------
+    axes : ndarray, shape (k, 3, 3)
+        Axes of every chip on the drawing.
+    gravity : float
+        Local gravity, m/s².
+    """
     k = len(axes)
 
     def condition(parameters: Floats, readings: Floats) -> tuple[Floats, Floats, Floats]:

@@ -57,6 +57,16 @@ def _calibrate(
     motion: Annotated[
         Path | None, typer.Option("--motion", help="array: recording with the motion, if it is another one.")
     ] = None,
+    update: Annotated[
+        Path | None,
+        typer.Option("--update", help="array: calibration of an earlier run to carry over; the biases may have moved."),
+    ] = None,
+    turn_on_std: Annotated[
+        float, typer.Option("--turn-on-std", help="With --update: change of a bias between power-ons, m/s².")
+    ] = 0.03,
+    bias_walk: Annotated[
+        float, typer.Option("--bias-walk", help="With --update: random walk of a bias between poses, m/s²/√s.")
+    ] = 0.0,
     picture: Annotated[Path | None, typer.Option("--picture", help="Picture to write (.png, .svg, .pdf).")] = None,
     json: JsonOption = False,
 ) -> None:
@@ -64,18 +74,31 @@ def _calibrate(
 
     Example: gfimu calibrate multi-position poses.csv --latitude 52.3 --height 80 --out calibration.json
     """
-    from gfimu.calibration.array_calibration import calibrate_array
+    from gfimu.calibration.array_calibration import calibrate_array, update_array_calibration
     from gfimu.calibration.methods import METHODS, calibrate, calibrate_gyro
+    from gfimu.calibration.result import load_calibration
     from gfimu.calibration.run_file import open_uncalibrated
-    from gfimu.errors import unknown_name
+    from gfimu.errors import InputError, unknown_name
     from gfimu.recording_formats import open_run
 
     if method not in {*METHODS, "array", "gyro"}:
         raise unknown_name("calibration method", method, (*METHODS, "array", "gyro"))
+    if update is not None and method != "array":
+        raise InputError(f"--update carries the calibration of a whole array over; use it with array, not {method}")
     drawing = None if array is None else load_array(array)
     local_gravity = _gravity(gravity, latitude, height)
     recording = open_uncalibrated(run, array=drawing)
-    if method == "array":
+    if update is not None:
+        result = update_array_calibration(
+            load_calibration(update),
+            recording,
+            drawing or open_run(run)[1],
+            turn_on_std_m_s2=turn_on_std,
+            bias_walk_m_s2_rt_s=bias_walk,
+            rest_threshold=rest_threshold,
+            min_rest_s=min_rest or 2.0,
+        )
+    elif method == "array":
         result = calibrate_array(
             recording,
             drawing or open_run(run)[1],

@@ -118,6 +118,25 @@ def test_positions_from_a_second_recording(gfimu_command, poses, run):
     np.testing.assert_allclose(fitted, CUBE.chip_positions, atol=2e-3)
 
 
+def test_carried_over_to_a_later_run(gfimu_command, poses):
+    """Biases that changed at power-on are found from three of its poses."""
+    first, later, out = (poses.with_name(name) for name in ("first.json", "later.parquet", "later.json"))
+    assert gfimu_command("calibrate", "array", poses, "--gravity", GRAVITY, "--out", first).code == 0
+    before = Recording.read(poses)
+    shift = np.random.default_rng(7).normal(0, 0.03, 12)
+    rows = before.t_s < 19.0
+    moved = before.for_array(CUBE)[rows] + shift
+    Recording.from_arrays(before.t_s[rows], moved, CUBE).write(later)
+    result = gfimu_command("calibrate", "array", later, "--update", first, "--turn-on-std", "0.03", "--out", out)
+    assert (result.code, result.stderr) == (0, "")
+    assert "updated with 3 poses: biases taken to change by 0.03" in " ".join(result.stdout.split())
+    change = load_calibration(out).values - load_calibration(first).values
+    np.testing.assert_allclose(change.reshape(4, 12)[:, 9:].ravel(), shift, atol=0.005)
+    refused = gfimu_command("calibrate", "six-position", later, "--update", first, "--out", out)
+    assert refused.code == 2
+    assert "use it with array, not six-position" in refused.stderr
+
+
 def test_raw_counts(gfimu_command, tmp_path, poses, run):
     """The same with counts: the calibration says so and estimate reads counts for it."""
     counts = []

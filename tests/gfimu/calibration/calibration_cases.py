@@ -4,6 +4,7 @@ import itertools
 
 import numpy as np
 
+from gfimu.calibration.error_model import ErrorModel
 from gfimu.calibration.observations import Observations
 
 GRAVITY = 9.81
@@ -20,6 +21,25 @@ def simulate(model, directions, rng, *, sigma=0.002, tilt=0.0, gravity=GRAVITY, 
     true = gravity * true / np.linalg.norm(true, axis=1, keepdims=True)
     readings = model.read(true) + rng.normal(0.0, sigma, directions.shape)
     return Observations.from_means(readings, sigma**2 * np.eye(3), unit=unit)
+
+
+def chips_in_gauge(array, rng, *, scale=1.0, spread=0.01):
+    """Random error models whose mean rotation against the drawing is zero, as the gauge wants it."""
+    relative = np.eye(3) + rng.normal(0, spread, (len(array.chips), 3, 3))  # A_iᵀ M_i A_i
+    antisymmetric = (relative - relative.swapaxes(1, 2)) / 2
+    relative = relative - antisymmetric.mean(axis=0)
+    return [
+        ErrorModel(scale * chip.axes @ inner @ chip.axes.T, scale * rng.normal(0, 0.3, 3))
+        for chip, inner in zip(array.chips, relative, strict=True)
+    ]
+
+
+def poses_of(array, models, directions, rng, sigma):
+    means = np.hstack(
+        [model.read(GRAVITY * directions @ chip.axes.T) for chip, model in zip(array.chips, models, strict=True)]
+    )
+    means = means + rng.normal(0, sigma, means.shape)
+    return Observations.from_means(means, sigma**2 * np.eye(means.shape[1]), channels=array.channels)
 
 
 def assert_honest(errors, std):
