@@ -150,6 +150,7 @@ class KalmanRateFilter:
         self.settings = settings or FilterSettings()
         self.tables = ChannelTables(array, errors)
         points, position = QUADRATURES[self.settings.quadrature]
+        weights = quadrature_weights(points)
         self.lag = points - 2 - position
         self._gyro = gyro
         c, d = array.n_channels, self.tables.n_null
@@ -157,8 +158,9 @@ class KalmanRateFilter:
         rest = self.settings.rest
         self._tuning = Tuning(
             period,
-            quadrature_weights(points),
+            weights,
             position,
+            2.0 * float(np.sum(weights[position] ** 2)) - 1.0,
             1.0 / errors.noise_std,
             errors.scale_std**2,
             errors.placement_std**2 * float(np.mean(1.0 / errors.noise_std**2)),
@@ -309,7 +311,9 @@ class KalmanRateFilter:
                 self._buffer, first, last, n, self._compiled_tables, self._tuning, self._kept[number].copy(), ignored,
                 -first, record, *self._axes,
             )  # fmt: skip
-            backward(record, last - first, adjoint, curvature, omega, covariance, first, self._axes[0])
+            backward(
+                record, last - first, self._tuning.ringing, adjoint, curvature, omega, covariance, first, self._axes[0]
+            )
         return omega, full_covariance(covariance)
 
     def _check_times(self, times: NDArray[np.float64]) -> None:
