@@ -32,8 +32,8 @@ from numba import njit
 
 from gfimu.rate.interval import interval_weights
 from gfimu.rate.model_errors import follow_differences, inflation_of, undersampled
-from gfimu.rate.recursion_data import BLOCK, COMPILE, LAST_GOOD, SAMPLES, STARTED, TIME, WALK
-from gfimu.rate.rest_recursion import rest_block
+from gfimu.rate.recursion_data import BLOCK, COMPILE, LAST_GOOD, RETURN, SAMPLES, STARTED, TIME, WALK
+from gfimu.rate.rest_recursion import keep_rest, rest_block
 from gfimu.rate.second_order import second_order
 from gfimu.rate.unrolled import step as _step_twelve
 
@@ -47,7 +47,9 @@ _SLOW = 1e-3  # tr P above this share of |ω|² switches the second-order terms 
 def forward(  # type: ignore[no-untyped-def]
     data, first, last, closing, tables, tuning, state, out, offset, record, states, null_axes, gyro_axes
 ):
-    """Run the filter over the samples ``first`` to ``last − 1``.
+    """Run the filter over the samples ``first`` to ``last − 1``; returns where it stopped.
+
+    It stops behind a sample at which a rest ended whose last blocks are in doubt (``state.counts[RETURN]``, `gfimu.rate.rest_recursion`).
 
     ``closing`` is the number of samples that the stencils may use; ``offset`` is added to a sample's place to find
     its place in ``out``; the record is filled when its arrays are not empty. ``states``, ``null_axes`` and
@@ -388,6 +390,8 @@ def forward(  # type: ignore[no-untyped-def]
         if tuning.rest_window > 0 and state.counts[BLOCK] == 0:
             state.block_x[:] = x
             state.block_covariance[:] = covariance
+            if rest:
+                keep_rest(state)
 
         if sensed:
             if tables.plain[place]:
@@ -411,6 +415,9 @@ def forward(  # type: ignore[no-untyped-def]
         if tuning.likelihood:
             out.likelihood[target] = -0.5 * (nis + np.log(determinant))
             out.manoeuvre[target] = _manoeuvre(data.corrected[k], tables.alpha_noise[noise_set], tuning, state)
+        if state.counts[RETURN] > 0:
+            return k + 1
+    return last
 
 
 @njit(**COMPILE)

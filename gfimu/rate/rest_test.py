@@ -16,6 +16,10 @@ Each is tested at a fifth of the stated false-alarm rate, so that a block at res
 cases. The mean α of the last 2, 4, 8 … blocks in a row is tested as well, against its bias as known when they began:
 it shows a departure too slow for one block.
 
+Until a slow departure shows it has been taken for rest. Therefore where a rest ends the filter takes back the block
+before, and the two, four … before when it was their mean that showed it: it goes back to its state before them and
+filters those samples again without ω = 0.
+
 Turning steadily about the vertical changes no reading; it is told from rest by the null space (down to about
 √(3 σ_b/h), σ_b the uncertainty of the null-space bias) and by the rate that the filter remembers, which is why a block
 only counts if ω was known to ``largest_rate_std`` when it began. A start in the dark, with ω unknown, is never taken
@@ -35,10 +39,13 @@ from scipy.stats import chi2
 from gfimu.array import AccelerometerArray
 from gfimu.errors import InputError
 
-__all__ = ["RUN_BLOCKS", "RestTest", "constant_readings"]
+__all__ = ["KEPT_BLOCKS", "RUN_BLOCKS", "RestTest", "constant_readings"]
 
 RUN_BLOCKS = 16
 """Blocks over which the mean of α is followed."""
+
+KEPT_BLOCKS = 5
+"""States kept during a rest: all but one of these blocks can be taken back."""
 
 
 @dataclass(frozen=True)
