@@ -49,7 +49,7 @@ def forward(  # type: ignore[no-untyped-def]
 ):
     """Run the filter over the samples ``first`` to ``last − 1``; returns where it stopped.
 
-    It stops behind a sample at which a rest ended whose last blocks are in doubt (``state.counts[RETURN]``, `gfimu.rate.rest_recursion`).
+    It stops behind a sample at which a rest ended whose last blocks are in doubt (``state.counts[RETURN]``).
 
     ``closing`` is the number of samples that the stencils may use; ``offset`` is added to a sample's place to find
     its place in ``out``; the record is filled when its arrays are not empty. ``states``, ``null_axes`` and

@@ -57,7 +57,7 @@ def keep_rest(state):  # type: ignore[no-untyped-def]
 
 @njit(**COMPILE)
 def _moving_blocks(y, tables, tuning, state):  # type: ignore[no-untyped-def]
-    """Test the block of readings y (window, c) for rest; returns how many blocks, with this one, are not: 0 for rest."""
+    """Test the block of readings y (window, c) for rest: 0, or how many blocks up to this one move."""
     window, c = y.shape
     d = tables.null_rows.shape[1]
     first = window // 2
@@ -115,7 +115,7 @@ def _moving_blocks(y, tables, tuning, state):  # type: ignore[no-untyped-def]
 def _moving_run(mean, alpha, tables, tuning, state):  # type: ignore[no-untyped-def]
     """Test the blocks in a row that ended with this one, which passed; rest begins when they are enough.
 
-    Returns how many blocks are not rest.
+    Returns 0, or how many blocks up to this one move.
     """
     counts = state.counts
     length = len(state.run_alpha)

@@ -36,8 +36,8 @@ def step(x, p, turned, t, ringing, noise, inflation, m, z, k, slow):  # type: ig
     """Predict and update x (15,) and p (15, 15); returns Σ e²/S and det S.
 
     ``turned`` (3,) is the integral of α over the interval of length ``t``, ``ringing`` g of its noise, ``noise`` (3, 3)
-    the covariance of α, ``inflation`` the further noise in units of it, ``m`` (6, 6) and row ``k`` of ``z`` the null space; while
-    tr P > ``slow`` |ω|² the update is of second order.
+    the covariance of α, ``inflation`` the further noise in units of it, ``m`` (6, 6) and row ``k`` of ``z`` the null
+    space; while tr P > ``slow`` |ω|² the update is of second order.
     """
 '''
 

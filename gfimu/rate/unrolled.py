@@ -15,8 +15,8 @@ def step(x, p, turned, t, ringing, noise, inflation, m, z, k, slow):  # type: ig
     """Predict and update x (15,) and p (15, 15); returns Σ e²/S and det S.
 
     ``turned`` (3,) is the integral of α over the interval of length ``t``, ``ringing`` g of its noise, ``noise`` (3, 3)
-    the covariance of α, ``inflation`` the further noise in units of it, ``m`` (6, 6) and row ``k`` of ``z`` the null space; while
-    tr P > ``slow`` |ω|² the update is of second order.
+    the covariance of α, ``inflation`` the further noise in units of it, ``m`` (6, 6) and row ``k`` of ``z`` the null
+    space; while tr P > ``slow`` |ω|² the update is of second order.
     """
     x0 = x[0]; p0_0 = p[0, 0]; p0_1 = p[0, 1]; p0_2 = p[0, 2]; p0_3 = p[0, 3]; p0_4 = p[0, 4]; p0_5 = p[0, 5]
     p0_6 = p[0, 6]; p0_7 = p[0, 7]; p0_8 = p[0, 8]; p0_9 = p[0, 9]; p0_10 = p[0, 10]; p0_11 = p[0, 11]
