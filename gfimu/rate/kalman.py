@@ -178,7 +178,7 @@ class KalmanRateFilter:
             errors.gyro_noise_std**2,
             rest.window(period) if rest else 0,
             rest.rate_std**2 if rest else 1.0,
-            rest.entry_blocks(period) if rest else 1,
+            *(rest.entry_blocks(period) if rest else (1, 1)),
             np.array([rest.limits(c, d, period), rest.limits(c, d, period, first=True)]) if rest else np.zeros((2, 8)),
             likelihood,
         )
@@ -213,7 +213,7 @@ class KalmanRateFilter:
         covariance[6 + d : n - 3, 6 + d : n - 3] = np.eye(n - 9 - d) * self.errors.gyro_bias_std**2
         rest = self.settings.rest
         settles = np.array([rest is not None and not x.any() and self.settings.start_std <= rest.largest_rate_std])
-        counts = np.array([0, 0, 0, 0, 0, int(settles[0]), 0, 0])  # a start at rest is rest to begin with
+        counts = np.array([0, 0, 0, 0, 0, int(settles[0]), 0, 0, 0])  # a start at rest is rest to begin with
         return RecursionState(
             x, covariance, np.zeros(5), np.zeros(3), counts, settles, x.copy(), covariance.copy(),
             np.zeros(c), np.zeros((RUN_BLOCKS, 3)), np.zeros((RUN_BLOCKS, 3)), np.zeros((RUN_BLOCKS, 3, 3)),

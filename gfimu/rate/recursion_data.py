@@ -15,7 +15,7 @@ COMPILE: dict[str, Any] = {"cache": True, "error_model": "numpy", "fastmath": {"
 # Places in RecursionState.scalars
 TIME, WALK, LAST_GOOD, FOURTH, FIFTH = range(5)
 # Places in RecursionState.counts
-STARTED, BLOCK, REST_BLOCKS, SAMPLES, RUN, RESTING, PAST, RETURN = range(8)
+STARTED, BLOCK, REST_BLOCKS, SAMPLES, RUN, RESTING, PAST, RETURN, RETRY = range(9)
 
 
 class Tables(NamedTuple):
@@ -47,6 +47,7 @@ class Tuning(NamedTuple):
     rest_window: int  # samples per block of the rest test; 0: no test
     rest_variance: float  # of the rate at rest, (rad/s)²
     rest_entry: int  # blocks in a row before rest begins anew
+    rest_retry: int  # the same right behind a single block that was no rest
     rest_limits: NDArray[np.float64]  # (2, 8) `gfimu.rate.rest_test.RestTest.limits`; row 1 for the first block
     likelihood: bool
 
@@ -58,7 +59,7 @@ class RecursionState(NamedTuple):
     covariance: NDArray[np.float64]  # (n, n)
     scalars: NDArray[np.float64]  # (5,)
     mean_alpha: NDArray[np.float64]  # (3,) over the filter's memory
-    counts: NDArray[np.int64]  # (8,)
+    counts: NDArray[np.int64]  # (9,)
     settles: NDArray[np.bool_]  # (1,) the run starts at rest
     block_x: NDArray[np.float64]  # (n,) state when the block began
     block_covariance: NDArray[np.float64]  # (n, n)

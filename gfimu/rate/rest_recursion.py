@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from gfimu.rate.recursion_data import BLOCK, COMPILE, PAST, REST_BLOCKS, RESTING, RETURN, RUN, SAMPLES
+from gfimu.rate.recursion_data import BLOCK, COMPILE, PAST, REST_BLOCKS, RESTING, RETRY, RETURN, RUN, SAMPLES
 
 __all__ = ["keep_rest", "rest_block"]
 
@@ -24,6 +24,7 @@ def rest_block(data, k, tables, tuning, state):  # type: ignore[no-untyped-def]
             counts[RUN] = 0
             counts[RESTING] = 0
             counts[PAST] = 0
+            counts[RETRY] = 0
         counts[BLOCK] = 0
         return False
     counts[BLOCK] += 1
@@ -37,6 +38,8 @@ def rest_block(data, k, tables, tuning, state):  # type: ignore[no-untyped-def]
             place = (counts[PAST] - 1 - doubted) % len(state.past_x)
             if counts[SAMPLES] < state.past_samples[place] + len(state.past_x) * window:  # those samples are at hand
                 counts[RETURN] = place + 1
+        if not data.vetoed[k] or counts[RESTING] > 0:  # all that is vetoed in a row counts as one block
+            counts[RETRY] = counts[RESTING]
         counts[RUN] = 0
         counts[RESTING] = 0
         counts[PAST] = 0
@@ -132,9 +135,10 @@ def _moving_run(mean, alpha, tables, tuning, state):  # type: ignore[no-untyped-
             return span
         span *= 2
     if counts[RESTING] == 0:
+        resumes = counts[RETRY] > 0
         if (
-            run < tuning.rest_entry
-            or _run_statistic(min(run, length), tables, tuning, state) > tuning.rest_limits[0, 6]
+            run < (tuning.rest_retry if resumes else tuning.rest_entry)
+            or _run_statistic(min(run, length), tables, tuning, state) > tuning.rest_limits[0, 7 if resumes else 6]
         ):
             return 0
         known = state.covariance[:3, :3] + tuning.rest_variance * np.eye(3)

@@ -159,7 +159,7 @@ def first_rest(motion):
     return ends
 
 
-def study(array, motion, runs, *, seed=2026, methods=("filter", "smoother"), **measurement):
+def study(array, motion, runs, *, seed=4117, methods=("filter", "smoother"), **measurement):
     """Filter and smooth ``runs`` independent measurements of a motion."""
     rate = 1 / (motion.t[1] - motion.t[0])
     errors = sensor_errors(array, rate)
