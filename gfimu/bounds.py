@@ -8,7 +8,7 @@ Over a run: the rate is also the integral of α, which the array measures indepe
 biases are learned along the way. The posterior Cramér–Rao bound of Tichavský, Muravchik & Nehorai (IEEE Trans. Signal
 Process. 46, 1998, eq. 21) is taken at the true motion, for the estimate from the samples so far (filter) or from all
 (smoother). In steady turning it is σ_α √(Δt/|ω|) across ω, and 1/√2 of it along ω; all samples together gain another
-1/√2.
+1/√2. Unequal noise of the channels correlates α with the null space, which is taken into account.
 
 The bounds are local: they use the slope of s(ω). Where the true rate is smaller than the bound itself the slope says
 that a sample tells nothing, while its curvature still limits |ω|; there an estimator can do better than the "bound",
@@ -226,18 +226,30 @@ def posterior_rate_bound(
     if tables.alpha_leak[0].any():
         raise InputError(f"array {array.name!r} leaves products of the angular rate in α; the bound needs one without")
     d = tables.n_null
-    slopes = tables.null_sensitivity[0] @ omega_products_jacobian(rates)  # (n, d, 3), noise of unit variance
+    readout = _readout(tables, errors)
+    # The null space scaled to unit noise: what it says of ω, and with it of the biases and of ε.
+    slopes = readout[:, 6 : 6 + d] @ tables.null_sensitivity[0] @ omega_products_jacobian(rates)  # (n, d, 3)
     start = np.zeros((9 + d, 9 + d))
     start[:3, :3] = np.eye(3) * start_std**2
     start[3 : 6 + d, 3 : 6 + d] = tables.bias_covariance(errors.bias_std)
-    filtered = _filter_bound(times, slopes, tables.alpha_noise[0], start, known, rest_std)
+    filtered = _filter_bound(times, slopes, readout, tables.alpha_noise[0], start, known, rest_std)
     if smoother:
-        _smoother_bound(times, slopes, tables.alpha_noise[0], known, rest_std, filtered)
+        _smoother_bound(times, slopes, readout, tables.alpha_noise[0], known, rest_std, filtered)
     return np.ascontiguousarray(filtered[:, :3, :3])
 
 
 # State of the bound: [ω; b_α; b_z; ε], ε minus the noise of α at the sample. Over an interval the integral of the
-# measured α carries half of the ε at either end: ω' = ω − Δt b_α + Δt/2 (ε + ε').
+# measured α carries half of the ε at either end: ω' = ω − Δt b_α + Δt/2 (ε + ε'). Where the channels' noise is unequal
+# that of the null space depends on it: z = M s + b_z − Γ ε + (the rest).
+
+
+def _readout(tables: ChannelTables, errors: SensorErrors) -> NDArray[np.float64]:
+    """H of the null space but for its slopes, scaled so that the noise that ε doesn't explain has unit variance."""
+    d = tables.n_null
+    crossed = tables.null_rows[0] * errors.noise_std**2 @ tables.alpha_rows[0].T  # (d, 3)
+    explained = np.linalg.solve(tables.alpha_noise[0], crossed.T).T  # Γ
+    white = np.linalg.inv(np.linalg.cholesky(np.eye(d) - explained @ crossed.T))
+    return np.hstack([np.zeros((d, 6)), white, -white @ explained])
 
 
 @njit(cache=True)
@@ -255,13 +267,12 @@ def _transition(step, n):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _measurement(slope, known, rest_std, n):  # type: ignore[no-untyped-def]
+def _measurement(slope, readout, known, rest_std, n):  # type: ignore[no-untyped-def]
     """H of all measurements of a sample, scaled to unit noise: the null space, and ω = 0 at rest."""
     d = len(slope)
     rows = np.zeros((d + 3 if known else d, n))
+    rows[:d] = readout
     rows[:d, :3] = slope
-    for i in range(d):
-        rows[i, 6 + i] = 1.0
     if known:
         for a in range(3):
             rows[d + a, a] = 1.0 / rest_std
@@ -269,7 +280,7 @@ def _measurement(slope, known, rest_std, n):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _filter_bound(t, slopes, alpha_noise, start, known, rest_std):  # type: ignore[no-untyped-def]
+def _filter_bound(t, slopes, readout, alpha_noise, start, known, rest_std):  # type: ignore[no-untyped-def]
     n = len(start)
     result = np.empty((len(t), n, n))
     covariance = start.copy()
@@ -278,7 +289,7 @@ def _filter_bound(t, slopes, alpha_noise, start, known, rest_std):  # type: igno
         if k > 0:
             move, enter = _transition(t[k] - t[k - 1], n)
             covariance = move @ covariance @ move.T + enter @ alpha_noise @ enter.T
-        rows = _measurement(slopes[k], known[k], rest_std, n)
+        rows = _measurement(slopes[k], readout, known[k], rest_std, n)
         gain = covariance @ rows.T
         total = rows @ gain + np.eye(len(rows))
         covariance = covariance - gain @ np.linalg.solve(total, gain.T)
@@ -288,13 +299,13 @@ def _filter_bound(t, slopes, alpha_noise, start, known, rest_std):  # type: igno
 
 
 @njit(cache=True)
-def _smoother_bound(t, slopes, alpha_noise, known, rest_std, filtered):  # type: ignore[no-untyped-def]
+def _smoother_bound(t, slopes, readout, alpha_noise, known, rest_std, filtered):  # type: ignore[no-untyped-def]
     """Add the information of the later samples, carried back in time: P_s = (P⁻¹ + J)⁻¹ = (I + P J)⁻¹ P."""
     n = filtered.shape[1]
     later = np.zeros((n, n))
     prior = np.linalg.inv(alpha_noise)
     for k in range(len(t) - 2, -1, -1):
-        rows = _measurement(slopes[k + 1], known[k + 1], rest_std, n)
+        rows = _measurement(slopes[k + 1], readout, known[k + 1], rest_std, n)
         later = later + rows.T @ rows
         move, enter = _transition(t[k + 1] - t[k], n)
         seen = later @ enter

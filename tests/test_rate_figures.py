@@ -18,14 +18,21 @@ def script(project_root):
     return module
 
 
-def test_paper_run_is_drawn_and_the_filter_beats_the_integration(script, tmp_path, capsys):
+def test_paper_run_is_drawn(script, tmp_path):
     picture = matplotlib.image.imread(script.draw_paper_run(tmp_path))
     assert np.mean(picture[..., :3].min(axis=-1) < 0.9) > 0.05
-    rows = {
-        line.split()[0]: [float(cell) for cell in line.split()[1:]] for line in capsys.readouterr().out.splitlines()[1:]
-    }
-    assert rows["filter"][0] < rows["integrate"][0] / 3
-    assert rows["smoother"][1] <= rows["filter"][1] < rows["integrate"][1] / 3
+
+
+def test_drift_on_the_paper_run_beside_the_model(script):
+    """Two runs of each method. At rest the model's position is an upper limit, turning all the time a lower one."""
+    rows = script.drift_table(2)
+    at_rest, turning, integrate, filtered, smoothed = rows.values()
+    assert list(rows)[2:] == ["integrate", "filter", "smoother"]
+    # Six components of two runs around the model's σ, and up to twice that by the scale factors the model is not told.
+    assert 0.5 * at_rest[0] < integrate[0] < 3 * at_rest[0]
+    assert turning[1] < integrate[1] < at_rest[1]
+    assert filtered[0] < integrate[0] / 3
+    assert smoothed[1] <= filtered[1] < integrate[1] / 3
 
 
 def test_bounds_are_reached_in_steady_turning(script):

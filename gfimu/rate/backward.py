@@ -11,7 +11,7 @@ __all__ = ["backward"]
 
 
 @njit(**COMPILE)
-def backward(record, count, adjoint, curvature, omega, covariance, first, states):  # type: ignore[no-untyped-def]
+def backward(record, count, ringing, adjoint, curvature, omega, covariance, first, states):  # type: ignore[no-untyped-def]
     """Run the smoother back over a recorded block of ``count`` samples (Bryson–Frazier form of Rauch–Tung–Striebel).
 
     For each scalar measurement, from the last to the first, with gain k = P h/S:
@@ -58,11 +58,11 @@ def backward(record, count, adjoint, curvature, omega, covariance, first, states
             for r in range(n):
                 total -= three[a, r] * record.rows[row, b, r]
             covariance[first + row, place] = total
-        # λ ← Fᵀλ, Λ ← FᵀΛF with F the identity but for the rows of ω; the rows of ε are zero: it starts anew.
+        # λ ← Fᵀλ, Λ ← FᵀΛF with F the identity but for the rows of ω, and −g for ε.
         transition = record.transition[row]
-        adjoint[n - 3 :] = 0.0
-        curvature[n - 3 :] = 0.0
-        curvature[:, n - 3 :] = 0.0
+        adjoint[n - 3 :] *= -ringing
+        curvature[n - 3 :] *= -ringing
+        curvature[:, n - 3 :] *= -ringing
         for r in range(n):
             total = adjoint[r] if r >= 3 else 0.0
             for a in range(3):

@@ -23,8 +23,18 @@ from gfimu.errors import InputError, unknown_name
 from gfimu.rate.backward import backward
 from gfimu.rate.preparation import prepare
 from gfimu.rate.recursion import forward
-from gfimu.rate.recursion_data import Record, RecursionInput, RecursionOutput, RecursionState, Tables, Tuning
-from gfimu.rate.rest_test import RUN_BLOCKS, RestTest
+from gfimu.rate.recursion_data import (
+    BLOCK,
+    RETURN,
+    SAMPLES,
+    Record,
+    RecursionInput,
+    RecursionOutput,
+    RecursionState,
+    Tables,
+    Tuning,
+)
+from gfimu.rate.rest_test import KEPT_BLOCKS, RUN_BLOCKS, RestTest
 from gfimu.rate.result import ChannelReport, RateEstimate, SignDecision, full_covariance
 from gfimu.rate.sensing import ChannelTables, SensorErrors
 
@@ -150,6 +160,7 @@ class KalmanRateFilter:
         self.settings = settings or FilterSettings()
         self.tables = ChannelTables(array, errors)
         points, position = QUADRATURES[self.settings.quadrature]
+        weights = quadrature_weights(points)
         self.lag = points - 2 - position
         self._gyro = gyro
         c, d = array.n_channels, self.tables.n_null
@@ -157,8 +168,9 @@ class KalmanRateFilter:
         rest = self.settings.rest
         self._tuning = Tuning(
             period,
-            quadrature_weights(points),
+            weights,
             position,
+            2.0 * float(np.sum(weights[position] ** 2)) - 1.0,
             1.0 / errors.noise_std,
             errors.scale_std**2,
             errors.placement_std**2 * float(np.mean(1.0 / errors.noise_std**2)),
@@ -166,13 +178,13 @@ class KalmanRateFilter:
             errors.gyro_noise_std**2,
             rest.window(period) if rest else 0,
             rest.rate_std**2 if rest else 1.0,
-            rest.entry_blocks(period) if rest else 1,
+            *(rest.entry_blocks(period) if rest else (1, 1)),
             np.array([rest.limits(c, d, period), rest.limits(c, d, period, first=True)]) if rest else np.zeros((2, 8)),
             likelihood,
         )
         self.state = self._start()
         self._compiled_tables = self._tables()
-        self._history = points + 2 + self._tuning.rest_window
+        self._history = points + 2 + (KEPT_BLOCKS + 1) * self._tuning.rest_window
         self._buffer = _buffer(capacity + self._history + points, c, d)
         self._received = 0  # rows of the buffer that hold samples
         self._done = 0  # rows of the buffer that are estimated
@@ -185,6 +197,7 @@ class KalmanRateFilter:
         self._gaps = 0
         self._record = empty_record(0, *self._axes)
         self._kept: list[RecursionState] = []
+        self._taken_back: list[tuple[int, int]] = []  # rows of the buffer, from behind the last rest to its end's block
         self._last_time = -np.inf
 
     def _start(self) -> RecursionState:
@@ -200,10 +213,12 @@ class KalmanRateFilter:
         covariance[6 + d : n - 3, 6 + d : n - 3] = np.eye(n - 9 - d) * self.errors.gyro_bias_std**2
         rest = self.settings.rest
         settles = np.array([rest is not None and not x.any() and self.settings.start_std <= rest.largest_rate_std])
-        counts = np.array([0, 0, 0, 0, 0, int(settles[0])])  # a start at rest is rest to begin with
+        counts = np.array([0, 0, 0, 0, 0, int(settles[0]), 0, 0, 0])  # a start at rest is rest to begin with
         return RecursionState(
             x, covariance, np.zeros(5), np.zeros(3), counts, settles, x.copy(), covariance.copy(),
             np.zeros(c), np.zeros((RUN_BLOCKS, 3)), np.zeros((RUN_BLOCKS, 3)), np.zeros((RUN_BLOCKS, 3, 3)),
+            np.zeros((KEPT_BLOCKS, n)), np.zeros((KEPT_BLOCKS, n, n)), np.zeros((KEPT_BLOCKS, 5)),
+            np.zeros(KEPT_BLOCKS, dtype=np.int64),
         )  # fmt: skip
 
     def _tables(self) -> Tables:
@@ -288,11 +303,16 @@ class KalmanRateFilter:
         self._check_times(times)
         self._take(times, rows, None if gyro is None else np.asarray(gyro, dtype=float))
         out, stamps = self._empty(len(times))
-        self._kept = []
-        for start in range(0, len(times), _SMOOTHER_BLOCK):
-            self._kept.append(self.state.copy())
-            self._advance(min(start + _SMOOTHER_BLOCK, len(times)), out, stamps, start, closing=True)
-        return FilterOutput(stamps, out)
+        while True:
+            self._kept, self._taken_back = [], []
+            for start in range(0, len(times), _SMOOTHER_BLOCK):
+                self._kept.append(self.state.copy())
+                self._advance(min(start + _SMOOTHER_BLOCK, len(times)), out, stamps, start, closing=True)
+            if not self._taken_back:
+                return FilterOutput(stamps, out)
+            for first, last in self._taken_back:  # again, without the blocks that turned out not to be rest
+                self._buffer.vetoed[first:last] = True
+            self.state, self._done = self._start(), 0
 
     def run_back(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Smooth the recording of `record_run`: rates (n, 3) and covariances (n, 3, 3)."""
@@ -309,7 +329,9 @@ class KalmanRateFilter:
                 self._buffer, first, last, n, self._compiled_tables, self._tuning, self._kept[number].copy(), ignored,
                 -first, record, *self._axes,
             )  # fmt: skip
-            backward(record, last - first, adjoint, curvature, omega, covariance, first, self._axes[0])
+            backward(
+                record, last - first, self._tuning.ringing, adjoint, curvature, omega, covariance, first, self._axes[0]
+            )
         return omega, full_covariance(covariance)
 
     def _check_times(self, times: NDArray[np.float64]) -> None:
@@ -370,13 +392,39 @@ class KalmanRateFilter:
         if until <= self._done or (not closing and self._received < self._tuning.weights.shape[1]):
             return filled
         first, self._done = self._done, until
-        forward(
-            self._buffer, first, until, self._received, self._compiled_tables, self._tuning, self.state, out,
-            filled - first, self._record, *self._axes,
-        )  # fmt: skip
+        reached = first
+        while reached < until:
+            reached = forward(
+                self._buffer, reached, until, self._received, self._compiled_tables, self._tuning, self.state, out,
+                filled - first, self._record, *self._axes,
+            )  # fmt: skip
+            if self.state.counts[RETURN]:
+                self._take_back(reached, out, filled + reached - first - 1)
         count = until - first
         stamps[filled : filled + count] = self._buffer.t[first:until]
         return filled + count
+
+    def _take_back(self, reached: int, out: RecursionOutput, place: int) -> None:
+        """Return to the state before the blocks in doubt and filter up to row ``reached`` again, without rest."""
+        state = self.state
+        kept = int(state.counts[RETURN]) - 1
+        first = reached - int(state.counts[SAMPLES] - state.past_samples[kept])
+        state.x[:] = state.past_x[kept]
+        state.covariance[:] = state.past_covariance[kept]
+        state.scalars[:] = state.past_scalars[kept]
+        state.counts[SAMPLES] = state.past_samples[kept]
+        state.counts[RETURN] = 0
+        again = empty_output(reached - first)
+        forward(
+            self._buffer, first, reached, self._received, self._compiled_tables,
+            self._tuning._replace(rest_window=0, likelihood=False), state, again, -first, self._record, *self._axes,
+        )  # fmt: skip
+        state.counts[BLOCK] = 0
+        state.block_x[:] = state.x
+        state.block_covariance[:] = state.covariance
+        out.omega[place] = again.omega[-1]
+        out.covariance[place] = again.covariance[-1]
+        self._taken_back.append((first, reached))
 
     def _empty(self, n: int) -> tuple[RecursionOutput, NDArray[np.float64]]:
         return empty_output(n), np.empty(n)
@@ -430,7 +478,7 @@ def _buffer(rows: int, n_channels: int, n_null: int) -> RecursionInput:
     return RecursionInput(
         np.zeros(rows), np.zeros((rows, n_channels)), np.zeros((rows, 3)), np.zeros((rows, n_null)),
         np.zeros(rows, dtype=np.int64), np.full((rows, 3), np.nan), np.zeros(rows, dtype=np.int64),
-        np.zeros(rows, dtype=np.int64), np.zeros((rows, 3)),
+        np.zeros(rows, dtype=np.int64), np.zeros((rows, 3)), np.zeros(rows, dtype=np.bool_),
     )  # fmt: skip
 
 

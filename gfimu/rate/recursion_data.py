@@ -15,7 +15,7 @@ COMPILE: dict[str, Any] = {"cache": True, "error_model": "numpy", "fastmath": {"
 # Places in RecursionState.scalars
 TIME, WALK, LAST_GOOD, FOURTH, FIFTH = range(5)
 # Places in RecursionState.counts
-STARTED, BLOCK, REST_BLOCKS, SAMPLES, RUN, RESTING = range(6)
+STARTED, BLOCK, REST_BLOCKS, SAMPLES, RUN, RESTING, PAST, RETURN, RETRY = range(9)
 
 
 class Tables(NamedTuple):
@@ -38,6 +38,7 @@ class Tuning(NamedTuple):
     period: float  # nominal sample period, s
     weights: NDArray[np.float64]  # (m − 1, m): quadrature of each interval of the stencil, in periods
     position: int  # interval of the stencil that is integrated
+    ringing: float  # g of (1b) in `gfimu.rate.recursion`
     inverse_noise: NDArray[np.float64]  # (c,) 1/σ, s²/m
     scale_variance: float  # of the scale factors
     placement_variance: float  # over σ² of a channel, 1/(m/s²)² m²
@@ -46,6 +47,7 @@ class Tuning(NamedTuple):
     rest_window: int  # samples per block of the rest test; 0: no test
     rest_variance: float  # of the rate at rest, (rad/s)²
     rest_entry: int  # blocks in a row before rest begins anew
+    rest_retry: int  # the same right behind a single block that was no rest
     rest_limits: NDArray[np.float64]  # (2, 8) `gfimu.rate.rest_test.RestTest.limits`; row 1 for the first block
     likelihood: bool
 
@@ -57,7 +59,7 @@ class RecursionState(NamedTuple):
     covariance: NDArray[np.float64]  # (n, n)
     scalars: NDArray[np.float64]  # (5,)
     mean_alpha: NDArray[np.float64]  # (3,) over the filter's memory
-    counts: NDArray[np.int64]  # (6,)
+    counts: NDArray[np.int64]  # (9,)
     settles: NDArray[np.bool_]  # (1,) the run starts at rest
     block_x: NDArray[np.float64]  # (n,) state when the block began
     block_covariance: NDArray[np.float64]  # (n, n)
@@ -65,6 +67,11 @@ class RecursionState(NamedTuple):
     run_alpha: NDArray[np.float64]  # (r, 3) mean α of the last blocks that passed, ring
     run_bias: NDArray[np.float64]  # (r, 3) its bias as known when each began
     run_covariance: NDArray[np.float64]  # (r, 3, 3)
+    # State after each of the last blocks of rest, rings
+    past_x: NDArray[np.float64]  # (m, n)
+    past_covariance: NDArray[np.float64]  # (m, n, n)
+    past_scalars: NDArray[np.float64]  # (m, 5)
+    past_samples: NDArray[np.int64]  # (m,)
 
     def copy(self) -> RecursionState:
         """Return a state that shares nothing with this one."""
@@ -83,6 +90,7 @@ class RecursionInput(NamedTuple):
     uniform_run: NDArray[np.int64]  # (N,) equal steps between complete samples in a row up to here
     whole_run: NDArray[np.int64]  # (N,) steps without a gap up to here
     corrected: NDArray[np.float64]  # (N, 3) α of the past without what the products of ω left in it
+    vetoed: NDArray[np.bool_]  # (N,) a block that ends here is known not to be rest
 
 
 class RecursionOutput(NamedTuple):

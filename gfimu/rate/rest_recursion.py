@@ -5,36 +5,62 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from gfimu.rate.recursion_data import BLOCK, COMPILE, REST_BLOCKS, RESTING, RUN, SAMPLES
+from gfimu.rate.recursion_data import BLOCK, COMPILE, PAST, REST_BLOCKS, RESTING, RETRY, RETURN, RUN, SAMPLES
 
-__all__ = ["rest_block"]
+__all__ = ["keep_rest", "rest_block"]
 
 
 @njit(**COMPILE)
 def rest_block(data, k, tables, tuning, state):  # type: ignore[no-untyped-def]
-    """Count sample k into the block; at the block's end test for rest (`gfimu.rate.rest_test`)."""
+    """Count sample k into the block; at the block's end test for rest (`gfimu.rate.rest_test`).
+
+    Returns whether a block of rest ended here. Where a rest ended, the motion may have begun before it could be seen:
+    ``state.counts[RETURN]`` is then the place, from 1, of the kept state that was certainly before it.
+    """
     counts = state.counts
     window = tuning.rest_window
     if data.channel_set[k] != 0 or (counts[BLOCK] > 0 and data.whole_run[k] == 0):
         if counts[BLOCK] > 0 and data.whole_run[k] == 0:  # who knows what happened in the gap
             counts[RUN] = 0
             counts[RESTING] = 0
+            counts[PAST] = 0
+            counts[RETRY] = 0
         counts[BLOCK] = 0
         return False
     counts[BLOCK] += 1
     if counts[BLOCK] < window:
         return False
     counts[BLOCK] = 0
-    if not _is_rest(data.y[k - window + 1 : k + 1], tables, tuning, state):
+    span = 0 if data.vetoed[k] else _moving_blocks(data.y[k - window + 1 : k + 1], tables, tuning, state)
+    if data.vetoed[k] or span > 0:
+        doubted = min(span, counts[PAST] - 1, len(state.past_x) - 1)  # the state behind the first block stays
+        if doubted > 0:
+            place = (counts[PAST] - 1 - doubted) % len(state.past_x)
+            if counts[SAMPLES] < state.past_samples[place] + len(state.past_x) * window:  # those samples are at hand
+                counts[RETURN] = place + 1
+        if not data.vetoed[k] or counts[RESTING] > 0:  # all that is vetoed in a row counts as one block
+            counts[RETRY] = counts[RESTING]
         counts[RUN] = 0
         counts[RESTING] = 0
+        counts[PAST] = 0
         return False
     return counts[RESTING] > 0
 
 
 @njit(**COMPILE)
-def _is_rest(y, tables, tuning, state):  # type: ignore[no-untyped-def]
-    """Test the block of readings y (window, c) against the hypothesis of rest."""
+def keep_rest(state):  # type: ignore[no-untyped-def]
+    """Keep the state after a block of rest, so that later blocks can be taken back."""
+    place = state.counts[PAST] % len(state.past_x)
+    state.past_x[place] = state.x
+    state.past_covariance[place] = state.covariance
+    state.past_scalars[place] = state.scalars
+    state.past_samples[place] = state.counts[SAMPLES]
+    state.counts[PAST] += 1
+
+
+@njit(**COMPILE)
+def _moving_blocks(y, tables, tuning, state):  # type: ignore[no-untyped-def]
+    """Test the block of readings y (window, c) for rest: 0, or how many blocks up to this one move."""
     window, c = y.shape
     d = tables.null_rows.shape[1]
     first = window // 2
@@ -44,9 +70,9 @@ def _is_rest(y, tables, tuning, state):  # type: ignore[no-untyped-def]
     known = state.block_covariance
     for a in range(3):
         if not known[a, a] <= limits[5]:  # nor if it is NaN
-            return False
+            return 1
         if state.block_x[a] ** 2 > limits[4] * (known[a, a] + tuning.rest_variance):  # never less than the full χ²
-            return False
+            return 1
     # Scatter within the block, and its second half against its first.
     mean = np.empty(c)
     scatter = 0.0
@@ -71,26 +97,29 @@ def _is_rest(y, tables, tuning, state):  # type: ignore[no-untyped-def]
         difference = late / second - early / first
         halves += weight * difference * difference
     if scatter > limits[0] or halves / (1.0 / first + 1.0 / second) > limits[1]:
-        return False
+        return 1
     consistent = np.linalg.solve(known[:3, :3] + tuning.rest_variance * np.eye(3), state.block_x[:3])
     if (consistent * state.block_x[:3]).sum() > limits[4]:
-        return False
+        return 1
     # Means against the biases known when the block began.
     alpha = tables.alpha_rows[0] @ mean - state.block_x[3:6]
     spread = known[3:6, 3:6] + tables.alpha_noise[0] / window
     if (np.linalg.solve(spread, alpha) * alpha).sum() > limits[2]:
-        return False
+        return 1
     if d > 0:
         null = tables.null_rows[0] @ mean - state.block_x[6 : 6 + d]
         spread_null = known[6 : 6 + d, 6 : 6 + d] + np.eye(d) / window
         if (np.linalg.solve(spread_null, null) * null).sum() > limits[3]:
-            return False
-    return _is_rest_run(mean, alpha, tables, tuning, state)
+            return 1
+    return _moving_run(mean, alpha, tables, tuning, state)
 
 
 @njit(**COMPILE)
-def _is_rest_run(mean, alpha, tables, tuning, state):  # type: ignore[no-untyped-def]
-    """Test the blocks in a row that ended with this one, which passed; rest begins when they are enough."""
+def _moving_run(mean, alpha, tables, tuning, state):  # type: ignore[no-untyped-def]
+    """Test the blocks in a row that ended with this one, which passed; rest begins when they are enough.
+
+    Returns 0, or how many blocks up to this one move.
+    """
     counts = state.counts
     length = len(state.run_alpha)
     place = counts[RUN] % length
@@ -103,23 +132,24 @@ def _is_rest_run(mean, alpha, tables, tuning, state):  # type: ignore[no-untyped
     span = 2
     while span <= min(run, length):
         if _run_statistic(span, tables, tuning, state) > tuning.rest_limits[0, 2]:
-            return False
+            return span
         span *= 2
     if counts[RESTING] == 0:
+        resumes = counts[RETRY] > 0
         if (
-            run < tuning.rest_entry
-            or _run_statistic(min(run, length), tables, tuning, state) > tuning.rest_limits[0, 6]
+            run < (tuning.rest_retry if resumes else tuning.rest_entry)
+            or _run_statistic(min(run, length), tables, tuning, state) > tuning.rest_limits[0, 7 if resumes else 6]
         ):
-            return True
+            return 0
         known = state.covariance[:3, :3] + tuning.rest_variance * np.eye(3)
         if (np.linalg.solve(known, state.x[:3]) * state.x[:3]).sum() > tuning.rest_limits[0, 7]:
-            return True
+            return 0
         counts[RESTING] = 1
     blocks = counts[REST_BLOCKS]
     for i in range(len(mean)):
         state.reference[i] += (mean[i] - state.reference[i]) / (blocks + 1)
     counts[REST_BLOCKS] = blocks + 1
-    return True
+    return 0
 
 
 @njit(**COMPILE)

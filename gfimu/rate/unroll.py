@@ -32,12 +32,12 @@ from gfimu.rate.second_order import second_order
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
-def step(x, p, turned, t, noise, inflation, m, z, k, slow):  # type: ignore[no-untyped-def]
+def step(x, p, turned, t, ringing, noise, inflation, m, z, k, slow):  # type: ignore[no-untyped-def]
     """Predict and update x (15,) and p (15, 15); returns Σ e²/S and det S.
 
-    ``turned`` (3,) is the integral of α over the interval of length ``t``, ``noise`` (3, 3) the covariance of α,
-    ``inflation`` the further noise in units of it, ``m`` (6, 6) and row ``k`` of ``z`` the null space; while
-    tr P > ``slow`` |ω|² the update is of second order.
+    ``turned`` (3,) is the integral of α over the interval of length ``t``, ``ringing`` g of its noise, ``noise`` (3, 3)
+    the covariance of α, ``inflation`` the further noise in units of it, ``m`` (6, 6) and row ``k`` of ``z`` the null
+    space; while tr P > ``slow`` |ω|² the update is of second order.
     """
 '''
 
@@ -47,33 +47,38 @@ def _p(row: int, column: int) -> str:
 
 
 def _predict(add: Callable[[str], None]) -> None:
-    """Write (1) of the recursion: ω by α, its bias and ε; then the ε of the new sample."""
+    """Write (1) of the recursion: ω by α, its bias and ε; then (1b), the ε of the new sample."""
     first_noise = STATES - 3
     add("half = 0.5 * t")
+    add("carried = half * (1.0 - ringing)")
     add("factor = 1.0 + inflation")
+    add("renewed = factor * (1.0 + ringing) * (1.0 + ringing)")
     for a in range(3):
-        add(f"x{a} += turned[{a}] - t * x{3 + a} + half * x{first_noise + a}")
-        add(f"x{first_noise + a} = 0.0")
+        add(f"x{a} += turned[{a}] - t * x{3 + a} + carried * x{first_noise + a}")
+        add(f"x{first_noise + a} *= -ringing")
     for a in range(3):
-        for r in [*range(3, first_noise), *range(first_noise + a, STATES)]:  # d = the change of the rows of ω
-            add(f"d{a}_{r} = half * {_p(first_noise + a, r)} - t * {_p(3 + a, r)}")
+        for r in range(3, STATES):  # d = the change of the rows of ω
+            add(f"d{a}_{r} = carried * {_p(first_noise + a, r)} - t * {_p(3 + a, r)}")
     for a in range(3):
         for b in range(a, 3):
-            cross = f"half * {_p(b, first_noise + a)} - t * {_p(b, 3 + a)}"
-            back = f"half * {_p(a, first_noise + b)} - t * {_p(a, 3 + b)}"
-            both = f"half * d{a}_{first_noise + b} - t * d{a}_{3 + b}"
-            add(f"n{a}_{b} = factor * noise[{a}, {b}]")
+            cross = f"carried * {_p(b, first_noise + a)} - t * {_p(b, 3 + a)}"
+            back = f"carried * {_p(a, first_noise + b)} - t * {_p(a, 3 + b)}"
+            both = f"carried * d{a}_{first_noise + b} - t * d{a}_{3 + b}"
+            add(f"n{a}_{b} = renewed * noise[{a}, {b}]")
             add(f"{_p(a, b)} += {cross} + {back} + {both} + half * half * n{a}_{b}")
     for a in range(3):
         for r in range(3, first_noise):
             add(f"{_p(a, r)} += d{a}_{r}")
     for a in range(3):
         for b in range(3):
-            add(f"{_p(a, first_noise + b)} = half * n{min(a, b)}_{max(a, b)}")
-        for b in range(a, 3):
-            add(f"{_p(first_noise + a, first_noise + b)} = n{a}_{b}")
+            old = f"{_p(a, first_noise + b)} + d{a}_{first_noise + b}"
+            add(f"{_p(a, first_noise + b)} = half * n{min(a, b)}_{max(a, b)} - ringing * ({old})")
         for r in range(3, first_noise):
-            add(f"{_p(r, first_noise + a)} = 0.0")
+            add(f"{_p(r, first_noise + a)} *= -ringing")
+    for a in range(3):
+        for b in range(a, 3):
+            old = _p(first_noise + a, first_noise + b)
+            add(f"{old} = n{a}_{b} + ringing * ringing * {old}")
 
 
 def _innovations(add: Callable[[str], None]) -> None:

@@ -11,12 +11,12 @@ from gfimu.rate.second_order import second_order
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
-def step(x, p, turned, t, noise, inflation, m, z, k, slow):  # type: ignore[no-untyped-def]
+def step(x, p, turned, t, ringing, noise, inflation, m, z, k, slow):  # type: ignore[no-untyped-def]
     """Predict and update x (15,) and p (15, 15); returns Σ e²/S and det S.
 
-    ``turned`` (3,) is the integral of α over the interval of length ``t``, ``noise`` (3, 3) the covariance of α,
-    ``inflation`` the further noise in units of it, ``m`` (6, 6) and row ``k`` of ``z`` the null space; while
-    tr P > ``slow`` |ω|² the update is of second order.
+    ``turned`` (3,) is the integral of α over the interval of length ``t``, ``ringing`` g of its noise, ``noise`` (3, 3)
+    the covariance of α, ``inflation`` the further noise in units of it, ``m`` (6, 6) and row ``k`` of ``z`` the null
+    space; while tr P > ``slow`` |ω|² the update is of second order.
     """
     x0 = x[0]; p0_0 = p[0, 0]; p0_1 = p[0, 1]; p0_2 = p[0, 2]; p0_3 = p[0, 3]; p0_4 = p[0, 4]; p0_5 = p[0, 5]
     p0_6 = p[0, 6]; p0_7 = p[0, 7]; p0_8 = p[0, 8]; p0_9 = p[0, 9]; p0_10 = p[0, 10]; p0_11 = p[0, 11]
@@ -38,41 +38,49 @@ def step(x, p, turned, t, noise, inflation, m, z, k, slow):  # type: ignore[no-u
     p9_13 = p[9, 13]; p9_14 = p[9, 14]; x10 = x[10]; p10_10 = p[10, 10]; p10_11 = p[10, 11]; p10_12 = p[10, 12]
     p10_13 = p[10, 13]; p10_14 = p[10, 14]; x11 = x[11]; p11_11 = p[11, 11]; p11_12 = p[11, 12]; p11_13 = p[11, 13]
     p11_14 = p[11, 14]; x12 = x[12]; p12_12 = p[12, 12]; p12_13 = p[12, 13]; p12_14 = p[12, 14]; x13 = x[13]
-    p13_13 = p[13, 13]; p13_14 = p[13, 14]; x14 = x[14]; p14_14 = p[14, 14]; half = 0.5 * t; factor = 1.0 + inflation
-    x0 += turned[0] - t * x3 + half * x12; x12 = 0.0; x1 += turned[1] - t * x4 + half * x13; x13 = 0.0
-    x2 += turned[2] - t * x5 + half * x14; x14 = 0.0; d0_3 = half * p3_12 - t * p3_3; d0_4 = half * p4_12 - t * p3_4
-    d0_5 = half * p5_12 - t * p3_5; d0_6 = half * p6_12 - t * p3_6; d0_7 = half * p7_12 - t * p3_7
-    d0_8 = half * p8_12 - t * p3_8; d0_9 = half * p9_12 - t * p3_9; d0_10 = half * p10_12 - t * p3_10
-    d0_11 = half * p11_12 - t * p3_11; d0_12 = half * p12_12 - t * p3_12; d0_13 = half * p12_13 - t * p3_13
-    d0_14 = half * p12_14 - t * p3_14; d1_3 = half * p3_13 - t * p3_4; d1_4 = half * p4_13 - t * p4_4
-    d1_5 = half * p5_13 - t * p4_5; d1_6 = half * p6_13 - t * p4_6; d1_7 = half * p7_13 - t * p4_7
-    d1_8 = half * p8_13 - t * p4_8; d1_9 = half * p9_13 - t * p4_9; d1_10 = half * p10_13 - t * p4_10
-    d1_11 = half * p11_13 - t * p4_11; d1_13 = half * p13_13 - t * p4_13; d1_14 = half * p13_14 - t * p4_14
-    d2_3 = half * p3_14 - t * p3_5; d2_4 = half * p4_14 - t * p4_5; d2_5 = half * p5_14 - t * p5_5
-    d2_6 = half * p6_14 - t * p5_6; d2_7 = half * p7_14 - t * p5_7; d2_8 = half * p8_14 - t * p5_8
-    d2_9 = half * p9_14 - t * p5_9; d2_10 = half * p10_14 - t * p5_10; d2_11 = half * p11_14 - t * p5_11
-    d2_14 = half * p14_14 - t * p5_14; n0_0 = factor * noise[0, 0]
-    p0_0 += half * p0_12 - t * p0_3 + half * p0_12 - t * p0_3 + half * d0_12 - t * d0_3 + half * half * n0_0
-    n0_1 = factor * noise[0, 1]
-    p0_1 += half * p1_12 - t * p1_3 + half * p0_13 - t * p0_4 + half * d0_13 - t * d0_4 + half * half * n0_1
-    n0_2 = factor * noise[0, 2]
-    p0_2 += half * p2_12 - t * p2_3 + half * p0_14 - t * p0_5 + half * d0_14 - t * d0_5 + half * half * n0_2
-    n1_1 = factor * noise[1, 1]
-    p1_1 += half * p1_13 - t * p1_4 + half * p1_13 - t * p1_4 + half * d1_13 - t * d1_4 + half * half * n1_1
-    n1_2 = factor * noise[1, 2]
-    p1_2 += half * p2_13 - t * p2_4 + half * p1_14 - t * p1_5 + half * d1_14 - t * d1_5 + half * half * n1_2
-    n2_2 = factor * noise[2, 2]
-    p2_2 += half * p2_14 - t * p2_5 + half * p2_14 - t * p2_5 + half * d2_14 - t * d2_5 + half * half * n2_2
+    p13_13 = p[13, 13]; p13_14 = p[13, 14]; x14 = x[14]; p14_14 = p[14, 14]; half = 0.5 * t
+    carried = half * (1.0 - ringing); factor = 1.0 + inflation; renewed = factor * (1.0 + ringing) * (1.0 + ringing)
+    x0 += turned[0] - t * x3 + carried * x12; x12 *= -ringing; x1 += turned[1] - t * x4 + carried * x13
+    x13 *= -ringing; x2 += turned[2] - t * x5 + carried * x14; x14 *= -ringing; d0_3 = carried * p3_12 - t * p3_3
+    d0_4 = carried * p4_12 - t * p3_4; d0_5 = carried * p5_12 - t * p3_5; d0_6 = carried * p6_12 - t * p3_6
+    d0_7 = carried * p7_12 - t * p3_7; d0_8 = carried * p8_12 - t * p3_8; d0_9 = carried * p9_12 - t * p3_9
+    d0_10 = carried * p10_12 - t * p3_10; d0_11 = carried * p11_12 - t * p3_11; d0_12 = carried * p12_12 - t * p3_12
+    d0_13 = carried * p12_13 - t * p3_13; d0_14 = carried * p12_14 - t * p3_14; d1_3 = carried * p3_13 - t * p3_4
+    d1_4 = carried * p4_13 - t * p4_4; d1_5 = carried * p5_13 - t * p4_5; d1_6 = carried * p6_13 - t * p4_6
+    d1_7 = carried * p7_13 - t * p4_7; d1_8 = carried * p8_13 - t * p4_8; d1_9 = carried * p9_13 - t * p4_9
+    d1_10 = carried * p10_13 - t * p4_10; d1_11 = carried * p11_13 - t * p4_11; d1_12 = carried * p12_13 - t * p4_12
+    d1_13 = carried * p13_13 - t * p4_13; d1_14 = carried * p13_14 - t * p4_14; d2_3 = carried * p3_14 - t * p3_5
+    d2_4 = carried * p4_14 - t * p4_5; d2_5 = carried * p5_14 - t * p5_5; d2_6 = carried * p6_14 - t * p5_6
+    d2_7 = carried * p7_14 - t * p5_7; d2_8 = carried * p8_14 - t * p5_8; d2_9 = carried * p9_14 - t * p5_9
+    d2_10 = carried * p10_14 - t * p5_10; d2_11 = carried * p11_14 - t * p5_11; d2_12 = carried * p12_14 - t * p5_12
+    d2_13 = carried * p13_14 - t * p5_13; d2_14 = carried * p14_14 - t * p5_14; n0_0 = renewed * noise[0, 0]
+    p0_0 += carried * p0_12 - t * p0_3 + carried * p0_12 - t * p0_3 + carried * d0_12 - t * d0_3 + half * half * n0_0
+    n0_1 = renewed * noise[0, 1]
+    p0_1 += carried * p1_12 - t * p1_3 + carried * p0_13 - t * p0_4 + carried * d0_13 - t * d0_4 + half * half * n0_1
+    n0_2 = renewed * noise[0, 2]
+    p0_2 += carried * p2_12 - t * p2_3 + carried * p0_14 - t * p0_5 + carried * d0_14 - t * d0_5 + half * half * n0_2
+    n1_1 = renewed * noise[1, 1]
+    p1_1 += carried * p1_13 - t * p1_4 + carried * p1_13 - t * p1_4 + carried * d1_13 - t * d1_4 + half * half * n1_1
+    n1_2 = renewed * noise[1, 2]
+    p1_2 += carried * p2_13 - t * p2_4 + carried * p1_14 - t * p1_5 + carried * d1_14 - t * d1_5 + half * half * n1_2
+    n2_2 = renewed * noise[2, 2]
+    p2_2 += carried * p2_14 - t * p2_5 + carried * p2_14 - t * p2_5 + carried * d2_14 - t * d2_5 + half * half * n2_2
     p0_3 += d0_3; p0_4 += d0_4; p0_5 += d0_5; p0_6 += d0_6; p0_7 += d0_7; p0_8 += d0_8; p0_9 += d0_9; p0_10 += d0_10
     p0_11 += d0_11; p1_3 += d1_3; p1_4 += d1_4; p1_5 += d1_5; p1_6 += d1_6; p1_7 += d1_7; p1_8 += d1_8; p1_9 += d1_9
     p1_10 += d1_10; p1_11 += d1_11; p2_3 += d2_3; p2_4 += d2_4; p2_5 += d2_5; p2_6 += d2_6; p2_7 += d2_7; p2_8 += d2_8
-    p2_9 += d2_9; p2_10 += d2_10; p2_11 += d2_11; p0_12 = half * n0_0; p0_13 = half * n0_1; p0_14 = half * n0_2
-    p12_12 = n0_0; p12_13 = n0_1; p12_14 = n0_2; p3_12 = 0.0; p4_12 = 0.0; p5_12 = 0.0; p6_12 = 0.0; p7_12 = 0.0
-    p8_12 = 0.0; p9_12 = 0.0; p10_12 = 0.0; p11_12 = 0.0; p1_12 = half * n0_1; p1_13 = half * n1_1
-    p1_14 = half * n1_2; p13_13 = n1_1; p13_14 = n1_2; p3_13 = 0.0; p4_13 = 0.0; p5_13 = 0.0; p6_13 = 0.0; p7_13 = 0.0
-    p8_13 = 0.0; p9_13 = 0.0; p10_13 = 0.0; p11_13 = 0.0; p2_12 = half * n0_2; p2_13 = half * n1_2
-    p2_14 = half * n2_2; p14_14 = n2_2; p3_14 = 0.0; p4_14 = 0.0; p5_14 = 0.0; p6_14 = 0.0; p7_14 = 0.0; p8_14 = 0.0
-    p9_14 = 0.0; p10_14 = 0.0; p11_14 = 0.0; h0_0 = 2.0 * x0 * m[0, 0] + x1 * m[0, 3] + x2 * m[0, 4]
+    p2_9 += d2_9; p2_10 += d2_10; p2_11 += d2_11; p0_12 = half * n0_0 - ringing * (p0_12 + d0_12)
+    p0_13 = half * n0_1 - ringing * (p0_13 + d0_13); p0_14 = half * n0_2 - ringing * (p0_14 + d0_14)
+    p3_12 *= -ringing; p4_12 *= -ringing; p5_12 *= -ringing; p6_12 *= -ringing; p7_12 *= -ringing; p8_12 *= -ringing
+    p9_12 *= -ringing; p10_12 *= -ringing; p11_12 *= -ringing; p1_12 = half * n0_1 - ringing * (p1_12 + d1_12)
+    p1_13 = half * n1_1 - ringing * (p1_13 + d1_13); p1_14 = half * n1_2 - ringing * (p1_14 + d1_14)
+    p3_13 *= -ringing; p4_13 *= -ringing; p5_13 *= -ringing; p6_13 *= -ringing; p7_13 *= -ringing; p8_13 *= -ringing
+    p9_13 *= -ringing; p10_13 *= -ringing; p11_13 *= -ringing; p2_12 = half * n0_2 - ringing * (p2_12 + d2_12)
+    p2_13 = half * n1_2 - ringing * (p2_13 + d2_13); p2_14 = half * n2_2 - ringing * (p2_14 + d2_14)
+    p3_14 *= -ringing; p4_14 *= -ringing; p5_14 *= -ringing; p6_14 *= -ringing; p7_14 *= -ringing; p8_14 *= -ringing
+    p9_14 *= -ringing; p10_14 *= -ringing; p11_14 *= -ringing; p12_12 = n0_0 + ringing * ringing * p12_12
+    p12_13 = n0_1 + ringing * ringing * p12_13; p12_14 = n0_2 + ringing * ringing * p12_14
+    p13_13 = n1_1 + ringing * ringing * p13_13; p13_14 = n1_2 + ringing * ringing * p13_14
+    p14_14 = n2_2 + ringing * ringing * p14_14; h0_0 = 2.0 * x0 * m[0, 0] + x1 * m[0, 3] + x2 * m[0, 4]
     h0_1 = 2.0 * x1 * m[0, 1] + x0 * m[0, 3] + x2 * m[0, 5]; h0_2 = 2.0 * x2 * m[0, 2] + x0 * m[0, 4] + x1 * m[0, 5]
     e0 = z[k, 0] - 0.5 * (h0_0 * x0 + h0_1 * x1 + h0_2 * x2) - x6; v0 = factor
     h1_0 = 2.0 * x0 * m[1, 0] + x1 * m[1, 3] + x2 * m[1, 4]; h1_1 = 2.0 * x1 * m[1, 1] + x0 * m[1, 3] + x2 * m[1, 5]

@@ -18,6 +18,7 @@ __all__ = ["angle_plot", "drift_plot", "free_rate_plots", "motion_plots", "raw_p
 
 _NAMES = ("x", "y", "z")
 _BOTH_SIDES = 2 * np.array([-1.0, 1.0])  # ±2σ
+_SHOWN = 0.9  # of the errors and their band
 
 
 def raw_plots(t: NDArray[np.float64], readings: NDArray[np.float64], array: AccelerometerArray) -> list[Plot]:
@@ -58,7 +59,8 @@ def table_rate_plots(recording: Recording, estimate: MotionEstimate | None, know
         spread = np.sqrt(estimate.omega_std**2 @ axis**2)[:, None] * _BOTH_SIDES
         lines.insert(0, Line("±2σ", estimate.t_s, rate[:, None] + spread, ESTIMATE_BAND, 1.0))
         lines.append(Line("estimate", estimate.t_s, rate, ESTIMATE))
-    plots = [Plot("angular rate about the table's axis, rad/s", lines)] if lines else []
+    span = None if estimate is None else _span(rate, 1.0, margin=1.2)
+    plots = [Plot("angular rate about the table's axis, rad/s", lines, span=span)] if lines else []
     if estimate is not None and compared is not None:
         name, reference_t, reference = compared
         error = rate - np.interp(estimate.t_s, reference_t, reference)
@@ -69,6 +71,7 @@ def table_rate_plots(recording: Recording, estimate: MotionEstimate | None, know
                     Line("±2σ", estimate.t_s, spread, ESTIMATE_BAND, 1.5),
                     Line(f"estimate − {name}", estimate.t_s, error, ESTIMATE, 1.2),
                 ],
+                span=_span(np.abs(np.concatenate([spread[:, 1], error])), _SHOWN, margin=2.0, even=True),
             )
         )
     return plots
@@ -89,8 +92,11 @@ def free_rate_plots(recording: Recording, estimate: MotionEstimate | None, known
             errors.append(Line(f"{name}, estimate − {reference[0]}", estimate.t_s, error, colour, 1.2))
     plots = [Plot("angular rate ω, rad/s", lines)] if lines else []
     if estimate is not None and errors:
-        band = Line("±2σ", estimate.t_s, estimate.omega_std.max(axis=1)[:, None] * _BOTH_SIDES, ESTIMATE_BAND)
-        plots.append(Plot("error of the rate, rad/s", [band, *errors]))
+        edges = estimate.omega_std.max(axis=1)[:, None] * _BOTH_SIDES
+        band = Line("±2σ", estimate.t_s, edges, ESTIMATE_BAND)
+        sizes = np.abs(np.concatenate([edges[:, 1], *(line.values for line in errors)]))
+        span = _span(sizes, _SHOWN, margin=2.0, even=True)
+        plots.append(Plot("error of the rate, rad/s", [band, *errors], span=span))
     return plots
 
 
@@ -136,6 +142,20 @@ def drift_plot(drift: ExpectedDrift) -> Plot:
         "position drift, m",
         [band, *[Line(f"error {name}", drift.t, drift.error[:, axis], AXES[axis]) for axis, name in enumerate(_NAMES)]],
     )
+
+
+def _span(
+    values: NDArray[np.float64], share: float, *, margin: float, even: bool = False
+) -> tuple[float, float] | None:
+    """Range that shows a share of the values with a margin; bands can be wide beyond measure where ω is unknown."""
+    known = values[np.isfinite(values)]
+    if not len(known):
+        return None
+    high, low = float(np.quantile(known, share)), float(np.quantile(known, 1.0 - share))
+    if even:
+        low = -high
+    centre, half = 0.5 * (low + high), 0.5 * margin * (high - low)
+    return (centre - half, centre + half) if half > 0 else None
 
 
 def _rate_reference(

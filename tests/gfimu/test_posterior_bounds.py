@@ -59,12 +59,16 @@ def test_steady_turning_exactly(step):
         assert bound[-1, axis, axis] == pytest.approx(filtered[0, 0], rel=1e-6)
 
 
-def test_smoother_equals_the_inverse_of_the_whole_information():
-    """A short run in one matrix: states and noises of all samples at once."""
+@pytest.mark.parametrize("noise", [NOISE, np.tile([0.02, 0.02, 0.05], 4)], ids=["equal", "unequal"])
+def test_smoother_equals_the_inverse_of_the_whole_information(noise):
+    """A short run in one matrix: states and noises of all samples at once.
+
+    With unequal noise of the axes those of α and of the null space are correlated.
+    """
     n, period, bias = 6, 0.02, 0.05
     rates = np.array([[0.3, 1.0, 2.0]]) * np.linspace(1, 1.5, n)[:, None]
     t = np.arange(n) * period
-    errors = SensorErrors.uniform(CUBE, NOISE, bias)
+    errors = SensorErrors.uniform(CUBE, noise, bias)
     bound = posterior_rate_bound(CUBE, t, rates, errors, start_std=0.5, smoother=True)
     from gfimu.bounds import omega_products_jacobian
     from gfimu.rate.sensing import ChannelTables
@@ -75,9 +79,8 @@ def test_smoother_equals_the_inverse_of_the_whole_information():
     information = np.zeros((size, size))
     information[:3, :3] = np.eye(3) / 0.5**2
     information[3:12, 3:12] = np.linalg.inv(tables.bias_covariance(errors.bias_std))
-    for k in range(n):
-        place = slice(12 + 3 * k, 15 + 3 * k)
-        information[place, place] = np.linalg.inv(tables.alpha_noise[0])
+    rows = np.vstack([tables.alpha_rows[0], tables.null_rows[0]])
+    both = np.linalg.inv(rows * errors.noise_std**2 @ rows.T)
     maps = []
     current = np.zeros((3, size))
     current[:, :3] = np.eye(3)
@@ -90,7 +93,8 @@ def test_smoother_equals_the_inverse_of_the_whole_information():
         maps.append(current)
         h = tables.null_sensitivity[0] @ omega_products_jacobian(rates[k]) @ current
         h[:, 6:12] += np.eye(6)
-        information += h.T @ h
+        h = np.vstack([np.eye(3, size, 12 + 3 * k), h])  # the noise of α, −ε, and that of the null space
+        information += h.T @ both @ h
     covariance = np.linalg.inv(information)
     for k in range(n):
         np.testing.assert_allclose(bound[k], maps[k] @ covariance @ maps[k].T, rtol=1e-6)

@@ -37,6 +37,7 @@ def reference_filter(array, t, readings, errors, *, start_std=1e-3, keep=False):
     n = 9 + d
     alpha, z = readings @ tables.alpha_rows[0].T, readings @ rows.T
     weights = centred_weights()
+    ringing = 2 * np.sum(weights[2] ** 2) - 1
     forms = [
         np.array([[m[0], m[3] / 2, m[4] / 2], [m[3] / 2, m[1], m[5] / 2], [m[4] / 2, m[5] / 2, m[2]]])
         for m in sensitivity
@@ -49,15 +50,17 @@ def reference_filter(array, t, readings, errors, *, start_std=1e-3, keep=False):
     for k in range(len(t)):
         half = period / 2 if k else 0.0
         f = np.eye(n)
-        f[-3:, -3:] = 0
-        g = np.vstack([half * np.eye(3), np.zeros((n - 6, 3)), np.eye(3)])
+        f[-3:, -3:] = -ringing * np.eye(3)
+        g = (1 + ringing) * np.vstack([half * np.eye(3), np.zeros((n - 6, 3)), np.eye(3)])
         if k:
             f[:3, 3:6] = -period * np.eye(3)
-            f[:3, -3:] = half * np.eye(3)
+            f[:3, -3:] = half * (1 - ringing) * np.eye(3)
             first = min(max(k - 3, 0), len(t) - 6)
             x = f @ x
             x[:3] += period * weights[k - 1 - first] @ alpha[first : first + 6]
             p = f @ p @ f.T
+        else:
+            g /= np.sqrt(1 - ringing**2)
         p = p + g @ noise @ g.T
         predicted = (x.copy(), p.copy())
         omega, spread = x[:3].copy(), p[:3, :3]

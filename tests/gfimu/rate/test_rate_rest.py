@@ -11,7 +11,9 @@ from rate_worlds import GRAVITY, Motion, cube, measure, sensor_errors, smooth_st
 from gfimu.errors import InputError
 from gfimu.rate.filter import filter_rate
 from gfimu.rate.kalman import FilterSettings
+from gfimu.rate.live import LiveRateFilter
 from gfimu.rate.rest_test import RestTest, constant_readings
+from gfimu.rate.smoother import smooth_rate
 
 ARRAY = cube(0.1)
 RATE = 100.0
@@ -64,6 +66,49 @@ def test_rest_begins_again_after_a_motion():
     assert np.abs(found.omega[t > 18]).max() < 0.06
 
 
+def test_a_departure_too_slow_for_one_block_is_taken_back():
+    """0.1 rev/s reached within 3 s: a second after the start the rate is 0.12 rad/s and its α not yet significant."""
+    array = cube()
+    motion = turntable(RATE, 2 * np.pi * 0.1, duration=6.0)
+    errors = sensor_errors(array, RATE)
+    moving = (motion.t > 2.6) & (motion.t < 2.99)
+    believed, kept, squares = 0, 0, []
+    for seed in range(20):
+        values = measure(array, motion, np.random.default_rng([5, seed]))
+        found = filter_rate(array, motion.t, values, errors)
+        believed += found.rest[moving].any()
+        kept += smooth_rate(array, motion.t, values, errors).rest[moving].any()
+        squares.append(((found.omega - motion.omega) / found.std)[350:])
+    assert believed > 5
+    assert kept == 0
+    # 20 runs with 3 axes, each about one independent error: three standard deviations of the mean square.
+    assert np.mean(np.square(squares)) < 1 + 3 * np.sqrt(2 / 60)
+
+
+def test_taking_back_is_the_same_live_and_in_blocks():
+    array = cube()
+    motion = turntable(RATE, 2 * np.pi * 0.1, duration=6.0)
+    values = measure(array, motion, np.random.default_rng([5, 0]))
+    whole, live = (LiveRateFilter(array, sensor_errors(array, RATE), 1 / RATE) for _ in range(2))
+    block = [whole.push(motion.t, values), whole.finish()]
+    single = [live.push(time, row) for time, row in zip(motion.t, values, strict=True)] + [live.finish()]
+    for name in ("omega", "covariance"):
+        one, other = (np.concatenate([getattr(part, name) for part in parts]) for parts in (block, single))
+        np.testing.assert_allclose(other, one, rtol=0, atol=1e-12)
+    std = np.concatenate([part.std for part in block]).max(axis=1)
+    assert (std[1:] / std[:-1])[200:400].max() > 1.5  # the uncertainty of the blocks taken back
+
+
+def test_rest_resumes_soon_after_a_single_block_that_was_none():
+    motion = still(15.0)
+    values = measure(ARRAY, motion, np.random.default_rng(3))
+    values[500:550] += 0.2 * np.sin(np.arange(50.0))[:, None]  # a knock on the table: no turning
+    found = filter_rate(ARRAY, motion.t, values, sensor_errors(ARRAY, RATE))
+    assert found.rest[450:500].all()
+    assert not found.rest[500:600].any()
+    assert found.rest[710:].mean() > 0.9
+
+
 def test_steady_turning_about_the_vertical_is_not_rest():
     """Its readings are as constant as those of rest."""
     motion = turntable(RATE, 2 * np.pi * 0.3, duration=12.0)
@@ -81,7 +126,7 @@ def test_a_start_at_rest_that_is_none_leaves_the_sign_in_doubt():
     assert found.sign.state == "undecided"
 
 
-@pytest.mark.parametrize("field", ["false_alarm", "window_s", "rate_std", "entry_s"])
+@pytest.mark.parametrize("field", ["false_alarm", "window_s", "rate_std", "entry_s", "retry_s"])
 def test_settings_are_checked(field):
     with pytest.raises(InputError, match=field):
         replace(RestTest(), **{field: -1.0})
