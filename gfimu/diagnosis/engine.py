@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
 from gfimu.diagnosis.causes import Cause, effects_of_run
@@ -17,7 +18,7 @@ from gfimu.diagnosis.refinement import Fit, refine
 from gfimu.diagnosis.run import Run
 from gfimu.diagnosis.search import search
 from gfimu.diagnosis.segment import Segment, difference_noise
-from gfimu.diagnosis.signatures import SignatureSet, hypotheses, plan_signatures, signature_columns
+from gfimu.diagnosis.signatures import Hypothesis, SignatureSet, hypotheses, plan_signatures, signature_columns
 
 __all__ = ["Explanation", "explain", "make_segments", "screen"]
 
@@ -37,6 +38,7 @@ LEAST_ODDS = 9.0
 LEAST_EXTRA_ODDS = 7.0
 """Log odds that a further cause needs against the set without it."""
 _ITERATIONS = 7
+_FEW_ITERATIONS = 3
 _STEADY_NOISE = 0.1
 _LEAST_VALID = 0.01
 
@@ -239,6 +241,12 @@ def explain(
                 # Ripples locked to the angle lose their phase where the drive's angle has drifted.
                 other = refine(segments, causes, fixed, drives=fitted.drives, iterations=_ITERATIONS)
                 fits[key] = max(fits[key], other, key=_posterior)
+        if round_number == 0 and min(fit.objective for fit in fits.values()) > _FAIR_FIT * observations:
+            for hypothesis in signatures.hypotheses:
+                if hypothesis.family.starts:
+                    tell(0.1, f"large sizes of {hypothesis.name}")
+                    large = _from_far(segments, hypothesis, fixed, best.drives)
+                    fits[large.key] = max(fits.get(large.key, large), large, key=_posterior)
         tried |= fits
         winner = max(fits.values(), key=lambda fit: fit.log_posterior)
         settled = winner.key == best.key
@@ -277,6 +285,21 @@ def explain(
         tuple(tuple(known) for known in fixed),
         screen(segments, best, fixed, runs),
     )
+
+
+def _from_far(
+    segments: Sequence[Segment],
+    hypothesis: Hypothesis,
+    fixed: Sequence[Sequence[Effect]],
+    drives: Sequence[NDArray[np.float64]],
+) -> Fit:
+    """Fit one effect from several large sizes, as its signature at nothing says little about them."""
+    fits = [
+        refine(segments, [hypothesis.cause(np.array([start]))], fixed, drives=drives, iterations=_FEW_ITERATIONS)
+        for start in hypothesis.family.starts
+    ]
+    best = max(fits, key=_posterior)
+    return refine(segments, best.causes, fixed, drives=best.drives, iterations=2 * _ITERATIONS)
 
 
 def prune(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]]) -> tuple[Fit, dict[str, Fit]]:

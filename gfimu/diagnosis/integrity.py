@@ -144,6 +144,8 @@ def _clipping(run: Run, prediction: NDArray[np.float64], quantum: float, expecte
         sigma = expected.white[channel]
         for sign in (1.0, -1.0):
             top = float((sign * mine).max())
+            if top <= 0.0:
+                continue  # the other sign's extreme
             at_top = np.abs(sign * mine - top) < 0.3 * quantum
             below = np.abs(sign * mine - (top - quantum)) < 0.3 * quantum
             beyond = sign * prediction[run.valid[:, channel], channel] > top + 1.5 * sigma

@@ -88,6 +88,8 @@ class EffectFamily(Protocol):
     def separated_by(self) -> str: ...  # noqa: D102
     @property
     def per_run(self) -> bool: ...  # noqa: D102
+    @property
+    def starts(self) -> tuple[float, ...]: ...  # noqa: D102
 
     def __call__(self, parameters: Mapping[str, Any]) -> Effect:
         """Build an effect from its contract parameters."""

@@ -63,6 +63,11 @@ class Hypothesis:
     positive: NDArray[np.bool_]
 
     @property
+    def family(self) -> EffectFamily:
+        """The kind of effect."""
+        return self.signature.family
+
+    @property
     def name(self) -> str:
         """Contract name of the effect."""
         return str(self.signature.family.name)

@@ -75,6 +75,9 @@ class Effect(ABC):
     per_run: ClassVar[bool] = False
     """True where another mounting or another day has its own value."""
 
+    starts: ClassVar[tuple[float, ...]] = ()
+    """Values in units of the prior to start from where a large size is far from linear; none by default."""
+
     def __init__(self, parameters: Mapping[str, Any]) -> None:
         self.parameters: dict[str, Any] = dict(parameters)
 

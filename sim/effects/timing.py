@@ -20,6 +20,7 @@ class ChannelSkew(Effect):
     summary = "chips are sampled one after another, not together"
     place = "timing"
     separated_by = "fast changes of the rate"
+    starts = (-200.0, -80.0, -30.0, -10.0, 10.0, 30.0, 80.0, 200.0)
 
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
@@ -39,6 +40,7 @@ class ClockError(Effect):
     summary = "the board's clock runs fast or slow against the reference's"
     place = "timing"
     separated_by = "a longer run with fast changes of the rate at its end"
+    starts = (-20.0, -8.0, -3.0, 3.0, 8.0, 20.0)
 
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
@@ -57,6 +59,7 @@ class TachoLatency(Effect):
     summary = "the reference is late"
     place = "reference"
     separated_by = "a fast chirp of the rate"
+    starts = (3.0, 10.0, 30.0)
 
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:

@@ -19,6 +19,7 @@ from gfimu.recording import Recording
 from gfimu.units import STANDARD_GRAVITY
 from sim.campaign import Measurement, detectability, hidden_effect, measure, random_profile
 from sim.effects import Effect, make_effect
+from sim.motion import SpinMotion
 from sim.study.cases import Case
 from sim.twin import Twin
 
@@ -26,6 +27,7 @@ __all__ = ["HiddenWorld", "draw_world", "outcome_of", "run_case"]
 
 _MG = STANDARD_GRAVITY / 1000.0
 _TURN = 2 * np.pi
+_CLIPPED_ABOVE = 1.05
 _WITHOUT_NOISE_FREE_FORM = frozenset(
     {"noise", "bias_random_walk", "coarse_resolution", "stuck_channel", "dropped_frames"}
 )
@@ -87,6 +89,8 @@ def draw_world(case: Case, source: str = "") -> HiddenWorld:
     rng = np.random.default_rng(case.seed)
     setting = Measurement(case.duration, case.sample_rate, case.bias_instability_mg * _MG, case.tacho_noise)
     motion = random_profile(rng, case.duration)
+    while "saturation" in case.effects and not _reaches(twin, motion, setting, _CLIPPED_ABOVE * twin.gravity):
+        motion = random_profile(rng, case.duration)
     hidden = [hidden_effect(rng, twin, name, motion, case.size, setting) for name in case.effects]
     residue = calibration_residue(rng, twin.array) if case.residue else []
     recording = measure(rng, twin, [*residue, *hidden], setting, motion=motion)
@@ -97,6 +101,12 @@ def draw_world(case: Case, source: str = "") -> HiddenWorld:
     ]
     truth = tuple((effect.name, effect.parameters) for effect in hidden)
     return HiddenWorld(recording, twin, truth, min(sizes, default=np.inf))
+
+
+def _reaches(twin: Twin, motion: SpinMotion, setting: Measurement, level: float) -> bool:
+    """Tell whether readings go beyond a level, m/s², often enough for clipping there to be seen."""
+    t = np.arange(round(setting.duration * setting.sample_rate)) / setting.sample_rate
+    return bool(np.quantile(np.abs(twin.predict(motion, t)[0]), 0.9) > level)
 
 
 def _foreign_world(case: Case, twin: Twin, source: str) -> HiddenWorld:
