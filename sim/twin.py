@@ -212,10 +212,6 @@ class Twin:
         """Return the time constant of the sensing chain's first-order lag, s."""
         return float(sum(e.value("time_constant_s") for e in (*self.effects, *effects) if e.name == "sensor_lag"))
 
-    def mount_modes(self, effects: Sequence[Any] = ()) -> list[tuple[float, float, float]]:
-        """Return gain, natural frequency (rad/s) and damping ratio of each torsional mode of the mounting."""
-        return [effect.mode for effect in (*self.effects, *effects) if effect.name == "resonance"]
-
     def expected_noise(self, sample_rate: float) -> ExpectedNoise:
         """Return white noise and quantisation of the part at a sample rate, as the data sheet has them."""
         part = read_toml(find_model("parts", self.part))

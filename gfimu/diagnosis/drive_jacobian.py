@@ -13,7 +13,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 from scipy.sparse import csr_array, diags_array, vstack
 
 from gfimu.diagnosis.drive import AngleSpline
@@ -21,7 +20,6 @@ from gfimu.diagnosis.drive import AngleSpline
 __all__ = ["DriveJacobian"]
 
 _LEAST_SHARE = 1e-14
-_LEAST_RESPONSE = 0.01
 _Delay = Callable[[csr_array], csr_array]
 
 
@@ -65,8 +63,7 @@ class DriveJacobian:
         weights : ndarray, shape (c + 1,)
             One over the variance of each observation; the factors are orthonormal under it.
         delay : callable, optional
-            Applies the lag of the sensing chain and the modes of the mounting to a matrix (n, m); the reference has
-            none.
+            Applies the sensing chain's lag to a matrix (n, m); the reference has none.
         """
         groups: dict[tuple[bytes, bool], list[int]] = {}
         for column, chip in enumerate(chips):
@@ -150,34 +147,6 @@ class DriveJacobian:
     def observations(self) -> int:
         """Number of observations, the reference included."""
         return int(self.loading.shape[1])
-
-
-def mode_matrix(n: int, period: float, gain: float, natural: float, damping: float) -> csr_array:
-    """Return what a body on a torsion spring makes of its base's motion, as a matrix (n, n) on the samples.
-
-    1 − gain · s²/(s² + 2ζω₀s + ω₀²) by the bilinear transform with ω₀ pre-warped; a response below a hundredth of the
-    gain is cut off.
-
-    Parameters
-    ----------
-    n : int
-        Number of samples.
-    period : float
-        Sample period, s.
-    gain, natural, damping : float
-        Share of the body, ω₀ in rad/s and ζ.
-    """
-    warped = np.tan(min(0.5 * natural * period, 0.45 * np.pi))
-    numerator = np.array([1.0, -2.0, 1.0])
-    denominator = np.array(
-        [1.0 + 2 * damping * warped + warped**2, 2.0 * (warped**2 - 1.0), 1.0 - 2 * damping * warped + warped**2]
-    )
-    decay = max(damping * natural * period, 1e-6)
-    length = int(min(np.ceil(np.log(1.0 / _LEAST_RESPONSE) / decay) + 3, n))
-    impulse = np.zeros(length)
-    impulse[0] = 1.0
-    response = impulse - gain * lfilter(numerator, denominator, impulse)
-    return csr_array(diags_array(list(response), offsets=[-k for k in range(length)], shape=(n, n)))
 
 
 def lag_matrix(n: int, samples: float) -> csr_array:

@@ -184,10 +184,6 @@ class WorldModel(Protocol):
         """Return the time constant of the sensing chain's first-order lag, s; zero where it has none."""
         ...
 
-    def mount_modes(self, effects: Sequence[Effect] = ()) -> list[tuple[float, float, float]]:
-        """Return gain, natural frequency (rad/s) and damping ratio of each torsional mode of the mounting."""
-        ...
-
     def expected_noise(self, sample_rate: float) -> ExpectedNoise:
         """Return the noise it expects at a sample rate."""
         ...

@@ -21,7 +21,7 @@ from scipy.sparse import csr_array, diags_array
 
 from gfimu.diagnosis.coloured_noise import CosineBasis, NoiseLevels
 from gfimu.diagnosis.drive import ROUGHNESS_FACTOR, AngleSpline, SplineState, roughness_prior
-from gfimu.diagnosis.drive_jacobian import DriveJacobian, lag_matrix, mode_matrix
+from gfimu.diagnosis.drive_jacobian import DriveJacobian, lag_matrix
 from gfimu.diagnosis.model import Effect, Spin, SpinState, WorldModel
 from gfimu.diagnosis.rounding import COARSE, rounded_likelihood, rounding_noise
 from gfimu.diagnosis.run import Run
@@ -32,7 +32,6 @@ KNOT_SPACING = 0.05
 TIME_MARGIN = 0.5
 _DEGREE = 4
 _KNOWN_ANGLE_STD = 5e-3
-_LEAST_GAIN = 1e-4
 _STATE_STEPS = (1e-5, 1e-4, 1e-3)
 
 
@@ -301,23 +300,16 @@ class Segment:
             moved = self.predict(effects, _Moved(spin, place, step))
             slopes[place] = (moved - base) / step * self.row_weight
         times = self.model.sample_times(self.run.t, effects)
-        responses = self._responses(effects)
+        lag = self.model.sensing_lag(effects)
+        delay = None
+        if lag > 0:
+            matrix = lag_matrix(len(times), lag / self.run.sample_period)
 
-        def respond(part: csr_array) -> csr_array:
-            for response in responses:
-                part = csr_array(response @ part)
-            return part
+            def delay(part: csr_array) -> csr_array:
+                return csr_array(matrix @ part)
 
         chips = np.append(self.model.array.chip_of_channel, times.shape[1] - 1)
-        return DriveJacobian.build(self.spline, slopes, times, chips, self.inverse_variance, respond)
-
-    def _responses(self, effects: Sequence[Effect]) -> list[csr_array]:
-        """Return what follows the motion with a memory of its own, as matrices on the samples."""
-        n, period = len(self.run.t), self.run.sample_period
-        modes = self.model.mount_modes(effects)
-        found = [mode_matrix(n, period, *mode) for mode in modes if abs(mode[0]) > _LEAST_GAIN]
-        lag = self.model.sensing_lag(effects)
-        return [*found, lag_matrix(n, lag / period)] if lag > 0 else found
+        return DriveJacobian.build(self.spline, slopes, times, chips, self.inverse_variance, delay)
 
     def whitened_products(
         self, linear: Linearisation, signatures: NDArray[np.float64]

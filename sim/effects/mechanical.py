@@ -299,14 +299,9 @@ class Resonance(Effect):
         frequencies = np.geomspace(2.0, max(top, 2.5), 16)
         return tuple({"frequency_hz": float(f), "damping_ratio": zeta} for f in frequencies for zeta in (0.02, 0.1))
 
-    @property
-    def mode(self) -> tuple[float, float, float]:
-        """Gain, natural frequency (rad/s) and damping ratio."""
-        return self.value("gain"), 2 * np.pi * self.value("frequency_hz", 10.0), self.value("damping_ratio", 0.03)
-
     def apply(self, world: World) -> World:
         """Let the cube twist."""
-        mode = self.mode
+        mode = (self.value("gain"), 2 * np.pi * self.value("frequency_hz", 10.0), self.value("damping_ratio", 0.03))
 
         def step(motion: SpinMotion, t: NDArray[np.float64]) -> SpinMotion:
             return TwistingSpin(motion, t, *mode)
