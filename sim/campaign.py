@@ -188,8 +188,6 @@ def hidden_effect(
     direction = pattern.mixing @ rng.standard_normal(pattern.mixing.shape[1])
     direction = direction * np.array([size.prior_std for size in sizes])
     direction = np.where([size.positive for size in sizes], np.abs(direction), direction)
-    if name == "resonance":
-        direction = np.array([abs(direction[0]), 0.0])
     scale = 1.0
     for _ in range(8):
         reached = detectability(twin, [family.from_sizes(twin.array, scale * direction, shape)], motion, setting)

@@ -27,7 +27,7 @@ __all__ = ["HiddenWorld", "draw_world", "outcome_of", "run_case"]
 
 _MG = STANDARD_GRAVITY / 1000.0
 _TURN = 2 * np.pi
-_CLIPPED_ABOVE = 1.05
+_CLIPPED_ABOVE = 1.15
 _WITHOUT_NOISE_FREE_FORM = frozenset(
     {"noise", "bias_random_walk", "coarse_resolution", "stuck_channel", "dropped_frames"}
 )
