@@ -223,7 +223,7 @@ def _shape(rng: np.random.Generator, name: str, setting: Measurement) -> dict[st
 
 
 def _saturation(rng, twin, magnitude, setting) -> dict[str, object]:  # type: ignore[no-untyped-def]
-    top = float(np.quantile(magnitude, rng.uniform(0.9, 0.997)))
+    top = float(np.quantile(magnitude, rng.uniform(0.9, 0.985)))
     return {"limit_m_s2": max(top, 1.05 * twin.gravity)}
 
 

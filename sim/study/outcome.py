@@ -27,7 +27,8 @@ __all__ = ["HiddenWorld", "draw_world", "outcome_of", "run_case"]
 
 _MG = STANDARD_GRAVITY / 1000.0
 _TURN = 2 * np.pi
-_CLIPPED_ABOVE = 1.15
+_CLIPPED_ABOVE = 1.07
+_FASTEST_SHARE = 0.02
 _WITHOUT_NOISE_FREE_FORM = frozenset(
     {"noise", "bias_random_walk", "coarse_resolution", "stuck_channel", "dropped_frames"}
 )
@@ -106,7 +107,7 @@ def draw_world(case: Case, source: str = "") -> HiddenWorld:
 def _reaches(twin: Twin, motion: SpinMotion, setting: Measurement, level: float) -> bool:
     """Tell whether readings go beyond a level, m/s², often enough for clipping there to be seen."""
     t = np.arange(round(setting.duration * setting.sample_rate)) / setting.sample_rate
-    return bool(np.quantile(np.abs(twin.predict(motion, t)[0]), 0.9) > level)
+    return bool(np.quantile(np.abs(twin.predict(motion, t)[0]), 1.0 - _FASTEST_SHARE) > level)
 
 
 def _foreign_world(case: Case, twin: Twin, source: str) -> HiddenWorld:
