@@ -184,7 +184,7 @@ def _verdict(
         verdict, causes = "unknown", tuple(found)
     elif rivals:
         verdict = "ambiguous"
-        causes = (*found, *_contested(explanation, named, rivals, likely, segments[0]))
+        causes = (*found, *_contested(explanation, named, likely, segments[0]))
     else:
         verdict = "explained" if causes else "nothing_found"
     unexplained = Unexplained(
@@ -233,7 +233,6 @@ def _named(explanation: Explanation, cause: Cause, likely: dict[str, float], seg
 def _contested(
     explanation: Explanation,
     named: Sequence[NamedCause],
-    rivals: Sequence[object],
     likely: dict[str, float],
     segment: BodySegment,
 ) -> list[NamedCause]:

@@ -21,6 +21,7 @@ __all__ = ["BodyNoise", "Projection", "change_of_readings", "learn_motion_noise"
 _AGITATION_GRID = np.concatenate([[0.0], np.geomspace(2e-5, 2e-2, 31)])
 _SLOPE_GRID = np.concatenate([[0.0], np.geomspace(1e-3, 3.0, 22)])
 _FLOOR_GRID = np.concatenate([[0.0], np.geomspace(1e-2, 3e2, 19)])
+_RATIO_SPREAD, _MODEL_ERROR = 0.5, 0.02
 _WORTH = 30.0
 _QUIET = 0.34
 _FEWEST_QUIET = 200
@@ -101,11 +102,16 @@ def change_of_readings(readings: NDArray[np.float64], period: float, white: NDAr
 
 
 def white_from_rows(
-    projected: NDArray[np.float64], projector: NDArray[np.float64], change: NDArray[np.float64], use: NDArray[np.bool_]
+    projected: NDArray[np.float64],
+    projector: NDArray[np.float64],
+    change: NDArray[np.float64],
+    use: NDArray[np.bool_],
+    expected: NDArray[np.float64],
 ) -> NDArray[np.float64]:
     """White noise of each channel from residuals r = P e of the quiet samples, shape (c,), m/s².
 
-    With independent channels E r_i² = Σ_j P_ij² σ_j²; second differences in time leave white noise alone.
+    With independent channels E r_i² = Σ_j P_ij² σ_j²; second differences in time leave white noise alone. Where few
+    combinations are left the channels can't be told apart well: their ratios are held near those of the data sheet.
     """
     both = use[2:] & use[1:-1] & use[:-2]
     quiet = both & (change[1:-1] <= np.quantile(change[1:-1][both], _QUIET)) if both.any() else both
@@ -114,8 +120,14 @@ def white_from_rows(
     second = np.diff(projected, 2, axis=0)[quiet]
     power = (np.median(np.abs(second), axis=0) / 0.6745) ** 2 / 6.0
     alive = power > 0
+    mixing = projector[np.ix_(alive, alive)] ** 2 * expected[alive] ** 2
+    scale = power[alive].sum() / mixing.sum()
+    error = power[alive] * (np.sqrt(3.0 / max(int(quiet.sum()), 1)) + _MODEL_ERROR)
+    count = len(error)
+    design = np.vstack([scale * mixing / error[:, None], np.eye(count) / _RATIO_SPREAD])
+    ratio, _ = nnls(design, np.concatenate([power[alive] / error, np.ones(count) / _RATIO_SPREAD]))
     found = np.zeros(len(power))
-    found[alive], _ = nnls(projector[np.ix_(alive, alive)] ** 2, power[alive])
+    found[alive] = ratio * scale * expected[alive] ** 2
     return np.sqrt(np.maximum(found, 0.04 * np.median(found[alive])))
 
 

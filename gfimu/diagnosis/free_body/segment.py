@@ -142,8 +142,9 @@ class BodySegment:
 
     def learn_noise(self, line: BodyLine) -> None:
         """Learn white noise and what grows with the motion from the residual, then the bias instability."""
-        white = white_from_rows(line.residual @ self._projector, self._projector, self.change, self.use)
-        floor = self.model.expected_noise(1.0 / self.run.sample_period).quantum / np.sqrt(12)
+        expected = self.model.expected_noise(1.0 / self.run.sample_period)
+        white = white_from_rows(line.residual @ self._projector, self._projector, self.change, self.use, expected.white)
+        floor = expected.quantum / np.sqrt(12)
         white = np.where(self.alive, np.maximum(white, floor), np.inf)
         projection = Projection(self.model.array, white)
         noise = learn_motion_noise(white, projection, line.residual @ projection.rows.T, self.change, self.use)
