@@ -281,7 +281,9 @@ def _references(
         columns["command_rad_s"] = _spin(command).at(t).rate
         columns["angle_rad"] = _stepped(table.at(t - world.tacho_delay).angle, quality.encoder_resolution)
     if quality.gyro_noise_std is not None:
-        gyro = body.omega + rng.normal(size=body.omega.shape) * quality.gyro_noise_std
+        late = command.at(t / (1.0 + world.clock_ratio) - world.tacho_delay) if run.free else body
+        rates = late.omega if isinstance(late, BodyState) else body.omega
+        gyro = rates @ world.gyro_matrix.T + rng.normal(size=body.omega.shape) * quality.gyro_noise_std
         columns |= {f"gyro_{axis}_rad_s": gyro[:, place] for place, axis in enumerate("xyz")}
     return columns
 
@@ -347,7 +349,7 @@ def _refuse_table_keys(scenario: Scenario, source: str) -> None:
         raise InputError(f"{source}: mounting_rotvec_rad belongs to the table; a tumbling body starts upright")
     world = scenario.world
     nominal = replace(scenario, effects=()).world
-    same = ("nod", "stretch", "tacho_delay", "motion_steps", "mount_steps", "reference_steps")
+    same = ("nod", "stretch", "motion_steps", "mount_steps", "reference_steps")
     moved = ("cube_offset", "mount_rotvec", "axis_rotvec")
     if any(getattr(world, name) != getattr(nominal, name) for name in same) or any(
         not np.array_equal(getattr(world, name), getattr(nominal, name)) for name in moved

@@ -13,12 +13,14 @@ import tomli_w
 from numpy.typing import NDArray
 
 from gfimu.array import AccelerometerArray
+from gfimu.diagnosis.free_body.motion import BodyDrive
 from gfimu.diagnosis.model import ExpectedNoise
 from gfimu.errors import InputError
 from gfimu.model_files import find_model, read_toml
 from gfimu.units import STANDARD_GRAVITY
 from sim import forward
-from sim.effects import EFFECTS, Effect, apply_effects, make_effect
+from sim.body import body_channels
+from sim.effects import BODY_EFFECTS, EFFECTS, Effect, apply_effects, make_effect
 from sim.world import World
 
 __all__ = ["Twin"]
@@ -163,9 +165,14 @@ class Twin:
         )
         return apply_effects(nominal, (*self.effects, *effects))
 
+    @property
+    def local_gravity(self) -> float:
+        """Magnitude of the specific force at rest, m/s²."""
+        return self.gravity
+
     def families(self) -> Mapping[str, type[Effect]]:
-        """Return the library of effects."""
-        return EFFECTS
+        """Return the library of effects: those of a table, or of a free body."""
+        return BODY_EFFECTS if self.drive_source == "gyro" else EFFECTS
 
     def predict(
         self,
@@ -191,6 +198,20 @@ class Twin:
                 spin = step(spin, t)
             return readings, spin.at(t - world.tacho_delay).angle
         return readings, forward.reference(world, spin, t)
+
+    def predict_body(
+        self,
+        drive: BodyDrive,
+        t: NDArray[np.float64],
+        *,
+        effects: Sequence[Any] = (),
+        temperature: NDArray[np.float64] | None = None,
+        start: float | None = None,
+    ) -> NDArray[np.float64]:
+        """Predict noise-free channels (n, c), m/s², of a free body from its gyro and its specific force."""
+        world = self.world(effects).changed(start=start)
+        readings = body_channels(world, drive, t, temperature)
+        return self._digital(readings, (*self.effects, *effects), world, t) if world.data_steps else readings
 
     def _digital(
         self, readings: NDArray[np.float64], effects: Sequence[Effect], world: World, t: NDArray[np.float64]

@@ -115,6 +115,8 @@ class World:
         The board's clock shows (1 + ratio) of the reference's time.
     tacho_delay : float
         How late the reference is, s.
+    gyro_matrix : ndarray, shape (3, 3)
+        What the reference gyro reads is this matrix times the angular rate.
     motion_steps : tuple
         Changes of the table's motion, seen by the cube and the tachometer.
     mount_steps : tuple
@@ -141,6 +143,7 @@ class World:
     chip_delay: NDArray[np.float64] | None = None
     clock_ratio: float = 0.0
     tacho_delay: float = 0.0
+    gyro_matrix: NDArray[np.float64] = field(default_factory=lambda: np.eye(3))
     motion_steps: tuple[MotionStep, ...] = ()
     mount_steps: tuple[MotionStep, ...] = ()
     sensing_steps: tuple[SensingStep, ...] = ()

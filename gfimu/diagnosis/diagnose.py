@@ -11,6 +11,7 @@ from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.adequacy import LEFT_OVER_ODDS, LeftOver, left_over
 from gfimu.diagnosis.causes import Cause, effects_of_run
 from gfimu.diagnosis.engine import LEAST_EXTRA_ODDS, Explanation, explain, make_segments, prune
+from gfimu.diagnosis.free_body.diagnose import diagnose_body
 from gfimu.diagnosis.holdout import Holdout, gate_gains, held_out_gain, split_segments
 from gfimu.diagnosis.integrity import IntegrityReport, check_integrity
 from gfimu.diagnosis.model import Effect, WorldModel
@@ -84,6 +85,8 @@ def diagnose(
         raise InputError("no recording to diagnose; give at least one")
     tell = report or (lambda share, text: None)
     labels = list(names) if names is not None else [f"run {number + 1}" for number in range(len(recordings))]
+    if model.drive_source == "gyro":
+        return diagnose_body(recordings, model, held_out=held_out, names=labels, report=tell)
     tell(0.02, "read")
     prepared = _Prepared.build(recordings, model, labels)
     explanation, walk = _explain(prepared, model, tell)

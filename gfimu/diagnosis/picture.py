@@ -96,6 +96,15 @@ def _motion(view: RunView, mounting: NDArray[np.float64], centre: NDArray[np.flo
 
 def _plots(view: RunView) -> list[Plot]:
     reference = np.where(np.isfinite(view.reference), view.reference, np.nan)
+    if not np.isfinite(view.angle).all():
+        return [
+            Plot("gyro, magnitude of its rate, rad/s", [Line("|ω|", view.t, reference, MEASURED)], legend=False),
+            Plot(
+                "angular acceleration from the gyro, magnitude, rad/s²",
+                [Line("|α|", view.t, view.acceleration, COMMAND)],
+                legend=False,
+            ),
+        ]
     return [
         Plot(
             "reference that drives the table",

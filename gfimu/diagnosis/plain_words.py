@@ -191,7 +191,8 @@ def next_steps(diagnosis: Diagnosis) -> list[str]:
             )
             steps.append("Record another run with another motion: what stays is in the rig or the sensors.")
         case _:
-            steps.append("Confirm on another recording: gfimu diagnose OTHER --twin twin.toml should find nothing.")
+            more = "no more than what is left unexplained" if diagnosis.unexplained.significant else "nothing"
+            steps.append(f"Confirm on another recording: gfimu diagnose OTHER --twin twin.toml should find {more}.")
             steps.append("Correct the rig or calibrate it, or keep twin.toml as the simulation from now on.")
     if diagnosis.verdict == "explained":
         for cause in diagnosis.causes:

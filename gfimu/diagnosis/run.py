@@ -11,7 +11,10 @@ from gfimu.diagnosis.model import WorldModel
 from gfimu.errors import InputError
 from gfimu.recording import Recording
 
-__all__ = ["Run", "prepare_run"]
+__all__ = ["GYRO_COLUMNS", "Run", "prepare_run"]
+
+GYRO_COLUMNS = ("gyro_x_rad_s", "gyro_y_rad_s", "gyro_z_rad_s")
+"""Columns of the gyro that drives the twin of a free body."""
 
 MINIMUM_DURATION = 4.0
 _MINIMUM_SAMPLES = 80
@@ -101,21 +104,9 @@ def prepare_run(recording: Recording, model: WorldModel, *, name: str = "run") -
             f"{name}: {len(recording)} samples over {recording.duration:.1f} s are too short to diagnose; "
             f"record at least {MINIMUM_DURATION:.0f} s and {_MINIMUM_SAMPLES} samples, better 40 s"
         )
-    if model.drive_source not in _REFERENCE_COLUMNS:
-        raise InputError(
-            f"{name}: a twin driven by {model.drive_source!r} (a free body) can't be diagnosed yet; "
-            f"use one of {', '.join(_REFERENCE_COLUMNS)}"
-        )
     if not np.isfinite(readings).any():
         raise InputError(f"{name}: no channel has a value; record the channels of array {model.array.name!r}")
-    column = _REFERENCE_COLUMNS[model.drive_source]
-    if column not in recording.reference:
-        have = [source for source, key in _REFERENCE_COLUMNS.items() if key in recording.reference]
-        raise InputError(
-            f"{name}: column {column} is missing, but the twin's drive source is {model.drive_source!r}; "
-            + (f"set source = {have[0]!r} in the twin's [drive]" if have else "record a tachometer, angle or command")
-        )
-    drive = _without_repeats(np.asarray(recording.reference[column], dtype=float))
+    column, drive = _drive(recording, model, name)
     if np.isfinite(drive).sum() < 20:
         raise InputError(f"{name}: column {column} has fewer than 20 values; record the reference with the channels")
     _refuse_dead_reference(readings, drive, column, model, recording.sample_rate, name)
@@ -171,6 +162,31 @@ def _without_repeats(reference: NDArray[np.float64]) -> NDArray[np.float64]:
     out = reference.copy()
     out[known[repeated]] = np.nan
     return out
+
+
+def _drive(recording: Recording, model: WorldModel, name: str) -> tuple[str, NDArray[np.float64]]:
+    """Return the column that drives the twin and its values: the rate or angle, or the magnitude of a gyro's rate."""
+    have = recording.reference
+    if model.drive_source == "gyro":
+        for column in GYRO_COLUMNS:
+            if column not in have:
+                raise InputError(
+                    f"{name}: column {column} is missing, but the twin's drive source is 'gyro'; record the gyro "
+                    "with the channels"
+                )
+        return "gyro", np.linalg.norm(np.column_stack([have[column] for column in GYRO_COLUMNS]), axis=1)
+    column = _REFERENCE_COLUMNS[model.drive_source]
+    if column not in have:
+        others = [source for source, key in _REFERENCE_COLUMNS.items() if key in have]
+        raise InputError(
+            f"{name}: column {column} is missing, but the twin's drive source is {model.drive_source!r}; "
+            + (
+                f"set source = {others[0]!r} in the twin's [drive]"
+                if others
+                else "record a tachometer, angle or command"
+            )
+        )
+    return column, _without_repeats(np.asarray(have[column], dtype=float))
 
 
 def _refuse_dead_reference(

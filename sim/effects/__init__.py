@@ -1,6 +1,6 @@
 """Physical effects: one small class each, in a registry; each knows its name, parameters, priors and place."""
 
 from sim.effects.base import Effect, Pattern, Size
-from sim.effects.registry import EFFECTS, apply_effects, make_effect
+from sim.effects.registry import BODY_EFFECTS, EFFECTS, NOT_OF_A_BODY, apply_effects, make_effect
 
-__all__ = ["EFFECTS", "Effect", "Pattern", "Size", "apply_effects", "make_effect"]
+__all__ = ["BODY_EFFECTS", "EFFECTS", "NOT_OF_A_BODY", "Effect", "Pattern", "Size", "apply_effects", "make_effect"]

@@ -7,11 +7,11 @@ from typing import Any
 
 from gfimu.array import AccelerometerArray
 from gfimu.errors import unknown_name
-from sim.effects import digital, mechanical, sensing, timing
+from sim.effects import body, digital, mechanical, sensing, timing
 from sim.effects.base import Effect
 from sim.world import World
 
-__all__ = ["EFFECTS", "apply_effects", "make_effect"]
+__all__ = ["BODY_EFFECTS", "EFFECTS", "NOT_OF_A_BODY", "apply_effects", "make_effect"]
 
 EFFECTS: dict[str, type[Effect]] = {
     effect.name: effect
@@ -53,7 +53,28 @@ EFFECTS: dict[str, type[Effect]] = {
         digital.DroppedFrames,
     )
 }
-"""Every effect by its contract name."""
+"""Every effect of a rig on its table, by its contract name."""
+
+NOT_OF_A_BODY: dict[str, str] = {
+    **dict.fromkeys(("eccentricity", "mount_tilt", "table_tilt", "axis_wobble"), "a body in the hand has no axis"),
+    **dict.fromkeys(("cogging", "resonance", "tacho_ripple"), "a body in the hand has no table that drives it"),
+    **dict.fromkeys(("centrifugal_flex", "vibration_rectification"), "defined by the rate about a table's axis"),
+    "gravity": "the specific force is unknown; poses at rest see a wrong gravity as a gain common to all channels",
+    "clock_error": "gyro and accelerometers share the board's clock",
+    "tacho_latency": "a gyro may be early as well as late: gyro_latency",
+    "sensor_lag": "against a motion that is itself unknown a lag of all channels is a delay: gyro_latency",
+    "tacho_scale": "a gyro has three gains: gyro_scale",
+    "interference_tone": "what all channels share looks like the body's own specific force",
+    "hysteresis": "what depends on the past of a motion that is itself unknown can't be told from it",
+    "bias_random_walk": "slow wander is part of the noise that is fitted",
+}
+"""Effects that a diagnosis of a free body does not look for, and why."""
+
+BODY_EFFECTS: dict[str, type[Effect]] = {
+    **{name: effect for name, effect in EFFECTS.items() if name not in NOT_OF_A_BODY},
+    **{effect.name: effect for effect in (body.ChipDelay, body.GyroLatency, body.GyroScale, body.GyroMisalignment)},
+}
+"""Every effect of a free body with a gyro, by its contract name."""
 
 _PLACES = ("geometry", "motion", "timing", "sensing", "reference", "noise", "data")
 
@@ -62,9 +83,10 @@ def make_effect(
     name: str, parameters: Mapping[str, Any] | None = None, array: AccelerometerArray | None = None
 ) -> Effect:
     """Build an effect by name; raises `InputError` for an unknown name or, given the array, an unknown key."""
-    if name not in EFFECTS:
-        raise unknown_name("effect", name, EFFECTS)
-    effect = EFFECTS[name](parameters or {})
+    known = EFFECTS | BODY_EFFECTS
+    if name not in known:
+        raise unknown_name("effect", name, known)
+    effect = known[name](parameters or {})
     if array is not None:
         effect.check(array)
     return effect

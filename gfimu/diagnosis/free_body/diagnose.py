@@ -1,0 +1,301 @@
+"""Diagnosis of a free body from end to end: recordings with a gyro and a twin in, a verdict out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gfimu.diagnosis.adequacy import LEFT_OVER_ODDS, LeftOver
+from gfimu.diagnosis.causes import Cause, effects_of_run
+from gfimu.diagnosis.engine import Explanation
+from gfimu.diagnosis.free_body.engine import explain, without_cause
+from gfimu.diagnosis.free_body.holdout import (
+    BodyHoldout,
+    gate_gains,
+    held_out_gain,
+    other_recording,
+    stretches,
+)
+from gfimu.diagnosis.free_body.left_over import motion_noise, structure_left
+from gfimu.diagnosis.free_body.model import BodyModel
+from gfimu.diagnosis.free_body.run import BodyRun, prepare_body_run
+from gfimu.diagnosis.free_body.segment import BodySegment
+from gfimu.diagnosis.integrity import check_integrity
+from gfimu.diagnosis.model import Effect, WorldModel
+from gfimu.diagnosis.naming import cause_parameters, conflicting, describe, mimics, probabilities, rival_list
+from gfimu.diagnosis.verdict import Diagnosis, Gain, NamedCause, Residual, RunView, Unexplained
+from gfimu.diagnosis.wording import verdict_sentences
+from gfimu.recording import Recording
+
+__all__ = ["diagnose_body"]
+
+Report = Callable[[float, str], None]
+
+_LEAST_GAIN = 2.0
+_DOMINANT = 0.1
+_INEXACTNESS = 2.5e-3
+_WIRING = ("axis_swap", "sign_flip", "wrong_range")
+_SWEEPS = 12
+_MOST_SPIKES = 2e-3
+
+
+def diagnose_body(
+    recordings: Sequence[Recording],
+    model: WorldModel,
+    *,
+    held_out: Sequence[Recording] = (),
+    names: Sequence[str],
+    report: Report,
+) -> Diagnosis:
+    """Diagnose recordings of a body that moves freely, its rate from a gyro, its specific force unknown.
+
+    Parameters
+    ----------
+    recordings, model, held_out, names, report
+        As `gfimu.diagnosis.diagnose.diagnose` has them; the twin's drive source is ``gyro``.
+    """
+    body_model = cast("BodyModel", model)
+    report(0.02, "read")
+    prepared = _Prepared.build(recordings, body_model, names)
+    segments, fixed = prepared.segments, prepared.fixed
+    explanation = explain(segments, fixed, report=lambda share, text: report(0.03 + 0.8 * share, text))
+    report(0.85, "hold out")
+    kept = None
+    if held_out:
+        kept = _Prepared.build(held_out, body_model, [f"held out {n + 1}" for n in range(len(held_out))])
+    pairs = _pairs(prepared, kept, explanation)
+    withdrawn: list[str] = []
+    while explanation.fit.causes:
+        gains = gate_gains(explanation.fit.causes, pairs)
+        worst = min(gains, key=lambda name: gains[name])
+        if gains[worst] >= _LEAST_GAIN:
+            break
+        withdrawn.append(worst)
+        explanation = without_cause(segments, explanation.fit.causes, fixed, worst)
+    report(0.92, "look at what is left")
+    noise = motion_noise(segments)
+    structure, tone = structure_left(segments, explanation.fit.causes, fixed)
+    report(0.96, "measure the gain")
+    gain = Gain()
+    if explanation.fit.causes or any(fixed):
+        constant = [effect for effects in fixed for effect in effects]
+        label = "another recording" if kept else "stretches of the recording, each from the others"
+        gain = held_out_gain(explanation.fit.causes, pairs, constant, label)
+    return _verdict(prepared, explanation, (structure, tone, noise), gain, withdrawn)
+
+
+@dataclass(frozen=True)
+class _Prepared:
+    """Runs after the integrity check, with the faults found in each."""
+
+    model: BodyModel
+    segments: list[BodySegment]
+    faults: list[list[Effect]]
+    why: dict[str, str]
+
+    @classmethod
+    def build(cls, recordings: Sequence[Recording], model: BodyModel, names: Sequence[str]) -> _Prepared:
+        segments, faults, why = [], [], {}
+        for number, (recording, name) in enumerate(zip(recordings, names, strict=True)):
+            body = prepare_body_run(recording, model, name=name)
+            checked = check_integrity(model, body.run, robust_prediction(BodySegment(model, body, number)))
+            run = checked.run
+            if checked.spikes > _MOST_SPIKES * run.valid.size:
+                # So many are no faults: the hand moves faster than the samples follow.
+                run = replace(run, valid=run.valid | body.run.valid & ~_lost_for_good(body, run.valid))
+            segments.append(BodySegment(model, replace(body, run=run), number))
+            faults.append(list(checked.effects))
+            why.update(checked.why)
+        return cls(model, segments, faults, why)
+
+    @property
+    def fixed(self) -> list[list[Effect]]:
+        """Faults of the wiring, which change a noise-free prediction."""
+        return [[effect for effect in effects if effect.name in _WIRING] for effects in self.faults]
+
+
+def _lost_for_good(body: BodyRun, valid: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Mark invalid stretches: those of a frozen or clipped channel, and no isolated samples."""
+    lost = body.run.valid & ~valid
+    return lost & (np.roll(lost, 1, axis=0) | np.roll(lost, -1, axis=0))
+
+
+def robust_prediction(segment: BodySegment) -> NDArray[np.float64]:
+    """Predict the channels with the specific force that most of them agree on, shape (n, c), m/s².
+
+    A few exchanged or inverted channels must not draw the specific force their way: each channel is weighted by how
+    well the others predict it, again and again.
+    """
+    array, run = segment.model.array, segment.run
+    rigid = segment.predict([], segment.drive.with_force(np.zeros_like(segment.drive.force)))
+    rest = np.where(run.valid, run.readings - rigid, 0.0)
+    axes = array.axes
+    weight = segment.alive.astype(float)
+    rows = slice(None, None, max(1, len(run.t) // 4000))
+    for _ in range(_SWEEPS):
+        inverse = np.linalg.pinv(axes * weight[:, None]) * weight
+        left = rest[rows] - (rest[rows] @ inverse.T) @ axes.T
+        spread = np.median(np.abs(left), axis=0) + np.sqrt(np.mean(left**2, axis=0))
+        typical = float(np.median(spread[segment.alive]))
+        weight = np.where(segment.alive, 1.0 / (0.1 * typical + spread), 0.0)
+        weight /= weight.max()
+    return np.asarray(rigid + (rest @ inverse.T) @ axes.T)
+
+
+def _pairs(prepared: _Prepared, kept: _Prepared | None, explanation: Explanation) -> list[BodyHoldout]:
+    if kept is None:
+        return stretches(prepared.segments, prepared.fixed)
+    for segment in kept.segments:
+        segment.index = 0
+    return other_recording(prepared.segments, prepared.fixed, kept.segments, kept.fixed, explanation.fit.causes)
+
+
+def _verdict(
+    prepared: _Prepared,
+    explanation: Explanation,
+    left: tuple[LeftOver, LeftOver, LeftOver],
+    gain: Gain,
+    withdrawn: Sequence[str],
+) -> Diagnosis:
+    """Put everything together."""
+    model, segments = prepared.model, prepared.segments
+    fit = explanation.fit
+    removed = max(explanation.nothing.objective - fit.objective, 0.0)
+    # No model is exact: what follows the motion must also stand out against what the causes explain.
+    thresholds = (max(LEFT_OVER_ODDS, _INEXACTNESS * removed), LEFT_OVER_ODDS, LEFT_OVER_ODDS)
+    told = [one for one, threshold in zip(left, thresholds, strict=True) if one.log_odds > threshold]
+    dominant = any(2 * one.log_odds > _DOMINANT * removed for one in told if one is not left[-1])
+    found = [
+        NamedCause(str(e.name), dict(e.parameters), {}, 0.999, why=prepared.why.get(e.name, ""))
+        for e in {effect.name: effect for effects in prepared.faults for effect in effects}.values()
+    ]
+    likely = probabilities(explanation)
+    named = [_named(explanation, cause, likely, segments[0]) for cause in fit.causes]
+    rivals = conflicting(explanation)
+    families = model.families()
+    extension = [] if dominant else [cause.effect(model.array) for cause in fit.causes]
+    faults = [families[cause.effect](cause.parameters) for cause in found if cause.effect in families]
+    causes: tuple[NamedCause, ...] = (*found, *named)
+    if dominant or (told and not causes):
+        verdict, causes = "unknown", tuple(found)
+    elif rivals:
+        verdict = "ambiguous"
+        causes = (*found, *_contested(explanation, named, likely, segments[0]))
+    else:
+        verdict = "explained" if causes else "nothing_found"
+    unexplained = Unexplained(
+        bool(told),
+        "; ".join(one.signature for one in told),
+        max(one.log_odds for one in left),
+        {key: value for one in told for key, value in one.surrogate.items()},
+    )
+    views = tuple(_view(segment, known, fit.causes) for segment, known in zip(segments, prepared.fixed, strict=True))
+    residual = _residual(views, segments)
+    words = verdict_sentences(verdict, causes, residual, gain, unexplained, withdrawn)
+    first = segments[0]
+    expected = model.expected_noise(1.0 / first.run.sample_period)
+    alive = first.alive
+    levels = {
+        "white_over_data_sheet": float(np.median(first.noise.white[alive] / expected.white[alive])),
+        "bias_instability_m_s2": first.noise.flicker,
+        "disagreement_s": first.noise.agitation,
+        "gyro_bias_rad_s": float(np.linalg.norm(first.body.gyro_bias)),
+    }
+    twin = model.extended([*faults, *extension])
+    return Diagnosis(verdict, causes, residual, gain, unexplained, rival_list(explanation), twin, views, words, levels)
+
+
+def _named(explanation: Explanation, cause: Cause, likely: dict[str, float], segment: BodySegment) -> NamedCause:
+    array = segment.model.array
+    parameters, std = cause_parameters(cause, array)
+    same = mimics(explanation, cause) if cause in explanation.fit.causes else []
+    without = explanation.without.get(cause.name)
+    change = segment.predict([cause.effect(array, segment.index)]) - segment.predict([])
+    size = np.sqrt(np.mean((change - (change @ segment.projection.to_force.T) @ array.axes.T) ** 2, axis=0))
+    share = dict(zip(array.channels, map(float, size), strict=True))
+    return NamedCause(
+        cause.name,
+        parameters,
+        std,
+        likely.get(cause.name, 0.0),
+        cause.pattern,
+        tuple(same),
+        str(cause.family.separated_by) if same else "",
+        describe(cause, array, share),
+        0.0 if without is None else float(explanation.fit.log_posterior - without.log_posterior),
+    )
+
+
+def _contested(
+    explanation: Explanation,
+    named: Sequence[NamedCause],
+    likely: dict[str, float],
+    segment: BodySegment,
+) -> list[NamedCause]:
+    """Return the causes with those that may be in their place, each telling the others."""
+    fits = [explanation.fit, *conflicting(explanation)]
+    shared = frozenset.intersection(*(fit.names for fit in fits))
+    others = {cause.name: cause for fit in fits[1:] for cause in fit.causes if cause.name not in explanation.fit.names}
+    every = [*named, *(_named(explanation, cause, likely, segment) for cause in others.values())]
+    contested = [cause.effect for cause in every if cause.effect not in shared]
+    out = []
+    for cause in every:
+        if cause.effect in shared:
+            out.append(cause)
+            continue
+        alike = tuple(dict.fromkeys([*(n for n in contested if n != cause.effect), *cause.not_distinguishable_from]))
+        text = cause.would_be_separated_by or str(segment.model.families()[cause.effect].separated_by)
+        out.append(replace(cause, not_distinguishable_from=alike, would_be_separated_by=text))
+    return out
+
+
+def _view(segment: BodySegment, known: Sequence[Effect], causes: Sequence[Cause]) -> RunView:
+    """Collect a run for pictures; the motion, as far as the gyro doesn't hold it, is fitted before and after alike."""
+    run = segment.run
+    measured = np.where(run.valid, run.readings, 0.0)
+    predictions = []
+    for effects in ([], [*known, *effects_of_run(causes, segment.model.array, segment.index)]):
+        line = segment.linearise(effects)
+        predictions.append(measured - segment.motion_removed(line))
+    rate, acceleration = line.drive.rate_at()
+    speed = np.linalg.norm(rate, axis=1)
+    valid = run.valid & segment.use[:, None] & segment.alive
+    white = np.where(segment.alive, segment.noise.white, segment.noise.typical)
+    return RunView(
+        run.name,
+        run.t,
+        run.readings,
+        valid,
+        predictions[0],
+        predictions[1],
+        np.linalg.norm(segment.body.gyro, axis=1),
+        speed,
+        speed,
+        np.full(len(run.t), np.nan),
+        speed,
+        np.linalg.norm(acceleration, axis=1),
+        run.temperature,
+        white,
+    )
+
+
+def _residual(views: Sequence[RunView], segments: Sequence[BodySegment]) -> Residual:
+    """Measure the residual before and after over the samples used."""
+    channels = segments[0].model.array.channels
+    use = np.concatenate([view.valid for view in views])
+    count = np.maximum(use.sum(axis=0), 1)
+    power = []
+    for name in ("before", "after"):
+        left = np.concatenate([view.measured - getattr(view, name) for view in views])
+        power.append(np.sum(np.where(use, left, 0.0) ** 2, axis=0))
+    return Residual(
+        float(np.sqrt(power[0].sum() / count.sum())),
+        float(np.sqrt(power[1].sum() / count.sum())),
+        segments[0].noise_floor,
+        dict(zip(channels, map(float, np.sqrt(power[0] / count)), strict=True)),
+        dict(zip(channels, map(float, np.sqrt(power[1] / count)), strict=True)),
+    )

@@ -1,0 +1,186 @@
+"""Effects hidden on a body thrown about: worlds from MuJoCo, motion unknown but for a gyro."""
+
+import copy
+import functools
+
+import numpy as np
+import pytest
+
+from gfimu.diagnosis.diagnose import diagnose
+from gfimu.diagnosis.free_body.motion import BodyDrive
+from gfimu.diagnosis.free_body.run import prepare_body_run
+from gfimu.errors import InputError
+from gfimu.model_files import find_model, read_toml
+from sim.effects import BODY_EFFECTS, EFFECTS, NOT_OF_A_BODY
+from sim.scenarios import Scenario, simulate
+from sim.twin import Twin
+
+TUMBLE = read_toml(find_model("scenarios", "tumble"))
+SENSOR = {"errors": False, "bandwidth": False, "bias_instability_m_s2": 5e-4}
+
+
+def tumble(*effects, seed=1, array="mimu4444", duration=20.0, rate=12.0, sensor=SENSOR):
+    """Recording of a torque-free tumble, by MuJoCo."""
+    data = copy.deepcopy(dict(TUMBLE))
+    data |= {"array": array, "duration_s": duration, "sensor": sensor}
+    data["motion"] = dict(data["motion"], rate_rad_s=rate)
+    data["effect"] = [{"name": name, "parameters": parameters} for name, parameters in effects]
+    return simulate(Scenario.from_dict(data), seed=seed)
+
+
+def twin(array="mimu4444"):
+    part = "mpu9150" if array == "mimu4444" else "adxl345"
+    return Twin.from_dict({"array": array, "drive": {"source": "gyro"}, "sensor": {"part": part}})
+
+
+def draw(name, seed):
+    """Place and size of an effect by its seed: from clear to gross, three to ten times what would surprise nobody."""
+    rng = np.random.default_rng(seed)
+    array = twin().array
+    chip, channel = str(rng.choice([c.name for c in array.chips])), str(rng.choice(array.channels))
+    sign = float(rng.choice([-1, 1]))
+    size = sign * float(rng.uniform(0.5, 3))
+    axis = str(rng.choice(list("xyz")))
+    return {
+        "bias": (f"channel {channel}", {f"{channel}_m_s2": 0.2 * size}),
+        "scale_factor": (f"channel {channel}", {channel: 0.02 * size}),
+        "sensor_position": (f"chip {chip}", {f"{chip}_x_m": 1e-3 * size, f"{chip}_y_m": -8e-4 * size}),
+        "misalignment": (f"chip {chip}", {f"{chip}_{axis}_rad": 0.01 * size}),
+        "chip_delay": (f"chip {chip}", {f"{chip}_s": 1e-3 * size}),
+        "channel_skew": ("", {"per_chip_s": 3e-4 * size}),
+        "gyro_latency": ("", {"delay_s": 2e-3 * size}),
+        "gyro_scale": (f"gyro axis {axis}", {axis: 0.02 * size}),
+        "gyro_misalignment": ("", {f"{axis}_rad": 0.02 * size}),
+        "quadratic": (f"channel {channel}", {f"{channel}_s2_m": 2e-3 * size}),
+        "axis_swap": ("", {"channels": [f"{chip}1", f"{chip}2"]}),
+        "sign_flip": ("", {"channel": channel}),
+        "wrong_range": ("", {"chip": chip, "factor": 2.0}),
+    }[name]
+
+
+HIDDEN = [
+    "bias",
+    "scale_factor",
+    "sensor_position",
+    "misalignment",
+    "chip_delay",
+    "channel_skew",
+    "gyro_latency",
+    "gyro_scale",
+    "gyro_misalignment",
+    "quadratic",
+    "axis_swap",
+    "sign_flip",
+    "wrong_range",
+]
+
+
+@functools.cache
+def found(name, seed):
+    place, parameters = draw(name, seed)
+    return place, parameters, diagnose([tumble((name, parameters), seed=seed)], twin())
+
+
+@pytest.mark.parametrize(("number", "name"), enumerate(HIDDEN))
+def test_a_hidden_effect_is_found_and_named_alone_with_its_place_and_size(number, name):
+    place, parameters, verdict = found(name, 500 + number)
+    assert verdict.verdict == "explained"
+    assert [(cause.effect, cause.place) for cause in verdict.causes] == [(name, place)]
+    assert not verdict.unexplained.significant
+    (cause,) = verdict.causes
+    for key, value in parameters.items():
+        if isinstance(value, float):
+            # MuJoCo's gyro noise and the steps of the converter are the spread; four sigma over some twenty numbers.
+            assert abs(cause.parameters[key] - value) < 4 * cause.std.get(key, 0.0) + 0.02 * abs(value)
+        else:
+            assert cause.parameters[key] == value
+    assert verdict.residual.rms_after == pytest.approx(verdict.residual.noise_floor, rel=0.1)
+
+
+@pytest.mark.parametrize(("seed", "array", "rate"), [(1, "mimu4444", 12.0), (2, "cube12", 6.0), (3, "mimu4444", 25.0)])
+def test_nothing_hidden_nothing_named(seed, array, rate):
+    verdict = diagnose([tumble(seed=seed, array=array, rate=rate)], twin(array))
+    assert (verdict.verdict, verdict.causes) == ("nothing_found", ())
+
+
+def test_two_effects_are_both_found_and_the_extended_twin_has_nothing_left():
+    hidden = [("bias", {"m32_m_s2": 0.3}), ("sensor_position", {"m6_x_m": 1.5e-3})]
+    one, other = tumble(*hidden, seed=5), tumble(*hidden, seed=6, rate=9.0)
+    verdict = diagnose([one], twin(), held_out=[other])
+    assert {cause.effect for cause in verdict.causes} == {"bias", "sensor_position"}
+    assert verdict.gain.held_out == "another recording"
+    assert verdict.gain.share_of_excess_removed > 0.98
+    assert verdict.gain.log_likelihood_per_sample > 5 * verdict.gain.log_likelihood_std
+    again = Twin.from_dict({**verdict.twin.to_dict()})
+    assert diagnose([other], again).verdict == "nothing_found"
+
+
+def test_what_the_library_does_not_have_is_unknown_and_told():
+    recording = tumble(seed=7)
+    recording.readings[:, 4] += 0.1 * np.sin(2 * np.pi * 11.3 * recording.t_s)
+    verdict = diagnose([recording], twin())
+    assert verdict.verdict == "unknown"
+    assert "channel m22 has a tone at 11.3" in verdict.unexplained.signature
+
+
+def test_sampling_at_random_instants_is_told_as_disagreement_in_motion():
+    """Each chip is late by some milliseconds, anew in every sample: no effect, but noise that grows with the motion."""
+    rng = np.random.default_rng(8)
+    steady = [tumble(("channel_skew", {"per_chip_s": s}), seed=8, rate=20.0).readings for s in (0.0, 1e-3)]
+    recording = tumble(seed=8, rate=20.0)
+    slope = (steady[1] - steady[0]) / (1e-3 * np.maximum(twin().array.chip_of_channel, 1))
+    late = rng.normal(0, 2e-3, (len(recording.t_s), 8))[:, twin().array.chip_of_channel]
+    recording.readings[:] = recording.readings + slope * late * (twin().array.chip_of_channel > 0)
+    verdict = diagnose([recording], twin())
+    assert verdict.verdict == "unknown"
+    assert not verdict.causes
+    assert "disagree from sample to sample" in verdict.unexplained.signature
+
+
+def test_the_twin_predicts_what_mujoco_measures():
+    """Analytic readings from the true rate and specific force, against MuJoCo's, effects of geometry and time in."""
+    hidden = [
+        ("sensor_position", {"m2_x_m": 2e-3}),
+        ("misalignment", {"m5_z_rad": 0.05}),
+        ("chip_delay", {"m7_s": 3e-3}),
+    ]
+    recording = tumble(*hidden, sensor={"perfect": True}, rate=9.0)
+    world = Twin.from_dict(
+        {**twin().to_dict(), "effect": [{"name": name, "parameters": parameters} for name, parameters in hidden]}
+    )
+    plain = tumble(sensor={"perfect": True}, rate=9.0)
+    omega = np.column_stack([recording.extra[f"truth_omega_{axis}_rad_s"] for axis in "xyz"])
+    # The specific force of the origin: the mean of eight chips about it, the tangential parts cancel.
+    array = twin().array
+    still = world.predict_body(BodyDrive(plain.t_s, omega, np.zeros_like(omega)), plain.t_s, effects=[])
+    nominal = twin().predict_body(BodyDrive(plain.t_s, omega, np.zeros_like(omega)), plain.t_s)
+    force = (plain.readings - nominal) @ np.linalg.pinv(array.axes).T
+    predicted = world.predict_body(BodyDrive(plain.t_s, omega, force), plain.t_s)
+    inside = slice(20, -20)
+    assert np.abs(still - nominal)[inside].max() > 0.1
+    # Cubic splines of the samples at 100 Hz stand for the motion between them.
+    assert np.abs(predicted - recording.readings)[inside].max() < 2e-3
+
+
+def test_every_effect_is_looked_for_or_left_out_for_a_reason():
+    assert set(EFFECTS) | {"chip_delay", "gyro_latency", "gyro_scale", "gyro_misalignment"} == set(BODY_EFFECTS) | set(
+        NOT_OF_A_BODY
+    )
+    assert not set(BODY_EFFECTS) & set(NOT_OF_A_BODY)
+    assert all(NOT_OF_A_BODY.values())
+
+
+def test_rest_is_found_and_the_gyro_bias_with_it():
+    recording = tumble(seed=9)
+    recording.reference["gyro_x_rad_s"][:] += 0.03
+    body = prepare_body_run(recording, twin())
+    assert recording.t_s[body.rest].max() < 2.1
+    assert body.rest[recording.t_s < 1.5].mean() > 0.9
+    assert body.gyro_bias == pytest.approx([0.03, 0, 0], abs=4 * 0.002 / np.sqrt(body.rest.sum()))
+
+
+def test_a_recording_without_its_gyro_is_refused():
+    recording = tumble(seed=9)
+    del recording.reference["gyro_y_rad_s"]
+    with pytest.raises(InputError, match=r"column gyro_y_rad_s is missing, but the twin's drive source is 'gyro'"):
+        diagnose([recording], twin())
