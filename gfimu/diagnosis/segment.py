@@ -32,6 +32,7 @@ KNOT_SPACING = 0.05
 TIME_MARGIN = 0.5
 _DEGREE = 4
 _KNOWN_ANGLE_STD = 5e-3
+_LEAST_FACTOR = 0.5
 _STATE_STEPS = (1e-5, 1e-4, 1e-3)
 
 
@@ -184,7 +185,8 @@ class Segment:
         """Pick the scale of the roughness prior by marginal likelihood, the drive integrated out."""
         kept, factor = self.coefficients, self.drive_factor
         best = (-np.inf, factor)
-        for trial in factor * np.array([0.5, 1.0, 2.0, 4.0]):
+        # Below the least factor a prior that is learnt from the drive and then tightened again would tighten for ever.
+        for trial in np.unique(np.maximum(factor * np.array([0.5, 1.0, 2.0, 4.0]), _LEAST_FACTOR)):
             self.drive_factor = float(trial)
             self._set_roughness()
             self.coefficients = kept

@@ -33,6 +33,7 @@ _SCANNED = ("interference_tone", "cogging", "tacho_ripple", "resonance")
 _PEAKS = {"interference_tone": 2, "cogging": 4, "tacho_ripple": 3, "resonance": 5}
 _DAMPINGS = (0.01, 0.03, 0.1)
 _RESTRICTED = 0.5
+_SHAPE_STEP = 1e-5  # a tone of a thousand cycles must not turn by a sensible part of a cycle
 ANGLES = frozenset({"direction_rad"})
 """Shape parameters that are angles; the others move in proportion."""
 _SHAPE_BOUNDS = {"damping_ratio": (1e-3, 0.3), "time_constant_s": (1.0, 1e5), "width_m_s2": (1e-3, 20.0)}
@@ -206,9 +207,9 @@ def cause_columns(
             columns.append(change / step)
         if shapes:
             for key, value in cause.free_shape.items():
-                moved_shape = {**cause.shape, key: shape_moved(key, value, 1e-3)}
+                moved_shape = {**cause.shape, key: shape_moved(key, value, _SHAPE_STEP)}
                 effect = cause.at(cause.coordinates, moved_shape).effect(array, segment.index)
-                columns.append((segment.predict([*others, effect]) - nominal) / 1e-3)
+                columns.append((segment.predict([*others, effect]) - nominal) / _SHAPE_STEP)
     if not columns:
         return np.zeros((nominal.shape[1], 0, nominal.shape[0]))
     return np.stack([column.T for column in columns], axis=1) * segment.row_weight.T[:, None, :]
