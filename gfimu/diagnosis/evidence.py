@@ -15,11 +15,20 @@ from numpy.typing import NDArray
 from scipy.linalg import lapack
 from scipy.special import log_ndtr
 
-__all__ = ["SCALES", "log_evidence", "log_evidence_each", "posterior"]
+__all__ = ["SCALES", "inverse", "log_evidence", "log_evidence_each", "posterior"]
 
 SCALES = (0.03, 0.2, 1.0, 5.0, 30.0, 300.0, 3000.0)
 """Scales k of the prior: a fraction of the usual size up to a gross error."""
+_LEAST_POWER = 1e-13
 _SCALE_WEIGHTS = np.log(np.array([0.22, 0.28, 0.28, 0.14, 0.06, 0.015, 0.005]))
+
+
+def inverse(information: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Invert an information matrix (k, k); directions that the data and the prior leave open get a wide variance."""
+    size = 1.0 / np.sqrt(np.maximum(information.diagonal(), 1e-300))
+    power, vectors = np.linalg.eigh(information * np.outer(size, size))
+    power = np.maximum(power, _LEAST_POWER * max(float(power[-1]), 1.0))
+    return np.asarray(np.outer(size, size) * ((vectors / power) @ vectors.T), dtype=np.float64)
 
 
 def posterior(
@@ -27,8 +36,8 @@ def posterior(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Posterior mean (k,) and covariance (k, k) of coordinates with prior N(0, scale²)."""
     information = gram + np.eye(len(score)) / scale**2
-    covariance = np.linalg.inv(information)
-    return np.asarray(covariance @ score), np.asarray(covariance)
+    covariance = inverse(information)
+    return np.asarray(covariance @ score), covariance
 
 
 def log_evidence_each(

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.causes import Cause, effects_of_run
-from gfimu.diagnosis.evidence import SCALES, log_evidence
+from gfimu.diagnosis.evidence import SCALES, inverse, log_evidence
 from gfimu.diagnosis.model import Effect
 from gfimu.diagnosis.search import EXTRA_CAUSE
 from gfimu.diagnosis.segment import Segment
@@ -166,7 +166,7 @@ def _evaluate(segments: Sequence[Segment], fixed: Sequence[Sequence[Effect]], st
     score = np.sum([product[1] for product in products], axis=0)
     precision, pull = _prior(state.causes)
     information = gram + np.diag(precision)
-    step = np.linalg.solve(information, score + pull) if len(score) else np.zeros(0)
+    step = inverse(information) @ (score + pull) if len(score) else np.zeros(0)
     step = _limited(state.causes, step)
     moves = tuple(
         segment.drive_step(line, product[2], step)
@@ -248,7 +248,7 @@ def _result(segments: Sequence[Segment], point: _Point) -> Fit:
         return Fit((), evidence, evidence + prior, point.objective, point.state.drives, empty, np.zeros(0))
     coordinates, shapes = _places(causes)
     values = np.concatenate([cause.coordinates for cause in causes])
-    covariance = np.asarray(np.linalg.inv(gram + np.diag(_prior(causes)[0])), dtype=np.float64)
+    covariance = inverse(gram + np.diag(_prior(causes)[0]))
     inner = gram[np.ix_(coordinates, coordinates)]
     total = score[coordinates] + inner @ values
     positive = np.concatenate([cause.positive(array) for cause in causes])

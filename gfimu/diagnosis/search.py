@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
-from gfimu.diagnosis.evidence import SCALES, log_evidence, log_evidence_each, posterior
+from gfimu.diagnosis.evidence import SCALES, inverse, log_evidence, log_evidence_each, posterior
 from gfimu.diagnosis.signatures import Hypothesis, SignatureSet
 
 __all__ = ["EXTRA_CAUSE", "Blocks", "Candidate", "search"]
@@ -75,7 +75,7 @@ class Blocks:
             mixing = block_diag(*[h.mixing for h in chosen])
             inner, right, _ = self.system(members)
             left = gram[:, columns] @ mixing  # (P, k)
-            gain = np.linalg.solve(inner + np.eye(len(right)) / SCALES[-1] ** 2, left.T)
+            gain = inverse(inner + np.eye(len(right)) / SCALES[-1] ** 2) @ left.T
             gram = gram - left @ gain
             score = score - gain.T @ right
         values = np.empty(len(self.hypotheses))
