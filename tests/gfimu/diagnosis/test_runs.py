@@ -1,0 +1,98 @@
+"""Recordings as diagnosis takes them: slower references, stretches of a long run, held-out blocks."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from gfimu.array import AccelerometerArray
+from gfimu.diagnosis import diagnose
+from gfimu.diagnosis.engine import make_segments
+from gfimu.diagnosis.holdout import split_segments
+from gfimu.diagnosis.integrity import check_integrity
+from gfimu.diagnosis.run import prepare_run
+from gfimu.recording import Recording
+from sim.campaign import Measurement, measure, random_profile
+from sim.effects import make_effect
+from sim.twin import Twin
+
+SETTING = Measurement(duration=24.0)
+
+
+@pytest.fixture(scope="module")
+def twin():
+    return Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
+
+
+@pytest.fixture(scope="module")
+def quiet(twin):
+    return measure(np.random.default_rng(7), twin, [], SETTING)
+
+
+def with_tacho(recording, array, tacho):
+    return Recording.from_arrays(
+        recording.t_s, recording.readings, array, reference={**recording.reference, "tacho_rad_s": tacho}
+    )
+
+
+@pytest.mark.parametrize("held", [False, True], ids=["left out", "held"])
+def test_a_tachometer_at_a_quarter_of_the_rate_is_no_discrepancy(twin, quiet, held):
+    tacho = quiet.reference["tacho_rad_s"]
+    place = np.arange(len(tacho))
+    slow = tacho[place // 4 * 4] if held else np.where(place % 4 == 0, tacho, np.nan)
+    run = prepare_run(with_tacho(quiet, twin.array, slow), twin)
+    assert_allclose(run.reference_valid, place % 4 == 0)
+    found = diagnose([with_tacho(quiet, twin.array, slow)], twin)
+    assert found.verdict == "nothing_found"
+    assert found.noise["reference_white"] == pytest.approx(0.02, rel=0.2)
+
+
+def test_a_coarse_tachometer_keeps_its_equal_values(twin, quiet):
+    coarse = np.round(quiet.reference["tacho_rad_s"] / 0.5) * 0.5
+    assert prepare_run(with_tacho(quiet, twin.array, coarse), twin).reference_valid.all()
+
+
+TIMED = {
+    "warm_up": {"a11_m_s2": 0.3, "time_constant_s": 9.0},
+    "gain_drift": {"slope_1_s": 1e-3},
+    "clock_error": {"ratio": 2e-3},
+}
+
+
+@pytest.mark.parametrize("name", TIMED)
+def test_a_stretch_keeps_the_time_origin_of_its_run(twin, quiet, name):
+    [segment] = make_segments(twin, [prepare_run(quiet, twin)])
+    segment.prepare_weights()
+    effect = make_effect(name, TIMED[name], twin.array)
+    whole = segment.predict([effect])
+    for pair in split_segments([segment], [[]]):
+        for block in pair.test:
+            rows = np.searchsorted(segment.run.t, block.run.t)
+            # The block's own spline follows the run's to this much; a lost origin would show tens of times more.
+            assert_allclose(block.predict([effect]), whole[rows], atol=0.01)
+
+
+def test_held_out_blocks_are_predicted_to_the_noise(twin):
+    effect = make_effect("channel_skew", {"per_chip_s": -0.04}, twin.array)
+    found = diagnose([measure(np.random.default_rng(8), twin, [effect], SETTING)], twin)
+    assert [cause.effect for cause in found.causes] == ["channel_skew"]
+    assert found.gain.share_of_excess_removed > 0.99
+
+
+def test_a_chip_at_twice_its_gain_is_not_taken_for_clipping(twin):
+    rng = np.random.default_rng(9)
+    motion = random_profile(rng, SETTING.duration)
+    effect = make_effect("wrong_range", {"chip": "a3", "factor": 2.0}, twin.array)
+    run = prepare_run(measure(rng, twin, [effect], SETTING, motion=motion), twin)
+    [segment] = make_segments(twin, [run])
+    checked = check_integrity(twin, run, segment.predict([])[:, :-1])
+    assert [found.name for found in checked.effects] == ["wrong_range"]
+
+
+def test_a_large_skew_is_found_though_far_from_linear(twin):
+    effect = make_effect("channel_skew", {"per_chip_s": -0.15}, twin.array)
+    found = diagnose([measure(np.random.default_rng(10), twin, [effect], SETTING)], twin)
+    assert [cause.effect for cause in found.causes] == ["channel_skew"]
+    [cause] = found.causes
+    assert abs(cause.parameters["per_chip_s"] + 0.15) < 4 * cause.std["per_chip_s"]
