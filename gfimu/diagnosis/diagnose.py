@@ -92,7 +92,8 @@ def diagnose(
     explanation, walk = _explain(prepared, model, tell)
     tell(0.92, "hold out")
     pairs, label = _holdouts(explanation, prepared, held_out, model)
-    explanation, withdrawn = _gate(explanation, pairs)
+    halves = split_segments(explanation.segments, explanation.fixed, duration=np.inf)
+    explanation, withdrawn = _gate(explanation, pairs if held_out else halves, other_recording=bool(held_out))
     left = left_over(
         explanation.segments, explanation.fit, explanation.fixed, prepared.spikes, rounded=prepared.rounded
     )
@@ -186,7 +187,7 @@ def _explain(prepared: _Prepared, model: WorldModel, tell: Report) -> tuple[Expl
 def _holdouts(
     explanation: Explanation, prepared: _Prepared, held_out: Sequence[Recording], model: WorldModel
 ) -> tuple[list[Holdout], str]:
-    """Pair fitted and held-out data: other recordings where given, halves otherwise."""
+    """Pair fitted and held-out data for the gain: other recordings where given, blocks of the run otherwise."""
     if not held_out:
         return split_segments(
             explanation.segments, explanation.fixed
@@ -201,12 +202,14 @@ def _holdouts(
     return [Holdout(fitted, [list(f) for f in explanation.fixed], segments, known)], "another recording"
 
 
-def _gate(explanation: Explanation, pairs: Sequence[Holdout]) -> tuple[Explanation, list[str]]:
+def _gate(
+    explanation: Explanation, pairs: Sequence[Holdout], *, other_recording: bool
+) -> tuple[Explanation, list[str]]:
     """Withdraw causes that do not predict held-out data; returns what is left and the names withdrawn."""
     fit, without = explanation.fit, explanation.without
     withdrawn: list[str] = []
     while fit.causes:
-        gains = gate_gains(fit, without, pairs)
+        gains = gate_gains(fit, without, pairs, other_recording=other_recording)
         worst = min(gains, key=lambda name: gains[name])
         if gains[worst] >= LEAST_GAIN:
             break

@@ -17,7 +17,7 @@ from gfimu.diagnosis.model import Effect, WorldModel
 from gfimu.diagnosis.refinement import Fit, refine
 from gfimu.diagnosis.run import Run
 from gfimu.diagnosis.search import search
-from gfimu.diagnosis.segment import Segment, difference_noise
+from gfimu.diagnosis.segment import Linearisation, Segment, difference_noise, over_segments
 from gfimu.diagnosis.signatures import Hypothesis, SignatureSet, hypotheses, plan_signatures, signature_columns
 
 __all__ = ["Explanation", "explain", "make_segments", "screen"]
@@ -108,15 +108,22 @@ def screen(segments: Sequence[Segment], base: Fit, fixed: Sequence[Sequence[Effe
     array = model.array
     for segment, drive in zip(segments, base.drives, strict=True):
         segment.coefficients = drive
-    linear = [
-        segment.linearise([*known, *effects_of_run(base.causes, array, segment.index)])
-        for segment, known in zip(segments, fixed, strict=True)
-    ]
+    linear = over_segments(
+        lambda segment, known: segment.linearise([*known, *effects_of_run(base.causes, array, segment.index)]),
+        segments,
+        fixed,
+    )
     signatures, count = plan_signatures(model.families(), segments, linear, base.causes, runs)
     gram, score = np.zeros((count, count)), np.zeros(count)
-    for segment, line, known in zip(segments, linear, fixed, strict=True):
+
+    def products(
+        segment: Segment, line: Linearisation, known: Sequence[Effect]
+    ) -> tuple[NDArray[np.intp], NDArray[np.float64], NDArray[np.float64]]:
         columns, numbers = signature_columns(segment, signatures, base.causes, known)
         part, part_score, _ = segment.whitened_products(line, columns)
+        return numbers, part, part_score
+
+    for numbers, part, part_score in over_segments(products, segments, linear, fixed):
         gram[np.ix_(numbers, numbers)] += part
         score[numbers] += part_score
     at = np.zeros(count)
@@ -172,10 +179,13 @@ def learn_noise(
 def tune_drives(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]]) -> None:
     """Let the data choose how rough the drive of every segment may be."""
     array = segments[0].model.array
-    for segment, known, drive in zip(segments, fixed, fit.drives, strict=True):
+
+    def tune(segment: Segment, known: Sequence[Effect], drive: NDArray[np.float64]) -> None:
         segment.coefficients = drive
         segment.learn_roughness()
         segment.tune_roughness([*known, *effects_of_run(fit.causes, array, segment.index)])
+
+    over_segments(tune, segments, fixed, fit.drives)
 
 
 def explain(

@@ -39,12 +39,24 @@ class Holdout:
     test_fixed: list[list[Effect]]
 
 
-def split_segments(segments: Sequence[Segment], fixed: Sequence[Sequence[Effect]]) -> list[Holdout]:
-    """Split every segment into blocks, alternately of one part and of the other, and pair the parts both ways."""
+def split_segments(
+    segments: Sequence[Segment], fixed: Sequence[Sequence[Effect]], *, duration: float = BLOCK_DURATION
+) -> list[Holdout]:
+    """Split every segment into an even number of blocks, alternately of one part and of the other; pair them both ways.
+
+    Parameters
+    ----------
+    segments : sequence of Segment
+        The data.
+    fixed : sequence of sequence of Effect
+        Effects known beforehand, per segment.
+    duration : float
+        About how long a block is, s; infinite for halves.
+    """
     parts: list[list[Segment]] = [[], []]
     known: list[list[list[Effect]]] = [[], []]
     for segment, effects in zip(segments, fixed, strict=True):
-        pairs = max(1, round(segment.run.duration / (2 * BLOCK_DURATION)))
+        pairs = max(1, round(segment.run.duration / (2 * duration)))
         edges = np.linspace(0, len(segment.run.t), 2 * pairs + 1).astype(int)
         for place, (start, stop) in enumerate(pairwise(edges)):
             block = Segment(segment.model, segment.run.rows(int(start), int(stop)), segment.index, segment.start)
@@ -54,18 +66,34 @@ def split_segments(segments: Sequence[Segment], fixed: Sequence[Sequence[Effect]
     return [Holdout(parts[0], known[0], parts[1], known[1]), Holdout(parts[1], known[1], parts[0], known[0])]
 
 
-def gate_gains(fit: Fit, without: dict[str, Fit], pairs: Sequence[Holdout]) -> dict[str, float]:
-    """Return the log predictive gain of each cause on the held-out blocks, the other causes kept.
+def gate_gains(
+    fit: Fit, without: dict[str, Fit], pairs: Sequence[Holdout], *, other_recording: bool = False
+) -> dict[str, float]:
+    """Return the log predictive gain of each cause on held-out data, the other causes kept.
 
-    The whole run is whitened as one block for the joint evidence, so that slow noise common to both parts does not
-    count as a repetition.
+    That of both parts together less that of the fitted part. The halves of one run are whitened as one block for the
+    joint evidence, so that slow noise common to both does not count as a repetition; many short blocks would each
+    count it anew.
+
+    Parameters
+    ----------
+    fit : Fit
+        The causes, fitted to all that is not another recording.
+    without : dict of str to Fit
+        The best fit without each.
+    pairs : sequence of Holdout
+        The halves both ways, or the runs fitted and the runs kept.
+    other_recording : bool
+        Whether the held-out data are other recordings.
     """
     gains = {}
-    whole = fit.log_evidence
     for name, other in without.items():
-        joint = whole - other.log_evidence
         parts = []
         for pair in pairs:
+            joint = fit.log_evidence - other.log_evidence
+            if other_recording:
+                every, known = [*pair.train, *pair.test], [*pair.train_fixed, *pair.test_fixed]
+                joint = _evidence_of(every, fit.causes, known) - _evidence_of(every, other.causes, known)
             full = _evidence_of(pair.train, fit.causes, pair.train_fixed)
             rest = _evidence_of(pair.train, other.causes, pair.train_fixed)
             parts.append(joint - (full - rest))
@@ -74,7 +102,7 @@ def gate_gains(fit: Fit, without: dict[str, Fit], pairs: Sequence[Holdout]) -> d
 
 
 def _evidence_of(segments: Sequence[Segment], causes: Sequence[Cause], fixed: Sequence[Sequence[Effect]]) -> float:
-    return refine(segments, causes, fixed, iterations=2, shapes=False).log_evidence
+    return refine(segments, causes, fixed, iterations=_ITERATIONS, shapes=False).log_evidence
 
 
 def held_out_gain(causes: Sequence[Cause], pairs: Sequence[Holdout], constant: Sequence[Effect], *, label: str) -> Gain:

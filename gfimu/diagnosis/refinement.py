@@ -16,7 +16,7 @@ from gfimu.diagnosis.causes import Cause, effects_of_run
 from gfimu.diagnosis.evidence import SCALES, inverse, log_evidence
 from gfimu.diagnosis.model import Effect
 from gfimu.diagnosis.search import EXTRA_CAUSE
-from gfimu.diagnosis.segment import Segment
+from gfimu.diagnosis.segment import Linearisation, Segment, over_segments
 from gfimu.diagnosis.signatures import ANGLES, cause_columns, shape_moved
 
 __all__ = ["Fit", "refine"]
@@ -156,12 +156,16 @@ def _descend(segments: Sequence[Segment], fixed: Sequence[Sequence[Effect]], sta
 
 def _evaluate(segments: Sequence[Segment], fixed: Sequence[Sequence[Effect]], state: _State) -> _Point:
     """Linearise every segment about a state and solve for the step of causes and drives."""
-    lines, products = [], []
-    for segment, known, drive in zip(segments, fixed, state.drives, strict=True):
+
+    def linearised(
+        segment: Segment, known: Sequence[Effect], drive: NDArray[np.float64]
+    ) -> tuple[Linearisation, tuple[NDArray[np.float64], ...]]:
         segment.coefficients = drive
         line = segment.linearise([*known, *effects_of_run(state.causes, segment.model.array, segment.index)])
-        lines.append(line)
-        products.append(segment.whitened_products(line, cause_columns(segment, state.causes, known, shapes=True)))
+        return line, segment.whitened_products(line, cause_columns(segment, state.causes, known, shapes=True))
+
+    done = over_segments(linearised, segments, fixed, state.drives)
+    lines, products = [line for line, _ in done], [product for _, product in done]
     gram = np.sum([product[0] for product in products], axis=0)
     score = np.sum([product[1] for product in products], axis=0)
     precision, pull = _prior(state.causes)

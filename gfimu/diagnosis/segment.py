@@ -10,8 +10,11 @@ so that everything after it is small algebra on G and b, whatever the length of 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import os
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,7 +29,9 @@ from gfimu.diagnosis.model import Effect, Spin, SpinState, WorldModel
 from gfimu.diagnosis.rounding import COARSE, rounded_likelihood, rounding_noise
 from gfimu.diagnosis.run import Run
 
-__all__ = ["Linearisation", "Segment", "difference_noise"]
+__all__ = ["Linearisation", "Segment", "difference_noise", "over_segments"]
+
+Result = TypeVar("Result")
 
 KNOT_SPACING = 0.05
 TIME_MARGIN = 0.5
@@ -62,6 +67,19 @@ class Linearisation:
     factor: NDArray[np.float64]
     forward: NDArray[np.float64]
     objective: float
+
+
+def over_segments(work: Callable[..., Result], *columns: Iterable[Any]) -> list[Result]:
+    """Call ``work`` with one item of each column per segment, on threads where there are several segments.
+
+    Segments share nothing that changes, and their algebra leaves the interpreter free.
+    """
+    rows = list(zip(*columns, strict=True))
+    workers = min(len(rows), os.cpu_count() or 1)
+    if workers < 2:
+        return [work(*row) for row in rows]
+    with ThreadPoolExecutor(workers) as pool:
+        return list(pool.map(lambda row: work(*row), rows))
 
 
 class Segment:

@@ -13,7 +13,8 @@ from gfimu.diagnosis.holdout import split_segments
 from gfimu.diagnosis.integrity import check_integrity
 from gfimu.diagnosis.run import prepare_run
 from gfimu.recording import Recording
-from sim.campaign import Measurement, measure, random_profile
+from gfimu.units import STANDARD_GRAVITY
+from sim.campaign import Measurement, hidden_effect, measure, random_profile
 from sim.effects import make_effect
 from sim.twin import Twin
 
@@ -96,3 +97,24 @@ def test_a_large_skew_is_found_though_far_from_linear(twin):
     assert [cause.effect for cause in found.causes] == ["channel_skew"]
     [cause] = found.causes
     assert abs(cause.parameters["per_chip_s"] + 0.15) < 4 * cause.std["per_chip_s"]
+
+
+@pytest.mark.parametrize("name", ["eccentricity", "bias"])
+def test_a_recording_kept_for_the_gate_confirms_the_cause(twin, name):
+    rng = np.random.default_rng(11)
+    motion = random_profile(rng, SETTING.duration)
+    effect = hidden_effect(rng, twin, name, motion, 300.0, SETTING)
+    first = measure(rng, twin, [effect], SETTING, motion=motion)
+    found = diagnose([first], twin, held_out=[measure(rng, twin, [effect], SETTING)])
+    assert name in {cause.effect for cause in found.causes}
+    assert found.gain.held_out == "another recording"
+    assert found.gain.share_of_excess_removed > 0.97
+
+
+def test_a_large_bias_under_strong_slow_noise_passes_the_gate(twin):
+    # Bias instability of 0.5 mg: every short block alone would count the slow noise as its own repetition of the bias.
+    rng = np.random.default_rng(12)
+    noisy = Measurement(duration=40.0, bias_instability=0.5e-3 * STANDARD_GRAVITY)
+    effect = make_effect("bias", {"a11_m_s2": 0.1}, twin.array)
+    found = diagnose([measure(rng, twin, [effect], noisy)], twin)
+    assert "bias" in {cause.effect for cause in found.causes}
