@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import multiprocessing
 import os
+import threading
+import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
@@ -21,6 +23,7 @@ from sim.study.outcome import run_case
 
 __all__ = ["open_executor", "read_outcomes", "run_study"]
 
+_WATCH_PERIOD = 2.0
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
@@ -38,8 +41,20 @@ def open_executor(workers: int, cluster: str = "") -> Iterator[Executor]:
     # Linear algebra on many threads collapses when every worker does it; NumPy reads this when it is first imported.
     for variable in _ONE_THREAD:
         os.environ.setdefault(variable, "1")
-    with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(workers, context, initializer=_end_with_parent, initargs=(os.getpid(),)) as pool:
         yield pool
+
+
+def _end_with_parent(parent: int) -> None:
+    """Let a worker end soon after the study was killed; it would go on with its case, and hold a core, otherwise."""
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(_WATCH_PERIOD)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
 
 
 def read_outcomes(path: str | Path) -> list[dict[str, Any]]:
