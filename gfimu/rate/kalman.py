@@ -34,7 +34,7 @@ from gfimu.rate.recursion_data import (
     Tables,
     Tuning,
 )
-from gfimu.rate.rest_test import KEPT_BLOCKS, RUN_BLOCKS, RestTest
+from gfimu.rate.rest_test import HISTORY_BLOCKS, KEPT_BLOCKS, RUN_BLOCKS, RestTest
 from gfimu.rate.result import ChannelReport, RateEstimate, SignDecision, full_covariance
 from gfimu.rate.sensing import ChannelTables, SensorErrors
 
@@ -184,7 +184,7 @@ class KalmanRateFilter:
         )
         self.state = self._start()
         self._compiled_tables = self._tables()
-        self._history = points + 2 + (KEPT_BLOCKS + 1) * self._tuning.rest_window
+        self._history = points + 2 + HISTORY_BLOCKS * self._tuning.rest_window
         self._buffer = _buffer(capacity + self._history + points, c, d)
         self._received = 0  # rows of the buffer that hold samples
         self._done = 0  # rows of the buffer that are estimated
@@ -213,7 +213,7 @@ class KalmanRateFilter:
         covariance[6 + d : n - 3, 6 + d : n - 3] = np.eye(n - 9 - d) * self.errors.gyro_bias_std**2
         rest = self.settings.rest
         settles = np.array([rest is not None and not x.any() and self.settings.start_std <= rest.largest_rate_std])
-        counts = np.array([0, 0, 0, 0, 0, int(settles[0]), 0, 0, 0])  # a start at rest is rest to begin with
+        counts = np.array([0, 0, 0, 0, 0, int(settles[0]), 0, 0, 0, 0])  # a start at rest is rest to begin with
         return RecursionState(
             x, covariance, np.zeros(5), np.zeros(3), counts, settles, x.copy(), covariance.copy(),
             np.zeros(c), np.zeros((RUN_BLOCKS, 3)), np.zeros((RUN_BLOCKS, 3)), np.zeros((RUN_BLOCKS, 3, 3)),

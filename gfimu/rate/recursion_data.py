@@ -15,7 +15,7 @@ COMPILE: dict[str, Any] = {"cache": True, "error_model": "numpy", "fastmath": {"
 # Places in RecursionState.scalars
 TIME, WALK, LAST_GOOD, FOURTH, FIFTH = range(5)
 # Places in RecursionState.counts
-STARTED, BLOCK, REST_BLOCKS, SAMPLES, RUN, RESTING, PAST, RETURN, RETRY = range(9)
+STARTED, BLOCK, REST_BLOCKS, SAMPLES, RUN, RESTING, PAST, RETURN, RETRY, DOUBT = range(10)
 
 
 class Tables(NamedTuple):
@@ -59,7 +59,7 @@ class RecursionState(NamedTuple):
     covariance: NDArray[np.float64]  # (n, n)
     scalars: NDArray[np.float64]  # (5,)
     mean_alpha: NDArray[np.float64]  # (3,) over the filter's memory
-    counts: NDArray[np.int64]  # (9,)
+    counts: NDArray[np.int64]  # (10,)
     settles: NDArray[np.bool_]  # (1,) the run starts at rest
     block_x: NDArray[np.float64]  # (n,) state when the block began
     block_covariance: NDArray[np.float64]  # (n, n)

@@ -5,7 +5,19 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from gfimu.rate.recursion_data import BLOCK, COMPILE, PAST, REST_BLOCKS, RESTING, RETRY, RETURN, RUN, SAMPLES
+from gfimu.rate.recursion_data import (
+    BLOCK,
+    COMPILE,
+    DOUBT,
+    PAST,
+    REST_BLOCKS,
+    RESTING,
+    RETRY,
+    RETURN,
+    RUN,
+    SAMPLES,
+)
+from gfimu.rate.rest_test import HISTORY_BLOCKS
 
 __all__ = ["keep_rest", "rest_block"]
 
@@ -25,6 +37,7 @@ def rest_block(data, k, tables, tuning, state):  # type: ignore[no-untyped-def]
             counts[RESTING] = 0
             counts[PAST] = 0
             counts[RETRY] = 0
+            counts[DOUBT] = 0
         counts[BLOCK] = 0
         return False
     counts[BLOCK] += 1
@@ -33,18 +46,22 @@ def rest_block(data, k, tables, tuning, state):  # type: ignore[no-untyped-def]
     counts[BLOCK] = 0
     span = 0 if data.vetoed[k] else _moving_blocks(data.y[k - window + 1 : k + 1], tables, tuning, state)
     if data.vetoed[k] or span > 0:
-        doubted = min(span, counts[PAST] - 1, len(state.past_x) - 1)  # the state behind the first block stays
-        if doubted > 0:
-            place = (counts[PAST] - 1 - doubted) % len(state.past_x)
-            if counts[SAMPLES] < state.past_samples[place] + len(state.past_x) * window:  # those samples are at hand
+        # Besides the blocks that move, the one before them; none of those in doubt was taken for rest.
+        back = 0 if data.vetoed[k] else max(span - counts[DOUBT], 1)
+        back = min(back, counts[PAST] - 1, len(state.past_x) - 1)  # the state behind the first block stays
+        while back > 0 and counts[RETURN] == 0:
+            place = (counts[PAST] - 1 - back) % len(state.past_x)
+            if counts[SAMPLES] < state.past_samples[place] + (HISTORY_BLOCKS - 1) * window:  # those are at hand
                 counts[RETURN] = place + 1
+            back -= 1
         if not data.vetoed[k] or counts[RESTING] > 0:  # all that is vetoed in a row counts as one block
             counts[RETRY] = counts[RESTING]
         counts[RUN] = 0
         counts[RESTING] = 0
         counts[PAST] = 0
+        counts[DOUBT] = 0
         return False
-    return counts[RESTING] > 0
+    return counts[RESTING] > 0 and counts[DOUBT] == 0
 
 
 @njit(**COMPILE)
@@ -60,18 +77,24 @@ def keep_rest(state):  # type: ignore[no-untyped-def]
 
 @njit(**COMPILE)
 def _moving_blocks(y, tables, tuning, state):  # type: ignore[no-untyped-def]
-    """Test the block of readings y (window, c) for rest: 0, or how many blocks up to this one move."""
+    """Test the block of readings y (window, c) for rest: 0, or how many blocks up to this one move.
+
+    Amid a rest ``state.counts[DOUBT]`` says whether the block is in doubt.
+    """
     window, c = y.shape
     d = tables.null_rows.shape[1]
+    counts = state.counts
+    resting = counts[RESTING] > 0
     first = window // 2
     second = window - first
-    limits = tuning.rest_limits[1 if state.counts[SAMPLES] < window else 0]
-    # ω when the block began: known, and not far from zero.
+    limits = tuning.rest_limits[1 if counts[SAMPLES] < window else 0]
+    ends = tuning.rest_limits[1] if resting else limits  # what ends a rest at once
+    # ω when the block began: known, and not far from zero. Amid a rest that is the α of a block in doubt over again.
     known = state.block_covariance
     for a in range(3):
         if not known[a, a] <= limits[5]:  # nor if it is NaN
             return 1
-        if state.block_x[a] ** 2 > limits[4] * (known[a, a] + tuning.rest_variance):  # never less than the full χ²
+        if state.block_x[a] ** 2 > ends[4] * (known[a, a] + tuning.rest_variance):  # never less than the full χ²
             return 1
     # Scatter within the block, and its second half against its first.
     mean = np.empty(c)
@@ -96,27 +119,37 @@ def _moving_blocks(y, tables, tuning, state):  # type: ignore[no-untyped-def]
         scatter += weight * (squares - total * total / window)
         difference = late / second - early / first
         halves += weight * difference * difference
-    if scatter > limits[0] or halves / (1.0 / first + 1.0 / second) > limits[1]:
+    halves /= 1.0 / first + 1.0 / second
+    if scatter > ends[0] or halves > ends[1]:
         return 1
     consistent = np.linalg.solve(known[:3, :3] + tuning.rest_variance * np.eye(3), state.block_x[:3])
-    if (consistent * state.block_x[:3]).sum() > limits[4]:
+    if (consistent * state.block_x[:3]).sum() > ends[4]:
         return 1
     # Means against the biases known when the block began.
     alpha = tables.alpha_rows[0] @ mean - state.block_x[3:6]
     spread = known[3:6, 3:6] + tables.alpha_noise[0] / window
-    if (np.linalg.solve(spread, alpha) * alpha).sum() > limits[2]:
-        return 1
+    alpha_statistic = (np.linalg.solve(spread, alpha) * alpha).sum()
+    null_statistic = 0.0
     if d > 0:
         null = tables.null_rows[0] @ mean - state.block_x[6 : 6 + d]
         spread_null = known[6 : 6 + d, 6 : 6 + d] + np.eye(d) / window
-        if (np.linalg.solve(spread_null, null) * null).sum() > limits[3]:
-            return 1
-    return _moving_run(mean, alpha, tables, tuning, state)
+        null_statistic = (np.linalg.solve(spread_null, null) * null).sum()
+    if alpha_statistic > ends[2] or null_statistic > ends[3]:
+        return 1
+    doubtful = (
+        scatter > limits[0] or halves > limits[1] or alpha_statistic > limits[2] or null_statistic > limits[3]
+    )
+    if doubtful and counts[DOUBT] > 0:  # the second in a row
+        return 2
+    span = _moving_run(mean, alpha, doubtful, tables, tuning, state)
+    if span == 0:
+        counts[DOUBT] = 1 if doubtful else 0
+    return span
 
 
 @njit(**COMPILE)
-def _moving_run(mean, alpha, tables, tuning, state):  # type: ignore[no-untyped-def]
-    """Test the blocks in a row that ended with this one, which passed; rest begins when they are enough.
+def _moving_run(mean, alpha, doubtful, tables, tuning, state):  # type: ignore[no-untyped-def]
+    """Test the blocks in a row that ended with this one, which alone moves not; rest begins when they are enough.
 
     Returns 0, or how many blocks up to this one move.
     """
@@ -129,9 +162,10 @@ def _moving_run(mean, alpha, tables, tuning, state):  # type: ignore[no-untyped-
     state.run_covariance[place] = state.block_covariance[3:6, 3:6]
     counts[RUN] += 1
     run = counts[RUN]
+    limit = tuning.rest_limits[1 if counts[RESTING] > 0 else 0, 2]
     span = 2
     while span <= min(run, length):
-        if _run_statistic(span, tables, tuning, state) > tuning.rest_limits[0, 2]:
+        if _run_statistic(span, tables, tuning, state) > limit:
             return span
         span *= 2
     if counts[RESTING] == 0:
@@ -145,6 +179,8 @@ def _moving_run(mean, alpha, tables, tuning, state):  # type: ignore[no-untyped-
         if (np.linalg.solve(known, state.x[:3]) * state.x[:3]).sum() > tuning.rest_limits[0, 7]:
             return 0
         counts[RESTING] = 1
+    if doubtful:
+        return 0
     blocks = counts[REST_BLOCKS]
     for i in range(len(mean)):
         state.reference[i] += (mean[i] - state.reference[i]) / (blocks + 1)

@@ -40,13 +40,16 @@ from scipy.stats import chi2
 from gfimu.array import AccelerometerArray
 from gfimu.errors import InputError
 
-__all__ = ["KEPT_BLOCKS", "RUN_BLOCKS", "RestTest", "constant_readings"]
+__all__ = ["HISTORY_BLOCKS", "KEPT_BLOCKS", "RUN_BLOCKS", "RestTest", "constant_readings"]
 
 RUN_BLOCKS = 16
 """Blocks over which the mean of α is followed."""
 
 KEPT_BLOCKS = 5
 """States kept during a rest: all but one of these blocks can be taken back."""
+
+HISTORY_BLOCKS = KEPT_BLOCKS + 3
+"""Blocks of samples kept for that, with room for blocks in doubt between them."""
 
 
 @dataclass(frozen=True)
