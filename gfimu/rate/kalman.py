@@ -179,7 +179,7 @@ class KalmanRateFilter:
             rest.window(period) if rest else 0,
             rest.rate_std**2 if rest else 1.0,
             *(rest.entry_blocks(period) if rest else (1, 1)),
-            np.array([rest.limits(c, d, period), rest.limits(c, d, period, first=True)]) if rest else np.zeros((2, 8)),
+            rest.all_limits(c, d, period) if rest else np.zeros((3, 8)),
             likelihood,
         )
         self.state = self._start()

@@ -355,7 +355,7 @@ def forward(  # type: ignore[no-untyped-def]
                     determinant *= variance
                     dof += 1
 
-        # Rest: at the end of each block that passes the test ω = 0 is one more measurement.
+        # Rest: at the end of each block that passes the test, without a doubt, ω = 0 is one more measurement.
         rest = False
         if tuning.rest_window > 0 and rest_block(data, k, tables, tuning, state):
             rest = True

@@ -48,7 +48,7 @@ class Tuning(NamedTuple):
     rest_variance: float  # of the rate at rest, (rad/s)²
     rest_entry: int  # blocks in a row before rest begins anew
     rest_retry: int  # the same right behind a single block that was no rest
-    rest_limits: NDArray[np.float64]  # (2, 8) `gfimu.rate.rest_test.RestTest.limits`; row 1 for the first block
+    rest_limits: NDArray[np.float64]  # (3, 8) `gfimu.rate.rest_test.RestTest.all_limits`
     likelihood: bool
 
 

@@ -79,7 +79,7 @@ def keep_rest(state):  # type: ignore[no-untyped-def]
 def _moving_blocks(y, tables, tuning, state):  # type: ignore[no-untyped-def]
     """Test the block of readings y (window, c) for rest: 0, or how many blocks up to this one move.
 
-    Amid a rest ``state.counts[DOUBT]`` says whether the block is in doubt.
+    Amid a rest ``state.counts[DOUBT]`` is how many blocks up to this one are in doubt.
     """
     window, c = y.shape
     d = tables.null_rows.shape[1]
@@ -88,7 +88,7 @@ def _moving_blocks(y, tables, tuning, state):  # type: ignore[no-untyped-def]
     first = window // 2
     second = window - first
     limits = tuning.rest_limits[1 if counts[SAMPLES] < window else 0]
-    ends = tuning.rest_limits[1] if resting else limits  # what ends a rest at once
+    ends = tuning.rest_limits[2] if resting and counts[SAMPLES] >= window else limits  # what ends a rest at once
     # ω when the block began: known, and not far from zero. Amid a rest that is the α of a block in doubt over again.
     known = state.block_covariance
     for a in range(3):
@@ -141,14 +141,26 @@ def _moving_blocks(y, tables, tuning, state):  # type: ignore[no-untyped-def]
     )
     if doubtful and counts[DOUBT] > 0:  # the second in a row
         return 2
-    span = _moving_run(mean, alpha, doubtful, tables, tuning, state)
-    if span == 0:
-        counts[DOUBT] = 1 if doubtful else 0
-    return span
+    span = _moving_run(alpha, tables, tuning, state)
+    if span > 0 or counts[RESTING] == 0:
+        return span
+    # A doubt is over when the mean since it began is again what rest explains.
+    since = counts[DOUBT] + 1
+    if counts[DOUBT] > 0 and _run_statistic(min(since, len(state.run_alpha)), tables, tuning, state) > limits[2]:
+        doubtful = True
+    if doubtful:
+        counts[DOUBT] = since
+        return 0 if since < len(state.past_x) else since
+    counts[DOUBT] = 0
+    blocks = counts[REST_BLOCKS]
+    for i in range(c):
+        state.reference[i] += (mean[i] - state.reference[i]) / (blocks + 1)
+    counts[REST_BLOCKS] = blocks + 1
+    return 0
 
 
 @njit(**COMPILE)
-def _moving_run(mean, alpha, doubtful, tables, tuning, state):  # type: ignore[no-untyped-def]
+def _moving_run(alpha, tables, tuning, state):  # type: ignore[no-untyped-def]
     """Test the blocks in a row that ended with this one, which alone moves not; rest begins when they are enough.
 
     Returns 0, or how many blocks up to this one move.
@@ -162,7 +174,7 @@ def _moving_run(mean, alpha, doubtful, tables, tuning, state):  # type: ignore[n
     state.run_covariance[place] = state.block_covariance[3:6, 3:6]
     counts[RUN] += 1
     run = counts[RUN]
-    limit = tuning.rest_limits[1 if counts[RESTING] > 0 else 0, 2]
+    limit = tuning.rest_limits[2 if counts[RESTING] > 0 else 0, 2]
     span = 2
     while span <= min(run, length):
         if _run_statistic(span, tables, tuning, state) > limit:
@@ -179,12 +191,6 @@ def _moving_run(mean, alpha, doubtful, tables, tuning, state):  # type: ignore[n
         if (np.linalg.solve(known, state.x[:3]) * state.x[:3]).sum() > tuning.rest_limits[0, 7]:
             return 0
         counts[RESTING] = 1
-    if doubtful:
-        return 0
-    blocks = counts[REST_BLOCKS]
-    for i in range(len(mean)):
-        state.reference[i] += (mean[i] - state.reference[i]) / (blocks + 1)
-    counts[REST_BLOCKS] = blocks + 1
     return 0
 
 

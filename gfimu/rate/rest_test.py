@@ -63,6 +63,8 @@ class RestTest:
     false_alarm : float
         Largest probability that a block at rest is not recognised; a hundredth of it for the first block of a run that
         is said to start at rest, because everything after hangs on that.
+    loss : float
+        Probability at which a block, or the mean of several, ends a rest at once, without waiting for the next block.
     rate_std : float
         How far from zero the rate may be at rest, rad/s (standard deviation).
     largest_rate_std : float
@@ -77,6 +79,7 @@ class RestTest:
 
     window_s: float = 0.5
     false_alarm: float = 0.01
+    loss: float = 1e-5
     rate_std: float = 5e-3
     largest_rate_std: float = 0.2
     noise_margin: float = 0.1
@@ -84,8 +87,9 @@ class RestTest:
     retry_s: float = 1.5
 
     def __post_init__(self) -> None:
-        if not 0 < self.false_alarm < 1:
-            raise InputError(f"false_alarm = {self.false_alarm!r}: must lie between 0 and 1")
+        for name in ("false_alarm", "loss"):
+            if not 0 < getattr(self, name) < 1:
+                raise InputError(f"{name} = {getattr(self, name)!r}: must lie between 0 and 1")
         for name in ("window_s", "rate_std", "largest_rate_std", "entry_s", "retry_s"):
             if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0):
                 raise InputError(f"{name} = {getattr(self, name)!r}: must be a positive number")
@@ -94,13 +98,20 @@ class RestTest:
         """Return the samples per block, at least four."""
         return max(4, round(self.window_s / period))
 
-    def limits(self, n_channels: int, n_null: int, period: float, *, first: bool = False) -> NDArray[np.float64]:
+    def limits(
+        self, n_channels: int, n_null: int, period: float, false_alarm: float | None = None
+    ) -> NDArray[np.float64]:
         """Return the limits of the five statistics, the largest variance of ω, and of α and ω at entry, shape (8,)."""
-        false_alarm = self.false_alarm / 100.0 if first else self.false_alarm
+        false_alarm = self.false_alarm if false_alarm is None else false_alarm
         freedom = np.array([n_channels * (self.window(period) - 1), n_channels, 3, max(n_null, 1), 3])
         largest = chi2.ppf(1.0 - false_alarm / len(freedom), freedom)
         largest[:2] *= (1.0 + self.noise_margin) ** 2
         return np.array([*largest, self.largest_rate_std**2, *chi2.ppf([0.8, 0.95], 3)])
+
+    def all_limits(self, n_channels: int, n_null: int, period: float) -> NDArray[np.float64]:
+        """Return the limits for a block, for the first one, and those that end a rest at once, shape (3, 8)."""
+        levels = (self.false_alarm, self.false_alarm / 100.0, min(self.loss, self.false_alarm))
+        return np.array([self.limits(n_channels, n_null, period, level) for level in levels])
 
     def entry_blocks(self, period: float) -> tuple[int, int]:
         """Return how many blocks in a row begin a rest, and resume one, at most `RUN_BLOCKS`."""

@@ -128,9 +128,9 @@ class Study:
     dof: np.ndarray
 
     def turning(self, share=0.5):
-        """Samples at more than half the top speed, after the first block of the rest test."""
+        """Samples at more than half the top speed (all of a rest), after the first block of the rest test."""
         speed = np.linalg.norm(self.motion.omega, axis=1)
-        return (speed > share * speed.max()) & (self.motion.t > 0.6)
+        return ((speed > share * speed.max()) | (speed.max() == 0)) & (self.motion.t > 0.6)
 
     def independent(self, rows):
         """Independent errors among the samples ``rows`` of one run: the estimates forget within 1/|ω|, both ways."""
