@@ -181,6 +181,7 @@ class KalmanRateFilter:
             *(rest.entry_blocks(period) if rest else (1, 1)),
             rest.all_limits(c, d, period) if rest else np.zeros((3, 8)),
             likelihood,
+            True,
         )
         self.state = self._start()
         self._compiled_tables = self._tables()
@@ -213,7 +214,7 @@ class KalmanRateFilter:
         covariance[6 + d : n - 3, 6 + d : n - 3] = np.eye(n - 9 - d) * self.errors.gyro_bias_std**2
         rest = self.settings.rest
         settles = np.array([rest is not None and not x.any() and self.settings.start_std <= rest.largest_rate_std])
-        counts = np.array([0, 0, 0, 0, 0, int(settles[0]), 0, 0, 0, 0])  # a start at rest is rest to begin with
+        counts = np.array([0, 0, 0, 0, 0, int(settles[0]), 0, 0, 0, 0, 0])  # a start at rest is rest to begin with
         return RecursionState(
             x, covariance, np.zeros(5), np.zeros(3), counts, settles, x.copy(), covariance.copy(),
             np.zeros(c), np.zeros((RUN_BLOCKS, 3)), np.zeros((RUN_BLOCKS, 3)), np.zeros((RUN_BLOCKS, 3, 3)),
@@ -302,6 +303,7 @@ class KalmanRateFilter:
             )
         self._check_times(times)
         self._take(times, rows, None if gyro is None else np.asarray(gyro, dtype=float))
+        self._tuning = self._tuning._replace(live=False)
         out, stamps = self._empty(len(times))
         while True:
             self._kept, self._taken_back = [], []
@@ -424,7 +426,8 @@ class KalmanRateFilter:
         state.block_covariance[:] = state.covariance
         out.omega[place] = again.omega[-1]
         out.covariance[place] = again.covariance[-1]
-        self._taken_back.append((first, reached))
+        if not self._tuning.live:
+            self._taken_back.append((first, reached))
 
     def _empty(self, n: int) -> tuple[RecursionOutput, NDArray[np.float64]]:
         return empty_output(n), np.empty(n)

@@ -15,7 +15,7 @@ COMPILE: dict[str, Any] = {"cache": True, "error_model": "numpy", "fastmath": {"
 # Places in RecursionState.scalars
 TIME, WALK, LAST_GOOD, FOURTH, FIFTH = range(5)
 # Places in RecursionState.counts
-STARTED, BLOCK, REST_BLOCKS, SAMPLES, RUN, RESTING, PAST, RETURN, RETRY, DOUBT = range(10)
+STARTED, BLOCK, REST_BLOCKS, SAMPLES, RUN, RESTING, PAST, RETURN, RETRY, DOUBT, PAIR = range(11)
 
 
 class Tables(NamedTuple):
@@ -50,6 +50,7 @@ class Tuning(NamedTuple):
     rest_retry: int  # the same right behind a single block that was no rest
     rest_limits: NDArray[np.float64]  # (3, 8) `gfimu.rate.rest_test.RestTest.all_limits`
     likelihood: bool
+    live: bool  # a block in doubt takes back the one before until it is decided; a recorded run leaves it
 
 
 class RecursionState(NamedTuple):
@@ -59,7 +60,7 @@ class RecursionState(NamedTuple):
     covariance: NDArray[np.float64]  # (n, n)
     scalars: NDArray[np.float64]  # (5,)
     mean_alpha: NDArray[np.float64]  # (3,) over the filter's memory
-    counts: NDArray[np.int64]  # (10,)
+    counts: NDArray[np.int64]  # (11,)
     settles: NDArray[np.bool_]  # (1,) the run starts at rest
     block_x: NDArray[np.float64]  # (n,) state when the block began
     block_covariance: NDArray[np.float64]  # (n, n)

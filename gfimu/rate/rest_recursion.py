@@ -9,6 +9,7 @@ from gfimu.rate.recursion_data import (
     BLOCK,
     COMPILE,
     DOUBT,
+    PAIR,
     PAST,
     REST_BLOCKS,
     RESTING,
@@ -44,16 +45,13 @@ def rest_block(data, k, tables, tuning, state):  # type: ignore[no-untyped-def]
     if counts[BLOCK] < window:
         return False
     counts[BLOCK] = 0
+    doubts = counts[DOUBT]
     span = 0 if data.vetoed[k] else _moving_blocks(data.y[k - window + 1 : k + 1], tables, tuning, state)
     if data.vetoed[k] or span > 0:
-        # Besides the blocks that move, the one before them; none of those in doubt was taken for rest.
-        back = 0 if data.vetoed[k] else max(span - counts[DOUBT], 1)
-        back = min(back, counts[PAST] - 1, len(state.past_x) - 1)  # the state behind the first block stays
-        while back > 0 and counts[RETURN] == 0:
-            place = (counts[PAST] - 1 - back) % len(state.past_x)
-            if counts[SAMPLES] < state.past_samples[place] + (HISTORY_BLOCKS - 1) * window:  # those are at hand
-                counts[RETURN] = place + 1
-            back -= 1
+        if not data.vetoed[k]:
+            # Besides the blocks that move, the one before them; none of those in doubt was taken for rest.
+            back = max(span - doubts, 1)
+            _return_before(back - 1 if doubts > 0 and tuning.live else back, window, state)
         if not data.vetoed[k] or counts[RESTING] > 0:  # all that is vetoed in a row counts as one block
             counts[RETRY] = counts[RESTING]
         counts[RUN] = 0
@@ -61,7 +59,24 @@ def rest_block(data, k, tables, tuning, state):  # type: ignore[no-untyped-def]
         counts[PAST] = 0
         counts[DOUBT] = 0
         return False
+    if counts[DOUBT] > 0 and doubts == 0 and tuning.live:  # until it is decided, the blocks before are in doubt as well
+        back = min(1 + counts[PAIR], counts[PAST] - 1)
+        _return_before(back, window, state)
+        if counts[RETURN] > 0:
+            counts[PAST] -= back
     return counts[RESTING] > 0 and counts[DOUBT] == 0
+
+
+@njit(**COMPILE)
+def _return_before(back, window, state):  # type: ignore[no-untyped-def]
+    """Mark the kept state before the last ``back`` blocks of rest, or as many of them as are at hand."""
+    counts = state.counts
+    back = min(back, counts[PAST] - 1, len(state.past_x) - 1)  # the state behind the first block stays
+    while back > 0 and counts[RETURN] == 0:
+        place = (counts[PAST] - 1 - back) % len(state.past_x)
+        if counts[SAMPLES] < state.past_samples[place] + (HISTORY_BLOCKS - 1) * window:
+            counts[RETURN] = place + 1
+        back -= 1
 
 
 @njit(**COMPILE)
@@ -136,18 +151,18 @@ def _moving_blocks(y, tables, tuning, state):  # type: ignore[no-untyped-def]
         null_statistic = (np.linalg.solve(spread_null, null) * null).sum()
     if alpha_statistic > ends[2] or null_statistic > ends[3]:
         return 1
-    doubtful = (
-        scatter > limits[0] or halves > limits[1] or alpha_statistic > limits[2] or null_statistic > limits[3]
-    )
+    doubtful = scatter > limits[0] or halves > limits[1] or alpha_statistic > limits[2] or null_statistic > limits[3]
     if doubtful and counts[DOUBT] > 0:  # the second in a row
         return 2
     span = _moving_run(alpha, tables, tuning, state)
     if span > 0 or counts[RESTING] == 0:
         return span
-    # A doubt is over when the mean since it began is again what rest explains.
+    # Two blocks together raise a doubt as well; it is over when the mean since it began is again what rest explains.
     since = counts[DOUBT] + 1
-    if counts[DOUBT] > 0 and _run_statistic(min(since, len(state.run_alpha)), tables, tuning, state) > limits[2]:
+    counts[PAIR] = 0
+    if counts[RUN] > 1 and _run_statistic(max(since, 2), tables, tuning, state) > limits[2]:
         doubtful = True
+        counts[PAIR] = 1
     if doubtful:
         counts[DOUBT] = since
         return 0 if since < len(state.past_x) else since

@@ -12,9 +12,14 @@ null space    mean z against its bias as known when the block began             
 rate          ω when the block began against zero                                    χ²(3)
 ============  ====================================================================  ==============
 
-Each is tested at a fifth of the stated false-alarm rate, so that a block at rest is missed in at most that share of
-cases. The mean α of the last 2, 4, 8 … blocks in a row is tested as well, against its bias as known when they began:
-it shows a departure too slow for one block.
+Each is tested at a fifth of the stated false-alarm rate, so that a block at rest fails in at most that share of cases.
+The mean α of the last 2, 4, 8 … blocks in a row is tested as well, against its bias as known when they began: it shows
+a departure too slow for one block.
+
+Amid a rest one failure is a doubt, because blocks fail by chance: ω = 0 is not used, and the filter takes the block
+before back as well (both, where the mean of two raised the doubt). The doubt is over when the next block passes and the
+mean α since it began is what rest explains. The rest ends with a second failed block in a row, with the fifth block in
+doubt, or at once where a block, the rate when it began, or the mean of 2, 4, 8 … fails at the level ``loss``.
 
 Until a slow departure shows it has been taken for rest. Therefore where a rest ends the filter takes back the block
 before, and the two, four … before when it was their mean that showed it: it goes back to its state before them and
@@ -25,8 +30,8 @@ Turning steadily about the vertical changes no reading; it is told from rest by 
 only counts if ω was known to ``largest_rate_std`` when it began. A start in the dark, with ω unknown, is never taken
 for rest. And a rate that passes slowly through zero looks like rest for a while: after a motion, rest begins only when
 blocks have passed in a row for ``entry_s`` and neither their mean α nor the rate is farther from zero than rest
-explains at a level of 20 % and 5 %. Too strict costs another block of waiting; too lax would be a wrong rate. Where one
-block fails amid a rest, as a hundredth of them do, ``retry_s`` and 5 % for both are enough: the biases are known then.
+explains at a level of 20 % and 5 %. Too strict costs another block of waiting; too lax would be a wrong rate. Behind a
+rest that a single block ended, ``retry_s`` and 5 % for both are enough: the biases are known then.
 """
 
 from __future__ import annotations
@@ -79,7 +84,7 @@ class RestTest:
 
     window_s: float = 0.5
     false_alarm: float = 0.01
-    loss: float = 1e-5
+    loss: float = 1e-6
     rate_std: float = 5e-3
     largest_rate_std: float = 0.2
     noise_margin: float = 0.1

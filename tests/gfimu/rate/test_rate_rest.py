@@ -40,18 +40,16 @@ def test_blocks_at_rest_are_recognised_at_the_stated_rate():
 
 
 def test_a_rest_is_not_lost_to_blocks_that_fail_by_chance():
-    """Each costs that block alone. α and null space fail in 0.2 % each; of the other statistics, two have a margin for
-    larger noise and the rate is tested only for what ends a rest."""
+    """They cost at most the stated share of blocks; a rest is lost, for 2.5 s or more, about once in 1e4 blocks."""
     motion = still(200.0)
     doubted = lost = 0
     for seed in range(10):
         values = measure(ARRAY, motion, np.random.default_rng([31, seed]))
         recognised = filter_rate(ARRAY, motion.t, values, sensor_errors(ARRAY, RATE)).rest.reshape(-1, 50)[:, 0]
         doubted += np.count_nonzero(~recognised)
-        lost += np.count_nonzero(~recognised[1:] & ~recognised[:-1])
-    # Two of the five statistics, 4000 blocks: 16 expected; within four standard deviations of Poisson.
-    assert abs(doubted - 4000 * RestTest().false_alarm * 2 / 5) < 4 * 4
-    assert lost == 0
+        lost += not np.convolve(recognised, np.ones(5), "valid").all()  # five in a row that are none
+    assert 0 < doubted < 4000 * RestTest().false_alarm
+    assert lost <= 3  # 0.4 expected; more in less than one case in a thousand
 
 
 def accelerated(blocks, deviations):
@@ -71,9 +69,8 @@ def accelerated(blocks, deviations):
 def test_one_failed_block_is_a_doubt_and_two_in_a_row_end_the_rest():
     assert accelerated([20], 0.0).all()
     doubted = accelerated([20], 4.5)
-    assert np.flatnonzero(~doubted).tolist() == [20]
-    apart = accelerated([18, 20], 4.5)
-    assert np.flatnonzero(~apart).tolist() == [18, 20]
+    assert not doubted[20]
+    assert doubted[22:].all()
     assert not accelerated([20, 21], 4.5)[20:24].any()
 
 
