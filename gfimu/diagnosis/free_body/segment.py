@@ -94,7 +94,7 @@ class BodySegment:
         stacked = np.hstack([array.axes, array.regression_matrix[:, :3] / array.length_unit]) * self.alive[:, None]
         self._projector = (np.eye(len(white)) - stacked @ np.linalg.pinv(stacked)) * self.alive
         self.change = change_of_readings(self.run.readings, self.run.sample_period, white)
-        self.drive = BodyDrive(self.run.t, body.gyro, self._first_force())
+        self.drive = BodyDrive(self.run.t, body.rate, self._first_force())
         self.starts = self._groups()
         self.count = np.add.reduceat(self.use.astype(float), self.starts)
         self.at_rest = np.add.reduceat((body.rest & self.use).astype(float), self.starts) > 0
@@ -147,7 +147,8 @@ class BodySegment:
         floor = expected.quantum / np.sqrt(12)
         white = np.where(self.alive, np.maximum(white, floor), np.inf)
         projection = Projection(self.model.array, white)
-        noise = learn_motion_noise(white, projection, line.residual @ projection.rows.T, self.change, self.use)
+        rows = line.residual @ projection.rows.T
+        noise = learn_motion_noise(white, projection, rows, self.change, self.use, self.body.acceleration_error)
         self.set_noise(replace(noise, flicker=self.noise.flicker))
 
     def learn_flicker(self, line: BodyLine, columns: NDArray[np.float64]) -> None:
