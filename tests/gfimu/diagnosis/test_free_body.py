@@ -103,6 +103,33 @@ def test_nothing_hidden_nothing_named(seed, array, rate):
     assert (verdict.verdict, verdict.causes) == ("nothing_found", ())
 
 
+@pytest.mark.parametrize(("seed", "array", "rate"), [(1, "cube12", 1.0), (2, "cube12", 3.0), (3, "mimu4444", 2.0)])
+def test_the_noise_of_the_gyro_in_a_slow_motion_is_no_cause(seed, array, rate):
+    """The derivative of the gyro is mostly noise here, and the residual holds the same noise."""
+    verdict = diagnose([tumble(seed=seed, array=array, rate=rate)], twin(array))
+    assert (verdict.verdict, verdict.causes) == ("nothing_found", ())
+    assert verdict.unexplained.log_odds < 8
+
+
+def test_a_slow_motion_shows_the_size_of_an_effect_on_the_angular_acceleration():
+    """Noise in the regressor would make the displacement smaller than it is."""
+    hidden = ("sensor_position", {"a2_x_m": 4e-3, "a2_y_m": -6e-3})
+    verdict = diagnose([tumble(hidden, seed=4, array="cube12", rate=3.0)], twin("cube12"))
+    (cause,) = verdict.causes
+    assert (cause.effect, cause.place) == ("sensor_position", "chip a2")
+    for key, value in hidden[1].items():
+        assert abs(cause.parameters[key] - value) < 4 * cause.std[key]
+
+
+@pytest.mark.parametrize(("seed", "array"), [(1, "cube12"), (2, "mimu4444")])
+def test_the_average_of_the_conversions_in_a_fast_motion_is_no_cause(seed, array):
+    """Chips that average over a sample read less of a fast motion: a fraction of a percent, in the shape of others."""
+    sensor = dict(SENSOR, bandwidth=True)
+    verdict = diagnose([tumble(seed=seed, array=array, rate=25.0, sensor=sensor)], twin(array))
+    assert (verdict.verdict, verdict.causes) == ("nothing_found", ())
+    assert verdict.unexplained.log_odds < 8
+
+
 def test_two_effects_are_both_found_and_the_extended_twin_has_nothing_left():
     hidden = [("bias", {"m32_m_s2": 0.3}), ("sensor_position", {"m6_x_m": 1.5e-3})]
     one, other = tumble(*hidden, seed=5), tumble(*hidden, seed=6, rate=9.0)
