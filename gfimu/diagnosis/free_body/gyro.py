@@ -1,6 +1,6 @@
 """The rate and angular acceleration behind a noisy gyro, by a smoother whose stiffness is fitted to the gyro itself.
 
-The derivative of a noisy gyro is mostly noise when the body turns slowly, and a residual that holds minus the same noise
+The derivative of a noisy gyro is mostly noise when the body turns slowly, and a residual that holds minus that noise
 depends on it: errors in variables. A smoother's posterior mean is uncorrelated with its error, so that neither the
 prediction nor a function of the motion carries the noise that is in the residual.
 """
@@ -20,7 +20,8 @@ __all__ = ["SmoothGyro", "smooth_gyro"]
 _ORDERS = (2, 3, 4)
 _CUTS = (0.12, 16.0)
 _MISSING = 1e-3
-_MOST_FITTED = 20_000
+_LOUDER = 1.5  # times the noise of the quieter half: no louder is the noise of a run
+_ROUGHNESS = 4  # order of the differences that show the noise
 
 
 @dataclass(frozen=True)
@@ -58,11 +59,11 @@ def smooth_gyro(gyro: NDArray[np.float64], missing: NDArray[np.bool_], period: f
         Sample period, s.
     """
     weight = np.where(missing, _MISSING, 1.0)
-    few = slice(0, _MOST_FITTED)
     rate, noise, densities = np.empty_like(gyro), np.empty(3), []
     phase = 2.0 * np.sin(np.pi * np.linspace(0.0, 0.5, 513))
     for axis, values in enumerate(gyro.T):
-        fits = [_fit(values[few], weight[few], order) for order in _ORDERS]
+        most = _LOUDER * _noise_where_quiet(values)
+        fits = [_fit(values, weight, order, most) for order in _ORDERS]
         _, order, cut, noise[axis] = max(fits)
         stiffness = cut ** (-2.0 * order)
         rate[:, axis] = cho_solve_banded((_factor(weight, order, stiffness), False), weight * values)
@@ -73,23 +74,34 @@ def smooth_gyro(gyro: NDArray[np.float64], missing: NDArray[np.bool_], period: f
     return SmoothGyro(rate, noise, float(np.sqrt(np.mean(densities))))
 
 
-def _fit(values: NDArray[np.float64], weight: NDArray[np.float64], order: int) -> tuple[float, int, float, float]:
+def _noise_where_quiet(values: NDArray[np.float64]) -> float:
+    """Return the white noise of the quieter half of a run, rad/s.
+
+    It bounds the noise of the fit, so that the violent part of a motion is not smoothed as if it were noise.
+    """
+    rough = np.diff(values, _ROUGHNESS) / np.sqrt(comb(2 * _ROUGHNESS, _ROUGHNESS))
+    return float(np.median(np.abs(rough)) / 0.6745)
+
+
+def _fit(
+    values: NDArray[np.float64], weight: NDArray[np.float64], order: int, most: float
+) -> tuple[float, int, float, float]:
     """Return the log likelihood, order, cut-off (as 2 sin πfT) and noise, rad/s, that fit best."""
     found = minimize_scalar(
-        lambda log_cut: -_likelihood(values, weight, order, float(np.exp(log_cut)))[0],
+        lambda log_cut: -_likelihood(values, weight, order, float(np.exp(log_cut)), most)[0],
         bounds=np.log(_CUTS),
         method="bounded",
         options={"xatol": 0.05},
     )
     cut = float(np.exp(found.x))
-    likelihood, noise = _likelihood(values, weight, order, cut)
+    likelihood, noise = _likelihood(values, weight, order, cut, most)
     return likelihood, order, cut, noise
 
 
 def _likelihood(
-    values: NDArray[np.float64], weight: NDArray[np.float64], order: int, cut: float
+    values: NDArray[np.float64], weight: NDArray[np.float64], order: int, cut: float, most: float
 ) -> tuple[float, float]:
-    """Return the marginal log likelihood, the noise profiled out, and the noise, rad/s."""
+    """Return the marginal log likelihood, the noise profiled out as far as its bound, and the noise, rad/s."""
     free, stiffness = len(values) - order, cut ** (-2.0 * order)
     try:
         factor = _factor(weight, order, stiffness)
@@ -97,8 +109,9 @@ def _likelihood(
         return -np.inf, 0.0
     smooth = cho_solve_banded((factor, False), weight * values)
     squares = float(np.sum(weight * (values - smooth) ** 2) + stiffness * np.sum(np.diff(smooth, order) ** 2))
-    variance = max(squares / free, 1e-30)
-    likelihood = -0.5 * free * (np.log(variance) - np.log(stiffness)) - float(np.sum(np.log(factor[-1])))
+    variance = max(min(squares / free, most**2), 1e-30)
+    likelihood = -0.5 * (squares / variance + free * (np.log(variance) - np.log(stiffness)))
+    likelihood -= float(np.sum(np.log(factor[-1])))
     return likelihood, float(np.sqrt(variance))
 
 

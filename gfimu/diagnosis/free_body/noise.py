@@ -141,8 +141,8 @@ def learn_motion_noise(
 ) -> BodyNoise:
     """Fit the terms that grow with the motion to whitened residual rows (n, c − 3), by likelihood.
 
-    Second differences in time leave what changes from sample to sample: noise, and no effect of a smooth motion. What the
-    gyro's own noise makes of the angular acceleration (rad/s²) is slower than that and is put in as known.
+    Second differences in time leave what changes from sample to sample: noise, and no effect of a smooth motion. What
+    the gyro's own noise makes of the angular acceleration (rad/s²) is slower than that and is put in as known.
     """
     both = use[2:] & use[1:-1] & use[:-2]
     second = np.diff(rows, 2, axis=0)[both] / np.sqrt(6.0)

@@ -324,7 +324,7 @@ class BodySegment:
             moved[:, axis] += prior
             drive = BodyDrive(line.drive.t, moved, line.drive.force)
             changes.append(self.predict(effects, drive) - base)
-        # A mean over a time τ adds τ²/24 of the second derivative; who averages, chips or gyro, and how long is unknown.
+        # A mean over a time τ adds τ²/24 of the second derivative; whether chips or gyro average is unknown.
         rigid = self.predict(effects, line.drive.with_force(np.zeros_like(line.drive.force)))
         bend = np.zeros_like(rigid)
         bend[1:-1] = _AVERAGING**2 / 24.0 * np.diff(rigid, 2, axis=0)

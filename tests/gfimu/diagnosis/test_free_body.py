@@ -6,9 +6,11 @@ import functools
 import numpy as np
 import pytest
 
+from gfimu.attitude import to_rotation
 from gfimu.diagnosis.diagnose import diagnose
 from gfimu.diagnosis.free_body.motion import BodyDrive
 from gfimu.diagnosis.free_body.run import prepare_body_run
+from gfimu.diagnosis.picture import write_picture
 from gfimu.errors import InputError
 from gfimu.model_files import find_model, read_toml
 from sim.effects import BODY_EFFECTS, EFFECTS, NOT_OF_A_BODY
@@ -128,6 +130,20 @@ def test_the_average_of_the_conversions_in_a_fast_motion_is_no_cause(seed, array
     verdict = diagnose([tumble(seed=seed, array=array, rate=25.0, sensor=sensor)], twin(array))
     assert (verdict.verdict, verdict.causes) == ("nothing_found", ())
     assert verdict.unexplained.log_odds < 8
+
+
+def test_the_picture_shows_the_body_turning_and_no_table(tmp_path):
+    recording = tumble(seed=2, array="cube12", rate=6.0, sensor={"perfect": True})
+    verdict = diagnose([recording], twin("cube12"))
+    attitude = to_rotation(verdict.runs[0].attitude)
+    truth = to_rotation(np.column_stack([recording.extra[f"truth_q_{axis}"] for axis in "wxyz"]))
+    # Gravity says nothing of the heading; the noise of the gyro walks by 0.002 rad/s × √(20 s × 0.01 s) per axis.
+    up, expected = attitude.inv().apply([0, 0, 1.0]), truth.inv().apply([0, 0, 1.0])
+    assert np.abs(up - expected).max() < 5 * 0.002 * np.sqrt(20 * 0.01) + 1e-3
+    write_picture(tmp_path / "free.rrd", verdict)
+    entities = (tmp_path / "free.rrd").read_bytes()
+    assert b"/cube" in entities
+    assert b"/table" not in entities
 
 
 def test_two_effects_are_both_found_and_the_extended_twin_has_nothing_left():

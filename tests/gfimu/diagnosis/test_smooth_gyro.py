@@ -52,6 +52,15 @@ def test_a_motion_as_fast_as_the_samples_is_left_as_the_gyro_reads_it():
     assert np.std(smooth.rate - np.cumsum(gyro, axis=0)) < 0.1 * np.std(gyro)
 
 
+def test_a_violent_part_of_a_quiet_run_is_not_smoothed_as_if_it_were_noise():
+    rng = np.random.default_rng(3)
+    gyro = rng.normal(0, NOISE, (4000, 3))
+    gyro[3000:] += 5.0 * rng.normal(0, 1.0, (1000, 3))
+    smooth = smooth_gyro(gyro, np.zeros(len(gyro), dtype=bool), T)
+    assert np.abs(smooth.noise).max() < 2 * NOISE
+    assert np.std((smooth.rate - gyro)[3000:]) < 0.1 * 5.0
+
+
 def test_samples_filled_in_do_not_draw_the_rate():
     t, rate, _, gyro = swinging()
     missing = np.zeros(len(t), dtype=bool)
