@@ -84,7 +84,9 @@ def _thinned(view: RunView) -> tuple[RunView, int]:
 
 
 def _motion(view: RunView, mounting: NDArray[np.float64], centre: NDArray[np.float64]) -> KnownMotion | None:
-    """Motion of the cube with the drive as estimated, its centre carried round by the table; None of a free body."""
+    """Motion of the cube with the drive as estimated, its centre carried round by the table; a free body has none."""
+    if view.attitude is not None:
+        return KnownMotion("gyro, integrated", view.t, view.attitude, centre)
     if not np.isfinite(view.angle).all():
         return None
     table = Rotation.from_rotvec(np.outer(view.angle, [0.0, 0.0, 1.0]))

@@ -166,7 +166,8 @@ class RunView:
     """A run as the report shows it; arrays of n samples and c channels.
 
     ``rate``, ``acceleration``, ``angle`` are the drive's posterior mean with the causes in; ``before`` is what the
-    given twin predicts, ``after`` the extended one. ``white`` is the noise per channel.
+    given twin predicts, ``after`` the extended one. ``white`` is the noise per channel. ``attitude``, shape (n, 4), is
+    the quaternion (w, x, y, z), body to world, of a free body, which has no ``angle``.
     """
 
     name: str
@@ -183,6 +184,7 @@ class RunView:
     acceleration: NDArray[np.float64]
     temperature: NDArray[np.float64] | None
     white: NDArray[np.float64]
+    attitude: NDArray[np.float64] | None = None
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,9 @@ from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
+from gfimu.attitude import from_rotation, integrate_attitude, to_rotation
 from gfimu.diagnosis.adequacy import LEFT_OVER_ODDS, LeftOver
 from gfimu.diagnosis.causes import Cause, effects_of_run
 from gfimu.diagnosis.engine import Explanation
@@ -254,7 +256,7 @@ def _contested(
 
 
 def _view(segment: BodySegment, known: Sequence[Effect], causes: Sequence[Cause]) -> RunView:
-    """Collect a run for pictures; the motion, as far as the gyro doesn't hold it, is fitted before and after alike."""
+    """Collect a run for pictures: the motion, as far as the gyro doesn't hold it, is fitted before and after alike."""
     run = segment.run
     measured = np.where(run.valid, run.readings, 0.0)
     predictions = []
@@ -280,7 +282,18 @@ def _view(segment: BodySegment, known: Sequence[Effect], causes: Sequence[Cause]
         np.linalg.norm(acceleration, axis=1),
         run.temperature,
         white,
+        _attitude(segment, rate),
     )
+
+
+def _attitude(segment: BodySegment, rate: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Integrate the rate from the run's first rest, or its start, with gravity along z there; shape (n, 4)."""
+    t, rest = segment.run.t, np.flatnonzero(segment.body.rest)
+    up = segment.drive.force[rest[0] if len(rest) else 0]
+    turned = to_rotation(integrate_attitude(t, rate))
+    here = turned[int(rest[0]) if len(rest) else 0]
+    level, _ = Rotation.align_vectors([[0.0, 0.0, 1.0]], [here.apply(up)])
+    return from_rotation(level * turned)
 
 
 def _residual(views: Sequence[RunView], segments: Sequence[BodySegment]) -> Residual:

@@ -130,7 +130,7 @@ def learn_noise(segments: Sequence[BodySegment], causes: Sequence[Cause], fixed:
         # What a pose decides must not pass for slow noise before its cause is found.
         constant = plan_signatures([segment], causes, _CONSTANT)
         columns = signature_columns(segment, constant, causes, known, line)
-        segment.learn_flicker(line, np.hstack([columns, segment.gyro_columns(effects, line)]))
+        segment.learn_flicker(line, np.hstack([columns, segment.motion_columns(effects, line)]))
 
 
 def explain(segments: Sequence[BodySegment], fixed: Known, *, report: Report | None = None) -> Explanation:

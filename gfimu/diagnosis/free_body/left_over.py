@@ -82,7 +82,7 @@ def structure_left(segments: Sequence[BodySegment], causes: Sequence[Cause], fix
             gain = np.linalg.solve(inner, np.column_stack([cross, own]))
             gram, score = gram - cross.T @ gain[:, :-1], score - cross.T @ gain[:, -1]
         found.append(_strongest(name, gram, score, [array.channels[c] for c in alive], total, len(functions)))
-    return max(found, key=lambda one: one.log_odds), _tone(segment, line)
+    return max(found, key=lambda one: one.log_odds), _tone(segment, segment.motion_corrected(effects, line, nuisances))
 
 
 def _strongest(
@@ -125,12 +125,12 @@ def _functions(segment: BodySegment, line: BodyLine) -> dict[str, NDArray[np.flo
     return out
 
 
-def _tone(segment: BodySegment, line: BodyLine) -> LeftOver:
+def _tone(segment: BodySegment, residual: NDArray[np.float64]) -> LeftOver:
     """Test every channel for a narrow line, over the whole run and, as oscillators wander, over short windows."""
     noise = segment.noise
     change = np.where(segment.body.rest, 0.0, segment.change)
     spread = np.sqrt(1.0 + (noise.agitation * change / noise.typical) ** 2)
-    left = np.where(segment.use[:, None], line.residual / spread[:, None], 0.0)[:, segment.alive]
+    left = np.where(segment.use[:, None], residual / spread[:, None], 0.0)[:, segment.alive]
     channels = [name for name, alive in zip(segment.model.array.channels, segment.alive, strict=True) if alive]
     found = LeftOver(-np.inf, "", {})
     for length in {len(left), min(_WINDOW, len(left))}:

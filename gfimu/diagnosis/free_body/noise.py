@@ -137,10 +137,12 @@ def learn_motion_noise(
     rows: NDArray[np.float64],
     change: NDArray[np.float64],
     use: NDArray[np.bool_],
+    acceleration_error: float,
 ) -> BodyNoise:
     """Fit the terms that grow with the motion to whitened residual rows (n, c − 3), by likelihood.
 
-    Second differences in time leave what changes from sample to sample: noise, and no effect of a smooth motion.
+    Second differences in time leave what changes from sample to sample: noise, and no effect of a smooth motion. What
+    the gyro's own noise makes of the angular acceleration (rad/s²) is slower than that and is put in as known.
     """
     both = use[2:] & use[1:-1] & use[:-2]
     second = np.diff(rows, 2, axis=0)[both] / np.sqrt(6.0)
@@ -155,6 +157,7 @@ def learn_motion_noise(
         best = 0
     agitation, gain = float(_AGITATION_GRID[best]), values[best] - values[0]
     common = 1.0 + (agitation * d / typical) ** 2
+    floors = np.hypot(_FLOOR_GRID, acceleration_error)
     table = np.array(
         [
             [
@@ -165,7 +168,7 @@ def learn_motion_noise(
                 / 2
                 for slope in _SLOPE_GRID
             ]
-            for floor in _FLOOR_GRID
+            for floor in floors
         ]
     )
     still = int(np.argmax(table[:, 0]))
@@ -176,7 +179,7 @@ def learn_motion_noise(
     return BodyNoise(
         white,
         agitation,
-        float(_FLOOR_GRID[floor_place]),
+        float(floors[floor_place]),
         float(_SLOPE_GRID[slope_place]),
         log_odds=gain if agitation or slope_place else 0.0,
     )

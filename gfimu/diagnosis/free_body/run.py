@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation, binary_erosion, uniform_filter1d
 
+from gfimu.diagnosis.free_body.gyro import smooth_gyro
 from gfimu.diagnosis.model import WorldModel
 from gfimu.diagnosis.run import GYRO_COLUMNS, Run, prepare_run
 from gfimu.recording import Recording
@@ -31,6 +32,10 @@ class BodyRun:
         Channels on a uniform grid; its reference is the magnitude of the gyro, rad/s.
     gyro : ndarray, shape (n, 3)
         Gyro less its reading at rest, rad/s; interpolated where it has no value.
+    rate : ndarray, shape (n, 3)
+        Angular rate that the gyro smoothed gives, rad/s.
+    acceleration_error : float
+        Error of its derivative, rad/s², as that of white noise of its greatest density.
     gyro_valid : ndarray of bool, shape (n,)
         Samples whose rate and angular acceleration come from gyro values.
     gyro_bias : ndarray, shape (3,)
@@ -41,6 +46,8 @@ class BodyRun:
 
     run: Run
     gyro: NDArray[np.float64]
+    rate: NDArray[np.float64]
+    acceleration_error: float
     gyro_valid: NDArray[np.bool_]
     gyro_bias: NDArray[np.float64]
     rest: NDArray[np.bool_]
@@ -65,7 +72,8 @@ def prepare_body_run(recording: Recording, model: WorldModel, *, name: str = "ru
     valid = ~binary_dilation(missing, iterations=_BESIDE_A_GAP) if missing.any() else ~missing
     rest = _rest(run, gyro, model.expected_noise(1.0 / run.sample_period).white) & valid
     bias = gyro[rest].mean(axis=0) if rest.any() else np.zeros(3)
-    return BodyRun(run, gyro - bias, valid, bias, rest)
+    smooth = smooth_gyro(gyro - bias, missing, run.sample_period)
+    return BodyRun(run, gyro - bias, smooth.rate, smooth.acceleration_error, valid, bias, rest)
 
 
 def _rest(run: Run, gyro: NDArray[np.float64], white: NDArray[np.float64]) -> NDArray[np.bool_]:

@@ -3,7 +3,8 @@
 For a sample with readings y, sensing axes A and specific force p the twin predicts y = A p + h(ω, ω̇; effects). Nothing
 is known of p, so that only combinations N y with N A = 0 count; at rest |p| = g is known as well and adds one row. The
 angular acceleration is ω̇ of the gyro plus an unknown part of known variance, which widens the three rows that feel it.
-Bias instability and the gyro's bias are columns with Gaussian priors, eliminated from the normal equations.
+Bias instability, the gyro's bias and an unknown time over which readings are averaged are columns with Gaussian priors,
+eliminated from the normal equations.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
+from scipy.linalg import cho_solve, solve_triangular
 
 from gfimu.diagnosis.coloured_noise import CosineBasis
 from gfimu.diagnosis.free_body.model import BodyModel
@@ -36,6 +37,7 @@ _REST_FLOOR = 5e-3  # m/s²: what "at rest" may leave in the magnitude of the sp
 _GYRO_BIAS = (0.005, 0.1)  # rad/s: uncertain after a rest, without one
 _SLOW_SHARE = 0.6  # of bias instability that a run shows about its mean
 _UNTRUE = 0.1
+_AVERAGING = 1.5  # sample periods: how long chips or gyro may average
 _FORCE_STEPS = 6
 _FORCE_DONE = 0.02
 _FLICKER_GRID = 9.80665e-3 * np.geomspace(0.02, 3.0, 22)
@@ -44,7 +46,7 @@ _FLICKER_PRIOR, _FLICKER_SPREAD = 9.80665e-3 * 0.2, np.log(3.3)
 
 @dataclass(frozen=True)
 class Nuisances:
-    """The gyro's errors (columns) and the bias instability (its rms), with the factor that eliminates both."""
+    """The errors of the motion (columns) and the bias instability (its rms), with the factor that eliminates both."""
 
     bias: NDArray[np.float64]
     flicker: float
@@ -94,7 +96,7 @@ class BodySegment:
         stacked = np.hstack([array.axes, array.regression_matrix[:, :3] / array.length_unit]) * self.alive[:, None]
         self._projector = (np.eye(len(white)) - stacked @ np.linalg.pinv(stacked)) * self.alive
         self.change = change_of_readings(self.run.readings, self.run.sample_period, white)
-        self.drive = BodyDrive(self.run.t, body.gyro, self._first_force())
+        self.drive = BodyDrive(self.run.t, body.rate, self._first_force())
         self.starts = self._groups()
         self.count = np.add.reduceat(self.use.astype(float), self.starts)
         self.at_rest = np.add.reduceat((body.rest & self.use).astype(float), self.starts) > 0
@@ -147,7 +149,8 @@ class BodySegment:
         floor = expected.quantum / np.sqrt(12)
         white = np.where(self.alive, np.maximum(white, floor), np.inf)
         projection = Projection(self.model.array, white)
-        noise = learn_motion_noise(white, projection, line.residual @ projection.rows.T, self.change, self.use)
+        rows = line.residual @ projection.rows.T
+        noise = learn_motion_noise(white, projection, rows, self.change, self.use, self.body.acceleration_error)
         self.set_noise(replace(noise, flicker=self.noise.flicker))
 
     def learn_flicker(self, line: BodyLine, columns: NDArray[np.float64]) -> None:
@@ -287,7 +290,7 @@ class BodySegment:
         out[:, -1] = -along * self._rest_weight
         return out.ravel()
 
-    # -- nuisances: slow noise per channel, in K cosines of unit rms 1 m/s², and the gyro's bias ---------------------
+    # -- nuisances: slow noise per channel, in K cosines of unit rms 1 m/s², and errors of the motion ---------------
 
     def slow_gram(self) -> NDArray[np.float64]:
         """Return NᵀN of the slow columns, shape (c · K, c · K)."""
@@ -311,28 +314,44 @@ class BodySegment:
             out[:, place] = (self._cosines.T @ mixed).T.ravel()
         return out
 
-    def gyro_columns(self, effects: Sequence[Effect], line: BodyLine) -> NDArray[np.float64]:
-        """Return the columns of the gyro's errors in units of their prior, shape (m · (c − 2), 3 or 6)."""
+    def motion_errors(self, effects: Sequence[Effect], line: BodyLine) -> list[NDArray[np.float64]]:
+        """Return what errors of the motion change in the prediction, in units of their prior, each (n, c), m/s²."""
         base = self.predict(effects, line.drive)
         prior = _GYRO_BIAS[0 if self.body.rest.any() else 1]
-        columns = []
+        changes = []
         for axis in range(3):
             moved = line.drive.rate.copy()
             moved[:, axis] += prior
             drive = BodyDrive(line.drive.t, moved, line.drive.force)
-            columns.append(self.signature(self.grouped(self.predict(effects, drive) - base)))
+            changes.append(self.predict(effects, drive) - base)
+        # A mean over a time τ adds τ²/24 of the second derivative; whether chips or gyro average is unknown.
+        rigid = self.predict(effects, line.drive.with_force(np.zeros_like(line.drive.force)))
+        bend = np.zeros_like(rigid)
+        bend[1:-1] = _AVERAGING**2 / 24.0 * np.diff(rigid, 2, axis=0)
+        changes.append(bend)
         if self.noise.acceleration_slope > 0:
             # Where its samples miss much of the angular acceleration, what they hold need not be to scale either.
             arms = self.model.array.regression_matrix
-            columns += [
-                self.signature(self.grouped(_UNTRUE * np.outer(line.drive.acceleration[:, axis], arms[:, axis])))
-                for axis in range(3)
-            ]
+            changes += [_UNTRUE * np.outer(line.drive.acceleration[:, axis], arms[:, axis]) for axis in range(3)]
+        return changes
+
+    def motion_columns(self, effects: Sequence[Effect], line: BodyLine) -> NDArray[np.float64]:
+        """Return the columns of the errors of the motion in units of their prior, shape (m · (c − 2), 4 or 7)."""
+        columns = [self.signature(self.grouped(change)) for change in self.motion_errors(effects, line)]
         return np.stack(columns, axis=1)
 
+    def motion_corrected(self, effects: Sequence[Effect], line: BodyLine, nuisances: Nuisances) -> NDArray[np.float64]:
+        """Return the residual less the most probable errors of the motion, shape (n, c), m/s²."""
+        right = line.rows.ravel()
+        score = np.concatenate([nuisances.flicker * self.slow_cross(right[:, None])[:, 0], nuisances.bias.T @ right])
+        changes = self.motion_errors(effects, line)
+        sizes = cho_solve((nuisances.factor, True), score)[-len(changes) :]
+        change = sum((size * one for size, one in zip(sizes, changes, strict=True)), np.zeros_like(line.residual))
+        return np.asarray(line.residual - change + (change @ self.projection.to_force.T) @ self.model.array.axes.T)
+
     def nuisances(self, effects: Sequence[Effect], line: BodyLine) -> Nuisances:
-        """Return slow noise and the gyro's errors, in units of their prior, ready to be eliminated."""
-        bias = self.gyro_columns(effects, line)
+        """Return slow noise and the errors of the motion, in units of their prior, ready to be eliminated."""
+        bias = self.motion_columns(effects, line)
         if self._slow is None:
             self._slow = self.slow_gram()
         scale = self.noise.flicker

@@ -5,10 +5,14 @@ import functools
 
 import numpy as np
 import pytest
+from rerun.chunk import RrdReader
 
+from gfimu.attitude import to_rotation
 from gfimu.diagnosis.diagnose import diagnose
 from gfimu.diagnosis.free_body.motion import BodyDrive
 from gfimu.diagnosis.free_body.run import prepare_body_run
+from gfimu.diagnosis.free_body.segment import BodySegment
+from gfimu.diagnosis.picture import write_picture
 from gfimu.errors import InputError
 from gfimu.model_files import find_model, read_toml
 from sim.effects import BODY_EFFECTS, EFFECTS, NOT_OF_A_BODY
@@ -101,6 +105,60 @@ def test_a_hidden_effect_is_found_and_named_alone_with_its_place_and_size(number
 def test_nothing_hidden_nothing_named(seed, array, rate):
     verdict = diagnose([tumble(seed=seed, array=array, rate=rate)], twin(array))
     assert (verdict.verdict, verdict.causes) == ("nothing_found", ())
+
+
+@pytest.mark.parametrize(("seed", "array", "rate"), [(2, "cube12", 1.0), (1, "cube12", 3.0), (3, "mimu4444", 2.0)])
+def test_the_noise_of_the_gyro_in_a_slow_motion_is_no_cause(seed, array, rate):
+    """The derivative of the gyro is mostly noise here, and the residual holds the same noise."""
+    verdict = diagnose([tumble(seed=seed, array=array, rate=rate)], twin(array))
+    assert (verdict.verdict, verdict.causes) == ("nothing_found", ())
+    assert verdict.unexplained.log_odds < 8
+
+
+def test_what_drives_the_twin_is_the_gyro_smoothed():
+    recording = tumble(seed=2, array="cube12", rate=3.0)
+    drive = BodySegment(twin("cube12"), prepare_body_run(recording, twin("cube12")), 0).drive
+    truth, gyro = (
+        np.column_stack([values[name.format(axis)] for axis in "xyz"])
+        for values, name in ((recording.extra, "truth_omega_{}_rad_s"), (recording.reference, "gyro_{}_rad_s"))
+    )
+    raw, smooth = (
+        BodyDrive(recording.t_s, rate - truth, truth).acceleration[20:-20].std() for rate in (gyro, drive.rate)
+    )
+    assert smooth < 0.1 * raw
+
+
+def test_a_slow_motion_shows_the_size_of_an_effect_on_the_angular_acceleration():
+    """Noise in the regressor would make the displacement smaller than it is."""
+    hidden = ("sensor_position", {"a2_x_m": 4e-3, "a2_y_m": -6e-3})
+    verdict = diagnose([tumble(hidden, seed=4, array="cube12", rate=3.0)], twin("cube12"))
+    (cause,) = verdict.causes
+    assert (cause.effect, cause.place) == ("sensor_position", "chip a2")
+    for key, value in hidden[1].items():
+        assert abs(cause.parameters[key] - value) < 4 * cause.std[key]
+
+
+@pytest.mark.parametrize(("seed", "array"), [(1, "cube12"), (2, "mimu4444")])
+def test_the_average_of_the_conversions_in_a_fast_motion_is_no_cause(seed, array):
+    """Chips that average over a sample read less of a fast motion: a fraction of a percent, in the shape of others."""
+    sensor = dict(SENSOR, bandwidth=True)
+    verdict = diagnose([tumble(seed=seed, array=array, rate=25.0, sensor=sensor)], twin(array))
+    assert (verdict.verdict, verdict.causes) == ("nothing_found", ())
+    assert verdict.unexplained.log_odds < 8
+
+
+def test_the_picture_shows_the_body_turning_and_no_table(tmp_path):
+    recording = tumble(seed=2, array="cube12", rate=6.0, sensor={"perfect": True})
+    verdict = diagnose([recording], twin("cube12"))
+    attitude = to_rotation(verdict.runs[0].attitude)
+    truth = to_rotation(np.column_stack([recording.extra[f"truth_q_{axis}"] for axis in "wxyz"]))
+    # Gravity says nothing of the heading; the noise of the gyro walks by 0.002 rad/s × √(20 s × 0.01 s) per axis.
+    up, expected = attitude.inv().apply([0, 0, 1.0]), truth.inv().apply([0, 0, 1.0])
+    assert np.abs(up - expected).max() < 5 * 0.002 * np.sqrt(20 * 0.01) + 1e-3
+    write_picture(tmp_path / "free.rrd", verdict)
+    entities = {chunk.entity_path for chunk in RrdReader(str(tmp_path / "free.rrd")).stream().to_chunks()}
+    assert any(name.startswith("/scene/cube") for name in entities)
+    assert not any("/table" in name or "/base" in name for name in entities)
 
 
 def test_two_effects_are_both_found_and_the_extended_twin_has_nothing_left():
