@@ -17,10 +17,10 @@ from scipy.special import log_ndtr
 
 __all__ = ["SCALES", "inverse", "log_evidence", "log_evidence_each", "posterior"]
 
-SCALES = (0.03, 0.2, 1.0, 5.0, 30.0, 300.0, 3000.0)
+SCALES = (0.03, 0.2, 1.0, 5.0, 30.0)
 """Scales k of the prior: a fraction of the usual size up to a gross error."""
 _LEAST_POWER = 1e-13
-_SCALE_WEIGHTS = np.log(np.array([0.22, 0.28, 0.28, 0.14, 0.06, 0.015, 0.005]))
+_SCALE_WEIGHTS = np.log(np.array([0.22, 0.28, 0.28, 0.15, 0.07]))
 
 
 def inverse(information: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -87,6 +87,8 @@ class EffectFamily(Protocol):
     @property
     def separated_by(self) -> str: ...  # noqa: D102
     @property
+    def place(self) -> str: ...  # noqa: D102
+    @property
     def per_run(self) -> bool: ...  # noqa: D102
     @property
     def starts(self) -> tuple[float, ...]: ...  # noqa: D102

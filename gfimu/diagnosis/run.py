@@ -155,6 +155,8 @@ def _without_repeats(reference: NDArray[np.float64]) -> NDArray[np.float64]:
     """
     known = np.flatnonzero(np.isfinite(reference))
     values = reference[known]
+    if len(values) < 2:
+        return reference
     repeated = np.concatenate([[False], np.diff(values) == 0.0])
     fresh = values[~repeated]
     if repeated.mean() < _REPEATING or len(np.unique(fresh)) < _DIFFERING * len(fresh):

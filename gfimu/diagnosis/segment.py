@@ -38,6 +38,7 @@ TIME_MARGIN = 0.5
 _DEGREE = 4
 _KNOWN_ANGLE_STD = 5e-3
 _LEAST_FACTOR = 0.5
+_REST_FACTOR = 1.3
 _STATE_STEPS = (1e-5, 1e-4, 1e-3)
 
 
@@ -204,7 +205,8 @@ class Segment:
         kept, factor = self.coefficients, self.drive_factor
         best = (-np.inf, factor)
         # Below the least factor a prior that is learnt from the drive and then tightened again would tighten for ever.
-        for trial in np.unique(np.maximum(factor * np.array([0.5, 1.0, 2.0, 4.0]), _LEAST_FACTOR)):
+        least = 0.0 if self.at_rest else _LEAST_FACTOR
+        for trial in np.unique(np.maximum(factor * np.array([0.5, 1.0, 2.0, 4.0]), least)):
             self.drive_factor = float(trial)
             self._set_roughness()
             self.coefficients = kept
@@ -214,6 +216,12 @@ class Segment:
             best = max(best, (value, float(trial)))
         self.coefficients, self.drive_factor = kept, best[1]
         self._set_roughness()
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether the reference shows no more than its noise."""
+        reference = self.run.reference[self.run.reference_valid]
+        return float(np.std(reference)) < _REST_FACTOR * float(self.levels.white[-1])
 
     def set_levels(self, levels: NoiseLevels) -> None:
         """Take new noise levels."""

@@ -36,6 +36,7 @@ _PEAKS = {"interference_tone": 2, "cogging": 4, "tacho_ripple": 3, "resonance": 
 _RESHAPED_DRIVE = 0.01
 _DAMPINGS = (0.01, 0.03, 0.1)
 _RESTRICTED = 0.5
+_OF_MOTION = frozenset({"motion", "timing", "reference"})  # a table at rest says nothing about these
 _SHAPE_STEP = 1e-5  # a tone of a thousand cycles must not turn by a sensible part of a cycle
 ANGLES = frozenset({"direction_rad"})
 """Shape parameters that are angles; the others move in proportion."""
@@ -110,12 +111,13 @@ def plan_signatures(
     duration = max(segment.run.t[-1] - segment.start for segment in segments)
     rate = 1.0 / segments[0].run.sample_period
     warm = any(segment.run.temperature is not None for segment in segments)
+    still = all(segment.at_rest for segment in segments)
     base_shapes = {cause.name: cause.shape for cause in base}
     signatures: list[Signature] = []
     columns = 0
     for name, family in families.items():
         count = len(family.sizes(array))
-        if count == 0 or (name == "bias_temperature" and not warm):
+        if count == 0 or (name == "bias_temperature" and not warm) or (still and family.place in _OF_MOTION):
             continue
         if name in base_shapes:
             shapes: Sequence[Mapping[str, float]] = [base_shapes[name]]

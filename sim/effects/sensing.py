@@ -155,7 +155,7 @@ class VibrationRectification(_PerChannel):
     name = "vibration_rectification"
     summary = "mean readings shift with vibration, about as ω⁴"
     suffix = "_m_s2_per_rad4_s4"
-    prior_std = 3 * _MG / 20.0**4
+    prior_std = 30 * _MG / 15.0**4
     separated_by = "several speeds with and without vibration isolation"
 
     @classmethod
