@@ -61,6 +61,7 @@ class Journal:
             raise InputError(f"{path}: {error.strerror or error}; choose a file that can be written") from None
         self._metadata = dict(metadata)
         self._header = ",".join(self.columns) + "\n"
+        self._header_lines = len(lines) + 1
         os.write(self._file, ("".join(lines) + self._header).encode())
 
     def append(self, t_s: NDArray[np.float64], counts: NDArray[np.float64], status: NDArray[np.uint16]) -> None:
@@ -91,24 +92,23 @@ class Journal:
         """Close the journal and replace it with the recording, with its final metadata; whole or not at all."""
         os.close(self._file)
         final = {**self._metadata, **metadata}
-        with self.path.open("rb") as journal, atomic_path(self.path) as temporary:
-            for line in journal:
-                if not line.startswith(b"#"):
-                    break
+        with atomic_path(self.path) as temporary:
             if self.path.suffix == ".csv":
-                self._finish_csv(journal, temporary, final)
+                self._finish_csv(temporary, final)
             else:
-                self._finish_parquet(journal, temporary, final)
+                self._finish_parquet(temporary, final)
 
-    def _finish_csv(self, journal: io.BufferedReader, target: Path, metadata: Mapping[str, Any]) -> None:
-        with target.open("wb") as file:
+    def _finish_csv(self, target: Path, metadata: Mapping[str, Any]) -> None:
+        with self.path.open("rb") as journal, target.open("wb") as file:
+            for _ in range(self._header_lines):
+                journal.readline()
             for key, value in metadata.items():
                 file.write(f"# {key}: {json.dumps(value)}\n".encode())
             file.write(self._header.encode())
             while block := journal.read(_BLOCK_BYTES):
                 file.write(block)
 
-    def _finish_parquet(self, journal: io.BufferedReader, target: Path, metadata: Mapping[str, Any]) -> None:
+    def _finish_parquet(self, target: Path, metadata: Mapping[str, Any]) -> None:
         types = {name: pa.float64() if name == "t_s" else pa.int16() for name in self.columns}
         types["status"] = pa.uint16()
         described = {key.encode(): json.dumps(value).encode() for key, value in metadata.items()}
@@ -116,7 +116,12 @@ class Journal:
         with pq.ParquetWriter(target, schema, compression="zstd") as writer:
             if not self.samples:
                 return
-            read = pa_csv.ReadOptions(column_names=self.columns, block_size=_BLOCK_BYTES)
+            read = pa_csv.ReadOptions(
+                column_names=self.columns, skip_rows=self._header_lines, block_size=_BLOCK_BYTES, use_threads=False
+            )
             convert = pa_csv.ConvertOptions(column_types=types, null_values=[""])
-            for batch in pa_csv.open_csv(journal, read_options=read, convert_options=convert):
-                writer.write_batch(batch)
+            # By its path: the reader's own thread outlives the loop, and with an open file of Python's it would reach
+            # for an interpreter that may be gone by then, which ends the process with an abort.
+            with pa_csv.open_csv(self.path, read_options=read, convert_options=convert) as batches:
+                for batch in batches:
+                    writer.write_batch(batch)
