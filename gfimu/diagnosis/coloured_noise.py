@@ -43,9 +43,19 @@ class NoiseLevels:
 
 
 class CosineBasis:
-    """Lowest cosines of a run of n samples and the spectrum of bias instability on them."""
+    """Lowest cosines of a stretch of a run and the spectrum of bias instability and of a random walk on them.
 
-    def __init__(self, n: int, period: float) -> None:
+    Parameters
+    ----------
+    n : int
+        Samples.
+    period : float
+        Sample period, s.
+    elapsed : float
+        Time since the run began, for which biases have wandered already, s.
+    """
+
+    def __init__(self, n: int, period: float, elapsed: float = 0.0) -> None:
         self.n, self.period = n, period
         duration = n * period
         k = np.arange(max(2, min(int(2 * duration * _TOP_FREQUENCY), n // 4)))
@@ -55,10 +65,10 @@ class CosineBasis:
         ratio = _TIMES / duration
         spectrum[0] = n * np.mean(2 * ratio * (1 + ratio * np.expm1(-1 / ratio)))
         self.flicker_spectrum = spectrum
-        # Random walk from the start of the run: 1/(ω²) above, and its mean's variance T/3 at zero.
+        # Random walk from the start of the run: 1/(ω²) above, and its mean's variance at zero.
         walk = np.empty(len(k))
         walk[1:] = 1.0 / (omega[1:] ** 2 * period)
-        walk[0] = n * duration / 3.0
+        walk[0] = n * (elapsed + duration / 3.0)
         self.walk_spectrum = walk
 
     def matrix(self, count: int) -> NDArray[np.float64]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -40,6 +40,11 @@ LEAST_EXTRA_ODDS = 7.0
 _ITERATIONS = 7
 _FEW_ITERATIONS = 3
 _STEADY_NOISE = 0.1
+_FAINT = 500.0  # log odds of a mode whose frequency may not be settled
+_MODE_STARTS = 6
+_MODE_DAMPING = 0.05
+# What the evidence of a mode may be wrong by: it bends the functions that the drive can follow (`signatures`).
+_AS_LIKELY = 10.0
 _LEAST_VALID = 0.01
 
 
@@ -133,9 +138,7 @@ def screen(segments: Sequence[Segment], base: Fit, fixed: Sequence[Sequence[Effe
     return SignatureSet(tuple(signatures), gram, score + gram @ at, tuple(hypotheses(signatures, array, runs)))
 
 
-def learn_noise(
-    segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]], *, walk: float | None = None
-) -> float:
+def learn_noise(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]]) -> float:
     """Re-estimate the noise of every segment from what the fit leaves; returns the largest relative change."""
     array = segments[0].model.array
     change = 0.0
@@ -160,7 +163,12 @@ def learn_noise(
         white[:-1] = np.maximum(white[:-1], 0.5 * floor)
         flicker = np.sqrt(
             np.mean(
-                [estimate_flicker(coefficients[place], white, segments[place].basis) ** 2 for place in mine], axis=0
+                [
+                    estimate_flicker(coefficients[place], white, segments[place].basis, segments[place].levels.walk)
+                    ** 2
+                    for place in mine
+                ],
+                axis=0,
             )
         )
         flicker[-1] = 0.0
@@ -171,7 +179,7 @@ def learn_noise(
                 float(np.max(np.abs(white / old.white - 1))),
                 float(np.max(np.abs(flicker[:-1] - old.flicker[:-1]) / (old.flicker[:-1] + 1e-3))),
             )
-            segments[place].set_levels(NoiseLevels(white, flicker, old.walk if walk is None else walk))
+            segments[place].set_levels(NoiseLevels(white, flicker, walk))
             segments[place].prepare_weights()
     return change
 
@@ -282,6 +290,8 @@ def explain(
         unique[best.key] = best
         best, without = prune(segments, better, fixed)
         unique.pop(best.key, None)
+    if "resonance" in without and best.log_posterior - without["resonance"].log_posterior < _FAINT:
+        best = _every_mode(segments, best, fixed)
     tell(0.9, "compare")
     nothing = refine(segments, (), fixed, drives=best.drives, iterations=8) if best.causes else best
     for segment, drive in zip(segments, best.drives, strict=True):
@@ -310,6 +320,33 @@ def _from_far(
     ]
     best = max(fits, key=_posterior)
     return refine(segments, best.causes, fixed, drives=best.drives, iterations=2 * _ITERATIONS)
+
+
+def _every_mode(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]]) -> Fit:
+    """Fit a mode that is hardly rung from everywhere; what its frequency could as well be goes into its covariance.
+
+    Far below its frequency a mode only bends the ramps, and many modes bend them alike.
+    """
+    place = next(number for number, cause in enumerate(fit.causes) if cause.name == "resonance")
+    mode = fit.causes[place]
+    duration = max(segment.run.duration for segment in segments)
+    grid = mode.family.shapes(duration, 1.0 / segments[0].run.sample_period)
+    frequencies = sorted({shape["frequency_hz"] for shape in grid})[:: max(len(grid) // (2 * _MODE_STARTS), 1)]
+    fits = [fit]
+    for frequency in frequencies:
+        shape = {**mode.shape, "frequency_hz": frequency, "damping_ratio": _MODE_DAMPING}
+        causes = [*fit.causes[:place], mode.at(mode.coordinates, shape), *fit.causes[place + 1 :]]
+        fits.append(refine(segments, causes, fixed, drives=fit.drives, iterations=2 * _ITERATIONS))
+    best = max(fits, key=_posterior)
+    modes = [other.causes[place] for other in fits if other.log_posterior > best.log_posterior - _AS_LIKELY]
+    mode = best.causes[place]
+    apart = np.mean([np.square(other.coordinates - mode.coordinates) for other in modes], axis=0)
+    shape_std = {
+        key: float(np.hypot(std, np.sqrt(np.mean([(other.shape[key] - mode.shape[key]) ** 2 for other in modes]))))
+        for key, std in mode.shape_std.items()
+    }
+    wide = replace(mode, covariance=mode.covariance + np.diag(apart), shape_std=shape_std)
+    return replace(best, causes=(*best.causes[:place], wide, *best.causes[place + 1 :]))
 
 
 def prune(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]]) -> tuple[Fit, dict[str, Fit]]:

@@ -111,7 +111,8 @@ def check_integrity(model: WorldModel, run: Run, prediction: NDArray[np.float64]
                 f"channel {model.array.channels[channel]} holds one value from {begin:.2f} s to {end:.2f} s",
             )
     run = replace(run, valid=valid)
-    spikes = _spikes(run, expected.white, quantum)
+    coarser = _range_factors(rewired, model)
+    spikes = _spikes(run, expected.white * coarser, quantum * coarser)
     run = replace(run, valid=run.valid & ~spikes)
     return IntegrityReport(run, tuple(effects), why, int(spikes.sum()))
 
@@ -184,8 +185,19 @@ def _frozen(
     return found
 
 
-def _spikes(run: Run, white: NDArray[np.float64], quantum: float) -> NDArray[np.bool_]:
-    """Mark isolated samples far off the median of their five neighbours."""
+def _range_factors(effects: Sequence[Effect], model: WorldModel) -> NDArray[np.float64]:
+    """Return how many times coarser each channel is than the model's, shape (c,), as its chip is in a wider range."""
+    factors = np.ones(model.array.n_channels)
+    chips = [chip.name for chip in model.array.chips]
+    for effect in effects:
+        if effect.name == "wrong_range":
+            mine = model.array.chip_of_channel == chips.index(str(effect.parameters["chip"]))
+            factors[mine] = max(float(effect.parameters["factor"]), 1.0)
+    return factors
+
+
+def _spikes(run: Run, white: NDArray[np.float64], quantum: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Mark isolated samples far off the median of their five neighbours; white noise and step per channel (c,)."""
     readings = run.readings.copy()
     for column, valid in zip(readings.T, run.valid.T, strict=True):
         if valid.any():  # a gap is no neighbour

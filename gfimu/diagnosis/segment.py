@@ -119,7 +119,7 @@ class Segment:
         self.spline = AngleSpline(run.t[0] - margin, run.t[-1] + margin, spacing)
         signs = (-1.0) ** np.arange(self.spline.size)
         self._alternating = np.outer(signs, signs)
-        self.basis = CosineBasis(len(run.t), period)
+        self.basis = CosineBasis(len(run.t), period, float(run.t[0] - start))
         self.is_angle = model.drive_source == "angle"
         self.weight_mask = np.column_stack([run.valid, run.reference_valid])  # (n, c + 1)
         self.row_weight = self.weight_mask.astype(float)

@@ -19,6 +19,7 @@ WALK_ODDS = 10.0
 """Log odds that a random walk needs over bias instability alone."""
 _WEAKEST_WALK = 3e-3
 _WALK_GRID = np.geomspace(2e-3, 0.5, 28)
+_DRIVE_TAKES = 0.08  # of the strength, as the unknown drive follows what wanders in the channels together
 _LARGEST_USUAL_FLICKER = 1.5 * 9.80665e-3
 _MEDIAN_FACTOR = 1.3
 _EVERY_FACTOR = 1.15
@@ -60,7 +61,7 @@ def walk_strength(
     mean = float(weight @ _WALK_GRID / weight.sum())
     std = float(np.sqrt(weight @ (_WALK_GRID - mean) ** 2 / weight.sum()))
     odds = float(totals[best] - without)
-    return (mean, max(std, 0.05 * mean), odds) if mean > _WEAKEST_WALK else (mean, std, 0.0)
+    return (mean, float(np.hypot(std, _DRIVE_TAKES * mean)), odds) if mean > _WEAKEST_WALK else (mean, std, 0.0)
 
 
 def _whittle(power: NDArray[np.float64], spectrum: NDArray[np.float64]) -> float:

@@ -1,8 +1,9 @@
-"""Dynamics between the commanded motion and the cube: torque ripple under a speed loop, a torsional mode."""
+"""Dynamics between the commanded motion and the cube: torque ripple under a servo, a torsional mode."""
 
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
 from numpy.typing import ArrayLike, NDArray
 from scipy.signal import cont2discrete, lfilter
 
@@ -11,18 +12,18 @@ from sim.motion import SpinMotion, SpinState
 __all__ = ["RippledSpin", "TwistingSpin"]
 
 _FINE_STEP = 2e-3
-_SPEED_LOOP_TIME = 0.5
+_SERVO = 2 * np.pi  # rad/s: a bandwidth of 1 Hz
+_SERVO_DAMPING = 0.7
 _REST_RATE = 0.3
 _SLOW_MODE = 90.0
 
 
 class RippledSpin:
-    """Spin of a speed-controlled table under a torque ripple locked to the commanded angle.
+    """Spin of a servo-controlled table under a torque ripple locked to the table's own angle.
 
-    The error δ against the command obeys δ'' = A s(ω) sin(nθ + φ) − δ'/τ with θ and ω the command's angle and rate and
-    τ the speed loop's time constant. At rest the bearing's friction holds the table, so that the ripple turns nothing:
-    s = ω²/(ω² + ω₀²). The real table's angle is meant, so this holds while n δ stays well below a radian; beyond it a
-    table stalls and slips, and no two runs are alike.
+    The error δ against the command obeys δ'' = A s(ω) sin(n(θ + δ) + φ) − 2ζω₀δ' − ω₀²δ with θ and ω the command's
+    angle and rate, ω₀ and ζ of the table's servo, which takes back what is slower than itself. At rest the bearing's
+    friction holds the table, so that the ripple turns nothing: s = ω²/(ω² + ω₁²).
 
     Parameters
     ----------
@@ -42,31 +43,43 @@ class RippledSpin:
         self, motion: SpinMotion, t: NDArray[np.float64], amplitude: float, order: float, phase: float
     ) -> None:
         self._motion = motion
-        self._ripple = (float(amplitude), float(order), float(phase))
         step = 0.5 * _FINE_STEP
         self._grid = np.arange(t[0], t[-1] + 2 * step, step)
-        push = self._push(motion.at(self._grid))
-        decay = np.exp(-step / _SPEED_LOOP_TIME)
-        mean = 0.5 * (push[1:] + push[:-1]) * (_SPEED_LOOP_TIME * (1 - decay))
-        rate = np.concatenate([[0.0], lfilter([1.0], [1.0, -decay], mean)])
-        self._rate = rate
-        self._angle = np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]))]) * step
-
-    def _push(self, spin: SpinState) -> NDArray[np.float64]:
-        amplitude, order, phase = self._ripple
-        turning = spin.rate**2 / (spin.rate**2 + _REST_RATE**2)
-        return np.asarray(amplitude * turning * np.sin(order * spin.angle + phase))
+        spin = motion.at(self._grid)
+        torque = amplitude * spin.rate**2 / (spin.rate**2 + _REST_RATE**2)
+        system = (np.array([[0.0, 1.0], [-(_SERVO**2), -2 * _SERVO_DAMPING * _SERVO]]), np.array([[0.0], [1.0]]))
+        a, b, *_ = cont2discrete((*system, np.eye(2), np.zeros((2, 1))), step)
+        self._angle, self._rate, self._acceleration = _servo_error(
+            torque, order * spin.angle + phase, float(order), a, b[:, 0], _SERVO**2, 2 * _SERVO_DAMPING * _SERVO
+        )
 
     def at(self, t: ArrayLike) -> SpinState:
         """State of the rippled spin at times (n,), s."""
         t = np.asarray(t, dtype=float)
         spin = self._motion.at(t)
-        rate = np.interp(t, self._grid, self._rate)
         return SpinState(
             spin.angle + np.interp(t, self._grid, self._angle),
-            spin.rate + rate,
-            spin.acceleration + self._push(spin) - rate / _SPEED_LOOP_TIME,
+            spin.rate + np.interp(t, self._grid, self._rate),
+            spin.acceleration + np.interp(t, self._grid, self._acceleration),
         )
+
+
+@njit(cache=True, nogil=True)
+def _servo_error(torque, turns, order, a, b, stiffness, damping):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Integrate the error of the servo: the torque of a step is the mean of its ends, the far one predicted."""
+    n = len(torque)
+    angle, rate, acceleration = np.zeros(n), np.zeros(n), np.zeros(n)
+    here = torque[0] * np.sin(turns[0])
+    acceleration[0] = here
+    for k in range(n - 1):
+        free = a[0, 0] * angle[k] + a[0, 1] * rate[k]
+        there = torque[k + 1] * np.sin(turns[k + 1] + order * (free + b[0] * here))
+        mean = 0.5 * (here + there)
+        angle[k + 1] = free + b[0] * mean
+        rate[k + 1] = a[1, 0] * angle[k] + a[1, 1] * rate[k] + b[1] * mean
+        here = torque[k + 1] * np.sin(turns[k + 1] + order * angle[k + 1])
+        acceleration[k + 1] = here - stiffness * angle[k + 1] - damping * rate[k + 1]
+    return angle, rate, acceleration
 
 
 class TwistingSpin:
