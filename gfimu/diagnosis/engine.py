@@ -161,13 +161,10 @@ def learn_noise(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[
         white = np.sqrt(np.mean([whites[place] ** 2 for place in mine], axis=0))
         floor = segments[mine[0]].model.expected_noise(1.0 / segments[mine[0]].run.sample_period).quantum / np.sqrt(12)
         white[:-1] = np.maximum(white[:-1], 0.5 * floor)
+        walk = segments[mine[0]].levels.walk
         flicker = np.sqrt(
             np.mean(
-                [
-                    estimate_flicker(coefficients[place], white, segments[place].basis, segments[place].levels.walk)
-                    ** 2
-                    for place in mine
-                ],
+                [estimate_flicker(coefficients[place], white, segments[place].basis, walk) ** 2 for place in mine],
                 axis=0,
             )
         )
