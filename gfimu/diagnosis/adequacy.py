@@ -18,7 +18,8 @@ from scipy.stats import chi2
 from gfimu.diagnosis.causes import effects_of_run
 from gfimu.diagnosis.evidence import log_evidence, log_evidence_each
 from gfimu.diagnosis.model import Effect
-from gfimu.diagnosis.refinement import Fit
+from gfimu.diagnosis.refinement import Fit, refine
+from gfimu.diagnosis.search import EXTRA_CAUSE
 from gfimu.diagnosis.segment import Linearisation, Segment
 from gfimu.diagnosis.signatures import cause_columns
 
@@ -30,6 +31,11 @@ _UNIT = 0.03
 _STEPS = 8
 _SLOW = 10
 _FEWEST_DIFFERENCES = 200
+_OF_READING = frozenset({"bias", "scale_factor", "quadratic"})
+_JUMP_WIDTHS = (1.0, 2.0)
+_FEWEST_JUMPS = 12
+_FEWEST_IN_JUMP = 20
+_NORMAL_MEDIAN = 0.6745
 _ORDERS = (1, 2, 3, 4, 6, 8, 12)
 
 
@@ -45,11 +51,14 @@ class LeftOver:
         Channels and dependence, in words.
     surrogate : dict of str to float
         Coefficients of the data-driven term, m/s² per unit basis function, by ``"channel: basis function"``.
+    instead : bool
+        Whether it takes the place of named causes, which then are a compromise, instead of adding to them.
     """
 
     log_odds: float
     signature: str
     surrogate: dict[str, float]
+    instead: bool = False
 
 
 def generic_basis(segment: Segment) -> tuple[list[str], NDArray[np.float64]]:
@@ -116,6 +125,8 @@ def left_over(
     candidates = [_basis_terms(segments, fit, fixed, channels)]
     lines = [_lines(segment, fit, known, channels) for segment, known in zip(segments, fixed, strict=True)]
     candidates += [max(lines, key=lambda found: found.log_odds)]
+    candidates.append(_one_curve(segments, fit, fixed, channels))
+    candidates += [_jumps(segment, fit, known, channels) for segment, known in zip(segments, fixed, strict=True)]
     if not rounded:
         candidates.append(_changing_noise(segments, fit, fixed))
     if spikes > max(3, 1e-4 * sum(segment.weight_mask.size for segment in segments)):
@@ -204,9 +215,9 @@ def _channelwise(
         matrix = line.jacobian.channel(channel)
         slow_jacobian = np.tensordot(line.jacobian.loading[:, channel], line.slow, axes=1)  # (m, K)
         cross[:, places] = weight * (matrix.T @ part - slow_jacobian @ damped)
-    eliminated = solve_triangular(line.factor, cross, lower=True, check_finite=False)
+    eliminated = solve_triangular(line.drive.factor, cross, lower=True, check_finite=False)
     gram -= eliminated.T @ eliminated
-    score -= eliminated.T @ line.forward
+    score -= eliminated.T @ line.drive.forward
     return gram, score, eliminated
 
 
@@ -271,6 +282,99 @@ def _lines(segment: Segment, fit: Fit, known: Sequence[Effect], channels: Sequen
         text = f"channel {channels[channel]} has a tone at {frequency[place]:.3f} Hz"
         return LeftOver(one, text, {f"{channels[channel]}: tone at {frequency[place]:.4f} Hz": 1.0})
     return LeftOver(every, f"several channels share a tone at {frequency[peak]:.3f} Hz", {})
+
+
+def _one_curve(
+    segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]], channels: Sequence[str]
+) -> LeftOver:
+    """Test whether one cubic of a channel's reading does what two or more named effects on that channel do together."""
+    best = LeftOver(-np.inf, "", {})
+    for number, channel in enumerate(channels):
+        mine = [
+            place
+            for place, cause in enumerate(fit.causes)
+            if cause.name in _OF_READING and np.abs(cause.mixing[number]).any()
+        ]
+        if len(mine) < 2 or not any(fit.causes[place].pattern == f"channel {channel}" for place in mine):
+            continue
+        priors = [fit.causes[place].log_prior for place in mine]
+        others = [cause for place, cause in enumerate(fit.causes) if place not in mine]
+        evidence, coefficient = _with_cubic(segments, refine(segments, others, fixed, drives=fit.drives), fixed, number)
+        odds = evidence + max(priors) - fit.log_evidence - sum(priors) - EXTRA_CAUSE * (len(mine) - 1)
+        if odds > best.log_odds:
+            text = f"channel {channel} follows a curve of its reading that the library has not (cubic)"
+            best = LeftOver(float(odds), text, {f"{channel}: reading³": coefficient}, instead=True)
+    return best
+
+
+def _with_cubic(
+    segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]], channel: int
+) -> tuple[float, float]:
+    """Return the log evidence of a fit and a cubic of one channel's reading besides, and the cubic, s⁴/m²."""
+    effects = [
+        [*known, *effects_of_run(fit.causes, segment.model.array, segment.index)]
+        for segment, known in zip(segments, fixed, strict=True)
+    ]
+    cubes = []
+    for segment, mine, drive in zip(segments, effects, fit.drives, strict=True):
+        kept, segment.coefficients = segment.coefficients, drive
+        cubes.append(segment.predict(mine)[:, channel] ** 3 * segment.row_weight[:, channel])
+        segment.coefficients = kept
+    unit = _UNIT / max(float(np.sqrt(np.mean(np.concatenate(cubes) ** 2))), 1e-12)
+    values = np.concatenate([*(cause.coordinates for cause in fit.causes), [0.0]])
+    gram, score, objective = np.zeros((len(values), len(values))), np.zeros(len(values)), 0.0
+    for segment, mine, known, cube, drive in zip(segments, effects, fixed, cubes, fit.drives, strict=True):
+        kept, segment.coefficients = segment.coefficients, drive
+        line = segment.linearise(mine)
+        causes = cause_columns(segment, fit.causes, known, shapes=False)  # (c + 1, K, n)
+        column = np.zeros((causes.shape[0], 1, causes.shape[2]))
+        column[channel, 0] = cube * unit
+        part, right, _ = segment.whitened_products(line, np.concatenate([causes, column], axis=1))
+        segment.coefficients = kept
+        gram, score, objective = gram + part, score + right, objective + line.drive.objective
+    nothing = objective + 2 * float(score @ values) + float(values @ gram @ values)
+    score = score + gram @ values
+    size = np.linalg.solve(gram + 1e-6 * np.eye(len(values)), score)[-1] * unit
+    return -0.5 * nothing + log_evidence(gram, score), float(size)
+
+
+def _jumps(segment: Segment, fit: Fit, known: Sequence[Effect], channels: Sequence[str]) -> LeftOver:
+    """Test whether a channel jumps: means of some seconds before and after every instant.
+
+    Bias instability is learnt from the residual and would take a jump for its own; so the difference is compared with
+    its usual size in this run, by the median, which a jump does not move.
+    """
+    mask = segment.weight_mask[:, :-1]
+    left = _left(segment, fit, known) * mask
+    sums = np.concatenate([np.zeros((1, left.shape[1])), np.cumsum(left, axis=0)])
+    counts = np.concatenate([np.zeros((1, left.shape[1])), np.cumsum(mask, axis=0)])
+    period, duration = segment.run.sample_period, segment.run.duration
+    best = LeftOver(-np.inf, "", {})
+    for width in _JUMP_WIDTHS:
+        size = round(width / period)
+        if size < _FEWEST_IN_JUMP or duration < _FEWEST_JUMPS * width:
+            continue
+        after, now, before = slice(2 * size, None), slice(size, -size), slice(None, -2 * size)
+        enough = np.minimum(counts[after] - counts[now], counts[now] - counts[before]) >= 0.5 * size
+        late = (sums[after] - sums[now]) / np.maximum(counts[after] - counts[now], 1)
+        early = (sums[now] - sums[before]) / np.maximum(counts[now] - counts[before], 1)
+        change = np.where(enough, late - early, np.nan)
+        if not np.isfinite(change).any(axis=0).all():
+            continue
+        usual = np.nanmedian(np.abs(change), axis=0) / _NORMAL_MEDIAN
+        usual = np.maximum(usual, np.sqrt(2.0 / size))
+        # A channel's own median has few independent values; it is trusted half as the others'.
+        usual = np.sqrt(usual * np.maximum(usual, np.median(usual)))
+        power = np.nan_to_num((change / usual) ** 2)
+        place, channel = divmod(int(np.argmax(power)), power.shape[1])
+        odds = 0.5 * float(power[place, channel]) - np.log(2 * duration / width * len(channels) * len(_JUMP_WIDTHS))
+        if odds > best.log_odds:
+            when = float(segment.run.t[min(place + size, len(left) - 1)])
+            size_si = float(change[place, channel] * segment.levels.white[channel])
+            name = channels[channel]
+            text = f"channel {name} jumps by {size_si:+.3g} m/s² at {when:.2f} s"
+            best = LeftOver(odds, text, {f"{name}: step at {when:.2f} s": size_si})
+    return best
 
 
 def _changing_noise(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]]) -> LeftOver:

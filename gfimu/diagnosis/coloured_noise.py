@@ -7,6 +7,7 @@ basis of a run its covariance is nearly diagonal, so whitening is white scaling 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,11 +73,8 @@ class CosineBasis:
         self.walk_spectrum = walk
 
     def matrix(self, count: int) -> NDArray[np.float64]:
-        """Return the first ``count`` orthonormal cosines, shape (n, count)."""
-        phase = np.pi * np.outer(np.arange(self.n) + 0.5, np.arange(count)) / self.n
-        basis = np.sqrt(2.0 / self.n) * np.cos(phase)
-        basis[:, 0] = np.sqrt(1.0 / self.n)
-        return basis
+        """Return the first ``count`` orthonormal cosines, shape (n, count), for reading only."""
+        return _cosines(self.n, count)
 
     def corrections(self, levels: NoiseLevels) -> NDArray[np.float64]:
         """Return 1 − σ²/S_k per mode and channel, shape (K, c + 1), cut where it no longer matters."""
@@ -90,6 +88,15 @@ class CosineBasis:
     def transform(self, residual: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return all cosine coefficients of residuals (n, c)."""
         return np.asarray(dct(residual, type=2, norm="ortho", axis=0))
+
+
+@lru_cache(maxsize=8)
+def _cosines(n: int, count: int) -> NDArray[np.float64]:
+    phase = np.pi * np.outer(np.arange(n) + 0.5, np.arange(count)) / n
+    basis = np.sqrt(2.0 / n) * np.cos(phase)
+    basis[:, 0] = np.sqrt(1.0 / n)
+    basis.flags.writeable = False
+    return basis
 
 
 def white_level(coefficients: NDArray[np.float64], slowest: float, period: float) -> NDArray[np.float64]:

@@ -11,10 +11,11 @@ from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.adequacy import LEFT_OVER_ODDS, LeftOver, left_over
 from gfimu.diagnosis.causes import Cause, effects_of_run
 from gfimu.diagnosis.coloured_noise import NoiseLevels
-from gfimu.diagnosis.engine import LEAST_EXTRA_ODDS, Explanation, explain, make_segments, prune
+from gfimu.diagnosis.engine import LEAST_EXTRA_ODDS, Explanation, make_segments, prune
 from gfimu.diagnosis.free_body.diagnose import diagnose_body
 from gfimu.diagnosis.holdout import Holdout, gate_gains, held_out_gain, split_segments
 from gfimu.diagnosis.integrity import IntegrityReport, check_integrity
+from gfimu.diagnosis.long_run import explain_any_length
 from gfimu.diagnosis.model import Effect, WorldModel
 from gfimu.diagnosis.naming import (
     cause_parameters,
@@ -28,7 +29,7 @@ from gfimu.diagnosis.naming import (
 from gfimu.diagnosis.refinement import Fit, refine
 from gfimu.diagnosis.run import Run, prepare_run
 from gfimu.diagnosis.segment import Segment
-from gfimu.diagnosis.stochastic import WALK_ODDS, noise_log_determinant, walk_strength, white_factor
+from gfimu.diagnosis.stochastic import UNEQUAL_WALK, WALK_ODDS, Walk, noise_log_determinant, walk_strength, white_factor
 from gfimu.diagnosis.verdict import Diagnosis, Gain, NamedCause, Residual, RunView, Unexplained
 from gfimu.diagnosis.wording import verdict_sentences
 from gfimu.errors import InputError
@@ -40,7 +41,7 @@ Report = Callable[[float, str], None]
 
 LEAST_GAIN = 2.0
 """Log predictive gain on held-out blocks below which a cause is withdrawn."""
-_DOMINANT = 0.1
+_DOMINANT = 0.03
 _INEXACTNESS = 2.5e-3
 _ROUNDING = ("coarse_resolution", "saturation")
 _WALK_ROUNDS = 3
@@ -157,41 +158,38 @@ def _acting(effects: Sequence[Effect]) -> list[Effect]:
     return [effect for effect in effects if effect.name in _WIRING]
 
 
-@dataclass(frozen=True)
-class _Walk:
-    strength: float
-    std: float
-    log_odds: float
-
-
-def _explain(prepared: _Prepared, model: WorldModel, tell: Report) -> tuple[Explanation, _Walk | None]:
+def _explain(prepared: _Prepared, model: WorldModel, tell: Report) -> tuple[Explanation, Walk | None]:
     """Search for causes; where biases may wander, search again with a random walk in the noise and compare."""
     segments, fixed = prepared.segments(model)
     runs = len(prepared.runs)
-    plain = explain(segments, fixed, runs, report=lambda share, text: tell(0.05 + 0.7 * share, text))
+    plain = explain_any_length(segments, fixed, runs, report=lambda share, text: tell(0.05 + 0.7 * share, text))
     # A walk passes for anything slow, so it is looked for in what the other causes leave.
     quick = [cause for cause in plain.fit.causes if cause.name not in _SLOW]
     same = len(quick) == len(plain.fit.causes)
     base = plain.fit if same else refine(segments, quick, fixed, drives=plain.fit.drives)
     plain_value = plain.fit.log_posterior + noise_log_determinant(segments)
-    found: tuple[Explanation, _Walk] | None = None
+    found: tuple[Explanation, Walk] | None = None
+    odds = 0.0
     before = segments
     for _ in range(_WALK_ROUNDS):
-        strength, std, odds = walk_strength(before, base, fixed)
-        if found is None and odds < WALK_ODDS:
+        walk = walk_strength(before, base, fixed)
+        if found is None and walk.log_odds < WALK_ODDS:
             break
-        if found is not None and abs(strength - found[1].strength) < std:
+        if found is not None and abs(walk.strength - found[1].strength) < walk.std:
+            found = found[0], walk
             break
         tell(0.8, "wandering biases")
         other, _ = prepared.segments(model)
         for segment, old in zip(other, before, strict=True):
             segment.adopt(old)
-            segment.levels = NoiseLevels(old.levels.white, old.levels.flicker, strength)
-        wandering = explain(other, fixed, runs, start=base.causes)
-        value = wandering.fit.log_posterior + noise_log_determinant(other) - np.log(len(model.families()))
-        found = wandering, _Walk(strength, std, float(value - plain_value))
+            segment.levels = NoiseLevels(old.levels.white, old.levels.flicker, walk.strength)
+        wandering = explain_any_length(other, fixed, runs, start=base.causes)
+        odds = wandering.fit.log_posterior + noise_log_determinant(other) - np.log(len(model.families())) - plain_value
+        found = wandering, walk
         before, base = other, wandering.fit
-    return found if found is not None and found[1].log_odds >= LEAST_EXTRA_ODDS else (plain, None)
+    if found is None or odds < LEAST_EXTRA_ODDS or found[1].unequal > UNEQUAL_WALK:
+        return plain, None
+    return found[0], replace(found[1], log_odds=float(odds))
 
 
 def _holdouts(
@@ -234,7 +232,7 @@ def _verdict(
     prepared: _Prepared,
     model: WorldModel,
     explanation: Explanation,
-    walk: _Walk | None,
+    walk: Walk | None,
     left: LeftOver,
     gain: Gain,
     withdrawn: Sequence[str],
@@ -248,8 +246,8 @@ def _verdict(
     named = _named(explanation, fit, likely, array)
     removed = explanation.nothing.objective - fit.objective
     # No model is exact: what is left must also stand out against what the causes explain.
-    significant = left.log_odds > max(LEFT_OVER_ODDS, _INEXACTNESS * removed)
-    dominant = significant and 2 * left.log_odds > _DOMINANT * max(removed, 0.0)
+    significant = left.log_odds > (LEFT_OVER_ODDS if left.instead else max(LEFT_OVER_ODDS, _INEXACTNESS * removed))
+    dominant = significant and (left.instead or 2 * left.log_odds > _DOMINANT * max(removed, 0.0))
     runs = tuple(_view(prepared, number, explanation, found) for number in range(len(prepared.runs)))
     extension = [cause.effect(array) for cause in fit.causes] if not dominant else []
     twin = model.extended([*_library_effects(model, found), *extension])
@@ -348,7 +346,7 @@ def _integrity_causes(prepared: _Prepared) -> list[NamedCause]:
     return list(causes.values())
 
 
-def _stochastic_causes(explanation: Explanation, walk: _Walk | None) -> list[NamedCause]:
+def _stochastic_causes(explanation: Explanation, walk: Walk | None) -> list[NamedCause]:
     """Return wandering biases and excess noise."""
     causes = []
     families = explanation.segments[0].model.families()

@@ -20,7 +20,17 @@ from gfimu.diagnosis.search import search
 from gfimu.diagnosis.segment import Linearisation, Segment, difference_noise, over_segments
 from gfimu.diagnosis.signatures import Hypothesis, SignatureSet, hypotheses, plan_signatures, signature_columns
 
-__all__ = ["Explanation", "explain", "make_segments", "screen"]
+__all__ = [
+    "RIVALS",
+    "Explanation",
+    "Report",
+    "explain",
+    "learn_noise",
+    "make_segments",
+    "prune",
+    "screen",
+    "tune_drives",
+]
 
 Report = Callable[[float, str], None]
 
@@ -31,8 +41,9 @@ _MOST_CAUSES = 4
 _CLOSE = 12.0
 _GROSS = 150.0
 _FAIR_FIT = 1.6
-_RIVALS = 6
 _WORTH_REFINING = -6.0
+RIVALS = 6
+"""How many other sets are judged beside the best."""
 LEAST_ODDS = 9.0
 """Log odds that a single cause needs against nothing; provisional until a study of null runs fixes it."""
 LEAST_EXTRA_ODDS = 7.0
@@ -227,11 +238,10 @@ def explain(
         tune_drives(segments, fitted, fixed)
         best = fitted = refine(segments, start, fixed, drives=fitted.drives, iterations=8)
     tried: dict[frozenset[tuple[str, str]], Fit] = {}
-    signatures = None
     settled_before = False
     for round_number in range(_ROUNDS):
         tell(0.1 + 0.8 * round_number / _ROUNDS, f"search {round_number + 1}")
-        signatures = screen(segments, best, fixed, runs)
+        signatures, screened = screen(segments, best, fixed, runs), best.key
         candidates, singles, blocks = search(signatures, most=max(2, min(len(best.causes) + 1, _MOST_CAUSES)))
         fits = {best.key: best}
         gross = candidates[0].log_odds > _GROSS
@@ -279,7 +289,7 @@ def explain(
         for fit in sorted(tried.values(), key=_posterior, reverse=True)
         if fit.key != best.key and fit.causes and fit.log_posterior > best.log_posterior - _CLOSE - 10.0
     ]
-    rivals = [refine(segments, fit.causes, fixed, drives=best.drives, iterations=6) for fit in near[:_RIVALS]]
+    rivals = [refine(segments, fit.causes, fixed, drives=best.drives, iterations=6) for fit in near[:RIVALS]]
     rivals = [prune(segments, rival, fixed)[0] for rival in rivals if len(rival.causes) <= len(best.causes) + 1]
     unique = {rival.key: rival for rival in rivals if rival.causes and rival.key != best.key}
     better = max(unique.values(), key=_posterior, default=best)
@@ -293,6 +303,8 @@ def explain(
     nothing = refine(segments, (), fixed, drives=best.drives, iterations=8) if best.causes else best
     for segment, drive in zip(segments, best.drives, strict=True):
         segment.coefficients = drive
+    if best.key != screened:
+        signatures = screen(segments, best, fixed, runs)
     return Explanation(
         best,
         tuple(sorted(unique.values(), key=_posterior, reverse=True)),
@@ -300,7 +312,7 @@ def explain(
         without,
         tuple(segments),
         tuple(tuple(known) for known in fixed),
-        screen(segments, best, fixed, runs),
+        signatures,
     )
 
 

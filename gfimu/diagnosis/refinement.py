@@ -16,7 +16,7 @@ from gfimu.diagnosis.causes import Cause, effects_of_run
 from gfimu.diagnosis.evidence import SCALES, inverse, log_evidence
 from gfimu.diagnosis.model import Effect
 from gfimu.diagnosis.search import EXTRA_CAUSE
-from gfimu.diagnosis.segment import Linearisation, Segment, over_segments
+from gfimu.diagnosis.segment import DriveElimination, Segment, over_segments
 from gfimu.diagnosis.signatures import ANGLES, cause_columns, shape_moved
 
 __all__ = ["Fit", "refine"]
@@ -67,6 +67,10 @@ class Fit:
     def names(self) -> frozenset[str]:
         """Names of the effects."""
         return frozenset(cause.name for cause in self.causes)
+
+    def of(self, places: Sequence[int]) -> Fit:
+        """Return the fit with the drives of some of its segments only."""
+        return replace(self, drives=tuple(self.drives[place] for place in places))
 
 
 def refine(
@@ -159,13 +163,14 @@ def _evaluate(segments: Sequence[Segment], fixed: Sequence[Sequence[Effect]], st
 
     def linearised(
         segment: Segment, known: Sequence[Effect], drive: NDArray[np.float64]
-    ) -> tuple[Linearisation, tuple[NDArray[np.float64], ...]]:
+    ) -> tuple[DriveElimination, tuple[NDArray[np.float64], ...]]:
         segment.coefficients = drive
         line = segment.linearise([*known, *effects_of_run(state.causes, segment.model.array, segment.index)])
-        return line, segment.whitened_products(line, cause_columns(segment, state.causes, known, shapes=True))
+        products = segment.whitened_products(line, cause_columns(segment, state.causes, known, shapes=True))
+        return line.drive, products  # the rest of the line would fill the memory in long recordings
 
     done = over_segments(linearised, segments, fixed, state.drives)
-    lines, products = [line for line, _ in done], [product for _, product in done]
+    eliminations, products = [drive for drive, _ in done], [product for _, product in done]
     gram = np.sum([product[0] for product in products], axis=0)
     score = np.sum([product[1] for product in products], axis=0)
     precision, pull = _prior(state.causes)
@@ -173,18 +178,17 @@ def _evaluate(segments: Sequence[Segment], fixed: Sequence[Sequence[Effect]], st
     step = inverse(information) @ (score + pull) if len(score) else np.zeros(0)
     step = _limited(state.causes, step)
     moves = tuple(
-        segment.drive_step(line, product[2], step)
-        for segment, line, product in zip(segments, lines, products, strict=True)
+        elimination.step(product[2], step) for elimination, product in zip(eliminations, products, strict=True)
     )
     return _Point(
         state,
-        sum(line.objective for line in lines),
+        sum(elimination.objective for elimination in eliminations),
         gram,
         score,
         step,
         moves,
         # What the step promises, and how far the drives still are from their best.
-        float(step @ information @ step) + _DRIVE_SHARE * sum(float(line.forward @ line.forward) for line in lines),
+        float(step @ information @ step) + _DRIVE_SHARE * sum(float(one.forward @ one.forward) for one in eliminations),
     )
 
 

@@ -29,7 +29,7 @@ from gfimu.diagnosis.model import Effect, Spin, SpinState, WorldModel
 from gfimu.diagnosis.rounding import COARSE, rounded_likelihood, rounding_noise
 from gfimu.diagnosis.run import Run
 
-__all__ = ["Linearisation", "Segment", "difference_noise", "over_segments"]
+__all__ = ["DriveElimination", "Linearisation", "Segment", "difference_noise", "over_segments"]
 
 Result = TypeVar("Result")
 
@@ -40,6 +40,30 @@ _KNOWN_ANGLE_STD = 5e-3
 _LEAST_FACTOR = 0.5
 _REST_FACTOR = 1.3
 _STATE_STEPS = (1e-5, 1e-4, 1e-3)
+
+
+@dataclass(frozen=True)
+class DriveElimination:
+    """What is needed to step the drive once the causes are known.
+
+    Parameters
+    ----------
+    factor : ndarray, shape (m, m)
+        Lower Cholesky factor L of H.
+    forward : ndarray, shape (m,)
+        x = L⁻¹(JᵀWr − Rd).
+    objective : float
+        rᵀWr + dᵀRd − xᵀx: twice the negative log likelihood, drive marginalised.
+    """
+
+    factor: NDArray[np.float64]
+    forward: NDArray[np.float64]
+    objective: float
+
+    def step(self, eliminated: NDArray[np.float64], step: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the step of the drive (m,) to its posterior mean, given the step of the signatures' coordinates."""
+        right = self.forward - eliminated @ step
+        return np.asarray(solve_triangular(self.factor, right, lower=True, trans=1, check_finite=False))
 
 
 @dataclass(frozen=True)
@@ -54,20 +78,14 @@ class Linearisation:
         Derivative of each observation with respect to the drive's coefficients.
     slow : ndarray, shape (R, m, K)
         The same in the cosines of slow noise.
-    factor : ndarray, shape (m, m)
-        Lower Cholesky factor L of H.
-    forward : ndarray, shape (m,)
-        x = L⁻¹(JᵀWr − Rd).
-    objective : float
-        rᵀWr + dᵀRd − xᵀx: twice the negative log likelihood, drive marginalised.
+    drive : DriveElimination
+        The drive's step and the likelihood without it.
     """
 
     residual: NDArray[np.float64]
     jacobian: DriveJacobian
     slow: NDArray[np.float64]
-    factor: NDArray[np.float64]
-    forward: NDArray[np.float64]
-    objective: float
+    drive: DriveElimination
 
 
 def over_segments(work: Callable[..., Result], *columns: Iterable[Any]) -> list[Result]:
@@ -212,7 +230,8 @@ class Segment:
             self.coefficients = kept
             line = self.linearise(effects)
             rows = self.spline.size - _DEGREE
-            value = -0.5 * line.objective - float(np.log(line.factor.diagonal()).sum()) - rows * np.log(trial)
+            drive = line.drive
+            value = -0.5 * drive.objective - float(np.log(drive.factor.diagonal()).sum()) - rows * np.log(trial)
             best = max(best, (value, float(trial)))
         self.coefficients, self.drive_factor = kept, best[1]
         self._set_roughness()
@@ -318,7 +337,8 @@ class Segment:
         lhs += 1e-14 * float(np.mean(lhs.diagonal())) * self._alternating
         factor = np.linalg.cholesky(lhs)
         forward = solve_triangular(factor, rhs, lower=True, check_finite=False)
-        return Linearisation(residual, jacobian, slow, factor, forward, objective - float(forward @ forward))
+        drive = DriveElimination(factor, forward, objective - float(forward @ forward))
+        return Linearisation(residual, jacobian, slow, drive)
 
     def _jacobian(self, effects: Sequence[Effect], base: NDArray[np.float64]) -> DriveJacobian:
         """Differentiate the prediction ``base`` with respect to the drive's state and chain with the spline."""
@@ -363,25 +383,18 @@ class Segment:
         cross = linear.jacobian.correlate(every, signatures, weights)  # (m, P)
         for r, slow in enumerate(linear.slow):
             cross -= slow @ np.tensordot(linear.jacobian.loading[r] * weights, damped, axes=1).T
-        eliminated = solve_triangular(linear.factor, cross, lower=True, check_finite=False)
+        eliminated = solve_triangular(linear.drive.factor, cross, lower=True, check_finite=False)
         gram -= eliminated.T @ eliminated
-        score -= eliminated.T @ linear.forward
+        score -= eliminated.T @ linear.drive.forward
         return gram, score, eliminated
-
-    def drive_step(
-        self, linear: Linearisation, eliminated: NDArray[np.float64], step: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
-        """Return the step of the drive to its posterior mean, given the step of the signatures' coordinates."""
-        right = linear.forward - eliminated @ step
-        return np.asarray(solve_triangular(linear.factor, right, lower=True, trans=1, check_finite=False))
 
     def move_drive(self, linear: Linearisation) -> None:
         """Move the drive to its posterior mean."""
-        self.coefficients = self.coefficients + self.drive_step(linear, np.zeros((self.spline.size, 0)), np.zeros(0))
+        self.coefficients = self.coefficients + linear.drive.step(np.zeros((self.spline.size, 0)), np.zeros(0))
 
     def whitened_residual(self, linear: Linearisation) -> NDArray[np.float64]:
         """Return W(r − Jδ) with δ the drive's posterior step, shape (n, c + 1): for scans over tones and orders."""
-        step = solve_triangular(linear.factor, linear.forward, lower=True, trans=1, check_finite=False)
+        step = linear.drive.step(np.zeros((self.spline.size, 0)), np.zeros(0))
         left = linear.residual - linear.jacobian.forward(step)
         slow = self.cosines.T @ left
         return (left - self.cosines @ (self.share * slow)) * self.inverse_variance

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import chi2
 
 from gfimu.diagnosis.causes import effects_of_run
 from gfimu.diagnosis.coloured_noise import NoiseLevels, estimate_flicker
@@ -13,10 +15,12 @@ from gfimu.diagnosis.model import Effect
 from gfimu.diagnosis.refinement import Fit
 from gfimu.diagnosis.segment import Segment
 
-__all__ = ["WALK_ODDS", "noise_log_determinant", "walk_strength", "white_factor"]
+__all__ = ["UNEQUAL_WALK", "WALK_ODDS", "Walk", "noise_log_determinant", "walk_strength", "white_factor"]
 
 WALK_ODDS = 10.0
 """Log odds that a random walk needs over bias instability alone."""
+UNEQUAL_WALK = 14.0
+"""`Walk.unequal` from which the channels do not wander alike: something else is taken for a walk."""
 _WEAKEST_WALK = 3e-3
 _WALK_GRID = np.geomspace(2e-3, 0.5, 28)
 _DRIVE_TAKES = 0.08  # of the strength, as the unknown drive follows what wanders in the channels together
@@ -25,22 +29,30 @@ _MEDIAN_FACTOR = 1.3
 _EVERY_FACTOR = 1.15
 
 
-def walk_strength(
-    segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]]
-) -> tuple[float, float, float]:
-    """Fit a random walk common to all channels to what a fit leaves.
+@dataclass(frozen=True)
+class Walk:
+    """A random walk common to all channels.
 
-    Returns
-    -------
-    strength : float
-        m/s² per √s.
-    std : float
-        Standard deviation of the strength.
+    Parameters
+    ----------
+    strength, std : float
+        Strength and its standard deviation, m/s² per √s.
     log_odds : float
         Against bias instability of at most 1.5 mg without a walk.
+    unequal : float
+        Minus the log of the chance that channels which wander equally differ as much as these.
     """
+
+    strength: float
+    std: float
+    log_odds: float
+    unequal: float
+
+
+def walk_strength(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]]) -> Walk:
+    """Fit a random walk common to all channels to what a fit leaves."""
     array = segments[0].model.array
-    totals = np.zeros(len(_WALK_GRID))
+    totals = np.zeros((len(_WALK_GRID), array.n_channels))
     without = 0.0
     for segment, known, drive in zip(segments, fixed, fit.drives, strict=True):
         kept, segment.coefficients = segment.coefficients, drive
@@ -52,21 +64,24 @@ def walk_strength(
         shape, drift = segment.basis.flicker_spectrum[1:], segment.basis.walk_spectrum[1:]
 
         usual = np.minimum(estimate_flicker(coefficients, white, segment.basis), _LARGEST_USUAL_FLICKER)
-        without += _whittle(slow, white**2 + np.outer(shape, usual**2))
+        without += float(_whittle(slow, white**2 + np.outer(shape, usual**2)).sum())
         for place, strength in enumerate(_WALK_GRID):
             flicker = np.minimum(estimate_flicker(coefficients, white, segment.basis, strength), _LARGEST_USUAL_FLICKER)
             totals[place] += _whittle(slow, white**2 + np.outer(shape, flicker**2) + (drift * strength**2)[:, None])
-    best = int(np.argmax(totals))
-    weight = np.exp(totals - totals[best])
+    common = totals.sum(axis=1)
+    best = int(np.argmax(common))
+    weight = np.exp(common - common[best])
     mean = float(weight @ _WALK_GRID / weight.sum())
     std = float(np.sqrt(weight @ (_WALK_GRID - mean) ** 2 / weight.sum()))
-    odds = float(totals[best] - without)
-    return (mean, float(np.hypot(std, _DRIVE_TAKES * mean)), odds) if mean > _WEAKEST_WALK else (mean, std, 0.0)
+    apart = 2.0 * float(totals.max(axis=0).sum() - common[best])
+    unequal = -float(chi2.logsf(apart, array.n_channels - 1))
+    odds = float(common[best] - without) if mean > _WEAKEST_WALK else 0.0
+    return Walk(mean, float(np.hypot(std, _DRIVE_TAKES * mean)), odds, unequal)
 
 
-def _whittle(power: NDArray[np.float64], spectrum: NDArray[np.float64]) -> float:
-    """Return the Whittle log likelihood of squared cosine coefficients (K, c)."""
-    return float(-0.5 * np.sum(np.log(spectrum) + power / spectrum))
+def _whittle(power: NDArray[np.float64], spectrum: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the Whittle log likelihood of squared cosine coefficients (K, c) per channel."""
+    return np.asarray(-0.5 * np.sum(np.log(spectrum) + power / spectrum, axis=0))
 
 
 def noise_log_determinant(segments: Sequence[Segment]) -> float:

@@ -1,0 +1,89 @@
+"""Long recordings: causes are searched on some stretches, spread over the runs, and judged on all.
+
+The search asks for hundreds of simulations of every stretch, the judgement for a few.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from gfimu.diagnosis.causes import Cause
+from gfimu.diagnosis.engine import RIVALS, Explanation, Report, explain, learn_noise, prune, tune_drives
+from gfimu.diagnosis.model import Effect
+from gfimu.diagnosis.refinement import refine
+from gfimu.diagnosis.segment import Segment
+
+__all__ = ["MOST_SEARCHED", "explain_any_length", "spread_over_runs"]
+
+MOST_SEARCHED = 8
+"""Stretches that are searched for causes, where there are as many runs at most."""
+
+
+def spread_over_runs(runs: Sequence[int], most: int) -> list[int]:
+    """Pick places of stretches, given the run that each belongs to: evenly spread, first and last ones included.
+
+    Parameters
+    ----------
+    runs : sequence of int
+        Number of the run of each stretch, in order.
+    most : int
+        About how many to pick; every run gives one at least.
+    """
+    chosen: list[int] = []
+    for run in dict.fromkeys(runs):
+        mine = [place for place, number in enumerate(runs) if number == run]
+        count = min(max(round(most * len(mine) / len(runs)), 1), len(mine))
+        chosen += [mine[int(place)] for place in np.linspace(0, len(mine) - 1, count).round()]
+    return chosen
+
+
+def explain_any_length(
+    segments: Sequence[Segment],
+    fixed: Sequence[Sequence[Effect]],
+    runs: int,
+    *,
+    start: Sequence[Cause] = (),
+    report: Report | None = None,
+) -> Explanation:
+    """Find the most probable set of causes (`explain`); in long recordings from some stretches, judged on all."""
+    chosen = spread_over_runs([segment.index for segment in segments], MOST_SEARCHED)
+    if len(chosen) == len(segments):
+        return explain(segments, fixed, runs, start=start, report=report)
+    tell = report or (lambda share, text: None)
+    part = explain(
+        [segments[place] for place in chosen],
+        [fixed[place] for place in chosen],
+        runs,
+        start=start,
+        report=lambda share, text: tell(0.6 * share, text),
+    )
+    tell(0.6, "the whole length")
+    rest = [place for place in range(len(segments)) if place not in set(chosen)]
+    for place in rest:
+        like = next(one for one in part.segments if one.index == segments[place].index)
+        segments[place].set_levels(like.levels)
+        segments[place].drive_factor, segments[place].rounding = like.drive_factor, like.rounding
+        segments[place].prepare_weights()
+    fit = refine(segments, part.fit.causes, fixed)
+    others, known = [segments[place] for place in rest], [fixed[place] for place in rest]
+    tune_drives(others, fit.of(rest), known)
+    fit = refine(segments, fit.causes, fixed, drives=fit.drives)
+    learn_noise(segments, fit, fixed)
+    fit = refine(segments, fit.causes, fixed, drives=fit.drives)
+    tell(0.8, "prune")
+    fit, without = prune(segments, fit, fixed)
+    rivals = [refine(segments, rival.causes, fixed, drives=fit.drives) for rival in part.rivals[:RIVALS]]
+    nothing = refine(segments, (), fixed, drives=fit.drives) if fit.causes else fit
+    for segment, drive in zip(segments, fit.drives, strict=True):
+        segment.coefficients = drive
+    return Explanation(
+        fit,
+        tuple(sorted(rivals, key=lambda rival: -rival.log_posterior)),
+        nothing,
+        without,
+        tuple(segments),
+        tuple(tuple(effects) for effects in fixed),
+        part.signatures,
+    )
