@@ -1,0 +1,88 @@
+"""What the library does not have is told by its channel and its form, and is not taken for the nearest thing it has."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+from gfimu.array import AccelerometerArray
+from gfimu.diagnosis import diagnose
+from gfimu.recording import Recording
+from sim.campaign import Measurement, measure
+from sim.effects import make_effect
+from sim.twin import Twin
+
+SETTING = Measurement(duration=24.0)
+CHANNEL = "a12"
+
+
+@pytest.fixture(scope="module")
+def twin():
+    return Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
+
+
+def recorded(twin, seed, change, effects=()):
+    """A run in which the readings are changed by ``change(t, readings)`` after everything else."""
+    run = measure(np.random.default_rng(seed), twin, effects, SETTING)
+    readings = run.readings.copy()
+    change(run.t_s, readings)
+    return Recording.from_arrays(run.t_s, readings, twin.array, reference=run.reference)
+
+
+def test_a_jump_is_told_by_channel_time_and_size(twin):
+    place = twin.array.channels.index(CHANNEL)
+
+    def jump(t, readings):
+        readings[t > 9.7, place] += 0.08
+
+    found = diagnose([recorded(twin, 3, jump)], twin)
+    assert found.verdict == "unknown"
+    told = re.search(rf"channel {CHANNEL} jumps by ([+-][\d.]+) m/s² at ([\d.]+) s", found.unexplained.signature)
+    assert told, found.unexplained.signature
+    assert float(told[1]) == pytest.approx(0.08, abs=0.02)
+    assert float(told[2]) == pytest.approx(9.7, abs=0.3)
+
+
+def test_a_cubic_is_not_a_scale_factor_and_a_quadratic(twin):
+    place = twin.array.channels.index(CHANNEL)
+
+    def bend(t, readings):
+        readings[:, place] += 3e-4 * readings[:, place] ** 3
+
+    found = diagnose([recorded(twin, 4, bend)], twin)
+    assert found.verdict == "unknown"
+    assert found.unexplained.signature.startswith(f"channel {CHANNEL} follows a curve")
+    (size,) = found.unexplained.surrogate.values()
+    assert size == pytest.approx(3e-4, rel=0.1)
+
+
+def test_a_scale_factor_and_a_quadratic_are_no_cubic(twin):
+    hidden = [
+        make_effect("scale_factor", {CHANNEL: 0.02}, twin.array),
+        make_effect("quadratic", {f"{CHANNEL}_s2_m": 1e-3}, twin.array),
+    ]
+    found = diagnose([recorded(twin, 5, lambda t, readings: None, hidden)], twin)
+    assert {cause.effect for cause in found.causes} == {"scale_factor", "quadratic"}
+    assert not found.unexplained.significant
+
+
+def test_a_walk_beside_strong_bias_instability_is_no_warm_up():
+    twin = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
+    unstable = Measurement(duration=30.0, bias_instability=0.5e-3 * 9.80665)
+    walk = make_effect("bias_random_walk", {"strength_m_s2_rts": 0.02})
+    found = diagnose([measure(np.random.default_rng(6), twin, [walk], unstable)], twin)
+    assert [cause.effect for cause in found.causes] == ["bias_random_walk"]
+    (cause,) = found.causes
+    assert abs(cause.parameters["strength_m_s2_rts"] - 0.02) < 3 * cause.std["strength_m_s2_rts"]
+
+
+def test_a_few_wandering_channels_are_no_walk_of_all(twin):
+    rng = np.random.default_rng(8)
+
+    def wander(t, readings):
+        readings[:, :3] += np.cumsum(0.004 * rng.standard_normal((len(t), 3)), axis=0)
+
+    found = diagnose([recorded(twin, 7, wander)], twin)
+    assert "bias_random_walk" not in [cause.effect for cause in found.causes]

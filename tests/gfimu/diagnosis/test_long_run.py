@@ -1,0 +1,61 @@
+"""A long recording is searched in part and judged whole."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gfimu.array import AccelerometerArray
+from gfimu.diagnosis import diagnose, engine, long_run
+from gfimu.diagnosis.long_run import spread_over_runs
+from sim.campaign import Measurement, measure
+from sim.effects import make_effect
+from sim.twin import Twin
+
+
+@pytest.mark.parametrize(
+    ("runs", "most", "chosen"),
+    [
+        ([0] * 5, 8, [0, 1, 2, 3, 4]),
+        ([0] * 28, 8, [0, 4, 8, 12, 15, 19, 23, 27]),
+        ([0] * 6 + [1], 4, [0, 2, 5, 6]),
+        ([0, 1, 2], 1, [0, 1, 2]),
+    ],
+)
+def test_stretches_are_spread_and_every_run_gives_one(runs, most, chosen):
+    assert spread_over_runs(runs, most) == chosen
+
+
+@pytest.fixture
+def short_stretches(monkeypatch):
+    monkeypatch.setattr(engine, "SEGMENT_DURATION", 10.0)
+
+
+def test_a_cause_found_in_part_is_measured_on_all(short_stretches, monkeypatch):
+    twin = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
+    hidden = make_effect("table_tilt", {"x_rad": 2e-3, "y_rad": -1e-3})
+    recording = measure(np.random.default_rng(11), twin, [hidden], Measurement(duration=50.0))
+    whole = diagnose([recording], twin)
+    searched = []
+    explain = long_run.explain
+    monkeypatch.setattr(
+        long_run,
+        "explain",
+        lambda segments, *rest, **kw: searched.append(len(segments)) or explain(segments, *rest, **kw),
+    )
+    monkeypatch.setattr(long_run, "MOST_SEARCHED", 2)
+    part = diagnose([recording], twin)
+    assert searched == [2]
+    for found in (whole, part):
+        assert [cause.effect for cause in found.causes] == ["table_tilt"]
+    one, other = whole.causes[0], part.causes[0]
+    for key, std in one.std.items():
+        assert other.std[key] == pytest.approx(std, rel=0.1)  # not that of two stretches in five
+        assert other.parameters[key] == pytest.approx(one.parameters[key], abs=0.5 * std)
+
+
+def test_nothing_is_found_in_a_long_quiet_recording(short_stretches, monkeypatch):
+    twin = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
+    monkeypatch.setattr(long_run, "MOST_SEARCHED", 2)
+    recording = measure(np.random.default_rng(12), twin, [], Measurement(duration=50.0))
+    assert diagnose([recording], twin).verdict == "nothing_found"
