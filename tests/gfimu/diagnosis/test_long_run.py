@@ -38,11 +38,12 @@ def test_a_cause_found_in_part_is_measured_on_all(short_stretches, monkeypatch):
     whole = diagnose([recording], twin)
     searched = []
     explain = long_run.explain
-    monkeypatch.setattr(
-        long_run,
-        "explain",
-        lambda segments, *rest, **kw: searched.append(len(segments)) or explain(segments, *rest, **kw),
-    )
+
+    def counted(segments, *rest, **keywords):
+        searched.append(len(segments))
+        return explain(segments, *rest, **keywords)
+
+    monkeypatch.setattr(long_run, "explain", counted)
     monkeypatch.setattr(long_run, "MOST_SEARCHED", 2)
     part = diagnose([recording], twin)
     assert searched == [2]
