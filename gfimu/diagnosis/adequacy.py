@@ -1,64 +1,34 @@
 """Adequacy: whether anything is left after the named causes, and what it depends on.
 
 A generic basis of the motion, the angle and time, per channel, is tested by the same evidence as the named effects,
-with the drive and the named causes projected out; narrow lines, noise that changes with the motion, and isolated
-spikes have tests of their own, as the generic basis is blind to them.
+with the drive and the named causes projected out; what the generic basis is blind to has tests of its own
+(`gfimu.diagnosis.residual_tests`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
-from scipy.stats import chi2
 
 from gfimu.diagnosis.causes import effects_of_run
 from gfimu.diagnosis.evidence import log_evidence, log_evidence_each
 from gfimu.diagnosis.model import Effect
-from gfimu.diagnosis.refinement import Fit, refine
-from gfimu.diagnosis.search import EXTRA_CAUSE
+from gfimu.diagnosis.refinement import Fit
+from gfimu.diagnosis.residual_tests import LeftOver, changing_noise, jumps, lines, one_curve
 from gfimu.diagnosis.segment import Linearisation, Segment
 from gfimu.diagnosis.signatures import cause_columns
 
-__all__ = ["LEFT_OVER_ODDS", "LeftOver", "generic_basis", "left_over"]
+__all__ = ["LEFT_OVER_ODDS", "generic_basis", "left_over"]
 
 LEFT_OVER_ODDS = 10.0
 """Log odds from which what is left is called significant; provisional until a study of null runs fixes it."""
 _UNIT = 0.03
 _STEPS = 8
 _SLOW = 10
-_FEWEST_DIFFERENCES = 200
-_OF_READING = frozenset({"bias", "scale_factor", "quadratic"})
-_JUMP_WIDTHS = (1.0, 2.0)
-_FEWEST_JUMPS = 12
-_FEWEST_IN_JUMP = 20
-_NORMAL_MEDIAN = 0.6745
 _ORDERS = (1, 2, 3, 4, 6, 8, 12)
-
-
-@dataclass(frozen=True)
-class LeftOver:
-    """The strongest term that is left.
-
-    Parameters
-    ----------
-    log_odds : float
-        Log odds against chance, all that was looked at accounted for.
-    signature : str
-        Channels and dependence, in words.
-    surrogate : dict of str to float
-        Coefficients of the data-driven term, m/s² per unit basis function, by ``"channel: basis function"``.
-    instead : bool
-        Whether it takes the place of named causes, which then are a compromise, instead of adding to them.
-    """
-
-    log_odds: float
-    signature: str
-    surrogate: dict[str, float]
-    instead: bool = False
 
 
 def generic_basis(segment: Segment) -> tuple[list[str], NDArray[np.float64]]:
@@ -123,12 +93,11 @@ def left_over(
     """
     channels = segments[0].model.array.channels
     candidates = [_basis_terms(segments, fit, fixed, channels)]
-    lines = [_lines(segment, fit, known, channels) for segment, known in zip(segments, fixed, strict=True)]
-    candidates += [max(lines, key=lambda found: found.log_odds)]
-    candidates.append(_one_curve(segments, fit, fixed, channels))
-    candidates += [_jumps(segment, fit, known, channels) for segment, known in zip(segments, fixed, strict=True)]
+    candidates += [lines(segment, fit, known, channels) for segment, known in zip(segments, fixed, strict=True)]
+    candidates.append(one_curve(segments, fit, fixed, channels))
+    candidates += [jumps(segment, fit, known, channels) for segment, known in zip(segments, fixed, strict=True)]
     if not rounded:
-        candidates.append(_changing_noise(segments, fit, fixed))
+        candidates.append(changing_noise(segments, fit, fixed))
     if spikes > max(3, 1e-4 * sum(segment.weight_mask.size for segment in segments)):
         candidates.append(LeftOver(10.0 * spikes, f"{spikes} isolated samples far off their neighbours", {}))
     return max(candidates, key=lambda found: found.log_odds)
@@ -248,162 +217,3 @@ def _project_out(
     mixed -= crossed.T @ eliminated
     gain = np.linalg.solve(inner + np.eye(len(right)) * 1e-6 * (1 + inner.diagonal().mean()), mixed)
     return gram - mixed.T @ gain, score - gain.T @ right
-
-
-def _left(segment: Segment, fit: Fit, known: Sequence[Effect]) -> NDArray[np.float64]:
-    """Return the residual in units of white noise, shape (n, c)."""
-    residual = segment.working_residual([*known, *effects_of_run(fit.causes, segment.model.array, segment.index)])
-    return residual[:, :-1] / segment.levels.white[:-1]
-
-
-def _whitened(segment: Segment, left: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Take the excess of slow noise out in its own basis, where a wandering bias has no jump between its ends."""
-    share = 1.0 - np.sqrt(1.0 - segment.share[:, :-1])
-    return np.asarray(left - segment.cosines @ (share * (segment.cosines.T @ left)))
-
-
-def _lines(segment: Segment, fit: Fit, known: Sequence[Effect], channels: Sequence[str]) -> LeftOver:
-    """Test for narrow lines on one channel or on all, by the maximum of the periodogram."""
-    left = _whitened(segment, _left(segment, fit, known))
-    n = len(left)
-    power = np.abs(np.fft.rfft(left, 2 * n, axis=0)) ** 2 / n
-    frequency = np.fft.rfftfreq(2 * n, segment.run.sample_period)
-    # Below this the slow noise and the drive have freedom of their own.
-    power[frequency < max(1.0, 4.0 / segment.run.duration)] = 0.0
-    level = np.median(power[frequency >= 1.0], axis=0) / np.log(2.0)
-    power = power / np.maximum(level, 0.7)
-    channel = int(np.argmax(power.max(axis=0)))
-    place = int(np.argmax(power[:, channel]))
-    one = float(power[place, channel]) - np.log(n * left.shape[1])
-    summed = power.sum(axis=1)
-    peak = int(np.argmax(summed))
-    every = -float(chi2.logsf(2 * summed[peak], 2 * left.shape[1])) - np.log(n)
-    if one >= every:
-        text = f"channel {channels[channel]} has a tone at {frequency[place]:.3f} Hz"
-        return LeftOver(one, text, {f"{channels[channel]}: tone at {frequency[place]:.4f} Hz": 1.0})
-    return LeftOver(every, f"several channels share a tone at {frequency[peak]:.3f} Hz", {})
-
-
-def _one_curve(
-    segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]], channels: Sequence[str]
-) -> LeftOver:
-    """Test whether one cubic of a channel's reading does what two or more named effects on that channel do together."""
-    best = LeftOver(-np.inf, "", {})
-    for number, channel in enumerate(channels):
-        mine = [
-            place
-            for place, cause in enumerate(fit.causes)
-            if cause.name in _OF_READING and np.abs(cause.mixing[number]).any()
-        ]
-        if len(mine) < 2 or not any(fit.causes[place].pattern == f"channel {channel}" for place in mine):
-            continue
-        priors = [fit.causes[place].log_prior for place in mine]
-        others = [cause for place, cause in enumerate(fit.causes) if place not in mine]
-        evidence, coefficient = _with_cubic(segments, refine(segments, others, fixed, drives=fit.drives), fixed, number)
-        odds = evidence + max(priors) - fit.log_evidence - sum(priors) - EXTRA_CAUSE * (len(mine) - 1)
-        if odds > best.log_odds:
-            text = f"channel {channel} follows a curve of its reading that the library has not (cubic)"
-            best = LeftOver(float(odds), text, {f"{channel}: reading³": coefficient}, instead=True)
-    return best
-
-
-def _with_cubic(
-    segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]], channel: int
-) -> tuple[float, float]:
-    """Return the log evidence of a fit and a cubic of one channel's reading besides, and the cubic, s⁴/m²."""
-    effects = [
-        [*known, *effects_of_run(fit.causes, segment.model.array, segment.index)]
-        for segment, known in zip(segments, fixed, strict=True)
-    ]
-    cubes = []
-    for segment, mine, drive in zip(segments, effects, fit.drives, strict=True):
-        kept, segment.coefficients = segment.coefficients, drive
-        cubes.append(segment.predict(mine)[:, channel] ** 3 * segment.row_weight[:, channel])
-        segment.coefficients = kept
-    unit = _UNIT / max(float(np.sqrt(np.mean(np.concatenate(cubes) ** 2))), 1e-12)
-    values = np.concatenate([*(cause.coordinates for cause in fit.causes), [0.0]])
-    gram, score, objective = np.zeros((len(values), len(values))), np.zeros(len(values)), 0.0
-    for segment, mine, known, cube, drive in zip(segments, effects, fixed, cubes, fit.drives, strict=True):
-        kept, segment.coefficients = segment.coefficients, drive
-        line = segment.linearise(mine)
-        causes = cause_columns(segment, fit.causes, known, shapes=False)  # (c + 1, K, n)
-        column = np.zeros((causes.shape[0], 1, causes.shape[2]))
-        column[channel, 0] = cube * unit
-        part, right, _ = segment.whitened_products(line, np.concatenate([causes, column], axis=1))
-        segment.coefficients = kept
-        gram, score, objective = gram + part, score + right, objective + line.drive.objective
-    nothing = objective + 2 * float(score @ values) + float(values @ gram @ values)
-    score = score + gram @ values
-    size = np.linalg.solve(gram + 1e-6 * np.eye(len(values)), score)[-1] * unit
-    return -0.5 * nothing + log_evidence(gram, score), float(size)
-
-
-def _jumps(segment: Segment, fit: Fit, known: Sequence[Effect], channels: Sequence[str]) -> LeftOver:
-    """Test whether a channel jumps: means of some seconds before and after every instant.
-
-    Bias instability is learnt from the residual and would take a jump for its own; so the difference is compared with
-    its usual size in this run, by the median, which a jump does not move.
-    """
-    mask = segment.weight_mask[:, :-1]
-    left = _left(segment, fit, known) * mask
-    sums = np.concatenate([np.zeros((1, left.shape[1])), np.cumsum(left, axis=0)])
-    counts = np.concatenate([np.zeros((1, left.shape[1])), np.cumsum(mask, axis=0)])
-    period, duration = segment.run.sample_period, segment.run.duration
-    best = LeftOver(-np.inf, "", {})
-    for width in _JUMP_WIDTHS:
-        size = round(width / period)
-        if size < _FEWEST_IN_JUMP or duration < _FEWEST_JUMPS * width:
-            continue
-        after, now, before = slice(2 * size, None), slice(size, -size), slice(None, -2 * size)
-        enough = np.minimum(counts[after] - counts[now], counts[now] - counts[before]) >= 0.5 * size
-        late = (sums[after] - sums[now]) / np.maximum(counts[after] - counts[now], 1)
-        early = (sums[now] - sums[before]) / np.maximum(counts[now] - counts[before], 1)
-        change = np.where(enough, late - early, np.nan)
-        if not np.isfinite(change).any(axis=0).all():
-            continue
-        usual = np.nanmedian(np.abs(change), axis=0) / _NORMAL_MEDIAN
-        usual = np.maximum(usual, np.sqrt(2.0 / size))
-        # A channel's own median has few independent values; it is trusted half as the others'.
-        usual = np.sqrt(usual * np.maximum(usual, np.median(usual)))
-        power = np.nan_to_num((change / usual) ** 2)
-        place, channel = divmod(int(np.argmax(power)), power.shape[1])
-        odds = 0.5 * float(power[place, channel]) - np.log(2 * duration / width * len(channels) * len(_JUMP_WIDTHS))
-        if odds > best.log_odds:
-            when = float(segment.run.t[min(place + size, len(left) - 1)])
-            size_si = float(change[place, channel] * segment.levels.white[channel])
-            name = channels[channel]
-            text = f"channel {name} jumps by {size_si:+.3g} m/s² at {when:.2f} s"
-            best = LeftOver(odds, text, {f"{name}: step at {when:.2f} s": size_si})
-    return best
-
-
-def _changing_noise(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]]) -> LeftOver:
-    """Test whether the noise level follows the rate, the acceleration or time."""
-    best = LeftOver(-np.inf, "", {})
-    for segment, known in zip(segments, fixed, strict=True):
-        left = np.diff(_left(segment, fit, known), n=2, axis=0) / np.sqrt(6.0)
-        mask = segment.weight_mask[:, :-1]
-        use = mask[1:-1] & mask[:-2] & mask[2:]  # a second difference needs three samples
-        power, count = np.where(use, left**2, 0.0).sum(axis=1), use.sum(axis=1)
-        state = segment.spin.at(segment.run.t[1:-1])
-        for name, value in (
-            ("the rate", np.abs(state.rate)),
-            ("the angular acceleration", np.abs(state.acceleration)),
-            ("time", segment.run.t[1:-1]),
-        ):
-            order = np.argsort(value, kind="stable")
-            parts = np.array_split(order, 6)
-            counts = np.array([count[part].sum() for part in parts])
-            if counts.min() < _FEWEST_DIFFERENCES:
-                continue
-            means = np.array([power[part].sum() for part in parts]) / counts
-            # Second differences of white noise: the mean square has about n/1.8 degrees of freedom per channel.
-            freedom = counts / 1.8
-            spread = means / means.mean()
-            statistic = float(np.sum(freedom / 2 * (spread - 1) ** 2))
-            # A change below ten per cent in power is within what a part's own noise does.
-            if np.ptp(spread) > 0.25:
-                odds = -float(chi2.logsf(statistic, 5)) - np.log(3.0)
-                if odds > best.log_odds:
-                    best = LeftOver(odds, f"the noise of all channels changes with {name}", {})
-    return best

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gfimu.array import AccelerometerArray
-from gfimu.diagnosis.adequacy import LEFT_OVER_ODDS, LeftOver, left_over
+from gfimu.diagnosis.adequacy import LEFT_OVER_ODDS, left_over
 from gfimu.diagnosis.causes import Cause, effects_of_run
 from gfimu.diagnosis.coloured_noise import NoiseLevels
 from gfimu.diagnosis.engine import LEAST_EXTRA_ODDS, Explanation, make_segments, prune
@@ -27,6 +27,7 @@ from gfimu.diagnosis.naming import (
     rival_list,
 )
 from gfimu.diagnosis.refinement import Fit, refine
+from gfimu.diagnosis.residual_tests import LeftOver
 from gfimu.diagnosis.run import Run, prepare_run
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.stochastic import UNEQUAL_WALK, WALK_ODDS, Walk, noise_log_determinant, walk_strength, white_factor

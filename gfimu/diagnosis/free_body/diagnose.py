@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from gfimu.attitude import from_rotation, integrate_attitude, to_rotation
-from gfimu.diagnosis.adequacy import LEFT_OVER_ODDS, LeftOver
+from gfimu.diagnosis.adequacy import LEFT_OVER_ODDS
 from gfimu.diagnosis.causes import Cause, effects_of_run
 from gfimu.diagnosis.engine import Explanation
 from gfimu.diagnosis.free_body.engine import explain, without_cause
@@ -29,6 +29,7 @@ from gfimu.diagnosis.free_body.segment import BodySegment
 from gfimu.diagnosis.integrity import check_integrity
 from gfimu.diagnosis.model import Effect, WorldModel
 from gfimu.diagnosis.naming import cause_parameters, conflicting, describe, mimics, probabilities, rival_list
+from gfimu.diagnosis.residual_tests import LeftOver
 from gfimu.diagnosis.verdict import Diagnosis, Gain, NamedCause, Residual, RunView, Unexplained
 from gfimu.diagnosis.wording import verdict_sentences
 from gfimu.recording import Recording

@@ -8,12 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
-from gfimu.diagnosis.adequacy import LEFT_OVER_ODDS, LeftOver
+from gfimu.diagnosis.adequacy import LEFT_OVER_ODDS
 from gfimu.diagnosis.causes import Cause, effects_of_run
 from gfimu.diagnosis.evidence import log_evidence, log_evidence_each
 from gfimu.diagnosis.free_body.engine import Known
 from gfimu.diagnosis.free_body.segment import BodyLine, BodySegment
 from gfimu.diagnosis.free_body.signatures import plan_signatures, signature_columns
+from gfimu.diagnosis.residual_tests import LeftOver
 from gfimu.kinematics import omega_products
 
 __all__ = ["motion_noise", "structure_left"]
