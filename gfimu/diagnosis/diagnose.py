@@ -29,7 +29,7 @@ from gfimu.diagnosis.naming import (
 from gfimu.diagnosis.refinement import Fit, refine
 from gfimu.diagnosis.residual_tests import LeftOver
 from gfimu.diagnosis.run import Run, prepare_run
-from gfimu.diagnosis.segment import Segment
+from gfimu.diagnosis.segment import Segment, known_walk
 from gfimu.diagnosis.stochastic import UNEQUAL_WALK, WALK_ODDS, Walk, noise_log_determinant, walk_strength, white_factor
 from gfimu.diagnosis.verdict import Diagnosis, Gain, NamedCause, Residual, RunView, Unexplained
 from gfimu.diagnosis.wording import verdict_sentences
@@ -121,6 +121,8 @@ class _Prepared:
     effects: list[list[Effect]]
     why: dict[str, str]
     spikes: int
+    rounded: bool
+    """Whether readings are clipped or coarse, so that their error follows the motion."""
 
     @classmethod
     def build(cls, recordings: Sequence[Recording], model: WorldModel, names: Sequence[str]) -> _Prepared:
@@ -132,12 +134,8 @@ class _Prepared:
             effects.append(list(checked.effects))
             why.update(checked.why)
             spikes += checked.spikes
-        return cls(runs, effects, why, spikes)
-
-    @property
-    def rounded(self) -> bool:
-        """Whether readings are clipped or coarse, so that their error follows the motion."""
-        return any(effect.name in _ROUNDING for effects in self.effects for effect in effects)
+        rounded = any(effect.name in _ROUNDING for known in (model.effects, *effects) for effect in known)
+        return cls(runs, effects, why, spikes, rounded)
 
     def segments(self, model: WorldModel) -> tuple[list[Segment], list[list[Effect]]]:
         """Return the segments and the effects known in each."""
@@ -174,7 +172,7 @@ def _explain(prepared: _Prepared, model: WorldModel, tell: Report) -> tuple[Expl
     before = segments
     for _ in range(_WALK_ROUNDS):
         walk = walk_strength(before, base, fixed)
-        if found is None and walk.log_odds < WALK_ODDS:
+        if found is None and (walk.log_odds < WALK_ODDS or known_walk(model) > 0):
             break
         if found is not None and abs(walk.strength - found[1].strength) < walk.std:
             found = found[0], walk

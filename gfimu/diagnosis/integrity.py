@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
-from gfimu.diagnosis.model import Effect, ExpectedNoise, WorldModel
+from gfimu.diagnosis.model import Effect, WorldModel
 from gfimu.diagnosis.run import Run
 
 __all__ = ["IntegrityReport", "check_integrity"]
@@ -85,7 +85,9 @@ def check_integrity(model: WorldModel, run: Run, prediction: NDArray[np.float64]
             f"all readings are multiples of {step:.4g} m/s², not of {expected.quantum:.4g} m/s²",
         )
     quantum = max(step or 0.0, expected.quantum)
-    limit = _clipping(run, prediction, quantum, expected)
+    clipped_at = [float(effect.parameters["limit_m_s2"]) for effect in model.effects if effect.name == "saturation"]
+    every = np.ones(model.array.n_channels)
+    limit = min(clipped_at) if clipped_at else _clipping(run, prediction, quantum * every, expected.white)
     at_limit = np.abs(run.readings) >= (np.inf if limit is None else limit - 0.6 * quantum)
     # Clipped readings look like those of a chip in a wider range.
     wiring = _wiring(model, replace(run, valid=run.valid & ~at_limit), prediction, expected.white, known)
@@ -94,7 +96,9 @@ def check_integrity(model: WorldModel, run: Run, prediction: NDArray[np.float64]
     rewired = [effect for effect in effects if effect.name in {"axis_swap", "sign_flip", "wrong_range"}]
     if rewired:
         prediction = _rewire(prediction, rewired, model)
-    limit = _clipping(run, prediction, quantum, expected)
+    coarser = _range_factors(rewired, model)
+    if not clipped_at:
+        limit = _clipping(run, prediction, quantum * coarser, expected.white * coarser)
     if limit is not None:
         if "saturation" not in known and limit < 0.97 * expected.full_scale:
             add("saturation", {"limit_m_s2": limit}, f"readings pile up at ±{limit:.2f} m/s² and never exceed it")
@@ -111,7 +115,6 @@ def check_integrity(model: WorldModel, run: Run, prediction: NDArray[np.float64]
                 f"channel {model.array.channels[channel]} holds one value from {begin:.2f} s to {end:.2f} s",
             )
     run = replace(run, valid=valid)
-    coarser = _range_factors(rewired, model)
     spikes = _spikes(run, expected.white * coarser, quantum * coarser)
     run = replace(run, valid=run.valid & ~spikes)
     return IntegrityReport(run, tuple(effects), why, int(spikes.sum()))
@@ -135,14 +138,15 @@ def _resolution(run: Run) -> float | None:
     return float(np.median(steps))
 
 
-def _clipping(run: Run, prediction: NDArray[np.float64], quantum: float, expected: ExpectedNoise) -> float | None:
-    """Return the level at which readings pile up, m/s²."""
+def _clipping(
+    run: Run, prediction: NDArray[np.float64], steps: NDArray[np.float64], white: NDArray[np.float64]
+) -> float | None:
+    """Return the level at which readings pile up, m/s²; step and white noise per channel (c,)."""
     levels = []
-    for channel in range(run.readings.shape[1]):
+    for channel, (quantum, sigma) in enumerate(zip(steps, white, strict=True)):
         mine = run.readings[run.valid[:, channel], channel]
         if len(mine) < 50 or np.ptp(mine) < 2 * quantum:
             continue  # a channel that holds one value is dead, not clipped
-        sigma = expected.white[channel]
         for sign in (1.0, -1.0):
             top = float((sign * mine).max())
             if top <= 0.0:
@@ -159,7 +163,7 @@ def _clipping(run: Run, prediction: NDArray[np.float64], quantum: float, expecte
     if not levels:
         return None
     limit = float(np.median(levels))
-    close = np.abs(np.array(levels) - limit) < 1.5 * quantum
+    close = np.abs(np.array(levels) - limit) < 1.5 * float(steps.min())
     return limit if close.sum() >= max(1, len(levels) // 2) else None
 
 

@@ -29,13 +29,14 @@ from gfimu.diagnosis.model import Effect, Spin, SpinState, WorldModel
 from gfimu.diagnosis.rounding import COARSE, rounded_likelihood, rounding_noise
 from gfimu.diagnosis.run import Run
 
-__all__ = ["DriveElimination", "Linearisation", "Segment", "difference_noise", "over_segments"]
+__all__ = ["DriveElimination", "Linearisation", "Segment", "difference_noise", "known_walk", "over_segments"]
 
 Result = TypeVar("Result")
 
 KNOT_SPACING = 0.05
 TIME_MARGIN = 0.5
 _DEGREE = 4
+_WALK = "bias_random_walk"
 _KNOWN_ANGLE_STD = 5e-3
 _LEAST_FACTOR = 0.5
 _REST_FACTOR = 1.3
@@ -165,7 +166,7 @@ class Segment:
         expected = self.model.expected_noise(1.0 / self.run.sample_period)
         reference = self.run.reference[self.run.reference_valid]
         white = np.append(expected.white, difference_noise(reference))
-        return NoiseLevels(white, np.append(np.full(len(expected.white), 2e-3), 0.0))
+        return NoiseLevels(white, np.append(np.full(len(expected.white), 2e-3), 0.0), known_walk(self.model))
 
     def _set_roughness(self) -> None:
         std = roughness_prior(
@@ -292,7 +293,8 @@ class Segment:
         analogue = self.model.expected_noise(1.0 / self.run.sample_period).analogue
         if quantum > COARSE * float(np.median(analogue)):
             self.rounding = quantum
-            self.set_levels(NoiseLevels(np.append(analogue, self.levels.white[-1]), self.levels.flicker))
+            white = np.append(analogue, self.levels.white[-1])
+            self.set_levels(NoiseLevels(white, self.levels.flicker, self.levels.walk))
 
     def noise_before_rounding(self, effects: Sequence[Effect], level: NDArray[np.float64]) -> NDArray[np.float64]:
         """Replace the channels' white noise in ``level`` by what it was before a coarse rounding, shape (c + 1,)."""
@@ -411,6 +413,12 @@ class _Moved:
         parts = [state.angle, state.rate, state.acceleration]
         parts[self._place] = parts[self._place] + self._step
         return SplineState(*parts)
+
+
+def known_walk(model: WorldModel) -> float:
+    """Return the random walk of the biases that the model has already, m/s² per √s."""
+    walks = [float(effect.parameters["strength_m_s2_rts"]) for effect in model.effects if effect.name == _WALK]
+    return float(np.linalg.norm(walks))
 
 
 def difference_noise(reference: NDArray[np.float64]) -> float:

@@ -11,10 +11,12 @@ from pathlib import Path
 import pytest
 from scipy.stats import binom
 
+from gfimu.diagnosis import diagnose
 from sim.effects import EFFECTS
 from sim.study.cases import EXOTICS, Case, study_cases
 from sim.study.outcome import draw_world, run_case
 from sim.study.report import score, visible
+from sim.twin import Twin
 
 OTHER_GENERATOR = f"{Path(__file__).resolve().parents[2] / 'independent_world.py'}:hide"
 SOURCES = ("", OTHER_GENERATOR)
@@ -113,6 +115,21 @@ def test_the_extension_removes_the_excess_on_data_the_fit_never_saw():
 def test_nothing_is_named_where_nothing_is_hidden():
     named = told(NULLS, lambda entry: not entry["nothing"])
     assert len(named) <= at_most(0.01, len(NULLS)), named
+
+
+NOT_BY_SIGNATURE = ("bias_random_walk", "coarse_resolution", "cogging", "noise", "saturation", "wrong_range")
+
+
+@pytest.mark.parametrize("name", NOT_BY_SIGNATURE)
+def test_nothing_is_left_for_the_extended_twin(name, tmp_path):
+    """Of effects that the noise, the integrity check or the table's dynamics carry, not a sum of signatures."""
+    source = OTHER_GENERATOR if name == "saturation" else ""
+    world = draw_world(Case("reduced", 600, (name,), 300.0, **SHORT), source)
+    found = diagnose([world.recording], world.twin)
+    assert [cause.effect for cause in found.causes] == [name]
+    (tmp_path / "twin.toml").write_text(found.twin.to_toml())
+    again = diagnose([world.recording], Twin.load(tmp_path / "twin.toml"))
+    assert again.verdict == "nothing_found", again
 
 
 def test_two_hidden_effects_are_named():
