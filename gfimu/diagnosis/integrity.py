@@ -86,8 +86,8 @@ def check_integrity(model: WorldModel, run: Run, prediction: NDArray[np.float64]
         )
     quantum = max(step or 0.0, expected.quantum)
     clipped_at = [float(effect.parameters["limit_m_s2"]) for effect in model.effects if effect.name == "saturation"]
-    every = np.ones(model.array.n_channels)
-    limit = min(clipped_at) if clipped_at else _clipping(run, prediction, quantum * every, expected.white)
+    coarser = _range_factors(model.effects, model)
+    limit = min(clipped_at) if clipped_at else _clipping(run, prediction, quantum * coarser, expected.white * coarser)
     at_limit = np.abs(run.readings) >= (np.inf if limit is None else limit - 0.6 * quantum)
     # Clipped readings look like those of a chip in a wider range.
     wiring = _wiring(model, replace(run, valid=run.valid & ~at_limit), prediction, expected.white, known)
@@ -96,7 +96,7 @@ def check_integrity(model: WorldModel, run: Run, prediction: NDArray[np.float64]
     rewired = [effect for effect in effects if effect.name in {"axis_swap", "sign_flip", "wrong_range"}]
     if rewired:
         prediction = _rewire(prediction, rewired, model)
-    coarser = _range_factors(rewired, model)
+    coarser = _range_factors([*model.effects, *rewired], model)
     if not clipped_at:
         limit = _clipping(run, prediction, quantum * coarser, expected.white * coarser)
     if limit is not None:
