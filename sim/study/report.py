@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.stats import beta
 
 from gfimu.atomic_file import write_text
+from sim.study.cases import OWN_SIGNATURE
 from sim.study.figures import draw_confusion, draw_detection, draw_reliability
 
 __all__ = ["Tally", "rate_with_interval", "score", "summarise", "visible", "write_report"]
@@ -194,7 +195,8 @@ def _noise_levels(outcomes: Sequence[Outcome]) -> str:
 
 
 def _misses(outcomes: Sequence[Outcome]) -> str:
-    single = [outcome for outcome in outcomes if len(outcome["effects"]) == 1 and not outcome["without"]]
+    inside = [outcome for outcome in outcomes if not outcome["without"] and outcome["study"] != "exotics"]
+    single = [outcome for outcome in inside if len(outcome["effects"]) == 1]
     rows = []
     for (effect,), group in sorted(_by([{**o, "effect": o["effects"][0]} for o in single], "effect").items()):
         tally = Tally(group)
@@ -219,7 +221,36 @@ def _left_out(outcomes: Sequence[Outcome]) -> str:
             (f"`{effect}`", len(tally), tally.share("unknown"), "; ".join(f"{k} × {v}" for k, v in said.most_common()))
         )
     header = ("hidden, not in the library", "runs", "unknown %", "said")
-    return "## Outside the library\n\n" + _table(header, rows) if rows else ""
+    groups = {
+        "exotic": [o for o in outside if o["study"] == "exotics"],
+        "taken out, with a signature of its own": [o for o in outside if o["without"] in OWN_SIGNATURE],
+        "taken out, contained in another": [o for o in outside if o["without"] and o["without"] not in OWN_SIGNATURE],
+    }
+    totals = [(f"**{name}**", len(group), Tally(group).share("unknown"), "") for name, group in groups.items() if group]
+    return "## Outside the library\n\n" + _table(header, [*totals, *rows]) if rows else ""
+
+
+def _several(outcomes: Sequence[Outcome]) -> str:
+    """Tell each run with two or three hidden effects that was not named right alone."""
+    rows = []
+    for outcome in outcomes:
+        tally = Tally([outcome])
+        if outcome["study"] in {"pairs", "triples"} and not tally.scores[0]["exact"]:
+            hidden = " + ".join(sorted(outcome["effects"]))
+            rows.append((outcome["study"], f"{outcome['size']:.0f}", hidden, tally.told(outcome)))
+    header = ("study", "d′ of each", "hidden", "said")
+    return (
+        "## Two and three effects hidden: what was not named right alone\n\n" + _table(header, sorted(rows))
+        if rows
+        else ""
+    )
+
+
+def _probabilities(outcomes: Sequence[Outcome]) -> str:
+    rows = [(f"{stated:.3f}", f"{right:.3f}", count) for stated, right, count in reliability(outcomes)]
+    return (
+        "## Stated probabilities\n\n" + _table(("stated, mean of the bin", "observed", "causes"), rows) if rows else ""
+    )
 
 
 def _baselines(outcomes: Sequence[Outcome]) -> str:
@@ -256,7 +287,9 @@ def summarise(outcomes: Sequence[Outcome]) -> str:
         + _overview(own)
         + _noise_levels(own)
         + _misses(own)
+        + _several(own)
         + _left_out(own)
+        + _probabilities(own)
         + _baselines([*same, *rivals])
     )
 
