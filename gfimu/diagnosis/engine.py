@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -11,25 +11,24 @@ from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
 from gfimu.diagnosis.causes import Cause, effects_of_run
-from gfimu.diagnosis.coloured_noise import NoiseLevels, estimate_flicker, white_level
 from gfimu.diagnosis.drive import smooth_rate
+from gfimu.diagnosis.far_starts import every_mode, from_far
 from gfimu.diagnosis.model import Effect, WorldModel
+from gfimu.diagnosis.nuisances import learn_noise, tune_drives
 from gfimu.diagnosis.refinement import Fit, refine
 from gfimu.diagnosis.run import Run
 from gfimu.diagnosis.search import search
 from gfimu.diagnosis.segment import Linearisation, Segment, difference_noise, over_segments
-from gfimu.diagnosis.signatures import Hypothesis, SignatureSet, hypotheses, plan_signatures, signature_columns
+from gfimu.diagnosis.signatures import SignatureSet, hypotheses, plan_signatures, signature_columns
 
 __all__ = [
     "RIVALS",
     "Explanation",
     "Report",
     "explain",
-    "learn_noise",
     "make_segments",
     "prune",
     "screen",
-    "tune_drives",
 ]
 
 Report = Callable[[float, str], None]
@@ -49,14 +48,8 @@ LEAST_ODDS = 9.0
 LEAST_EXTRA_ODDS = 7.0
 """Log odds that a further cause needs against the set without it."""
 _ITERATIONS = 7
-_FEW_ITERATIONS = 3
 _STEADY_NOISE = 0.1
 _FAINT = 500.0  # log odds of a mode whose frequency may not be settled
-_MODE_STARTS = 6
-_MODE_DAMPING = 0.05
-# What the evidence of a mode may be wrong by: it bends the functions that the drive can follow (`signatures`).
-_AS_LIKELY = 10.0
-_LEAST_VALID = 0.01
 
 
 @dataclass(frozen=True)
@@ -149,61 +142,6 @@ def screen(segments: Sequence[Segment], base: Fit, fixed: Sequence[Sequence[Effe
     return SignatureSet(tuple(signatures), gram, score + gram @ at, tuple(hypotheses(signatures, array, runs)))
 
 
-def learn_noise(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]]) -> float:
-    """Re-estimate the noise of every segment from what the fit leaves; returns the largest relative change."""
-    array = segments[0].model.array
-    change = 0.0
-    coefficients, whites = [], []
-    for segment, known, drive in zip(segments, fixed, fit.drives, strict=True):
-        segment.coefficients = drive
-        effects = [*known, *effects_of_run(fit.causes, array, segment.index)]
-        line = segment.linearise(effects)
-        segment.move_drive(line)
-        left = segment.working_residual(effects)
-        coefficients.append(segment.basis.transform(left))
-        # Above this frequency the drive has no freedom to follow the noise.
-        slowest = 0.6 / segment.spline.spacing
-        level = white_level(coefficients[-1], slowest, segment.run.sample_period)
-        # Missing samples stand as zeros, as where the reference comes at a lower rate.
-        level = level / np.sqrt(np.maximum(segment.weight_mask.mean(axis=0), _LEAST_VALID))
-        whites.append(segment.noise_before_rounding(effects, level))
-    for index in {segment.index for segment in segments}:
-        mine = [place for place, segment in enumerate(segments) if segment.index == index]
-        white = np.sqrt(np.mean([whites[place] ** 2 for place in mine], axis=0))
-        floor = segments[mine[0]].model.expected_noise(1.0 / segments[mine[0]].run.sample_period).quantum / np.sqrt(12)
-        white[:-1] = np.maximum(white[:-1], 0.5 * floor)
-        walk = segments[mine[0]].levels.walk
-        flicker = np.sqrt(
-            np.mean(
-                [estimate_flicker(coefficients[place], white, segments[place].basis, walk) ** 2 for place in mine],
-                axis=0,
-            )
-        )
-        flicker[-1] = 0.0
-        for place in mine:
-            old = segments[place].levels
-            change = max(
-                change,
-                float(np.max(np.abs(white / old.white - 1))),
-                float(np.max(np.abs(flicker[:-1] - old.flicker[:-1]) / (old.flicker[:-1] + 1e-3))),
-            )
-            segments[place].set_levels(NoiseLevels(white, flicker, walk))
-            segments[place].prepare_weights()
-    return change
-
-
-def tune_drives(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]]) -> None:
-    """Let the data choose how rough the drive of every segment may be."""
-    array = segments[0].model.array
-
-    def tune(segment: Segment, known: Sequence[Effect], drive: NDArray[np.float64]) -> None:
-        segment.coefficients = drive
-        segment.learn_roughness()
-        segment.tune_roughness([*known, *effects_of_run(fit.causes, array, segment.index)])
-
-    over_segments(tune, segments, fixed, fit.drives)
-
-
 def explain(
     segments: Sequence[Segment],
     fixed: Sequence[Sequence[Effect]],
@@ -270,7 +208,7 @@ def explain(
             for hypothesis in signatures.hypotheses:
                 if hypothesis.family.starts:
                     tell(0.1, f"large sizes of {hypothesis.name}")
-                    large = _from_far(segments, hypothesis, fixed, best.drives)
+                    large = from_far(segments, hypothesis, fixed, best.drives)
                     fits[large.key] = max(fits.get(large.key, large), large, key=_posterior)
         tried |= fits
         winner = max(fits.values(), key=lambda fit: fit.log_posterior)
@@ -298,7 +236,7 @@ def explain(
         best, without = prune(segments, better, fixed)
         unique.pop(best.key, None)
     if "resonance" in without and best.log_posterior - without["resonance"].log_posterior < _FAINT:
-        best = _every_mode(segments, best, fixed)
+        best = every_mode(segments, best, fixed)
     tell(0.9, "compare")
     nothing = refine(segments, (), fixed, drives=best.drives, iterations=8) if best.causes else best
     for segment, drive in zip(segments, best.drives, strict=True):
@@ -314,48 +252,6 @@ def explain(
         tuple(tuple(known) for known in fixed),
         signatures,
     )
-
-
-def _from_far(
-    segments: Sequence[Segment],
-    hypothesis: Hypothesis,
-    fixed: Sequence[Sequence[Effect]],
-    drives: Sequence[NDArray[np.float64]],
-) -> Fit:
-    """Fit one effect from several large sizes, as its signature at nothing says little about them."""
-    fits = [
-        refine(segments, [hypothesis.cause(np.array([start]))], fixed, drives=drives, iterations=_FEW_ITERATIONS)
-        for start in hypothesis.family.starts
-    ]
-    best = max(fits, key=_posterior)
-    return refine(segments, best.causes, fixed, drives=best.drives, iterations=2 * _ITERATIONS)
-
-
-def _every_mode(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]]) -> Fit:
-    """Fit a mode that is hardly rung from everywhere; what its frequency could as well be goes into its covariance.
-
-    Far below its frequency a mode only bends the ramps, and many modes bend them alike.
-    """
-    place = next(number for number, cause in enumerate(fit.causes) if cause.name == "resonance")
-    mode = fit.causes[place]
-    duration = max(segment.run.duration for segment in segments)
-    grid = mode.family.shapes(duration, 1.0 / segments[0].run.sample_period)
-    frequencies = sorted({shape["frequency_hz"] for shape in grid})[:: max(len(grid) // (2 * _MODE_STARTS), 1)]
-    fits = [fit]
-    for frequency in frequencies:
-        shape = {**mode.shape, "frequency_hz": frequency, "damping_ratio": _MODE_DAMPING}
-        causes = [*fit.causes[:place], mode.at(mode.coordinates, shape), *fit.causes[place + 1 :]]
-        fits.append(refine(segments, causes, fixed, drives=fit.drives, iterations=2 * _ITERATIONS))
-    best = max(fits, key=_posterior)
-    modes = [other.causes[place] for other in fits if other.log_posterior > best.log_posterior - _AS_LIKELY]
-    mode = best.causes[place]
-    apart = np.mean([np.square(other.coordinates - mode.coordinates) for other in modes], axis=0)
-    shape_std = {
-        key: float(np.hypot(std, np.sqrt(np.mean([(other.shape[key] - mode.shape[key]) ** 2 for other in modes]))))
-        for key, std in mode.shape_std.items()
-    }
-    wide = replace(mode, covariance=mode.covariance + np.diag(apart), shape_std=shape_std)
-    return replace(best, causes=(*best.causes[:place], wide, *best.causes[place + 1 :]))
 
 
 def prune(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]]) -> tuple[Fit, dict[str, Fit]]:

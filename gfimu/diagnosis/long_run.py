@@ -10,8 +10,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from gfimu.diagnosis.causes import Cause
-from gfimu.diagnosis.engine import RIVALS, Explanation, Report, explain, learn_noise, prune, tune_drives
+from gfimu.diagnosis.engine import RIVALS, Explanation, Report, explain, prune
 from gfimu.diagnosis.model import Effect
+from gfimu.diagnosis.nuisances import learn_noise, tune_drives
 from gfimu.diagnosis.refinement import refine
 from gfimu.diagnosis.segment import Segment
 

@@ -1,0 +1,240 @@
+"""From the most probable causes to the verdict: names, parameters, rivals, what is left, and the views of each run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from gfimu.array import AccelerometerArray
+from gfimu.diagnosis.adequacy import LEFT_OVER_ODDS
+from gfimu.diagnosis.causes import Cause, effects_of_run
+from gfimu.diagnosis.engine import Explanation
+from gfimu.diagnosis.model import Effect, WorldModel
+from gfimu.diagnosis.naming import (
+    cause_parameters,
+    channel_share,
+    conflicting,
+    describe,
+    mimics,
+    probabilities,
+    rival_list,
+)
+from gfimu.diagnosis.prepared_runs import PreparedRuns
+from gfimu.diagnosis.refinement import Fit
+from gfimu.diagnosis.residual_tests import LeftOver
+from gfimu.diagnosis.stochastic import Walk, white_factor
+from gfimu.diagnosis.verdict import Diagnosis, Gain, NamedCause, Residual, RunView, Unexplained
+from gfimu.diagnosis.wording import verdict_sentences
+
+__all__ = ["conclude"]
+
+_DOMINANT = 0.03
+_INEXACTNESS = 2.5e-3
+
+
+def conclude(
+    prepared: PreparedRuns,
+    model: WorldModel,
+    explanation: Explanation,
+    walk: Walk | None,
+    left: LeftOver,
+    gain: Gain,
+    withdrawn: Sequence[str],
+) -> Diagnosis:
+    """Put everything together."""
+    array = model.array
+    fit = explanation.fit
+    found = [*_integrity_causes(prepared), *_stochastic_causes(explanation, walk)]
+    likely = probabilities(explanation)
+    rivals = conflicting(explanation)
+    named = _named(explanation, fit, likely, array)
+    removed = explanation.nothing.objective - fit.objective
+    # No model is exact: what is left must also stand out against what the causes explain.
+    significant = left.log_odds > (LEFT_OVER_ODDS if left.instead else max(LEFT_OVER_ODDS, _INEXACTNESS * removed))
+    dominant = significant and (left.instead or 2 * left.log_odds > _DOMINANT * max(removed, 0.0))
+    runs = tuple(_view(prepared, number, explanation, found) for number in range(len(prepared.runs)))
+    extension = [cause.effect(array) for cause in fit.causes] if not dominant else []
+    twin = model.extended([*_library_effects(model, found), *extension])
+    if dominant:
+        verdict, causes = "unknown", tuple(found)
+    elif rivals:
+        verdict = "ambiguous"
+        others = [cause for rival in rivals for cause in _named(explanation, rival, likely, array)]
+        causes = _mutual([*named, *(other for other in others if other.effect not in fit.names)], fit, rivals)
+        causes = (*found, *causes)
+    elif named or found:
+        verdict, causes = "explained", (*found, *named)
+    else:
+        verdict, causes = "nothing_found", ()
+    unexplained = Unexplained(significant, left.signature if significant else "", left.log_odds, left.surrogate)
+    residual = _residual(runs, explanation)
+    levels = explanation.segments[0].levels
+    expected = model.expected_noise(1.0 / prepared.runs[0].sample_period)
+    noise = {
+        "white_over_data_sheet": float(np.median(levels.white[:-1] / expected.white)),
+        "bias_instability_m_s2": float(np.median(levels.flicker[:-1])),
+        "reference_white": float(levels.white[-1]),
+    }
+    words = verdict_sentences(verdict, causes, residual, gain, unexplained, withdrawn)
+    return Diagnosis(verdict, causes, residual, gain, unexplained, rival_list(explanation), twin, runs, words, noise)
+
+
+def _named(explanation: Explanation, fit: Fit, likely: dict[str, float], array: AccelerometerArray) -> list[NamedCause]:
+    """Return the causes of a fit as the verdict names them, the largest contribution first."""
+    segment = explanation.segments[0]
+    known = explanation.fixed[0]
+    whole = segment.predict([*known, *effects_of_run(fit.causes, array, segment.index)])
+    entries = []
+    for cause in fit.causes:
+        others = [other for other in fit.causes if other.name != cause.name]
+        change = whole - segment.predict([*known, *effects_of_run(others, array, segment.index)])
+        share = channel_share(change[:, :-1] * segment.weight_mask[:, :-1], array.channels)
+        parameters, std = cause_parameters(cause, array)
+        same = mimics(explanation, cause) if fit is explanation.fit else []
+        odds = (
+            float(fit.log_posterior - explanation.without[cause.name].log_posterior)
+            if cause.name in explanation.without
+            else 0.0
+        )
+        entry = NamedCause(
+            cause.name,
+            parameters,
+            std,
+            likely.get(cause.name, 0.0),
+            cause.pattern,
+            tuple(same),
+            str(cause.family.separated_by) if same else "",
+            describe(cause, array, share) + _other_runs(cause, array, len({s.index for s in explanation.segments})),
+            odds,
+        )
+        entries.append((float(sum(value**2 for value in share.values())), entry))
+    return [entry for _, entry in sorted(entries, key=lambda pair: -pair[0])]
+
+
+def _other_runs(cause: Cause, array: AccelerometerArray, runs: int) -> str:
+    """Tell the sizes in the other runs of a cause that each mounting has anew."""
+    if not cause.family.per_run or runs < 2:
+        return ""
+    parts = []
+    for run in range(1, runs):
+        values, _ = cause_parameters(cause, array, run)
+        numbers = ", ".join(f"{key} = {value:.3g}" for key, value in values.items() if isinstance(value, float))
+        parts.append(f"run {run + 1}: {numbers}")
+    return f"; the values are those of the first run ({'; '.join(parts)})"
+
+
+def _mutual(named: Sequence[NamedCause], fit: Fit, rivals: Sequence[Fit]) -> tuple[NamedCause, ...]:
+    """Let each cause that may be another list the others."""
+    shared = frozenset.intersection(fit.names, *(rival.names for rival in rivals))
+    contested = list(dict.fromkeys(cause.effect for cause in named if cause.effect not in shared))
+    out = []
+    for cause in named:
+        if cause.effect in shared:
+            out.append(cause)
+            continue
+        others = tuple(dict.fromkeys([*(n for n in contested if n != cause.effect), *cause.not_distinguishable_from]))
+        text = cause.would_be_separated_by or "several speeds in both directions, and the cube remounted on its side"
+        out.append(replace(cause, not_distinguishable_from=others, would_be_separated_by=text))
+    return tuple(out)
+
+
+def _integrity_causes(prepared: PreparedRuns) -> list[NamedCause]:
+    """Return the faults seen in the samples, each once."""
+    causes: dict[str, NamedCause] = {}
+    for effects in prepared.effects:
+        for effect in effects:
+            if effect.name not in causes:
+                causes[effect.name] = NamedCause(
+                    str(effect.name), dict(effect.parameters), {}, 0.999, why=prepared.why.get(effect.name, "")
+                )
+    return list(causes.values())
+
+
+def _stochastic_causes(explanation: Explanation, walk: Walk | None) -> list[NamedCause]:
+    """Return wandering biases and excess noise."""
+    causes = []
+    families = explanation.segments[0].model.families()
+    if walk is not None and "bias_random_walk" in families:
+        causes.append(
+            NamedCause(
+                "bias_random_walk",
+                {"strength_m_s2_rts": walk.strength},
+                {"strength_m_s2_rts": walk.std},
+                0.99,
+                why="the slow part of every channel grows like a random walk, beyond bias instability",
+                log_odds=walk.log_odds,
+            )
+        )
+    excess = white_factor(explanation.segments)
+    if excess is not None and "noise" in families:
+        factor, std = excess
+        causes.append(
+            NamedCause(
+                "noise",
+                {"factor": factor},
+                {"factor": std},
+                0.999,
+                why=f"the white noise of all channels is {factor:.2f} times the data sheet's",
+            )
+        )
+    return causes
+
+
+def _library_effects(model: WorldModel, causes: Sequence[NamedCause]) -> list[Effect]:
+    families = model.families()
+    return [families[cause.effect](cause.parameters) for cause in causes if cause.effect in families]
+
+
+def _view(prepared: PreparedRuns, number: int, explanation: Explanation, found: Sequence[NamedCause]) -> RunView:
+    """Collect one run for pictures: before is the given twin driven by the reference alone."""
+    run = prepared.runs[number]
+    mine = [
+        (segment, known)
+        for segment, known in zip(explanation.segments, explanation.fixed, strict=True)
+        if segment.index == number
+    ]
+    before, after, states = [], [], []
+    for segment, known in mine:
+        array = segment.model.array
+        effects = [*known, *effects_of_run(explanation.fit.causes, array, segment.index)]
+        after.append(segment.predict(effects))
+        states.append(segment.spin.at(segment.run.t))
+        before.append(segment.reference_prediction([]))
+    first, second = np.concatenate(before), np.concatenate(after)
+    return RunView(
+        run.name,
+        run.t,
+        run.readings,
+        run.valid,
+        first[:, :-1],
+        second[:, :-1],
+        run.reference,
+        first[:, -1],
+        second[:, -1],
+        np.concatenate([state.angle for state in states]),
+        np.concatenate([state.rate for state in states]),
+        np.concatenate([state.acceleration for state in states]),
+        run.temperature,
+        mine[0][0].levels.white[:-1],
+    )
+
+
+def _residual(runs: Sequence[RunView], explanation: Explanation) -> Residual:
+    """Measure the residual before and after over valid samples."""
+    channels = explanation.segments[0].model.array.channels
+    use = np.concatenate([run.valid for run in runs])
+    measured = np.concatenate([run.measured for run in runs])
+    before = np.where(use, measured - np.concatenate([run.before for run in runs]), 0.0)
+    after = np.where(use, measured - np.concatenate([run.after for run in runs]), 0.0)
+    count = np.maximum(use.sum(axis=0), 1)
+    levels = explanation.segments[0].levels
+    floor = levels.white[:-1] ** 2 + 0.6 * levels.flicker[:-1] ** 2 + explanation.segments[0].rounding ** 2 / 12.0
+    return Residual(
+        float(np.sqrt(np.sum(before**2) / count.sum())),
+        float(np.sqrt(np.sum(after**2) / count.sum())),
+        float(np.sqrt(np.sum(floor * count) / count.sum())),
+        dict(zip(channels, map(float, np.sqrt(np.sum(before**2, axis=0) / count)), strict=True)),
+        dict(zip(channels, map(float, np.sqrt(np.sum(after**2, axis=0) / count)), strict=True)),
+    )

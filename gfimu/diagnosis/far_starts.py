@@ -1,0 +1,65 @@
+"""Starts far from nothing, for effects whose signature at nothing says little about where they are."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gfimu.diagnosis.model import Effect
+from gfimu.diagnosis.refinement import Fit, refine
+from gfimu.diagnosis.segment import Segment
+from gfimu.diagnosis.signatures import Hypothesis
+
+__all__ = ["every_mode", "from_far"]
+
+_ITERATIONS = 14
+_FEW_ITERATIONS = 3
+_MODE_STARTS = 6
+_MODE_DAMPING = 0.05
+# What the evidence of a mode may be wrong by: it bends the functions that the drive can follow (`signatures`).
+_AS_LIKELY = 10.0
+
+
+def from_far(
+    segments: Sequence[Segment],
+    hypothesis: Hypothesis,
+    fixed: Sequence[Sequence[Effect]],
+    drives: Sequence[NDArray[np.float64]],
+) -> Fit:
+    """Fit one effect from several large sizes, as its signature at nothing says little about them."""
+    fits = [
+        refine(segments, [hypothesis.cause(np.array([start]))], fixed, drives=drives, iterations=_FEW_ITERATIONS)
+        for start in hypothesis.family.starts
+    ]
+    best = max(fits, key=lambda fit: fit.log_posterior)
+    return refine(segments, best.causes, fixed, drives=best.drives, iterations=_ITERATIONS)
+
+
+def every_mode(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]]) -> Fit:
+    """Fit a mode that is hardly rung from everywhere; what its frequency could as well be goes into its covariance.
+
+    Far below its frequency a mode only bends the ramps, and many modes bend them alike.
+    """
+    place = next(number for number, cause in enumerate(fit.causes) if cause.name == "resonance")
+    mode = fit.causes[place]
+    duration = max(segment.run.duration for segment in segments)
+    grid = mode.family.shapes(duration, 1.0 / segments[0].run.sample_period)
+    frequencies = sorted({shape["frequency_hz"] for shape in grid})[:: max(len(grid) // (2 * _MODE_STARTS), 1)]
+    fits = [fit]
+    for frequency in frequencies:
+        shape = {**mode.shape, "frequency_hz": frequency, "damping_ratio": _MODE_DAMPING}
+        causes = [*fit.causes[:place], mode.at(mode.coordinates, shape), *fit.causes[place + 1 :]]
+        fits.append(refine(segments, causes, fixed, drives=fit.drives, iterations=_ITERATIONS))
+    best = max(fits, key=lambda fit: fit.log_posterior)
+    modes = [other.causes[place] for other in fits if other.log_posterior > best.log_posterior - _AS_LIKELY]
+    mode = best.causes[place]
+    apart = np.mean([np.square(other.coordinates - mode.coordinates) for other in modes], axis=0)
+    shape_std = {
+        key: float(np.hypot(std, np.sqrt(np.mean([(other.shape[key] - mode.shape[key]) ** 2 for other in modes]))))
+        for key, std in mode.shape_std.items()
+    }
+    wide = replace(mode, covariance=mode.covariance + np.diag(apart), shape_std=shape_std)
+    return replace(best, causes=(*best.causes[:place], wide, *best.causes[place + 1 :]))

@@ -1,0 +1,73 @@
+"""What is not asked for but has to be known: the noise of the sensors and how rough the drive may be."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gfimu.diagnosis.causes import effects_of_run
+from gfimu.diagnosis.coloured_noise import NoiseLevels, estimate_flicker, white_level
+from gfimu.diagnosis.model import Effect
+from gfimu.diagnosis.refinement import Fit
+from gfimu.diagnosis.segment import Segment, over_segments
+
+__all__ = ["learn_noise", "tune_drives"]
+
+_LEAST_VALID = 0.01
+
+
+def learn_noise(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]]) -> float:
+    """Re-estimate the noise of every segment from what the fit leaves; returns the largest relative change."""
+    array = segments[0].model.array
+    change = 0.0
+    coefficients, whites = [], []
+    for segment, known, drive in zip(segments, fixed, fit.drives, strict=True):
+        segment.coefficients = drive
+        effects = [*known, *effects_of_run(fit.causes, array, segment.index)]
+        line = segment.linearise(effects)
+        segment.move_drive(line)
+        left = segment.working_residual(effects)
+        coefficients.append(segment.basis.transform(left))
+        # Above this frequency the drive has no freedom to follow the noise.
+        slowest = 0.6 / segment.spline.spacing
+        level = white_level(coefficients[-1], slowest, segment.run.sample_period)
+        # Missing samples stand as zeros, as where the reference comes at a lower rate.
+        level = level / np.sqrt(np.maximum(segment.weight_mask.mean(axis=0), _LEAST_VALID))
+        whites.append(segment.noise_before_rounding(effects, level))
+    for index in {segment.index for segment in segments}:
+        mine = [place for place, segment in enumerate(segments) if segment.index == index]
+        white = np.sqrt(np.mean([whites[place] ** 2 for place in mine], axis=0))
+        floor = segments[mine[0]].model.expected_noise(1.0 / segments[mine[0]].run.sample_period).quantum / np.sqrt(12)
+        white[:-1] = np.maximum(white[:-1], 0.5 * floor)
+        walk = segments[mine[0]].levels.walk
+        flicker = np.sqrt(
+            np.mean(
+                [estimate_flicker(coefficients[place], white, segments[place].basis, walk) ** 2 for place in mine],
+                axis=0,
+            )
+        )
+        flicker[-1] = 0.0
+        for place in mine:
+            old = segments[place].levels
+            change = max(
+                change,
+                float(np.max(np.abs(white / old.white - 1))),
+                float(np.max(np.abs(flicker[:-1] - old.flicker[:-1]) / (old.flicker[:-1] + 1e-3))),
+            )
+            segments[place].set_levels(NoiseLevels(white, flicker, walk))
+            segments[place].prepare_weights()
+    return change
+
+
+def tune_drives(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]]) -> None:
+    """Let the data choose how rough the drive of every segment may be."""
+    array = segments[0].model.array
+
+    def tune(segment: Segment, known: Sequence[Effect], drive: NDArray[np.float64]) -> None:
+        segment.coefficients = drive
+        segment.learn_roughness()
+        segment.tune_roughness([*known, *effects_of_run(fit.causes, array, segment.index)])
+
+    over_segments(tune, segments, fixed, fit.drives)
