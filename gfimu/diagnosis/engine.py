@@ -176,6 +176,7 @@ def explain(
         tune_drives(segments, fitted, fixed)
         best = fitted = refine(segments, start, fixed, drives=fitted.drives, iterations=8)
     tried: dict[frozenset[tuple[str, str]], Fit] = {}
+    behind: dict[frozenset[tuple[str, str]], float] = {}  # how far, under the noise that both were judged by
     settled_before = False
     for round_number in range(_ROUNDS):
         tell(0.1 + 0.8 * round_number / _ROUNDS, f"search {round_number + 1}")
@@ -211,7 +212,8 @@ def explain(
                     large = from_far(segments, hypothesis, fixed, best.drives)
                     fits[large.key] = max(fits.get(large.key, large), large, key=_posterior)
         tried |= fits
-        winner = max(fits.values(), key=lambda fit: fit.log_posterior)
+        winner = max(fits.values(), key=_posterior)
+        behind |= {key: winner.log_posterior - fit.log_posterior for key, fit in fits.items()}
         settled = winner.key == best.key
         best = winner
         change = learn_noise(segments, best, fixed)
@@ -223,9 +225,9 @@ def explain(
     tell(0.85, "prune")
     best, without = prune(segments, best, fixed)
     near = [
-        fit
-        for fit in sorted(tried.values(), key=_posterior, reverse=True)
-        if fit.key != best.key and fit.causes and fit.log_posterior > best.log_posterior - _CLOSE - 10.0
+        tried[key]
+        for key in sorted(behind, key=behind.__getitem__)
+        if best.causes and key != best.key and tried[key].causes and behind[key] < _CLOSE + 10.0
     ]
     rivals = [refine(segments, fit.causes, fixed, drives=best.drives, iterations=6) for fit in near[:RIVALS]]
     rivals = [prune(segments, rival, fixed)[0] for rival in rivals if len(rival.causes) <= len(best.causes) + 1]
