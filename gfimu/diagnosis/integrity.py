@@ -24,6 +24,7 @@ _RANGE_FACTORS = (1 / 16, 1 / 8, 1 / 4, 1 / 2, 2.0, 4.0, 8.0, 16.0)
 _REMOVED = 0.7
 _SIGNIFICANT_RMS = 12.0
 _SPIKE = 8.0
+_PILE = 30
 
 
 @dataclass(frozen=True)
@@ -142,7 +143,7 @@ def _clipping(
     run: Run, prediction: NDArray[np.float64], steps: NDArray[np.float64], white: NDArray[np.float64]
 ) -> float | None:
     """Return the level at which readings pile up, m/s²; step and white noise per channel (c,)."""
-    levels = []
+    levels, piles = [], []
     for channel, (quantum, sigma) in enumerate(zip(steps, white, strict=True)):
         mine = run.readings[run.valid[:, channel], channel]
         if len(mine) < 50 or np.ptp(mine) < 2 * quantum:
@@ -154,12 +155,13 @@ def _clipping(
             at_top = np.abs(sign * mine - top) < 0.3 * quantum
             below = np.abs(sign * mine - (top - quantum)) < 0.3 * quantum
             beyond = sign * prediction[run.valid[:, channel], channel] > top + 1.5 * sigma
-            if (
-                at_top.sum() >= 8
-                and at_top.sum() > 3 * below.sum() + 4
-                and (beyond & at_top).sum() > 0.5 * at_top.sum()
-            ):
+            if at_top.sum() < 8 or at_top.sum() <= 3 * below.sum() + 4:
+                continue
+            if (beyond & at_top).sum() > 0.5 * at_top.sum():
                 levels.append(top)
+            elif at_top.sum() >= _PILE and sigma > 0.5 * quantum:
+                piles.append(top)  # a steady signal at the limit: its noise would go beyond
+    levels = levels or (piles if len(piles) > 1 else [])
     if not levels:
         return None
     limit = float(np.median(levels))

@@ -16,6 +16,7 @@ from gfimu.recording import Recording
 from gfimu.units import STANDARD_GRAVITY
 from sim.campaign import Measurement, hidden_effect, measure, random_profile
 from sim.effects import make_effect
+from sim.profiles import Hold, spin_profile
 from sim.twin import Twin
 
 SETTING = Measurement(duration=24.0)
@@ -118,3 +119,16 @@ def test_a_large_bias_under_strong_slow_noise_passes_the_gate(twin):
     effect = make_effect("bias", {"a11_m_s2": 0.1}, twin.array)
     found = diagnose([measure(rng, twin, [effect], noisy)], twin)
     assert "bias" in {cause.effect for cause in found.causes}
+
+
+def test_clipping_is_seen_where_a_steady_signal_just_reaches_it(twin):
+    spin = spin_profile([Hold(20.0)], start_rate=9.0)
+    steady = measure(np.random.default_rng(9), twin, [], Measurement(duration=10.0), motion=spin)
+    level = float(np.quantile(np.abs(steady.readings[:, 0]), 0.5))
+    clipped = Recording.from_arrays(
+        steady.t_s, np.clip(steady.readings, -level, level), twin.array, reference=steady.reference
+    )
+    for recording, names in ((steady, []), (clipped, ["saturation"])):
+        run = prepare_run(recording, twin)
+        prediction = np.concatenate([segment.predict([])[:, :-1] for segment in make_segments(twin, [run])])
+        assert [effect.name for effect in check_integrity(twin, run, prediction).effects] == names
