@@ -124,7 +124,7 @@ def test_a_large_bias_under_strong_slow_noise_passes_the_gate(twin):
 def test_clipping_is_seen_where_a_steady_signal_just_reaches_it(twin):
     spin = spin_profile([Hold(20.0)], start_rate=9.0)
     steady = measure(np.random.default_rng(9), twin, [], Measurement(duration=10.0), motion=spin)
-    level = float(np.quantile(np.abs(steady.readings[:, 0]), 0.5))
+    level = float(np.quantile(np.abs(steady.readings[:, 0]), 0.15))
     clipped = Recording.from_arrays(
         steady.t_s, np.clip(steady.readings, -level, level), twin.array, reference=steady.reference
     )
