@@ -125,7 +125,10 @@ def _explain(prepared: PreparedRuns, model: WorldModel, tell: Report) -> tuple[E
         odds = wandering.fit.log_posterior + noise_log_determinant(other) - np.log(len(model.families())) - plain_value
         found = wandering, walk
         before, base = other, wandering.fit
-    if found is None or odds < LEAST_EXTRA_ODDS or found[1].unequal > UNEQUAL_WALK:
+    if found is None or odds < LEAST_EXTRA_ODDS:
+        return plain, None
+    walk = found[1]
+    if walk.log_odds < WALK_ODDS or walk.unequal > UNEQUAL_WALK:  # another cause was taken for a walk at first
         return plain, None
     return found[0], replace(found[1], log_odds=float(odds))
 
