@@ -7,7 +7,7 @@ eliminated against the drive is summed over channels first and multiplied by the
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -102,13 +102,11 @@ class DriveJacobian:
         combined = weighted @ self.loading.T  # (n, R)
         return np.asarray(sum(part.T @ combined[:, r] for r, part in enumerate(self.parts)))
 
-    def correlate(
-        self, columns: Sequence[int], values: NDArray[np.float64], weights: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
-        """Return Σ_c w_c J_cᵀ A_c of columns (C, P, n) of the observations ``columns``, shape (m, P)."""
+    def correlate(self, values: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return Σ_c w_c J_cᵀ A_c of columns (c + 1, P, n) of every observation, shape (m, P)."""
         total = np.zeros((self.parts[0].shape[1], values.shape[1]))
         for r, part in enumerate(self.parts):
-            share = self.loading[r, columns] * weights[columns]
+            share = self.loading[r] * weights
             used = np.flatnonzero(share)
             if len(used):
                 total += part.T @ np.tensordot(share[used], values[used], axes=1).T

@@ -381,8 +381,7 @@ class Segment:
             gram[np.ix_(used, used)] += weight * (part.T @ part - slow.T @ damped[column, used].T)
             residual = linear.residual[:, column]
             score[used] += weight * (part.T @ residual - damped[column, used] @ (self.cosines.T @ residual))
-        every = range(len(weights))
-        cross = linear.jacobian.correlate(every, signatures, weights)  # (m, P)
+        cross = linear.jacobian.correlate(signatures, weights)  # (m, P)
         for r, slow in enumerate(linear.slow):
             cross -= slow @ np.tensordot(linear.jacobian.loading[r] * weights, damped, axes=1).T
         eliminated = solve_triangular(linear.drive.factor, cross, lower=True, check_finite=False)

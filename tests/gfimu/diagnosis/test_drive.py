@@ -74,7 +74,7 @@ def test_factored_derivative_is_the_plain_one(spline, lagged):
     assert_allclose(jacobian.backward(values), np.einsum("cnm,nc->m", stacked, values), atol=1e-6)
     columns = rng.standard_normal((channels, 4, n))
     assert_allclose(
-        jacobian.correlate(range(channels), columns, weights),
+        jacobian.correlate(columns, weights),
         np.einsum("c,cnm,cpn->mp", weights, stacked, columns),
         atol=1e-5,
     )
