@@ -38,7 +38,8 @@ TIME_MARGIN = 0.5
 _DEGREE = 4
 _WALK = "bias_random_walk"
 _KNOWN_ANGLE_STD = 5e-3
-_LEAST_FACTOR = 0.5
+_LEAST_FACTOR = 0.05
+_FACTOR_STEPS = 4
 _REST_FACTOR = 1.3
 _STATE_STEPS = (1e-5, 1e-4, 1e-3)
 
@@ -132,7 +133,7 @@ class Segment:
         self.model, self.run, self.index, self.start = model, run, index, start
         self.start_angle, self.start_angle_std = start_angle, start_angle_std
         period = run.sample_period
-        spacing = max(KNOT_SPACING, 4 * period)
+        spacing = max(KNOT_SPACING, period)
         # Late chips and fast clocks ask for the motion beyond the ends of the run.
         margin = max(TIME_MARGIN, 2 * spacing)
         self.spline = AngleSpline(run.t[0] - margin, run.t[-1] + margin, spacing)
@@ -222,18 +223,27 @@ class Segment:
     def tune_roughness(self, effects: Sequence[Effect]) -> None:
         """Pick the scale of the roughness prior by marginal likelihood, the drive integrated out."""
         kept, factor = self.coefficients, self.drive_factor
-        best = (-np.inf, factor)
         # Below the least factor a prior that is learnt from the drive and then tightened again would tighten for ever.
         least = 0.0 if self.at_rest else _LEAST_FACTOR
-        for trial in np.unique(np.maximum(factor * np.array([0.5, 1.0, 2.0, 4.0]), least)):
-            self.drive_factor = float(trial)
+
+        def likelihood(trial: float) -> float:
+            self.drive_factor = trial
             self._set_roughness()
             self.coefficients = kept
-            line = self.linearise(effects)
+            drive = self.linearise(effects).drive
             rows = self.spline.size - _DEGREE
-            drive = line.drive
-            value = -0.5 * drive.objective - float(np.log(drive.factor.diagonal()).sum()) - rows * np.log(trial)
-            best = max(best, (value, float(trial)))
+            return -0.5 * drive.objective - float(np.log(drive.factor.diagonal()).sum()) - rows * float(np.log(trial))
+
+        best = (likelihood(factor), factor)
+        for ratio in (0.5, 2.0):
+            for _ in range(_FACTOR_STEPS):
+                trial = max(best[1] * ratio, least)
+                value = likelihood(trial)
+                if value <= best[0]:
+                    break
+                best = (value, trial)
+            if best[1] != factor:
+                break
         self.coefficients, self.drive_factor = kept, best[1]
         self._set_roughness()
 
