@@ -11,6 +11,7 @@ from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.adequacy import LEFT_OVER_ODDS
 from gfimu.diagnosis.causes import Cause, effects_of_run
 from gfimu.diagnosis.engine import Explanation
+from gfimu.diagnosis.loose_calibration import LooseCalibration
 from gfimu.diagnosis.model import Effect, WorldModel
 from gfimu.diagnosis.naming import (
     cause_parameters,
@@ -39,6 +40,7 @@ def conclude(
     model: WorldModel,
     explanation: Explanation,
     walk: Walk | None,
+    loose: LooseCalibration | None,
     left: LeftOver,
     gain: Gain,
     withdrawn: Sequence[str],
@@ -56,7 +58,8 @@ def conclude(
     dominant = significant and (left.instead or 2 * left.log_odds > _DOMINANT * max(removed, 0.0))
     runs = tuple(_view(prepared, number, explanation, found) for number in range(len(prepared.runs)))
     extension = [cause.effect(array) for cause in fit.causes] if not dominant else []
-    twin = model.extended([*_library_effects(model, found), *extension])
+    residue = () if loose is None else loose.effects
+    twin = model.extended([*_library_effects(model, found), *residue, *extension])
     if dominant:
         verdict, causes = "unknown", tuple(found)
     elif rivals:
@@ -76,8 +79,11 @@ def conclude(
         "white_over_data_sheet": float(np.median(levels.white[:-1] / expected.white)),
         "bias_instability_m_s2": float(np.median(levels.flicker[:-1])),
         "reference_white": float(levels.white[-1]),
+        "calibration_residue": 0.0 if loose is None else loose.scale,
     }
-    words = verdict_sentences(verdict, causes, residual, gain, unexplained, withdrawn)
+    words = verdict_sentences(
+        verdict, causes, residual, gain, unexplained, withdrawn, residue=noise["calibration_residue"]
+    )
     return Diagnosis(verdict, causes, residual, gain, unexplained, rival_list(explanation), twin, runs, words, noise)
 
 

@@ -14,7 +14,8 @@ from gfimu.diagnosis.engine import LEAST_EXTRA_ODDS, Explanation, prune
 from gfimu.diagnosis.free_body.diagnose import diagnose_body
 from gfimu.diagnosis.holdout import Holdout, gate_gains, held_out_gain, split_segments
 from gfimu.diagnosis.long_run import explain_any_length
-from gfimu.diagnosis.model import WorldModel
+from gfimu.diagnosis.loose_calibration import LooseCalibration, loosen
+from gfimu.diagnosis.model import Effect, WorldModel
 from gfimu.diagnosis.prepared_runs import PreparedRuns
 from gfimu.diagnosis.refinement import refine
 from gfimu.diagnosis.segment import known_walk
@@ -76,17 +77,19 @@ def diagnose(
         return diagnose_body(recordings, model, held_out=held_out, names=labels, report=tell)
     tell(0.02, "read")
     prepared = PreparedRuns.build(recordings, model, labels)
-    explanation, walk = _explain(prepared, model, tell)
+    explanation, walk, loose = _explain(prepared, model, tell)
     tell(0.92, "hold out")
-    pairs, label = _holdouts(explanation, prepared, held_out, model)
+    pairs, label = _holdouts(explanation, held_out, model, () if loose is None else loose.effects)
     halves = split_segments(explanation.segments, explanation.fixed, duration=np.inf)
-    explanation, withdrawn = _gate(explanation, pairs if held_out else halves, other_recording=bool(held_out))
+    judged = explanation if loose is None else loose.held
+    gated, withdrawn = _gate(judged, pairs if held_out else halves, other_recording=bool(held_out))
+    explanation = gated if withdrawn or loose is None else explanation
     left = left_over(
         explanation.segments, explanation.fit, explanation.fixed, prepared.spikes, rounded=prepared.rounded
     )
     tell(0.97, "measure the gain")
     gain = _gain(prepared, explanation, pairs, label)
-    return conclude(prepared, model, explanation, walk, left, gain, withdrawn)
+    return conclude(prepared, model, explanation, walk, loose, left, gain, withdrawn)
 
 
 def _gain(prepared: PreparedRuns, explanation: Explanation, pairs: Sequence[Holdout], label: str) -> Gain:
@@ -96,16 +99,24 @@ def _gain(prepared: PreparedRuns, explanation: Explanation, pairs: Sequence[Hold
     return held_out_gain(explanation.fit.causes, pairs, constant, label=label)
 
 
-def _explain(prepared: PreparedRuns, model: WorldModel, tell: Report) -> tuple[Explanation, Walk | None]:
-    """Search for causes; where biases may wander, search again with a random walk in the noise and compare."""
+def _explain(
+    prepared: PreparedRuns, model: WorldModel, tell: Report
+) -> tuple[Explanation, Walk | None, LooseCalibration | None]:
+    """Search for causes, then again with a calibration residue and with wandering biases, and compare."""
     segments, fixed = prepared.segments(model)
     runs = len(prepared.runs)
     plain = explain_any_length(segments, fixed, runs, report=lambda share, text: tell(0.05 + 0.7 * share, text))
+    tell(0.76, "calibration residue")
+    loose = loosen(plain, prepared, model)
+    judged = plain
+    if loose is not None:
+        plain, judged = loose.explanation, loose.held
+        segments, fixed = list(judged.segments), judged.fixed
     # A walk passes for anything slow, so it is looked for in what the other causes leave.
-    quick = [cause for cause in plain.fit.causes if cause.name not in _SLOW]
-    same = len(quick) == len(plain.fit.causes)
-    base = plain.fit if same else refine(segments, quick, fixed, drives=plain.fit.drives)
-    plain_value = plain.fit.log_posterior + noise_log_determinant(segments)
+    quick = [cause for cause in judged.fit.causes if cause.name not in _SLOW]
+    same = len(quick) == len(judged.fit.causes)
+    base = judged.fit if same else refine(segments, quick, fixed, drives=judged.fit.drives)
+    plain_value = judged.fit.log_posterior + noise_log_determinant(segments)
     found: tuple[Explanation, Walk] | None = None
     odds = 0.0
     before = segments
@@ -126,15 +137,17 @@ def _explain(prepared: PreparedRuns, model: WorldModel, tell: Report) -> tuple[E
         found = wandering, walk
         before, base = other, wandering.fit
     if found is None or odds < LEAST_EXTRA_ODDS:
-        return plain, None
+        return plain, None, loose
     walk = found[1]
     if walk.log_odds < WALK_ODDS or walk.unequal > UNEQUAL_WALK:  # another cause was taken for a walk at first
-        return plain, None
-    return found[0], replace(found[1], log_odds=float(odds))
+        return plain, None, loose
+    if loose is not None:
+        loose = replace(loose, explanation=found[0], held=found[0])
+    return found[0], replace(found[1], log_odds=float(odds)), loose
 
 
 def _holdouts(
-    explanation: Explanation, prepared: PreparedRuns, held_out: Sequence[Recording], model: WorldModel
+    explanation: Explanation, held_out: Sequence[Recording], model: WorldModel, residue: Sequence[Effect]
 ) -> tuple[list[Holdout], str]:
     """Pair fitted and held-out data for the gain: other recordings where given, blocks of the run otherwise."""
     if not held_out:
@@ -148,7 +161,8 @@ def _holdouts(
         segment.prepare_weights()
         segment.index = 0
     fitted = list(explanation.segments)
-    return [Holdout(fitted, [list(f) for f in explanation.fixed], segments, known)], "another recording"
+    kept = [[*effects, *residue] for effects in known]
+    return [Holdout(fitted, [list(f) for f in explanation.fixed], segments, kept)], "another recording"
 
 
 def _gate(

@@ -28,7 +28,7 @@ def learn_noise(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[
         effects = [*known, *effects_of_run(fit.causes, array, segment.index)]
         line = segment.linearise(effects)
         segment.move_drive(line)
-        left = segment.working_residual(effects)
+        left = segment.working_residual(effects) - segment.residue_readings(line)
         coefficients.append(segment.basis.transform(left))
         # Above this frequency the drive has no freedom to follow the noise.
         slowest = 0.6 / segment.spline.spacing

@@ -188,7 +188,7 @@ def _evaluate(segments: Sequence[Segment], fixed: Sequence[Sequence[Effect]], st
         step,
         moves,
         # What the step promises, and how far the drives still are from their best.
-        float(step @ information @ step) + _DRIVE_SHARE * sum(float(one.forward @ one.forward) for one in eliminations),
+        float(step @ information @ step) + _DRIVE_SHARE * sum(one.distance() for one in eliminations),
     )
 
 

@@ -22,6 +22,7 @@ from scipy.linalg import cho_factor, cho_solve, solve_triangular
 from scipy.ndimage import uniform_filter1d
 from scipy.sparse import csr_array, diags_array
 
+from gfimu.diagnosis.calibration_residue import CalibrationResidue
 from gfimu.diagnosis.coloured_noise import CosineBasis, NoiseLevels
 from gfimu.diagnosis.drive import ROUGHNESS_FACTOR, AngleSpline, SplineState, roughness_prior
 from gfimu.diagnosis.drive_jacobian import DriveJacobian, lag_matrix
@@ -50,21 +51,44 @@ class DriveElimination:
 
     Parameters
     ----------
-    factor : ndarray, shape (m, m)
-        Lower Cholesky factor L of H.
-    forward : ndarray, shape (m,)
+    factor : ndarray, shape (m + q, m + q)
+        Lower Cholesky factor L of H; the last q unknowns are the calibration residue, where it is admitted.
+    forward : ndarray, shape (m + q,)
         x = L⁻¹(JᵀWr − Rd).
     objective : float
         rᵀWr + dᵀRd − xᵀx: twice the negative log likelihood, drive marginalised.
+    size : int
+        m.
     """
 
     factor: NDArray[np.float64]
     forward: NDArray[np.float64]
     objective: float
+    size: int
 
     def step(self, eliminated: NDArray[np.float64], step: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the step of the drive (m,) to its posterior mean, given the step of the signatures' coordinates."""
         right = self.forward - eliminated @ step
+        return self._solve(right)[: self.size]
+
+    def alone(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the step of the drive (m,) and the sizes of the calibration residue (q,), the causes held."""
+        both = self._solve(self.forward)
+        return both[: self.size], both[self.size :]
+
+    def distance(self) -> float:
+        """Return how far the drive is from its best, in squared standard deviations, the causes held."""
+        if len(self.forward) == self.size:
+            return float(self.forward @ self.forward)
+        away = self.factor[: self.size, : self.size].T @ self.alone()[0]
+        return float(away @ away)
+
+    def residue(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the information (q, q), prior included, and score (q,) of the residue, drive eliminated."""
+        corner = self.factor[self.size :, self.size :]
+        return corner @ corner.T, corner @ self.forward[self.size :]
+
+    def _solve(self, right: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.asarray(solve_triangular(self.factor, right, lower=True, trans=1, check_finite=False))
 
 
@@ -147,6 +171,7 @@ class Segment:
         self.levels = self._starting_levels()
         self.round_to(model.expected_noise(1.0 / period).quantum)
         self.drive_factor = 2.0
+        self.calibration_residue: CalibrationResidue | None = None
         self._learned = np.zeros(self.spline.size - _DEGREE)
         self._set_roughness()
         self.coefficients = self._reference_drive = self._starting_drive()
@@ -347,9 +372,15 @@ class Segment:
         # A vanishing coupling keeps far entries of the factor out of the denormal range, where LAPACK crawls; its
         # sign alternates, as a constant one would hold the mean angle, which the data hardly fix.
         lhs += 1e-14 * float(np.mean(lhs.diagonal())) * self._alternating
+        if self.calibration_residue is not None:
+            inner, right, cross = self.calibration_residue.normal_equations(
+                residual, jacobian, slow, self.cosines, self.share, weights
+            )
+            lhs = np.block([[lhs, cross], [cross.T, inner]])
+            rhs = np.concatenate([rhs, right])
         factor = np.linalg.cholesky(lhs)
         forward = solve_triangular(factor, rhs, lower=True, check_finite=False)
-        drive = DriveElimination(factor, forward, objective - float(forward @ forward))
+        drive = DriveElimination(factor, forward, objective - float(forward @ forward), self.spline.size)
         return Linearisation(residual, jacobian, slow, drive)
 
     def _jacobian(self, effects: Sequence[Effect], base: NDArray[np.float64]) -> DriveJacobian:
@@ -374,7 +405,7 @@ class Segment:
     def whitened_products(
         self, linear: Linearisation, signatures: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Return G (P, P), b (P,) and X (m, P) of signatures (c + 1, P, n)."""
+        """Return G (P, P), b (P,) and X (m + q, P) of signatures (c + 1, P, n)."""
         count = signatures.shape[1]
         gram = np.zeros((count, count))
         score = np.zeros(count)
@@ -394,6 +425,8 @@ class Segment:
         cross = linear.jacobian.correlate(signatures, weights)  # (m, P)
         for r, slow in enumerate(linear.slow):
             cross -= slow @ np.tensordot(linear.jacobian.loading[r] * weights, damped, axes=1).T
+        if self.calibration_residue is not None:
+            cross = np.vstack([cross, self.calibration_residue.correlate(signatures, damped, self.cosines, weights)])
         eliminated = solve_triangular(linear.drive.factor, cross, lower=True, check_finite=False)
         gram -= eliminated.T @ eliminated
         score -= eliminated.T @ linear.drive.forward
@@ -401,12 +434,17 @@ class Segment:
 
     def move_drive(self, linear: Linearisation) -> None:
         """Move the drive to its posterior mean."""
-        self.coefficients = self.coefficients + linear.drive.step(np.zeros((self.spline.size, 0)), np.zeros(0))
+        self.coefficients = self.coefficients + linear.drive.alone()[0]
+
+    def residue_readings(self, linear: Linearisation) -> NDArray[np.float64] | float:
+        """Return what the calibration residue most probably adds to the observations, shape (n, c + 1)."""
+        if self.calibration_residue is None:
+            return 0.0
+        return self.calibration_residue.readings(linear.drive.alone()[1])
 
     def whitened_residual(self, linear: Linearisation) -> NDArray[np.float64]:
         """Return W(r − Jδ) with δ the drive's posterior step, shape (n, c + 1): for scans over tones and orders."""
-        step = linear.drive.step(np.zeros((self.spline.size, 0)), np.zeros(0))
-        left = linear.residual - linear.jacobian.forward(step)
+        left = linear.residual - linear.jacobian.forward(linear.drive.alone()[0]) - self.residue_readings(linear)
         slow = self.cosines.T @ left
         return (left - self.cosines @ (self.share * slow)) * self.inverse_variance
 

@@ -6,7 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from gfimu.diagnosis.calibration_residue import TOLERANCE
 from gfimu.diagnosis.verdict import Gain, NamedCause, Residual, Unexplained
+from gfimu.units import STANDARD_GRAVITY
 
 __all__ = ["verdict_sentences"]
 
@@ -18,8 +20,13 @@ def verdict_sentences(
     gain: Gain,
     unexplained: Unexplained,
     withdrawn: Sequence[str],
+    *,
+    residue: float = 0.0,
 ) -> tuple[str, ...]:
-    """Return the verdict in sentences, the most important first."""
+    """Return the verdict in sentences, the most important first.
+
+    ``residue`` is the size of a calibration residue, in units of what a good calibration leaves, where there is one.
+    """
     words = [_headline(verdict, causes, unexplained)]
     words += [f"{cause.effect}: {cause.why}." for cause in causes if cause.why]
     for cause in causes:
@@ -39,6 +46,8 @@ def verdict_sentences(
         )
     if unexplained.significant and verdict != "unknown":
         words.append(f"Something is left that nothing in the library explains: {unexplained.signature}.")
+    if residue > 0.0:
+        words.append(_residue_sentence(residue))
     words += [f"{name} was withdrawn: it did not predict held-out data." for name in withdrawn]
     return tuple(words)
 
@@ -55,6 +64,16 @@ def _headline(verdict: str, causes: Sequence[NamedCause], unexplained: Unexplain
         which = _listed([cause.effect for cause in contested])
         return f"The simulation is wrong, but this data cannot tell {which} apart; {by} would."
     return f"The simulation is wrong in a way that nothing in the library explains: {unexplained.signature}."
+
+
+def _residue_sentence(scale: float) -> str:
+    bias, gain, axes, place = TOLERANCE.values()
+    return (
+        "The twin's calibration is a little off everywhere, within about "
+        f"{scale * bias / STANDARD_GRAVITY * 1e3:.1f} mg of bias, {scale * gain:.2%} of gain, "
+        f"{np.rad2deg(scale * axes):.2f}° of the axes and {scale * place * 1e3:.2f} mm of position, as after a usual "
+        "calibration; no single cause stands behind it, and the extended twin has the corrections."
+    )
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -1,0 +1,116 @@
+"""What a good calibration leaves everywhere: small errors of every bias, gain, axis and position at once.
+
+They are nobody's cause. Like bias instability they are part of what has to be known before anything is named: each
+channel's few columns join the drive's coefficients as unknowns with a Gaussian prior of unit variance and are
+marginalised with them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gfimu.diagnosis.drive_jacobian import DriveJacobian
+
+__all__ = ["TOLERANCE", "CalibrationResidue"]
+
+TOLERANCE = {
+    "bias": 0.3e-3 * 9.80665,
+    "scale_factor": 5e-4,
+    "misalignment": float(np.deg2rad(0.02)),
+    "sensor_position": 5e-5,
+}
+"""Standard deviations that a good calibration leaves, by effect: m/s², ratio, rad, m."""
+
+
+@dataclass(frozen=True)
+class CalibrationResidue:
+    """Columns of the residue, kept for each channel where they are not zero.
+
+    Parameters
+    ----------
+    count : int
+        Number q of columns.
+    places : tuple of ndarray of int, each (k,)
+        Numbers of each channel's columns.
+    parts : tuple of ndarray, each (n, k)
+        Each channel's columns for one standard deviation of the prior.
+    """
+
+    count: int
+    places: tuple[NDArray[np.intp], ...]
+    parts: tuple[NDArray[np.float64], ...]
+
+    @classmethod
+    def of_columns(cls, columns: NDArray[np.float64]) -> CalibrationResidue:
+        """Take columns of every observation, shape (c + 1, q, n); the reference, last, has none."""
+        used = [np.flatnonzero(mine.any(axis=1)) for mine in columns[:-1]]
+        parts = tuple(np.ascontiguousarray(mine[at].T) for mine, at in zip(columns[:-1], used, strict=True))
+        return cls(columns.shape[1], tuple(used), parts)
+
+    def normal_equations(
+        self,
+        residual: NDArray[np.float64],
+        jacobian: DriveJacobian,
+        slow: NDArray[np.float64],
+        cosines: NDArray[np.float64],
+        share: NDArray[np.float64],
+        weights: NDArray[np.float64],
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Return AᵀWA + I (q, q), AᵀWr (q,) and JᵀWA (m, q) under noise that is white plus slow cosines.
+
+        Parameters
+        ----------
+        residual : ndarray, shape (n, c + 1)
+            r.
+        jacobian : DriveJacobian
+            J.
+        slow : ndarray, shape (R, m, K)
+            Its parts in the cosines.
+        cosines : ndarray, shape (n, K)
+            Cosines of slow noise.
+        share : ndarray, shape (K, c + 1)
+            Correction of each cosine in each observation.
+        weights : ndarray, shape (c + 1,)
+            One over the variance of each observation.
+        """
+        gram, score = np.eye(self.count), np.zeros(self.count)
+        cross = np.zeros((slow.shape[1], self.count))
+        for channel, (at, part) in enumerate(zip(self.places, self.parts, strict=True)):
+            low = cosines.T @ part  # (K, k)
+            damped = share[:, [channel]] * low
+            gram[np.ix_(at, at)] += weights[channel] * (part.T @ part - low.T @ damped)
+            mine = residual[:, channel]
+            score[at] += weights[channel] * (part.T @ mine - damped.T @ (cosines.T @ mine))
+            drive = (
+                jacobian.channel(channel).T @ part - np.tensordot(jacobian.loading[:, channel], slow, axes=1) @ damped
+            )
+            cross[:, at] += weights[channel] * drive
+        return gram, score, cross
+
+    def correlate(
+        self,
+        signatures: NDArray[np.float64],
+        damped: NDArray[np.float64],
+        cosines: NDArray[np.float64],
+        weights: NDArray[np.float64],
+    ) -> NDArray[np.float64]:
+        """Return AᵀWS of signatures (c + 1, P, n), whose damped cosines are (c + 1, P, K), shape (q, P)."""
+        total = np.zeros((self.count, signatures.shape[1]))
+        for channel, (at, part) in enumerate(zip(self.places, self.parts, strict=True)):
+            low = cosines.T @ part
+            total[at] += weights[channel] * (part.T @ signatures[channel].T - low.T @ damped[channel].T)
+        return total
+
+    def readings(self, sizes: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return what sizes (q,), in standard deviations, add to the channels and the reference, shape (n, c + 1)."""
+        columns = [part @ sizes[at] for at, part in zip(self.places, self.parts, strict=True)]
+        return np.column_stack([*columns, np.zeros(len(columns[0]))])
+
+
+def tolerance_of(families: Sequence[str]) -> dict[str, float]:
+    """Return the tolerances of the effects that a library has."""
+    return {name: std for name, std in TOLERANCE.items() if name in families}

@@ -1,0 +1,171 @@
+"""Whether the twin's numbers are all a little off, as after any calibration, instead of one thing being wrong.
+
+Without this a residue of many small errors is taken for whichever wide effect comes closest. The search is run again
+with the residue among the unknowns, and kept where that makes the data more probable.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gfimu.diagnosis.calibration_residue import CalibrationResidue, tolerance_of
+from gfimu.diagnosis.causes import Cause, Signature, effects_of_run
+from gfimu.diagnosis.engine import Explanation, prune
+from gfimu.diagnosis.long_run import explain_any_length
+from gfimu.diagnosis.model import Effect, EffectFamily, WorldModel
+from gfimu.diagnosis.prepared_runs import PreparedRuns
+from gfimu.diagnosis.refinement import Fit, refine
+from gfimu.diagnosis.segment import Segment
+from gfimu.diagnosis.signatures import signature_columns
+from gfimu.diagnosis.stochastic import noise_log_determinant
+
+__all__ = ["LooseCalibration", "loosen"]
+
+_SCALES = (1.0, 3.0)
+_LEAST_ODDS = 3.0  # no more: that everything is a little off is what anybody expects
+
+
+@dataclass(frozen=True)
+class LooseCalibration:
+    """An explanation in which the twin's calibration has a residue.
+
+    Parameters
+    ----------
+    scale : float
+        Size of the residue in units of `TOLERANCE`.
+    effects : tuple of Effect
+        Its most probable values.
+    explanation : Explanation
+        The causes beside it, judged with the residue marginalised; ``fixed`` has the effects, the segments no more
+        unknowns of their own.
+    held : Explanation
+        The same, judged with the residue held at its most probable values.
+    """
+
+    scale: float
+    effects: tuple[Effect, ...]
+    explanation: Explanation
+    held: Explanation
+
+
+def loosen(plain: Explanation, prepared: PreparedRuns, model: WorldModel) -> LooseCalibration | None:
+    """Return the explanation with a calibration residue where it is more probable than the one without, or None."""
+    tolerance = tolerance_of(model.families())
+    if not tolerance:
+        return None
+    runs = len(prepared.runs)
+    reference = plain.fit.log_posterior
+    value, scale, start = max((_trial(plain, tolerance, scale) for scale in _SCALES), key=lambda trial: float(trial[0]))
+    if value < reference:
+        return None
+    segments, _ = prepared.segments(model)
+    fixed = plain.fixed
+    for segment, old in zip(segments, plain.segments, strict=True):
+        segment.adopt(old)
+    _admit(segments, start.causes, fixed, start.drives, tolerance, scale)
+    found = explain_any_length(segments, fixed, runs, start=start.causes)
+    odds = found.fit.log_posterior + _occam(segments, found.fit, fixed) + noise_log_determinant(segments)
+    odds -= reference + noise_log_determinant(plain.segments)
+    if odds < _LEAST_ODDS:
+        return None
+    effects = _most_probable(segments, found.fit, fixed, tolerance, scale)
+    known = tuple((*before, *effects) for before in fixed)
+    for segment in segments:
+        segment.calibration_residue = None
+    fit = refine(segments, found.fit.causes, known, drives=found.fit.drives)
+    held = Explanation(
+        fit,
+        (),
+        refine(segments, (), known, drives=fit.drives),
+        {name: refine(segments, other.causes, known, drives=fit.drives) for name, other in found.without.items()},
+        found.segments,
+        known,
+        found.signatures,
+    )
+    for segment, drive in zip(segments, fit.drives, strict=True):
+        segment.coefficients = drive
+    whole = replace(found.fit, drives=fit.drives)
+    return LooseCalibration(scale, effects, replace(found, fit=whole, fixed=known), held)
+
+
+def _trial(plain: Explanation, tolerance: dict[str, float], scale: float) -> tuple[float, float, Fit]:
+    """Admit a residue to the plain explanation and drop the causes that it makes superfluous."""
+    _admit(plain.segments, plain.fit.causes, plain.fixed, plain.fit.drives, tolerance, scale)
+    try:
+        fit = refine(plain.segments, plain.fit.causes, plain.fixed, drives=plain.fit.drives)
+        fit = prune(plain.segments, fit, plain.fixed)[0]
+        return fit.log_posterior + _occam(plain.segments, fit, plain.fixed), scale, fit
+    finally:
+        for segment, drive in zip(plain.segments, plain.fit.drives, strict=True):
+            segment.calibration_residue, segment.coefficients = None, drive
+
+
+def _families(model: WorldModel, tolerance: dict[str, float]) -> list[tuple[EffectFamily, NDArray[np.float64]]]:
+    """Return each family of the residue with the standard deviation of its sizes."""
+    families = [model.families()[name] for name in tolerance]
+    return [(family, np.full(len(family.sizes(model.array)), tolerance[family.name])) for family in families]
+
+
+def _admit(
+    segments: Sequence[Segment],
+    causes: Sequence[Cause],
+    fixed: Sequence[Sequence[Effect]],
+    drives: Sequence[NDArray[np.float64]],
+    tolerance: dict[str, float],
+    scale: float,
+) -> None:
+    """Let every segment have a residue, linear about the present causes."""
+    model = segments[0].model
+    signatures, spread = [], []
+    for family, std in _families(model, tolerance):
+        prior = np.array([size.prior_std for size in family.sizes(model.array)])
+        signatures.append(Signature(family, {}, np.arange(len(std))))
+        spread.append(scale * std / prior)
+    for segment, known, drive in zip(segments, fixed, drives, strict=True):
+        segment.coefficients = drive
+        segment.prepare_weights()
+        present = effects_of_run(causes, model.array, segment.index)
+        columns, _ = signature_columns(segment, signatures, (), [*known, *present])
+        columns *= np.concatenate(spread)[:, None]
+        segment.calibration_residue = CalibrationResidue.of_columns(columns)
+
+
+def _occam(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]]) -> float:
+    """Return what admitting the residue costs: −½ log det of its information in units of its prior."""
+    array = segments[0].model.array
+    total = 0.0
+    for segment, known, drive in zip(segments, fixed, fit.drives, strict=True):
+        segment.coefficients = drive
+        line = segment.linearise([*known, *effects_of_run(fit.causes, array, segment.index)])
+        total -= 0.5 * float(np.linalg.slogdet(line.drive.residue()[0])[1])
+    return total
+
+
+def _most_probable(
+    segments: Sequence[Segment],
+    fit: Fit,
+    fixed: Sequence[Sequence[Effect]],
+    tolerance: dict[str, float],
+    scale: float,
+) -> tuple[Effect, ...]:
+    """Return the effects of one residue common to all segments, the causes held."""
+    model = segments[0].model
+    families = _families(model, tolerance)
+    count = sum(len(std) for _, std in families)
+    information, score = np.eye(count), np.zeros(count)
+    for segment, known, drive in zip(segments, fixed, fit.drives, strict=True):
+        segment.coefficients = drive
+        line = segment.linearise([*known, *effects_of_run(fit.causes, model.array, segment.index)])
+        inner, right = line.drive.residue()
+        information += inner - np.eye(count)
+        score += right
+    sizes = scale * np.linalg.solve(information, score)
+    ends = np.cumsum([len(std) for _, std in families])[:-1]
+    return tuple(
+        family.from_sizes(model.array, part * std, {})
+        for (family, std), part in zip(families, np.split(sizes, ends), strict=True)
+    )
