@@ -7,7 +7,7 @@ marginalised with them.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from gfimu.diagnosis.drive_jacobian import DriveJacobian
 
-__all__ = ["TOLERANCE", "CalibrationResidue"]
+__all__ = ["TOLERANCE", "CalibrationResidue", "tolerance_of"]
 
 TOLERANCE = {
     "bias": 0.3e-3 * 9.80665,
@@ -78,18 +78,26 @@ class CalibrationResidue:
             One over the variance of each observation.
         """
         gram, score = np.eye(self.count), np.zeros(self.count)
-        cross = np.zeros((slow.shape[1], self.count))
+        damped = []
         for channel, (at, part) in enumerate(zip(self.places, self.parts, strict=True)):
             low = cosines.T @ part  # (K, k)
-            damped = share[:, [channel]] * low
-            gram[np.ix_(at, at)] += weights[channel] * (part.T @ part - low.T @ damped)
+            damped.append(share[:, [channel]] * low)
+            gram[np.ix_(at, at)] += weights[channel] * (part.T @ part - low.T @ damped[-1])
             mine = residual[:, channel]
-            score[at] += weights[channel] * (part.T @ mine - damped.T @ (cosines.T @ mine))
-            drive = (
-                jacobian.channel(channel).T @ part - np.tensordot(jacobian.loading[:, channel], slow, axes=1) @ damped
-            )
-            cross[:, at] += weights[channel] * drive
+            score[at] += weights[channel] * (part.T @ mine - damped[-1].T @ (cosines.T @ mine))
+        cross = np.zeros((slow.shape[1], self.count))
+        for r, matrix in enumerate(jacobian.parts):
+            scale = jacobian.loading[r] * weights
+            cross += matrix.T @ self._mixed(self.parts, scale) - slow[r] @ self._mixed(damped, scale)
         return gram, score, cross
+
+    def _mixed(self, blocks: Sequence[NDArray[np.float64]], scale: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the sum over channels of their columns (n, k), each at its places, shape (n, q)."""
+        total = np.zeros((len(blocks[0]), self.count))
+        for channel, (at, block) in enumerate(zip(self.places, blocks, strict=True)):
+            if scale[channel]:
+                total[:, at] += scale[channel] * block
+        return total
 
     def correlate(
         self,
@@ -111,6 +119,6 @@ class CalibrationResidue:
         return np.column_stack([*columns, np.zeros(len(columns[0]))])
 
 
-def tolerance_of(families: Sequence[str]) -> dict[str, float]:
+def tolerance_of(families: Collection[str]) -> dict[str, float]:
     """Return the tolerances of the effects that a library has."""
     return {name: std for name, std in TOLERANCE.items() if name in families}

@@ -19,7 +19,7 @@ from gfimu.diagnosis.model import Effect, WorldModel
 from gfimu.diagnosis.prepared_runs import PreparedRuns
 from gfimu.diagnosis.refinement import refine
 from gfimu.diagnosis.segment import known_walk
-from gfimu.diagnosis.stochastic import UNEQUAL_WALK, WALK_ODDS, Walk, noise_log_determinant, walk_strength
+from gfimu.diagnosis.stochastic import UNEQUAL_WALK, WALK_ODDS, Walk, log_probability, walk_strength
 from gfimu.diagnosis.verdict import Diagnosis, Gain
 from gfimu.errors import InputError
 from gfimu.recording import Recording
@@ -111,12 +111,12 @@ def _explain(
     judged = plain
     if loose is not None:
         plain, judged = loose.explanation, loose.held
-        segments, fixed = list(judged.segments), judged.fixed
+        segments, fixed = list(judged.segments), [list(known) for known in judged.fixed]
     # A walk passes for anything slow, so it is looked for in what the other causes leave.
     quick = [cause for cause in judged.fit.causes if cause.name not in _SLOW]
     same = len(quick) == len(judged.fit.causes)
     base = judged.fit if same else refine(segments, quick, fixed, drives=judged.fit.drives)
-    plain_value = judged.fit.log_posterior + noise_log_determinant(segments)
+    plain_value = log_probability(segments, judged.fit, fixed)
     found: tuple[Explanation, Walk] | None = None
     odds = 0.0
     before = segments
@@ -133,7 +133,7 @@ def _explain(
             segment.adopt(old)
             segment.levels = NoiseLevels(old.levels.white, old.levels.flicker, walk.strength)
         wandering = explain_any_length(other, fixed, runs, start=base.causes)
-        odds = wandering.fit.log_posterior + noise_log_determinant(other) - np.log(len(model.families())) - plain_value
+        odds = log_probability(other, wandering.fit, fixed) - np.log(len(model.families())) - plain_value
         found = wandering, walk
         before, base = other, wandering.fit
     if found is None or odds < LEAST_EXTRA_ODDS:

@@ -20,6 +20,7 @@ from gfimu.diagnosis.drive import AngleSpline
 __all__ = ["DriveJacobian"]
 
 _LEAST_SHARE = 1e-14
+_COLUMNS = 32  # signatures that are taken at once, which bounds the memory
 _Delay = Callable[[csr_array], csr_array]
 
 
@@ -105,11 +106,12 @@ class DriveJacobian:
     def correlate(self, values: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return Σ_c w_c J_cᵀ A_c of columns (c + 1, P, n) of every observation, shape (m, P)."""
         total = np.zeros((self.parts[0].shape[1], values.shape[1]))
-        for r, part in enumerate(self.parts):
-            share = self.loading[r] * weights
-            used = np.flatnonzero(share)
-            if len(used):
-                total += part.T @ np.tensordot(share[used], values[used], axes=1).T
+        scaled = self.loading * weights
+        for start in range(0, values.shape[1], _COLUMNS):
+            some = values[:, start : start + _COLUMNS]
+            mixed = (scaled @ some.reshape(len(some), -1)).reshape(len(scaled), *some.shape[1:])  # (R, P, n)
+            for part, mine in zip(self.parts, mixed, strict=True):
+                total[:, start : start + _COLUMNS] += part.T @ mine.T
         return total
 
     def information(self) -> csr_array:

@@ -21,7 +21,7 @@ from gfimu.diagnosis.prepared_runs import PreparedRuns
 from gfimu.diagnosis.refinement import Fit, refine
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.signatures import signature_columns
-from gfimu.diagnosis.stochastic import noise_log_determinant
+from gfimu.diagnosis.stochastic import log_probability
 
 __all__ = ["LooseCalibration", "loosen"]
 
@@ -58,7 +58,7 @@ def loosen(plain: Explanation, prepared: PreparedRuns, model: WorldModel) -> Loo
     if not tolerance:
         return None
     runs = len(prepared.runs)
-    reference = plain.fit.log_posterior
+    reference = log_probability(plain.segments, plain.fit, plain.fixed)
     value, scale, start = max((_trial(plain, tolerance, scale) for scale in _SCALES), key=lambda trial: float(trial[0]))
     if value < reference:
         return None
@@ -68,9 +68,7 @@ def loosen(plain: Explanation, prepared: PreparedRuns, model: WorldModel) -> Loo
         segment.adopt(old)
     _admit(segments, start.causes, fixed, start.drives, tolerance, scale)
     found = explain_any_length(segments, fixed, runs, start=start.causes)
-    odds = found.fit.log_posterior + _occam(segments, found.fit, fixed) + noise_log_determinant(segments)
-    odds -= reference + noise_log_determinant(plain.segments)
-    if odds < _LEAST_ODDS:
+    if log_probability(segments, found.fit, fixed) - reference < _LEAST_ODDS:
         return None
     effects = _most_probable(segments, found.fit, fixed, tolerance, scale)
     known = tuple((*before, *effects) for before in fixed)
@@ -98,7 +96,7 @@ def _trial(plain: Explanation, tolerance: dict[str, float], scale: float) -> tup
     try:
         fit = refine(plain.segments, plain.fit.causes, plain.fixed, drives=plain.fit.drives)
         fit = prune(plain.segments, fit, plain.fixed)[0]
-        return fit.log_posterior + _occam(plain.segments, fit, plain.fixed), scale, fit
+        return log_probability(plain.segments, fit, plain.fixed), scale, fit
     finally:
         for segment, drive in zip(plain.segments, plain.fit.drives, strict=True):
             segment.calibration_residue, segment.coefficients = None, drive
@@ -132,17 +130,6 @@ def _admit(
         columns, _ = signature_columns(segment, signatures, (), [*known, *present])
         columns *= np.concatenate(spread)[:, None]
         segment.calibration_residue = CalibrationResidue.of_columns(columns)
-
-
-def _occam(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]]) -> float:
-    """Return what admitting the residue costs: −½ log det of its information in units of its prior."""
-    array = segments[0].model.array
-    total = 0.0
-    for segment, known, drive in zip(segments, fixed, fit.drives, strict=True):
-        segment.coefficients = drive
-        line = segment.linearise([*known, *effects_of_run(fit.causes, array, segment.index)])
-        total -= 0.5 * float(np.linalg.slogdet(line.drive.residue()[0])[1])
-    return total
 
 
 def _most_probable(

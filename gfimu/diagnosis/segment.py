@@ -204,6 +204,7 @@ class Segment:
         )
         rows = self.spline.roughness_rows()
         std = np.maximum(std, self.drive_factor * self._learned)
+        self._log_roughness = float(np.sum(np.log(std)))
         scaled = diags_array(1.0 / std) @ rows
         begin = self.spline.matrices(self.run.t[:1])[0] / self.start_angle_std
         self._rough = csr_array(scaled)
@@ -255,9 +256,8 @@ class Segment:
             self.drive_factor = trial
             self._set_roughness()
             self.coefficients = kept
-            drive = self.linearise(effects).drive
-            rows = self.spline.size - _DEGREE
-            return -0.5 * drive.objective - float(np.log(drive.factor.diagonal()).sum()) - rows * float(np.log(trial))
+            line = self.linearise(effects)
+            return self.log_volume(line) - 0.5 * line.drive.objective
 
         best = (likelihood(factor), factor)
         for ratio in (0.5, 2.0):
@@ -431,6 +431,13 @@ class Segment:
         gram -= eliminated.T @ eliminated
         score -= eliminated.T @ linear.drive.forward
         return gram, score, eliminated
+
+    def log_volume(self, linear: Linearisation) -> float:
+        """Return the log of how much of the prior of the drive (and of a calibration residue) the data leave.
+
+        Needed only to compare fits under different priors.
+        """
+        return -float(np.log(linear.drive.factor.diagonal()).sum()) - self._log_roughness
 
     def move_drive(self, linear: Linearisation) -> None:
         """Move the drive to its posterior mean."""

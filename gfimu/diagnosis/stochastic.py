@@ -15,7 +15,7 @@ from gfimu.diagnosis.model import Effect
 from gfimu.diagnosis.refinement import Fit
 from gfimu.diagnosis.segment import Segment
 
-__all__ = ["UNEQUAL_WALK", "WALK_ODDS", "Walk", "noise_log_determinant", "walk_strength", "white_factor"]
+__all__ = ["UNEQUAL_WALK", "WALK_ODDS", "Walk", "log_probability", "walk_strength", "white_factor"]
 
 WALK_ODDS = 10.0
 """Log odds that a random walk needs over bias instability alone."""
@@ -84,19 +84,31 @@ def _whittle(power: NDArray[np.float64], spectrum: NDArray[np.float64]) -> NDArr
     return np.asarray(-0.5 * np.sum(np.log(spectrum) + power / spectrum, axis=0))
 
 
-def noise_log_determinant(segments: Sequence[Segment]) -> float:
-    """Return −½ log det of the channels' noise covariance, to compare fits under different noise."""
-    total = 0.0
-    for segment in segments:
-        levels: NoiseLevels = segment.levels
-        white = levels.white[:-1] ** 2
-        spectrum = (
-            white
-            + np.outer(segment.basis.flicker_spectrum, levels.flicker[:-1] ** 2)
-            + (segment.basis.walk_spectrum * levels.walk**2)[:, None]
-        )
-        total -= 0.5 * float(np.sum(np.log(spectrum)) + (len(segment.run.t) - len(spectrum)) * np.sum(np.log(white)))
+def log_probability(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]]) -> float:
+    """Return the log posterior of a fit with all that depends on the noise and on the drive's prior.
+
+    To compare fits under different noise, or with a calibration residue and without.
+    """
+    array = segments[0].model.array
+    total = fit.log_posterior
+    for segment, known, drive in zip(segments, fixed, fit.drives, strict=True):
+        kept, segment.coefficients = segment.coefficients, drive
+        total += segment.log_volume(segment.linearise([*known, *effects_of_run(fit.causes, array, segment.index)]))
+        segment.coefficients = kept
+        total += _noise_log_determinant(segment)
     return total
+
+
+def _noise_log_determinant(segment: Segment) -> float:
+    """Return −½ log det of the channels' noise covariance."""
+    levels: NoiseLevels = segment.levels
+    white = levels.white[:-1] ** 2
+    spectrum = (
+        white
+        + np.outer(segment.basis.flicker_spectrum, levels.flicker[:-1] ** 2)
+        + (segment.basis.walk_spectrum * levels.walk**2)[:, None]
+    )
+    return -0.5 * float(np.sum(np.log(spectrum)) + (len(segment.run.t) - len(spectrum)) * np.sum(np.log(white)))
 
 
 def white_factor(segments: Sequence[Segment]) -> tuple[float, float] | None:

@@ -208,7 +208,9 @@ class Diagnosis:
     sentences : tuple of str
         The verdict in words, most important first.
     noise : mapping of str to float
-        Noise levels estimated: ``white_over_data_sheet``, ``bias_instability_m_s2``, ``reference_white``.
+        Noise levels estimated: ``white_over_data_sheet``, ``bias_instability_m_s2``, ``reference_white``; and
+        ``calibration_residue``, small errors of all the twin's numbers at once, in units of what a good calibration
+        leaves (0 where there are none).
     """
 
     verdict: str

@@ -1,0 +1,104 @@
+"""The residue of a calibration: its algebra against dense Gaussians, and that it is taken for no cause."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from gfimu.array import AccelerometerArray
+from gfimu.diagnosis import diagnose
+from gfimu.diagnosis.calibration_residue import TOLERANCE, CalibrationResidue
+from gfimu.diagnosis.engine import make_segments
+from gfimu.diagnosis.run import prepare_run
+from sim.campaign import Measurement, measure
+from sim.effects import make_effect
+from sim.study.cases import Case
+from sim.study.outcome import draw_world
+from sim.twin import Twin
+
+TWIN = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
+
+
+@pytest.fixture
+def segment():
+    recording = measure(np.random.default_rng(3), TWIN, [], Measurement(duration=6.0))
+    (one,) = make_segments(TWIN, [prepare_run(recording, TWIN)])
+    one.prepare_weights()
+    return one
+
+
+def noise_of(segment, column):
+    """Covariance (n, n) of one observation's noise: white plus slow cosines of bias instability."""
+    sigma, share = segment.levels.white[column], segment.share[:, column]
+    precision = (np.eye(len(segment.cosines)) - (segment.cosines * share) @ segment.cosines.T) / sigma**2
+    return np.linalg.inv(precision)
+
+
+def test_marginalised_with_the_drive_as_a_dense_gaussian_is(segment):
+    rng = np.random.default_rng(4)
+    n, observed = segment.weight_mask.shape
+    columns = np.zeros((observed, 5, n))
+    for column in range(observed - 1):
+        columns[column, rng.choice(5, 2, replace=False)] = 0.02 * rng.standard_normal((2, n))
+    signature = np.zeros((observed, 1, n))
+    signature[2, 0], signature[7, 0] = np.sin(np.arange(n) / 20), 0.5
+    plain = segment.linearise([])
+    segment.calibration_residue = CalibrationResidue.of_columns(columns)
+    line = segment.linearise([])
+    gram, score, _ = segment.whitened_products(line, signature)
+
+    drive = np.vstack([plain.jacobian.channel(column).toarray() for column in range(observed)])  # (c n, m)
+    precision = np.zeros((observed * n, observed * n))
+    for column in range(observed):
+        part = slice(column * n, (column + 1) * n)
+        precision[part, part] = np.linalg.inv(noise_of(segment, column))
+    unknowns = np.hstack([drive, columns.transpose(0, 2, 1).reshape(-1, 5)])
+    prior = np.zeros((unknowns.shape[1],) * 2)
+    prior[:-5, :-5] = segment.prior.toarray()
+    prior[-5:, -5:] = np.eye(5)
+    left = unknowns.T @ precision
+    solved = np.linalg.solve(left @ unknowns + prior, left)
+    reduced = precision - left.T @ solved
+    one = signature.transpose(0, 2, 1).reshape(-1)
+    assert_allclose(gram[0, 0], one @ reduced @ one, rtol=1e-5)
+    residual = line.residual.T.reshape(-1)
+    pull = np.zeros(unknowns.shape[1])
+    pull[:-5] = -(segment.prior @ segment.coefficients)
+    pull[:-5] += np.asarray(segment._begin.T @ np.array([segment.start_angle / segment.start_angle_std])).ravel()
+    moved = np.linalg.solve(left @ unknowns + prior, left @ residual + pull)
+    assert_allclose(score[0], one @ precision @ (residual - unknowns @ moved), rtol=1e-4)
+    assert_allclose(line.drive.alone()[1], moved[-5:], rtol=1e-4, atol=1e-6)
+    information, right = line.drive.residue()
+    assert_allclose(np.linalg.solve(information, right), moved[-5:], rtol=1e-4, atol=1e-6)
+
+
+def test_a_residue_alone_is_no_cause_and_is_told():
+    world = draw_world(Case("reduced", 700, residue=True, duration=20.0))
+    found = diagnose([world.recording], world.twin)
+    assert found.verdict == "nothing_found", found
+    assert found.noise["calibration_residue"] == 1.0
+    assert any("calibration is a little off" in sentence for sentence in found.sentences)
+    corrections = {effect.name for effect in found.twin.effects}
+    assert corrections == set(TOLERANCE)
+    again = diagnose([world.recording], found.twin)
+    assert again.verdict == "nothing_found"
+    assert again.noise["calibration_residue"] == 0.0
+
+
+def test_a_cause_beside_a_residue_is_named_alone():
+    world = draw_world(Case("reduced", 701, ("clock_error",), 1500.0, residue=True, duration=20.0))
+    found = diagnose([world.recording], world.twin)
+    assert [cause.effect for cause in found.causes] == ["clock_error"]
+    ((_, truth),) = world.truth
+    (cause,) = found.causes
+    assert abs(cause.parameters["ratio"] - truth["ratio"]) < 4 * cause.std["ratio"]
+
+
+def test_a_single_small_error_is_not_called_a_residue():
+    recording = measure(
+        np.random.default_rng(5), TWIN, [make_effect("bias", {"a21_m_s2": 0.02})], Measurement(duration=20.0)
+    )
+    found = diagnose([recording], TWIN)
+    assert found.noise["calibration_residue"] == 0.0
+    assert "bias" in {cause.effect for cause in found.causes}
