@@ -55,7 +55,9 @@ def conclude(
     removed = explanation.nothing.objective - fit.objective
     # No model is exact: what is left must also stand out against what the causes explain.
     significant = left.log_odds > (LEFT_OVER_ODDS if left.instead else max(LEFT_OVER_ODDS, _INEXACTNESS * removed))
-    dominant = significant and (left.instead or 2 * left.log_odds > _DOMINANT * max(removed, 0.0))
+    # Several causes that together still miss something, and a share of held-out data, coincide by chance.
+    missed = len(fit.causes) > 1 and gain.share_of_excess_removed < 1.0 - _DOMINANT
+    dominant = significant and (left.instead or missed or 2 * left.log_odds > _DOMINANT * max(removed, 0.0))
     runs = tuple(_view(prepared, number, explanation, found) for number in range(len(prepared.runs)))
     extension = [cause.effect(array) for cause in fit.causes] if not dominant else []
     residue = () if loose is None else loose.effects

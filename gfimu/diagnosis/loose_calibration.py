@@ -55,7 +55,8 @@ class LooseCalibration:
 def loosen(plain: Explanation, prepared: PreparedRuns, model: WorldModel) -> LooseCalibration | None:
     """Return the explanation with a calibration residue where it is more probable than the one without, or None."""
     tolerance = tolerance_of(model.families())
-    if not tolerance:
+    # Of coarse rounding only the likelihood about a point is known, which does not reach as far as a residue.
+    if not tolerance or any(segment.rounding for segment in plain.segments):
         return None
     runs = len(prepared.runs)
     reference = log_probability(plain.segments, plain.fit, plain.fixed)

@@ -12,7 +12,7 @@ import numpy as np
 from gfimu.errors import unknown_name
 from sim.effects import EFFECTS
 
-__all__ = ["EXOTICS", "OWN_SIGNATURE", "STUDIES", "Case", "study_cases"]
+__all__ = ["EXOTICS", "STUDIES", "Case", "study_cases"]
 
 SIZES = (15.0, 60.0, 300.0, 1500.0, 6000.0)
 """Sizes as d′: from just detectable to gross."""
@@ -31,7 +31,7 @@ EXOTICS = (
 )
 """Effects outside the library, known to the independent generator only."""
 
-OWN_SIGNATURE = (
+_TAKEN_OUT = (
     "table_tilt",
     "axis_wobble",
     "channel_skew",
@@ -48,10 +48,13 @@ OWN_SIGNATURE = (
     "misalignment",
     "scale_factor",
     "tacho_ripple",
+    "eccentricity",
+    "mount_tilt",
+    "gravity",
+    "tacho_scale",
+    "centrifugal_flex",
+    "tacho_latency",
 )
-"""Effects that no other family of the library contains, so that "unknown" is right once they are taken out."""
-
-_NESTED = ("eccentricity", "mount_tilt", "gravity", "tacho_scale", "centrifugal_flex", "tacho_latency")
 
 
 @dataclass(frozen=True)
@@ -177,7 +180,7 @@ def _elsewhere(study: str, first_seed: int, settings: Mapping[str, Any], count: 
 def _left_out() -> list[Case]:
     return [
         Case("left_out", 80_000 + number, (name,), size, without=name, **_noise_of(number))
-        for number, (size, name) in enumerate(itertools.product((60.0, 200.0, 1000.0), OWN_SIGNATURE + _NESTED))
+        for number, (size, name) in enumerate(itertools.product((60.0, 200.0, 1000.0), _TAKEN_OUT))
     ]
 
 

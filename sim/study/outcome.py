@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from gfimu.array import AccelerometerArray
+from gfimu.diagnosis.distinguishability import PlannedRun, predict_distinguishability
 from gfimu.diagnosis.verdict import Diagnosis, NamedCause
 from gfimu.errors import InputError
 from gfimu.recording import Recording
@@ -38,13 +39,15 @@ _WITHOUT_NOISE_FREE_FORM = frozenset(
 class HiddenWorld:
     """A recording, the twin to diagnose it with, and what is hidden: contract names and parameters.
 
-    ``reached`` is the d′ of the least hidden effect that has a noise-free form, infinite where none has.
+    ``reached`` is the d′ of the least hidden effect that has a noise-free form, infinite where none has. ``apart`` is
+    the d′ of an effect taken out of the library that the best other effect of the library leaves, the drive unknown.
     """
 
     recording: Recording
     twin: Twin
     truth: tuple[tuple[str, Mapping[str, Any]], ...]
     reached: float
+    apart: float | None = None
 
 
 @dataclass(frozen=True)
@@ -101,7 +104,26 @@ def draw_world(case: Case, source: str = "") -> HiddenWorld:
         if effect.name not in _WITHOUT_NOISE_FREE_FORM
     ]
     truth = tuple((effect.name, effect.parameters) for effect in hidden)
-    return HiddenWorld(recording, twin, truth, min(sizes, default=np.inf))
+    apart = _apart(twin, hidden[0], motion, setting) if case.without else None
+    return HiddenWorld(recording, twin, truth, min(sizes, default=np.inf), apart)
+
+
+def _apart(twin: Twin, hidden: Effect, motion: SpinMotion, setting: Measurement) -> float:
+    rivals = [
+        name
+        for name, family in twin.families().items()
+        if name not in {hidden.name, *_WITHOUT_NOISE_FREE_FORM} and family.sizes(twin.array)
+    ]
+    run = PlannedRun(
+        motion,
+        setting.duration,
+        setting.sample_rate,
+        reference_noise=setting.tacho_noise,
+        bias_instability=setting.bias_instability,
+    )
+    whole = Twin(array=twin.array, array_name=twin.array_name, sample_rate=twin.sample_rate)
+    energy = predict_distinguishability(whole, [hidden, *rivals], [run]).energy[0, 1:]
+    return float(np.sqrt(energy.min()))
 
 
 def _reaches(twin: Twin, motion: SpinMotion, setting: Measurement, level: float) -> bool:
@@ -157,7 +179,7 @@ def run_case(case: Case, source: str = "") -> dict[str, Any]:
     else:
         found = outcome_of(diagnosis, world.truth)
     times = {"wall_s": time.perf_counter() - wall, "processor_s": time.process_time() - processor}
-    reached = {"reached": world.reached}
+    reached = {"reached": world.reached, "apart": world.apart}
     return {"key": case.key, "source": source or "sim.campaign", **case.to_dict(), **reached, **found, **times}
 
 

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from scipy.stats import beta
 
 from gfimu.atomic_file import write_text
-from sim.study.cases import OWN_SIGNATURE
 from sim.study.figures import draw_confusion, draw_detection, draw_reliability
 
 __all__ = ["Tally", "rate_with_interval", "score", "summarise", "visible", "write_report"]
@@ -26,6 +25,10 @@ INSEPARABLE = (
     frozenset({"eccentricity", "sensor_position"}),
 )
 """Effects that one upright run can't tell apart on channels that see constant gravity, or that contain each other."""
+
+LEAST_APART = 15.0
+"""Size d′ that the best other effect must leave of one taken out of the library for it to have a signature of its own;
+just detectable."""
 
 LEAST_VISIBLE = 7.0
 """Size d′ below which an effect is at or below the information limit."""
@@ -221,10 +224,15 @@ def _left_out(outcomes: Sequence[Outcome]) -> str:
             (f"`{effect}`", len(tally), tally.share("unknown"), "; ".join(f"{k} × {v}" for k, v in said.most_common()))
         )
     header = ("hidden, not in the library", "runs", "unknown %", "said")
+
+    def taken(least: float, most: float = np.inf) -> list[Outcome]:
+        return [o for o in outside if o["without"] and least <= (o.get("apart") or 0.0) < most]
+
     groups = {
         "exotic": [o for o in outside if o["study"] == "exotics"],
-        "taken out, with a signature of its own": [o for o in outside if o["without"] in OWN_SIGNATURE],
-        "taken out, contained in another": [o for o in outside if o["without"] and o["without"] not in OWN_SIGNATURE],
+        f"taken out, d′ > {2 * LEAST_APART:g} left by the best other effect": taken(2 * LEAST_APART),
+        f"taken out, d′ {LEAST_APART:g} to {2 * LEAST_APART:g} left": taken(LEAST_APART, 2 * LEAST_APART),
+        "taken out, imitated by one other effect": taken(0.0, LEAST_APART),
     }
     totals = [(f"**{name}**", len(group), Tally(group).share("unknown"), "") for name, group in groups.items() if group]
     return "## Outside the library\n\n" + _table(header, [*totals, *rows]) if rows else ""
@@ -247,9 +255,19 @@ def _several(outcomes: Sequence[Outcome]) -> str:
 
 
 def _probabilities(outcomes: Sequence[Outcome]) -> str:
-    rows = [(f"{stated:.3f}", f"{right:.3f}", count) for stated, right, count in reliability(outcomes)]
+    bins = reliability(outcomes)
+    if not bins:
+        return ""
+    causes = sum(count for _, _, count in bins)
+    error = sum(count * abs(stated - right) for stated, right, count in bins) / causes
+    rows = [
+        (f"{stated:.3f}", "{:.3f} ({:.2f}–{:.2f})".format(*rate_with_interval(round(right * count), count)), count)
+        for stated, right, count in bins
+    ]
     return (
-        "## Stated probabilities\n\n" + _table(("stated, mean of the bin", "observed", "causes"), rows) if rows else ""
+        "## Stated probabilities\n\n"
+        + _table(("stated, mean of the bin", "observed, with its 95 % interval", "causes"), rows)
+        + f"Expected calibration error, over all {causes} causes: {error:.3f}.\n\n"
     )
 
 
