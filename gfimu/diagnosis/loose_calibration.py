@@ -21,7 +21,7 @@ from gfimu.diagnosis.prepared_runs import PreparedRuns
 from gfimu.diagnosis.refinement import Fit, refine
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.signatures import signature_columns
-from gfimu.diagnosis.stochastic import log_probability
+from gfimu.diagnosis.stochastic import LARGEST_USUAL_FLICKER, log_probability
 
 __all__ = ["LooseCalibration", "loosen"]
 
@@ -55,8 +55,7 @@ class LooseCalibration:
 def loosen(plain: Explanation, prepared: PreparedRuns, model: WorldModel) -> LooseCalibration | None:
     """Return the explanation with a calibration residue where it is more probable than the one without, or None."""
     tolerance = tolerance_of(model.families())
-    # Of coarse rounding only the likelihood about a point is known, which does not reach as far as a residue.
-    if not tolerance or any(segment.rounding for segment in plain.segments):
+    if not tolerance or not all(_fits(segment) for segment in plain.segments):
         return None
     runs = len(prepared.runs)
     reference = log_probability(plain.segments, plain.fit, plain.fixed)
@@ -89,6 +88,11 @@ def loosen(plain: Explanation, prepared: PreparedRuns, model: WorldModel) -> Loo
         segment.coefficients = drive
     whole = replace(found.fit, drives=fit.drives)
     return LooseCalibration(scale, effects, replace(found, fit=whole, fixed=known), held)
+
+
+def _fits(segment: Segment) -> bool:
+    """Tell whether errors as small as a residue can be judged: readings are fine, and nothing large is left in them."""
+    return not segment.rounding and float(np.median(segment.levels.flicker[:-1])) < LARGEST_USUAL_FLICKER
 
 
 def _trial(plain: Explanation, tolerance: dict[str, float], scale: float) -> tuple[float, float, Fit]:

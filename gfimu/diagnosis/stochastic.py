@@ -14,17 +14,27 @@ from gfimu.diagnosis.coloured_noise import NoiseLevels, estimate_flicker
 from gfimu.diagnosis.model import Effect
 from gfimu.diagnosis.refinement import Fit
 from gfimu.diagnosis.segment import Segment
+from gfimu.units import STANDARD_GRAVITY
 
-__all__ = ["UNEQUAL_WALK", "WALK_ODDS", "Walk", "log_probability", "walk_strength", "white_factor"]
+__all__ = [
+    "LARGEST_USUAL_FLICKER",
+    "UNEQUAL_WALK",
+    "WALK_ODDS",
+    "Walk",
+    "log_probability",
+    "walk_strength",
+    "white_factor",
+]
 
 WALK_ODDS = 10.0
 """Log odds that a random walk needs over bias instability alone."""
 UNEQUAL_WALK = 14.0
 """`Walk.unequal` from which the channels do not wander alike: something else is taken for a walk."""
+LARGEST_USUAL_FLICKER = 1.5e-3 * STANDARD_GRAVITY
+"""Bias instability beyond which something else is left in the channels, m/s²."""
 _WEAKEST_WALK = 3e-3
 _WALK_GRID = np.geomspace(2e-3, 0.5, 28)
 _DRIVE_TAKES = 0.08  # of the strength, as the unknown drive follows what wanders in the channels together
-_LARGEST_USUAL_FLICKER = 1.5 * 9.80665e-3
 _MEDIAN_FACTOR = 1.3
 _EVERY_FACTOR = 1.15
 
@@ -63,10 +73,10 @@ def walk_strength(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequenc
         slow = coefficients[1 : len(segment.basis.frequency)] ** 2
         shape, drift = segment.basis.flicker_spectrum[1:], segment.basis.walk_spectrum[1:]
 
-        usual = np.minimum(estimate_flicker(coefficients, white, segment.basis), _LARGEST_USUAL_FLICKER)
+        usual = np.minimum(estimate_flicker(coefficients, white, segment.basis), LARGEST_USUAL_FLICKER)
         without += float(_whittle(slow, white**2 + np.outer(shape, usual**2)).sum())
         for place, strength in enumerate(_WALK_GRID):
-            flicker = np.minimum(estimate_flicker(coefficients, white, segment.basis, strength), _LARGEST_USUAL_FLICKER)
+            flicker = np.minimum(estimate_flicker(coefficients, white, segment.basis, strength), LARGEST_USUAL_FLICKER)
             totals[place] += _whittle(slow, white**2 + np.outer(shape, flicker**2) + (drift * strength**2)[:, None])
     common = totals.sum(axis=1)
     best = int(np.argmax(common))
