@@ -70,6 +70,8 @@ def headline(diagnosis: Diagnosis) -> str:
     """Return the verdict in one sentence."""
     found = [_short(diagnosis, cause) for cause in diagnosis.causes]
     match diagnosis.verdict:
+        case "nothing_found" if diagnosis.calibration_residue:
+            return "No single thing is wrong: the simulation's numbers are all a little off, as after a calibration."
         case "nothing_found":
             return "Nothing is wrong with the simulation that this recording could show."
         case "unknown" if found:
@@ -119,6 +121,11 @@ def story(diagnosis: Diagnosis) -> str:
     silent = sorted({channel for run in diagnosis.runs for channel in _silent(diagnosis, run)})
     if silent:
         text += f"Left out for want of a usable sample: {_joined(silent)}. "
+    if diagnosis.verdict == "nothing_found" and diagnosis.calibration_residue:
+        return text + (
+            f"With small corrections of every bias, gain, axis and position it misses by {after:.3g} m/s²; no single "
+            "cause predicts the data better."
+        )
     if diagnosis.verdict == "nothing_found":
         return text + "No cause in the library, and no pattern of any other kind, predicts the data better than chance."
     if diagnosis.causes:
@@ -176,6 +183,8 @@ def next_steps(diagnosis: Diagnosis) -> list[str]:
     steps = []
     remedies = dict.fromkeys(cause.would_be_separated_by for cause in diagnosis.causes if cause.would_be_separated_by)
     match diagnosis.verdict:
+        case "nothing_found" if diagnosis.calibration_residue:
+            steps.append("Keep twin.toml, which has the corrections, or calibrate the unit again.")
         case "nothing_found":
             steps.append(
                 "Keep the simulation as it is. A longer run, with faster ramps in both directions, would show "

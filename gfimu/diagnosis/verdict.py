@@ -224,6 +224,11 @@ class Diagnosis:
     sentences: tuple[str, ...]
     noise: Mapping[str, float]
 
+    @property
+    def calibration_residue(self) -> float:
+        """Size of a residue of the twin's calibration, 0 where there is none."""
+        return float(self.noise.get("calibration_residue", 0.0))
+
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON form of the contract."""
         residual = self.residual

@@ -28,6 +28,8 @@ def verdict_sentences(
     ``residue`` is the size of a calibration residue, in units of what a good calibration leaves, where there is one.
     """
     words = [_headline(verdict, causes, unexplained)]
+    if residue > 0.0 and verdict == "nothing_found":
+        words = ["No single thing is wrong with the simulation."]
     words += [f"{cause.effect}: {cause.why}." for cause in causes if cause.why]
     for cause in causes:
         if cause.not_distinguishable_from and verdict != "ambiguous":
@@ -69,10 +71,10 @@ def _headline(verdict: str, causes: Sequence[NamedCause], unexplained: Unexplain
 def _residue_sentence(scale: float) -> str:
     bias, gain, axes, place = TOLERANCE.values()
     return (
-        "The twin's calibration is a little off everywhere, within about "
+        "The twin's calibration is a little off everywhere, by some "
         f"{scale * bias / STANDARD_GRAVITY * 1e3:.1f} mg of bias, {scale * gain:.2%} of gain, "
-        f"{np.rad2deg(scale * axes):.2f}° of the axes and {scale * place * 1e3:.2f} mm of position, as after a usual "
-        "calibration; no single cause stands behind it, and the extended twin has the corrections."
+        f"{np.rad2deg(scale * axes):.2f}° of the axes and {scale * place * 1e3:.2f} mm of position, as a calibration "
+        "leaves it; no single cause stands behind that, and the extended twin has the corrections."
     )
 
 
