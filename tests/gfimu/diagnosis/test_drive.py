@@ -7,8 +7,13 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.interpolate import BSpline
 
+from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.drive import AngleSpline
 from gfimu.diagnosis.drive_jacobian import DriveJacobian, lag_matrix
+from gfimu.diagnosis.engine import make_segments
+from gfimu.diagnosis.run import prepare_run
+from sim.campaign import Measurement, measure
+from sim.twin import Twin
 
 
 @pytest.fixture
@@ -82,3 +87,42 @@ def test_factored_derivative_is_the_plain_one(spline, lagged):
     rows = jacobian.slow_rows(jacobian.slow(cosines), share, weights)
     slow = np.einsum("cnm,nk->ckm", stacked, cosines)
     assert_allclose(rows.T @ rows, np.einsum("c,kc,cki,ckj->ij", weights, share, slow, slow), atol=1e-5)
+
+
+def tuned(rate):
+    """A segment of a quiet run whose drive's roughness was learnt, at a sample rate, Hz."""
+    twin = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12", sample_rate=rate)
+    recording = measure(np.random.default_rng(8), twin, [], Measurement(duration=20.0, sample_rate=rate))
+    (segment,) = make_segments(twin, [prepare_run(recording, twin)])
+    segment.prepare_weights()
+    for _ in range(3):
+        segment.move_drive(segment.linearise([]))
+    segment.learn_roughness()
+    segment.tune_roughness([])
+    return segment
+
+
+def test_the_roughness_is_the_most_probable_one():
+    segment = tuned(100.0)
+    best = segment.drive_factor
+
+    def likelihood(factor):
+        segment.drive_factor = factor
+        segment._set_roughness()
+        line = segment.linearise([])
+        return segment.log_volume(line) - 0.5 * line.drive.objective
+
+    top = likelihood(best)
+    assert top >= likelihood(0.5 * best)
+    assert top >= likelihood(2.0 * best)
+    assert best < 0.5  # six times as rough as the smoothed reference leaves the drive free to follow noise
+
+
+@pytest.mark.parametrize("rate", [10.0, 25.0, 100.0])
+def test_the_drive_is_followed_at_every_sample_rate(rate):
+    segment = tuned(rate)
+    for _ in range(3):
+        segment.move_drive(segment.linearise([]))
+    scaled = segment.residual([])[:, :-1] / segment.levels.white[:-1]
+    # Knots as far apart as slow samples could not hold a motion that its corners need: 6 and more.
+    assert 0.85 < np.sqrt(np.mean(scaled**2)) < 1.15

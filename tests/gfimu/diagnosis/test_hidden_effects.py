@@ -51,6 +51,10 @@ PAIRS = [
     (Case("reduced", 301, ("scale_factor", "interference_tone"), 300.0, **SHORT), ""),
     (Case("reduced", 302, ("eccentricity", "sign_flip"), 300.0, **SHORT), OTHER_GENERATOR),
 ]
+SLOW = [
+    (Case("reduced", 250, duration=20.0, sample_rate=25.0), ""),
+    (Case("reduced", 251, ("eccentricity",), 300.0, duration=20.0, sample_rate=25.0), OTHER_GENERATOR),
+]
 OUTSIDE = [
     (Case("reduced", 400, ("magnetic_pickup",), 600.0, **SHORT), OTHER_GENERATOR),
     (Case("reduced", 401, ("tone_on_one_channel",), 600.0, **SHORT), OTHER_GENERATOR),
@@ -115,6 +119,11 @@ def test_the_extension_removes_the_excess_on_data_the_fit_never_saw():
 def test_nothing_is_named_where_nothing_is_hidden():
     named = told(NULLS, lambda entry: not entry["nothing"])
     assert len(named) <= at_most(0.01, len(NULLS)), named
+
+
+def test_slow_sampling_is_no_discrepancy():
+    missed = told(SLOW, lambda entry: not entry["exact"])
+    assert not missed, missed
 
 
 NOT_BY_SIGNATURE = ("bias_random_walk", "coarse_resolution", "cogging", "noise", "saturation", "wrong_range")
