@@ -14,6 +14,7 @@ import os
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, TypeVar
 
 import numpy as np
@@ -21,6 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
 from scipy.ndimage import uniform_filter1d
 from scipy.sparse import csr_array, diags_array
+from threadpoolctl import ThreadpoolController
 
 from gfimu.diagnosis.calibration_residue import CalibrationResidue
 from gfimu.diagnosis.coloured_noise import CosineBasis, NoiseLevels
@@ -123,8 +125,14 @@ def over_segments(work: Callable[..., Result], *columns: Iterable[Any]) -> list[
     workers = min(len(rows), os.cpu_count() or 1)
     if workers < 2:
         return [work(*row) for row in rows]
-    with ThreadPoolExecutor(workers) as pool:
+    # Each segment's algebra on threads of its own as well would take half as long again.
+    with _thread_pools().limit(limits=1, user_api="blas"), ThreadPoolExecutor(workers) as pool:
         return list(pool.map(lambda row: work(*row), rows))
+
+
+@cache
+def _thread_pools() -> ThreadpoolController:
+    return ThreadpoolController()
 
 
 class Segment:
