@@ -192,8 +192,9 @@ def _noise_levels(outcomes: Sequence[Outcome]) -> str:
     rows = []
     for (level, tacho), group in sorted(_by(nulls, "bias_instability_mg", "tacho_noise").items()):
         tally = Tally(group)
-        rows.append((level, tacho, len(tally), tally.share("named"), tally.share("unknown")))
-    header = ("bias instability, mg", "tachometer noise, rad/s", "runs", "named %", "unknown %")
+        loose = sum(bool(outcome["noise"].get("calibration_residue")) for outcome in group if "noise" in outcome)
+        rows.append((level, tacho, len(tally), tally.share("named"), tally.share("unknown"), loose))
+    header = ("bias instability, mg", "tachometer noise, rad/s", "runs", "named %", "unknown %", "residue told in")
     return "## Nothing hidden\n\n" + _table(header, rows) if rows else ""
 
 

@@ -1,0 +1,71 @@
+"""The study of the diagnosis: what counts as right, and the tables made of it."""
+
+from __future__ import annotations
+
+import pytest
+
+from sim.study.cases import Case
+from sim.study.outcome import draw_world
+from sim.study.report import rate_with_interval, reliability, score, summarise
+
+
+def outcome(effects=(), causes=(), verdict="nothing_found", **more):
+    """An outcome with the causes given as (effect, probability, rivals)."""
+    told = [
+        {"effect": name, "probability": probability, "rivals": list(rivals), "z": {}, "place": "", "log_odds": 50.0}
+        for name, probability, rivals in causes
+    ]
+    plain = {
+        "key": "singles/1",
+        "study": "singles",
+        "source": "sim.campaign",
+        "size": 60.0,
+        "without": "",
+        "reached": 60.0,
+        "noise": {},
+        "processor_s": 1.0,
+    }
+    return {**plain, "effects": list(effects), "causes": told, "verdict": verdict, **more}
+
+
+def test_a_name_too_many_is_wrong_and_a_set_is_right_only_where_nothing_parts_it():
+    right = score(outcome(["bias"], [("bias", 0.9, ())], "explained"))
+    assert right["exact"]
+    assert not right["wrong"]
+    more = score(outcome(["bias"], [("bias", 0.9, ()), ("noise", 0.9, ())], "explained"))
+    assert more["wrong"]
+    assert not more["exact"]
+    honest = score(outcome(["bias"], [("bias", 0.5, ("scale_factor",))], "ambiguous"))
+    assert honest["fair"]
+    assert not honest["exact"]
+    escape = score(outcome(["bias"], [("bias", 0.5, ("clock_error",))], "ambiguous"))
+    assert escape["within"]
+    assert not escape["fair"]
+    assert score(outcome())["exact"]
+
+
+def test_stated_probabilities_are_compared_with_what_was_observed():
+    outcomes = [outcome(["bias"], [("bias", 0.8, ())], "explained") for _ in range(3)]
+    outcomes.append(outcome(["noise"], [("bias", 0.8, ())], "explained"))
+    ((stated, observed, count),) = reliability(outcomes)
+    assert (stated, observed, count) == (pytest.approx(0.8), pytest.approx(0.75), 4)
+    assert "over all 4 causes: 0.050" in summarise(outcomes)
+
+
+def test_an_interval_holds_its_rate():
+    rate, low, high = rate_with_interval(9, 10)
+    assert low < rate < high
+    assert rate_with_interval(0, 100)[2] == pytest.approx(0.0362, abs=1e-4)  # 1 − 0.025^(1/100)
+
+
+@pytest.mark.parametrize(("name", "least", "most"), [("table_tilt", 50.0, 250.0), ("eccentricity", 0.0, 3.0)])
+def test_an_effect_taken_out_is_as_far_from_the_rest_as_it_is_unlike_it(name, least, most):
+    world = draw_world(Case("left_out", 5, (name,), 200.0, duration=20.0, without=name))
+    assert least <= world.apart <= most
+    assert name not in world.twin.families()
+    line = next(
+        row
+        for row in summarise([outcome([name], study="left_out", without=name, apart=world.apart)]).splitlines()
+        if row.startswith("| **taken out")
+    )
+    assert ("imitated by one other effect" in line) == (most < 15.0)
