@@ -15,7 +15,9 @@ from scipy.spatial.transform import Rotation
 from sim.motion import SpinMotion, SpinState
 from sim.world import SampleContext, World
 
-__all__ = ["TableGeometry", "channels", "reference", "rigid_readings", "table_geometry"]
+__all__ = ["TableGeometry", "arm_growth", "channels", "growing_arms", "reference", "rigid_readings", "table_geometry"]
+
+_JERK_STEP = 1e-4  # s
 
 
 @dataclass(frozen=True)
@@ -105,6 +107,26 @@ def _nodding_readings(
     return gravity @ placed.axes.T + arm * np.reshape(stretch, (-1, 1))
 
 
+def arm_growth(world: World, motion: SpinMotion, t: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
+    """Return first (1/s) and second (1/s²) derivative of the arms' relative length 1 + k ω², each (n,)."""
+    spin = motion.at(t)
+    ahead, behind = motion.at(t + _JERK_STEP), motion.at(t - _JERK_STEP)
+    jerk = (ahead.acceleration - behind.acceleration) / (2 * _JERK_STEP)
+    rate, acceleration = spin.rate, spin.acceleration
+    return 2 * world.stretch * rate * acceleration, 2 * world.stretch * (acceleration**2 + rate * jerk)
+
+
+def growing_arms(
+    world: World, motion: SpinMotion, t: NDArray[np.float64], geometry: TableGeometry
+) -> NDArray[np.float64] | float:
+    """Return what the growth of the arms adds to the readings, 2 ω × ṙ + r̈, shape (n, c), m/s²; 0 without."""
+    if not (world.moving_arms and world.stretch):
+        return 0.0
+    first, second = arm_growth(world, motion, t)
+    along = -0.5 * geometry.centripetal[:, :3].sum(axis=1)  # r · a of each sensing axis a
+    return np.outer(2 * motion.at(t).rate * first, geometry.tangential[:, 2]) + np.outer(second, along)
+
+
 def channels(
     world: World, motion: SpinMotion, t: NDArray[np.float64], temperature: NDArray[np.float64] | None = None
 ) -> NDArray[np.float64]:
@@ -129,15 +151,16 @@ def channels(
     for step in (*world.motion_steps, *world.mount_steps):
         motion = step(motion, t)
     geometry = table_geometry(world)
-    spin = motion.at(t / (1.0 + world.clock_ratio))
+    true_times = t / (1.0 + world.clock_ratio)
+    spin = motion.at(true_times)
     if world.chip_delay is None:
-        readings = rigid_readings(world, spin, geometry)
+        readings = rigid_readings(world, spin, geometry) + growing_arms(world, motion, true_times, geometry)
     else:
         readings = np.empty((len(t), world.array.n_channels))
         for chip, times in enumerate(world.chip_times(t).T):
             mine = world.array.chip_of_channel == chip
             part = TableGeometry(geometry.axes[mine], geometry.tangential[mine], geometry.centripetal[mine])
-            readings[:, mine] = rigid_readings(world, motion.at(times), part)
+            readings[:, mine] = rigid_readings(world, motion.at(times), part) + growing_arms(world, motion, times, part)
     warm = np.full(len(t), world.temperature) if temperature is None else temperature
     return world.sense(readings, SampleContext(t, spin, warm))
 

@@ -10,6 +10,7 @@ MuJoCo's sensors still belong to the old state, position and velocity to the new
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import cast
 
 import mujoco
 import numpy as np
@@ -20,6 +21,7 @@ from scipy.spatial.transform import Rotation
 from gfimu.array import AccelerometerArray
 from gfimu.errors import InputError
 from gfimu.model_files import find_model
+from sim.forward import arm_growth
 from sim.motion import BodyMotion, BodyState, SpinMotion, SpinState, SplineSpin
 from sim.world import Nod, World
 
@@ -116,8 +118,8 @@ def prescribed_readings(world: World, motion: SpinMotion | BodyMotion, t: NDArra
     delays = np.zeros(len(world.array.chips)) if world.chip_delay is None else np.asarray(world.chip_delay)
     for delay in np.unique(delays):
         together = delays == delay
-        state = motion.at(chip_times[:, int(np.argmax(together))])
-        imposed = _free_state(state) if isinstance(state, BodyState) else _table_state(world, model, state)
+        times = chip_times[:, int(np.argmax(together))]
+        imposed = _imposed(world, model, motion, times)
         channels = together[world.array.chip_of_channel]
         readings[:, channels] = _inverse(model, *imposed)[:, channels]
     return readings
@@ -235,10 +237,28 @@ def _accelerometers(model: mujoco.MjModel) -> NDArray[np.intp]:
     return np.asarray(model.sensor_adr[model.sensor_type == mujoco.mjtSensor.mjSENS_ACCELEROMETER], dtype=np.intp)
 
 
-def _table_state(
-    world: World, model: mujoco.MjModel, spin: SpinState
+def _imposed(
+    world: World, model: mujoco.MjModel, motion: SpinMotion | BodyMotion, t: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Positions, velocities and accelerations of the rig's joints, each (n, nv), for a spin of the table."""
+    """Positions, velocities and accelerations of the joints for a motion."""
+    state = motion.at(t)
+    if isinstance(state, BodyState):
+        return _free_state(state)
+    first, second = arm_growth(world, cast("SpinMotion", motion), t) if world.moving_arms else (0.0, 0.0)
+    return _table_state(world, model, state, first, second)
+
+
+def _table_state(
+    world: World,
+    model: mujoco.MjModel,
+    spin: SpinState,
+    growth: NDArray[np.float64] | float,
+    growing: NDArray[np.float64] | float,
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Positions, velocities and accelerations of the rig's joints, each (n, nv), for a spin of the table.
+
+    ``growth`` and ``growing`` are the first and second derivative of the arms' relative length.
+    """
     position, velocity, acceleration = (np.zeros((len(spin.angle), model.nv)) for _ in range(3))
     place = model.joint(_SPIN_JOINT).dofadr[0]
     position[:, place], velocity[:, place], acceleration[:, place] = spin.angle, spin.rate, spin.acceleration
@@ -249,12 +269,14 @@ def _table_state(
         velocity[:, place] = -world.nod.amplitude * sin * spin.rate
         acceleration[:, place] = -world.nod.amplitude * (cos * spin.rate**2 + sin * spin.acceleration)
     if world.stretch:
-        # The arms follow the rate quasi-statically: their own velocity is left out, as in the forward model.
+        # Unless the arms are said to move, their own velocity is left out, as in the forward model.
         centre = Rotation.from_rotvec(world.mount_rotvec).inv().apply(world.cube_offset)
         for chip in world.array.chips:
             arm = float(np.linalg.norm(centre + chip.position))
             if arm:
-                position[:, model.joint(f"stretch_{chip.name}").dofadr[0]] = arm * world.stretch * spin.rate**2
+                place = model.joint(f"stretch_{chip.name}").dofadr[0]
+                position[:, place] = arm * world.stretch * spin.rate**2
+                velocity[:, place], acceleration[:, place] = arm * growth, arm * growing
     return position, velocity, acceleration
 
 

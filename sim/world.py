@@ -109,6 +109,8 @@ class World:
         Nod of the axis.
     stretch : float
         Relative stretch of the arms per rate squared, s²/rad²: arm × (1 + stretch·ω²).
+    moving_arms : bool
+        Whether readings hold what the stretching itself is: the Coriolis and radial acceleration of a growing arm.
     chip_delay : ndarray, shape (k,)
         How late each chip is sampled after the time stamp, s.
     clock_ratio : float
@@ -140,6 +142,7 @@ class World:
     axis_rotvec: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
     nod: Nod = Nod()
     stretch: float = 0.0
+    moving_arms: bool = False
     chip_delay: NDArray[np.float64] | None = None
     clock_ratio: float = 0.0
     tacho_delay: float = 0.0

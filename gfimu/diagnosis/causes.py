@@ -12,7 +12,7 @@ from scipy.linalg import block_diag
 from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.model import Effect, EffectFamily, Pattern
 
-WHOLE_NUMBERS = frozenset({"order"})
+WHOLE_NUMBERS = frozenset({"order", "moving_arms"})
 """Shape parameters that are whole numbers, picked from a grid and not refined."""
 
 __all__ = ["WHOLE_NUMBERS", "Cause", "Signature", "effects_of_run"]

@@ -216,7 +216,11 @@ class Gravity(Effect):
 
 
 class CentrifugalFlex(Effect):
-    """Arms that stretch with ω²."""
+    """Arms that stretch with ω²: each is as long as the present rate makes it.
+
+    With ``moving_arms`` = 1 it also moves while it grows, as a soft rig does, which adds Coriolis and radial
+    acceleration; without, the arm of the moment turns as if rigid.
+    """
 
     name = "centrifugal_flex"
     summary = "arms stretch with the rate squared"
@@ -228,9 +232,15 @@ class CentrifugalFlex(Effect):
         """One stretch, never negative."""
         return (Size("stretch_s2_rad2", 2.5e-5, positive=True),)
 
+    @classmethod
+    def shapes(cls, duration: float, sample_rate: float) -> tuple[dict[str, float], ...]:
+        """Arms that grow as if rigid, and arms that move."""
+        return ({"moving_arms": 0.0}, {"moving_arms": 1.0})
+
     def apply(self, world: World) -> World:
         """Stretch the arms."""
-        return world.changed(stretch=world.stretch + self.value("stretch_s2_rad2"))
+        moving = world.moving_arms or self.value("moving_arms") != 0.0
+        return world.changed(stretch=world.stretch + self.value("stretch_s2_rad2"), moving_arms=moving)
 
 
 class Cogging(Effect):
