@@ -234,8 +234,12 @@ class CentrifugalFlex(Effect):
 
     @classmethod
     def shapes(cls, duration: float, sample_rate: float) -> tuple[dict[str, float], ...]:
-        """Arms that grow as if rigid, and arms that move."""
-        return ({"moving_arms": 0.0}, {"moving_arms": 1.0})
+        """Arms that move, and arms that turn as if rigid."""
+        return ({"moving_arms": 1.0}, {"moving_arms": 0.0})
+
+    def shape_values(self) -> dict[str, float]:
+        """Return whether the arms move: not unless it is said."""
+        return {"moving_arms": float(self.parameters.get("moving_arms", 0.0))}
 
     def apply(self, world: World) -> World:
         """Stretch the arms."""
