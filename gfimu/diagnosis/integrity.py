@@ -154,7 +154,9 @@ def _clipping(
                 continue  # the other sign's extreme
             at_top = np.abs(sign * mine - top) < 0.3 * quantum
             below = np.abs(sign * mine - (top - quantum)) < 0.3 * quantum
-            beyond = sign * prediction[run.valid[:, channel], channel] > top + 1.5 * sigma
+            # Coarse rounding shows the top for anything within half a step of it.
+            clear = max(1.5 * sigma, 0.5 * quantum + sigma)
+            beyond = sign * prediction[run.valid[:, channel], channel] > top + clear
             if at_top.sum() < 8 or at_top.sum() <= 3 * below.sum() + 4:
                 continue
             if (beyond & at_top).sum() > 0.5 * at_top.sum():
