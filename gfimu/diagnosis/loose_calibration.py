@@ -25,7 +25,7 @@ from gfimu.diagnosis.stochastic import LARGEST_USUAL_FLICKER, log_probability
 
 __all__ = ["LooseCalibration", "loosen"]
 
-_SCALES = (1.0, 3.0)
+_USUAL, _LARGE = 1.0, 3.0  # of the tolerances
 _LEAST_ODDS = 3.0  # no more: that everything is a little off is what anybody expects
 
 
@@ -59,7 +59,11 @@ def loosen(plain: Explanation, prepared: PreparedRuns, model: WorldModel) -> Loo
         return None
     runs = len(prepared.runs)
     reference = log_probability(plain.segments, plain.fit, plain.fixed)
-    value, scale, start = max((_trial(plain, tolerance, scale) for scale in _SCALES), key=lambda trial: float(trial[0]))
+    value, start = _trial(plain, plain.fit.causes, tolerance, _USUAL)
+    scale = _USUAL
+    larger, other = _trial(plain, start.causes, tolerance, _LARGE)
+    if larger > value:
+        value, scale, start = larger, _LARGE, other
     if value < reference:
         return None
     segments, _ = prepared.segments(model)
@@ -95,15 +99,16 @@ def _fits(segment: Segment) -> bool:
     return not segment.rounding and float(np.median(segment.levels.flicker[:-1])) < LARGEST_USUAL_FLICKER
 
 
-def _trial(plain: Explanation, tolerance: dict[str, float], scale: float) -> tuple[float, float, Fit]:
-    """Admit a residue to the plain explanation and drop the causes that it makes superfluous."""
-    _admit(plain.segments, plain.fit.causes, plain.fixed, plain.fit.drives, tolerance, scale)
+def _trial(plain: Explanation, causes: Sequence[Cause], tolerance: dict[str, float], scale: float) -> tuple[float, Fit]:
+    """Admit a residue beside causes and drop those that it makes superfluous; returns the log probability too."""
+    segments, fixed = plain.segments, plain.fixed
+    _admit(segments, causes, fixed, plain.fit.drives, tolerance, scale)
     try:
-        fit = refine(plain.segments, plain.fit.causes, plain.fixed, drives=plain.fit.drives)
-        fit = prune(plain.segments, fit, plain.fixed)[0]
-        return log_probability(plain.segments, fit, plain.fixed), scale, fit
+        fit = refine(segments, causes, fixed, drives=plain.fit.drives)
+        fit = prune(segments, fit, fixed)[0]
+        return log_probability(segments, fit, fixed), fit
     finally:
-        for segment, drive in zip(plain.segments, plain.fit.drives, strict=True):
+        for segment, drive in zip(segments, plain.fit.drives, strict=True):
             segment.calibration_residue, segment.coefficients = None, drive
 
 
