@@ -14,7 +14,7 @@ from gfimu.diagnosis.engine import LEAST_EXTRA_ODDS, Explanation, prune
 from gfimu.diagnosis.free_body.diagnose import diagnose_body
 from gfimu.diagnosis.holdout import Holdout, gate_gains, held_out_gain, split_segments
 from gfimu.diagnosis.long_run import explain_any_length
-from gfimu.diagnosis.loose_calibration import LooseCalibration, loosen
+from gfimu.diagnosis.loose_calibration import LooseCalibration, loosen, relearned
 from gfimu.diagnosis.model import Effect, WorldModel
 from gfimu.diagnosis.prepared_runs import PreparedRuns
 from gfimu.diagnosis.refinement import refine
@@ -88,14 +88,15 @@ def diagnose(
         explanation.segments, explanation.fit, explanation.fixed, prepared.spikes, rounded=prepared.rounded
     )
     tell(0.97, "measure the gain")
-    gain = _gain(prepared, explanation, pairs, label)
+    gain = _gain(explanation, pairs if loose is None else relearned(loose, pairs), label)
     return conclude(prepared, model, explanation, walk, loose, left, gain, withdrawn)
 
 
-def _gain(prepared: PreparedRuns, explanation: Explanation, pairs: Sequence[Holdout], label: str) -> Gain:
+def _gain(explanation: Explanation, pairs: Sequence[Holdout], label: str) -> Gain:
+    """Measure what all that was found is worth on data the fit never saw."""
     if not explanation.fit.causes and not any(explanation.fixed):
         return Gain()
-    constant = [effect for effects in explanation.fixed for effect in effects]
+    constant = [effect for pair in pairs for known in pair.train_fixed for effect in known]
     return held_out_gain(explanation.fit.causes, pairs, constant, label=label)
 
 

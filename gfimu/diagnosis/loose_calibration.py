@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from gfimu.diagnosis.calibration_residue import CalibrationResidue, tolerance_of
 from gfimu.diagnosis.causes import Cause, Signature, effects_of_run
 from gfimu.diagnosis.engine import Explanation, prune
+from gfimu.diagnosis.holdout import Holdout
 from gfimu.diagnosis.long_run import explain_any_length
 from gfimu.diagnosis.model import Effect, EffectFamily, WorldModel
 from gfimu.diagnosis.prepared_runs import PreparedRuns
@@ -23,7 +24,7 @@ from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.signatures import signature_columns
 from gfimu.diagnosis.stochastic import LARGEST_USUAL_FLICKER, log_probability
 
-__all__ = ["LooseCalibration", "loosen"]
+__all__ = ["LooseCalibration", "loosen", "relearned"]
 
 _USUAL, _LARGE = 1.0, 3.0  # of the tolerances
 _LEAST_ODDS = 3.0  # no more: that everything is a little off is what anybody expects
@@ -92,6 +93,30 @@ def loosen(plain: Explanation, prepared: PreparedRuns, model: WorldModel) -> Loo
         segment.coefficients = drive
     whole = replace(found.fit, drives=fit.drives)
     return LooseCalibration(scale, effects, replace(found, fit=whole, fixed=known), held)
+
+
+def relearned(loose: LooseCalibration, pairs: Sequence[Holdout]) -> list[Holdout]:
+    """Return pairs of fitted and held-out data in which the residue comes from the fitted part alone."""
+    return [_relearned(loose, pair) for pair in pairs]
+
+
+def _relearned(loose: LooseCalibration, pair: Holdout) -> Holdout:
+    causes = loose.explanation.fit.causes
+    old = set(map(id, loose.effects))
+    train, test = (
+        [[effect for effect in known if id(effect) not in old] for known in fixed]
+        for fixed in (pair.train_fixed, pair.test_fixed)
+    )
+    tolerance = tolerance_of(pair.train[0].model.families())
+    drives = [segment.coefficients for segment in pair.train]
+    _admit(pair.train, causes, train, drives, tolerance, loose.scale)
+    fit = refine(pair.train, causes, train, drives=drives, shapes=False)
+    effects = _most_probable(pair.train, fit, train, tolerance, loose.scale)
+    for segment, drive in zip(pair.train, fit.drives, strict=True):
+        segment.calibration_residue, segment.coefficients = None, drive
+    return Holdout(
+        pair.train, [[*known, *effects] for known in train], pair.test, [[*known, *effects] for known in test]
+    )
 
 
 def _fits(segment: Segment) -> bool:

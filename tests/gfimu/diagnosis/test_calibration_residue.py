@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -102,3 +104,27 @@ def test_a_single_small_error_is_not_called_a_residue():
     found = diagnose([recording], TWIN)
     assert found.noise["calibration_residue"] == 0.0
     assert "bias" in {cause.effect for cause in found.causes}
+
+
+def test_the_gain_of_a_residue_is_that_of_the_part_it_was_not_fitted_to(monkeypatch):
+    judged = sys.modules["gfimu.diagnosis.diagnose"]
+    measured = judged.held_out_gain
+    seen = []
+
+    def kept(causes, pairs, constant, *, label):
+        seen.extend(pairs)
+        return measured(causes, pairs, constant, label=label)
+
+    monkeypatch.setattr(judged, "held_out_gain", kept)
+    world = draw_world(Case("reduced", 702, residue=True, duration=30.0))
+    found = diagnose([world.recording], world.twin)
+    assert found.calibration_residue
+    assert found.gain.rms_after < found.gain.rms_before
+    whole = next(effect for effect in found.twin.effects if effect.name == "bias")
+    one, other = (next(e for e in pair.test_fixed[0] if e.name == "bias") for pair in seen)
+    names = [f"{channel}_m_s2" for channel in TWIN.array.channels]
+    of_whole, of_one, of_other = (np.array([e.parameters[key] for key in names]) for e in (whole, one, other))
+    # Each part's own, and not those of the whole run; both near them, as they measure the same.
+    assert np.abs(of_one - of_other).max() > 1e-5
+    assert np.abs(of_one - of_whole).max() > 1e-5
+    assert np.sqrt(np.mean((of_one - of_other) ** 2)) < 2 * np.sqrt(np.mean(of_whole**2))
