@@ -149,7 +149,10 @@ def _descend(segments: Sequence[Segment], fixed: Sequence[Sequence[Effect]], sta
         if point.expected < _TOLERANCE:
             break
         for scale in _SHARES:
-            trial = _evaluate(segments, fixed, point.moved(scale, array))
+            try:
+                trial = _evaluate(segments, fixed, point.moved(scale, array))
+            except np.linalg.LinAlgError:  # so far off that the prediction overflows
+                continue
             if trial.value <= point.value + _UPHILL:
                 break
         else:

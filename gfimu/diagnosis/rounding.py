@@ -22,6 +22,7 @@ __all__ = ["COARSE", "WorkingResidual", "rounded_likelihood", "rounding_noise"]
 COARSE = 1.5
 """Steps per standard deviation of the noise from which rounding is no longer like noise."""
 _LEAST_WEIGHT = 0.02
+_FAR = 1e4  # standard deviations
 _NOISE_FACTORS = np.geomspace(0.5, 6.0, 26)
 _LOG_ROOT_TWO_PI = 0.5 * np.log(2 * np.pi)
 
@@ -61,16 +62,19 @@ def rounded_likelihood(
     """
     # By symmetry the prediction lies below the reading: both limits are then well inside the range of Φ's logarithm.
     side = np.where(error < 0, -1.0, 1.0)
-    upper = (np.abs(error) + 0.5 * quantum) / sigma
-    lower = (np.abs(error) - 0.5 * quantum) / sigma
+    true_lower = (np.abs(error) - 0.5 * quantum) / sigma
+    # Farther off, the squares of the limits lose all digits of their difference; there only the nearer limit counts.
+    lower = np.minimum(true_lower, _FAR)
+    upper = lower + quantum / sigma
     log_outer, log_inner = log_ndtr(-upper), log_ndtr(-lower)
     log_p = log_inner + np.log1p(-np.exp(log_outer - log_inner))
     density_upper = np.exp(-0.5 * upper**2 - _LOG_ROOT_TWO_PI - log_p)
     density_lower = np.exp(-0.5 * lower**2 - _LOG_ROOT_TWO_PI - log_p)
-    score = density_lower - density_upper  # σ d log p/dx
-    curvature = score**2 - (lower * density_lower - upper * density_upper)  # −σ² d² log p/dx²
+    beyond = true_lower - lower
+    score = density_lower - density_upper + beyond  # σ d log p/dx
+    curvature = (score - beyond) ** 2 - (lower * density_lower - upper * density_upper)  # −σ² d² log p/dx²
     weight = np.sqrt(np.clip(curvature, _LEAST_WEIGHT**2, 1.0))
-    return WorkingResidual(side * sigma * score / weight, weight, -2.0 * log_p)
+    return WorkingResidual(side * sigma * score / weight, weight, beyond * (true_lower + lower) - 2.0 * log_p)
 
 
 def rounding_noise(error: NDArray[np.float64], quantum: float, sigma: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -40,3 +40,13 @@ def test_mean_and_noise_are_recovered_from_coarse_readings():
     assert abs(readings.mean() - mean) > 5 * std
     assert abs(x[0] - mean) < 4 * std
     assert_allclose(rounding_noise(readings - mean, quantum, np.array([0.4])), sigma, rtol=0.12)
+
+
+def test_a_prediction_absurdly_far_off_keeps_a_finite_pull_towards_the_reading():
+    error = np.array([3e2, 3e3, 3e6, -3e6])[:, None]
+    far = rounded_likelihood(error, 0.3, np.array([0.03]))
+    for part in (far.residual, far.weight, far.deviance):
+        assert np.isfinite(part).all()
+    assert_allclose(far.weight, 1.0, atol=0.01)
+    assert_allclose(far.residual, error - np.sign(error) * 0.15, rtol=1e-3)
+    assert_allclose(far.deviance, ((np.abs(error) - 0.15) / 0.03) ** 2, rtol=1e-3)
