@@ -15,16 +15,17 @@ from scipy.linalg import solve_triangular
 
 from gfimu.diagnosis.causes import effects_of_run
 from gfimu.diagnosis.evidence import log_evidence, log_evidence_each
+from gfimu.diagnosis.linearisation import Linearisation
 from gfimu.diagnosis.model import Effect
 from gfimu.diagnosis.refinement import Fit
 from gfimu.diagnosis.residual_tests import LeftOver, changing_noise, jumps, lines, one_curve
-from gfimu.diagnosis.segment import Linearisation, Segment
+from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.signatures import cause_columns
 
 __all__ = ["LEFT_OVER_ODDS", "generic_basis", "left_over"]
 
 LEFT_OVER_ODDS = 10.0
-"""Log odds from which what is left is called significant; one in 600 runs with nothing hidden reached it."""
+"""Log odds from which what is left is called significant; one in 320 runs with nothing hidden reached it."""
 _UNIT = 0.03
 _STEPS = 8
 _SLOW = 10

@@ -14,11 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.diagnosis.drive_jacobian import DriveJacobian
+from gfimu.units import STANDARD_GRAVITY
 
 __all__ = ["TOLERANCE", "CalibrationResidue", "tolerance_of"]
 
 TOLERANCE = {
-    "bias": 0.3e-3 * 9.80665,
+    "bias": 0.3e-3 * STANDARD_GRAVITY,
     "scale_factor": 5e-4,
     "misalignment": float(np.deg2rad(0.02)),
     "sensor_position": 5e-5,

@@ -88,7 +88,9 @@ def diagnose(
         explanation.segments, explanation.fit, explanation.fixed, prepared.spikes, rounded=prepared.rounded
     )
     tell(0.97, "measure the gain")
-    gain = _gain(explanation, pairs if loose is None else relearned(loose, pairs), label)
+    if loose is not None:
+        pairs = relearned(loose, explanation.fit.causes, pairs)
+    gain = _gain(explanation, pairs, label)
     return conclude(prepared, model, explanation, walk, loose, left, gain, withdrawn)
 
 

@@ -13,12 +13,13 @@ from scipy.integrate import cumulative_trapezoid
 from gfimu.diagnosis.causes import Cause, effects_of_run
 from gfimu.diagnosis.drive import smooth_rate
 from gfimu.diagnosis.far_starts import every_mode, from_far
+from gfimu.diagnosis.linearisation import Linearisation
 from gfimu.diagnosis.model import Effect, WorldModel
 from gfimu.diagnosis.nuisances import learn_noise, tune_drives
 from gfimu.diagnosis.refinement import Fit, refine
 from gfimu.diagnosis.run import Run
 from gfimu.diagnosis.search import search
-from gfimu.diagnosis.segment import Linearisation, Segment, difference_noise, over_segments
+from gfimu.diagnosis.segment import Segment, difference_noise, over_segments
 from gfimu.diagnosis.signatures import SignatureSet, hypotheses, plan_signatures, signature_columns
 
 __all__ = [

@@ -95,13 +95,12 @@ def loosen(plain: Explanation, prepared: PreparedRuns, model: WorldModel) -> Loo
     return LooseCalibration(scale, effects, replace(found, fit=whole, fixed=known), held)
 
 
-def relearned(loose: LooseCalibration, pairs: Sequence[Holdout]) -> list[Holdout]:
-    """Return pairs of fitted and held-out data in which the residue comes from the fitted part alone."""
-    return [_relearned(loose, pair) for pair in pairs]
+def relearned(loose: LooseCalibration, causes: Sequence[Cause], pairs: Sequence[Holdout]) -> list[Holdout]:
+    """Return pairs of fitted and held-out data in which the residue beside causes comes from the fitted part alone."""
+    return [_relearned(loose, causes, pair) for pair in pairs]
 
 
-def _relearned(loose: LooseCalibration, pair: Holdout) -> Holdout:
-    causes = loose.explanation.fit.causes
+def _relearned(loose: LooseCalibration, causes: Sequence[Cause], pair: Holdout) -> Holdout:
     old = set(map(id, loose.effects))
     train, test = (
         [[effect for effect in known if id(effect) not in old] for known in fixed]

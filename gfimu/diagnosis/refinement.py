@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.causes import Cause, effects_of_run
 from gfimu.diagnosis.evidence import SCALES, inverse, log_evidence
+from gfimu.diagnosis.linearisation import DriveElimination
 from gfimu.diagnosis.model import Effect
 from gfimu.diagnosis.search import EXTRA_CAUSE
-from gfimu.diagnosis.segment import DriveElimination, Segment, over_segments
+from gfimu.diagnosis.segment import Segment, over_segments
 from gfimu.diagnosis.signatures import ANGLES, cause_columns, shape_moved
 
 __all__ = ["Fit", "refine"]

@@ -13,7 +13,6 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from functools import cache
 from typing import Any, TypeVar
 
@@ -28,11 +27,12 @@ from gfimu.diagnosis.calibration_residue import CalibrationResidue
 from gfimu.diagnosis.coloured_noise import CosineBasis, NoiseLevels
 from gfimu.diagnosis.drive import ROUGHNESS_FACTOR, AngleSpline, SplineState, roughness_prior
 from gfimu.diagnosis.drive_jacobian import DriveJacobian, lag_matrix
+from gfimu.diagnosis.linearisation import DriveElimination, Linearisation
 from gfimu.diagnosis.model import Effect, Spin, SpinState, WorldModel
 from gfimu.diagnosis.rounding import COARSE, rounded_likelihood, rounding_noise
 from gfimu.diagnosis.run import Run
 
-__all__ = ["DriveElimination", "Linearisation", "Segment", "difference_noise", "known_walk", "over_segments"]
+__all__ = ["Segment", "difference_noise", "known_walk", "over_segments"]
 
 Result = TypeVar("Result")
 
@@ -45,75 +45,6 @@ _LEAST_FACTOR = 0.05
 _FACTOR_STEPS = 4
 _REST_FACTOR = 1.3
 _STATE_STEPS = (1e-5, 1e-4, 1e-3)
-
-
-@dataclass(frozen=True)
-class DriveElimination:
-    """What is needed to step the drive once the causes are known.
-
-    Parameters
-    ----------
-    factor : ndarray, shape (m + q, m + q)
-        Lower Cholesky factor L of H; the last q unknowns are the calibration residue, where it is admitted.
-    forward : ndarray, shape (m + q,)
-        x = L⁻¹(JᵀWr − Rd).
-    objective : float
-        rᵀWr + dᵀRd − xᵀx: twice the negative log likelihood, drive marginalised.
-    size : int
-        m.
-    """
-
-    factor: NDArray[np.float64]
-    forward: NDArray[np.float64]
-    objective: float
-    size: int
-
-    def step(self, eliminated: NDArray[np.float64], step: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the step of the drive (m,) to its posterior mean, given the step of the signatures' coordinates."""
-        right = self.forward - eliminated @ step
-        return self._solve(right)[: self.size]
-
-    def alone(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return the step of the drive (m,) and the sizes of the calibration residue (q,), the causes held."""
-        both = self._solve(self.forward)
-        return both[: self.size], both[self.size :]
-
-    def distance(self) -> float:
-        """Return how far the drive is from its best, in squared standard deviations, the causes held."""
-        if len(self.forward) == self.size:
-            return float(self.forward @ self.forward)
-        away = self.factor[: self.size, : self.size].T @ self.alone()[0]
-        return float(away @ away)
-
-    def residue(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return the information (q, q), prior included, and score (q,) of the residue, drive eliminated."""
-        corner = self.factor[self.size :, self.size :]
-        return corner @ corner.T, corner @ self.forward[self.size :]
-
-    def _solve(self, right: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.asarray(solve_triangular(self.factor, right, lower=True, trans=1, check_finite=False))
-
-
-@dataclass(frozen=True)
-class Linearisation:
-    """Residual, drive Jacobian and eliminated drive of a segment about given effects.
-
-    Parameters
-    ----------
-    residual : ndarray, shape (n, c + 1)
-        Measured minus predicted; zero where invalid.
-    jacobian : DriveJacobian
-        Derivative of each observation with respect to the drive's coefficients.
-    slow : ndarray, shape (R, m, K)
-        The same in the cosines of slow noise.
-    drive : DriveElimination
-        The drive's step and the likelihood without it.
-    """
-
-    residual: NDArray[np.float64]
-    jacobian: DriveJacobian
-    slow: NDArray[np.float64]
-    drive: DriveElimination
 
 
 def over_segments(work: Callable[..., Result], *columns: Iterable[Any]) -> list[Result]:

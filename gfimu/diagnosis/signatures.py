@@ -15,8 +15,9 @@ from scipy.signal import lfilter
 
 from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.causes import Cause, Signature, effects_of_run, per_run_mixing
+from gfimu.diagnosis.linearisation import Linearisation
 from gfimu.diagnosis.model import Effect, EffectFamily
-from gfimu.diagnosis.segment import Linearisation, Segment
+from gfimu.diagnosis.segment import Segment
 
 __all__ = [
     "ANGLES",

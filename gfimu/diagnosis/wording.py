@@ -27,9 +27,7 @@ def verdict_sentences(
 
     ``residue`` is the size of a calibration residue, in units of what a good calibration leaves, where there is one.
     """
-    words = [_headline(verdict, causes, unexplained)]
-    if residue > 0.0 and verdict == "nothing_found":
-        words = ["No single thing is wrong with the simulation."]
+    words = [_headline(verdict, causes, unexplained, residue)]
     words += [f"{cause.effect}: {cause.why}." for cause in causes if cause.why]
     for cause in causes:
         if cause.not_distinguishable_from and verdict != "ambiguous":
@@ -54,8 +52,10 @@ def verdict_sentences(
     return tuple(words)
 
 
-def _headline(verdict: str, causes: Sequence[NamedCause], unexplained: Unexplained) -> str:
+def _headline(verdict: str, causes: Sequence[NamedCause], unexplained: Unexplained, residue: float) -> str:
     names = _listed([cause.effect for cause in causes])
+    if verdict == "nothing_found" and residue > 0.0:
+        return "No single thing is wrong with the simulation."
     if verdict == "nothing_found":
         return "The simulation agrees with the measurement: nothing was found beyond the sensors' own noise."
     if verdict == "explained":

@@ -1,0 +1,82 @@
+"""What is left of a stretch once it is linearised and its drive eliminated (`gfimu.diagnosis.segment`)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
+
+from gfimu.diagnosis.drive_jacobian import DriveJacobian
+
+__all__ = ["DriveElimination", "Linearisation"]
+
+
+@dataclass(frozen=True)
+class DriveElimination:
+    """What is needed to step the drive once the causes are known.
+
+    Parameters
+    ----------
+    factor : ndarray, shape (m + q, m + q)
+        Lower Cholesky factor L of H; the last q unknowns are the calibration residue, where it is admitted.
+    forward : ndarray, shape (m + q,)
+        x = L⁻¹(JᵀWr − Rd).
+    objective : float
+        rᵀWr + dᵀRd − xᵀx: twice the negative log likelihood, drive marginalised.
+    size : int
+        m.
+    """
+
+    factor: NDArray[np.float64]
+    forward: NDArray[np.float64]
+    objective: float
+    size: int
+
+    def step(self, eliminated: NDArray[np.float64], step: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the step of the drive (m,) to its posterior mean, given the step of the signatures' coordinates."""
+        right = self.forward - eliminated @ step
+        return self._solve(right)[: self.size]
+
+    def alone(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the step of the drive (m,) and the sizes of the calibration residue (q,), the causes held."""
+        both = self._solve(self.forward)
+        return both[: self.size], both[self.size :]
+
+    def distance(self) -> float:
+        """Return how far the drive is from its best, in squared standard deviations, the causes held."""
+        if len(self.forward) == self.size:
+            return float(self.forward @ self.forward)
+        away = self.factor[: self.size, : self.size].T @ self.alone()[0]
+        return float(away @ away)
+
+    def residue(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the information (q, q), prior included, and score (q,) of the residue, drive eliminated."""
+        corner = self.factor[self.size :, self.size :]
+        return corner @ corner.T, corner @ self.forward[self.size :]
+
+    def _solve(self, right: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.asarray(solve_triangular(self.factor, right, lower=True, trans=1, check_finite=False))
+
+
+@dataclass(frozen=True)
+class Linearisation:
+    """Residual, drive Jacobian and eliminated drive of a segment about given effects.
+
+    Parameters
+    ----------
+    residual : ndarray, shape (n, c + 1)
+        Measured minus predicted; zero where invalid.
+    jacobian : DriveJacobian
+        Derivative of each observation with respect to the drive's coefficients.
+    slow : ndarray, shape (R, m, K)
+        The same in the cosines of slow noise.
+    drive : DriveElimination
+        The drive's step and the likelihood without it.
+    """
+
+    residual: NDArray[np.float64]
+    jacobian: DriveJacobian
+    slow: NDArray[np.float64]
+    drive: DriveElimination
