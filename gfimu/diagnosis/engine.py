@@ -42,6 +42,7 @@ _CLOSE = 12.0
 _GROSS = 150.0
 _FAIR_FIT = 1.6
 _WORTH_REFINING = -6.0
+_WORTH_PRUNING = 40.0
 RIVALS = 6
 """How many other sets are judged beside the best."""
 LEAST_ODDS = 9.0
@@ -228,19 +229,19 @@ def explain(
             break
         settled_before = settled
     tell(0.85, "prune")
-    best, without = prune(segments, best, fixed)
+    done: dict[frozenset[tuple[str, str]], Fit] = {}
+    best, without = prune(segments, best, fixed, done)
     near = [
         tried[key]
         for key in sorted(behind, key=behind.__getitem__)
         if best.causes and key != best.key and tried[key].causes and behind[key] < _CLOSE + 10.0
     ]
-    rivals = [refine(segments, fit.causes, fixed, drives=best.drives, iterations=6) for fit in near[:RIVALS]]
-    rivals = [prune(segments, rival, fixed)[0] for rival in rivals if len(rival.causes) <= len(best.causes) + 1]
+    rivals = _rivals(segments, best, near[:RIVALS], fixed, done)
     unique = {rival.key: rival for rival in rivals if rival.causes and rival.key != best.key}
     better = max(unique.values(), key=_posterior, default=best)
     if better.log_posterior > best.log_posterior:
         unique[best.key] = best
-        best, without = prune(segments, better, fixed)
+        best, without = prune(segments, better, fixed, done)
         unique.pop(best.key, None)
     if "resonance" in without and best.log_posterior - without["resonance"].log_posterior < _FAINT:
         best = every_mode(segments, best, fixed)
@@ -261,19 +262,62 @@ def explain(
     )
 
 
-def prune(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]]) -> tuple[Fit, dict[str, Fit]]:
-    """Drop causes that the data hardly ask for; returns the fit and, by cause, the best fit without it."""
+def _rivals(
+    segments: Sequence[Segment],
+    best: Fit,
+    near: Sequence[Fit],
+    fixed: Sequence[Sequence[Effect]],
+    done: dict[frozenset[tuple[str, str]], Fit],
+) -> list[Fit]:
+    """Refine other sets under the noise and drive prior of the best one; those that come close are pruned too."""
+    rivals = []
+    for fit in near:
+        if len(fit.causes) > len(best.causes) + 1:
+            continue
+        rival = refine(segments, fit.causes, fixed, drives=best.drives, iterations=6)
+        if rival.key > best.key and rival.log_posterior < best.log_posterior:
+            continue  # the best set with something superfluous
+        if rival.log_posterior > best.log_posterior - _WORTH_PRUNING:
+            rival = prune(segments, rival, fixed, done)[0]
+        rivals.append(rival)
+    return rivals
+
+
+def prune(
+    segments: Sequence[Segment],
+    fit: Fit,
+    fixed: Sequence[Sequence[Effect]],
+    done: dict[frozenset[tuple[str, str]], Fit] | None = None,
+) -> tuple[Fit, dict[str, Fit]]:
+    """Drop causes that the data hardly ask for.
+
+    Parameters
+    ----------
+    segments : sequence of Segment
+        The data.
+    fit : Fit
+        What to prune.
+    fixed : sequence of sequence of Effect
+        Effects known beforehand, per segment.
+    done : dict, optional
+        Sets refined before under the same noise; those refined here are added.
+
+    Returns
+    -------
+    fit : Fit
+        What the data ask for.
+    without : dict of str to Fit
+        By cause, the best fit without it.
+    """
+    known = {} if done is None else done
     while True:
-        without = {
-            cause.name: refine(
-                segments,
-                [other for other in fit.causes if other.name != cause.name],
-                fixed,
-                drives=fit.drives,
-                iterations=8,
-            )
-            for cause in fit.causes
-        }
+        without = {}
+        for cause in fit.causes:
+            others = [other for other in fit.causes if other.name != cause.name]
+            key = frozenset(other.key for other in others)
+            if key not in known:
+                known[key] = refine(segments, others, fixed, drives=fit.drives, iterations=8)
+            without[cause.name] = known[key]
         if not without:
             return fit, without
         weakest = max(without, key=lambda name: without[name].log_posterior)

@@ -86,19 +86,18 @@ def gate_gains(
     other_recording : bool
         Whether the held-out data are other recordings.
     """
-    gains = {}
-    for name, other in without.items():
-        parts = []
-        for pair in pairs:
-            joint = fit.log_evidence - other.log_evidence
-            if other_recording:
-                every, known = [*pair.train, *pair.test], [*pair.train_fixed, *pair.test_fixed]
-                joint = _evidence_of(every, fit.causes, known) - _evidence_of(every, other.causes, known)
-            full = _evidence_of(pair.train, fit.causes, pair.train_fixed)
+    if not without:
+        return {}
+    gains: dict[str, list[float]] = {name: [] for name in without}
+    for pair in pairs:
+        every, known = [*pair.train, *pair.test], [*pair.train_fixed, *pair.test_fixed]
+        full = _evidence_of(pair.train, fit.causes, pair.train_fixed)
+        joint = _evidence_of(every, fit.causes, known) if other_recording else fit.log_evidence
+        for name, other in without.items():
             rest = _evidence_of(pair.train, other.causes, pair.train_fixed)
-            parts.append(joint - (full - rest))
-        gains[name] = float(np.mean(parts))
-    return gains
+            both = _evidence_of(every, other.causes, known) if other_recording else other.log_evidence
+            gains[name].append((joint - both) - (full - rest))
+    return {name: float(np.mean(values)) for name, values in gains.items()}
 
 
 def _evidence_of(segments: Sequence[Segment], causes: Sequence[Cause], fixed: Sequence[Sequence[Effect]]) -> float:

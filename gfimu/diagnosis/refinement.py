@@ -27,6 +27,7 @@ _SHAPE_PRIOR = 0.7
 _TOLERANCE = 0.02
 _DRIVE_SHARE = 0.1
 _UPHILL = 0.5
+_STALLED = 0.5
 _SHARES = (1.0, 0.3, 0.08)
 _SMALLEST_POSITIVE = 1e-6
 
@@ -158,7 +159,10 @@ def _descend(segments: Sequence[Segment], fixed: Sequence[Sequence[Effect]], sta
                 break
         else:
             break
+        stalled = point.value - trial.value < _TOLERANCE and trial.expected > _STALLED * point.expected
         point = trial
+        if stalled:
+            break
     return point
 
 

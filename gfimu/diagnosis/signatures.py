@@ -159,9 +159,10 @@ def signature_columns(
     for signature in signatures:
         family = signature.family
         sizes = family.sizes(array)
-        others = [*fixed, *(effect for effect in present if effect.name != family.name)]
-        mine = next((effect for effect in present if effect.name == family.name), None)
-        zero = np.zeros(len(sizes)) if mine is None else mine.size_values(array)
+        # Effects do not commute: one that is there already is varied in its place.
+        at = next((number for number, effect in enumerate(present) if effect.name == family.name), len(present))
+        before, after = [*fixed, *present[:at]], present[at + 1 :]
+        zero = present[at].size_values(array) if at < len(present) else np.zeros(len(sizes))
         steps = np.array([size.step * size.prior_std for size in sizes])
         prior = np.array([size.prior_std for size in sizes])
         reach = family.reach(array)
@@ -169,7 +170,7 @@ def signature_columns(
             moved = zero.copy()
             moved[group] += steps[group]
             effect = family.from_sizes(array, moved, signature.shape)
-            change = (segment.predict([*others, effect]) - nominal).T * mask  # (c + 1, n)
+            change = (segment.predict([*before, effect, *after]) - nominal).T * mask  # (c + 1, n)
             for size in group:
                 reached = slice(None) if reach is None else np.flatnonzero(reach[size])
                 out[reached, place + size] = change[reached] * (prior[size] / steps[size])
@@ -202,7 +203,8 @@ def cause_columns(
     nominal = segment.predict([*fixed, *present])
     columns = []
     for number, cause in enumerate(causes):
-        others = [*fixed, *present[:number], *present[number + 1 :]]
+        # Effects do not commute: in another order the difference quotient would hold a commutator over a small step.
+        before, after = [*fixed, *present[:number]], present[number + 1 :]
         sizes = cause.family.sizes(array)
         step = min(size.step for size in sizes)
         if any(size.step > 0.01 for size in sizes):
@@ -211,13 +213,13 @@ def cause_columns(
         for place in range(len(cause.coordinates)):
             moved = cause.coordinates.copy()
             moved[place] += step
-            change = segment.predict([*others, cause.at(moved).effect(array, segment.index)]) - nominal
-            columns.append(change / step)
+            effect = cause.at(moved).effect(array, segment.index)
+            columns.append((segment.predict([*before, effect, *after]) - nominal) / step)
         if shapes:
             for key, value in cause.free_shape.items():
                 moved_shape = {**cause.shape, key: shape_moved(key, value, _SHAPE_STEP)}
                 effect = cause.at(cause.coordinates, moved_shape).effect(array, segment.index)
-                columns.append((segment.predict([*others, effect]) - nominal) / _SHAPE_STEP)
+                columns.append((segment.predict([*before, effect, *after]) - nominal) / _SHAPE_STEP)
     if not columns:
         return np.zeros((nominal.shape[1], 0, nominal.shape[0]))
     return np.stack([column.T for column in columns], axis=1) * segment.row_weight.T[:, None, :]

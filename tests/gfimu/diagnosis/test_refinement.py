@@ -1,0 +1,93 @@
+"""Fits of several effects: columns against central differences, and descent to where nothing more is gained."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from gfimu.array import AccelerometerArray
+from gfimu.diagnosis.causes import effects_of_run
+from gfimu.diagnosis.engine import make_segments
+from gfimu.diagnosis.refinement import refine
+from gfimu.diagnosis.run import prepare_run
+from gfimu.diagnosis.signatures import Signature, cause_columns, hypotheses, signature_columns
+from sim.campaign import Measurement, measure
+from sim.effects import make_effect
+from sim.twin import Twin
+
+PAIRS = {
+    ("scale_factor", "cross_axis"): ({"a12": 0.02, "a21": -0.03}, {"a12_from_a13": 0.02, "a21_from_a22": -0.01}),
+    ("cross_axis", "quadratic"): ({"a12_from_a13": 0.02}, {"a12_s2_m": 2e-3, "a33_s2_m": -1e-3}),
+    ("misalignment", "bias"): ({"a1_x_rad": 0.02, "a1_y_rad": -0.01}, {"a11_m_s2": 0.3}),
+}
+
+
+@pytest.fixture(scope="module")
+def twin():
+    return Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
+
+
+def _segment(twin, effects=()):
+    recording = measure(np.random.default_rng(5), twin, effects, Measurement(duration=20.0))
+    (segment,) = make_segments(twin, [prepare_run(recording, twin)])
+    segment.prepare_weights()
+    return segment
+
+
+def _causes(segment, names, values, array):
+    """The freest hypothesis of each effect at given parameters."""
+    families = segment.model.families()
+    causes = []
+    for name, parameters in zip(names, values, strict=True):
+        family = families[name]
+        signature = Signature(family, {}, np.arange(len(family.sizes(array))))
+        free = hypotheses([signature], array, 1)[0]
+        sizes = family(parameters).size_values(array) / [size.prior_std for size in family.sizes(array)]
+        causes.append(free.cause(np.linalg.lstsq(free.mixing, sizes, rcond=None)[0]))
+    return causes
+
+
+@pytest.mark.parametrize("names", list(PAIRS), ids="+".join)
+def test_columns_are_central_differences_of_effects_in_their_order(twin, names):
+    # Sensing effects do not commute. Varied at the end of the list instead of in its place, an effect's column holds
+    # their commutator over a small step.
+    segment = _segment(twin)
+    causes = _causes(segment, names, PAIRS[names], twin.array)
+    columns = cause_columns(segment, causes, (), shapes=False)  # (c + 1, K, n)
+    place = 0
+    for number, cause in enumerate(causes):
+        for coordinate in range(len(cause.coordinates)):
+            two = []
+            for step in (1e-3, -1e-3):
+                moved = cause.coordinates.copy()
+                moved[coordinate] += step
+                changed = [*causes[:number], cause.at(moved), *causes[number + 1 :]]
+                two.append(segment.predict(effects_of_run(changed, twin.array, 0)))
+            truth = (two[0] - two[1]) / 2e-3 * segment.row_weight
+            assert_allclose(columns[:, place].T, truth, atol=0.02 * np.abs(truth).max() + 1e-9)
+            place += 1
+
+
+def test_screening_about_a_set_varies_its_effects_in_their_order(twin):
+    names = ("scale_factor", "cross_axis")
+    segment = _segment(twin)
+    causes = _causes(segment, names, PAIRS[names], twin.array)
+    family = causes[0].family
+    signature = Signature(family, {}, np.arange(len(family.sizes(twin.array))))
+    columns, _ = signature_columns(segment, [signature], causes, ())  # (c + 1, P, n)
+    assert_allclose(columns, cause_columns(segment, causes[:1], [], shapes=False), atol=0.05 * np.abs(columns).max())
+
+
+def test_a_pair_that_does_not_commute_is_fitted_until_nothing_is_gained(twin):
+    names = ("scale_factor", "cross_axis")
+    truth = [make_effect(name, parameters) for name, parameters in zip(names, PAIRS[names], strict=True)]
+    segment = _segment(twin, truth)
+    causes = _causes(segment, names, PAIRS[names], twin.array)
+    start = [cause.at(0.8 * cause.coordinates) for cause in causes]
+    fit = refine([segment], start, [()], iterations=8)
+    again = refine([segment], fit.causes, [()], drives=fit.drives, iterations=8)
+    assert fit.objective - again.objective == pytest.approx(0.0, abs=0.05)
+    for cause, wanted in zip(fit.causes, causes, strict=True):
+        off = (cause.coordinates - wanted.coordinates) / np.sqrt(cause.covariance.diagonal())
+        assert np.abs(off).max() < 4.5
