@@ -233,6 +233,10 @@ class Twin:
         """Return the time constant of the sensing chain's first-order lag, s."""
         return float(sum(e.value("time_constant_s") for e in (*self.effects, *effects) if e.name == "sensor_lag"))
 
+    def reference_gain(self, effects: Sequence[Any] = ()) -> float:
+        """Return what the reference reads per unit of motion once effects are added, relative to the twin's own."""
+        return float(math.prod(1.0 + e.value("ratio") for e in effects if e.name == "tacho_scale"))
+
     def expected_noise(self, sample_rate: float) -> ExpectedNoise:
         """Return white noise and quantisation of the part at a sample rate, as the data sheet has them."""
         part = read_toml(find_model("parts", self.part))

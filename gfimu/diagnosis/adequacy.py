@@ -16,7 +16,7 @@ from scipy.linalg import solve_triangular
 from gfimu.diagnosis.causes import effects_of_run
 from gfimu.diagnosis.evidence import log_evidence, log_evidence_each
 from gfimu.diagnosis.linearisation import Linearisation
-from gfimu.diagnosis.model import Effect
+from gfimu.diagnosis.model import Effect, SpinState
 from gfimu.diagnosis.refinement import Fit
 from gfimu.diagnosis.residual_tests import LeftOver, changing_noise, jumps, lines, one_curve
 from gfimu.diagnosis.segment import Segment
@@ -32,9 +32,8 @@ _SLOW = 10
 _ORDERS = (1, 2, 3, 4, 6, 8, 12)
 
 
-def generic_basis(segment: Segment) -> tuple[list[str], NDArray[np.float64]]:
+def generic_basis(segment: Segment, state: SpinState) -> tuple[list[str], NDArray[np.float64]]:
     """Return names and values (n, k) of smooth functions of rate, acceleration, angle and time, of unit rms."""
-    state = segment.spin.at(segment.run.t)
     rate = state.rate / max(float(np.abs(state.rate).max()), 1e-6)
     acceleration = state.acceleration / max(float(np.abs(state.acceleration).max()), 1e-6)
     jerk = np.gradient(acceleration)
@@ -113,7 +112,7 @@ def _basis_terms(
     names: list[str] = []
     for segment, known in zip(segments, fixed, strict=True):
         line = segment.linearise([*known, *effects_of_run(fit.causes, segment.model.array, segment.index)])
-        names, basis = generic_basis(segment)
+        names, basis = generic_basis(segment, line.state)
         part, right, cross = _channelwise(segment, line, basis)
         named = cause_columns(segment, fit.causes, known, shapes=True)
         if named.shape[1]:

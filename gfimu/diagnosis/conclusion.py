@@ -208,7 +208,7 @@ def _view(prepared: PreparedRuns, number: int, explanation: Explanation, found: 
         array = segment.model.array
         effects = [*known, *effects_of_run(explanation.fit.causes, array, segment.index)]
         after.append(segment.predict(effects))
-        states.append(segment.spin.at(segment.run.t))
+        states.append(segment.motion(effects).at(segment.run.t))
         before.append(segment.reference_prediction([]))
     first, second = np.concatenate(before), np.concatenate(after)
     return RunView(

@@ -45,11 +45,11 @@ _WORTH_REFINING = -6.0
 _WORTH_PRUNING = 40.0
 RIVALS = 6
 """How many other sets are judged beside the best."""
-LEAST_ODDS = 9.0
+LEAST_ODDS = 4.0
 """Log odds that a single cause needs against nothing.
 
-Wide of what chance does: in 60 runs with nothing hidden (`threshold_nulls` of `sim.study`, not those that the false
-alarms are counted on) nothing reached even odds.
+Wide of what chance does: in 240 runs with nothing hidden (`threshold_nulls` of `sim.study`, not those that the false
+alarms are counted on) two reached even odds and none e against one.
 """
 LEAST_EXTRA_ODDS = 7.0
 """Log odds that a further cause needs against the set without it."""

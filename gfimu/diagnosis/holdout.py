@@ -191,7 +191,7 @@ def _motion_errors(
     believed = segment.predict(nominal)[:, :-1]
     correction = segment.predict(effects)[:, :-1] - believed
     measured = np.where(run.valid, run.readings, believed + correction)
-    truth = segment.spin.at(run.t)
+    truth = segment.motion(effects).at(run.t)
     results = []
     for readings in (measured, measured - correction):
         alpha = (readings - believed) @ pseudo_inverse.T

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
 from gfimu.diagnosis.drive_jacobian import DriveJacobian
+from gfimu.diagnosis.model import SpinState
 
 __all__ = ["DriveElimination", "Linearisation"]
 
@@ -74,9 +75,12 @@ class Linearisation:
         The same in the cosines of slow noise.
     drive : DriveElimination
         The drive's step and the likelihood without it.
+    state : SpinState
+        The table's motion at the samples, each (n,).
     """
 
     residual: NDArray[np.float64]
     jacobian: DriveJacobian
     slow: NDArray[np.float64]
     drive: DriveElimination
+    state: SpinState

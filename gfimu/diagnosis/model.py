@@ -186,6 +186,10 @@ class WorldModel(Protocol):
         """Return the time constant of the sensing chain's first-order lag, s; zero where it has none."""
         ...
 
+    def reference_gain(self, effects: Sequence[Effect] = ()) -> float:
+        """Return what the reference reads per unit of motion once effects are added, relative to without them."""
+        ...
+
     def expected_noise(self, sample_rate: float) -> ExpectedNoise:
         """Return the noise it expects at a sample rate."""
         ...

@@ -29,7 +29,7 @@ __all__ = [
 TEMPERATURE = 1.3
 """Softening of log posteriors, as the linear-Gaussian model is never quite true."""
 _MOST_CERTAIN = 0.999
-_AMBIGUOUS_ODDS = 3.0
+_AMBIGUOUS_ODDS = 2.0
 _MIMIC_ENERGY = 6.0
 
 

@@ -119,7 +119,8 @@ def changing_noise(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequen
         mask = segment.weight_mask[:, :-1]
         use = mask[1:-1] & mask[:-2] & mask[2:]  # a second difference needs three samples
         power, count = np.where(use, left**2, 0.0).sum(axis=1), use.sum(axis=1)
-        state = segment.spin.at(segment.run.t[1:-1])
+        effects = [*known, *effects_of_run(fit.causes, segment.model.array, segment.index)]
+        state = segment.motion(effects).at(segment.run.t[1:-1])
         for name, value in (
             ("the rate", np.abs(state.rate)),
             ("the angular acceleration", np.abs(state.acceleration)),

@@ -6,6 +6,10 @@ weight W and the roughness prior R, the drive is eliminated by
     H = JᵀWJ + R = LLᵀ,  X = L⁻¹JᵀWA,  x = L⁻¹(JᵀWr − Rd),  G = AᵀWA − XᵀX,  b = AᵀWr − Xᵀx,
 
 so that everything after it is small algebra on G and b, whatever the length of the run.
+
+The drive is held in units of the reference: where effects change the reference's gain, the motion is the drive over
+that gain. Held in true units, a gain that shrinks the drive would be paid for it by the roughness prior, once per
+coefficient.
 """
 
 from __future__ import annotations
@@ -44,6 +48,7 @@ _KNOWN_ANGLE_STD = 5e-3
 _LEAST_FACTOR = 0.05
 _FACTOR_STEPS = 4
 _REST_FACTOR = 1.3
+_LEAST_GAIN = 0.05
 _STATE_STEPS = (1e-5, 1e-4, 1e-3)
 
 
@@ -226,7 +231,7 @@ class Segment:
     def predict(self, effects: Sequence[Effect], spin: Spin | None = None) -> NDArray[np.float64]:
         """Predict channels and reference, shape (n, c + 1)."""
         channels, reference = self.model.predict(
-            self.spin if spin is None else spin,
+            self.motion(effects, spin),
             self.run.t,
             effects=effects,
             temperature=self.run.temperature,
@@ -234,6 +239,12 @@ class Segment:
             start=self.start,
         )
         return np.column_stack([channels, reference])
+
+    def motion(self, effects: Sequence[Effect], spin: Spin | None = None) -> Spin:
+        """Return the table's motion for a drive (the present one) under effects."""
+        drive = self.spin if spin is None else spin
+        gain = self.model.reference_gain(effects)
+        return drive if gain == 1.0 else _Scaled(drive, np.copysign(max(abs(gain), _LEAST_GAIN), gain))
 
     def reference_prediction(self, effects: Sequence[Effect]) -> NDArray[np.float64]:
         """Predict channels and reference, shape (n, c + 1), with the drive that the reference alone gives."""
@@ -320,7 +331,7 @@ class Segment:
         factor = np.linalg.cholesky(lhs)
         forward = solve_triangular(factor, rhs, lower=True, check_finite=False)
         drive = DriveElimination(factor, forward, objective - float(forward @ forward), self.spline.size)
-        return Linearisation(residual, jacobian, slow, drive)
+        return Linearisation(residual, jacobian, slow, drive, self.motion(effects).at(self.run.t))
 
     def _jacobian(self, effects: Sequence[Effect], base: NDArray[np.float64]) -> DriveJacobian:
         """Differentiate the prediction ``base`` with respect to the drive's state and chain with the spline."""
@@ -393,6 +404,17 @@ class Segment:
         left = linear.residual - linear.jacobian.forward(linear.drive.alone()[0]) - self.residue_readings(linear)
         slow = self.cosines.T @ left
         return (left - self.cosines @ (self.share * slow)) * self.inverse_variance
+
+
+class _Scaled:
+    """A spin over the gain of the reference that it was read by."""
+
+    def __init__(self, spin: Spin, gain: float) -> None:
+        self._spin, self._gain = spin, gain
+
+    def at(self, t: ArrayLike) -> SpinState:
+        state = self._spin.at(t)
+        return SplineState(state.angle / self._gain, state.rate / self._gain, state.acceleration / self._gain)
 
 
 class _Moved:

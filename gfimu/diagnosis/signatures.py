@@ -265,7 +265,7 @@ def _scan(
     power = np.zeros(len(_ORDERS))
     for segment, line in zip(segments, linear, strict=True):
         left = segment.whitened_residual(line)
-        state = segment.spin.at(segment.run.t)
+        state = line.state
         if name == "cogging":
             per_acceleration = _acceleration_pattern(segment)
             signal = left[:, :-1] @ per_acceleration
@@ -308,7 +308,7 @@ def _scan_resonances(
         pattern = _acceleration_pattern(segment)
         weight = float(np.sum(pattern**2 * segment.inverse_variance[:-1]))
         signal = segment.whitened_residual(line)[:, :-1] @ pattern
-        push = segment.spin.at(segment.run.t).acceleration
+        push = line.state.acceleration
         for place, (frequency, damping) in enumerate(modes):
             ring = _ring(push, frequency, damping, period)
             power[place] += float(ring @ signal)

@@ -48,6 +48,24 @@ def _causes(segment, names, values, array):
     return causes
 
 
+@pytest.mark.parametrize("gain", [0.5, 2.0])
+def test_a_gain_of_the_reference_is_not_paid_for_by_the_prior_of_the_drive(twin, gain):
+    # The same motion read by a tachometer of another gain: the misfit has to be the same, roughness included.
+    objectives = []
+    for effects in ([], [make_effect("tacho_scale", {"ratio": gain - 1.0})]):
+        segment = _segment(twin, effects)
+        for _ in range(2):
+            segment.coefficients = refine([segment], (), [effects], iterations=8).drives[0]
+            segment.learn_roughness()
+        fit = refine([segment], (), [effects], iterations=8)
+        objectives.append(fit.objective)
+        segment.coefficients = fit.drives[0]
+        motion = segment.motion(effects).at(segment.run.t)
+        assert_allclose(motion.rate, segment.spin.at(segment.run.t).rate / (gain if effects else 1.0))
+    # The roughness alone is some 400, one per coefficient.
+    assert objectives[0] == pytest.approx(objectives[1], abs=60.0)
+
+
 @pytest.mark.parametrize("names", list(PAIRS), ids="+".join)
 def test_columns_are_central_differences_of_effects_in_their_order(twin, names):
     # Sensing effects do not commute. Varied at the end of the list instead of in its place, an effect's column holds
