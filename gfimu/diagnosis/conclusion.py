@@ -13,18 +13,12 @@ from gfimu.diagnosis.causes import Cause, effects_of_run
 from gfimu.diagnosis.engine import Explanation
 from gfimu.diagnosis.loose_calibration import LooseCalibration
 from gfimu.diagnosis.model import Effect, WorldModel
-from gfimu.diagnosis.naming import (
-    cause_parameters,
-    channel_share,
-    conflicting,
-    describe,
-    mimics,
-    probabilities,
-    rival_list,
-)
+from gfimu.diagnosis.named_causes import contested, fault_causes, name_cause
+from gfimu.diagnosis.naming import cause_parameters, channel_share, conflicting, probabilities, rival_list
 from gfimu.diagnosis.prepared_runs import PreparedRuns
 from gfimu.diagnosis.refinement import Fit
 from gfimu.diagnosis.residual_tests import LeftOver
+from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.stochastic import Walk, white_factor
 from gfimu.diagnosis.verdict import Diagnosis, Gain, NamedCause, Residual, RunView, Unexplained
 from gfimu.diagnosis.wording import verdict_sentences
@@ -48,7 +42,10 @@ def conclude(
     """Put everything together."""
     array = model.array
     fit = explanation.fit
-    found = [*_integrity_causes(prepared), *_stochastic_causes(explanation, walk)]
+    found = [
+        *fault_causes((effect for effects in prepared.effects for effect in effects), prepared.why),
+        *_stochastic_causes(explanation, walk),
+    ]
     likely = probabilities(explanation)
     rivals = conflicting(explanation)
     named = _named(explanation, fit, likely, array)
@@ -67,14 +64,14 @@ def conclude(
     elif rivals:
         verdict = "ambiguous"
         others = [cause for rival in rivals for cause in _named(explanation, rival, likely, array)]
-        causes = _mutual([*named, *(other for other in others if other.effect not in fit.names)], fit, rivals)
-        causes = (*found, *causes)
+        every = [*named, *(other for other in others if other.effect not in fit.names)]
+        causes = (*found, *contested(every, [fit, *rivals], model.families()))
     elif named or found:
         verdict, causes = "explained", (*found, *named)
     else:
         verdict, causes = "nothing_found", ()
     unexplained = Unexplained(significant, left.signature if significant else "", left.log_odds, left.surrogate)
-    residual = _residual(runs, explanation)
+    residual = Residual.of_views(runs, array.channels, _noise_floor(runs, explanation.segments[0]))
     levels = explanation.segments[0].levels
     expected = model.expected_noise(1.0 / prepared.runs[0].sample_period)
     noise = {
@@ -93,30 +90,15 @@ def _named(explanation: Explanation, fit: Fit, likely: dict[str, float], array: 
     """Return the causes of a fit as the verdict names them, the largest contribution first."""
     segment = explanation.segments[0]
     known = explanation.fixed[0]
+    runs = len({one.index for one in explanation.segments})
     whole = segment.predict([*known, *effects_of_run(fit.causes, array, segment.index)])
     entries = []
     for cause in fit.causes:
         others = [other for other in fit.causes if other.name != cause.name]
         change = whole - segment.predict([*known, *effects_of_run(others, array, segment.index)])
         share = channel_share(change[:, :-1] * segment.weight_mask[:, :-1], array.channels)
-        parameters, std = cause_parameters(cause, array)
-        same = mimics(explanation, cause) if fit is explanation.fit else []
-        odds = (
-            float(fit.log_posterior - explanation.without[cause.name].log_posterior)
-            if cause.name in explanation.without
-            else 0.0
-        )
-        entry = NamedCause(
-            cause.name,
-            parameters,
-            std,
-            likely.get(cause.name, 0.0),
-            cause.pattern,
-            tuple(same),
-            str(cause.family.separated_by) if same else "",
-            describe(cause, array, share) + _other_runs(cause, array, len({s.index for s in explanation.segments})),
-            odds,
-        )
+        entry = name_cause(explanation, fit, cause, likely, array, share)
+        entry = replace(entry, why=entry.why + _other_runs(cause, array, runs))
         entries.append((float(sum(value**2 for value in share.values())), entry))
     return [entry for _, entry in sorted(entries, key=lambda pair: -pair[0])]
 
@@ -131,33 +113,6 @@ def _other_runs(cause: Cause, array: AccelerometerArray, runs: int) -> str:
         numbers = ", ".join(f"{key} = {value:.3g}" for key, value in values.items() if isinstance(value, float))
         parts.append(f"run {run + 1}: {numbers}")
     return f"; the values are those of the first run ({'; '.join(parts)})"
-
-
-def _mutual(named: Sequence[NamedCause], fit: Fit, rivals: Sequence[Fit]) -> tuple[NamedCause, ...]:
-    """Let each cause that may be another list the others."""
-    shared = frozenset.intersection(fit.names, *(rival.names for rival in rivals))
-    contested = list(dict.fromkeys(cause.effect for cause in named if cause.effect not in shared))
-    out = []
-    for cause in named:
-        if cause.effect in shared:
-            out.append(cause)
-            continue
-        others = tuple(dict.fromkeys([*(n for n in contested if n != cause.effect), *cause.not_distinguishable_from]))
-        text = cause.would_be_separated_by or "several speeds in both directions, and the cube remounted on its side"
-        out.append(replace(cause, not_distinguishable_from=others, would_be_separated_by=text))
-    return tuple(out)
-
-
-def _integrity_causes(prepared: PreparedRuns) -> list[NamedCause]:
-    """Return the faults seen in the samples, each once."""
-    causes: dict[str, NamedCause] = {}
-    for effects in prepared.effects:
-        for effect in effects:
-            if effect.name not in causes:
-                causes[effect.name] = NamedCause(
-                    str(effect.name), dict(effect.parameters), {}, 0.999, why=prepared.why.get(effect.name, "")
-                )
-    return list(causes.values())
 
 
 def _stochastic_causes(explanation: Explanation, walk: Walk | None) -> list[NamedCause]:
@@ -229,20 +184,9 @@ def _view(prepared: PreparedRuns, number: int, explanation: Explanation, found: 
     )
 
 
-def _residual(runs: Sequence[RunView], explanation: Explanation) -> Residual:
-    """Measure the residual before and after over valid samples."""
-    channels = explanation.segments[0].model.array.channels
-    use = np.concatenate([run.valid for run in runs])
-    measured = np.concatenate([run.measured for run in runs])
-    before = np.where(use, measured - np.concatenate([run.before for run in runs]), 0.0)
-    after = np.where(use, measured - np.concatenate([run.after for run in runs]), 0.0)
-    count = np.maximum(use.sum(axis=0), 1)
-    levels = explanation.segments[0].levels
-    floor = levels.white[:-1] ** 2 + 0.6 * levels.flicker[:-1] ** 2 + explanation.segments[0].rounding ** 2 / 12.0
-    return Residual(
-        float(np.sqrt(np.sum(before**2) / count.sum())),
-        float(np.sqrt(np.sum(after**2) / count.sum())),
-        float(np.sqrt(np.sum(floor * count) / count.sum())),
-        dict(zip(channels, map(float, np.sqrt(np.sum(before**2, axis=0) / count)), strict=True)),
-        dict(zip(channels, map(float, np.sqrt(np.sum(after**2, axis=0) / count)), strict=True)),
-    )
+def _noise_floor(runs: Sequence[RunView], segment: Segment) -> float:
+    """Return the rms of the noise of all channels: white, slow and rounding."""
+    levels = segment.levels
+    floor = levels.white[:-1] ** 2 + 0.6 * levels.flicker[:-1] ** 2 + segment.rounding**2 / 12.0
+    count = np.maximum(np.sum([run.valid.sum(axis=0) for run in runs], axis=0), 1)
+    return float(np.sqrt(np.sum(floor * count) / count.sum()))

@@ -225,27 +225,31 @@ def _wiring(
     prediction = prediction.copy()
     chip_of = model.array.chip_of_channel
     for _ in range(4):
-        misfit = _misfits(run, prediction, white)
-        own = np.diag(misfit)
+        misfit, inverted = _misfits(run, prediction, white), _misfits(run, -prediction, white)
+        own, flipped = np.diag(misfit), np.diag(inverted)
         options: list[tuple[float, str, dict[str, object], str, NDArray[np.float64]]] = []
         for one, two in combinations(range(len(names)), 2):
             before = own[one] + own[two]
             after = misfit[one, two] + misfit[two, one]
+            # Exchanged channels may be inverted as well: neither shows without the other, so both are tried at once
+            # where inversion alone does not do; the inversion itself is found next.
+            signed = _signed(misfit, inverted, (one, two), (two, one))
+            if _clears(signed, _signed(misfit, inverted, (one, one), (two, two))):
+                after = signed
             if before > 2 * _SIGNIFICANT_RMS**2 and after < (1 - _REMOVED) * before:
                 order = np.arange(len(names))
                 order[[one, two]] = order[[two, one]]
                 options.append(
                     (
-                        before - after,
+                        float(before - after),
                         "axis_swap",
                         {"channels": [names[one], names[two]]},
                         f"{names[one]} and {names[two]} read what the other should",
                         prediction[:, order],
                     )
                 )
-        flipped = np.diag(_misfits(run, -prediction, white))
         for one in range(len(names)):
-            if own[one] > _SIGNIFICANT_RMS**2 and flipped[one] < (1 - _REMOVED) * own[one]:
+            if _clears(flipped[one], own[one]):
                 sign = np.ones(len(names))
                 sign[one] = -1
                 options.append(
@@ -279,6 +283,16 @@ def _wiring(
         found.append((name, parameters, sentence))
         known = known | {name} if name != "sign_flip" else known
     return _merged_flips(found)
+
+
+def _signed(misfit: NDArray[np.float64], inverted: NDArray[np.float64], *places: tuple[int, int]) -> float:
+    """Return the summed misfit of channels to predictions, each inverted where that clears it."""
+    return sum(float(inverted[at] if _clears(inverted[at], misfit[at]) else misfit[at]) for at in places)
+
+
+def _clears(after: float, before: float) -> bool:
+    """Tell whether a mean squared misfit is significant, and gone after."""
+    return before > _SIGNIFICANT_RMS**2 and after < (1 - _REMOVED) * before
 
 
 def _misfits(run: Run, prediction: NDArray[np.float64], white: NDArray[np.float64]) -> NDArray[np.float64]:

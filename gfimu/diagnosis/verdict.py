@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -105,6 +105,22 @@ class Residual:
     noise_floor: float
     before_by_channel: Mapping[str, float]
     after_by_channel: Mapping[str, float]
+
+    @classmethod
+    def of_views(cls, views: Sequence[RunView], channels: Sequence[str], noise_floor: float) -> Residual:
+        """Measure the residual over the valid samples of all runs."""
+        count = np.maximum(np.sum([view.valid.sum(axis=0) for view in views], axis=0), 1)
+        before, after = (
+            np.sum([np.sum(np.where(v.valid, v.measured - getattr(v, name), 0.0) ** 2, axis=0) for v in views], axis=0)
+            for name in ("before", "after")
+        )
+        return cls(
+            float(np.sqrt(before.sum() / count.sum())),
+            float(np.sqrt(after.sum() / count.sum())),
+            noise_floor,
+            dict(zip(channels, map(float, np.sqrt(before / count)), strict=True)),
+            dict(zip(channels, map(float, np.sqrt(after / count)), strict=True)),
+        )
 
 
 @dataclass(frozen=True)

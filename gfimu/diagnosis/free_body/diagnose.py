@@ -28,7 +28,9 @@ from gfimu.diagnosis.free_body.run import BodyRun, prepare_body_run
 from gfimu.diagnosis.free_body.segment import BodySegment
 from gfimu.diagnosis.integrity import check_integrity
 from gfimu.diagnosis.model import Effect, WorldModel
-from gfimu.diagnosis.naming import cause_parameters, conflicting, describe, mimics, probabilities, rival_list
+from gfimu.diagnosis.named_causes import contested, fault_causes, name_cause
+from gfimu.diagnosis.naming import channel_share, conflicting, probabilities, rival_list
+from gfimu.diagnosis.refinement import Fit
 from gfimu.diagnosis.residual_tests import LeftOver
 from gfimu.diagnosis.verdict import Diagnosis, Gain, NamedCause, Residual, RunView, Unexplained
 from gfimu.diagnosis.wording import verdict_sentences
@@ -172,12 +174,9 @@ def _verdict(
     thresholds = (max(LEFT_OVER_ODDS, _INEXACTNESS * removed), LEFT_OVER_ODDS, LEFT_OVER_ODDS)
     told = [one for one, threshold in zip(left, thresholds, strict=True) if one.log_odds > threshold]
     dominant = any(2 * one.log_odds > _DOMINANT * removed for one in told if one is not left[-1])
-    found = [
-        NamedCause(str(e.name), dict(e.parameters), {}, 0.999, why=prepared.why.get(e.name, ""))
-        for e in {effect.name: effect for effects in prepared.faults for effect in effects}.values()
-    ]
+    found = fault_causes((effect for effects in prepared.faults for effect in effects), prepared.why)
     likely = probabilities(explanation)
-    named = [_named(explanation, cause, likely, segments[0]) for cause in fit.causes]
+    named = [_named(explanation, fit, cause, likely, segments[0]) for cause in fit.causes]
     rivals = conflicting(explanation)
     families = model.families()
     extension = [] if dominant else [cause.effect(model.array) for cause in fit.causes]
@@ -187,7 +186,12 @@ def _verdict(
         verdict, causes = "unknown", tuple(found)
     elif rivals:
         verdict = "ambiguous"
-        causes = (*found, *_contested(explanation, named, likely, segments[0]))
+        others = {cause.name: (rival, cause) for rival in rivals for cause in rival.causes}
+        every = [
+            *named,
+            *(_named(explanation, *at, likely, segments[0]) for name, at in others.items() if name not in fit.names),
+        ]
+        causes = (*found, *contested(every, [fit, *rivals], families))
     else:
         verdict = "explained" if causes else "nothing_found"
     unexplained = Unexplained(
@@ -197,7 +201,7 @@ def _verdict(
         {key: value for one in told for key, value in one.surrogate.items()},
     )
     views = tuple(_view(segment, known, fit.causes) for segment, known in zip(segments, prepared.fixed, strict=True))
-    residual = _residual(views, segments)
+    residual = Residual.of_views(views, model.array.channels, segments[0].noise_floor)
     words = verdict_sentences(verdict, causes, residual, gain, unexplained, withdrawn)
     first = segments[0]
     expected = model.expected_noise(1.0 / first.run.sample_period)
@@ -212,48 +216,13 @@ def _verdict(
     return Diagnosis(verdict, causes, residual, gain, unexplained, rival_list(explanation), twin, views, words, levels)
 
 
-def _named(explanation: Explanation, cause: Cause, likely: dict[str, float], segment: BodySegment) -> NamedCause:
+def _named(
+    explanation: Explanation, fit: Fit, cause: Cause, likely: dict[str, float], segment: BodySegment
+) -> NamedCause:
     array = segment.model.array
-    parameters, std = cause_parameters(cause, array)
-    same = mimics(explanation, cause) if cause in explanation.fit.causes else []
-    without = explanation.without.get(cause.name)
     change = segment.predict([cause.effect(array, segment.index)]) - segment.predict([])
-    size = np.sqrt(np.mean((change - (change @ segment.projection.to_force.T) @ array.axes.T) ** 2, axis=0))
-    share = dict(zip(array.channels, map(float, size), strict=True))
-    return NamedCause(
-        cause.name,
-        parameters,
-        std,
-        likely.get(cause.name, 0.0),
-        cause.pattern,
-        tuple(same),
-        str(cause.family.separated_by) if same else "",
-        describe(cause, array, share),
-        0.0 if without is None else float(explanation.fit.log_posterior - without.log_posterior),
-    )
-
-
-def _contested(
-    explanation: Explanation,
-    named: Sequence[NamedCause],
-    likely: dict[str, float],
-    segment: BodySegment,
-) -> list[NamedCause]:
-    """Return the causes with those that may be in their place, each telling the others."""
-    fits = [explanation.fit, *conflicting(explanation)]
-    shared = frozenset.intersection(*(fit.names for fit in fits))
-    others = {cause.name: cause for fit in fits[1:] for cause in fit.causes if cause.name not in explanation.fit.names}
-    every = [*named, *(_named(explanation, cause, likely, segment) for cause in others.values())]
-    contested = [cause.effect for cause in every if cause.effect not in shared]
-    out = []
-    for cause in every:
-        if cause.effect in shared:
-            out.append(cause)
-            continue
-        alike = tuple(dict.fromkeys([*(n for n in contested if n != cause.effect), *cause.not_distinguishable_from]))
-        text = cause.would_be_separated_by or str(segment.model.families()[cause.effect].separated_by)
-        out.append(replace(cause, not_distinguishable_from=alike, would_be_separated_by=text))
-    return out
+    seen = change - (change @ segment.projection.to_force.T) @ array.axes.T
+    return name_cause(explanation, fit, cause, likely, array, channel_share(seen, array.channels))
 
 
 def _view(segment: BodySegment, known: Sequence[Effect], causes: Sequence[Cause]) -> RunView:
@@ -295,21 +264,3 @@ def _attitude(segment: BodySegment, rate: NDArray[np.float64]) -> NDArray[np.flo
     here = turned[int(rest[0]) if len(rest) else 0]
     level, _ = Rotation.align_vectors([[0.0, 0.0, 1.0]], [here.apply(up)])
     return from_rotation(level * turned)
-
-
-def _residual(views: Sequence[RunView], segments: Sequence[BodySegment]) -> Residual:
-    """Measure the residual before and after over the samples used."""
-    channels = segments[0].model.array.channels
-    use = np.concatenate([view.valid for view in views])
-    count = np.maximum(use.sum(axis=0), 1)
-    power = []
-    for name in ("before", "after"):
-        left = np.concatenate([view.measured - getattr(view, name) for view in views])
-        power.append(np.sum(np.where(use, left, 0.0) ** 2, axis=0))
-    return Residual(
-        float(np.sqrt(power[0].sum() / count.sum())),
-        float(np.sqrt(power[1].sum() / count.sum())),
-        segments[0].noise_floor,
-        dict(zip(channels, map(float, np.sqrt(power[0] / count)), strict=True)),
-        dict(zip(channels, map(float, np.sqrt(power[1] / count)), strict=True)),
-    )

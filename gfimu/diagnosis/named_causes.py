@@ -1,0 +1,86 @@
+"""Causes as a verdict names them: with parameters, probability, what could be in their place, and a sentence why."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+
+from gfimu.array import AccelerometerArray
+from gfimu.diagnosis.causes import Cause
+from gfimu.diagnosis.engine import Explanation
+from gfimu.diagnosis.model import Effect, EffectFamily
+from gfimu.diagnosis.naming import cause_parameters, describe, mimics
+from gfimu.diagnosis.refinement import Fit
+from gfimu.diagnosis.verdict import NamedCause
+
+__all__ = ["contested", "fault_causes", "name_cause"]
+
+_CERTAIN = 0.999
+
+
+def fault_causes(effects: Iterable[Effect], why: Mapping[str, str]) -> list[NamedCause]:
+    """Return the faults seen in the samples of all runs, each kind once; ``why`` has a sentence by name."""
+    kinds: dict[str, Effect] = {}
+    for effect in effects:
+        kinds.setdefault(str(effect.name), effect)
+    return [
+        NamedCause(name, dict(effect.parameters), {}, _CERTAIN, why=why.get(name, "")) for name, effect in kinds.items()
+    ]
+
+
+def name_cause(
+    explanation: Explanation,
+    fit: Fit,
+    cause: Cause,
+    likely: Mapping[str, float],
+    array: AccelerometerArray,
+    share: Mapping[str, float],
+) -> NamedCause:
+    """Return a fitted cause as the verdict names it.
+
+    Parameters
+    ----------
+    explanation : Explanation
+        What the search ended with.
+    fit : Fit
+        The set that the cause belongs to: the best one or a rival.
+    cause : Cause
+        The cause.
+    likely : mapping
+        Probability of each effect.
+    array : AccelerometerArray
+        The array.
+    share : mapping
+        What the cause changes in each channel, rms, m/s².
+    """
+    parameters, std = cause_parameters(cause, array)
+    same = mimics(explanation, cause) if fit is explanation.fit else []
+    without = explanation.without.get(cause.name)
+    return NamedCause(
+        cause.name,
+        parameters,
+        std,
+        likely.get(cause.name, 0.0),
+        cause.pattern,
+        tuple(same),
+        str(cause.family.separated_by) if same else "",
+        describe(cause, array, share),
+        0.0 if without is None else float(fit.log_posterior - without.log_posterior),
+    )
+
+
+def contested(
+    named: Sequence[NamedCause], fits: Sequence[Fit], families: Mapping[str, EffectFamily]
+) -> tuple[NamedCause, ...]:
+    """Let each cause that may be another list the others; ``fits`` are the sets that the data can't tell apart."""
+    shared = frozenset.intersection(*(fit.names for fit in fits))
+    open_names = list(dict.fromkeys(cause.effect for cause in named if cause.effect not in shared))
+    out = []
+    for cause in named:
+        if cause.effect in shared:
+            out.append(cause)
+            continue
+        others = [*(name for name in open_names if name != cause.effect), *cause.not_distinguishable_from]
+        text = cause.would_be_separated_by or str(families[cause.effect].separated_by)
+        out.append(replace(cause, not_distinguishable_from=tuple(dict.fromkeys(others)), would_be_separated_by=text))
+    return tuple(out)
