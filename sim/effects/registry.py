@@ -92,8 +92,24 @@ def make_effect(
     return effect
 
 
+_CHAIN = (
+    *("sensor_position", "misalignment", "mount_tilt", "eccentricity", "centrifugal_flex", "table_tilt", "axis_wobble"),
+    *("cross_axis", "scale_factor", "gain_drift", "quadratic", "vibration_rectification", "hysteresis"),
+    *("bias", "bias_temperature", "warm_up", "interference_tone", "sensor_lag"),
+)
+
+
+def _place_in_chain(effect: Effect) -> tuple[int, int]:
+    within = _CHAIN.index(effect.name) if effect.name in _CHAIN else 0
+    return _PLACES.index(effect.place), within
+
+
 def apply_effects(world: World, effects: Sequence[Effect]) -> World:
-    """Apply effects in the order of their place in the chain."""
-    for effect in sorted(effects, key=lambda effect: _PLACES.index(effect.place)):
+    """Apply effects in the order of the chain, whatever the order they are given in.
+
+    From the chip in the cube to the table in the world; from the proof mass (axes, gain, curvature) to the offset of
+    the circuit and its filter. Those that neither place nor chain tell apart keep their order.
+    """
+    for effect in sorted(effects, key=_place_in_chain):
         world = effect.apply(world)
     return world

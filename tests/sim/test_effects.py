@@ -386,8 +386,19 @@ def test_noise_and_random_walk_reach_the_world(twin):
     assert (world.noise_factor, world.bias_walk) == (3.0, 0.02)
 
 
-def test_effects_are_applied_by_their_place_whatever_the_order(cube12, twin):
-    effects = [make_effect(name, CONTRACT[name], cube12) for name in ("sign_flip", "bias", "table_tilt", "cogging")]
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("sign_flip", "bias", "table_tilt", "cogging"),
+        ("scale_factor", "cross_axis"),
+        ("sensor_lag", "vibration_rectification"),
+        ("mount_tilt", "misalignment"),
+        ("eccentricity", "mount_tilt", "sensor_position"),
+    ],
+    ids="+".join,
+)
+def test_effects_are_applied_by_their_place_whatever_the_order(cube12, twin, names):
+    effects = [make_effect(name, CONTRACT[name], cube12) for name in names]
     t = np.arange(0.0, 2.0, 0.01)
     forth, back = (twin.predict(Swing(), t, effects=order)[0] for order in (effects, effects[::-1]))
     np.testing.assert_array_equal(forth, back)
