@@ -6,7 +6,7 @@ import importlib
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -39,15 +39,17 @@ _WITHOUT_NOISE_FREE_FORM = frozenset(
 class HiddenWorld:
     """A recording, the twin to diagnose it with, and what is hidden: contract names and parameters.
 
-    ``reached`` is the d′ of the least hidden effect that has a noise-free form, infinite where none has. ``apart`` is
-    the d′ of an effect taken out of the library that the best other effect of the library leaves, the drive unknown.
+    ``reached`` is the d′ of the least hidden effect that has a noise-free form, infinite where none has, the drive
+    known. Of a single effect with sizes, ``drive_unknown`` is its d′ with the drive unknown and ``left_by`` what of
+    that each other effect of the library leaves at its best.
     """
 
     recording: Recording
     twin: Twin
     truth: tuple[tuple[str, Mapping[str, Any]], ...]
     reached: float
-    apart: float | None = None
+    drive_unknown: float | None = None
+    left_by: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -104,11 +106,17 @@ def draw_world(case: Case, source: str = "") -> HiddenWorld:
         if effect.name not in _WITHOUT_NOISE_FREE_FORM
     ]
     truth = tuple((effect.name, effect.parameters) for effect in hidden)
-    apart = _apart(twin, hidden[0], motion, setting) if case.without else None
-    return HiddenWorld(recording, twin, truth, min(sizes, default=np.inf), apart)
+    world = HiddenWorld(recording, twin, truth, min(sizes, default=np.inf))
+    if len(hidden) == 1 and sizes and hidden[0].sizes(twin.array):
+        drive_unknown, left_by = _drive_unknown(twin, hidden[0], motion, setting)
+        world = replace(world, drive_unknown=drive_unknown, left_by=left_by)
+    return world
 
 
-def _apart(twin: Twin, hidden: Effect, motion: SpinMotion, setting: Measurement) -> float:
+def _drive_unknown(
+    twin: Twin, hidden: Effect, motion: SpinMotion, setting: Measurement
+) -> tuple[float, dict[str, float]]:
+    """Return d′ of an effect with the drive unknown, and what of it is left by each other effect of the library."""
     rivals = [
         name
         for name, family in twin.families().items()
@@ -122,8 +130,8 @@ def _apart(twin: Twin, hidden: Effect, motion: SpinMotion, setting: Measurement)
         bias_instability=setting.bias_instability,
     )
     whole = Twin(array=twin.array, array_name=twin.array_name, sample_rate=twin.sample_rate)
-    energy = predict_distinguishability(whole, [hidden, *rivals], [run]).energy[0, 1:]
-    return float(np.sqrt(energy.min()))
+    told = predict_distinguishability(whole, [hidden, *rivals], [run])
+    return float(told.detectability[0]), dict(zip(rivals, np.sqrt(told.energy[0, 1:]).tolist(), strict=True))
 
 
 def _reaches(twin: Twin, motion: SpinMotion, setting: Measurement, level: float) -> bool:
@@ -179,7 +187,7 @@ def run_case(case: Case, source: str = "") -> dict[str, Any]:
     else:
         found = outcome_of(diagnosis, world.truth)
     times = {"wall_s": time.perf_counter() - wall, "processor_s": time.process_time() - processor}
-    reached = {"reached": world.reached, "apart": world.apart}
+    reached = {"reached": world.reached, "drive_unknown": world.drive_unknown, "left_by": dict(world.left_by)}
     return {"key": case.key, "source": source or "sim.campaign", **case.to_dict(), **reached, **found, **times}
 
 

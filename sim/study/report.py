@@ -24,7 +24,18 @@ INSEPARABLE = (
     frozenset({"mount_tilt", "misalignment"}),
     frozenset({"eccentricity", "sensor_position"}),
 )
-"""Effects that one upright run can't tell apart on channels that see constant gravity, or that contain each other."""
+"""Effects that one upright run can't tell apart on channels that see constant gravity, or that contain each other.
+
+For sets of which what each leaves of the other was not computed.
+"""
+
+LEAST_SEPARABLE = 3.0
+"""Size d′ below which what a rival leaves of an effect, the drive unknown, does not tell them apart.
+
+The log odds of an ideal observer are 4.5 ± 3 there.
+"""
+
+_DRIVE_UNKNOWN = (0.0, 5.0, 7.0, 10.0, 15.0, 60.0, np.inf)
 
 LEAST_APART = 15.0
 """Size d′ that the best other effect must leave of one taken out of the library for it to have a signature of its own;
@@ -51,7 +62,7 @@ def score(outcome: Outcome) -> dict[str, bool]:
     verdict = outcome["verdict"]
     explained = verdict == "explained"
     exact = (explained and names == hidden) if hidden else verdict == "nothing_found"
-    same = verdict == "ambiguous" and hidden <= told and any(told <= group for group in INSEPARABLE)
+    same = verdict == "ambiguous" and hidden <= told and _inseparable(outcome, told - hidden)
     return {
         "exact": exact,
         "fair": exact or same,
@@ -63,6 +74,14 @@ def score(outcome: Outcome) -> dict[str, bool]:
         "unknown": verdict == "unknown",
         "error": verdict == "error",
     }
+
+
+def _inseparable(outcome: Outcome, rivals: set[str]) -> bool:
+    """Tell whether the data can't tell any of these rivals from what is hidden."""
+    if any(rivals | set(outcome["effects"]) <= group for group in INSEPARABLE):
+        return True
+    left_by = outcome.get("left_by") or {}
+    return all(left_by.get(rival, np.inf) < LEAST_SEPARABLE for rival in rivals)
 
 
 def visible(outcome: Outcome) -> bool:
@@ -212,7 +231,21 @@ def _misses(outcomes: Sequence[Outcome]) -> str:
         told = "; ".join(f"{name} × {count}" if count > 1 else name for name, count in other.most_common())
         rows.append((f"`{effect}`", len(tally), tally.share("exact"), tally.share("within"), told))
     header = ("hidden", "runs", "right alone %", "right in the set %", "what was said otherwise")
-    return "## One effect hidden: what was said\n\n" + _table(header, rows) if rows else ""
+    return _drive_unknown(single) + "## One effect hidden: what was said\n\n" + _table(header, rows) if rows else ""
+
+
+def _drive_unknown(single: Sequence[Outcome]) -> str:
+    """Tell what was said by the size that is left when the drive has to be found from the same data."""
+    sized = [outcome for outcome in single if outcome.get("drive_unknown") is not None]
+    rows = []
+    for least, most in itertools.pairwise(_DRIVE_UNKNOWN):
+        group = [outcome for outcome in sized if least <= outcome["drive_unknown"] < most]
+        if group:
+            tally = Tally(group)
+            span = f"{least:g} to {most:g}" if np.isfinite(most) else f"above {least:g}"
+            rows.append((span, len(group), *(tally.share(what) for what in ("exact", "fair", "within", "nothing"))))
+    header = ("d′, drive unknown", "runs", "right alone %", "or an inseparable set %", "in any set %", "nothing %")
+    return "## One effect hidden: size with the drive unknown\n\n" + _table(header, rows) if rows else ""
 
 
 def _left_out(outcomes: Sequence[Outcome]) -> str:
@@ -227,7 +260,7 @@ def _left_out(outcomes: Sequence[Outcome]) -> str:
     header = ("hidden, not in the library", "runs", "unknown %", "said")
 
     def taken(least: float, most: float = np.inf) -> list[Outcome]:
-        return [o for o in outside if o["without"] and least <= (o.get("apart") or 0.0) < most]
+        return [o for o in outside if o["without"] and least <= min((o.get("left_by") or {"": 0.0}).values()) < most]
 
     groups = {
         "exotic": [o for o in outside if o["study"] == "exotics"],

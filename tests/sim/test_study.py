@@ -42,6 +42,9 @@ def test_a_name_too_many_is_wrong_and_a_set_is_right_only_where_nothing_parts_it
     assert escape["within"]
     assert not escape["fair"]
     assert score(outcome())["exact"]
+    told = ([("clock_error", 0.8, ("tacho_latency",)), ("tacho_latency", 0.2, ("clock_error",))], "ambiguous")
+    for left, fair in ((2.0, True), (5.0, False)):
+        assert score(outcome(["clock_error"], *told, left_by={"tacho_latency": left}))["fair"] == fair
 
 
 def test_stated_probabilities_are_compared_with_what_was_observed():
@@ -50,6 +53,17 @@ def test_stated_probabilities_are_compared_with_what_was_observed():
     ((stated, observed, count),) = reliability(outcomes)
     assert (stated, observed, count) == (pytest.approx(0.8), pytest.approx(0.75), 4)
     assert "over all 4 causes: 0.050" in summarise(outcomes)
+
+
+def test_singles_are_sorted_by_their_size_with_the_drive_unknown():
+    outcomes = [
+        outcome(["bias"], drive_unknown=4.0),
+        outcome(["bias"], [("bias", 0.9, ())], "explained", drive_unknown=8),
+    ]
+    lines = [
+        line for line in summarise(outcomes).splitlines() if line.startswith(("| 0 to 5 | 1 |", "| 7 to 10 | 1 |"))
+    ]
+    assert [line.split("|")[3].split()[0] for line in lines] == ["0.0", "100.0"]
 
 
 def test_an_interval_holds_its_rate():
@@ -61,11 +75,12 @@ def test_an_interval_holds_its_rate():
 @pytest.mark.parametrize(("name", "least", "most"), [("table_tilt", 50.0, 250.0), ("eccentricity", 0.0, 3.0)])
 def test_an_effect_taken_out_is_as_far_from_the_rest_as_it_is_unlike_it(name, least, most):
     world = draw_world(Case("left_out", 5, (name,), 200.0, duration=20.0, without=name))
-    assert least <= world.apart <= most
+    assert least <= min(world.left_by.values()) <= most
+    assert min(world.left_by.values()) <= world.drive_unknown <= world.reached
     assert name not in world.twin.families()
     line = next(
         row
-        for row in summarise([outcome([name], study="left_out", without=name, apart=world.apart)]).splitlines()
+        for row in summarise([outcome([name], study="left_out", without=name, left_by=world.left_by)]).splitlines()
         if row.startswith("| **taken out")
     )
     assert ("imitated by one other effect" in line) == (most < 15.0)
