@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import gaussian_filter1d, uniform_filter1d
-from scipy.sparse import csr_array, diags_array
+from scipy.sparse import csr_array
 
 from gfimu.diagnosis.model import SpinState
 from gfimu.diagnosis.run import Run
@@ -17,10 +17,6 @@ from gfimu.diagnosis.run import Run
 __all__ = ["ROUGHNESS_FACTOR", "AngleSpline", "SplineState", "roughness_prior", "smooth_rate"]
 
 _DEGREE = 4
-# Coefficients of 1, u, … u⁴ of the five basis functions on a knot interval, uniform knots (de Boor 1978, ch. X).
-_QUARTIC = (
-    np.array([[1, -4, 6, -4, 1], [11, -12, -6, 12, -4], [11, 12, -6, -12, 6], [1, 4, 6, 4, -4], [0, 0, 0, 0, 1]]) / 24.0
-)
 _SMOOTHEST = 5.0
 ROUGHNESS_FACTOR = 6.0
 _REMEMBERED = 8
@@ -36,23 +32,44 @@ class SplineState:
 
 
 class AngleSpline:
-    """Quartic spline of the table angle on uniform knots.
+    """Quartic spline of the table angle.
 
     Parameters
     ----------
-    start, stop : float
-        Time span, s.
-    spacing : float
-        Knot spacing, s.
+    breaks : ndarray, shape (k + 1,)
+        Ends of the k knot intervals, ascending, s.
     """
 
-    def __init__(self, start: float, stop: float, spacing: float) -> None:
-        intervals = max(int(np.ceil((stop - start) / spacing)), 8)
-        self.spacing = (stop - start) / intervals
-        self.start, self.stop = start, stop
-        self.knots = start + self.spacing * np.arange(-_DEGREE, intervals + _DEGREE + 1)
-        self.size = intervals + _DEGREE
+    def __init__(self, breaks: NDArray[np.float64]) -> None:
+        self.breaks = np.asarray(breaks, dtype=float)
+        self.widths = np.diff(self.breaks)
+        self.start, self.stop = float(self.breaks[0]), float(self.breaks[-1])
+        self.spacing = float(self.widths.max())
+        reach = np.arange(1, _DEGREE + 1)
+        before = self.start - self.widths[0] * reach[::-1]
+        self.knots = np.concatenate([before, self.breaks, self.stop + self.widths[-1] * reach])
+        self.size = len(self.widths) + _DEGREE
+        self._pieces = _pieces(self.knots)
+        degrees = np.arange(1.0, _DEGREE + 1)[:, None]
+        self._once = self._pieces[:, 1:] * degrees  # first derivative of each piece
+        self._twice = self._once[:, 1:] * degrees[:-1]
         self._known: dict[bytes, tuple[NDArray[np.intp], NDArray[np.float64]]] = {}
+
+    @classmethod
+    def uniform(cls, start: float, stop: float, spacing: float) -> AngleSpline:
+        """Return a spline on equal intervals of at most ``spacing`` s."""
+        return cls(np.linspace(start, stop, max(int(np.ceil((stop - start) / spacing)), 8) + 1))
+
+    def halved(self, chosen: NDArray[np.bool_]) -> AngleSpline:
+        """Return the spline with the chosen intervals (k,) cut in two."""
+        middle = self.interval_centres()[chosen]
+        return AngleSpline(np.sort(np.concatenate([self.breaks, middle])))
+
+    def within(self, start: float, stop: float) -> AngleSpline:
+        """Return the spline on the same breaks between two times, s."""
+        apart = 0.1 * float(self.widths.min())  # an interval much narrower than its neighbours is ill conditioned
+        inner = self.breaks[(self.breaks > start + apart) & (self.breaks < stop - apart)]
+        return AngleSpline(np.concatenate([[start], inner, [stop]]))
 
     def local(self, t: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
         """Return the first coefficient (n,) that matters at each time, and what angle, rate and acceleration take
@@ -68,19 +85,10 @@ class AngleSpline:
 
     def _local(self, t: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
         inside = np.clip(t, self.start, self.stop)
-        place = (inside - self.start) / self.spacing
-        first = np.clip(place.astype(np.intp), 0, self.size - _DEGREE - 1)
-        powers = np.vander(place - first, _DEGREE + 1, increasing=True)  # (n, 5)
-        degrees = np.arange(1.0, _DEGREE + 1)
-        once = _QUARTIC[:, 1:] * degrees  # derivative of each basis function
-        twice = once[:, 1:] * degrees[:-1]
-        values = np.stack(
-            [
-                powers @ _QUARTIC.T,
-                powers[:, :-1] @ once.T / self.spacing,
-                powers[:, :-2] @ twice.T / self.spacing**2,
-            ]
-        )
+        first = np.clip(np.searchsorted(self.breaks, inside, side="right") - 1, 0, len(self.widths) - 1)
+        powers = np.vander(inside - self.breaks[first], _DEGREE + 1, increasing=True)[:, None]  # (n, 1, 5)
+        parts = (self._pieces, self._once, self._twice)
+        values = np.stack([(powers[..., : part.shape[1]] @ part[first])[:, 0] for part in parts])
         beyond = t - inside
         if beyond.any():
             values[0] += values[1] * beyond[:, None]
@@ -109,15 +117,24 @@ class AngleSpline:
 
     def roughness_rows(self) -> csr_array:
         """Return the matrix from the coefficients to the third derivative of the rate per knot interval, rad/s⁴."""
-        # The fourth derivative of a quartic on uniform knots is the fourth difference of its coefficients.
-        rows = self.size - _DEGREE
-        fourth = [1.0, -4.0, 6.0, -4.0, 1.0]
-        matrix = diags_array(fourth, offsets=list(range(_DEGREE + 1)), shape=(rows, self.size))
-        return csr_array(matrix / self.spacing**_DEGREE)
+        # The fourth derivative of a quartic is constant on each interval.
+        fourth = 24.0 * self._pieces[:, _DEGREE]  # (k, 5)
+        rows = len(fourth)
+        columns = np.arange(rows)[:, None] + np.arange(_DEGREE + 1)
+        ends = np.arange(0, fourth.size + 1, _DEGREE + 1)
+        return csr_array((fourth.ravel(), columns.ravel(), ends), shape=(rows, self.size))
 
     def interval_centres(self) -> NDArray[np.float64]:
         """Return the centre of each knot interval, s."""
-        return np.asarray(self.start + self.spacing * (np.arange(self.size - _DEGREE) + 0.5), dtype=np.float64)
+        return np.asarray(0.5 * (self.breaks[:-1] + self.breaks[1:]), dtype=np.float64)
+
+    def moving_average(self, values: NDArray[np.float64], width: float) -> NDArray[np.float64]:
+        """Return the average of values per interval (k,) over a width of time about each interval's centre, s."""
+        area = np.concatenate([[0.0], np.cumsum(values * self.widths)])
+        centres = self.interval_centres()
+        half = np.maximum(0.5 * width, 0.5 * self.widths)
+        low, high = np.maximum(centres - half, self.start), np.minimum(centres + half, self.stop)
+        return np.asarray((np.interp(high, self.breaks, area) - np.interp(low, self.breaks, area)) / (high - low))
 
     def through(self, t: NDArray[np.float64], state: SpinState) -> NDArray[np.float64]:
         """Return the coefficients that come closest to a known motion at times ``t``."""
@@ -130,6 +147,30 @@ class AngleSpline:
     def spin(self, coefficients: NDArray[np.float64]) -> _SplineSpin:
         """Return the motion with these coefficients."""
         return _SplineSpin(self, coefficients)
+
+
+def _pieces(knots: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the coefficients of 1, s, … s⁴ (s from an interval's start) of its five basis functions, (k, 5, 5).
+
+    The recurrence of Cox and de Boor (de Boor 1978, ch. X) on polynomials instead of values.
+    """
+    start = np.arange(_DEGREE, len(knots) - _DEGREE - 1)  # knot at which each interval starts
+    lower = np.ones((len(start), 1, 1))  # (k, powers, functions)
+    for degree in range(1, _DEGREE + 1):
+        out = np.zeros((len(start), degree + 1, degree + 1))
+        for function in range(degree + 1):
+            knot = start - degree + function
+            if function > 0:  # (t − k_i) / (k_{i+p} − k_i) of the function before
+                span, part = knots[knot + degree] - knots[knot], lower[:, :, function - 1]
+                out[:, :-1, function] += ((knots[start] - knots[knot]) / span)[:, None] * part
+                out[:, 1:, function] += part / span[:, None]
+            if function < degree:  # (k_{i+p+1} − t) / (k_{i+p+1} − k_{i+1}) of the function itself
+                end = knots[knot + degree + 1]
+                span, part = end - knots[knot + 1], lower[:, :, function]
+                out[:, :-1, function] += ((end - knots[start]) / span)[:, None] * part
+                out[:, 1:, function] -= part / span[:, None]
+        lower = out
+    return lower
 
 
 class _SplineSpin:

@@ -15,7 +15,7 @@ from gfimu.diagnosis.drive import smooth_rate
 from gfimu.diagnosis.far_starts import every_mode, from_far
 from gfimu.diagnosis.linearisation import Linearisation
 from gfimu.diagnosis.model import Effect, WorldModel
-from gfimu.diagnosis.nuisances import learn_noise, tune_drives
+from gfimu.diagnosis.nuisances import learn_noise, sharpen_drives, tune_drives
 from gfimu.diagnosis.refinement import Fit, refine
 from gfimu.diagnosis.run import Run
 from gfimu.diagnosis.search import search
@@ -179,6 +179,8 @@ def explain(
     observations = sum(int(segment.weight_mask.sum()) for segment in segments)
     if fitted.objective < _FAIR_FIT * observations:
         # The channels sharpen the drive unless something gross twists it.
+        tune_drives(segments, fitted, fixed)
+        fitted = sharpen_drives(segments, fitted, fixed)
         tune_drives(segments, fitted, fixed)
         best = fitted = refine(segments, start, fixed, drives=fitted.drives, iterations=8)
     tried: dict[frozenset[tuple[str, str]], Fit] = {}

@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 from gfimu.diagnosis.causes import effects_of_run
 from gfimu.diagnosis.coloured_noise import NoiseLevels, estimate_flicker, white_level
 from gfimu.diagnosis.model import Effect
-from gfimu.diagnosis.refinement import Fit
+from gfimu.diagnosis.refinement import Fit, refine
 from gfimu.diagnosis.segment import Segment, over_segments
 
-__all__ = ["learn_noise", "tune_drives"]
+__all__ = ["learn_noise", "sharpen_drives", "tune_drives"]
 
+_ITERATIONS = 6
 _LEAST_VALID = 0.01
 
 
@@ -59,6 +60,20 @@ def learn_noise(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[
             segments[place].set_levels(NoiseLevels(white, flicker, walk))
             segments[place].prepare_weights()
     return change
+
+
+def sharpen_drives(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]]) -> Fit:
+    """Give the drives finer knots where they bend sharply; returns the fit with its drives on them."""
+    before = [segment.coefficients for segment in segments]
+    for segment, drive in zip(segments, fit.drives, strict=True):
+        segment.coefficients = drive
+    changed = over_segments(Segment.sharpen, segments)
+    if not any(changed):
+        for segment, drive in zip(segments, before, strict=True):
+            segment.coefficients = drive
+        return fit
+    drives = tuple(segment.coefficients for segment in segments)
+    return refine(segments, fit.causes, fixed, drives=drives, iterations=_ITERATIONS)
 
 
 def tune_drives(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]]) -> None:

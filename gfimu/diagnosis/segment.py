@@ -23,7 +23,6 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
-from scipy.ndimage import uniform_filter1d
 from scipy.sparse import csr_array, diags_array
 from threadpoolctl import ThreadpoolController
 
@@ -46,6 +45,11 @@ _DEGREE = 4
 _WALK = "bias_random_walk"
 _KNOWN_ANGLE_STD = 5e-3
 _LEAST_FACTOR = 0.05
+_ROUGH_FOR = 0.3
+_CORNER = 0.1
+_BLUR = 0.3
+_MOST_CUTS = 2
+_MOST_INTERVALS = 1.7
 _FACTOR_STEPS = 4
 _REST_FACTOR = 1.3
 _LEAST_GAIN = 0.05
@@ -104,9 +108,7 @@ class Segment:
         spacing = max(KNOT_SPACING, period)
         # Late chips and fast clocks ask for the motion beyond the ends of the run.
         margin = max(TIME_MARGIN, 2 * spacing)
-        self.spline = AngleSpline(run.t[0] - margin, run.t[-1] + margin, spacing)
-        signs = (-1.0) ** np.arange(self.spline.size)
-        self._alternating = np.outer(signs, signs)
+        self._take(AngleSpline.uniform(run.t[0] - margin, run.t[-1] + margin, spacing))
         self.basis = CosineBasis(len(run.t), period, float(run.t[0] - start))
         self.is_angle = model.drive_source == "angle"
         self.weight_mask = np.column_stack([run.valid, run.reference_valid])  # (n, c + 1)
@@ -116,7 +118,6 @@ class Segment:
         self.round_to(model.expected_noise(1.0 / period).quantum)
         self.drive_factor = 2.0
         self.calibration_residue: CalibrationResidue | None = None
-        self._learned = np.zeros(self.spline.size - _DEGREE)
         self._set_roughness()
         self.coefficients = self._reference_drive = self._starting_drive()
 
@@ -129,6 +130,13 @@ class Segment:
     def coefficients(self, values: NDArray[np.float64]) -> None:
         self._coefficients = values
         self.spin = self.spline.spin(values)
+
+    def _take(self, spline: AngleSpline) -> None:
+        """Use a spline, of which nothing is learnt yet."""
+        self.spline = spline
+        signs = (-1.0) ** np.arange(spline.size)
+        self._alternating = np.outer(signs, signs)
+        self._learned = np.zeros(spline.size - _DEGREE)
 
     # -- starting values -------------------------------------------------------------------------------------
 
@@ -174,21 +182,50 @@ class Segment:
         """Take noise levels, roughness and drive from a segment of which this is a part."""
         self.levels = whole.levels
         self.drive_factor, self.rounding = whole.drive_factor, whole.rounding
-        centres = self.spline.interval_centres()
-        self._learned = np.interp(centres, whole.spline.interval_centres(), whole._learned)
+        self._take(whole.spline.within(self.spline.start, self.spline.stop))
+        self._learned = np.interp(self.spline.interval_centres(), whole.spline.interval_centres(), whole._learned)
         self.start_angle, self.start_angle_std = float(whole.spin.at(self.run.t[:1]).angle[0]), _KNOWN_ANGLE_STD
         self._set_roughness()
         # Beyond the ends too: late chips ask for the motion there.
-        reach = np.arange(self.spline.start, self.spline.stop, self.run.sample_period)
+        step = min(self.run.sample_period, 0.5 * float(self.spline.widths.min()))
+        reach = np.arange(self.spline.start, self.spline.stop, step)
         self.coefficients = self.spline.through(reach, whole.spin.at(reach))
+        self._reference_drive = self._starting_drive()
         self.prepare_weights()
 
     def learn_roughness(self) -> None:
         """Take the roughness from the present drive, which knows the corners of ramps better than the reference."""
         third = self.spline.roughness_rows() @ self.coefficients
-        window = max(int(0.3 / self.spline.spacing), 3)
-        self._learned = ROUGHNESS_FACTOR * np.sqrt(np.maximum(uniform_filter1d(third**2, window, mode="nearest"), 0.0))
+        self._learned = ROUGHNESS_FACTOR * np.sqrt(self.spline.moving_average(third**2, _ROUGH_FOR))
         self._set_roughness()
+
+    def sharpen(self) -> bool:
+        """Cut the knot intervals where the drive bends faster than they follow; tells whether any was cut."""
+        arm = float(np.linalg.norm(self.model.array.positions, axis=1).max())
+        allowed = _BLUR * float(np.median(self.levels.white[:-1])) / max(arm, 1e-3)  # rad/s²
+        spline, kept = self.spline, self.spin
+        third = spline.roughness_rows() @ self.coefficients
+        for _ in range(_MOST_CUTS):
+            bend = np.sqrt(spline.moving_average(third**2, _CORNER))
+            # What a piecewise parabola misses of an acceleration that bends by `bend` over its interval.
+            cut = (bend * spline.widths**2 / 16.0 > allowed) & (spline.widths > 1.5 * self.run.sample_period)
+            most = int(_MOST_INTERVALS * (self.run.duration / KNOT_SPACING)) - len(spline.widths)
+            if cut.sum() > max(most, 0):
+                cut &= bend >= np.sort(bend[cut])[::-1][max(most, 0)] if most > 0 else False
+            if not cut.any():
+                break
+            third = np.repeat(third, 1 + cut)
+            spline = spline.halved(cut)
+        if spline is self.spline:
+            return False
+        old, learned = self.spline, self._learned
+        reach = np.arange(old.start, old.stop, 0.5 * float(spline.widths.min()))
+        self._take(spline)
+        self._learned = np.interp(spline.interval_centres(), old.interval_centres(), learned)
+        self._set_roughness()
+        self.coefficients = spline.through(reach, kept.at(reach))
+        self._reference_drive = self._starting_drive()
+        return True
 
     def tune_roughness(self, effects: Sequence[Effect]) -> None:
         """Pick the scale of the roughness prior by marginal likelihood, the drive integrated out."""

@@ -16,9 +16,14 @@ from sim.campaign import Measurement, measure
 from sim.twin import Twin
 
 
-@pytest.fixture
-def spline():
-    return AngleSpline(-0.3, 4.1, 0.05)
+@pytest.fixture(params=["uniform", "finer in places"])
+def spline(request):
+    plain = AngleSpline.uniform(-0.3, 4.1, 0.05)
+    if request.param == "uniform":
+        return plain
+    middle = plain.interval_centres()
+    finer = plain.halved((middle > 1.0) & (middle < 1.6))
+    return finer.halved(np.abs(finer.interval_centres() - 1.3) < 0.1)
 
 
 def test_states_are_those_of_the_same_spline_in_scipy(spline):
