@@ -119,7 +119,7 @@ def _explain(
     quick = [cause for cause in judged.fit.causes if cause.name not in _SLOW]
     same = len(quick) == len(judged.fit.causes)
     base = judged.fit if same else refine(segments, quick, fixed, drives=judged.fit.drives)
-    plain_value = log_probability(segments, judged.fit, fixed)
+    plain_value = log_probability(segments, judged.fit)
     found: tuple[Explanation, Walk] | None = None
     odds = 0.0
     before = segments
@@ -136,7 +136,7 @@ def _explain(
             segment.adopt(old)
             segment.levels = NoiseLevels(old.levels.white, old.levels.flicker, walk.strength)
         wandering = explain_any_length(other, fixed, runs, start=base.causes)
-        odds = log_probability(other, wandering.fit, fixed) - np.log(len(model.families())) - plain_value
+        odds = log_probability(other, wandering.fit) - np.log(len(model.families())) - plain_value
         found = wandering, walk
         before, base = other, wandering.fit
     if found is None or odds < LEAST_EXTRA_ODDS:

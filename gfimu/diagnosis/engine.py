@@ -181,7 +181,6 @@ def explain(
         # The channels sharpen the drive unless something gross twists it.
         tune_drives(segments, fitted, fixed)
         fitted = sharpen_drives(segments, fitted, fixed)
-        tune_drives(segments, fitted, fixed)
         best = fitted = refine(segments, start, fixed, drives=fitted.drives, iterations=8)
     tried: dict[frozenset[tuple[str, str]], Fit] = {}
     behind: dict[frozenset[tuple[str, str]], float] = {}  # how far, under the noise that both were judged by

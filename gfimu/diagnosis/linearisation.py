@@ -45,6 +45,10 @@ class DriveElimination:
         both = self._solve(self.forward)
         return both[: self.size], both[self.size :]
 
+    def log_volume(self) -> float:
+        """Return the log of the posterior's volume, up to a constant: −½ log det H."""
+        return -float(np.log(self.factor.diagonal()).sum())
+
     def distance(self) -> float:
         """Return how far the drive is from its best, in squared standard deviations, the causes held."""
         if len(self.forward) == self.size:

@@ -59,7 +59,7 @@ def loosen(plain: Explanation, prepared: PreparedRuns, model: WorldModel) -> Loo
     if not tolerance or not all(_fits(segment) for segment in plain.segments):
         return None
     runs = len(prepared.runs)
-    reference = log_probability(plain.segments, plain.fit, plain.fixed)
+    reference = log_probability(plain.segments, plain.fit)
     value, start = _trial(plain, plain.fit.causes, tolerance, _USUAL)
     scale = _USUAL
     larger, other = _trial(plain, start.causes, tolerance, _LARGE)
@@ -73,7 +73,7 @@ def loosen(plain: Explanation, prepared: PreparedRuns, model: WorldModel) -> Loo
         segment.adopt(old)
     _admit(segments, start.causes, fixed, start.drives, tolerance, scale)
     found = explain_any_length(segments, fixed, runs, start=start.causes)
-    if log_probability(segments, found.fit, fixed) - reference < _LEAST_ODDS:
+    if log_probability(segments, found.fit) - reference < _LEAST_ODDS:
         return None
     effects = _most_probable(segments, found.fit, fixed, tolerance, scale)
     known = tuple((*before, *effects) for before in fixed)
@@ -130,7 +130,7 @@ def _trial(plain: Explanation, causes: Sequence[Cause], tolerance: dict[str, flo
     try:
         fit = refine(segments, causes, fixed, drives=plain.fit.drives)
         fit = prune(segments, fit, fixed)[0]
-        return log_probability(segments, fit, fixed), fit
+        return log_probability(segments, fit), fit
     finally:
         for segment, drive in zip(segments, plain.fit.drives, strict=True):
             segment.calibration_residue, segment.coefficients = None, drive

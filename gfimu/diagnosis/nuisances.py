@@ -16,6 +16,7 @@ from gfimu.diagnosis.segment import Segment, over_segments
 __all__ = ["learn_noise", "sharpen_drives", "tune_drives"]
 
 _ITERATIONS = 6
+_MOST_CUTS = 3
 _LEAST_VALID = 0.01
 
 
@@ -64,16 +65,15 @@ def learn_noise(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[
 
 def sharpen_drives(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]]) -> Fit:
     """Give the drives finer knots where they bend sharply; returns the fit with its drives on them."""
-    before = [segment.coefficients for segment in segments]
-    for segment, drive in zip(segments, fit.drives, strict=True):
-        segment.coefficients = drive
-    changed = over_segments(Segment.sharpen, segments)
-    if not any(changed):
-        for segment, drive in zip(segments, before, strict=True):
+    for _ in range(_MOST_CUTS):
+        for segment, drive in zip(segments, fit.drives, strict=True):
             segment.coefficients = drive
-        return fit
-    drives = tuple(segment.coefficients for segment in segments)
-    return refine(segments, fit.causes, fixed, drives=drives, iterations=_ITERATIONS)
+        if not any(over_segments(Segment.sharpen, segments)):
+            break
+        drives = tuple(segment.coefficients for segment in segments)
+        fit = refine(segments, fit.causes, fixed, drives=drives, iterations=_ITERATIONS)
+        tune_drives(segments, fit, fixed)
+    return fit
 
 
 def tune_drives(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]]) -> None:

@@ -131,6 +131,7 @@ class _Point:
     step: NDArray[np.float64]
     moves: tuple[NDArray[np.float64], ...]
     expected: float
+    log_volume: float
 
     @property
     def value(self) -> float:
@@ -197,6 +198,7 @@ def _evaluate(segments: Sequence[Segment], fixed: Sequence[Sequence[Effect]], st
         moves,
         # What the step promises, and how far the drives still are from their best.
         float(step @ information @ step) + _DRIVE_SHARE * sum(one.distance() for one in eliminations),
+        sum(one.log_volume() for one in eliminations),
     )
 
 
@@ -259,7 +261,7 @@ def _result(segments: Sequence[Segment], point: _Point) -> Fit:
     causes, gram, score = point.state.causes, point.gram, point.score
     prior = sum(cause.log_prior for cause in causes) + EXTRA_CAUSE * max(len(causes) - 1, 0)
     if not causes:
-        evidence = -0.5 * point.objective
+        evidence = point.log_volume - 0.5 * point.objective
         empty = np.zeros((0, 0))
         return Fit((), evidence, evidence + prior, point.objective, point.state.drives, empty, np.zeros(0))
     coordinates, shapes = _places(causes)
@@ -269,7 +271,8 @@ def _result(segments: Sequence[Segment], point: _Point) -> Fit:
     total = score[coordinates] + inner @ values
     positive = np.concatenate([cause.positive(array) for cause in causes])
     nothing = point.objective + 2 * float(score[coordinates] @ values) + float(values @ inner @ values)
-    evidence = -0.5 * nothing + log_evidence(inner, total, positive)
+    # A cause that reshapes what the drive can do, as a mode does, is charged for it by the volume.
+    evidence = point.log_volume - 0.5 * nothing + log_evidence(inner, total, positive)
     done = []
     ends = np.cumsum([len(cause.coordinates) for cause in causes])
     for number, (cause, mine) in enumerate(zip(causes, np.split(coordinates, ends[:-1]), strict=True)):

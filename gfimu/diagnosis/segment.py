@@ -46,9 +46,11 @@ _WALK = "bias_random_walk"
 _KNOWN_ANGLE_STD = 5e-3
 _LEAST_FACTOR = 0.05
 _ROUGH_FOR = 0.3
+_PEAK = 0.04
+_PEAK_FACTOR = 2.0
 _CORNER = 0.1
 _BLUR = 0.3
-_MOST_CUTS = 2
+_LEAST_WIDTH = 0.8
 _MOST_INTERVALS = 1.7
 _FACTOR_STEPS = 4
 _REST_FACTOR = 1.3
@@ -137,6 +139,7 @@ class Segment:
         signs = (-1.0) ** np.arange(spline.size)
         self._alternating = np.outer(signs, signs)
         self._learned = np.zeros(spline.size - _DEGREE)
+        self._corners = np.zeros(spline.size - _DEGREE)
 
     # -- starting values -------------------------------------------------------------------------------------
 
@@ -155,8 +158,8 @@ class Segment:
             factor=self.drive_factor,
         )
         rows = self.spline.roughness_rows()
-        std = np.maximum(std, self.drive_factor * self._learned)
-        self._log_roughness = float(np.sum(np.log(std)))
+        std = np.maximum(np.maximum(std, self.drive_factor * self._learned), self._corners)
+        self.log_roughness = float(np.sum(np.log(std)))
         scaled = diags_array(1.0 / std) @ rows
         begin = self.spline.matrices(self.run.t[:1])[0] / self.start_angle_std
         self._rough = csr_array(scaled)
@@ -183,7 +186,9 @@ class Segment:
         self.levels = whole.levels
         self.drive_factor, self.rounding = whole.drive_factor, whole.rounding
         self._take(whole.spline.within(self.spline.start, self.spline.stop))
-        self._learned = np.interp(self.spline.interval_centres(), whole.spline.interval_centres(), whole._learned)
+        centres, known = self.spline.interval_centres(), whole.spline.interval_centres()
+        self._learned = np.interp(centres, known, whole._learned)
+        self._corners = np.interp(centres, known, whole._corners)
         self.start_angle, self.start_angle_std = float(whole.spin.at(self.run.t[:1]).angle[0]), _KNOWN_ANGLE_STD
         self._set_roughness()
         # Beyond the ends too: late chips ask for the motion there.
@@ -197,28 +202,26 @@ class Segment:
         """Take the roughness from the present drive, which knows the corners of ramps better than the reference."""
         third = self.spline.roughness_rows() @ self.coefficients
         self._learned = ROUGHNESS_FACTOR * np.sqrt(self.spline.moving_average(third**2, _ROUGH_FOR))
+        # Corners are no Gaussian noise: however stiff the drive is elsewhere, there it may bend as it does.
+        corner = self.spline.widths < 0.75 * self.spline.spacing
+        self._corners = np.where(corner, _PEAK_FACTOR * np.sqrt(self.spline.moving_average(third**2, _PEAK)), 0.0)
         self._set_roughness()
 
     def sharpen(self) -> bool:
         """Cut the knot intervals where the drive bends faster than they follow; tells whether any was cut."""
         arm = float(np.linalg.norm(self.model.array.positions, axis=1).max())
         allowed = _BLUR * float(np.median(self.levels.white[:-1])) / max(arm, 1e-3)  # rad/s²
-        spline, kept = self.spline, self.spin
-        third = spline.roughness_rows() @ self.coefficients
-        for _ in range(_MOST_CUTS):
-            bend = np.sqrt(spline.moving_average(third**2, _CORNER))
-            # What a piecewise parabola misses of an acceleration that bends by `bend` over its interval.
-            cut = (bend * spline.widths**2 / 16.0 > allowed) & (spline.widths > 1.5 * self.run.sample_period)
-            most = int(_MOST_INTERVALS * (self.run.duration / KNOT_SPACING)) - len(spline.widths)
-            if cut.sum() > max(most, 0):
-                cut &= bend >= np.sort(bend[cut])[::-1][max(most, 0)] if most > 0 else False
-            if not cut.any():
-                break
-            third = np.repeat(third, 1 + cut)
-            spline = spline.halved(cut)
-        if spline is self.spline:
+        old, kept, learned = self.spline, self.spin, self._learned
+        third = old.roughness_rows() @ self.coefficients
+        bend = np.sqrt(old.moving_average(third**2, _CORNER))
+        # What a piecewise parabola misses of an acceleration that bends by `bend` over its interval.
+        cut = (bend * old.widths**2 / 16.0 > allowed) & (old.widths > _LEAST_WIDTH * self.run.sample_period)
+        most = int(_MOST_INTERVALS * self.run.duration / KNOT_SPACING) - len(old.widths)
+        if cut.sum() > most > 0:
+            cut &= bend >= np.sort(bend[cut])[-most]
+        if most <= 0 or not cut.any():
             return False
-        old, learned = self.spline, self._learned
+        spline = old.halved(cut)
         reach = np.arange(old.start, old.stop, 0.5 * float(spline.widths.min()))
         self._take(spline)
         self._learned = np.interp(spline.interval_centres(), old.interval_centres(), learned)
@@ -424,7 +427,7 @@ class Segment:
 
         Needed only to compare fits under different priors.
         """
-        return -float(np.log(linear.drive.factor.diagonal()).sum()) - self._log_roughness
+        return linear.drive.log_volume() - self.log_roughness
 
     def move_drive(self, linear: Linearisation) -> None:
         """Move the drive to its posterior mean."""
