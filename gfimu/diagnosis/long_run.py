@@ -12,7 +12,7 @@ import numpy as np
 from gfimu.diagnosis.causes import Cause
 from gfimu.diagnosis.engine import RIVALS, Explanation, Report, explain, prune
 from gfimu.diagnosis.model import Effect
-from gfimu.diagnosis.nuisances import learn_noise, tune_drives
+from gfimu.diagnosis.nuisances import learn_noise, sharpen_drives, tune_drives
 from gfimu.diagnosis.refinement import refine
 from gfimu.diagnosis.segment import Segment
 
@@ -70,7 +70,9 @@ def explain_any_length(
     fit = refine(segments, part.fit.causes, fixed)
     others, known = [segments[place] for place in rest], [fixed[place] for place in rest]
     tune_drives(others, fit.of(rest), known)
-    fit = refine(segments, fit.causes, fixed, drives=fit.drives)
+    sharper = dict(zip(rest, sharpen_drives(others, fit.of(rest), known).drives, strict=True))
+    drives = [sharper.get(place, drive) for place, drive in enumerate(fit.drives)]
+    fit = refine(segments, fit.causes, fixed, drives=drives)
     learn_noise(segments, fit, fixed)
     fit = refine(segments, fit.causes, fixed, drives=fit.drives)
     tell(0.8, "prune")

@@ -5,14 +5,18 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import BSpline
 
 from gfimu.array import AccelerometerArray
+from gfimu.diagnosis.diagnose import diagnose
 from gfimu.diagnosis.drive import AngleSpline
 from gfimu.diagnosis.drive_jacobian import DriveJacobian, lag_matrix
 from gfimu.diagnosis.engine import make_segments
+from gfimu.diagnosis.refinement import refine
 from gfimu.diagnosis.run import prepare_run
 from sim.campaign import Measurement, measure
+from sim.motion import SpinState
 from sim.twin import Twin
 
 
@@ -131,3 +135,65 @@ def test_the_drive_is_followed_at_every_sample_rate(rate):
     scaled = segment.residual([])[:, :-1] / segment.levels.white[:-1]
     # Knots as far apart as slow samples could not hold a motion that its corners need: 6 and more.
     assert 0.85 < np.sqrt(np.mean(scaled**2)) < 1.15
+
+
+def test_an_average_over_time_weighs_intervals_by_their_width():
+    spline = AngleSpline.uniform(0.0, 1.0, 0.1).halved(np.arange(10) == 4)
+    values = spline.interval_centres()  # a straight line is its own average away from the ends
+    assert_allclose(spline.moving_average(values, 0.2)[2:8], values[2:8], atol=0.013)
+    assert_allclose(spline.moving_average(np.ones(11), 0.3), 1.0)
+
+
+def test_a_part_has_the_breaks_of_the_whole():
+    whole = AngleSpline.uniform(0.0, 2.0, 0.1).halved(np.arange(20) == 7)
+    part = whole.within(0.3, 1.25)
+    assert_allclose(part.breaks, [0.3, 0.4, 0.5, 0.6, 0.7, 0.75, 0.8, 0.9, 1.0, 1.1, 1.2, 1.25])
+    assert whole.within(0.3005, 1.2).breaks[1] == pytest.approx(0.4)  # no sliver at the end
+
+
+class Corners:
+    """Ramps between steady rates whose corners last a few hundredths of a second; 0.1 ms grid."""
+
+    def __init__(self, seed, corner):
+        rng = np.random.default_rng(seed)
+        step = 1e-4
+        self.grid = np.arange(-1.5, 21.5, step)
+        times = np.concatenate([[0.0], np.cumsum(rng.uniform(0.4, 2.5, 16))])
+        rates = np.concatenate([[0.0], np.repeat(rng.uniform(-14.0, 14.0, 8), 2)])
+        kernel = np.hanning(round(corner / step))
+        rate = np.interp(self.grid, times, rates)
+        rate = np.convolve(np.pad(rate, len(kernel), mode="edge"), kernel / kernel.sum(), "same")
+        rate = rate[len(kernel) : -len(kernel)]
+        self.states = cumulative_trapezoid(rate, dx=step, initial=0.0), rate, np.gradient(rate, step)
+
+    def at(self, t):
+        return SpinState(*(np.interp(np.asarray(t, dtype=float), self.grid, state) for state in self.states))
+
+
+@pytest.mark.parametrize("corner", [0.2, 0.08, 0.03])
+def test_sharp_corners_of_the_motion_are_no_effect(corner):
+    # Knots 0.05 s apart everywhere cut the corners, and a mode of the table was named for what they missed.
+    twin = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
+    motion = Corners(1, corner)
+    recording = measure(np.random.default_rng(1), twin, [], Measurement(duration=20.0), motion=motion)
+    assert diagnose([recording], twin).verdict == "nothing_found"
+
+
+def test_knots_are_finer_only_where_the_drive_bends():
+    twin = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
+    motion = Corners(1, 0.05)
+    recording = measure(np.random.default_rng(1), twin, [], Measurement(duration=20.0), motion=motion)
+    (segment,) = make_segments(twin, [prepare_run(recording, twin)])
+    segment.prepare_weights()
+    plain = segment.spline.size
+    segment.coefficients = refine([segment], (), [()], iterations=8).drives[0]
+    segment.learn_roughness()
+    before = segment.spin.at(segment.run.t)
+    assert segment.sharpen()
+    assert plain < segment.spline.size < 1.7 * plain
+    assert_allclose(segment.spin.at(segment.run.t).rate, before.rate, atol=2e-3)
+    fine = segment.spline.interval_centres()[segment.spline.widths < 0.03]
+    bend = np.abs(np.gradient(np.gradient(motion.states[2], 1e-4), 1e-4))
+    sharp = motion.grid[bend > 0.2 * bend[(motion.grid > 0) & (motion.grid < 20)].max()]
+    near = np.abs(fine[:, None] - sharp[None, ::20]).min(axis=1)
+    assert np.quantile(near, 0.9) < 0.3
