@@ -12,7 +12,7 @@ import numpy as np
 from gfimu.diagnosis.causes import Cause
 from gfimu.diagnosis.engine import RIVALS, Explanation, Report, explain, prune
 from gfimu.diagnosis.model import Effect
-from gfimu.diagnosis.nuisances import learn_noise, sharpen_drives, tune_drives
+from gfimu.diagnosis.nuisances import learn_noise, sharpen_drives
 from gfimu.diagnosis.refinement import refine
 from gfimu.diagnosis.segment import Segment
 
@@ -69,7 +69,9 @@ def explain_any_length(
         segments[place].prepare_weights()
     fit = refine(segments, part.fit.causes, fixed)
     others, known = [segments[place] for place in rest], [fixed[place] for place in rest]
-    tune_drives(others, fit.of(rest), known)
+    for segment, drive in zip(others, fit.of(rest).drives, strict=True):
+        segment.coefficients = drive
+        segment.learn_roughness()
     sharper = dict(zip(rest, sharpen_drives(others, fit.of(rest), known).drives, strict=True))
     drives = [sharper.get(place, drive) for place, drive in enumerate(fit.drives)]
     fit = refine(segments, fit.causes, fixed, drives=drives)

@@ -65,13 +65,17 @@ def learn_noise(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[
 
 def sharpen_drives(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]]) -> Fit:
     """Give the drives finer knots where they bend sharply; returns the fit with its drives on them."""
+    before = fit
     for _ in range(_MOST_CUTS):
         for segment, drive in zip(segments, fit.drives, strict=True):
             segment.coefficients = drive
+            if fit is not before:
+                segment.learn_roughness()
         if not any(over_segments(Segment.sharpen, segments)):
             break
         drives = tuple(segment.coefficients for segment in segments)
         fit = refine(segments, fit.causes, fixed, drives=drives, iterations=_ITERATIONS)
+    if fit is not before:
         tune_drives(segments, fit, fixed)
     return fit
 
