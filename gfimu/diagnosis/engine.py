@@ -177,7 +177,8 @@ def explain(
     best = refine(segments, start, fixed, iterations=6 if start else 0)
     fitted = refine(segments, start, fixed, iterations=8)
     observations = sum(int(segment.weight_mask.sum()) for segment in segments)
-    if fitted.objective < _FAIR_FIT * observations:
+    fair = fitted.objective < _FAIR_FIT * observations
+    if fair:
         # The channels sharpen the drive unless something gross twists it.
         tune_drives(segments, fitted, fixed)
         fitted = sharpen_drives(segments, fitted, fixed)
@@ -220,12 +221,16 @@ def explain(
                     fits[large.key] = max(fits.get(large.key, large), large, key=_posterior)
         tried |= fits
         winner = max(fits.values(), key=_posterior)
+        was_fair, fair = fair, fair or winner.objective < _FAIR_FIT * observations
         behind |= {key: winner.log_posterior - fit.log_posterior for key, fit in fits.items()}
         settled = winner.key == best.key
         best = winner
         change = learn_noise(segments, best, fixed)
         tune_drives(segments, best, fixed)
         best = refine(segments, best.causes, fixed, drives=best.drives, iterations=6)
+        if fair and not was_fair:
+            best = sharpen_drives(segments, best, fixed)
+            fitted = refine(segments, start, fixed, drives=best.drives, iterations=8)  # on the same knots
         if settled and (settled_before or change < _STEADY_NOISE):
             break
         settled_before = settled

@@ -16,6 +16,7 @@ from gfimu.diagnosis.engine import make_segments
 from gfimu.diagnosis.refinement import refine
 from gfimu.diagnosis.run import prepare_run
 from sim.campaign import Measurement, measure
+from sim.effects import make_effect
 from sim.motion import SpinState
 from sim.twin import Twin
 
@@ -177,6 +178,14 @@ def test_sharp_corners_of_the_motion_are_no_effect(corner):
     motion = Corners(1, corner)
     recording = measure(np.random.default_rng(1), twin, [], Measurement(duration=20.0), motion=motion)
     assert diagnose([recording], twin).verdict == "nothing_found"
+
+
+def test_a_gross_effect_is_named_alone_where_the_corners_are_sharp():
+    twin = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
+    gross = make_effect("scale_factor", {"a11": 0.2, "a12": 0.2, "a13": 0.2}, twin.array)
+    recording = measure(np.random.default_rng(2), twin, [gross], Measurement(duration=20.0), motion=Corners(1, 0.03))
+    found = diagnose([recording], twin)
+    assert (found.verdict, [cause.effect for cause in found.causes]) == ("explained", ["scale_factor"])
 
 
 def test_knots_are_finer_only_where_the_drive_bends():
