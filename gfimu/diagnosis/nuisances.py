@@ -75,6 +75,8 @@ def sharpen_drives(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequen
             break
         drives = tuple(segment.coefficients for segment in segments)
         fit = refine(segments, fit.causes, fixed, drives=drives, iterations=_ITERATIONS)
+    for segment in segments:
+        segment.knots_chosen = True
     if fit is not before:
         tune_drives(segments, fit, fixed)
     return fit

@@ -182,7 +182,7 @@ def _with_cubic(
         segment.coefficients = kept
     unit = _UNIT / max(float(np.sqrt(np.mean(np.concatenate(cubes) ** 2))), 1e-12)
     values = np.concatenate([*(cause.coordinates for cause in fit.causes), [0.0]])
-    gram, score, objective = np.zeros((len(values), len(values))), np.zeros(len(values)), 0.0
+    gram, score, objective, volume = np.zeros((len(values), len(values))), np.zeros(len(values)), 0.0, 0.0
     for segment, mine, known, cube, drive in zip(segments, effects, fixed, cubes, fit.drives, strict=True):
         kept, segment.coefficients = segment.coefficients, drive
         line = segment.linearise(mine)
@@ -192,10 +192,11 @@ def _with_cubic(
         part, right, _ = segment.whitened_products(line, np.concatenate([causes, column], axis=1))
         segment.coefficients = kept
         gram, score, objective = gram + part, score + right, objective + line.drive.objective
+        volume += line.drive.log_volume()
     nothing = objective + 2 * float(score @ values) + float(values @ gram @ values)
     score = score + gram @ values
     size = np.linalg.solve(gram + 1e-6 * np.eye(len(values)), score)[-1] * unit
-    return -0.5 * nothing + log_evidence(gram, score), float(size)
+    return volume - 0.5 * nothing + log_evidence(gram, score), float(size)
 
 
 def _left(segment: Segment, fit: Fit, known: Sequence[Effect]) -> NDArray[np.float64]:

@@ -111,6 +111,8 @@ class Segment:
         # Late chips and fast clocks ask for the motion beyond the ends of the run.
         margin = max(TIME_MARGIN, 2 * spacing)
         self._take(AngleSpline.uniform(run.t[0] - margin, run.t[-1] + margin, spacing))
+        # Fits are compared under the same knots, so these are chosen once.
+        self.knots_chosen = False
         self.basis = CosineBasis(len(run.t), period, float(run.t[0] - start))
         self.is_angle = model.drive_source == "angle"
         self.weight_mask = np.column_stack([run.valid, run.reference_valid])  # (n, c + 1)
@@ -186,6 +188,7 @@ class Segment:
         self.levels = whole.levels
         self.drive_factor, self.rounding = whole.drive_factor, whole.rounding
         self._take(whole.spline.within(self.spline.start, self.spline.stop))
+        self.knots_chosen = whole.knots_chosen
         centres, known = self.spline.interval_centres(), whole.spline.interval_centres()
         self._learned = np.interp(centres, known, whole._learned)
         self._corners = np.interp(centres, known, whole._corners)
@@ -209,6 +212,8 @@ class Segment:
 
     def sharpen(self) -> bool:
         """Cut the knot intervals where the drive bends faster than they follow; tells whether any was cut."""
+        if self.knots_chosen:
+            return False
         arm = float(np.linalg.norm(self.model.array.positions, axis=1).max())
         allowed = _BLUR * float(np.median(self.levels.white[:-1])) / max(arm, 1e-3)  # rad/s²
         old, kept, learned = self.spline, self.spin, self._learned
