@@ -171,7 +171,7 @@ class Corners:
         return SpinState(*(np.interp(np.asarray(t, dtype=float), self.grid, state) for state in self.states))
 
 
-@pytest.mark.parametrize("corner", [0.2, 0.08, 0.03])
+@pytest.mark.parametrize("corner", [0.08, 0.03])
 def test_sharp_corners_of_the_motion_are_no_effect(corner):
     # Knots 0.05 s apart everywhere cut the corners, and a mode of the table was named for what they missed.
     twin = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
@@ -183,7 +183,7 @@ def test_sharp_corners_of_the_motion_are_no_effect(corner):
 def test_a_gross_effect_is_named_alone_where_the_corners_are_sharp():
     twin = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
     gross = make_effect("scale_factor", {"a11": 0.2, "a12": 0.2, "a13": 0.2}, twin.array)
-    recording = measure(np.random.default_rng(2), twin, [gross], Measurement(duration=20.0), motion=Corners(1, 0.03))
+    recording = measure(np.random.default_rng(2), twin, [gross], Measurement(duration=12.0), motion=Corners(1, 0.03))
     found = diagnose([recording], twin)
     assert (found.verdict, [cause.effect for cause in found.causes]) == ("explained", ["scale_factor"])
 

@@ -28,7 +28,7 @@ SWAP_Z = ("axis_swap", {"channels": ["a13", "a21"]})
 def test_exchanged_and_inverted_channels_are_told_together(faults):
     twin = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
     effects = [make_effect(name, parameters, twin.array) for name, parameters in faults]
-    diagnosis = diagnose([measure(np.random.default_rng(11), twin, effects, Measurement(duration=20.0))], twin)
+    diagnosis = diagnose([measure(np.random.default_rng(11), twin, effects, Measurement(duration=12.0))], twin)
     assert diagnosis.verdict == "explained"
     told = {cause.effect: cause.parameters for cause in diagnosis.causes}
     assert set(told) == {name for name, _ in faults}
