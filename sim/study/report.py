@@ -78,9 +78,9 @@ def score(outcome: Outcome) -> dict[str, bool]:
 
 def _inseparable(outcome: Outcome, rivals: set[str]) -> bool:
     """Tell whether the data can't tell any of these rivals from what is hidden."""
-    if any(rivals | set(outcome["effects"]) <= group for group in INSEPARABLE):
-        return True
-    left_by = outcome.get("left_by") or {}
+    left_by = outcome.get("left_by")
+    if not left_by:
+        return any(rivals | set(outcome["effects"]) <= group for group in INSEPARABLE)
     return all(left_by.get(rival, np.inf) < LEAST_SEPARABLE for rival in rivals)
 
 
