@@ -114,6 +114,8 @@ class Contender:
         Columns of every shape that it can take as a rival.
     positive : ndarray of bool, shape (m,)
         Sizes that physics allows one sign only.
+    signed : bool
+        Whether the directions are meant with the sign that they have: where the sizes are given, not merely usual.
     """
 
     name: str
@@ -121,6 +123,7 @@ class Contender:
     directions: NDArray[np.float64]
     alternatives: tuple[NDArray[np.intp], ...]
     positive: NDArray[np.bool_]
+    signed: bool = False
 
 
 @dataclass(frozen=True)
@@ -202,7 +205,8 @@ def _left(
     target = (vectors[:, kept] / np.sqrt(values[kept])).T @ cross  # (kept, r)
     explained = np.sum(target**2, axis=0)
     if rival.positive.any():
-        explained = _explained_by_one_sign(root, target, rival.positive, both_signs=not one.positive.all())
+        both_signs = not (one.signed or one.positive.all())
+        explained = _explained_by_one_sign(root, target, rival.positive, both_signs=both_signs)
     own = gram[np.ix_(one.columns, one.columns)]
     energy = np.einsum("ar,ab,br->r", one.directions, own, one.directions)
     return float(np.maximum(energy - explained, 0.0).sum())
@@ -272,6 +276,7 @@ def plan_contenders(
                 block_diag(*[direction] * blocks),
                 tuple(places),
                 np.tile([size.positive for size in sizes], blocks),
+                signed=not isinstance(request, str),
             )
         )
     return signatures, contenders

@@ -191,6 +191,20 @@ def test_lag_of_the_channels_and_of_the_reference_have_opposite_signs(twin):
     assert table.unexplained[0, 1] > 0.99
 
 
+def test_an_effect_of_known_size_is_imitated_with_its_own_sign_only(twin):
+    # A board's clock that runs fast shows the channels late, which a late tachometer cannot imitate.
+    fast, slow = (
+        predict_distinguishability(
+            twin, [make_effect("clock_error", {"ratio": ratio}), "tacho_latency"], EXCITATIONS["full"]
+        )
+        for ratio in (1e-4, -1e-4)
+    )
+    assert fast.unexplained[0, 1] > 0.95
+    assert slow.unexplained[0, 1] < 0.5
+    either = predict_distinguishability(twin, ["clock_error", "tacho_latency"], EXCITATIONS["full"])
+    assert either.unexplained[0, 1] == pytest.approx((fast.unexplained[0, 1] + slow.unexplained[0, 1]) / 2, abs=0.01)
+
+
 def test_the_drive_is_marginalised_to_the_digits_that_a_margin_needs(twin):
     # A tachometer of wrong gain moves the whole drive by its share: a large step that leaves little behind, so that
     # normal equations lose digits first here. Truth: orthogonal projection on drive and rival, no normal equations.
