@@ -23,6 +23,7 @@ from gfimu.diagnosis.segment import Segment, difference_noise, over_segments
 from gfimu.diagnosis.signatures import SignatureSet, hypotheses, plan_signatures, signature_columns
 
 __all__ = [
+    "FAIR_FIT",
     "RIVALS",
     "Explanation",
     "Report",
@@ -40,9 +41,10 @@ _REFINED = 6
 _MOST_CAUSES = 4
 _CLOSE = 12.0
 _GROSS = 150.0
-_FAIR_FIT = 1.6
 _WORTH_REFINING = -6.0
 _WORTH_PRUNING = 40.0
+FAIR_FIT = 1.6
+"""Misfit per observation, in variances, above which something large is still missing."""
 RIVALS = 6
 """How many other sets are judged beside the best."""
 LEAST_ODDS = 4.0
@@ -52,7 +54,7 @@ Wide of what chance does: in 240 runs with nothing hidden (`threshold_nulls` of 
 alarms are counted on) two reached even odds and none e against one.
 """
 LEAST_EXTRA_ODDS = 7.0
-"""Log odds that a further cause needs against the set without it."""
+"""Log odds that a further cause, beside others or a fault of the data, needs against the set without it."""
 _ITERATIONS = 7
 _STEADY_NOISE = 0.1
 _FAINT = 500.0  # log odds of a mode whose frequency may not be settled
@@ -177,7 +179,7 @@ def explain(
     best = refine(segments, start, fixed, iterations=6 if start else 0)
     fitted = refine(segments, start, fixed, iterations=8)
     observations = sum(int(segment.weight_mask.sum()) for segment in segments)
-    fair = fitted.objective < _FAIR_FIT * observations
+    fair = fitted.objective < FAIR_FIT * observations
     if fair:
         # The channels sharpen the drive unless something gross twists it.
         tune_drives(segments, fitted, fixed)
@@ -213,7 +215,8 @@ def explain(
                 # Ripples locked to the angle lose their phase where the drive's angle has drifted.
                 other = refine(segments, causes, fixed, drives=fitted.drives, iterations=_ITERATIONS)
                 fits[key] = max(fits[key], other, key=_posterior)
-        if round_number == 0 and min(fit.objective for fit in fits.values()) > _FAIR_FIT * observations:
+        # A start has been through this.
+        if round_number == 0 and not start and min(fit.objective for fit in fits.values()) > FAIR_FIT * observations:
             for hypothesis in signatures.hypotheses:
                 if hypothesis.family.starts:
                     tell(0.1, f"large sizes of {hypothesis.name}")
@@ -221,7 +224,7 @@ def explain(
                     fits[large.key] = max(fits.get(large.key, large), large, key=_posterior)
         tried |= fits
         winner = max(fits.values(), key=_posterior)
-        was_fair, fair = fair, fair or winner.objective < _FAIR_FIT * observations
+        was_fair, fair = fair, fair or winner.objective < FAIR_FIT * observations
         behind |= {key: winner.log_posterior - fit.log_posterior for key, fit in fits.items()}
         settled = winner.key == best.key
         best = winner
@@ -316,6 +319,8 @@ def prune(
         By cause, the best fit without it.
     """
     known = {} if done is None else done
+    faults = any(effect.place == "data" for effects in fixed for effect in effects)
+    faults |= any(segment.rounding > 0 for segment in segments)
     while True:
         without = {}
         for cause in fit.causes:
@@ -326,8 +331,10 @@ def prune(
             without[cause.name] = known[key]
         if not without:
             return fit, without
-        weakest = max(without, key=lambda name: without[name].log_posterior)
-        needed = LEAST_ODDS if len(fit.causes) == 1 else LEAST_EXTRA_ODDS
-        if fit.log_posterior - without[weakest].log_posterior >= needed:
+        lost = {name: fit.log_posterior - other.log_posterior for name, other in without.items()}
+        weakest = min(lost, key=lost.__getitem__)
+        needed = LEAST_ODDS if len(fit.causes) == 1 and not faults else LEAST_EXTRA_ODDS
+        needed += sum(cause.family.inexactness * lost[cause.name] for cause in fit.causes if cause.name != weakest)
+        if lost[weakest] >= needed:
             return fit, without
         fit = without[weakest]

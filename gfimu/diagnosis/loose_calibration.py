@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from gfimu.diagnosis.calibration_residue import CalibrationResidue, tolerance_of
 from gfimu.diagnosis.causes import Cause, Signature, effects_of_run
-from gfimu.diagnosis.engine import Explanation, prune
+from gfimu.diagnosis.engine import FAIR_FIT, Explanation, prune
 from gfimu.diagnosis.holdout import Holdout
 from gfimu.diagnosis.long_run import explain_any_length
 from gfimu.diagnosis.model import Effect, EffectFamily, WorldModel
@@ -67,6 +67,8 @@ def loosen(plain: Explanation, prepared: PreparedRuns, model: WorldModel) -> Loo
         value, scale, start = larger, _LARGE, other
     if value < reference:
         return None
+    if start.objective > FAIR_FIT * sum(int(segment.weight_mask.sum()) for segment in plain.segments):
+        return None  # what is missing is larger than any residue
     segments, _ = prepared.segments(model)
     fixed = plain.fixed
     for segment, old in zip(segments, plain.segments, strict=True):

@@ -91,6 +91,8 @@ class EffectFamily(Protocol):
     @property
     def per_run(self) -> bool: ...  # noqa: D102
     @property
+    def inexactness(self) -> float: ...  # noqa: D102
+    @property
     def starts(self) -> tuple[float, ...]: ...  # noqa: D102
 
     def __call__(self, parameters: Mapping[str, Any]) -> Effect:

@@ -74,7 +74,8 @@ class Effect(ABC):
     """Excitation that separates it from its usual rivals."""
     per_run: ClassVar[bool] = False
     """True where another mounting or another day has its own value."""
-
+    inexactness: ClassVar[float] = 0.0
+    """Share of what it explains that its model may get wrong; beside it a further cause must explain more than that."""
     starts: ClassVar[tuple[float, ...]] = ()
     """Values in units of the prior to start from where a large size is far from linear; none by default."""
 

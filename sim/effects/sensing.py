@@ -291,6 +291,7 @@ class Hysteresis(Effect):
     summary = "play in the reading: it depends on the direction from which it came"
     place = "sensing"
     separated_by = "slow reversals of the rate"
+    inexactness = 0.01  # a play remembers the extremes of a motion that is only estimated
 
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:

@@ -90,6 +90,13 @@ def test_one_hidden_effect_is_named():
     assert sum(entry["wrong"] for entry in judged) <= at_most(0.05, len(judged)), missed
 
 
+@pytest.mark.parametrize("name", ["hysteresis", "coarse_resolution"])
+def test_what_the_first_cause_may_get_wrong_is_no_further_cause(name):
+    """A play that an estimated motion takes up, and rounding of readings at rest, leave odds of e^4 to e^10."""
+    case, source = next(one for one in SINGLES if one[0].effects == (name,))
+    assert [cause["effect"] for cause in outcome(case, source)["causes"]] == [name]
+
+
 def test_parameters_lie_within_three_standard_deviations():
     z = [
         abs(value)
