@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +35,7 @@ __all__ = [
     "Distinguishability",
     "PlannedRun",
     "distinguishability",
+    "energy_left",
     "gained_log_likelihood",
     "normal_equations",
     "plan_contenders",
@@ -125,6 +127,17 @@ class Contender:
     positive: NDArray[np.bool_]
     signed: bool = False
 
+    def beside(self, other: Contender) -> Contender:
+        """Return this effect and another one as one contender that may be both at once, each in any shape."""
+        shapes = product(self.alternatives, other.alternatives)
+        return Contender(
+            f"{self.name} + {other.name}",
+            np.concatenate([self.columns, other.columns]),
+            block_diag(self.directions, other.directions),
+            tuple(np.concatenate(pair) for pair in shapes),
+            np.concatenate([self.positive, other.positive]),
+        )
+
 
 @dataclass(frozen=True)
 class Distinguishability:
@@ -187,10 +200,19 @@ def distinguishability(
     for i, one in enumerate(contenders):
         own = gram[np.ix_(one.columns, one.columns)]
         detectability[i] = np.sqrt(max(np.einsum("ar,ab,br->", one.directions, own, one.directions), 0.0))
-        for j, rival in enumerate(contenders):
-            if i != j:
-                energy[i, j] = min(_left(gram, one, rival, shape, largest_rival) for shape in rival.alternatives)
+        others = np.arange(count) != i
+        rivals = [rival for rival, other in zip(contenders, others, strict=True) if other]
+        energy[i, others] = energy_left(gram, one, rivals, largest_rival=largest_rival)
     return Distinguishability(tuple(one.name for one in contenders), detectability, energy)
+
+
+def energy_left(
+    gram: NDArray[np.float64], one: Contender, rivals: Sequence[Contender], *, largest_rival: float = SCALES[-1]
+) -> NDArray[np.float64]:
+    """Return the energy of an effect that each of the rivals, at its best, does not explain, shape (k,)."""
+    return np.array(
+        [min(_left(gram, one, rival, shape, largest_rival) for shape in rival.alternatives) for rival in rivals]
+    )
 
 
 def _left(

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from gfimu.array import AccelerometerArray
-from gfimu.diagnosis.distinguishability import PlannedRun, predict_distinguishability
+from gfimu.diagnosis.distinguishability import PlannedRun, energy_left, normal_equations, plan_contenders
 from gfimu.diagnosis.verdict import Diagnosis, NamedCause
 from gfimu.errors import InputError
 from gfimu.recording import Recording
@@ -30,6 +30,7 @@ _MG = STANDARD_GRAVITY / 1000.0
 _TURN = 2 * np.pi
 _CLIPPED_ABOVE = 1.07
 _FASTEST_SHARE = 0.02
+_CLOSEST = 8  # of the other effects, of which one is taken into every pair
 _WITHOUT_NOISE_FREE_FORM = frozenset(
     {"noise", "bias_random_walk", "coarse_resolution", "stuck_channel", "dropped_frames"}
 )
@@ -41,7 +42,8 @@ class HiddenWorld:
 
     ``reached`` is the d′ of the least hidden effect that has a noise-free form, infinite where none has, the drive
     known. Of a single effect with sizes, ``drive_unknown`` is its d′ with the drive unknown and ``left_by`` what of
-    that each other effect of the library leaves at its best.
+    that each other effect of the library leaves at its best. Of one that is taken out of the library, ``left_by_two``
+    is what the best two others together leave.
     """
 
     recording: Recording
@@ -50,6 +52,7 @@ class HiddenWorld:
     reached: float
     drive_unknown: float | None = None
     left_by: Mapping[str, float] = field(default_factory=dict)
+    left_by_two: float | None = None
 
 
 @dataclass(frozen=True)
@@ -108,15 +111,15 @@ def draw_world(case: Case, source: str = "") -> HiddenWorld:
     truth = tuple((effect.name, effect.parameters) for effect in hidden)
     world = HiddenWorld(recording, twin, truth, min(sizes, default=np.inf))
     if len(hidden) == 1 and sizes and hidden[0].sizes(twin.array):
-        drive_unknown, left_by = _drive_unknown(twin, hidden[0], motion, setting)
-        world = replace(world, drive_unknown=drive_unknown, left_by=left_by)
+        world = _with_limits(world, hidden[0], motion, setting, pairs=bool(case.without))
     return world
 
 
-def _drive_unknown(
-    twin: Twin, hidden: Effect, motion: SpinMotion, setting: Measurement
-) -> tuple[float, dict[str, float]]:
-    """Return d′ of an effect with the drive unknown, and what of it is left by each other effect of the library."""
+def _with_limits(
+    world: HiddenWorld, hidden: Effect, motion: SpinMotion, setting: Measurement, *, pairs: bool
+) -> HiddenWorld:
+    """Return the world with what an ideal observer could see of its single effect, and what others leave of it."""
+    twin = Twin(array=world.twin.array, array_name=world.twin.array_name, sample_rate=world.twin.sample_rate)
     rivals = [
         name
         for name, family in twin.families().items()
@@ -129,9 +132,28 @@ def _drive_unknown(
         reference_noise=setting.tacho_noise,
         bias_instability=setting.bias_instability,
     )
-    whole = Twin(array=twin.array, array_name=twin.array_name, sample_rate=twin.sample_rate)
-    told = predict_distinguishability(whole, [hidden, *rivals], [run])
-    return float(told.detectability[0]), dict(zip(rivals, np.sqrt(told.energy[0, 1:]).tolist(), strict=True))
+    signatures, (own, *others) = plan_contenders(
+        twin, [hidden, *rivals], duration=setting.duration, sample_rate=setting.sample_rate
+    )
+    gram, _ = normal_equations([run.segment(twin, 0)], signatures)
+    size = own.directions[:, 0]
+    left = np.sqrt(energy_left(gram, own, others))
+    by_two = None
+    if pairs:
+        closest = np.argsort(left)[:_CLOSEST]
+        couples = [
+            others[first].beside(other)
+            for first in closest
+            for second, other in enumerate(others)
+            if second not in closest or second > first
+        ]
+        by_two = float(energy_left(gram, own, couples).min()) ** 0.5
+    return replace(
+        world,
+        drive_unknown=max(float(size @ gram[np.ix_(own.columns, own.columns)] @ size), 0.0) ** 0.5,
+        left_by=dict(zip(rivals, left.tolist(), strict=True)),
+        left_by_two=by_two,
+    )
 
 
 def _reaches(twin: Twin, motion: SpinMotion, setting: Measurement, level: float) -> bool:
@@ -187,7 +209,12 @@ def run_case(case: Case, source: str = "") -> dict[str, Any]:
     else:
         found = outcome_of(diagnosis, world.truth)
     times = {"wall_s": time.perf_counter() - wall, "processor_s": time.process_time() - processor}
-    reached = {"reached": world.reached, "drive_unknown": world.drive_unknown, "left_by": dict(world.left_by)}
+    reached = {
+        "reached": world.reached,
+        "drive_unknown": world.drive_unknown,
+        "left_by": dict(world.left_by),
+        "left_by_two": world.left_by_two,
+    }
     return {"key": case.key, "source": source or "sim.campaign", **case.to_dict(), **reached, **found, **times}
 
 

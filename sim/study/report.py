@@ -290,11 +290,17 @@ def _left_out(outcomes: Sequence[Outcome]) -> str:
         )
     header = ("hidden, not in the library", "runs", "unknown %", "said")
 
+    def left(outcome: Outcome) -> float:
+        return min((outcome.get("left_by") or {"": 0.0}).values())
+
     def taken(least: float, most: float = np.inf) -> list[Outcome]:
-        return [o for o in outside if o["without"] and least <= min((o.get("left_by") or {"": 0.0}).values()) < most]
+        return [o for o in outside if o["without"] and least <= left(o) < most]
 
     groups = {
         "exotic": [o for o in outside if o["study"] == "exotics"],
+        f"taken out, d′ > {2 * LEAST_APART:g} left by the best two others": [
+            o for o in outside if o["without"] and (o.get("left_by_two") or 0.0) > 2 * LEAST_APART
+        ],
         f"taken out, d′ > {2 * LEAST_APART:g} left by the best other effect": taken(2 * LEAST_APART),
         f"taken out, d′ {LEAST_APART:g} to {2 * LEAST_APART:g} left": taken(LEAST_APART, 2 * LEAST_APART),
         "taken out, imitated by one other effect": taken(0.0, LEAST_APART),

@@ -92,7 +92,7 @@ def test_an_interval_holds_its_rate():
 def test_an_effect_taken_out_is_as_far_from_the_rest_as_it_is_unlike_it(name, least, most):
     world = draw_world(Case("left_out", 5, (name,), 200.0, duration=20.0, without=name))
     assert least <= min(world.left_by.values()) <= most
-    assert min(world.left_by.values()) <= world.drive_unknown <= world.reached
+    assert world.left_by_two <= min(world.left_by.values()) <= world.drive_unknown <= world.reached
     assert name not in world.twin.families()
     line = next(
         row

@@ -1,5 +1,7 @@
 """Distinguishability: against brute force, closed forms, and what is known of confounding on a turntable."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -10,6 +12,7 @@ from gfimu.diagnosis.distinguishability import (
     Contender,
     PlannedRun,
     distinguishability,
+    energy_left,
     normal_equations,
     plan_contenders,
     predict_distinguishability,
@@ -108,6 +111,22 @@ def test_a_rival_of_one_sign_cannot_explain_the_opposite():
     _, other = nnls(signatures[:, 1:], -signatures[:, 0])
     both = distinguishability(gram, [contender("own", [0]), rival], largest_rival=np.inf)
     assert both.energy[0, 1] == pytest.approx((left**2 + other**2) / 2, rel=1e-6)
+
+
+def test_two_rivals_at_once_leave_what_a_projection_on_both_leaves():
+    rng = np.random.default_rng(4)
+    signatures = rng.standard_normal((60, 7))
+    own, one, other = contender("own", [0]), contender("one", [1, 2]), contender("other", [3, 4])
+    other = replace(other, alternatives=(other.columns, np.array([5, 6])))
+    both = one.beside(other)
+    assert both.name == "one + other"
+    lefts = []
+    for shape in ([1, 2, 3, 4], [1, 2, 5, 6]):
+        fit, *_ = np.linalg.lstsq(signatures[:, shape], signatures[:, 0])
+        lefts.append(np.sum((signatures[:, 0] - signatures[:, shape] @ fit) ** 2))
+    left = energy_left(signatures.T @ signatures, own, [one, both], largest_rival=np.inf)
+    assert left[1] == pytest.approx(min(lefts), rel=1e-9)
+    assert left[1] < left[0]
 
 
 @given(st.integers(0, 10_000))
