@@ -10,13 +10,14 @@ import numpy as np
 from gfimu.diagnosis.adequacy import left_over
 from gfimu.diagnosis.coloured_noise import NoiseLevels
 from gfimu.diagnosis.conclusion import conclude
-from gfimu.diagnosis.engine import LEAST_EXTRA_ODDS, Explanation, prune
+from gfimu.diagnosis.engine import Explanation
 from gfimu.diagnosis.free_body.diagnose import diagnose_body
 from gfimu.diagnosis.holdout import Holdout, gate_gains, held_out_gain, split_segments
 from gfimu.diagnosis.long_run import explain_any_length
 from gfimu.diagnosis.loose_calibration import LooseCalibration, loosen, relearned
 from gfimu.diagnosis.model import Effect, WorldModel
 from gfimu.diagnosis.prepared_runs import PreparedRuns
+from gfimu.diagnosis.pruning import LEAST_EXTRA_ODDS, prune
 from gfimu.diagnosis.refinement import refine
 from gfimu.diagnosis.segment import known_walk
 from gfimu.diagnosis.stochastic import UNEQUAL_WALK, WALK_ODDS, Walk, log_probability, walk_strength

@@ -16,6 +16,7 @@ from gfimu.diagnosis.far_starts import every_mode, from_far
 from gfimu.diagnosis.linearisation import Linearisation
 from gfimu.diagnosis.model import Effect, WorldModel
 from gfimu.diagnosis.nuisances import learn_noise, sharpen_drives, tune_drives
+from gfimu.diagnosis.pruning import RIVALS, near_rivals, prune
 from gfimu.diagnosis.refinement import Fit, refine
 from gfimu.diagnosis.run import Run
 from gfimu.diagnosis.search import search
@@ -24,12 +25,10 @@ from gfimu.diagnosis.signatures import SignatureSet, hypotheses, plan_signatures
 
 __all__ = [
     "FAIR_FIT",
-    "RIVALS",
     "Explanation",
     "Report",
     "explain",
     "make_segments",
-    "prune",
     "screen",
 ]
 
@@ -42,19 +41,8 @@ _MOST_CAUSES = 4
 _CLOSE = 12.0
 _GROSS = 150.0
 _WORTH_REFINING = -6.0
-_WORTH_PRUNING = 40.0
 FAIR_FIT = 1.6
 """Misfit per observation, in variances, above which something large is still missing."""
-RIVALS = 6
-"""How many other sets are judged beside the best."""
-LEAST_ODDS = 4.0
-"""Log odds that a single cause needs against nothing.
-
-Wide of what chance does: in 240 runs with nothing hidden (`threshold_nulls` of `sim.study`, not those that the false
-alarms are counted on) two reached even odds and none e against one.
-"""
-LEAST_EXTRA_ODDS = 7.0
-"""Log odds that a further cause, beside others or a fault of the data, needs against the set without it."""
 _ITERATIONS = 7
 _STEADY_NOISE = 0.1
 _FAINT = 500.0  # log odds of a mode whose frequency may not be settled
@@ -174,167 +162,144 @@ def explain(
         Called with the share done and a line of text.
     """
     tell = report or (lambda share, text: None)
-    for segment in segments:
-        segment.prepare_weights()
-    best = refine(segments, start, fixed, iterations=6 if start else 0)
-    fitted = refine(segments, start, fixed, iterations=8)
-    observations = sum(int(segment.weight_mask.sum()) for segment in segments)
-    fair = fitted.objective < FAIR_FIT * observations
-    if fair:
-        # The channels sharpen the drive unless something gross twists it.
-        tune_drives(segments, fitted, fixed)
-        fitted = sharpen_drives(segments, fitted, fixed)
-        best = fitted = refine(segments, start, fixed, drives=fitted.drives, iterations=8)
-    tried: dict[frozenset[tuple[str, str]], Fit] = {}
-    behind: dict[frozenset[tuple[str, str]], float] = {}  # how far, under the noise that both were judged by
-    settled_before = False
-    for round_number in range(_ROUNDS):
-        tell(0.1 + 0.8 * round_number / _ROUNDS, f"search {round_number + 1}")
-        signatures, screened = screen(segments, best, fixed, runs), best.key
-        candidates, singles, blocks = search(signatures, most=max(2, min(len(best.causes) + 1, _MOST_CAUSES)))
-        fits = {best.key: best}
-        gross = candidates[0].log_odds > _GROSS
-        leading = candidates[:_REFINED]
-        if gross and not settled_before:
-            # A large effect is far from linear: the right cause may be well down the linear list.
-            leading = [*candidates[:3], *(one for one in singles[:_REFINED] if one not in candidates[:3])]
-        for candidate in leading:
-            causes = [
-                signatures.hypotheses[number].cause(coordinates)
-                for number, coordinates in zip(candidate.members, blocks.coordinates(candidate.members), strict=True)
-            ]
-            key = frozenset(cause.key for cause in causes)
-            close = candidate.log_odds > max(candidates[0].log_odds - _CLOSE, _WORTH_REFINING)
-            if key in fits or not (close or (gross and len(causes) == 1 and key not in tried)):
-                continue
-            known = tried.get(key)
-            if known is not None:
-                causes = list(known.causes)
-            fits[key] = refine(segments, causes, fixed, drives=best.drives, iterations=_ITERATIONS)
-            if key not in tried and any("order" in cause.shape for cause in causes):
-                # Ripples locked to the angle lose their phase where the drive's angle has drifted.
-                other = refine(segments, causes, fixed, drives=fitted.drives, iterations=_ITERATIONS)
-                fits[key] = max(fits[key], other, key=_posterior)
-        # A start has been through this.
-        if round_number == 0 and not start and min(fit.objective for fit in fits.values()) > FAIR_FIT * observations:
-            for hypothesis in signatures.hypotheses:
-                if hypothesis.family.starts:
-                    tell(0.1, f"large sizes of {hypothesis.name}")
-                    large = from_far(segments, hypothesis, fixed, best.drives)
-                    fits[large.key] = max(fits.get(large.key, large), large, key=_posterior)
-        tried |= fits
-        winner = max(fits.values(), key=_posterior)
-        was_fair, fair = fair, fair or winner.objective < FAIR_FIT * observations
-        behind |= {key: winner.log_posterior - fit.log_posterior for key, fit in fits.items()}
-        settled = winner.key == best.key
-        best = winner
-        change = learn_noise(segments, best, fixed)
-        tune_drives(segments, best, fixed)
-        best = refine(segments, best.causes, fixed, drives=best.drives, iterations=6)
-        if fair and not was_fair:
-            best = sharpen_drives(segments, best, fixed)
-            fitted = refine(segments, start, fixed, drives=best.drives, iterations=8)  # on the same knots
-        if settled and (settled_before or change < _STEADY_NOISE):
+    search = _Search(segments, fixed, runs, start)
+    for number in range(_ROUNDS):
+        tell(0.1 + 0.8 * number / _ROUNDS, f"search {number + 1}")
+        if search.round(first=number == 0, tell=tell):
             break
-        settled_before = settled
     tell(0.85, "prune")
-    done: dict[frozenset[tuple[str, str]], Fit] = {}
-    best, without = prune(segments, best, fixed, done)
-    near = [
-        tried[key]
-        for key in sorted(behind, key=behind.__getitem__)
-        if best.causes and key != best.key and tried[key].causes and behind[key] < _CLOSE + 10.0
-    ]
-    rivals = _rivals(segments, best, near[:RIVALS], fixed, done)
-    unique = {rival.key: rival for rival in rivals if rival.causes and rival.key != best.key}
-    better = max(unique.values(), key=_posterior, default=best)
-    if better.log_posterior > best.log_posterior:
-        unique[best.key] = best
-        best, without = prune(segments, better, fixed, done)
-        unique.pop(best.key, None)
-    if "resonance" in without and best.log_posterior - without["resonance"].log_posterior < _FAINT:
-        best = every_mode(segments, best, fixed)
+    best, without, rivals = search.judged()
     tell(0.9, "compare")
     nothing = refine(segments, (), fixed, drives=best.drives, iterations=8) if best.causes else best
     for segment, drive in zip(segments, best.drives, strict=True):
         segment.coefficients = drive
-    if best.key != screened:
-        signatures = screen(segments, best, fixed, runs)
     return Explanation(
         best,
-        tuple(sorted(unique.values(), key=_posterior, reverse=True)),
+        tuple(sorted(rivals, key=_posterior, reverse=True)),
         nothing,
         without,
         tuple(segments),
         tuple(tuple(known) for known in fixed),
-        signatures,
+        search.screened(best),
     )
 
 
-def _rivals(
-    segments: Sequence[Segment],
-    best: Fit,
-    near: Sequence[Fit],
-    fixed: Sequence[Sequence[Effect]],
-    done: dict[frozenset[tuple[str, str]], Fit],
-) -> list[Fit]:
-    """Refine other sets under the noise and drive prior of the best one; those that come close are pruned too."""
-    rivals = []
-    for fit in near:
-        if len(fit.causes) > len(best.causes) + 1:
-            continue
-        rival = refine(segments, fit.causes, fixed, drives=best.drives, iterations=6)
-        if rival.key > best.key and rival.log_posterior < best.log_posterior:
-            continue  # the best set with something superfluous
-        if rival.log_posterior > best.log_posterior - _WORTH_PRUNING:
-            rival = prune(segments, rival, fixed, done)[0]
-        rivals.append(rival)
-    return rivals
-
-
-def prune(
-    segments: Sequence[Segment],
-    fit: Fit,
-    fixed: Sequence[Sequence[Effect]],
-    done: dict[frozenset[tuple[str, str]], Fit] | None = None,
-) -> tuple[Fit, dict[str, Fit]]:
-    """Drop causes that the data hardly ask for.
+class _Search:
+    """The best set so far and what was tried.
 
     Parameters
     ----------
-    segments : sequence of Segment
-        The data.
-    fit : Fit
-        What to prune.
-    fixed : sequence of sequence of Effect
-        Effects known beforehand, per segment.
-    done : dict, optional
-        Sets refined before under the same noise; those refined here are added.
-
-    Returns
-    -------
-    fit : Fit
-        What the data ask for.
-    without : dict of str to Fit
-        By cause, the best fit without it.
+    segments, fixed, runs, start
+        As `explain` takes them.
     """
-    known = {} if done is None else done
-    faults = any(effect.place == "data" for effects in fixed for effect in effects)
-    faults |= any(segment.rounding > 0 for segment in segments)
-    while True:
-        without = {}
-        for cause in fit.causes:
-            others = [other for other in fit.causes if other.name != cause.name]
-            key = frozenset(other.key for other in others)
-            if key not in known:
-                known[key] = refine(segments, others, fixed, drives=fit.drives, iterations=8)
-            without[cause.name] = known[key]
-        if not without:
-            return fit, without
-        lost = {name: fit.log_posterior - other.log_posterior for name, other in without.items()}
-        weakest = min(lost, key=lost.__getitem__)
-        needed = LEAST_ODDS if len(fit.causes) == 1 and not faults else LEAST_EXTRA_ODDS
-        needed += sum(cause.family.inexactness * lost[cause.name] for cause in fit.causes if cause.name != weakest)
-        if lost[weakest] >= needed:
-            return fit, without
-        fit = without[weakest]
+
+    def __init__(
+        self, segments: Sequence[Segment], fixed: Sequence[Sequence[Effect]], runs: int, start: Sequence[Cause]
+    ) -> None:
+        self._segments, self._fixed, self._runs, self._start = segments, fixed, runs, start
+        for segment in segments:
+            segment.prepare_weights()
+        self._observations = sum(int(segment.weight_mask.sum()) for segment in segments)
+        best = refine(segments, start, fixed, iterations=6 if start else 0)
+        fitted = refine(segments, start, fixed, iterations=8)
+        self._fair = self._is_fair(fitted)
+        if self._fair:
+            # The channels sharpen the drive unless something gross twists it.
+            tune_drives(segments, fitted, fixed)
+            fitted = sharpen_drives(segments, fitted, fixed)
+            best = fitted = refine(segments, start, fixed, drives=fitted.drives, iterations=8)
+        self._best, self._fitted = best, fitted
+        self._tried: dict[frozenset[tuple[str, str]], Fit] = {}
+        # How far each set was behind, under the noise that both were judged by.
+        self._behind: dict[frozenset[tuple[str, str]], float] = {}
+        self._settled = False
+
+    def _is_fair(self, fit: Fit) -> bool:
+        return fit.objective < FAIR_FIT * self._observations
+
+    def round(self, *, first: bool, tell: Report) -> bool:
+        """Screen about the best set, refine what leads, relearn the noise; tells whether nothing changes any more."""
+        segments, fixed = self._segments, self._fixed
+        self._signatures, self._screened = screen(segments, self._best, fixed, self._runs), self._best.key
+        fits = self._refined_leaders()
+        # A start has been through this.
+        if first and not self._start and not any(self._is_fair(fit) for fit in fits.values()):
+            for hypothesis in self._signatures.hypotheses:
+                if hypothesis.family.starts:
+                    tell(0.1, f"large sizes of {hypothesis.name}")
+                    large = from_far(segments, hypothesis, fixed, self._best.drives)
+                    fits[large.key] = max(fits.get(large.key, large), large, key=_posterior)
+        self._tried |= fits
+        winner = max(fits.values(), key=_posterior)
+        self._behind |= {key: winner.log_posterior - fit.log_posterior for key, fit in fits.items()}
+        settled = winner.key == self._best.key
+        change = learn_noise(segments, winner, fixed)
+        tune_drives(segments, winner, fixed)
+        self._best = refine(segments, winner.causes, fixed, drives=winner.drives, iterations=6)
+        if not self._fair and self._is_fair(winner):
+            self._fair = True
+            self._best = sharpen_drives(segments, self._best, fixed)
+            # On the same knots.
+            self._fitted = refine(segments, self._start, fixed, drives=self._best.drives, iterations=8)
+        done = settled and (self._settled or change < _STEADY_NOISE)
+        self._settled = settled
+        return done
+
+    def _refined_leaders(self) -> dict[frozenset[tuple[str, str]], Fit]:
+        """Refine the sets that lead the linear list; returns them and the best set so far by their keys."""
+        candidates, singles, blocks = search(
+            self._signatures, most=max(2, min(len(self._best.causes) + 1, _MOST_CAUSES))
+        )
+        fits = {self._best.key: self._best}
+        gross = candidates[0].log_odds > _GROSS
+        leading = candidates[:_REFINED]
+        if gross and not self._settled:
+            # A large effect is far from linear: the right cause may be well down the linear list.
+            leading = [*candidates[:3], *(one for one in singles[:_REFINED] if one not in candidates[:3])]
+        for candidate in leading:
+            causes = [
+                self._signatures.hypotheses[number].cause(coordinates)
+                for number, coordinates in zip(candidate.members, blocks.coordinates(candidate.members), strict=True)
+            ]
+            key = frozenset(cause.key for cause in causes)
+            close = candidate.log_odds > max(candidates[0].log_odds - _CLOSE, _WORTH_REFINING)
+            new = key not in self._tried
+            if key in fits or not (close or (gross and len(causes) == 1 and new)):
+                continue
+            if not new:
+                causes = list(self._tried[key].causes)
+            fits[key] = self._refined(causes, self._best)
+            if new and any("order" in cause.shape for cause in causes):
+                # Ripples locked to the angle lose their phase where the drive's angle has drifted.
+                fits[key] = max(fits[key], self._refined(causes, self._fitted), key=_posterior)
+        return fits
+
+    def _refined(self, causes: Sequence[Cause], about: Fit) -> Fit:
+        return refine(self._segments, causes, self._fixed, drives=about.drives, iterations=_ITERATIONS)
+
+    def judged(self) -> tuple[Fit, dict[str, Fit], list[Fit]]:
+        """Prune the best set and compare it with what came close: the best, the best without each cause, the rivals."""
+        segments, fixed, best = self._segments, self._fixed, self._best
+        done: dict[frozenset[tuple[str, str]], Fit] = {}
+        best, without = prune(segments, best, fixed, done)
+        near = [
+            self._tried[key]
+            for key in sorted(self._behind, key=self._behind.__getitem__)
+            if best.causes and key != best.key and self._tried[key].causes and self._behind[key] < _CLOSE + 10.0
+        ]
+        rivals = near_rivals(segments, best, near[:RIVALS], fixed, done)
+        unique = {rival.key: rival for rival in rivals if rival.causes and rival.key != best.key}
+        better = max(unique.values(), key=_posterior, default=best)
+        if better.log_posterior > best.log_posterior:
+            unique[best.key] = best
+            best, without = prune(segments, better, fixed, done)
+            unique.pop(best.key, None)
+        if "resonance" in without and best.log_posterior - without["resonance"].log_posterior < _FAINT:
+            best = every_mode(segments, best, fixed)
+        return best, without, list(unique.values())
+
+    def screened(self, about: Fit) -> SignatureSet:
+        """Return the signatures about a set: the last ones where they are."""
+        if about.key == self._screened:
+            return self._signatures
+        return screen(self._segments, about, self._fixed, self._runs)

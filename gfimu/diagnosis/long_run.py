@@ -10,9 +10,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from gfimu.diagnosis.causes import Cause
-from gfimu.diagnosis.engine import RIVALS, Explanation, Report, explain, prune
+from gfimu.diagnosis.engine import Explanation, Report, explain
 from gfimu.diagnosis.model import Effect
 from gfimu.diagnosis.nuisances import learn_noise, sharpen_drives
+from gfimu.diagnosis.pruning import RIVALS, prune
 from gfimu.diagnosis.refinement import refine
 from gfimu.diagnosis.segment import Segment
 

@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 
 from gfimu.diagnosis.calibration_residue import CalibrationResidue, tolerance_of
 from gfimu.diagnosis.causes import Cause, Signature, effects_of_run
-from gfimu.diagnosis.engine import FAIR_FIT, Explanation, prune
+from gfimu.diagnosis.engine import FAIR_FIT, Explanation
 from gfimu.diagnosis.holdout import Holdout
 from gfimu.diagnosis.long_run import explain_any_length
 from gfimu.diagnosis.model import Effect, EffectFamily, WorldModel
 from gfimu.diagnosis.prepared_runs import PreparedRuns
+from gfimu.diagnosis.pruning import prune
 from gfimu.diagnosis.refinement import Fit, refine
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.signatures import signature_columns

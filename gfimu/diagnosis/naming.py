@@ -17,6 +17,7 @@ from gfimu.diagnosis.refinement import Fit
 from gfimu.diagnosis.verdict import Rival
 
 __all__ = [
+    "AMBIGUOUS_ODDS",
     "cause_parameters",
     "conflicting",
     "describe",
@@ -29,7 +30,8 @@ __all__ = [
 TEMPERATURE = 1.3
 """Softening of log posteriors, as the linear-Gaussian model is never quite true."""
 _MOST_CERTAIN = 0.999
-_AMBIGUOUS_ODDS = 2.0
+AMBIGUOUS_ODDS = 2.0
+"""Log odds within which a rival set counts as not told from the best one."""
 _MIMIC_ENERGY = 6.0
 
 
@@ -119,7 +121,7 @@ def conflicting(explanation: Explanation) -> list[Fit]:
         for rival in explanation.rivals
         if rival.names != best.names
         and len(rival.causes) <= len(best.causes)
-        and rival.log_posterior > best.log_posterior - _AMBIGUOUS_ODDS
+        and rival.log_posterior > best.log_posterior - AMBIGUOUS_ODDS
     ]
 
 

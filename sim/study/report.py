@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from scipy.stats import beta, norm
 
 from gfimu.atomic_file import write_text
+from gfimu.diagnosis.naming import AMBIGUOUS_ODDS
+from gfimu.diagnosis.pruning import LEAST_ODDS
 from sim.study.figures import draw_confusion, draw_detection, draw_reliability
 
 __all__ = ["Tally", "ideal_share", "rate_with_interval", "score", "summarise", "visible", "write_report"]
@@ -34,9 +36,6 @@ LEAST_SEPARABLE = 3.0
 
 The log odds of an ideal observer are 4.5 ± 3 there.
 """
-
-_LEAST_ODDS, _AMBIGUOUS_ODDS = 4.0, 2.0
-"""Log odds that the diagnosis asks against nothing, and against a rival, before it names an effect alone."""
 
 _DRIVE_UNKNOWN = (0.0, 5.0, 7.0, 10.0, 15.0, 60.0, np.inf)
 
@@ -96,8 +95,8 @@ def ideal_share(outcome: Outcome) -> float | None:
     """
     if outcome.get("drive_unknown") is None or len(outcome["effects"]) != 1:
         return None
-    sizes = [(outcome["drive_unknown"], _LEAST_ODDS)]
-    sizes += [(left, _AMBIGUOUS_ODDS) for left in outcome["left_by"].values()]
+    sizes = [(outcome["drive_unknown"], LEAST_ODDS)]
+    sizes += [(left, AMBIGUOUS_ODDS) for left in outcome["left_by"].values()]
     return min(float(norm.cdf(size / 2 - odds / size)) if size > 0 else 0.0 for size, odds in sizes)
 
 

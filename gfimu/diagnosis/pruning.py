@@ -1,0 +1,92 @@
+"""Pruning: what the data hardly ask for is dropped, and rivals are judged as the best set was."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from gfimu.diagnosis.model import Effect
+from gfimu.diagnosis.refinement import Fit, refine
+from gfimu.diagnosis.segment import Segment
+
+__all__ = ["LEAST_EXTRA_ODDS", "LEAST_ODDS", "RIVALS", "near_rivals", "prune"]
+
+LEAST_ODDS = 4.0
+"""Log odds that a single cause needs against nothing.
+
+Wide of what chance does: in 240 runs with nothing hidden (`threshold_nulls` of `sim.study`, not those that the false
+alarms are counted on) two reached even odds and none e against one.
+"""
+LEAST_EXTRA_ODDS = 7.0
+"""Log odds that a further cause, beside others or a fault of the data, needs against the set without it."""
+RIVALS = 6
+"""How many other sets are judged beside the best."""
+_WORTH_PRUNING = 40.0
+
+
+def prune(
+    segments: Sequence[Segment],
+    fit: Fit,
+    fixed: Sequence[Sequence[Effect]],
+    done: dict[frozenset[tuple[str, str]], Fit] | None = None,
+) -> tuple[Fit, dict[str, Fit]]:
+    """Drop causes that the data hardly ask for.
+
+    Parameters
+    ----------
+    segments : sequence of Segment
+        The data.
+    fit : Fit
+        What to prune.
+    fixed : sequence of sequence of Effect
+        Effects known beforehand, per segment.
+    done : dict, optional
+        Sets refined before under the same noise; those refined here are added.
+
+    Returns
+    -------
+    fit : Fit
+        What the data ask for.
+    without : dict of str to Fit
+        By cause, the best fit without it.
+    """
+    known = {} if done is None else done
+    faults = any(effect.place == "data" for effects in fixed for effect in effects)
+    faults |= any(segment.rounding > 0 for segment in segments)
+    while True:
+        without = {}
+        for cause in fit.causes:
+            others = [other for other in fit.causes if other.name != cause.name]
+            key = frozenset(other.key for other in others)
+            if key not in known:
+                known[key] = refine(segments, others, fixed, drives=fit.drives, iterations=8)
+            without[cause.name] = known[key]
+        if not without:
+            return fit, without
+        lost = {name: fit.log_posterior - other.log_posterior for name, other in without.items()}
+        weakest = min(lost, key=lost.__getitem__)
+        needed = LEAST_ODDS if len(fit.causes) == 1 and not faults else LEAST_EXTRA_ODDS
+        needed += sum(cause.family.inexactness * lost[cause.name] for cause in fit.causes if cause.name != weakest)
+        if lost[weakest] >= needed:
+            return fit, without
+        fit = without[weakest]
+
+
+def near_rivals(
+    segments: Sequence[Segment],
+    best: Fit,
+    near: Sequence[Fit],
+    fixed: Sequence[Sequence[Effect]],
+    done: dict[frozenset[tuple[str, str]], Fit],
+) -> list[Fit]:
+    """Refine other sets under the noise and drive prior of the best one; those that come close are pruned too."""
+    rivals = []
+    for fit in near:
+        if len(fit.causes) > len(best.causes) + 1:
+            continue
+        rival = refine(segments, fit.causes, fixed, drives=best.drives, iterations=6)
+        if rival.key > best.key and rival.log_posterior < best.log_posterior:
+            continue  # the best set with something superfluous
+        if rival.log_posterior > best.log_posterior - _WORTH_PRUNING:
+            rival = prune(segments, rival, fixed, done)[0]
+        rivals.append(rival)
+    return rivals
