@@ -10,7 +10,7 @@ import typer
 import gfimu
 from gfimu.errors import GfimuError, InputError
 
-__all__ = ["app", "main"]
+__all__ = ["main", "program"]
 
 COMMAND_FILES = (
     "demo",
@@ -29,15 +29,6 @@ COMMAND_FILES = (
     "view",
 )
 
-app = typer.Typer(
-    name="gfimu",
-    help="A gyro-free IMU in software: simulate, estimate, calibrate, diagnose.",
-    no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    rich_markup_mode="markdown",
-)
-
 
 def _version(show: bool) -> None:
     if show:
@@ -45,23 +36,32 @@ def _version(show: bool) -> None:
         raise typer.Exit
 
 
-@app.callback()
 def _options(
     version: bool = typer.Option(False, "--version", callback=_version, is_eager=True, help="Print the version."),
 ) -> None:
     """Collect the options of the program itself."""
 
 
-def _collect() -> None:
+def program() -> typer.Typer:
+    """Return the program with all its commands."""
+    app = typer.Typer(
+        name="gfimu",
+        help="A gyro-free IMU in software: simulate, estimate, calibrate, diagnose.",
+        no_args_is_help=True,
+        add_completion=False,
+        pretty_exceptions_enable=False,
+        rich_markup_mode="markdown",
+    )
+    app.callback()(_options)
     for name in COMMAND_FILES:
         importlib.import_module(f"gfimu.cli.{name}").register(app)
+    return app
 
 
 def main() -> None:
     """Run the program: exit code 0 when done, 2 on bad input, 1 on anything else."""
-    _collect()
     try:
-        app()
+        program()()
     except InputError as error:
         sys.stderr.write(f"gfimu: {error}\n")
         raise SystemExit(2) from None
