@@ -8,17 +8,16 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.ndimage import gaussian_filter1d, uniform_filter1d
+from scipy.ndimage import gaussian_filter1d
 from scipy.sparse import csr_array
 
-from gfimu.diagnosis.model import SpinState
+from gfimu.diagnosis.model import Spin, SpinState
 from gfimu.diagnosis.run import Run
 
-__all__ = ["ROUGHNESS_FACTOR", "AngleSpline", "SplineState", "roughness_prior", "smooth_rate"]
+__all__ = ["DEGREE", "AngleSpline", "ScaledSpin", "ShiftedSpin", "SplineState", "smooth_rate"]
 
-_DEGREE = 4
-_SMOOTHEST = 5.0
-ROUGHNESS_FACTOR = 6.0
+DEGREE = 4
+"""Of the spline of the angle."""
 _REMEMBERED = 8
 
 
@@ -45,12 +44,12 @@ class AngleSpline:
         self.widths = np.diff(self.breaks)
         self.start, self.stop = float(self.breaks[0]), float(self.breaks[-1])
         self.spacing = float(self.widths.max())
-        reach = np.arange(1, _DEGREE + 1)
+        reach = np.arange(1, DEGREE + 1)
         before = self.start - self.widths[0] * reach[::-1]
         self.knots = np.concatenate([before, self.breaks, self.stop + self.widths[-1] * reach])
-        self.size = len(self.widths) + _DEGREE
+        self.size = len(self.widths) + DEGREE
         self._pieces = _pieces(self.knots)
-        degrees = np.arange(1.0, _DEGREE + 1)[:, None]
+        degrees = np.arange(1.0, DEGREE + 1)[:, None]
         self._once = self._pieces[:, 1:] * degrees  # first derivative of each piece
         self._twice = self._once[:, 1:] * degrees[:-1]
         self._known: dict[bytes, tuple[NDArray[np.intp], NDArray[np.float64]]] = {}
@@ -86,7 +85,7 @@ class AngleSpline:
     def _local(self, t: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
         inside = np.clip(t, self.start, self.stop)
         first = np.clip(np.searchsorted(self.breaks, inside, side="right") - 1, 0, len(self.widths) - 1)
-        powers = np.vander(inside - self.breaks[first], _DEGREE + 1, increasing=True)[:, None]  # (n, 1, 5)
+        powers = np.vander(inside - self.breaks[first], DEGREE + 1, increasing=True)[:, None]  # (n, 1, 5)
         parts = (self._pieces, self._once, self._twice)
         values = np.stack([(powers[..., : part.shape[1]] @ part[first])[:, 0] for part in parts])
         beyond = t - inside
@@ -106,8 +105,8 @@ class AngleSpline:
         """
         first, values = self.local(t)
         data = np.einsum("sn,snj->nj", slopes, values)
-        columns = first[:, None] + np.arange(_DEGREE + 1)
-        ends = np.arange(0, data.size + 1, _DEGREE + 1)
+        columns = first[:, None] + np.arange(DEGREE + 1)
+        ends = np.arange(0, data.size + 1, DEGREE + 1)
         return csr_array((data.ravel(), columns.ravel(), ends), shape=(len(t), self.size))
 
     def matrices(self, t: NDArray[np.float64]) -> tuple[csr_array, csr_array, csr_array]:
@@ -118,10 +117,10 @@ class AngleSpline:
     def roughness_rows(self) -> csr_array:
         """Return the matrix from the coefficients to the third derivative of the rate per knot interval, rad/s⁴."""
         # The fourth derivative of a quartic is constant on each interval.
-        fourth = 24.0 * self._pieces[:, _DEGREE]  # (k, 5)
+        fourth = 24.0 * self._pieces[:, DEGREE]  # (k, 5)
         rows = len(fourth)
-        columns = np.arange(rows)[:, None] + np.arange(_DEGREE + 1)
-        ends = np.arange(0, fourth.size + 1, _DEGREE + 1)
+        columns = np.arange(rows)[:, None] + np.arange(DEGREE + 1)
+        ends = np.arange(0, fourth.size + 1, DEGREE + 1)
         return csr_array((fourth.ravel(), columns.ravel(), ends), shape=(rows, self.size))
 
     def interval_centres(self) -> NDArray[np.float64]:
@@ -154,9 +153,9 @@ def _pieces(knots: NDArray[np.float64]) -> NDArray[np.float64]:
 
     The recurrence of Cox and de Boor (de Boor 1978, ch. X) on polynomials instead of values.
     """
-    start = np.arange(_DEGREE, len(knots) - _DEGREE - 1)  # knot at which each interval starts
+    start = np.arange(DEGREE, len(knots) - DEGREE - 1)  # knot at which each interval starts
     lower = np.ones((len(start), 1, 1))  # (k, powers, functions)
-    for degree in range(1, _DEGREE + 1):
+    for degree in range(1, DEGREE + 1):
         out = np.zeros((len(start), degree + 1, degree + 1))
         for function in range(degree + 1):
             knot = start - degree + function
@@ -189,10 +188,36 @@ class _SplineSpin:
             if len(self._known) >= _REMEMBERED:
                 self._known.pop(next(iter(self._known)))
             first, values = self._spline.local(np.atleast_1d(times))
-            local = self._coefficients[first[:, None] + np.arange(_DEGREE + 1)]  # (n, 5)
+            local = self._coefficients[first[:, None] + np.arange(DEGREE + 1)]  # (n, 5)
             state = np.einsum("snj,nj->sn", values, local).reshape(3, *times.shape)
             self._known[key] = SplineState(*state)
         return self._known[key]
+
+
+class ScaledSpin:
+    """A spin over the gain of the reference that it was read by."""
+
+    def __init__(self, spin: Spin, gain: float) -> None:
+        self._spin, self._gain = spin, gain
+
+    def at(self, t: ArrayLike) -> SpinState:
+        """Return the state at times (n,), s."""
+        state = self._spin.at(t)
+        return SplineState(state.angle / self._gain, state.rate / self._gain, state.acceleration / self._gain)
+
+
+class ShiftedSpin:
+    """A spin with one state shifted by a constant."""
+
+    def __init__(self, spin: Spin, place: int, step: float) -> None:
+        self._spin, self._place, self._step = spin, place, step
+
+    def at(self, t: ArrayLike) -> SpinState:
+        """Return the state at times (n,), s."""
+        state = self._spin.at(t)
+        parts = [state.angle, state.rate, state.acceleration]
+        parts[self._place] = parts[self._place] + self._step
+        return SplineState(*parts)
 
 
 def smooth_rate(run: Run, *, is_angle: bool, width: float = 0.1) -> NDArray[np.float64]:
@@ -202,43 +227,3 @@ def smooth_rate(run: Run, *, is_angle: bool, width: float = 0.1) -> NDArray[np.f
     sigma = width / run.sample_period / 2.0
     smooth = gaussian_filter1d(reference, max(sigma, 0.5), mode="nearest")
     return np.asarray(np.gradient(smooth, run.sample_period)) if is_angle else np.asarray(smooth)
-
-
-def roughness_prior(
-    run: Run, spline: AngleSpline, *, is_angle: bool, reference_noise: float, factor: float = 1.0
-) -> NDArray[np.float64]:
-    """Return the standard deviation of the third derivative of the rate per knot interval, rad/s⁴.
-
-    Loose on ramps and stiff on plateaus, so that a ripple at constant speed is a discrepancy and not a motion.
-
-    Parameters
-    ----------
-    run : Run
-        The run; its smoothed reference tells where the motion is rough.
-    spline : AngleSpline
-        The spline.
-    is_angle : bool
-        Whether the reference is an angle.
-    reference_noise : float
-        White noise of the reference, rad/s or rad.
-    factor : float
-        Multiplier of the whole prior.
-
-    Returns
-    -------
-    ndarray, shape (m − 4,)
-        Standard deviations.
-    """
-    period = run.sample_period
-    rate = smooth_rate(run, is_angle=is_angle)
-    third = np.gradient(np.gradient(np.gradient(rate, period), period), period)
-    window = max(int(0.3 / period), 3)
-    power = np.maximum(uniform_filter1d(third**2, window, mode="nearest"), 0.0)
-    # What white noise of the reference alone gives after the same smoothing and differentiation.
-    noise = np.random.default_rng(0).standard_normal(4096) * reference_noise
-    smooth = gaussian_filter1d(noise, max(0.05 / period, 0.5))
-    for _ in range(4 if is_angle else 3):
-        smooth = np.gradient(smooth, period)
-    power = np.maximum(power - 1.5 * float(np.mean(smooth[50:-50] ** 2)), 0.0)
-    at_knots = np.interp(spline.interval_centres(), run.t, power)
-    return factor * np.sqrt(ROUGHNESS_FACTOR**2 * at_knots + _SMOOTHEST**2)

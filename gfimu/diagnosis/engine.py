@@ -20,8 +20,9 @@ from gfimu.diagnosis.pruning import RIVALS, near_rivals, prune
 from gfimu.diagnosis.refinement import Fit, refine
 from gfimu.diagnosis.run import Run
 from gfimu.diagnosis.search import search
-from gfimu.diagnosis.segment import Segment, difference_noise, over_segments
+from gfimu.diagnosis.segment import Segment, difference_noise
 from gfimu.diagnosis.signatures import SignatureSet, hypotheses, plan_signatures, signature_columns
+from gfimu.diagnosis.threads import over_segments
 
 __all__ = [
     "FAIR_FIT",

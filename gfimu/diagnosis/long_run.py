@@ -66,7 +66,7 @@ def explain_any_length(
     for place in rest:
         like = next(one for one in part.segments if one.index == segments[place].index)
         segments[place].set_levels(like.levels)
-        segments[place].drive_factor, segments[place].rounding = like.drive_factor, like.rounding
+        segments[place].roughness.factor, segments[place].rounding = like.roughness.factor, like.rounding
         segments[place].prepare_weights()
     fit = refine(segments, part.fit.causes, fixed)
     others, known = [segments[place] for place in rest], [fixed[place] for place in rest]

@@ -11,7 +11,8 @@ from gfimu.diagnosis.causes import effects_of_run
 from gfimu.diagnosis.coloured_noise import NoiseLevels, estimate_flicker, white_level
 from gfimu.diagnosis.model import Effect
 from gfimu.diagnosis.refinement import Fit, refine
-from gfimu.diagnosis.segment import Segment, over_segments
+from gfimu.diagnosis.segment import Segment
+from gfimu.diagnosis.threads import over_segments
 
 __all__ = ["learn_noise", "sharpen_drives", "tune_drives"]
 

@@ -17,8 +17,9 @@ from gfimu.diagnosis.evidence import SCALES, inverse, log_evidence
 from gfimu.diagnosis.linearisation import DriveElimination
 from gfimu.diagnosis.model import Effect
 from gfimu.diagnosis.search import EXTRA_CAUSE
-from gfimu.diagnosis.segment import Segment, over_segments
+from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.signatures import ANGLES, cause_columns, shape_moved
+from gfimu.diagnosis.threads import over_segments
 
 __all__ = ["Fit", "refine"]
 

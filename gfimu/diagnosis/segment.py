@@ -14,41 +14,31 @@ coefficient.
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from functools import cache
-from typing import Any, TypeVar
+from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
 from scipy.sparse import csr_array, diags_array
-from threadpoolctl import ThreadpoolController
 
 from gfimu.diagnosis.calibration_residue import CalibrationResidue
 from gfimu.diagnosis.coloured_noise import CosineBasis, NoiseLevels
-from gfimu.diagnosis.drive import ROUGHNESS_FACTOR, AngleSpline, SplineState, roughness_prior
+from gfimu.diagnosis.drive import AngleSpline, ScaledSpin, ShiftedSpin
 from gfimu.diagnosis.drive_jacobian import DriveJacobian, lag_matrix
 from gfimu.diagnosis.linearisation import DriveElimination, Linearisation
-from gfimu.diagnosis.model import Effect, Spin, SpinState, WorldModel
+from gfimu.diagnosis.model import Effect, Spin, WorldModel
+from gfimu.diagnosis.roughness import Roughness
 from gfimu.diagnosis.rounding import COARSE, rounded_likelihood, rounding_noise
 from gfimu.diagnosis.run import Run
 
-__all__ = ["Segment", "difference_noise", "known_walk", "over_segments"]
-
-Result = TypeVar("Result")
+__all__ = ["Segment", "difference_noise", "known_walk"]
 
 KNOT_SPACING = 0.05
 TIME_MARGIN = 0.5
-_DEGREE = 4
 _WALK = "bias_random_walk"
+_START_FACTOR = 2.0  # of the roughness prior, before the data have chosen
 _KNOWN_ANGLE_STD = 5e-3
 _LEAST_FACTOR = 0.05
-_ROUGH_FOR = 0.3  # s over which a drive is about as rough
-_PEAK = 0.04  # s that a corner's sharpest part lasts
-_PEAK_FACTOR = 2.0  # standard deviations of the prior to what a corner's sharpest part is
-_CORNER = 0.1  # s of a drive over which its bend is averaged before knots are set
 _BLUR = 0.3  # of the white noise: what an interval may miss of the acceleration at the longest arm
 _LEAST_WIDTH = 0.8  # sample periods of an interval that is cut in two
 _MOST_INTERVALS = 1.7  # times as many as without finer ones, for the cost grows with their square
@@ -56,25 +46,6 @@ _FACTOR_STEPS = 4
 _REST_FACTOR = 1.3
 _LEAST_GAIN = 0.05
 _STATE_STEPS = (1e-5, 1e-4, 1e-3)
-
-
-def over_segments(work: Callable[..., Result], *columns: Iterable[Any]) -> list[Result]:
-    """Call ``work`` with one item of each column per segment, on threads where there are several segments.
-
-    Segments share nothing that changes, and their algebra leaves the interpreter free.
-    """
-    rows = list(zip(*columns, strict=True))
-    workers = min(len(rows), os.cpu_count() or 1)
-    if workers < 2:
-        return [work(*row) for row in rows]
-    # Each segment's algebra on threads of its own as well would take half as long again.
-    with _thread_pools().limit(limits=1, user_api="blas"), ThreadPoolExecutor(workers) as pool:
-        return list(pool.map(lambda row: work(*row), rows))
-
-
-@cache
-def _thread_pools() -> ThreadpoolController:
-    return ThreadpoolController()
 
 
 class Segment:
@@ -110,7 +81,8 @@ class Segment:
         spacing = max(KNOT_SPACING, period)
         # Late chips and fast clocks ask for the motion beyond the ends of the run.
         margin = max(TIME_MARGIN, 2 * spacing)
-        self._take(AngleSpline.uniform(run.t[0] - margin, run.t[-1] + margin, spacing))
+        spline = AngleSpline.uniform(run.t[0] - margin, run.t[-1] + margin, spacing)
+        self._take(Roughness(spline, _START_FACTOR))
         # Fits are compared under the same knots, so these are chosen once.
         self.knots_chosen = False
         self.basis = CosineBasis(len(run.t), period, float(run.t[0] - start))
@@ -120,7 +92,6 @@ class Segment:
         self.rounding = 0.0
         self.levels = self._starting_levels()
         self.round_to(model.expected_noise(1.0 / period).quantum)
-        self.drive_factor = 2.0
         self.calibration_residue: CalibrationResidue | None = None
         self._set_roughness()
         self.coefficients = self._reference_drive = self._starting_drive()
@@ -135,13 +106,11 @@ class Segment:
         self._coefficients = values
         self.spin = self.spline.spin(values)
 
-    def _take(self, spline: AngleSpline) -> None:
-        """Use a spline, of which nothing is learnt yet."""
-        self.spline = spline
-        signs = (-1.0) ** np.arange(spline.size)
+    def _take(self, roughness: Roughness) -> None:
+        """Use a prior of the drive and its spline."""
+        self.roughness, self.spline = roughness, roughness.spline
+        signs = (-1.0) ** np.arange(self.spline.size)
         self._alternating = np.outer(signs, signs)
-        self._learned = np.zeros(spline.size - _DEGREE)
-        self._corners = np.zeros(spline.size - _DEGREE)
 
     # -- starting values -------------------------------------------------------------------------------------
 
@@ -152,23 +121,13 @@ class Segment:
         return NoiseLevels(white, np.append(np.full(len(expected.white), 2e-3), 0.0), known_walk(self.model))
 
     def _set_roughness(self) -> None:
-        std = roughness_prior(
-            self.run,
-            self.spline,
-            is_angle=self.is_angle,
-            reference_noise=float(self.levels.white[-1]),
-            factor=self.drive_factor,
+        self._rough, self.log_roughness = self.roughness.scaled_rows(
+            self.run, is_angle=self.is_angle, reference_noise=float(self.levels.white[-1])
         )
-        rows = self.spline.roughness_rows()
-        std = np.maximum(np.maximum(std, self.drive_factor * self._learned), self._corners)
-        self.log_roughness = float(np.sum(np.log(std)))
-        scaled = diags_array(1.0 / std) @ rows
-        begin = self.spline.matrices(self.run.t[:1])[0] / self.start_angle_std
-        self._rough = csr_array(scaled)
-        self._begin = csr_array(begin)
-        self.prior = csr_array(scaled.T @ scaled)
+        self._begin = csr_array(self.spline.matrices(self.run.t[:1])[0] / self.start_angle_std)
+        self.prior = csr_array(self._rough.T @ self._rough)
         if not self.is_angle:
-            self.prior = csr_array(self.prior + begin.T @ begin)
+            self.prior = csr_array(self.prior + self._begin.T @ self._begin)
 
     def _starting_drive(self) -> NDArray[np.float64]:
         """Fit the spline to the reference alone."""
@@ -186,12 +145,8 @@ class Segment:
     def adopt(self, whole: Segment) -> None:
         """Take noise levels, roughness and drive from a segment of which this is a part."""
         self.levels = whole.levels
-        self.drive_factor, self.rounding = whole.drive_factor, whole.rounding
-        self._take(whole.spline.within(self.spline.start, self.spline.stop))
-        self.knots_chosen = whole.knots_chosen
-        centres, known = self.spline.interval_centres(), whole.spline.interval_centres()
-        self._learned = np.interp(centres, known, whole._learned)
-        self._corners = np.interp(centres, known, whole._corners)
+        self.rounding, self.knots_chosen = whole.rounding, whole.knots_chosen
+        self._take(whole.roughness.on(whole.spline.within(self.spline.start, self.spline.stop), corners=True))
         self.start_angle, self.start_angle_std = float(whole.spin.at(self.run.t[:1]).angle[0]), _KNOWN_ANGLE_STD
         self._set_roughness()
         # Beyond the ends too: late chips ask for the motion there.
@@ -203,11 +158,7 @@ class Segment:
 
     def learn_roughness(self) -> None:
         """Take the roughness from the present drive, which knows the corners of ramps better than the reference."""
-        third = self.spline.roughness_rows() @ self.coefficients
-        self._learned = ROUGHNESS_FACTOR * np.sqrt(self.spline.moving_average(third**2, _ROUGH_FOR))
-        # Corners are no Gaussian noise: however stiff the drive is elsewhere, there it may bend as it does.
-        corner = self.spline.widths < 0.75 * self.spline.spacing
-        self._corners = np.where(corner, _PEAK_FACTOR * np.sqrt(self.spline.moving_average(third**2, _PEAK)), 0.0)
+        self.roughness.learn(self.coefficients)
         self._set_roughness()
 
     def sharpen(self) -> bool:
@@ -216,9 +167,8 @@ class Segment:
             return False
         arm = float(np.linalg.norm(self.model.array.positions, axis=1).max())
         allowed = _BLUR * float(np.median(self.levels.white[:-1])) / max(arm, 1e-3)  # rad/s²
-        old, kept, learned = self.spline, self.spin, self._learned
-        third = old.roughness_rows() @ self.coefficients
-        bend = np.sqrt(old.moving_average(third**2, _CORNER))
+        old, kept = self.spline, self.spin
+        bend = self.roughness.bend(self.coefficients)
         # What a piecewise parabola misses of an acceleration that bends by `bend` over its interval.
         cut = (bend * old.widths**2 / 16.0 > allowed) & (old.widths > _LEAST_WIDTH * self.run.sample_period)
         most = int(_MOST_INTERVALS * self.run.duration / KNOT_SPACING) - len(old.widths)
@@ -228,8 +178,7 @@ class Segment:
             return False
         spline = old.halved(cut)
         reach = np.arange(old.start, old.stop, 0.5 * float(spline.widths.min()))
-        self._take(spline)
-        self._learned = np.interp(spline.interval_centres(), old.interval_centres(), learned)
+        self._take(self.roughness.on(spline, corners=False))
         self._set_roughness()
         self.coefficients = spline.through(reach, kept.at(reach))
         self._reference_drive = self._starting_drive()
@@ -237,12 +186,12 @@ class Segment:
 
     def tune_roughness(self, effects: Sequence[Effect]) -> None:
         """Pick the scale of the roughness prior by marginal likelihood, the drive integrated out."""
-        kept, factor = self.coefficients, self.drive_factor
+        kept, factor = self.coefficients, self.roughness.factor
         # Below the least factor a prior that is learnt from the drive and then tightened again would tighten for ever.
         least = 0.0 if self.at_rest else _LEAST_FACTOR
 
         def likelihood(trial: float) -> float:
-            self.drive_factor = trial
+            self.roughness.factor = trial
             self._set_roughness()
             self.coefficients = kept
             line = self.linearise(effects)
@@ -258,7 +207,7 @@ class Segment:
                 best = (value, trial)
             if best[1] != factor:
                 break
-        self.coefficients, self.drive_factor = kept, best[1]
+        self.coefficients, self.roughness.factor = kept, best[1]
         self._set_roughness()
 
     @property
@@ -289,7 +238,7 @@ class Segment:
         """Return the table's motion for a drive (the present one) under effects."""
         drive = self.spin if spin is None else spin
         gain = self.model.reference_gain(effects)
-        return drive if gain == 1.0 else _Scaled(drive, np.copysign(max(abs(gain), _LEAST_GAIN), gain))
+        return drive if gain == 1.0 else ScaledSpin(drive, np.copysign(max(abs(gain), _LEAST_GAIN), gain))
 
     def reference_prediction(self, effects: Sequence[Effect]) -> NDArray[np.float64]:
         """Predict channels and reference, shape (n, c + 1), with the drive that the reference alone gives."""
@@ -383,7 +332,7 @@ class Segment:
         spin = self.spin
         slopes = np.empty((3, *base.shape))
         for place, step in enumerate(_STATE_STEPS):
-            moved = self.predict(effects, _Moved(spin, place, step))
+            moved = self.predict(effects, ShiftedSpin(spin, place, step))
             slopes[place] = (moved - base) / step * self.row_weight
         times = self.model.sample_times(self.run.t, effects)
         lag = self.model.sensing_lag(effects)
@@ -449,30 +398,6 @@ class Segment:
         left = linear.residual - linear.jacobian.forward(linear.drive.alone()[0]) - self.residue_readings(linear)
         slow = self.cosines.T @ left
         return (left - self.cosines @ (self.share * slow)) * self.inverse_variance
-
-
-class _Scaled:
-    """A spin over the gain of the reference that it was read by."""
-
-    def __init__(self, spin: Spin, gain: float) -> None:
-        self._spin, self._gain = spin, gain
-
-    def at(self, t: ArrayLike) -> SpinState:
-        state = self._spin.at(t)
-        return SplineState(state.angle / self._gain, state.rate / self._gain, state.acceleration / self._gain)
-
-
-class _Moved:
-    """A spin with one state shifted by a constant."""
-
-    def __init__(self, spin: Spin, place: int, step: float) -> None:
-        self._spin, self._place, self._step = spin, place, step
-
-    def at(self, t: ArrayLike) -> SpinState:
-        state = self._spin.at(t)
-        parts = [state.angle, state.rate, state.acceleration]
-        parts[self._place] = parts[self._place] + self._step
-        return SplineState(*parts)
 
 
 def known_walk(model: WorldModel) -> float:

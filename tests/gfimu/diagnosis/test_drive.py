@@ -114,10 +114,10 @@ def tuned(rate):
 
 def test_the_roughness_is_the_most_probable_one():
     segment = tuned(100.0)
-    best = segment.drive_factor
+    best = segment.roughness.factor
 
     def likelihood(factor):
-        segment.drive_factor = factor
+        segment.roughness.factor = factor
         segment._set_roughness()
         line = segment.linearise([])
         return segment.log_volume(line) - 0.5 * line.drive.objective
