@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.special import expit
 
 from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.adequacy import LEFT_OVER_ODDS
@@ -14,7 +15,15 @@ from gfimu.diagnosis.engine import Explanation
 from gfimu.diagnosis.loose_calibration import LooseCalibration
 from gfimu.diagnosis.model import Effect, WorldModel
 from gfimu.diagnosis.named_causes import contested, fault_causes, name_cause
-from gfimu.diagnosis.naming import cause_parameters, channel_share, conflicting, probabilities, rival_list
+from gfimu.diagnosis.naming import (
+    MOST_CERTAIN,
+    TEMPERATURE,
+    cause_parameters,
+    channel_share,
+    conflicting,
+    probabilities,
+    rival_list,
+)
 from gfimu.diagnosis.prepared_runs import PreparedRuns
 from gfimu.diagnosis.refinement import Fit
 from gfimu.diagnosis.residual_tests import LeftOver
@@ -125,7 +134,7 @@ def _stochastic_causes(explanation: Explanation, walk: Walk | None) -> list[Name
                 "bias_random_walk",
                 {"strength_m_s2_rts": walk.strength},
                 {"strength_m_s2_rts": walk.std},
-                0.99,
+                min(float(expit(walk.log_odds / TEMPERATURE)), MOST_CERTAIN),
                 why="the slow part of every channel grows like a random walk, beyond bias instability",
                 log_odds=walk.log_odds,
             )
@@ -138,7 +147,7 @@ def _stochastic_causes(explanation: Explanation, walk: Walk | None) -> list[Name
                 "noise",
                 {"factor": factor},
                 {"factor": std},
-                0.999,
+                MOST_CERTAIN,
                 why=f"the white noise of all channels is {factor:.2f} times the data sheet's",
             )
         )

@@ -9,13 +9,11 @@ from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.causes import Cause
 from gfimu.diagnosis.engine import Explanation
 from gfimu.diagnosis.model import Effect, EffectFamily
-from gfimu.diagnosis.naming import cause_parameters, describe, mimics
+from gfimu.diagnosis.naming import MOST_CERTAIN, cause_parameters, describe, mimics
 from gfimu.diagnosis.refinement import Fit
 from gfimu.diagnosis.verdict import NamedCause
 
 __all__ = ["contested", "fault_causes", "name_cause"]
-
-_CERTAIN = 0.999
 
 
 def fault_causes(effects: Iterable[Effect], why: Mapping[str, str]) -> list[NamedCause]:
@@ -24,7 +22,8 @@ def fault_causes(effects: Iterable[Effect], why: Mapping[str, str]) -> list[Name
     for effect in effects:
         kinds.setdefault(str(effect.name), effect)
     return [
-        NamedCause(name, dict(effect.parameters), {}, _CERTAIN, why=why.get(name, "")) for name, effect in kinds.items()
+        NamedCause(name, dict(effect.parameters), {}, MOST_CERTAIN, why=why.get(name, ""))
+        for name, effect in kinds.items()
     ]
 
 

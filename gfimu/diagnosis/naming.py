@@ -18,6 +18,8 @@ from gfimu.diagnosis.verdict import Rival
 
 __all__ = [
     "AMBIGUOUS_ODDS",
+    "MOST_CERTAIN",
+    "TEMPERATURE",
     "cause_parameters",
     "conflicting",
     "describe",
@@ -29,7 +31,8 @@ __all__ = [
 
 TEMPERATURE = 1.3
 """Softening of log posteriors, as the linear-Gaussian model is never quite true."""
-_MOST_CERTAIN = 0.999
+MOST_CERTAIN = 0.999
+"""Largest probability that is stated: the library may lack the true cause."""
 AMBIGUOUS_ODDS = 2.0
 """Log odds within which a rival set counts as not told from the best one."""
 _MIMIC_ENERGY = 6.0
@@ -42,7 +45,7 @@ def probabilities(explanation: Explanation) -> dict[str, float]:
     names = {name for fit in fits for name in fit.names}
     return {
         name: float(
-            np.clip(sum(w for w, fit in zip(weight, fits, strict=True) if name in fit.names), 0.0, _MOST_CERTAIN)
+            np.clip(sum(w for w, fit in zip(weight, fits, strict=True) if name in fit.names), 0.0, MOST_CERTAIN)
         )
         for name in names
     }
