@@ -107,6 +107,13 @@ class Cause:
         """Return the effect as it acts in a run."""
         return self.family.from_sizes(array, self.sizes(array, run), self.shape)
 
+    def reach(self, array: AccelerometerArray) -> NDArray[np.bool_] | None:
+        """Return which channels each coordinate changes, shape (k, c), or None where all may change."""
+        each = self.family.reach(array)
+        if each is None or len(each) != len(self.mixing):
+            return None
+        return np.asarray(np.abs(self.mixing.T) @ each > 0)
+
     def positive(self, array: AccelerometerArray) -> NDArray[np.bool_]:
         """Return which coordinates physics allows one sign only, shape (k,)."""
         sign = np.array([size.positive for size in self.family.sizes(array)])

@@ -210,11 +210,17 @@ def cause_columns(
         if any(size.step > 0.01 for size in sizes):
             # A tenth of the present size keeps one-sided, non-smooth effects on their side.
             step = max(step * 0.2, 0.05 * float(np.abs(cause.coordinates).max(initial=0.0)))
-        for place in range(len(cause.coordinates)):
+        reach = cause.reach(array)
+        mine = np.zeros((len(cause.coordinates), *nominal.shape))
+        for group in _disjoint(reach, len(mine)):
             moved = cause.coordinates.copy()
-            moved[place] += step
+            moved[group] += step
             effect = cause.at(moved).effect(array, segment.index)
-            columns.append((segment.predict([*before, effect, *after]) - nominal) / step)
+            change = (segment.predict([*before, effect, *after]) - nominal) / step
+            for place in group:
+                reached = slice(None) if reach is None else np.flatnonzero(reach[place])
+                mine[place][:, reached] = change[:, reached]
+        columns += list(mine)
         if shapes:
             for key, value in cause.free_shape.items():
                 moved_shape = {**cause.shape, key: shape_moved(key, value, _SHAPE_STEP)}
