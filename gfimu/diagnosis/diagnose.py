@@ -32,6 +32,7 @@ Report = Callable[[float, str], None]
 LEAST_GAIN = 2.0
 """Log predictive gain on held-out blocks below which a cause is withdrawn."""
 _WALK_ROUNDS = 3
+_HOPELESS = 300.0  # `Walk.unequal` with all other causes in place
 _SLOW = frozenset(
     {"bias", "warm_up", "bias_temperature", "gain_drift", "scale_factor", "quadratic", "gravity", "cross_axis"}
 )
@@ -128,6 +129,8 @@ def _explain(
         walk = walk_strength(before, base, fixed)
         if found is None and (walk.log_odds < WALK_ODDS or known_walk(model) > 0):
             break
+        if found is None and min(walk.unequal, walk_strength(segments, judged.fit, fixed).unequal) > _HOPELESS:
+            break  # whatever else were found beside it
         if found is not None and abs(walk.strength - found[1].strength) < walk.std:
             found = found[0], walk
             break

@@ -17,7 +17,7 @@ from gfimu.diagnosis.linearisation import Linearisation
 from gfimu.diagnosis.model import Effect, WorldModel
 from gfimu.diagnosis.nuisances import learn_noise, sharpen_drives, tune_drives
 from gfimu.diagnosis.pruning import RIVALS, near_rivals, prune
-from gfimu.diagnosis.refinement import Fit, refine
+from gfimu.diagnosis.refinement import Fit, refine, refine_each
 from gfimu.diagnosis.run import Run
 from gfimu.diagnosis.search import search
 from gfimu.diagnosis.segment import Segment, difference_noise
@@ -257,6 +257,9 @@ class _Search:
         if gross and not self._settled:
             # A large effect is far from linear: the right cause may be well down the linear list.
             leading = [*candidates[:3], *(one for one in singles[:_REFINED] if one not in candidates[:3])]
+        keys: list[frozenset[tuple[str, str]]] = []
+        sets: list[Sequence[Cause]] = []
+        about: list[Fit] = []
         for candidate in leading:
             causes = [
                 self._signatures.hypotheses[number].cause(coordinates)
@@ -265,18 +268,22 @@ class _Search:
             key = frozenset(cause.key for cause in causes)
             close = candidate.log_odds > max(candidates[0].log_odds - _CLOSE, _WORTH_REFINING)
             new = key not in self._tried
-            if key in fits or not (close or (gross and len(causes) == 1 and new)):
+            if key in fits or key in keys or not (close or (gross and len(causes) == 1 and new)):
                 continue
             if not new:
                 causes = list(self._tried[key].causes)
-            fits[key] = self._refined(causes, self._best)
-            if new and any("order" in cause.shape for cause in causes):
-                # Ripples locked to the angle lose their phase where the drive's angle has drifted.
-                fits[key] = max(fits[key], self._refined(causes, self._fitted), key=_posterior)
+            # Ripples locked to the angle lose their phase where the drive's angle has drifted.
+            again = [self._fitted] if new and any("order" in cause.shape for cause in causes) else []
+            for base in (self._best, *again):
+                keys.append(key)
+                sets.append(causes)
+                about.append(base)
+        drives = [base.drives for base in about]
+        for key, fit in zip(
+            keys, refine_each(self._segments, sets, self._fixed, drives, iterations=_ITERATIONS), strict=True
+        ):
+            fits[key] = max(fits.get(key, fit), fit, key=_posterior)
         return fits
-
-    def _refined(self, causes: Sequence[Cause], about: Fit) -> Fit:
-        return refine(self._segments, causes, self._fixed, drives=about.drives, iterations=_ITERATIONS)
 
     def judged(self) -> tuple[Fit, dict[str, Fit], list[Fit]]:
         """Prune the best set and compare it with what came close: the best, the best without each cause, the rivals."""

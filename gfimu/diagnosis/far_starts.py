@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.diagnosis.model import Effect
-from gfimu.diagnosis.refinement import Fit, refine
+from gfimu.diagnosis.refinement import Fit, refine, refine_each
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.signatures import Hypothesis
 
@@ -30,10 +30,8 @@ def from_far(
     drives: Sequence[NDArray[np.float64]],
 ) -> Fit:
     """Fit one effect from several large sizes, as its signature at nothing says little about them."""
-    fits = [
-        refine(segments, [hypothesis.cause(np.array([start]))], fixed, drives=drives, iterations=_FEW_ITERATIONS)
-        for start in hypothesis.family.starts
-    ]
+    sets = [[hypothesis.cause(np.array([start]))] for start in hypothesis.family.starts]
+    fits = refine_each(segments, sets, fixed, [drives] * len(sets), iterations=_FEW_ITERATIONS)
     best = max(fits, key=lambda fit: fit.log_posterior)
     return refine(segments, best.causes, fixed, drives=best.drives, iterations=_ITERATIONS)
 
@@ -48,11 +46,11 @@ def every_mode(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[E
     duration = max(segment.run.duration for segment in segments)
     grid = mode.family.shapes(duration, 1.0 / segments[0].run.sample_period)
     frequencies = sorted({shape["frequency_hz"] for shape in grid})[:: max(len(grid) // (2 * _MODE_STARTS), 1)]
-    fits = [fit]
+    sets = []
     for frequency in frequencies:
         shape = {**mode.shape, "frequency_hz": frequency, "damping_ratio": _MODE_DAMPING}
-        causes = [*fit.causes[:place], mode.at(mode.coordinates, shape), *fit.causes[place + 1 :]]
-        fits.append(refine(segments, causes, fixed, drives=fit.drives, iterations=_ITERATIONS))
+        sets.append([*fit.causes[:place], mode.at(mode.coordinates, shape), *fit.causes[place + 1 :]])
+    fits = [fit, *refine_each(segments, sets, fixed, [fit.drives] * len(sets), iterations=_ITERATIONS)]
     best = max(fits, key=lambda fit: fit.log_posterior)
     modes = [other.causes[place] for other in fits if other.log_posterior > best.log_posterior - _AS_LIKELY]
     mode = best.causes[place]

@@ -18,7 +18,7 @@ from scipy.integrate import cumulative_trapezoid
 from gfimu.diagnosis.causes import Cause, effects_of_run
 from gfimu.diagnosis.drive import smooth_rate
 from gfimu.diagnosis.model import Effect
-from gfimu.diagnosis.refinement import Fit, refine
+from gfimu.diagnosis.refinement import Fit, refine, refine_each
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.verdict import Gain
 
@@ -91,17 +91,19 @@ def gate_gains(
     gains: dict[str, list[float]] = {name: [] for name in without}
     for pair in pairs:
         every, known = [*pair.train, *pair.test], [*pair.train_fixed, *pair.test_fixed]
-        full = _evidence_of(pair.train, fit.causes, pair.train_fixed)
-        joint = _evidence_of(every, fit.causes, known) if other_recording else fit.log_evidence
-        for name, other in without.items():
-            rest = _evidence_of(pair.train, other.causes, pair.train_fixed)
-            both = _evidence_of(every, other.causes, known) if other_recording else other.log_evidence
-            gains[name].append((joint - both) - (full - rest))
+        fits = [fit, *without.values()]
+        full, *rest = _evidence_of(pair.train, fits, pair.train_fixed)
+        joint, *both = _evidence_of(every, fits, known) if other_recording else [other.log_evidence for other in fits]
+        for name, part, whole in zip(without, rest, both, strict=True):
+            gains[name].append((joint - whole) - (full - part))
     return {name: float(np.mean(values)) for name, values in gains.items()}
 
 
-def _evidence_of(segments: Sequence[Segment], causes: Sequence[Cause], fixed: Sequence[Sequence[Effect]]) -> float:
-    return refine(segments, causes, fixed, iterations=_ITERATIONS, shapes=False).log_evidence
+def _evidence_of(segments: Sequence[Segment], fits: Sequence[Fit], fixed: Sequence[Sequence[Effect]]) -> list[float]:
+    """Return the evidence of each set of causes on some data, shapes held."""
+    sets = [fit.causes for fit in fits]
+    refined = refine_each(segments, sets, fixed, [None] * len(sets), iterations=_ITERATIONS, shapes=False)
+    return [fit.log_evidence for fit in refined]
 
 
 def held_out_gain(causes: Sequence[Cause], pairs: Sequence[Holdout], constant: Sequence[Effect], *, label: str) -> Gain:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from gfimu.diagnosis.model import Effect
-from gfimu.diagnosis.refinement import Fit, refine
+from gfimu.diagnosis.refinement import Fit, refine_each
 from gfimu.diagnosis.segment import Segment
 
 __all__ = ["LEAST_EXTRA_ODDS", "LEAST_ODDS", "RIVALS", "near_rivals", "prune"]
@@ -53,15 +53,13 @@ def prune(
     faults = any(effect.place == "data" for effects in fixed for effect in effects)
     faults |= any(segment.rounding > 0 for segment in segments)
     while True:
-        without = {}
-        for cause in fit.causes:
-            others = [other for other in fit.causes if other.name != cause.name]
-            key = frozenset(other.key for other in others)
-            if key not in known:
-                known[key] = refine(segments, others, fixed, drives=fit.drives, iterations=8)
-            without[cause.name] = known[key]
-        if not without:
-            return fit, without
+        if not fit.causes:
+            return fit, {}
+        others = [[other for other in fit.causes if other.name != cause.name] for cause in fit.causes]
+        keys = [frozenset(other.key for other in rest) for rest in others]
+        new = [rest for rest, key in zip(others, keys, strict=True) if key not in known]
+        known |= {one.key: one for one in refine_each(segments, new, fixed, [fit.drives] * len(new), iterations=8)}
+        without = {cause.name: known[key] for cause, key in zip(fit.causes, keys, strict=True)}
         lost = {name: fit.log_posterior - other.log_posterior for name, other in without.items()}
         weakest = min(lost, key=lost.__getitem__)
         needed = LEAST_ODDS if len(fit.causes) == 1 and not faults else LEAST_EXTRA_ODDS
@@ -80,10 +78,9 @@ def near_rivals(
 ) -> list[Fit]:
     """Refine other sets under the noise and drive prior of the best one; those that come close are pruned too."""
     rivals = []
-    for fit in near:
-        if len(fit.causes) > len(best.causes) + 1:
-            continue
-        rival = refine(segments, fit.causes, fixed, drives=best.drives, iterations=6)
+    sets = [fit.causes for fit in near if len(fit.causes) <= len(best.causes) + 1]
+    for refined in refine_each(segments, sets, fixed, [best.drives] * len(sets), iterations=6):
+        rival = refined
         if rival.key > best.key and rival.log_posterior < best.log_posterior:
             continue  # the best set with something superfluous
         if rival.log_posterior > best.log_posterior - _WORTH_PRUNING:

@@ -6,6 +6,7 @@ Gauss–Newton on the drive-marginalised normal equations; the evidence is Lapla
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,9 +20,9 @@ from gfimu.diagnosis.model import Effect
 from gfimu.diagnosis.search import EXTRA_CAUSE
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.signatures import ANGLES, cause_columns, shape_moved
-from gfimu.diagnosis.threads import over_segments
+from gfimu.diagnosis.threads import at_once, over_segments
 
-__all__ = ["Fit", "refine"]
+__all__ = ["Fit", "refine", "refine_each"]
 
 _SHAPE_LIMIT = 0.3
 _SHAPE_PRIOR = 0.7
@@ -111,6 +112,30 @@ def refine(
     finally:
         for segment, drive in zip(segments, kept, strict=True):
             segment.coefficients = drive
+
+
+def refine_each(
+    segments: Sequence[Segment],
+    sets: Sequence[Sequence[Cause]],
+    fixed: Sequence[Sequence[Effect]],
+    drives: Sequence[Sequence[NDArray[np.float64]] | None],
+    *,
+    iterations: int = 6,
+    shapes: bool = True,
+) -> list[Fit]:
+    """Fit several sets of causes, each from its own drives, at once where there is one segment only.
+
+    Several segments are worked on at once within each fit.
+    """
+
+    def fitted(task: tuple[Sequence[Cause], Sequence[NDArray[np.float64]] | None]) -> Fit:
+        causes, start = task
+        # A fit moves the drives of its segments while it goes.
+        mine = [copy(segment) for segment in segments]
+        return refine(mine, causes, fixed, drives=start, iterations=iterations, shapes=shapes)
+
+    tasks = list(zip(sets, drives, strict=True))
+    return at_once(fitted, tasks) if len(segments) == 1 else [fitted(task) for task in tasks]
 
 
 @dataclass(frozen=True)

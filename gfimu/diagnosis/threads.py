@@ -1,17 +1,18 @@
-"""Work on several segments at once."""
+"""Work on several segments, or on several sets of causes, at once."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from typing import Any, TypeVar
 
 from threadpoolctl import ThreadpoolController
 
-__all__ = ["over_segments"]
+__all__ = ["at_once", "over_segments"]
 
+Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 
@@ -21,12 +22,19 @@ def over_segments(work: Callable[..., Result], *columns: Iterable[Any]) -> list[
     Segments share nothing that changes, and their algebra leaves the interpreter free.
     """
     rows = list(zip(*columns, strict=True))
-    workers = min(len(rows), os.cpu_count() or 1)
-    if workers < 2:
+    if len(rows) < 2:
         return [work(*row) for row in rows]
-    # Each segment's algebra on threads of its own as well would take half as long again.
+    return at_once(lambda row: work(*row), rows)
+
+
+def at_once(work: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
+    """Call ``work`` with each item, on as many threads as there are processors; results in the order of the items."""
+    workers = min(len(items), os.cpu_count() or 1)
+    if workers < 2:
+        return [work(item) for item in items]
+    # Each one's algebra on threads of its own as well would take half as long again.
     with _thread_pools().limit(limits=1, user_api="blas"), ThreadPoolExecutor(workers) as pool:
-        return list(pool.map(lambda row: work(*row), rows))
+        return list(pool.map(work, items))
 
 
 @cache
