@@ -10,14 +10,12 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import beta, norm
+from scipy.stats import beta
 
 from gfimu.atomic_file import write_text
-from gfimu.diagnosis.naming import AMBIGUOUS_ODDS
-from gfimu.diagnosis.pruning import LEAST_ODDS
 from sim.study.figures import draw_confusion, draw_detection, draw_reliability
 
-__all__ = ["Tally", "ideal_share", "rate_with_interval", "score", "summarise", "visible", "write_report"]
+__all__ = ["Tally", "rate_with_interval", "score", "summarise", "visible", "write_report"]
 
 Outcome = Mapping[str, Any]
 
@@ -84,20 +82,6 @@ def _inseparable(outcome: Outcome, rivals: set[str]) -> bool:
     if not left_by:
         return any(rivals | set(outcome["effects"]) <= group for group in INSEPARABLE)
     return all(left_by.get(rival, np.inf) < LEAST_SEPARABLE for rival in rivals)
-
-
-def ideal_share(outcome: Outcome) -> float | None:
-    """Return the probability that an ideal observer would name a single effect alone, None where it was not computed.
-
-    The observer knows the noise and the sizes that each effect would have, but not the drive, and asks for the same
-    odds. Its log odds against a rival that leaves the energy E of the effect are normal with mean E/2 and variance E;
-    the rivals count as dependent, so that the most similar one decides: an upper bound.
-    """
-    if outcome.get("drive_unknown") is None or len(outcome["effects"]) != 1:
-        return None
-    sizes = [(outcome["drive_unknown"], LEAST_ODDS)]
-    sizes += [(left, AMBIGUOUS_ODDS) for left in outcome["left_by"].values()]
-    return min(float(norm.cdf(size / 2 - odds / size)) if size > 0 else 0.0 for size, odds in sizes)
 
 
 def visible(outcome: Outcome) -> bool:
@@ -259,23 +243,9 @@ def _drive_unknown(single: Sequence[Outcome]) -> str:
         if group:
             tally = Tally(group)
             span = f"{least:g} to {most:g}" if np.isfinite(most) else f"above {least:g}"
-            ideal = 100 * float(np.mean([ideal_share(outcome) or 0.0 for outcome in group]))
-            said = (tally.share(what) for what in ("exact", "fair", "within", "nothing"))
-            rows.append((span, len(group), f"{ideal:.1f}", *said))
-    header = (
-        "d′, drive unknown",
-        "runs",
-        "alone by an ideal observer %",
-        "right alone %",
-        "or an inseparable set %",
-        "in any set %",
-        "nothing %",
-    )
-    text = (
-        "## One effect hidden: size with the drive unknown\n\nThe ideal observer knows the noise and the sizes of "
-        "every effect, but not the drive, and asks for the same odds; no method can do better on average.\n\n"
-    )
-    return text + _table(header, rows) if rows else ""
+            rows.append((span, len(group), *(tally.share(what) for what in ("exact", "fair", "within", "nothing"))))
+    header = ("d′, drive unknown", "runs", "right alone %", "or an inseparable set %", "in any set %", "nothing %")
+    return "## One effect hidden: size with the drive unknown\n\n" + _table(header, rows) if rows else ""
 
 
 def _left_out(outcomes: Sequence[Outcome]) -> str:
