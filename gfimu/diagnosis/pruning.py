@@ -18,6 +18,7 @@ alarms are counted on) two reached even odds and none e against one.
 """
 LEAST_EXTRA_ODDS = 7.0
 """Log odds that a further cause, beside others or a fault of the data, needs against the set without it."""
+_LEAST_ROUNDED_ODDS = 15.0  # where readings are coarse: at rest the same rounding error repeats, sample after sample
 RIVALS = 6
 """How many other sets are judged beside the best."""
 _WORTH_PRUNING = 40.0
@@ -51,7 +52,7 @@ def prune(
     """
     known = {} if done is None else done
     faults = any(effect.place == "data" for effects in fixed for effect in effects)
-    faults |= any(segment.rounding > 0 for segment in segments)
+    rounded = any(segment.rounding > 0 for segment in segments)
     while True:
         if not fit.causes:
             return fit, {}
@@ -63,6 +64,7 @@ def prune(
         lost = {name: fit.log_posterior - other.log_posterior for name, other in without.items()}
         weakest = min(lost, key=lost.__getitem__)
         needed = LEAST_ODDS if len(fit.causes) == 1 and not faults else LEAST_EXTRA_ODDS
+        needed = _LEAST_ROUNDED_ODDS if rounded else needed
         needed += sum(cause.family.inexactness * lost[cause.name] for cause in fit.causes if cause.name != weakest)
         if lost[weakest] >= needed:
             return fit, without
