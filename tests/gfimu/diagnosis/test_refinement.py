@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.causes import effects_of_run
 from gfimu.diagnosis.engine import make_segments
-from gfimu.diagnosis.refinement import refine
+from gfimu.diagnosis.refinement import refine, refine_each
 from gfimu.diagnosis.run import prepare_run
 from gfimu.diagnosis.signatures import Signature, cause_columns, hypotheses, signature_columns
 from sim.campaign import Measurement, measure
@@ -95,6 +95,18 @@ def test_screening_about_a_set_varies_its_effects_in_their_order(twin):
     signature = Signature(family, {}, np.arange(len(family.sizes(twin.array))))
     columns, _ = signature_columns(segment, [signature], causes, ())  # (c + 1, P, n)
     assert_allclose(columns, cause_columns(segment, causes[:1], [], shapes=False), atol=0.05 * np.abs(columns).max())
+
+
+def test_sets_refined_at_once_are_as_one_after_the_other_and_leave_the_drive_alone(twin):
+    segment = _segment(twin, [make_effect("bias", {"a12_m_s2": 0.2})])
+    sets = [_causes(segment, [name], [{}], twin.array) for name in ("bias", "scale_factor", "cross_axis", "quadratic")]
+    before, drive = segment.coefficients, refine([segment], (), [[]]).drives
+    single = [refine([segment], causes, [[]], drives=drive) for causes in sets]
+    for at_once in (refine_each([segment], sets, [[]], [drive] * len(sets)) for _ in range(3)):
+        # To the digits that another number of threads in the algebra leaves.
+        assert_allclose([fit.log_posterior for fit in at_once], [fit.log_posterior for fit in single], rtol=1e-7)
+        assert [fit.key for fit in at_once] == [fit.key for fit in single]
+    assert segment.coefficients is before
 
 
 def test_a_pair_that_does_not_commute_is_fitted_until_nothing_is_gained(twin):
