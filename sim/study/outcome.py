@@ -30,6 +30,7 @@ _MG = STANDARD_GRAVITY / 1000.0
 _TURN = 2 * np.pi
 _CLIPPED_ABOVE = 1.07
 _FASTEST_SHARE = 0.02
+_LONGEST_PLANNED = 120.0  # s: a planned run has one drive, whose normal equations grow with its square
 _CLOSEST = 8  # of the other effects, of which one is taken into every pair
 _WITHOUT_NOISE_FREE_FORM = frozenset(
     {"noise", "bias_random_walk", "coarse_resolution", "stuck_channel", "dropped_frames"}
@@ -41,9 +42,9 @@ class HiddenWorld:
     """A recording, the twin to diagnose it with, and what is hidden: contract names and parameters.
 
     ``reached`` is the d′ of the least hidden effect that has a noise-free form, infinite where none has, the drive
-    known. Of a single effect with sizes, ``drive_unknown`` is its d′ with the drive unknown and ``left_by`` what of
-    that each other effect of the library leaves at its best. Of one that is taken out of the library, ``left_by_two``
-    is what the best two others together leave.
+    known. Of a single effect with sizes in a run of up to two minutes, ``drive_unknown`` is its d′ with the drive
+    unknown and ``left_by`` what of that each other effect of the library leaves at its best. Of one that is taken out
+    of the library, ``left_by_two`` is what the best two others together leave.
     """
 
     recording: Recording
@@ -110,7 +111,7 @@ def draw_world(case: Case, source: str = "") -> HiddenWorld:
     ]
     truth = tuple((effect.name, effect.parameters) for effect in hidden)
     world = HiddenWorld(recording, twin, truth, min(sizes, default=np.inf))
-    if len(hidden) == 1 and sizes and hidden[0].sizes(twin.array):
+    if len(hidden) == 1 and sizes and hidden[0].sizes(twin.array) and case.duration <= _LONGEST_PLANNED:
         world = _with_limits(world, hidden[0], motion, setting, pairs=bool(case.without))
     return world
 
