@@ -76,9 +76,12 @@ class DriveJacobian:
             root = np.sqrt(weights[columns])
             mine = slopes[:, :, columns] * root  # (3, n, C)
             gram = np.einsum("snc,snd->cd", mine, mine)
-            power, vectors = np.linalg.eigh(gram)
-            kept = vectors[:, power > _LEAST_SHARE * max(float(power[-1]), 1e-30)]
-            functions = mine @ kept  # (3, n, R)
+            vectors = np.linalg.eigh(gram)[1]
+            functions = mine @ vectors  # (3, n, C)
+            # The eigenvalues of a vanishing direction are rounding errors of the largest one.
+            power = np.einsum("snr,snr->r", functions, functions)
+            large = power > _LEAST_SHARE * max(float(power.max()), 1e-30)
+            kept, functions = vectors[:, large], functions[:, :, large]  # (C, R), (3, n, R)
             for place in range(kept.shape[1]):
                 part = spline.matrix(times[:, chips[columns[0]]], functions[:, :, place])
                 parts.append(delay(part) if delay is not None and sensed else part)

@@ -73,10 +73,12 @@ class Linearisation:
     ----------
     residual : ndarray, shape (n, c + 1)
         Measured minus predicted; zero where invalid.
+    slow_residual : ndarray, shape (K, c + 1)
+        The same in the cosines of slow noise.
     jacobian : DriveJacobian
         Derivative of each observation with respect to the drive's coefficients.
     slow : ndarray, shape (R, m, K)
-        The same in the cosines of slow noise.
+        The Jacobian's parts in the cosines of slow noise.
     drive : DriveElimination
         The drive's step and the likelihood without it.
     state : SpinState
@@ -84,6 +86,7 @@ class Linearisation:
     """
 
     residual: NDArray[np.float64]
+    slow_residual: NDArray[np.float64]
     jacobian: DriveJacobian
     slow: NDArray[np.float64]
     drive: DriveElimination

@@ -15,10 +15,12 @@ coefficient.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve, solve_triangular
+from scipy.linalg import cho_factor, cho_solve, lapack, solve_triangular
+from scipy.linalg.blas import dsyr, dsyrk
 from scipy.sparse import csr_array, diags_array
 
 from gfimu.diagnosis.calibration_residue import CalibrationResidue
@@ -46,6 +48,20 @@ _FACTOR_STEPS = 4
 _REST_FACTOR = 1.3
 _LEAST_GAIN = 0.05
 _STATE_STEPS = (1e-5, 1e-4, 1e-3)
+
+
+@dataclass(frozen=True)
+class _DataEquations:
+    """Normal equations of a drive from the data alone: lower triangle JᵀWJ (m, m), JᵀWr (m,) and rᵀWr."""
+
+    residual: NDArray[np.float64]
+    slow_residual: NDArray[np.float64]
+    jacobian: DriveJacobian
+    slow: NDArray[np.float64]
+    lhs: NDArray[np.float64]
+    rhs: NDArray[np.float64]
+    objective: float
+    residue: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]] | None
 
 
 class Segment:
@@ -109,8 +125,6 @@ class Segment:
     def _take(self, roughness: Roughness) -> None:
         """Use a prior of the drive and its spline."""
         self.roughness, self.spline = roughness, roughness.spline
-        signs = (-1.0) ** np.arange(self.spline.size)
-        self._alternating = np.outer(signs, signs)
 
     # -- starting values -------------------------------------------------------------------------------------
 
@@ -186,16 +200,17 @@ class Segment:
 
     def tune_roughness(self, effects: Sequence[Effect]) -> None:
         """Pick the scale of the roughness prior by marginal likelihood, the drive integrated out."""
-        kept, factor = self.coefficients, self.roughness.factor
+        factor = self.roughness.factor
         # Below the least factor a prior that is learnt from the drive and then tightened again would tighten for ever.
         least = 0.0 if self.at_rest else _LEAST_FACTOR
+
+        data = self._data_equations(effects)
 
         def likelihood(trial: float) -> float:
             self.roughness.factor = trial
             self._set_roughness()
-            self.coefficients = kept
-            line = self.linearise(effects)
-            return self.log_volume(line) - 0.5 * line.drive.objective
+            drive = self._eliminate(data)
+            return self.log_volume(drive) - 0.5 * drive.objective
 
         best = (likelihood(factor), factor)
         for ratio in (0.5, 2.0):
@@ -207,7 +222,7 @@ class Segment:
                 best = (value, trial)
             if best[1] != factor:
                 break
-        self.coefficients, self.roughness.factor = kept, best[1]
+        self.roughness.factor = best[1]
         self._set_roughness()
 
     @property
@@ -292,40 +307,59 @@ class Segment:
 
     def linearise(self, effects: Sequence[Effect]) -> Linearisation:
         """Linearise about effects and the present drive, and eliminate the drive."""
+        data = self._data_equations(effects)
+        state = self.motion(effects).at(self.run.t)
+        return Linearisation(
+            data.residual, data.slow_residual, data.jacobian, data.slow, self._eliminate(data), state
+        )
+
+    def _data_equations(self, effects: Sequence[Effect]) -> _DataEquations:
+        """Return the normal equations of the drive, and of a calibration residue, without the drive's prior."""
         predicted = self.predict(effects)
         measured = np.column_stack([self.run.readings, self.run.reference])
         residual, objective = self._weigh(np.where(self.weight_mask, measured - predicted, 0.0))
         jacobian = self._jacobian(effects, predicted)
-        # Differences first: the quadratic form of the coefficients would lose ten digits.
-        rough = self._rough @ self.coefficients
-        rhs = -(self._rough.T @ rough)
-        objective += float(rough @ rough)
-        if not self.is_angle:
-            off = self._begin @ self.coefficients - self.start_angle / self.start_angle_std
-            rhs = rhs - self._begin.T @ off
-            objective += float(off @ off)
         slow_residual = self.cosines.T @ residual  # (K, c + 1)
         damped = self.share * slow_residual
         weights = self.inverse_variance
         objective += float(weights @ (np.sum(residual**2, axis=0) - np.sum(slow_residual * damped, axis=0)))
-        rhs += jacobian.backward((residual - self.cosines @ damped) * weights)
+        rhs = jacobian.backward((residual - self.cosines @ damped) * weights)
         slow = jacobian.slow(self.cosines)
-        lhs = (self.prior + jacobian.information()).toarray()
         low = jacobian.slow_rows(slow, self.share, weights)
-        lhs -= low.T @ low
-        # A vanishing coupling keeps far entries of the factor out of the denormal range, where LAPACK crawls; its
-        # sign alternates, as a constant one would hold the mean angle, which the data hardly fix.
-        lhs += 1e-14 * float(np.mean(lhs.diagonal())) * self._alternating
+        # Lower triangles only, here and in what follows.
+        lhs = dsyrk(-1.0, low.T, beta=1.0, c=jacobian.information().toarray(order="F"), lower=1, overwrite_c=1)
+        residue = None
         if self.calibration_residue is not None:
-            inner, right, cross = self.calibration_residue.normal_equations(
+            residue = self.calibration_residue.normal_equations(
                 residual, jacobian, slow, self.cosines, self.share, weights
             )
-            lhs = np.block([[lhs, cross], [cross.T, inner]])
+        return _DataEquations(residual, slow_residual, jacobian, slow, lhs, rhs, objective, residue)
+
+    def _eliminate(self, data: _DataEquations) -> DriveElimination:
+        """Add the prior of the drive and factor."""
+        # Differences first: the quadratic form of the coefficients would lose ten digits.
+        rough = self._rough @ self.coefficients
+        rhs = data.rhs - self._rough.T @ rough
+        objective = data.objective + float(rough @ rough)
+        if not self.is_angle:
+            off = self._begin @ self.coefficients - self.start_angle / self.start_angle_std
+            rhs = rhs - self._begin.T @ off
+            objective += float(off @ off)
+        prior = self.prior.tocoo()
+        lhs = data.lhs.copy(order="F")
+        lhs[prior.row, prior.col] += prior.data
+        # A vanishing coupling keeps far entries of the factor out of the denormal range, where LAPACK crawls; its
+        # sign alternates, as a constant one would hold the mean angle, which the data hardly fix.
+        lhs = dsyr(1e-14 * float(np.mean(lhs.diagonal())), (-1.0) ** np.arange(len(lhs)), lower=1, a=lhs, overwrite_a=1)
+        if data.residue is not None:
+            inner, right, cross = data.residue
+            lhs = np.asfortranarray(np.block([[lhs, cross], [cross.T, inner]]))
             rhs = np.concatenate([rhs, right])
-        factor = np.linalg.cholesky(lhs)
+        factor, failed = lapack.dpotrf(lhs, lower=1, clean=1, overwrite_a=1)
+        if failed:
+            raise np.linalg.LinAlgError("the normal equations of the drive are not positive definite")
         forward = solve_triangular(factor, rhs, lower=True, check_finite=False)
-        drive = DriveElimination(factor, forward, objective - float(forward @ forward), self.spline.size)
-        return Linearisation(residual, jacobian, slow, drive, self.motion(effects).at(self.run.t))
+        return DriveElimination(factor, forward, objective - float(forward @ forward), self.spline.size)
 
     def _jacobian(self, effects: Sequence[Effect], base: NDArray[np.float64]) -> DriveJacobian:
         """Differentiate the prediction ``base`` with respect to the drive's state and chain with the spline."""
@@ -355,17 +389,15 @@ class Segment:
         score = np.zeros(count)
         weights = self.inverse_variance
         damped = np.zeros((len(weights), count, len(self.share)))  # (c + 1, P, K)
-        for column, weight in enumerate(weights):
-            mine = signatures[column]  # (P, n)
-            used = np.flatnonzero(mine.any(axis=1))
-            if len(used) == 0:
-                continue
-            part = mine[used].T  # (n, P)
-            slow = self.cosines.T @ part  # (K, P)
-            damped[column, used] = (self.share[:, [column]] * slow).T
-            gram[np.ix_(used, used)] += weight * (part.T @ part - slow.T @ damped[column, used].T)
-            residual = linear.residual[:, column]
-            score[used] += weight * (part.T @ residual - damped[column, used] @ (self.cosines.T @ residual))
+        reached = [np.flatnonzero(mine.any(axis=1)) for mine in signatures]
+        for column, used in enumerate(reached):
+            part = signatures[column, used]  # (P, n)
+            slow = part @ self.cosines  # (P, K)
+            damped[column, used] = slow * self.share[:, column]
+            gram[np.ix_(used, used)] += weights[column] * (part @ part.T - slow @ damped[column, used].T)
+            score[used] += weights[column] * (
+                part @ linear.residual[:, column] - damped[column, used] @ linear.slow_residual[:, column]
+            )
         cross = linear.jacobian.correlate(signatures, weights)  # (m, P)
         for r, slow in enumerate(linear.slow):
             cross -= slow @ np.tensordot(linear.jacobian.loading[r] * weights, damped, axes=1).T
@@ -376,12 +408,12 @@ class Segment:
         score -= eliminated.T @ linear.drive.forward
         return gram, score, eliminated
 
-    def log_volume(self, linear: Linearisation) -> float:
+    def log_volume(self, drive: DriveElimination) -> float:
         """Return the log of how much of the prior of the drive (and of a calibration residue) the data leave.
 
         Needed only to compare fits under different priors.
         """
-        return linear.drive.log_volume() - self.log_roughness
+        return drive.log_volume() - self.log_roughness
 
     def move_drive(self, linear: Linearisation) -> None:
         """Move the drive to its posterior mean."""

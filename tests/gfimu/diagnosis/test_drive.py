@@ -120,7 +120,7 @@ def test_the_roughness_is_the_most_probable_one():
         segment.roughness.factor = factor
         segment._set_roughness()
         line = segment.linearise([])
-        return segment.log_volume(line) - 0.5 * line.drive.objective
+        return segment.log_volume(line.drive) - 0.5 * line.drive.objective
 
     top = likelihood(best)
     assert top >= likelihood(0.5 * best)
