@@ -78,6 +78,32 @@ class CalibrationResidue:
         weights : ndarray, shape (c + 1,)
             One over the variance of each observation.
         """
+        gram, score, damped = self._own_equations(residual, cosines, share, weights)
+        cross = np.zeros((slow.shape[1], self.count))
+        for r, matrix in enumerate(jacobian.parts):
+            scale = jacobian.loading[r] * weights
+            cross += matrix.T @ self._mixed(self.parts, scale) - slow[r] @ self._mixed(damped, scale)
+        return gram, score, cross
+
+    def explained(
+        self,
+        residual: NDArray[np.float64],
+        cosines: NDArray[np.float64],
+        share: NDArray[np.float64],
+        weights: NDArray[np.float64],
+    ) -> float:
+        """Return how much of rᵀWr the residue takes at its best, its prior counted, the drive held."""
+        gram, score, _ = self._own_equations(residual, cosines, share, weights)
+        return float(score @ np.linalg.solve(gram, score))
+
+    def _own_equations(
+        self,
+        residual: NDArray[np.float64],
+        cosines: NDArray[np.float64],
+        share: NDArray[np.float64],
+        weights: NDArray[np.float64],
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], list[NDArray[np.float64]]]:
+        """Return AᵀWA + I (q, q), AᵀWr (q,) and each channel's damped cosines (K, k)."""
         gram, score = np.eye(self.count), np.zeros(self.count)
         damped = []
         for channel, (at, part) in enumerate(zip(self.places, self.parts, strict=True)):
@@ -86,11 +112,7 @@ class CalibrationResidue:
             gram[np.ix_(at, at)] += weights[channel] * (part.T @ part - low.T @ damped[-1])
             mine = residual[:, channel]
             score[at] += weights[channel] * (part.T @ mine - damped[-1].T @ (cosines.T @ mine))
-        cross = np.zeros((slow.shape[1], self.count))
-        for r, matrix in enumerate(jacobian.parts):
-            scale = jacobian.loading[r] * weights
-            cross += matrix.T @ self._mixed(self.parts, scale) - slow[r] @ self._mixed(damped, scale)
-        return gram, score, cross
+        return gram, score, damped
 
     def _mixed(self, blocks: Sequence[NDArray[np.float64]], scale: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the sum over channels of their columns (n, k), each at its places, shape (n, q)."""

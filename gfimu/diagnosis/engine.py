@@ -17,7 +17,7 @@ from gfimu.diagnosis.linearisation import Linearisation
 from gfimu.diagnosis.model import Effect, WorldModel
 from gfimu.diagnosis.nuisances import learn_noise, sharpen_drives, tune_drives
 from gfimu.diagnosis.pruning import RIVALS, near_rivals, prune
-from gfimu.diagnosis.refinement import Fit, refine, refine_each
+from gfimu.diagnosis.refinement import Fit, Start, refine, refine_each
 from gfimu.diagnosis.run import Run
 from gfimu.diagnosis.search import search
 from gfimu.diagnosis.segment import Segment, difference_noise
@@ -124,19 +124,24 @@ def screen(segments: Sequence[Segment], base: Fit, fixed: Sequence[Sequence[Effe
 
     def products(
         segment: Segment, line: Linearisation, known: Sequence[Effect]
-    ) -> tuple[NDArray[np.intp], NDArray[np.float64], NDArray[np.float64]]:
+    ) -> tuple[NDArray[np.intp], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         columns, numbers = signature_columns(segment, signatures, base.causes, known)
-        part, part_score, _ = segment.whitened_products(line, columns)
-        return numbers, part, part_score
+        part, part_score, eliminated = segment.whitened_products(line, columns)
+        response = np.zeros((segment.spline.size, count))
+        response[:, numbers] = line.drive.response(eliminated)
+        return numbers, part, part_score, response
 
-    for numbers, part, part_score in over_segments(products, segments, linear, fixed):
+    responses = []
+    for numbers, part, part_score, response in over_segments(products, segments, linear, fixed):
         gram[np.ix_(numbers, numbers)] += part
         score[numbers] += part_score
+        responses.append(response)
     at = np.zeros(count)
     for cause in base.causes:
         signature = next(one for one in signatures if one.family.name == cause.name)
         at[signature.columns] = cause.mixing @ cause.coordinates
-    return SignatureSet(tuple(signatures), gram, score + gram @ at, tuple(hypotheses(signatures, array, runs)))
+    places = tuple(hypotheses(signatures, array, runs))
+    return SignatureSet(tuple(signatures), gram, score + gram @ at, places, at, tuple(responses))
 
 
 def explain(
@@ -260,6 +265,7 @@ class _Search:
         keys: list[frozenset[tuple[str, str]]] = []
         sets: list[Sequence[Cause]] = []
         about: list[Fit] = []
+        starts: list[Start | None] = []
         for candidate in leading:
             causes = [
                 self._signatures.hypotheses[number].cause(coordinates)
@@ -270,7 +276,10 @@ class _Search:
             new = key not in self._tried
             if key in fits or key in keys or not (close or (gross and len(causes) == 1 and new)):
                 continue
-            if not new:
+            if new:
+                moves = self._signatures.drive_moves(causes, candidate.members)
+                drives = [drive + move for drive, move in zip(self._best.drives, moves, strict=True)]
+            else:
                 causes = list(self._tried[key].causes)
             # Ripples locked to the angle lose their phase where the drive's angle has drifted.
             again = [self._fitted] if new and any("order" in cause.shape for cause in causes) else []
@@ -278,10 +287,11 @@ class _Search:
                 keys.append(key)
                 sets.append(causes)
                 about.append(base)
-        drives = [base.drives for base in about]
-        for key, fit in zip(
-            keys, refine_each(self._segments, sets, self._fixed, drives, iterations=_ITERATIONS), strict=True
-        ):
+                starts.append(Start(causes, drives) if new and base is self._best else None)
+        refined = refine_each(
+            self._segments, sets, self._fixed, [base.drives for base in about], iterations=_ITERATIONS, others=starts
+        )
+        for key, fit in zip(keys, refined, strict=True):
             fits[key] = max(fits.get(key, fit), fit, key=_posterior)
         return fits
 

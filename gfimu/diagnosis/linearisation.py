@@ -40,6 +40,10 @@ class DriveElimination:
         right = self.forward - eliminated @ step
         return self._solve(right)[: self.size]
 
+    def response(self, eliminated: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return how the drive follows each of the signatures' coordinates, shape (m, P)."""
+        return -self._solve(eliminated)[: self.size]
+
     def alone(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the step of the drive (m,) and the sizes of the calibration residue (q,), the causes held."""
         both = self._solve(self.forward)
@@ -51,10 +55,12 @@ class DriveElimination:
 
     def distance(self) -> float:
         """Return how far the drive is from its best, in squared standard deviations, the causes held."""
+        total = float(self.forward @ self.forward)
         if len(self.forward) == self.size:
-            return float(self.forward @ self.forward)
-        away = self.factor[: self.size, : self.size].T @ self.alone()[0]
-        return float(away @ away)
+            return total
+        corner = self.factor[self.size :]
+        right = corner @ self.forward
+        return total - float(right @ np.linalg.solve(corner @ corner.T, right))  # the residue free at any drive
 
     def residue(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the information (q, q), prior included, and score (q,) of the residue, drive eliminated."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from gfimu.diagnosis.model import Effect
-from gfimu.diagnosis.refinement import Fit, refine_each
+from gfimu.diagnosis.refinement import Fit, refine_each, without
 from gfimu.diagnosis.segment import Segment
 
 __all__ = ["LEAST_EXTRA_ODDS", "LEAST_ODDS", "RIVALS", "near_rivals", "prune"]
@@ -56,19 +56,27 @@ def prune(
     while True:
         if not fit.causes:
             return fit, {}
-        others = [[other for other in fit.causes if other.name != cause.name] for cause in fit.causes]
-        keys = [frozenset(other.key for other in rest) for rest in others]
-        new = [rest for rest, key in zip(others, keys, strict=True) if key not in known]
-        known |= {one.key: one for one in refine_each(segments, new, fixed, [fit.drives] * len(new), iterations=8)}
-        without = {cause.name: known[key] for cause, key in zip(fit.causes, keys, strict=True)}
-        lost = {name: fit.log_posterior - other.log_posterior for name, other in without.items()}
+        rest = [[other for other in fit.causes if other.name != cause.name] for cause in fit.causes]
+        keys = [frozenset(other.key for other in some) for some in rest]
+        new = [number for number, key in enumerate(keys) if key not in known]
+        refined = refine_each(
+            segments,
+            [rest[number] for number in new],
+            fixed,
+            [fit.drives] * len(new),
+            iterations=8,
+            others=[without(fit, number, segments[0].model.array) for number in new],
+        )
+        known |= {one.key: one for one in refined}
+        fewer = {cause.name: known[key] for cause, key in zip(fit.causes, keys, strict=True)}
+        lost = {name: fit.log_posterior - other.log_posterior for name, other in fewer.items()}
         weakest = min(lost, key=lost.__getitem__)
         needed = LEAST_ODDS if len(fit.causes) == 1 and not faults else LEAST_EXTRA_ODDS
         needed = _LEAST_ROUNDED_ODDS if rounded else needed
         needed += sum(cause.family.inexactness * lost[cause.name] for cause in fit.causes if cause.name != weakest)
         if lost[weakest] >= needed:
-            return fit, without
-        fit = without[weakest]
+            return fit, fewer
+        fit = fewer[weakest]
 
 
 def near_rivals(

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,11 +23,11 @@ from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.signatures import ANGLES, cause_columns, shape_moved
 from gfimu.diagnosis.threads import at_once, over_segments
 
-__all__ = ["Fit", "refine", "refine_each"]
+__all__ = ["Fit", "Start", "refine", "refine_each", "without"]
 
 _SHAPE_LIMIT = 0.3
 _SHAPE_PRIOR = 0.7
-_TOLERANCE = 0.02
+_TOLERANCE = 0.3
 _DRIVE_SHARE = 0.1
 _UPHILL = 0.5
 _STALLED = 0.5
@@ -52,6 +53,8 @@ class Fit:
         Drive coefficients of every segment.
     gram, score : ndarray
         Normal equations of the coordinates relative to no effect.
+    responses : tuple of ndarray
+        How the drive coefficients of every segment follow the coordinates, each (m, k).
     """
 
     causes: tuple[Cause, ...]
@@ -61,6 +64,7 @@ class Fit:
     drives: tuple[NDArray[np.float64], ...]
     gram: NDArray[np.float64]
     score: NDArray[np.float64]
+    responses: tuple[NDArray[np.float64], ...] = ()
 
     @property
     def key(self) -> frozenset[tuple[str, str]]:
@@ -74,7 +78,44 @@ class Fit:
 
     def of(self, places: Sequence[int]) -> Fit:
         """Return the fit with the drives of some of its segments only."""
-        return replace(self, drives=tuple(self.drives[place] for place in places))
+        return replace(
+            self,
+            drives=tuple(self.drives[place] for place in places),
+            responses=tuple(self.responses[place] for place in places),
+        )
+
+
+@dataclass(frozen=True)
+class Start:
+    """Causes and drives from which a fit may start.
+
+    Parameters
+    ----------
+    causes : sequence of Cause
+        At starting coordinates.
+    drives : sequence of ndarray
+        Drive coefficients of every segment.
+    """
+
+    causes: Sequence[Cause]
+    drives: Sequence[NDArray[np.float64]]
+
+
+def without(fit: Fit, number: int, array: AccelerometerArray) -> Start:
+    """Return where the other causes of a fit, and the drives, would go without one of them in a linear world."""
+    owners = np.repeat(np.arange(len(fit.causes)), [len(cause.coordinates) for cause in fit.causes])
+    old = np.concatenate([cause.coordinates for cause in fit.causes])
+    kept = np.flatnonzero(owners != number)
+    new = np.zeros_like(old)
+    information = fit.gram[np.ix_(kept, kept)] + np.eye(len(kept)) / SCALES[-1] ** 2
+    positive = np.concatenate([cause.positive(array) for cause in fit.causes])
+    if len(kept):
+        new[kept] = inverse(information) @ fit.score[kept]
+        new = np.where(positive, np.maximum(new, _SMALLEST_POSITIVE), new)
+    new[owners == number] = 0.0
+    causes = [cause.at(new[owners == place]) for place, cause in enumerate(fit.causes) if place != number]
+    moves = [response @ (new - old) for response in fit.responses]
+    return Start(causes, [drive + move for drive, move in zip(fit.drives, moves, strict=True)])
 
 
 def refine(
@@ -85,6 +126,7 @@ def refine(
     drives: Sequence[NDArray[np.float64]] | None = None,
     iterations: int = 6,
     shapes: bool = True,
+    other: Start | None = None,
 ) -> Fit:
     """Fit a set of causes with the full simulation.
 
@@ -102,12 +144,16 @@ def refine(
         Most Gauss–Newton steps.
     shapes : bool
         Whether shape parameters are fitted too.
+    other : Start, optional
+        Another start of the same set, taken if the simulation comes closer to the data there.
     """
-    if not shapes:
-        causes = [replace(cause, frozen=True) for cause in causes]
     kept = [segment.coefficients for segment in segments]
     try:
         start = _State(tuple(causes), tuple(kept if drives is None else drives))
+        if other is not None:
+            start = min(start, _State(tuple(other.causes), tuple(other.drives)), key=partial(_energy, segments, fixed))
+        if not shapes:
+            start = replace(start, causes=tuple(replace(cause, frozen=True) for cause in start.causes))
         return _result(segments, _descend(segments, fixed, start, iterations))
     finally:
         for segment, drive in zip(segments, kept, strict=True):
@@ -122,19 +168,20 @@ def refine_each(
     *,
     iterations: int = 6,
     shapes: bool = True,
+    others: Sequence[Start | None] = (),
 ) -> list[Fit]:
     """Fit several sets of causes, each from its own drives, at once where there is one segment only.
 
     Several segments are worked on at once within each fit.
     """
 
-    def fitted(task: tuple[Sequence[Cause], Sequence[NDArray[np.float64]] | None]) -> Fit:
-        causes, start = task
+    def fitted(task: tuple[Sequence[Cause], Sequence[NDArray[np.float64]] | None, Start | None]) -> Fit:
+        causes, start, other = task
         # A fit moves the drives of its segments while it goes.
         mine = [copy(segment) for segment in segments]
-        return refine(mine, causes, fixed, drives=start, iterations=iterations, shapes=shapes)
+        return refine(mine, causes, fixed, drives=start, iterations=iterations, shapes=shapes, other=other)
 
-    tasks = list(zip(sets, drives, strict=True))
+    tasks = list(zip(sets, drives, others or [None] * len(sets), strict=True))
     return at_once(fitted, tasks) if len(segments) == 1 else [fitted(task) for task in tasks]
 
 
@@ -148,7 +195,7 @@ class _State:
 
 @dataclass(frozen=True)
 class _Point:
-    """A state with its normal equations and the Gauss–Newton step from it."""
+    """A state with its normal equations, the Gauss–Newton step from it, and its energy with the drives held."""
 
     state: _State
     objective: float
@@ -158,10 +205,12 @@ class _Point:
     moves: tuple[NDArray[np.float64], ...]
     expected: float
     log_volume: float
+    responses: tuple[NDArray[np.float64], ...]
+    energy: float
 
     @property
     def value(self) -> float:
-        """What is minimised: misfit and prior energy."""
+        """Misfit and prior energy, the drives at their best in a linear world."""
         return self.objective + _prior_energy(self.state.causes)
 
     def moved(self, scale: float, array: AccelerometerArray) -> _State:
@@ -171,41 +220,63 @@ class _Point:
 
 
 def _descend(segments: Sequence[Segment], fixed: Sequence[Sequence[Effect]], start: _State, iterations: int) -> _Point:
-    """Take Gauss–Newton steps, shortened where they go uphill, until nothing is gained."""
+    """Take Gauss–Newton steps, shortened where they go uphill, until nothing is gained.
+
+    Up or down is told by the energy with the drives held: values at different drives are of different tangents.
+    """
     array = segments[0].model.array
     point = _evaluate(segments, fixed, start)
     for _ in range(iterations):
         if point.expected < _TOLERANCE:
+            return _stepped(point, array)
+        trials = [point.moved(share, array) for share in _SHARES]
+        downhill = (one for one in trials if _energy(segments, fixed, one) <= point.energy + _UPHILL)
+        trial = next(downhill, None)
+        try:
+            following = _evaluate(segments, fixed, trials[0] if trial is None else trial)
+        except np.linalg.LinAlgError:  # so far off that the prediction overflows
             break
-        for scale in _SHARES:
-            try:
-                trial = _evaluate(segments, fixed, point.moved(scale, array))
-            except np.linalg.LinAlgError:  # so far off that the prediction overflows
-                continue
-            if trial.value <= point.value + _UPHILL:
-                break
-        else:
+        # Where the drive has yet to follow, a step may be right that is uphill with the drive held.
+        if trial is None and following.value > point.value + _UPHILL:
             break
-        stalled = point.value - trial.value < _TOLERANCE and trial.expected > _STALLED * point.expected
-        point = trial
+        stalled = point.energy - following.energy < _TOLERANCE and following.expected > _STALLED * point.expected
+        point = following
         if stalled:
             break
     return point
 
 
+def _stepped(point: _Point, array: AccelerometerArray) -> _Point:
+    """Return the point after its step in a linear world, which it is so near to the optimum."""
+    score = point.score - point.gram @ point.step
+    objective = point.objective - float(point.step @ (point.score + score))
+    return replace(point, state=point.moved(1.0, array), objective=objective, score=score)
+
+
+def _energy(segments: Sequence[Segment], fixed: Sequence[Sequence[Effect]], state: _State) -> float:
+    """Return misfit and prior energy of a state, its drives held."""
+    total = _prior_energy(state.causes)
+    for segment, known, drive in zip(segments, fixed, state.drives, strict=True):
+        segment.coefficients = drive
+        total += segment.energy([*known, *effects_of_run(state.causes, segment.model.array, segment.index)])
+    return total if np.isfinite(total) else np.inf
+
+
 def _evaluate(segments: Sequence[Segment], fixed: Sequence[Sequence[Effect]], state: _State) -> _Point:
     """Linearise every segment about a state and solve for the step of causes and drives."""
+    coordinates = _places(state.causes)[0]
 
     def linearised(
         segment: Segment, known: Sequence[Effect], drive: NDArray[np.float64]
-    ) -> tuple[DriveElimination, tuple[NDArray[np.float64], ...]]:
+    ) -> tuple[DriveElimination, tuple[NDArray[np.float64], ...], NDArray[np.float64]]:
         segment.coefficients = drive
         line = segment.linearise([*known, *effects_of_run(state.causes, segment.model.array, segment.index)])
         products = segment.whitened_products(line, cause_columns(segment, state.causes, known, shapes=True))
-        return line.drive, products  # the rest of the line would fill the memory in long recordings
+        # The rest of the line would fill the memory in long recordings.
+        return line.drive, products, line.drive.response(products[2][:, coordinates])
 
     done = over_segments(linearised, segments, fixed, state.drives)
-    eliminations, products = [drive for drive, _ in done], [product for _, product in done]
+    eliminations, products, responses = zip(*done, strict=True)
     gram = np.sum([product[0] for product in products], axis=0)
     score = np.sum([product[1] for product in products], axis=0)
     precision, pull = _prior(state.causes)
@@ -225,6 +296,8 @@ def _evaluate(segments: Sequence[Segment], fixed: Sequence[Sequence[Effect]], st
         # What the step promises, and how far the drives still are from their best.
         float(step @ information @ step) + _DRIVE_SHARE * sum(one.distance() for one in eliminations),
         sum(one.log_volume() for one in eliminations),
+        responses,
+        sum(one.objective + one.distance() for one in eliminations) + _prior_energy(state.causes),
     )
 
 
@@ -289,7 +362,9 @@ def _result(segments: Sequence[Segment], point: _Point) -> Fit:
     if not causes:
         evidence = point.log_volume - 0.5 * point.objective
         empty = np.zeros((0, 0))
-        return Fit((), evidence, evidence + prior, point.objective, point.state.drives, empty, np.zeros(0))
+        return Fit(
+            (), evidence, evidence + prior, point.objective, point.state.drives, empty, np.zeros(0), point.responses
+        )
     coordinates, shapes = _places(causes)
     values = np.concatenate([cause.coordinates for cause in causes])
     covariance = inverse(gram + np.diag(_prior(causes)[0]))
@@ -305,4 +380,5 @@ def _result(segments: Sequence[Segment], point: _Point) -> Fit:
         stds = {key: float(np.sqrt(covariance[p, p])) for owner, key, p in shapes if owner == number}
         scaled = {key: std if key in ANGLES else std * abs(cause.shape[key]) for key, std in stds.items()}
         done.append(replace(cause, covariance=covariance[np.ix_(mine, mine)], shape_std=scaled))
-    return Fit(tuple(done), evidence, evidence + prior, point.objective, point.state.drives, inner, total)
+    drives = point.state.drives
+    return Fit(tuple(done), evidence, evidence + prior, point.objective, drives, inner, total, point.responses)

@@ -309,20 +309,15 @@ class Segment:
         """Linearise about effects and the present drive, and eliminate the drive."""
         data = self._data_equations(effects)
         state = self.motion(effects).at(self.run.t)
-        return Linearisation(
-            data.residual, data.slow_residual, data.jacobian, data.slow, self._eliminate(data), state
-        )
+        return Linearisation(data.residual, data.slow_residual, data.jacobian, data.slow, self._eliminate(data), state)
 
     def _data_equations(self, effects: Sequence[Effect]) -> _DataEquations:
         """Return the normal equations of the drive, and of a calibration residue, without the drive's prior."""
         predicted = self.predict(effects)
-        measured = np.column_stack([self.run.readings, self.run.reference])
-        residual, objective = self._weigh(np.where(self.weight_mask, measured - predicted, 0.0))
+        residual, slow_residual, objective = self._misfit(predicted)
         jacobian = self._jacobian(effects, predicted)
-        slow_residual = self.cosines.T @ residual  # (K, c + 1)
         damped = self.share * slow_residual
         weights = self.inverse_variance
-        objective += float(weights @ (np.sum(residual**2, axis=0) - np.sum(slow_residual * damped, axis=0)))
         rhs = jacobian.backward((residual - self.cosines @ damped) * weights)
         slow = jacobian.slow(self.cosines)
         low = jacobian.slow_rows(slow, self.share, weights)
@@ -335,16 +330,35 @@ class Segment:
             )
         return _DataEquations(residual, slow_residual, jacobian, slow, lhs, rhs, objective, residue)
 
-    def _eliminate(self, data: _DataEquations) -> DriveElimination:
-        """Add the prior of the drive and factor."""
+    def _misfit(self, predicted: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+        """Return the working residual r (n, c + 1), the same in the cosines (K, c + 1), and rᵀWr."""
+        measured = np.column_stack([self.run.readings, self.run.reference])
+        residual, misfit = self._weigh(np.where(self.weight_mask, measured - predicted, 0.0))
+        slow = self.cosines.T @ residual
+        power = np.sum(residual**2, axis=0) - np.sum(slow**2 * self.share, axis=0)
+        return residual, slow, misfit + float(self.inverse_variance @ power)
+
+    def energy(self, effects: Sequence[Effect]) -> float:
+        """Return rᵀWr + dᵀRd at the present drive, which is held; a calibration residue is at its best there."""
+        residual, _, misfit = self._misfit(self.predict(effects))
+        if self.calibration_residue is not None:
+            misfit -= self.calibration_residue.explained(residual, self.cosines, self.share, self.inverse_variance)
+        return misfit + self._drive_energy()[0]
+
+    def _drive_energy(self) -> tuple[float, NDArray[np.float64]]:
+        """Return dᵀRd of the present drive and −Rd (m,)."""
         # Differences first: the quadratic form of the coefficients would lose ten digits.
         rough = self._rough @ self.coefficients
-        rhs = data.rhs - self._rough.T @ rough
-        objective = data.objective + float(rough @ rough)
+        energy, pull = float(rough @ rough), -(self._rough.T @ rough)
         if not self.is_angle:
             off = self._begin @ self.coefficients - self.start_angle / self.start_angle_std
-            rhs = rhs - self._begin.T @ off
-            objective += float(off @ off)
+            energy, pull = energy + float(off @ off), pull - self._begin.T @ off
+        return energy, pull
+
+    def _eliminate(self, data: _DataEquations) -> DriveElimination:
+        """Add the prior of the drive and factor."""
+        energy, pull = self._drive_energy()
+        rhs, objective = data.rhs + pull, data.objective + energy
         prior = self.prior.tocoo()
         lhs = data.lhs.copy(order="F")
         lhs[prior.row, prior.col] += prior.data

@@ -92,12 +92,35 @@ class Hypothesis:
 
 @dataclass(frozen=True)
 class SignatureSet:
-    """All signatures about a base and the normal equations in their columns, relative to no effects at all."""
+    """All signatures about a base and the normal equations in their P columns, relative to no effects at all.
+
+    Parameters
+    ----------
+    signatures : tuple of Signature
+        Every effect in every shape.
+    gram, score : ndarray
+        G (P, P) and b (P,).
+    hypotheses : tuple of Hypothesis
+        Every effect at every place.
+    base : ndarray, shape (P,)
+        The base in the columns.
+    responses : tuple of ndarray
+        How the drive coefficients of every segment follow the columns, each (m, P).
+    """
 
     signatures: tuple[Signature, ...]
     gram: NDArray[np.float64]
     score: NDArray[np.float64]
     hypotheses: tuple[Hypothesis, ...]
+    base: NDArray[np.float64]
+    responses: tuple[NDArray[np.float64], ...] = ()
+
+    def drive_moves(self, causes: Sequence[Cause], members: Sequence[int]) -> list[NDArray[np.float64]]:
+        """Return how far the drive of every segment would follow from the base to other causes in a linear world."""
+        move = -self.base
+        for cause, number in zip(causes, members, strict=True):
+            move[self.hypotheses[number].signature.columns] += cause.mixing @ cause.coordinates
+        return [response @ move for response in self.responses]
 
 
 def plan_signatures(

@@ -118,7 +118,7 @@ def screen(
     for cause in causes:
         signature = next(one for one in signatures if one.family.name == cause.name)
         at[signature.columns] = cause.mixing @ cause.coordinates
-    places = SignatureSet(tuple(signatures), gram, score + gram @ at, tuple(hypotheses(signatures, array, 1)))
+    places = SignatureSet(tuple(signatures), gram, score + gram @ at, tuple(hypotheses(signatures, array, 1)), at)
     return Screening(places, objective, at)
 
 
