@@ -21,6 +21,7 @@ from gfimu.diagnosis.pruning import LEAST_EXTRA_ODDS, prune
 from gfimu.diagnosis.refinement import refine
 from gfimu.diagnosis.segment import known_walk
 from gfimu.diagnosis.stochastic import UNEQUAL_WALK, WALK_ODDS, Walk, log_probability, walk_strength
+from gfimu.diagnosis.threads import one_blas_thread
 from gfimu.diagnosis.verdict import Diagnosis, Gain
 from gfimu.errors import InputError
 from gfimu.recording import Recording
@@ -75,8 +76,20 @@ def diagnose(
         raise InputError("no recording to diagnose; give at least one")
     tell = report or (lambda share, text: None)
     labels = list(names) if names is not None else [f"run {number + 1}" for number in range(len(recordings))]
-    if model.drive_source == "gyro":
-        return diagnose_body(recordings, model, held_out=held_out, names=labels, report=tell)
+    with one_blas_thread():
+        if model.drive_source == "gyro":
+            return diagnose_body(recordings, model, held_out=held_out, names=labels, report=tell)
+        return _diagnose_table(recordings, model, held_out, labels, tell)
+
+
+def _diagnose_table(
+    recordings: Sequence[Recording],
+    model: WorldModel,
+    held_out: Sequence[Recording],
+    labels: Sequence[str],
+    tell: Report,
+) -> Diagnosis:
+    """Diagnose a unit on a table, whose drive is one smooth unknown."""
     tell(0.02, "read")
     prepared = PreparedRuns.build(recordings, model, labels)
     explanation, walk, loose = _explain(prepared, model, tell)

@@ -142,6 +142,8 @@ class DriveJacobian:
         """
         mixed = np.einsum("rc,kc,sc->krs", self.loading * weights, share, self.loading)  # (K, R, R)
         power, vectors = np.linalg.eigh(mixed)
+        there = power.max(axis=0) > _LEAST_SHARE  # the reference has no slow noise
+        power, vectors = power[:, there], vectors[:, :, there]
         roots = vectors * np.sqrt(np.maximum(power, 0.0))[:, None, :]  # S_k = roots rootsᵀ
         rows = np.einsum("krq,rmk->qkm", roots, slow, optimize=True)
         return np.asarray(rows.reshape(-1, slow.shape[1]))

@@ -230,11 +230,10 @@ class _Search:
         fits = self._refined_leaders()
         # A start has been through this.
         if first and not self._start and not any(self._is_fair(fit) for fit in fits.values()):
-            for hypothesis in self._signatures.hypotheses:
-                if hypothesis.family.starts:
-                    tell(0.1, f"large sizes of {hypothesis.name}")
-                    large = from_far(segments, hypothesis, fixed, self._best.drives)
-                    fits[large.key] = max(fits.get(large.key, large), large, key=_posterior)
+            tell(0.1, "large sizes")
+            far = [hypothesis for hypothesis in self._signatures.hypotheses if hypothesis.family.starts]
+            for large in from_far(segments, far, fixed, self._best.drives):
+                fits[large.key] = max(fits.get(large.key, large), large, key=_posterior)
         self._tried |= fits
         winner = max(fits.values(), key=_posterior)
         self._behind |= {key: winner.log_posterior - fit.log_posterior for key, fit in fits.items()}

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from copy import copy
 from dataclasses import replace
 
 import numpy as np
@@ -12,11 +13,13 @@ from gfimu.diagnosis.model import Effect
 from gfimu.diagnosis.refinement import Fit, refine, refine_each
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.signatures import Hypothesis
+from gfimu.diagnosis.threads import over_segments
 
 __all__ = ["every_mode", "from_far"]
 
 _ITERATIONS = 14
 _FEW_ITERATIONS = 3
+_SPACING = 0.1  # s, twice that of the fit
 _MODE_STARTS = 6
 _MODE_DAMPING = 0.05
 # What the evidence of a mode may be wrong by: it bends the functions that the drive can follow (`signatures`).
@@ -25,15 +28,25 @@ _AS_LIKELY = 10.0
 
 def from_far(
     segments: Sequence[Segment],
-    hypothesis: Hypothesis,
+    hypotheses: Sequence[Hypothesis],
     fixed: Sequence[Sequence[Effect]],
     drives: Sequence[NDArray[np.float64]],
-) -> Fit:
-    """Fit one effect from several large sizes, as its signature at nothing says little about them."""
-    sets = [[hypothesis.cause(np.array([start]))] for start in hypothesis.family.starts]
-    fits = refine_each(segments, sets, fixed, [drives] * len(sets), iterations=_FEW_ITERATIONS)
-    best = max(fits, key=lambda fit: fit.log_posterior)
-    return refine(segments, best.causes, fixed, drives=best.drives, iterations=_ITERATIONS)
+) -> Iterator[Fit]:
+    """Fit effects, each alone, from several large sizes, as their signatures at nothing say little about them.
+
+    Which size to start from is found with drives of few knots.
+    """
+    for segment, drive in zip(segments, drives, strict=True):
+        segment.coefficients = drive
+    coarse = over_segments(lambda segment: segment.coarser(_SPACING), segments)
+    for hypothesis in hypotheses:
+        sets = [[hypothesis.cause(np.array([start]))] for start in hypothesis.family.starts]
+        fits = refine_each(coarse, sets, fixed, [None] * len(sets), iterations=_FEW_ITERATIONS)
+        best = max(fits, key=lambda fit: fit.log_posterior)
+        mine = [copy(segment) for segment in segments]
+        for segment, few, drive in zip(mine, coarse, best.drives, strict=True):
+            segment.follow(few.spline.spin(drive))
+        yield refine(mine, best.causes, fixed, iterations=_ITERATIONS)
 
 
 def every_mode(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]]) -> Fit:

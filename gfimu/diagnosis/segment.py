@@ -15,6 +15,7 @@ coefficient.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -163,10 +164,7 @@ class Segment:
         self._take(whole.roughness.on(whole.spline.within(self.spline.start, self.spline.stop), corners=True))
         self.start_angle, self.start_angle_std = float(whole.spin.at(self.run.t[:1]).angle[0]), _KNOWN_ANGLE_STD
         self._set_roughness()
-        # Beyond the ends too: late chips ask for the motion there.
-        step = min(self.run.sample_period, 0.5 * float(self.spline.widths.min()))
-        reach = np.arange(self.spline.start, self.spline.stop, step)
-        self.coefficients = self.spline.through(reach, whole.spin.at(reach))
+        self.follow(whole.spin)
         self._reference_drive = self._starting_drive()
         self.prepare_weights()
 
@@ -191,12 +189,27 @@ class Segment:
         if most <= 0 or not cut.any():
             return False
         spline = old.halved(cut)
-        reach = np.arange(old.start, old.stop, 0.5 * float(spline.widths.min()))
         self._take(self.roughness.on(spline, corners=False))
         self._set_roughness()
-        self.coefficients = spline.through(reach, kept.at(reach))
+        self.follow(kept)
         self._reference_drive = self._starting_drive()
         return True
+
+    def coarser(self, spacing: float) -> Segment:
+        """Return a copy whose knots are all ``spacing`` s apart, at the present drive."""
+        other = copy(self)
+        spline = AngleSpline.uniform(self.spline.start, self.spline.stop, spacing)
+        other._take(self.roughness.on(spline, corners=False))
+        other._set_roughness()
+        other.follow(self.spin)
+        return other
+
+    def follow(self, spin: Spin) -> None:
+        """Take the drive that comes closest to a motion."""
+        step = min(self.run.sample_period, 0.5 * float(self.spline.widths.min()))
+        # Beyond the ends too: late chips ask for the motion there.
+        reach = np.arange(self.spline.start, self.spline.stop, step)
+        self.coefficients = self.spline.through(reach, spin.at(reach))
 
     def tune_roughness(self, effects: Sequence[Effect]) -> None:
         """Pick the scale of the roughness prior by marginal likelihood, the drive integrated out."""
