@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.stats import beta
 
 from gfimu.atomic_file import write_text
+from gfimu.errors import InputError
 from sim.study.figures import draw_confusion, draw_detection, draw_reliability
 
 __all__ = ["Tally", "rate_with_interval", "score", "summarise", "visible", "write_report"]
@@ -34,6 +35,9 @@ LEAST_SEPARABLE = 3.0
 
 The log odds of an ideal observer are 4.5 ± 3 there.
 """
+
+_REMARKS = "<!-- remarks, kept by the report -->"
+_END_OF_REMARKS = "<!-- end of remarks -->"
 
 _DRIVE_UNKNOWN = (0.0, 5.0, 7.0, 10.0, 15.0, 60.0, np.inf)
 
@@ -370,9 +374,29 @@ def reliability(outcomes: Sequence[Outcome]) -> list[tuple[float, float, int]]:
     return bins
 
 
+def _remarks(page: Path) -> str:
+    """Return what was written by hand into a page, blank lines around it; nothing where there is no page."""
+    if not page.exists():
+        return ""
+    _, mark, after = page.read_text(encoding="utf-8").partition(_REMARKS)
+    if not mark or _END_OF_REMARKS not in after:
+        raise InputError(f"{page}: no marks around remarks, which would be lost; add {_REMARKS} and {_END_OF_REMARKS}")
+    kept = after.partition(_END_OF_REMARKS)[0].strip("\n")
+    return f"\n{kept}\n" if kept else ""
+
+
 def write_report(outcomes: Sequence[Outcome], folder: str | Path) -> list[Path]:
-    """Write ``diagnosis-study.md`` and its figures into a folder; return the files."""
+    """Write ``diagnosis-study.md`` and its figures into a folder; return the files.
+
+    Remarks that stand in the page between two marks, written by hand, are kept.
+
+    Raises
+    ------
+    InputError
+        If there is such a page without the marks.
+    """
     place = Path(folder)
+    remarks = _remarks(place / "diagnosis-study.md")
     own = [outcome for outcome in outcomes if "method" not in outcome and visible(outcome)]
     singles = [outcome for outcome in own if outcome["study"] == "singles"]
     figures: list[tuple[str, str, Path]] = []
@@ -399,6 +423,7 @@ def write_report(outcomes: Sequence[Outcome], folder: str | Path) -> list[Path]:
         "d′ = √Σ(Δ/σ)² over all channels and the tachometer with the drive known. Made by\n\n"
         "```\npython -m sim.study run STUDY ... --out outcomes.jsonl\n"
         "python -m sim.study report outcomes.jsonl --out docs\n```\n\n"
+        f"{_REMARKS}\n{remarks}\n{_END_OF_REMARKS}\n\n"
         + summarise(outcomes)
         + "".join(f"## {title}\n\n![{name}](figures/{path.name})\n\n" for name, title, path in figures)
     )

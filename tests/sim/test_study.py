@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import pytest
 
+from gfimu.errors import InputError
 from sim.study.cases import Case
 from sim.study.outcome import draw_world
-from sim.study.report import rate_with_interval, reliability, score, summarise
+from sim.study.report import rate_with_interval, reliability, score, summarise, write_report
 
 
 def outcome(effects=(), causes=(), verdict="nothing_found", **more):
@@ -84,3 +85,20 @@ def test_an_effect_taken_out_is_as_far_from_the_rest_as_it_is_unlike_it(name, le
         if row.startswith("| **taken out")
     )
     assert ("imitated by one other effect" in line) == (most < 15.0)
+
+
+def test_the_report_keeps_what_was_written_by_hand(tmp_path):
+    outcomes = [outcome(["bias"], [("bias", 0.8, ())], "explained"), outcome()]
+    page = write_report(outcomes, tmp_path)[0]
+    first = page.read_text()
+    remark = "**State.** Two runs only."
+    page.write_text(first.replace("\n<!-- end of remarks -->", f"\n{remark}\n\n<!-- end of remarks -->"))
+    write_report(outcomes, tmp_path)
+    once = page.read_text()
+    assert once.count(remark) == 1
+    write_report(outcomes, tmp_path)
+    assert page.read_text() == once
+    page.write_text(first.replace("<!-- end of remarks -->", remark))
+    with pytest.raises(InputError, match="remarks"):
+        write_report(outcomes, tmp_path)
+    assert remark in page.read_text()
