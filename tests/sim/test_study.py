@@ -88,7 +88,7 @@ def test_an_effect_taken_out_is_as_far_from_the_rest_as_it_is_unlike_it(name, le
 
 
 def test_the_report_keeps_what_was_written_by_hand(tmp_path):
-    outcomes = [outcome(["bias"], [("bias", 0.8, ())], "explained"), outcome(study="nulls", size=0.0)]
+    outcomes = [outcome(["bias"], [("bias", 0.8, ())], "explained"), outcome(["noise"])]
     page = write_report(outcomes, tmp_path)[0]
     first = page.read_text()
     remark = "**State.** Two runs only."
