@@ -16,6 +16,7 @@ from gfimu.diagnosis.holdout import Holdout, gate_gains, held_out_gain, split_se
 from gfimu.diagnosis.long_run import explain_any_length
 from gfimu.diagnosis.loose_calibration import LooseCalibration, loosen, relearned
 from gfimu.diagnosis.model import Effect, WorldModel
+from gfimu.diagnosis.nuisances import settle_noise
 from gfimu.diagnosis.prepared_runs import PreparedRuns
 from gfimu.diagnosis.pruning import LEAST_EXTRA_ODDS, prune
 from gfimu.diagnosis.refinement import refine
@@ -151,7 +152,10 @@ def _explain(
         other, _ = prepared.segments(model)
         for segment, old in zip(other, before, strict=True):
             segment.adopt(old)
-            segment.levels = NoiseLevels(old.levels.white, old.levels.flicker, walk.strength)
+            segment.set_levels(NoiseLevels(old.levels.white, old.levels.flicker, walk.strength))
+            segment.prepare_weights()
+        # What was taken for bias instability is the walk now.
+        settle_noise(other, base.causes, fixed)
         wandering = explain_any_length(other, fixed, runs, start=base.causes)
         odds = log_probability(other, wandering.fit) - np.log(len(model.families())) - plain_value
         found = wandering, walk

@@ -15,7 +15,7 @@ from gfimu.diagnosis.drive import smooth_rate
 from gfimu.diagnosis.far_starts import every_mode, from_far
 from gfimu.diagnosis.linearisation import Linearisation
 from gfimu.diagnosis.model import Effect, WorldModel
-from gfimu.diagnosis.nuisances import learn_noise, sharpen_drives, tune_drives
+from gfimu.diagnosis.nuisances import STEADY_NOISE, learn_noise, sharpen_drives, tune_drives
 from gfimu.diagnosis.pruning import RIVALS, near_rivals, prune
 from gfimu.diagnosis.refinement import Fit, Start, refine, refine_each
 from gfimu.diagnosis.run import Run
@@ -45,7 +45,6 @@ _WORTH_REFINING = -6.0
 FAIR_FIT = 1.6
 """Misfit per observation, in variances, above which something large is still missing."""
 _ITERATIONS = 7
-_STEADY_NOISE = 0.1
 _FAINT = 500.0  # log odds of a mode whose frequency may not be settled
 
 
@@ -246,7 +245,7 @@ class _Search:
             self._best = sharpen_drives(segments, self._best, fixed)
             # On the same knots.
             self._fitted = refine(segments, self._start, fixed, drives=self._best.drives, iterations=8)
-        done = settled and (self._settled or change < _STEADY_NOISE)
+        done = settled and (self._settled or change < STEADY_NOISE)
         self._settled = settled
         return done
 

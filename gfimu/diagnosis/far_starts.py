@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from copy import copy
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.diagnosis.model import Effect
-from gfimu.diagnosis.refinement import Fit, refine, refine_each
+from gfimu.diagnosis.refinement import Fit, refine_each
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.signatures import Hypothesis
 from gfimu.diagnosis.threads import over_segments
@@ -19,6 +18,7 @@ __all__ = ["every_mode", "from_far"]
 
 _ITERATIONS = 14
 _FEW_ITERATIONS = 3
+_WORTH_STARTING = 1.2
 _SPACING = 0.1  # s, twice that of the fit
 _MODE_STARTS = 6
 _MODE_DAMPING = 0.05
@@ -31,7 +31,7 @@ def from_far(
     hypotheses: Sequence[Hypothesis],
     fixed: Sequence[Sequence[Effect]],
     drives: Sequence[NDArray[np.float64]],
-) -> Iterator[Fit]:
+) -> list[Fit]:
     """Fit effects, each alone, from several large sizes, as their signatures at nothing say little about them.
 
     Which size to start from is found with drives of few knots.
@@ -39,14 +39,23 @@ def from_far(
     for segment, drive in zip(segments, drives, strict=True):
         segment.coefficients = drive
     coarse = over_segments(lambda segment: segment.coarser(_SPACING), segments)
-    for hypothesis in hypotheses:
-        sets = [[hypothesis.cause(np.array([start]))] for start in hypothesis.family.starts]
-        fits = refine_each(coarse, sets, fixed, [None] * len(sets), iterations=_FEW_ITERATIONS)
-        best = max(fits, key=lambda fit: fit.log_posterior)
-        mine = [copy(segment) for segment in segments]
-        for segment, few, drive in zip(mine, coarse, best.drives, strict=True):
-            segment.follow(few.spline.spin(drive))
-        yield refine(mine, best.causes, fixed, iterations=_ITERATIONS)
+    sets = [[one.cause(np.array([start]))] for one in hypotheses for start in one.family.starts]
+    nothing, *first = refine_each(coarse, [[], *sets], fixed, [None] * (1 + len(sets)), iterations=0)
+    # A start of which anything can come is nearer to the data than nothing, or not much farther.
+    sets = [some for some, fit in zip(sets, first, strict=True) if fit.objective < _WORTH_STARTING * nothing.objective]
+    fits = refine_each(coarse, sets, fixed, [None] * len(sets), iterations=_FEW_ITERATIONS)
+    best: dict[frozenset[str], Fit] = {}
+    for fit in fits:
+        best[fit.names] = max(best.get(fit.names, fit), fit, key=lambda one: one.log_posterior)
+    followed = [
+        [
+            segment.following(few.spline.spin(drive))
+            for segment, few, drive in zip(segments, coarse, fit.drives, strict=True)
+        ]
+        for fit in best.values()
+    ]
+    causes = [fit.causes for fit in best.values()]
+    return refine_each(segments, causes, fixed, followed, iterations=_ITERATIONS)
 
 
 def every_mode(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]]) -> Fit:

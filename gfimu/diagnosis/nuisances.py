@@ -7,14 +7,17 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.diagnosis.causes import effects_of_run
+from gfimu.diagnosis.causes import Cause, effects_of_run
 from gfimu.diagnosis.coloured_noise import NoiseLevels, estimate_flicker, white_level
 from gfimu.diagnosis.model import Effect
 from gfimu.diagnosis.refinement import Fit, refine
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.threads import over_segments
 
-__all__ = ["learn_noise", "sharpen_drives", "tune_drives"]
+__all__ = ["STEADY_NOISE", "learn_noise", "settle_noise", "sharpen_drives", "tune_drives"]
+
+STEADY_NOISE = 0.1
+"""Relative change of the noise below which it is known."""
 
 _ITERATIONS = 6
 _MOST_CUTS = 3
@@ -62,6 +65,13 @@ def learn_noise(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[
             segments[place].set_levels(NoiseLevels(white, flicker, walk))
             segments[place].prepare_weights()
     return change
+
+
+def settle_noise(segments: Sequence[Segment], causes: Sequence[Cause], fixed: Sequence[Sequence[Effect]]) -> None:
+    """Learn the noise that causes leave again and again until it stays the same."""
+    for _ in range(_ITERATIONS):
+        if learn_noise(segments, refine(segments, causes, fixed), fixed) < STEADY_NOISE:
+            break
 
 
 def sharpen_drives(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]]) -> Fit:

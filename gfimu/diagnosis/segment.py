@@ -164,7 +164,7 @@ class Segment:
         self._take(whole.roughness.on(whole.spline.within(self.spline.start, self.spline.stop), corners=True))
         self.start_angle, self.start_angle_std = float(whole.spin.at(self.run.t[:1]).angle[0]), _KNOWN_ANGLE_STD
         self._set_roughness()
-        self.follow(whole.spin)
+        self.coefficients = self.following(whole.spin)
         self._reference_drive = self._starting_drive()
         self.prepare_weights()
 
@@ -191,7 +191,7 @@ class Segment:
         spline = old.halved(cut)
         self._take(self.roughness.on(spline, corners=False))
         self._set_roughness()
-        self.follow(kept)
+        self.coefficients = self.following(kept)
         self._reference_drive = self._starting_drive()
         return True
 
@@ -201,15 +201,15 @@ class Segment:
         spline = AngleSpline.uniform(self.spline.start, self.spline.stop, spacing)
         other._take(self.roughness.on(spline, corners=False))
         other._set_roughness()
-        other.follow(self.spin)
+        other.coefficients = other.following(self.spin)
         return other
 
-    def follow(self, spin: Spin) -> None:
-        """Take the drive that comes closest to a motion."""
+    def following(self, spin: Spin) -> NDArray[np.float64]:
+        """Return the coefficients (m,) of the drive that comes closest to a motion."""
         step = min(self.run.sample_period, 0.5 * float(self.spline.widths.min()))
         # Beyond the ends too: late chips ask for the motion there.
         reach = np.arange(self.spline.start, self.spline.stop, step)
-        self.coefficients = self.spline.through(reach, spin.at(reach))
+        return self.spline.through(reach, spin.at(reach))
 
     def tune_roughness(self, effects: Sequence[Effect]) -> None:
         """Pick the scale of the roughness prior by marginal likelihood, the drive integrated out."""

@@ -92,12 +92,15 @@ def test_a_chip_at_twice_its_gain_is_not_taken_for_clipping(twin):
     assert [found.name for found in checked.effects] == ["wrong_range"]
 
 
-def test_a_large_skew_is_found_though_far_from_linear(twin):
-    effect = make_effect("channel_skew", {"per_chip_s": -0.15}, twin.array)
+@pytest.mark.parametrize(
+    ("name", "key", "value"), [("channel_skew", "per_chip_s", -0.15), ("clock_error", "ratio", -0.05)]
+)
+def test_a_large_fault_of_timing_is_found_though_far_from_linear(twin, name, key, value):
+    effect = make_effect(name, {key: value}, twin.array)
     found = diagnose([measure(np.random.default_rng(10), twin, [effect], SETTING)], twin)
-    assert [cause.effect for cause in found.causes] == ["channel_skew"]
+    assert [cause.effect for cause in found.causes] == [name]
     [cause] = found.causes
-    assert abs(cause.parameters["per_chip_s"] + 0.15) < 4 * cause.std["per_chip_s"]
+    assert abs(cause.parameters[key] - value) < 4 * cause.std[key]
 
 
 @pytest.mark.parametrize("name", ["eccentricity", "bias"])
