@@ -96,7 +96,7 @@ def _diagnose_table(
     explanation, walk, loose = _explain(prepared, model, tell)
     tell(0.92, "hold out")
     pairs, label = _holdouts(explanation, held_out, model, () if loose is None else loose.effects)
-    halves = split_segments(explanation.segments, explanation.fixed, duration=np.inf)
+    halves = split_segments(explanation.segments, explanation.fixed, explanation.fit.causes, duration=np.inf)
     judged = explanation if loose is None else loose.held
     gated, withdrawn = _gate(judged, pairs if held_out else halves, other_recording=bool(held_out))
     explanation = gated if withdrawn or loose is None else explanation
@@ -176,7 +176,7 @@ def _holdouts(
     """Pair fitted and held-out data for the gain: other recordings where given, blocks of the run otherwise."""
     if not held_out:
         return split_segments(
-            explanation.segments, explanation.fixed
+            explanation.segments, explanation.fixed, explanation.fit.causes
         ), "blocks of the recording, odd and even from each other"
     other = PreparedRuns.build(held_out, model, [f"held out {n + 1}" for n in range(len(held_out))])
     segments, known = other.segments(model)

@@ -70,6 +70,14 @@ class AngleSpline:
         inner = self.breaks[(self.breaks > start + apart) & (self.breaks < stop - apart)]
         return AngleSpline(np.concatenate([[start], inner, [stop]]))
 
+    def widened(self, before: float, after: float) -> AngleSpline:
+        """Return the spline with intervals added at its ends over times, s."""
+        ends = [
+            np.linspace(0.0, more, int(np.ceil(more / self.spacing)) + 1)[1:] if more > 0 else np.zeros(0)
+            for more in (before, after)
+        ]
+        return AngleSpline(np.concatenate([self.start - ends[0][::-1], self.breaks, self.stop + ends[1]]))
+
     def local(self, t: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
         """Return the first coefficient (n,) that matters at each time, and what angle, rate and acceleration take
         from it and the four after it, shape (3, n, 5); constant rate beyond the ends.

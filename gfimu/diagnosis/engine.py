@@ -15,7 +15,7 @@ from gfimu.diagnosis.drive import smooth_rate
 from gfimu.diagnosis.far_starts import every_mode, from_far
 from gfimu.diagnosis.linearisation import Linearisation
 from gfimu.diagnosis.model import Effect, WorldModel
-from gfimu.diagnosis.nuisances import STEADY_NOISE, learn_noise, sharpen_drives, tune_drives
+from gfimu.diagnosis.nuisances import STEADY_NOISE, learn_noise, sharpen_drives, tune_drives, widen_drives
 from gfimu.diagnosis.pruning import RIVALS, near_rivals, prune
 from gfimu.diagnosis.refinement import Fit, Start, refine, refine_each
 from gfimu.diagnosis.run import Run
@@ -237,6 +237,10 @@ class _Search:
         winner = max(fits.values(), key=_posterior)
         self._behind |= {key: winner.log_posterior - fit.log_posterior for key, fit in fits.items()}
         settled = winner.key == self._best.key
+        wider = widen_drives(segments, winner, fixed)
+        if wider is not winner:
+            winner, settled = wider, False
+            self._fitted = refine(segments, self._start, fixed, drives=winner.drives, iterations=8)
         change = learn_noise(segments, winner, fixed)
         tune_drives(segments, winner, fixed)
         self._best = refine(segments, winner.causes, fixed, drives=winner.drives, iterations=6)

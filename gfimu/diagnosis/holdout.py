@@ -40,7 +40,11 @@ class Holdout:
 
 
 def split_segments(
-    segments: Sequence[Segment], fixed: Sequence[Sequence[Effect]], *, duration: float = BLOCK_DURATION
+    segments: Sequence[Segment],
+    fixed: Sequence[Sequence[Effect]],
+    causes: Sequence[Cause] = (),
+    *,
+    duration: float = BLOCK_DURATION,
 ) -> list[Holdout]:
     """Split every segment into an even number of blocks, alternately of one part and of the other; pair them both ways.
 
@@ -50,17 +54,20 @@ def split_segments(
         The data.
     fixed : sequence of sequence of Effect
         Effects known beforehand, per segment.
+    causes : sequence of Cause
+        What was found; a slow clock asks for the motion beyond the ends of a block.
     duration : float
         About how long a block is, s; infinite for halves.
     """
     parts: list[list[Segment]] = [[], []]
     known: list[list[list[Effect]]] = [[], []]
     for segment, effects in zip(segments, fixed, strict=True):
+        present = [*effects, *effects_of_run(causes, segment.model.array, segment.index)]
         pairs = max(1, round(segment.run.duration / (2 * duration)))
         edges = np.linspace(0, len(segment.run.t), 2 * pairs + 1).astype(int)
         for place, (start, stop) in enumerate(pairwise(edges)):
             block = Segment(segment.model, segment.run.rows(int(start), int(stop)), segment.index, segment.start)
-            block.adopt(segment)
+            block.adopt(segment, present)
             parts[place % 2].append(block)
             known[place % 2].append(list(effects))
     return [Holdout(parts[0], known[0], parts[1], known[1]), Holdout(parts[1], known[1], parts[0], known[0])]

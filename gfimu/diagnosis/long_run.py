@@ -12,7 +12,7 @@ import numpy as np
 from gfimu.diagnosis.causes import Cause
 from gfimu.diagnosis.engine import Explanation, Report, explain
 from gfimu.diagnosis.model import Effect
-from gfimu.diagnosis.nuisances import learn_noise, sharpen_drives
+from gfimu.diagnosis.nuisances import learn_noise, sharpen_drives, widen_drives
 from gfimu.diagnosis.pruning import RIVALS, prune
 from gfimu.diagnosis.refinement import refine
 from gfimu.diagnosis.segment import Segment
@@ -68,7 +68,7 @@ def explain_any_length(
         segments[place].set_levels(like.levels)
         segments[place].roughness.factor, segments[place].rounding = like.roughness.factor, like.rounding
         segments[place].prepare_weights()
-    fit = refine(segments, part.fit.causes, fixed)
+    fit = widen_drives(segments, refine(segments, part.fit.causes, fixed), fixed)
     others, known = [segments[place] for place in rest], [fixed[place] for place in rest]
     for segment, drive in zip(others, fit.of(rest).drives, strict=True):
         segment.coefficients = drive

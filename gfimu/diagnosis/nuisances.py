@@ -14,7 +14,7 @@ from gfimu.diagnosis.refinement import Fit, refine
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.threads import over_segments
 
-__all__ = ["STEADY_NOISE", "learn_noise", "settle_noise", "sharpen_drives", "tune_drives"]
+__all__ = ["STEADY_NOISE", "learn_noise", "settle_noise", "sharpen_drives", "tune_drives", "widen_drives"]
 
 STEADY_NOISE = 0.1
 """Relative change of the noise below which it is known."""
@@ -91,6 +91,20 @@ def sharpen_drives(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequen
     if fit is not before:
         tune_drives(segments, fit, fixed)
     return fit
+
+
+def widen_drives(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]]) -> Fit:
+    """Let the drives reach as far beyond the ends as the causes ask for; returns the fit with such drives."""
+    array = segments[0].model.array
+
+    def widen(segment: Segment, known: Sequence[Effect], drive: NDArray[np.float64]) -> bool:
+        segment.coefficients = drive
+        return segment.reach_out([*known, *effects_of_run(fit.causes, array, segment.index)])
+
+    if not any(over_segments(widen, segments, fixed, fit.drives)):
+        return fit
+    drives = tuple(segment.coefficients for segment in segments)
+    return refine(segments, fit.causes, fixed, drives=drives, iterations=_ITERATIONS)
 
 
 def tune_drives(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]]) -> None:

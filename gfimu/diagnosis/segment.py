@@ -48,6 +48,7 @@ _MOST_INTERVALS = 1.7  # times as many as without finer ones, for the cost grows
 _FACTOR_STEPS = 4
 _REST_FACTOR = 1.3
 _LEAST_GAIN = 0.05
+_RIDGE = 1e-10
 _STATE_STEPS = (1e-5, 1e-4, 1e-3)
 
 
@@ -98,7 +99,8 @@ class Segment:
         spacing = max(KNOT_SPACING, period)
         # Late chips and fast clocks ask for the motion beyond the ends of the run.
         margin = max(TIME_MARGIN, 2 * spacing)
-        spline = AngleSpline.uniform(run.t[0] - margin, run.t[-1] + margin, spacing)
+        times = np.append(model.sample_times(run.t), run.t[:, None], axis=1)
+        spline = AngleSpline.uniform(times.min() - margin, times.max() + margin, spacing)
         self._take(Roughness(spline, _START_FACTOR))
         # Fits are compared under the same knots, so these are chosen once.
         self.knots_chosen = False
@@ -157,11 +159,20 @@ class Segment:
             rhs = rhs + self._begin.T @ np.array([self.start_angle / self.start_angle_std])
         return np.asarray(cho_solve(cho_factor(lhs, lower=True), rhs))
 
-    def adopt(self, whole: Segment) -> None:
-        """Take noise levels, roughness and drive from a segment of which this is a part."""
+    def adopt(self, whole: Segment, effects: Sequence[Effect] = ()) -> None:
+        """Take noise levels, roughness and drive from a segment of which this is a part.
+
+        The drive reaches as far as it does there, or, in a part, as effects ask for.
+        """
         self.levels = whole.levels
         self.rounding, self.knots_chosen = whole.rounding, whole.knots_chosen
-        self._take(whole.roughness.on(whole.spline.within(self.spline.start, self.spline.stop), corners=True))
+        start, stop = whole.spline.start, whole.spline.stop
+        if len(self.run.t) < len(whole.run.t):
+            times = self.model.sample_times(self.run.t, effects)
+            start = max(min(self.spline.start, float(times.min()) - TIME_MARGIN), start)
+            stop = min(max(self.spline.stop, float(times.max()) + TIME_MARGIN), stop)
+        spline = whole.spline.within(start, stop)
+        self._take(whole.roughness.on(spline, corners=True))
         self.start_angle, self.start_angle_std = float(whole.spin.at(self.run.t[:1]).angle[0]), _KNOWN_ANGLE_STD
         self._set_roughness()
         self.coefficients = self.following(whole.spin)
@@ -190,6 +201,20 @@ class Segment:
             return False
         spline = old.halved(cut)
         self._take(self.roughness.on(spline, corners=False))
+        self._set_roughness()
+        self.coefficients = self.following(kept)
+        self._reference_drive = self._starting_drive()
+        return True
+
+    def reach_out(self, effects: Sequence[Effect]) -> bool:
+        """Widen the spline to the motion that effects ask for (a slow clock, late chips); tells whether it was."""
+        times = self.model.sample_times(self.run.t, effects)
+        before, after = self.spline.start - float(times.min()), float(times.max()) - self.spline.stop
+        if not 0.0 < max(before, after) < self.run.duration:
+            return False
+        kept = self.spin
+        spline = self.spline.widened(max(before + TIME_MARGIN, 0.0), max(after + TIME_MARGIN, 0.0))
+        self._take(self.roughness.on(spline, corners=True))
         self._set_roughness()
         self.coefficients = self.following(kept)
         self._reference_drive = self._starting_drive()
@@ -382,7 +407,10 @@ class Segment:
             inner, right, cross = data.residue
             lhs = np.asfortranarray(np.block([[lhs, cross], [cross.T, inner]]))
             rhs = np.concatenate([rhs, right])
-        factor, failed = lapack.dpotrf(lhs, lower=1, clean=1, overwrite_a=1)
+        factor, failed = lapack.dpotrf(lhs, lower=1, clean=1)
+        if failed:  # a stretch of the drive that only its prior holds, and hardly
+            ridge = np.asfortranarray(lhs + np.diag(_RIDGE * lhs.diagonal()))
+            factor, failed = lapack.dpotrf(ridge, lower=1, clean=1, overwrite_a=1)
         if failed:
             raise np.linalg.LinAlgError("the normal equations of the drive are not positive definite")
         forward = solve_triangular(factor, rhs, lower=True, check_finite=False)

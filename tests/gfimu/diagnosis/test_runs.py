@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -16,7 +18,7 @@ from gfimu.recording import Recording
 from gfimu.units import STANDARD_GRAVITY
 from sim.campaign import Measurement, hidden_effect, measure, random_profile
 from sim.effects import make_effect
-from sim.profiles import Hold, spin_profile
+from sim.profiles import Hold, Ramp, spin_profile
 from sim.twin import Twin
 
 SETTING = Measurement(duration=24.0)
@@ -101,6 +103,17 @@ def test_a_large_fault_of_timing_is_found_though_far_from_linear(twin, name, key
     assert [cause.effect for cause in found.causes] == [name]
     [cause] = found.causes
     assert abs(cause.parameters[key] - value) < 4 * cause.std[key]
+
+
+def test_a_slow_clock_asks_for_the_motion_beyond_the_end(twin):
+    # The last readings are of 0.9 s after the last of the reference, while the table turns ever faster.
+    effect = make_effect("clock_error", {"ratio": -0.03}, twin.array)
+    motion = spin_profile([Ramp(3.0, 10.0), Hold(6.0), Ramp(9.0, 20.0)])
+    recording = measure(np.random.default_rng(4), twin, [effect], Measurement(duration=30.0), motion=motion)
+    found = diagnose([recording], twin)
+    assert [cause.effect for cause in found.causes] == ["clock_error"]
+    assert abs(found.causes[0].parameters["ratio"] + 0.03) < 4 * found.causes[0].std["ratio"]
+    assert diagnose([recording], replace(twin, effects=(effect,))).verdict == "nothing_found"
 
 
 @pytest.mark.parametrize("name", ["eccentricity", "bias"])
