@@ -7,9 +7,10 @@ import pytest
 from numpy.testing import assert_allclose
 
 from gfimu.array import AccelerometerArray
+from gfimu.diagnosis.calibration_residue import CalibrationResidue
 from gfimu.diagnosis.causes import effects_of_run
 from gfimu.diagnosis.engine import make_segments
-from gfimu.diagnosis.refinement import refine, refine_each
+from gfimu.diagnosis.refinement import Start, refine, refine_each, without
 from gfimu.diagnosis.run import prepare_run
 from gfimu.diagnosis.signatures import Signature, cause_columns, hypotheses, signature_columns
 from sim.campaign import Measurement, measure
@@ -121,3 +122,46 @@ def test_a_pair_that_does_not_commute_is_fitted_until_nothing_is_gained(twin):
     for cause, wanted in zip(fit.causes, causes, strict=True):
         off = (cause.coordinates - wanted.coordinates) / np.sqrt(cause.covariance.diagonal())
         assert np.abs(off).max() < 4.5
+
+
+@pytest.mark.parametrize("off", [0.0, 0.5])
+def test_the_energy_of_a_held_drive_is_what_elimination_starts_from(twin, off):
+    segment = _segment(twin, [make_effect("bias", {"a12_m_s2": 0.2})])
+    segment.coefficients = segment.coefficients + off * np.sin(np.arange(segment.spline.size))
+    for _ in range(2):
+        drive = segment.linearise([]).drive
+        assert segment.energy([]) == pytest.approx(drive.objective + drive.distance(), rel=1e-9)
+        # The same with a residue of the calibration that is free at any drive.
+        columns = np.zeros((len(segment.weight_mask[0]), 2, len(segment.run.t)))
+        columns[1, 0], columns[4, 1] = 0.1, 0.1 * np.sin(segment.run.t)
+        segment.calibration_residue = CalibrationResidue.of_columns(columns)
+
+
+def test_the_last_step_is_taken_though_not_looked_at(twin):
+    segment = _segment(twin, [make_effect("bias", {"a12_m_s2": 0.2})])
+    fit = refine([segment], _causes(segment, ["bias"], [{}], twin.array), [()], iterations=8)
+    (cause,) = fit.causes
+    std = np.sqrt(cause.covariance.diagonal())
+    start = cause.at(cause.coordinates + 0.3 * std * (np.arange(len(std)) == 1))  # 0.1 nats off
+    again = refine([segment], [start], [()], drives=fit.drives, iterations=8)
+    assert_allclose(again.causes[0].coordinates, cause.coordinates, atol=0.05 * std.min())
+    assert again.log_evidence == pytest.approx(fit.log_evidence, abs=0.01)
+    assert again.objective == pytest.approx(fit.objective, abs=0.01)
+
+
+def test_a_set_starts_where_a_linear_world_would_put_it(twin):
+    # Without one of two effects that share the drive, the others and the drive are at once near their new best.
+    truth = [make_effect("sensor_position", {"a1_x_m": 5e-4, "a1_y_m": 5e-4}), make_effect("bias", {"a12_m_s2": 0.01})]
+    segment = _segment(twin, truth)
+    causes = _causes(segment, ["sensor_position", "bias"], [{}, {}], twin.array)
+    fit = refine([segment], causes, [()], iterations=8)
+    start = without(fit, 0, twin.array)
+    best = refine([segment], start.causes, [()], drives=start.drives, iterations=8)
+    energies = []
+    for state in (start, Start(fit.causes[1:], fit.drives), best):
+        segment.coefficients = state.drives[0]
+        energies.append(segment.energy(effects_of_run(state.causes, twin.array, 0)))
+    assert energies[0] - energies[2] < 1e-3 * (energies[1] - energies[2])
+    for other in (start, Start(fit.causes[1:], fit.drives)):
+        again = refine([segment], fit.causes[1:], [()], drives=fit.drives, iterations=8, other=other)
+        assert again.log_posterior == pytest.approx(best.log_posterior, abs=0.05)
