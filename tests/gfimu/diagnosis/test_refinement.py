@@ -9,9 +9,10 @@ from numpy.testing import assert_allclose
 from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.calibration_residue import CalibrationResidue
 from gfimu.diagnosis.causes import effects_of_run
-from gfimu.diagnosis.engine import make_segments
+from gfimu.diagnosis.engine import make_segments, screen
 from gfimu.diagnosis.refinement import Start, refine, refine_each, without
 from gfimu.diagnosis.run import prepare_run
+from gfimu.diagnosis.search import Blocks
 from gfimu.diagnosis.signatures import Signature, cause_columns, hypotheses, signature_columns
 from sim.campaign import Measurement, measure
 from sim.effects import make_effect
@@ -165,3 +166,23 @@ def test_a_set_starts_where_a_linear_world_would_put_it(twin):
     for other in (start, Start(fit.causes[1:], fit.drives)):
         again = refine([segment], fit.causes[1:], [()], drives=fit.drives, iterations=8, other=other)
         assert again.log_posterior == pytest.approx(best.log_posterior, abs=0.05)
+
+
+def test_a_screened_set_starts_with_the_drive_that_follows_it(twin):
+    segment = _segment(twin, [make_effect("sensor_position", {"a1_x_m": 5e-4, "a1_y_m": 5e-4})])
+    nothing = refine([segment], (), [()], iterations=8)
+    signatures = screen([segment], nothing, [()], 1)
+    (member,) = [
+        number
+        for number, one in enumerate(signatures.hypotheses)
+        if one.name == "sensor_position" and len(one.mixing) == one.mixing.shape[1]
+    ]
+    blocks = Blocks(signatures)
+    cause = signatures.hypotheses[member].cause(blocks.coordinates((member,))[0])
+    (move,) = signatures.drive_moves([cause], (member,))
+    best = refine([segment], [cause], [()], drives=nothing.drives, iterations=8)
+    energies = []
+    for drive in (nothing.drives[0] + move, nothing.drives[0], best.drives[0]):
+        segment.coefficients = drive
+        energies.append(segment.energy(effects_of_run([cause], twin.array, 0)))
+    assert energies[0] - energies[2] < 0.01 * (energies[1] - energies[2])
