@@ -6,12 +6,74 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
+from scipy.linalg import lapack, solve_triangular
+from scipy.linalg.blas import dsyr
 
 from gfimu.diagnosis.drive_jacobian import DriveJacobian
+from gfimu.diagnosis.drive_prior import DrivePrior
 from gfimu.diagnosis.model import SpinState
 
-__all__ = ["DriveElimination", "Linearisation"]
+__all__ = ["DriveElimination", "DriveEquations", "Linearisation"]
+
+_RIDGE = 1e-10
+
+
+@dataclass(frozen=True)
+class DriveEquations:
+    """Normal equations of a drive from the data alone.
+
+    Parameters
+    ----------
+    residual, slow_residual, jacobian, slow
+        As in `Linearisation`.
+    lhs : ndarray, shape (m, m)
+        Lower triangle of JᵀWJ.
+    rhs : ndarray, shape (m,)
+        JᵀWr.
+    objective : float
+        rᵀWr.
+    residue : tuple of ndarray, optional
+        Where a calibration residue is admitted, its information (q, q), score (q,) and coupling to the drive (m, q).
+    """
+
+    residual: NDArray[np.float64]
+    slow_residual: NDArray[np.float64]
+    jacobian: DriveJacobian
+    slow: NDArray[np.float64]
+    lhs: NDArray[np.float64]
+    rhs: NDArray[np.float64]
+    objective: float
+    residue: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]] | None
+
+    def eliminated(self, prior: DrivePrior, coefficients: NDArray[np.float64]) -> DriveElimination:
+        """Add the prior of the drive, at coefficients (m,), and factor.
+
+        Raises
+        ------
+        numpy.linalg.LinAlgError
+            If data and prior hold no drive.
+        """
+        energy, pull = prior.energy(coefficients)
+        rhs, objective = self.rhs + pull, self.objective + energy
+        precision = prior.precision.tocoo()
+        lhs = self.lhs.copy(order="F")
+        lhs[precision.row, precision.col] += precision.data
+        # A vanishing coupling keeps far entries of the factor out of the denormal range, where LAPACK crawls; its
+        # sign alternates, as a constant one would hold the mean angle, which the data hardly fix.
+        coupling = 1e-14 * float(np.mean(lhs.diagonal()))
+        lhs = dsyr(coupling, (-1.0) ** np.arange(len(lhs)), lower=1, a=lhs, overwrite_a=1)
+        if self.residue is not None:
+            inner, right, cross = self.residue
+            lhs = np.asfortranarray(np.block([[lhs, cross], [cross.T, inner]]))
+            rhs = np.concatenate([rhs, right])
+        factor, failed = lapack.dpotrf(lhs, lower=1, clean=1)
+        if failed:  # a stretch of the drive that only its prior holds, and hardly
+            ridge = np.asfortranarray(lhs + np.diag(_RIDGE * lhs.diagonal()))
+            factor, failed = lapack.dpotrf(ridge, lower=1, clean=1, overwrite_a=1)
+        if failed:
+            raise np.linalg.LinAlgError("the normal equations of the drive are not positive definite")
+        forward = solve_triangular(factor, rhs, lower=True, check_finite=False)
+        return DriveElimination(factor, forward, objective - float(forward @ forward), len(self.rhs))
 
 
 @dataclass(frozen=True)

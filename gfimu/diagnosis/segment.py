@@ -16,19 +16,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import copy
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve, lapack, solve_triangular
-from scipy.linalg.blas import dsyr, dsyrk
-from scipy.sparse import csr_array, diags_array
+from scipy.linalg import solve_triangular
+from scipy.linalg.blas import dsyrk
+from scipy.sparse import csr_array
 
 from gfimu.diagnosis.calibration_residue import CalibrationResidue
 from gfimu.diagnosis.coloured_noise import CosineBasis, NoiseLevels
 from gfimu.diagnosis.drive import AngleSpline, ScaledSpin, ShiftedSpin
 from gfimu.diagnosis.drive_jacobian import DriveJacobian, lag_matrix
-from gfimu.diagnosis.linearisation import DriveElimination, Linearisation
+from gfimu.diagnosis.drive_prior import DrivePrior
+from gfimu.diagnosis.linearisation import DriveElimination, DriveEquations, Linearisation
 from gfimu.diagnosis.model import Effect, Spin, WorldModel
 from gfimu.diagnosis.roughness import Roughness
 from gfimu.diagnosis.rounding import COARSE, rounded_likelihood, rounding_noise
@@ -48,22 +48,7 @@ _MOST_INTERVALS = 1.7  # times as many as without finer ones, for the cost grows
 _FACTOR_STEPS = 4
 _REST_FACTOR = 1.3
 _LEAST_GAIN = 0.05
-_RIDGE = 1e-10
 _STATE_STEPS = (1e-5, 1e-4, 1e-3)
-
-
-@dataclass(frozen=True)
-class _DataEquations:
-    """Normal equations of a drive from the data alone: lower triangle JᵀWJ (m, m), JᵀWr (m,) and rᵀWr."""
-
-    residual: NDArray[np.float64]
-    slow_residual: NDArray[np.float64]
-    jacobian: DriveJacobian
-    slow: NDArray[np.float64]
-    lhs: NDArray[np.float64]
-    rhs: NDArray[np.float64]
-    objective: float
-    residue: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]] | None
 
 
 class Segment:
@@ -112,7 +97,7 @@ class Segment:
         self.levels = self._starting_levels()
         self.round_to(model.expected_noise(1.0 / period).quantum)
         self.calibration_residue: CalibrationResidue | None = None
-        self._set_roughness()
+        self._set_prior()
         self.coefficients = self._reference_drive = self._starting_drive()
 
     @property
@@ -137,27 +122,27 @@ class Segment:
         white = np.append(expected.white, difference_noise(reference))
         return NoiseLevels(white, np.append(np.full(len(expected.white), 2e-3), 0.0), known_walk(self.model))
 
-    def _set_roughness(self) -> None:
-        self._rough, self.log_roughness = self.roughness.scaled_rows(
-            self.run, is_angle=self.is_angle, reference_noise=float(self.levels.white[-1])
+    def _set_prior(self) -> None:
+        self.drive_prior = DrivePrior.of_run(
+            self.roughness,
+            self.run,
+            is_angle=self.is_angle,
+            reference_noise=float(self.levels.white[-1]),
+            start_angle=(self.start_angle, self.start_angle_std),
         )
-        self._begin = csr_array(self.spline.matrices(self.run.t[:1])[0] / self.start_angle_std)
-        self.prior = csr_array(self._rough.T @ self._rough)
-        if not self.is_angle:
-            self.prior = csr_array(self.prior + self._begin.T @ self._begin)
 
     def _starting_drive(self) -> NDArray[np.float64]:
         """Fit the spline to the reference alone."""
-        run = self.run
-        angle, rate, _ = self.spline.matrices(run.t)
-        weight = diags_array(run.reference_valid / self.levels.white[-1] ** 2)
-        observe = angle if self.is_angle else rate
-        lhs = (observe.T @ weight @ observe + self.prior).toarray()
-        lhs[np.diag_indices_from(lhs)] *= 1 + 1e-14
-        rhs = observe.T @ (weight @ run.reference)
-        if not self.is_angle:
-            rhs = rhs + self._begin.T @ np.array([self.start_angle / self.start_angle_std])
-        return np.asarray(cho_solve(cho_factor(lhs, lower=True), rhs))
+        return self.drive_prior.with_reference(
+            self.run, is_angle=self.is_angle, reference_noise=float(self.levels.white[-1])
+        )
+
+    def _follow(self, spin: Spin, roughness: Roughness) -> None:
+        """Take the drive that comes closest to a motion, on other knots."""
+        self._take(roughness)
+        self._set_prior()
+        self.coefficients = self.following(spin)
+        self._reference_drive = self._starting_drive()
 
     def adopt(self, whole: Segment, effects: Sequence[Effect] = ()) -> None:
         """Take noise levels, roughness and drive from a segment of which this is a part.
@@ -172,17 +157,14 @@ class Segment:
             start = max(min(self.spline.start, float(times.min()) - TIME_MARGIN), start)
             stop = min(max(self.spline.stop, float(times.max()) + TIME_MARGIN), stop)
         spline = whole.spline.within(start, stop)
-        self._take(whole.roughness.on(spline, corners=True))
         self.start_angle, self.start_angle_std = float(whole.spin.at(self.run.t[:1]).angle[0]), _KNOWN_ANGLE_STD
-        self._set_roughness()
-        self.coefficients = self.following(whole.spin)
-        self._reference_drive = self._starting_drive()
+        self._follow(whole.spin, whole.roughness.on(spline, corners=True))
         self.prepare_weights()
 
     def learn_roughness(self) -> None:
         """Take the roughness from the present drive, which knows the corners of ramps better than the reference."""
         self.roughness.learn(self.coefficients)
-        self._set_roughness()
+        self._set_prior()
 
     def sharpen(self) -> bool:
         """Cut the knot intervals where the drive bends faster than they follow; tells whether any was cut."""
@@ -190,7 +172,7 @@ class Segment:
             return False
         arm = float(np.linalg.norm(self.model.array.positions, axis=1).max())
         allowed = _BLUR * float(np.median(self.levels.white[:-1])) / max(arm, 1e-3)  # rad/s²
-        old, kept = self.spline, self.spin
+        old = self.spline
         bend = self.roughness.bend(self.coefficients)
         # What a piecewise parabola misses of an acceleration that bends by `bend` over its interval.
         cut = (bend * old.widths**2 / 16.0 > allowed) & (old.widths > _LEAST_WIDTH * self.run.sample_period)
@@ -199,11 +181,7 @@ class Segment:
             cut &= bend >= np.sort(bend[cut])[-most]
         if most <= 0 or not cut.any():
             return False
-        spline = old.halved(cut)
-        self._take(self.roughness.on(spline, corners=False))
-        self._set_roughness()
-        self.coefficients = self.following(kept)
-        self._reference_drive = self._starting_drive()
+        self._follow(self.spin, self.roughness.on(old.halved(cut), corners=False))
         return True
 
     def reach_out(self, effects: Sequence[Effect]) -> bool:
@@ -212,21 +190,15 @@ class Segment:
         before, after = self.spline.start - float(times.min()), float(times.max()) - self.spline.stop
         if not 0.0 < max(before, after) < self.run.duration:
             return False
-        kept = self.spin
         spline = self.spline.widened(max(before + TIME_MARGIN, 0.0), max(after + TIME_MARGIN, 0.0))
-        self._take(self.roughness.on(spline, corners=True))
-        self._set_roughness()
-        self.coefficients = self.following(kept)
-        self._reference_drive = self._starting_drive()
+        self._follow(self.spin, self.roughness.on(spline, corners=True))
         return True
 
     def coarser(self, spacing: float) -> Segment:
         """Return a copy whose knots are all ``spacing`` s apart, at the present drive."""
         other = copy(self)
         spline = AngleSpline.uniform(self.spline.start, self.spline.stop, spacing)
-        other._take(self.roughness.on(spline, corners=False))
-        other._set_roughness()
-        other.coefficients = other.following(self.spin)
+        other._follow(self.spin, self.roughness.on(spline, corners=False))
         return other
 
     def following(self, spin: Spin) -> NDArray[np.float64]:
@@ -242,12 +214,12 @@ class Segment:
         # Below the least factor a prior that is learnt from the drive and then tightened again would tighten for ever.
         least = 0.0 if self.at_rest else _LEAST_FACTOR
 
-        data = self._data_equations(effects)
+        data = self._equations(effects)
 
         def likelihood(trial: float) -> float:
             self.roughness.factor = trial
-            self._set_roughness()
-            drive = self._eliminate(data)
+            self._set_prior()
+            drive = data.eliminated(self.drive_prior, self.coefficients)
             return self.log_volume(drive) - 0.5 * drive.objective
 
         best = (likelihood(factor), factor)
@@ -261,7 +233,7 @@ class Segment:
             if best[1] != factor:
                 break
         self.roughness.factor = best[1]
-        self._set_roughness()
+        self._set_prior()
 
     @property
     def at_rest(self) -> bool:
@@ -345,11 +317,18 @@ class Segment:
 
     def linearise(self, effects: Sequence[Effect]) -> Linearisation:
         """Linearise about effects and the present drive, and eliminate the drive."""
-        data = self._data_equations(effects)
+        data = self._equations(effects)
         state = self.motion(effects).at(self.run.t)
-        return Linearisation(data.residual, data.slow_residual, data.jacobian, data.slow, self._eliminate(data), state)
+        return Linearisation(
+            data.residual,
+            data.slow_residual,
+            data.jacobian,
+            data.slow,
+            data.eliminated(self.drive_prior, self.coefficients),
+            state,
+        )
 
-    def _data_equations(self, effects: Sequence[Effect]) -> _DataEquations:
+    def _equations(self, effects: Sequence[Effect]) -> DriveEquations:
         """Return the normal equations of the drive, and of a calibration residue, without the drive's prior."""
         predicted = self.predict(effects)
         residual, slow_residual, objective = self._misfit(predicted)
@@ -366,7 +345,7 @@ class Segment:
             residue = self.calibration_residue.normal_equations(
                 residual, jacobian, slow, self.cosines, self.share, weights
             )
-        return _DataEquations(residual, slow_residual, jacobian, slow, lhs, rhs, objective, residue)
+        return DriveEquations(residual, slow_residual, jacobian, slow, lhs, rhs, objective, residue)
 
     def _misfit(self, predicted: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
         """Return the working residual r (n, c + 1), the same in the cosines (K, c + 1), and rᵀWr."""
@@ -381,40 +360,7 @@ class Segment:
         residual, _, misfit = self._misfit(self.predict(effects))
         if self.calibration_residue is not None:
             misfit -= self.calibration_residue.explained(residual, self.cosines, self.share, self.inverse_variance)
-        return misfit + self._drive_energy()[0]
-
-    def _drive_energy(self) -> tuple[float, NDArray[np.float64]]:
-        """Return dᵀRd of the present drive and −Rd (m,)."""
-        # Differences first: the quadratic form of the coefficients would lose ten digits.
-        rough = self._rough @ self.coefficients
-        energy, pull = float(rough @ rough), -(self._rough.T @ rough)
-        if not self.is_angle:
-            off = self._begin @ self.coefficients - self.start_angle / self.start_angle_std
-            energy, pull = energy + float(off @ off), pull - self._begin.T @ off
-        return energy, pull
-
-    def _eliminate(self, data: _DataEquations) -> DriveElimination:
-        """Add the prior of the drive and factor."""
-        energy, pull = self._drive_energy()
-        rhs, objective = data.rhs + pull, data.objective + energy
-        prior = self.prior.tocoo()
-        lhs = data.lhs.copy(order="F")
-        lhs[prior.row, prior.col] += prior.data
-        # A vanishing coupling keeps far entries of the factor out of the denormal range, where LAPACK crawls; its
-        # sign alternates, as a constant one would hold the mean angle, which the data hardly fix.
-        lhs = dsyr(1e-14 * float(np.mean(lhs.diagonal())), (-1.0) ** np.arange(len(lhs)), lower=1, a=lhs, overwrite_a=1)
-        if data.residue is not None:
-            inner, right, cross = data.residue
-            lhs = np.asfortranarray(np.block([[lhs, cross], [cross.T, inner]]))
-            rhs = np.concatenate([rhs, right])
-        factor, failed = lapack.dpotrf(lhs, lower=1, clean=1)
-        if failed:  # a stretch of the drive that only its prior holds, and hardly
-            ridge = np.asfortranarray(lhs + np.diag(_RIDGE * lhs.diagonal()))
-            factor, failed = lapack.dpotrf(ridge, lower=1, clean=1, overwrite_a=1)
-        if failed:
-            raise np.linalg.LinAlgError("the normal equations of the drive are not positive definite")
-        forward = solve_triangular(factor, rhs, lower=True, check_finite=False)
-        return DriveElimination(factor, forward, objective - float(forward @ forward), self.spline.size)
+        return misfit + self.drive_prior.energy(self.coefficients)[0]
 
     def _jacobian(self, effects: Sequence[Effect], base: NDArray[np.float64]) -> DriveJacobian:
         """Differentiate the prediction ``base`` with respect to the drive's state and chain with the spline."""
@@ -468,7 +414,7 @@ class Segment:
 
         Needed only to compare fits under different priors.
         """
-        return drive.log_volume() - self.log_roughness
+        return drive.log_volume() - self.drive_prior.log_roughness
 
     def move_drive(self, linear: Linearisation) -> None:
         """Move the drive to its posterior mean."""

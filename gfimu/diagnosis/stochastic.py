@@ -101,7 +101,7 @@ def log_probability(segments: Sequence[Segment], fit: Fit) -> float:
     """
     total = fit.log_posterior
     for segment in segments:
-        total += _noise_log_determinant(segment) - segment.log_roughness
+        total += _noise_log_determinant(segment) - segment.drive_prior.log_roughness
     return total
 
 

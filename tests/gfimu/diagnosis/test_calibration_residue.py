@@ -57,7 +57,7 @@ def test_marginalised_with_the_drive_as_a_dense_gaussian_is(segment):
         precision[part, part] = np.linalg.inv(noise_of(segment, column))
     unknowns = np.hstack([drive, columns.transpose(0, 2, 1).reshape(-1, 5)])
     prior = np.zeros((unknowns.shape[1],) * 2)
-    prior[:-5, :-5] = segment.prior.toarray()
+    prior[:-5, :-5] = segment.drive_prior.precision.toarray()
     prior[-5:, -5:] = np.eye(5)
     left = unknowns.T @ precision
     solved = np.linalg.solve(left @ unknowns + prior, left)
@@ -66,8 +66,10 @@ def test_marginalised_with_the_drive_as_a_dense_gaussian_is(segment):
     assert_allclose(gram[0, 0], one @ reduced @ one, rtol=1e-5)
     residual = line.residual.T.reshape(-1)
     pull = np.zeros(unknowns.shape[1])
-    pull[:-5] = -(segment.prior @ segment.coefficients)
-    pull[:-5] += np.asarray(segment._begin.T @ np.array([segment.start_angle / segment.start_angle_std])).ravel()
+    pull[:-5] = -(segment.drive_prior.precision @ segment.coefficients)
+    pull[:-5] += np.asarray(
+        segment.drive_prior.begin.T @ np.array([segment.start_angle / segment.start_angle_std])
+    ).ravel()
     moved = np.linalg.solve(left @ unknowns + prior, left @ residual + pull)
     assert_allclose(score[0], one @ precision @ (residual - unknowns @ moved), rtol=1e-4)
     assert_allclose(line.drive.alone()[1], moved[-5:], rtol=1e-4, atol=1e-6)

@@ -236,7 +236,7 @@ def test_the_drive_is_marginalised_to_the_digits_that_a_margin_needs(twin):
     weight = np.sqrt(segment.inverse_variance)
     jacobian = segment.linearise(()).jacobian
     drive = np.vstack([jacobian.channel(column).toarray() * w for column, w in enumerate(weight)])
-    values, vectors = np.linalg.eigh(segment.prior.toarray())
+    values, vectors = np.linalg.eigh(segment.drive_prior.precision.toarray())
     prior = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
     wanted = np.concatenate([part.T * w for part, w in zip(columns, weight, strict=True)])  # (n (c + 1), P)
     rival = wanted[:, [1, 2, 4, 5, 7, 8, 10, 11]]  # heights change nothing

@@ -122,7 +122,7 @@ def test_the_roughness_is_the_most_probable_one():
 
     def likelihood(factor):
         segment.roughness.factor = factor
-        segment._set_roughness()
+        segment._set_prior()
         line = segment.linearise([])
         return segment.log_volume(line.drive) - 0.5 * line.drive.objective
 
