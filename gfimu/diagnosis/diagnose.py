@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from gfimu.diagnosis.adequacy import left_over
+from gfimu.diagnosis.causes import effects_of_run
 from gfimu.diagnosis.coloured_noise import NoiseLevels
 from gfimu.diagnosis.conclusion import conclude
 from gfimu.diagnosis.engine import Explanation
@@ -180,10 +181,11 @@ def _holdouts(
         ), "blocks of the recording, odd and even from each other"
     other = PreparedRuns.build(held_out, model, [f"held out {n + 1}" for n in range(len(held_out))])
     segments, known = other.segments(model)
-    for segment in segments:
+    for segment, effects in zip(segments, known, strict=True):
         segment.set_levels(explanation.segments[0].levels)
         segment.prepare_weights()
         segment.index = 0
+        segment.reach_out([*effects, *effects_of_run(explanation.fit.causes, model.array, segment.index)])
     fitted = list(explanation.segments)
     kept = [[*effects, *residue] for effects in known]
     return [Holdout(fitted, [list(f) for f in explanation.fixed], segments, kept)], "another recording"

@@ -109,8 +109,12 @@ def test_a_slow_clock_asks_for_the_motion_beyond_the_end(twin):
     # The last readings are of 0.9 s after the last of the reference, while the table turns ever faster.
     effect = make_effect("clock_error", {"ratio": -0.03}, twin.array)
     motion = spin_profile([Ramp(3.0, 10.0), Hold(6.0), Ramp(9.0, 20.0)])
-    recording = measure(np.random.default_rng(4), twin, [effect], Measurement(duration=30.0), motion=motion)
-    found = diagnose([recording], twin)
+    recording, other = (
+        measure(np.random.default_rng(seed), twin, [effect], Measurement(duration=30.0), motion=motion)
+        for seed in (4, 5)
+    )
+    found = diagnose([recording], twin, held_out=[other])
+    assert found.gain.share_of_excess_removed > 0.999
     assert [cause.effect for cause in found.causes] == ["clock_error"]
     assert abs(found.causes[0].parameters["ratio"] + 0.03) < 4 * found.causes[0].std["ratio"]
     assert diagnose([recording], replace(twin, effects=(effect,))).verdict == "nothing_found"
