@@ -20,7 +20,7 @@ from gfimu.model_files import find_model, read_toml
 from gfimu.units import STANDARD_GRAVITY
 from sim import forward
 from sim.body import body_channels
-from sim.effects import BODY_EFFECTS, EFFECTS, Effect, apply_effects, make_effect
+from sim.effects import BODY_EFFECTS, EFFECTS, ENCODER_EFFECTS, Effect, apply_effects, make_effect
 from sim.world import World
 
 __all__ = ["Twin"]
@@ -171,8 +171,8 @@ class Twin:
         return self.gravity
 
     def families(self) -> Mapping[str, type[Effect]]:
-        """Return the library of effects: those of a table, or of a free body."""
-        return BODY_EFFECTS if self.drive_source == "gyro" else EFFECTS
+        """Return the library of effects: those of a table with its kind of reference, or of a free body."""
+        return {"gyro": BODY_EFFECTS, "angle": ENCODER_EFFECTS}.get(self.drive_source, EFFECTS)
 
     def predict(
         self,
@@ -235,6 +235,8 @@ class Twin:
 
     def reference_gain(self, effects: Sequence[Any] = ()) -> float:
         """Return what the reference reads per unit of motion once effects are added, relative to the twin's own."""
+        if self.drive_source == "angle":
+            return 1.0
         return float(math.prod(1.0 + e.value("ratio") for e in effects if e.name == "tacho_scale"))
 
     def expected_noise(self, sample_rate: float) -> ExpectedNoise:

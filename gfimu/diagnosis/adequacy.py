@@ -18,7 +18,15 @@ from gfimu.diagnosis.evidence import log_evidence, log_evidence_each
 from gfimu.diagnosis.linearisation import Linearisation
 from gfimu.diagnosis.model import Effect, SpinState
 from gfimu.diagnosis.refinement import Fit
-from gfimu.diagnosis.residual_tests import LeftOver, changing_noise, jumps, lines, one_curve
+from gfimu.diagnosis.residual_tests import (
+    REFERENCE,
+    LeftOver,
+    changing_noise,
+    judges_reference,
+    jumps,
+    lines,
+    one_curve,
+)
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.signatures import cause_columns
 
@@ -106,7 +114,7 @@ def left_over(
 def _basis_terms(
     segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]], channels: Sequence[str]
 ) -> LeftOver:
-    """Score every basis function on every channel, on all channels, and every channel on all functions."""
+    """Score every basis function on every channel and the reference, on all channels, and each of them on all."""
     gram: NDArray[np.float64] | None = None
     score: NDArray[np.float64] | None = None
     names: list[str] = []
@@ -123,13 +131,17 @@ def _basis_terms(
     assert score is not None
     count = len(names)
     observed = len(channels)
-    total = count * observed
+    series = [f"channel {name}" for name in channels]
+    if all(judges_reference(segment) for segment in segments):
+        series.append(REFERENCE)
+    total = count * len(series)
+    gram, score = gram[:total, :total], score[:total]
     diagonal = np.maximum(gram.diagonal(), 0.0)
     usable = diagonal > 1e-9
     single = log_evidence_each(diagonal, score, np.zeros(total, dtype=bool)) - np.log(total)
     single[~usable] = -np.inf
     best = int(np.argmax(single))
-    found = LeftOver(float(single[best]), f"channel {channels[best // count]} depends on {names[best % count]}", {})
+    found = LeftOver(float(single[best]), f"{series[best // count]} depends on {names[best % count]}", {})
     chosen = [best]
     for function in range(count):
         places = np.arange(observed) * count + function
@@ -140,14 +152,14 @@ def _basis_terms(
                 float(value), f"several channels (strongest {', '.join(strong)}) depend on {names[function]}", {}
             )
             chosen = list(places)
-    for channel in range(observed):
-        places = np.arange(channel * count, (channel + 1) * count)
-        value = log_evidence(gram[np.ix_(places, places)], score[places]) - np.log(observed)
+    for number, told in enumerate(series):
+        places = np.arange(number * count, (number + 1) * count)
+        value = log_evidence(gram[np.ix_(places, places)], score[places]) - np.log(len(series))
         if value > found.log_odds + 5.0:
             top = places[int(np.argmax(single[places]))]
             found = LeftOver(
                 float(value),
-                f"channel {channels[channel]} depends on the motion or time in a way nothing in the library has "
+                f"{told} depends on the motion or time in a way nothing in the library has "
                 f"(strongest: {names[top % count]})",
                 {},
             )
@@ -155,7 +167,7 @@ def _basis_terms(
     inner = gram[np.ix_(chosen, chosen)] + np.eye(len(chosen)) * 1e-2
     values = np.linalg.solve(inner, score[chosen])
     surrogate = {
-        f"{channels[place // count]}: {names[place % count]}": float(value * _UNIT)
+        f"{series[place // count].removeprefix('channel ')}: {names[place % count]}": float(value * _UNIT)
         for place, value in zip(chosen, values, strict=True)
         if abs(value) > 1e-3
     }
@@ -165,9 +177,9 @@ def _basis_terms(
 def _channelwise(
     segment: Segment, line: Linearisation, basis: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Return G, b and X of one set of basis functions on each channel, drive marginalised."""
+    """Return G, b and X of one set of basis functions on each channel and the reference, drive marginalised."""
     count = basis.shape[1]
-    observed = line.jacobian.observations - 1
+    observed = line.jacobian.observations
     gram = np.zeros((count * observed, count * observed))
     score = np.zeros(count * observed)
     cross = np.zeros((segment.spline.size, count * observed))
@@ -203,7 +215,7 @@ def _project_out(
     inner, right, crossed = segment.whitened_products(line, named)
     count = basis.shape[1]
     mixed = np.zeros((named.shape[1], gram.shape[0]))
-    for channel in range(line.jacobian.observations - 1):
+    for channel in range(line.jacobian.observations):
         places = slice(channel * count, (channel + 1) * count)
         columns = named[channel]  # (K, n)
         if not columns.any():

@@ -90,7 +90,14 @@ def conclude(
         "calibration_residue": 0.0 if loose is None else loose.scale,
     }
     words = verdict_sentences(
-        verdict, causes, residual, gain, unexplained, withdrawn, residue=noise["calibration_residue"]
+        verdict,
+        causes,
+        residual,
+        gain,
+        unexplained,
+        withdrawn,
+        residue=noise["calibration_residue"],
+        unreferenced=sum(run.unreferenced for run in prepared.runs),
     )
     return Diagnosis(verdict, causes, residual, gain, unexplained, rival_list(explanation), twin, runs, words, noise)
 
@@ -196,6 +203,6 @@ def _view(prepared: PreparedRuns, number: int, explanation: Explanation, found: 
 def _noise_floor(runs: Sequence[RunView], segment: Segment) -> float:
     """Return the rms of the noise of all channels: white, slow and rounding."""
     levels = segment.levels
-    floor = levels.white[:-1] ** 2 + 0.6 * levels.flicker[:-1] ** 2 + segment.rounding**2 / 12.0
+    floor = levels.white[:-1] ** 2 + 0.6 * levels.flicker[:-1] ** 2 + segment.rounding.channels**2 / 12.0
     count = np.maximum(np.sum([run.valid.sum(axis=0) for run in runs], axis=0), 1)
     return float(np.sqrt(np.sum(floor * count) / count.sum()))

@@ -231,7 +231,9 @@ class ShiftedSpin:
 def smooth_rate(run: Run, *, is_angle: bool, width: float = 0.1) -> NDArray[np.float64]:
     """Smooth the reference to a rate, for starting values and the prior only, shape (n,), rad/s."""
     known = run.reference_valid
-    reference = np.interp(run.t, run.t[known], run.reference[known])
-    sigma = width / run.sample_period / 2.0
-    smooth = gaussian_filter1d(reference, max(sigma, 0.5), mode="nearest")
-    return np.asarray(np.gradient(smooth, run.sample_period)) if is_angle else np.asarray(smooth)
+    if not known.any():
+        return np.zeros(len(run.t))
+    rate = np.interp(run.t, run.t[known], run.reference[known])
+    if is_angle:  # before smoothing, which would bend a turning angle at the ends
+        rate = np.gradient(rate, run.sample_period)
+    return np.asarray(gaussian_filter1d(rate, max(width / run.sample_period / 2.0, 0.5), mode="nearest"))

@@ -88,6 +88,8 @@ class DriveJacobian:
                 row = np.zeros(len(chips))
                 row[columns] = kept[:, place] / root
                 loadings.append(row)
+        if not parts:  # nothing valid in this stretch
+            parts, loadings = [csr_array((times.shape[0], spline.size))], [np.zeros(len(chips))]
         return cls(tuple(parts), np.array(loadings).reshape(len(parts), len(chips)))
 
     def channel(self, column: int) -> csr_array:

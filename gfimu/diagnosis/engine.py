@@ -36,6 +36,7 @@ __all__ = [
 Report = Callable[[float, str], None]
 
 SEGMENT_DURATION = 64.0
+_LOST_ANGLE_STD = 3.0  # rad
 _ROUNDS = 6
 _REFINED = 6
 _MOST_CAUSES = 4
@@ -84,26 +85,28 @@ def _posterior(fit: Fit) -> float:
 
 
 def make_segments(model: WorldModel, runs: Sequence[Run]) -> list[Segment]:
-    """Cut runs into stretches that are short enough for one drive."""
+    """Cut runs into stretches that are short enough for one drive, and where the reference was lost."""
     segments = []
     for index, run in enumerate(runs):
-        pieces = max(1, round(run.duration / SEGMENT_DURATION))
-        edges = np.linspace(0, len(run.t), pieces + 1).astype(int)
         rate = smooth_rate(run, is_angle=model.drive_source == "angle")
         turned = cumulative_trapezoid(rate, run.t, initial=0.0)
         noise = difference_noise(run.reference[run.reference_valid])
-        for start, stop in pairwise(edges):
-            drift = noise * np.sqrt(run.sample_period * (run.t[start] - run.t[0]))
-            segments.append(
-                Segment(
-                    model,
-                    run.rows(int(start), int(stop)),
-                    index,
-                    float(run.t[0]),
-                    start_angle=float(turned[start]),
-                    start_angle_std=float(np.hypot(1e-4, 2.0 * drift)),
+        for first, end in pairwise([0, *run.resumed, len(run.t)]):
+            pieces = max(1, round((end - first) * run.sample_period / SEGMENT_DURATION))
+            lost = first > 0 or not run.valid[0].any()
+            for start, stop in pairwise(np.linspace(first, end, pieces + 1).astype(int).tolist()):
+                drift = noise * np.sqrt(run.sample_period * (run.t[start] - run.t[0]))
+                std = _LOST_ANGLE_STD if lost else float(np.hypot(1e-4, 2.0 * drift))
+                segments.append(
+                    Segment(
+                        model,
+                        run.rows(start, stop),
+                        index,
+                        float(run.t[0]),
+                        start_angle=float(turned[start]),
+                        start_angle_std=std,
+                    )
                 )
-            )
     return segments
 
 

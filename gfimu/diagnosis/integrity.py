@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from gfimu.diagnosis.model import Effect, WorldModel
+from gfimu.diagnosis.rounding import common_step
 from gfimu.diagnosis.run import Run
 
 __all__ = ["IntegrityReport", "check_integrity"]
@@ -25,6 +26,7 @@ _REMOVED = 0.7
 _SIGNIFICANT_RMS = 12.0
 _SPIKE = 8.0
 _PILE = 30
+_DIFFERENT = 0.6  # share of values above which steps are finer than what is seen
 
 
 @dataclass(frozen=True)
@@ -124,15 +126,9 @@ def check_integrity(model: WorldModel, run: Run, prediction: NDArray[np.float64]
 def _resolution(run: Run) -> float | None:
     """Return the step that all readings of most channels are multiples of, m/s²."""
     steps = []
-    for channel in range(run.readings.shape[1]):
-        values = np.unique(run.readings[run.valid[:, channel], channel])
-        gaps = np.diff(values)
-        gaps = gaps[gaps > 1e-9]
-        if len(gaps) < 2:
-            continue
-        step = float(gaps.min())
-        ratio = gaps / step
-        if np.max(np.abs(ratio - np.round(ratio))) < 0.05 and len(values) < 0.6 * run.valid[:, channel].sum():
+    for column, valid in zip(run.readings.T, run.valid.T, strict=True):
+        step = common_step(column[valid])
+        if step is not None and len(np.unique(column[valid])) < _DIFFERENT * valid.sum():
             steps.append(step)
     if len(steps) < max(2, run.readings.shape[1] // 2):
         return None

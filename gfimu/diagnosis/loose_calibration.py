@@ -123,7 +123,7 @@ def _relearned(loose: LooseCalibration, causes: Sequence[Cause], pair: Holdout) 
 
 def _fits(segment: Segment) -> bool:
     """Tell whether errors as small as a residue can be judged: readings are fine, and nothing large is left in them."""
-    return not segment.rounding and float(np.median(segment.levels.flicker[:-1])) < LARGEST_USUAL_FLICKER
+    return not segment.rounding.channels and float(np.median(segment.levels.flicker[:-1])) < LARGEST_USUAL_FLICKER
 
 
 def _trial(plain: Explanation, causes: Sequence[Cause], tolerance: dict[str, float], scale: float) -> tuple[float, Fit]:

@@ -44,16 +44,15 @@ def learn_noise(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[
         whites.append(segment.noise_before_rounding(effects, level))
     for index in {segment.index for segment in segments}:
         mine = [place for place, segment in enumerate(segments) if segment.index == index]
-        white = np.sqrt(np.mean([whites[place] ** 2 for place in mine], axis=0))
+        shares = np.array([segments[place].weight_mask.sum(axis=0) for place in mine], dtype=float)  # (segments, c + 1)
+        shares = np.maximum(shares, 1e-9) / np.maximum(shares, 1e-9).sum(axis=0)  # one may be without data
+        white = np.sqrt(np.sum([share * whites[place] ** 2 for share, place in zip(shares, mine, strict=True)], axis=0))
         floor = segments[mine[0]].model.expected_noise(1.0 / segments[mine[0]].run.sample_period).quantum / np.sqrt(12)
         white[:-1] = np.maximum(white[:-1], 0.5 * floor)
+        white[-1] = max(white[-1], segments[mine[0]].finest)
         walk = segments[mine[0]].levels.walk
-        flicker = np.sqrt(
-            np.mean(
-                [estimate_flicker(coefficients[place], white, segments[place].basis, walk) ** 2 for place in mine],
-                axis=0,
-            )
-        )
+        flickers = [estimate_flicker(coefficients[place], white, segments[place].basis, walk) for place in mine]
+        flicker = np.sqrt(np.sum([share * one**2 for share, one in zip(shares, flickers, strict=True)], axis=0))
         flicker[-1] = 0.0
         for place in mine:
             old = segments[place].levels

@@ -52,7 +52,7 @@ def prune(
     """
     known = {} if done is None else done
     faults = any(effect.place == "data" for effects in fixed for effect in effects)
-    rounded = any(segment.rounding > 0 for segment in segments)
+    rounded = any(segment.rounding.channels > 0 for segment in segments)
     while True:
         if not fit.causes:
             return fit, {}

@@ -17,8 +17,10 @@ from gfimu.diagnosis.search import EXTRA_CAUSE
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.signatures import cause_columns
 
-__all__ = ["LeftOver", "changing_noise", "jumps", "lines", "one_curve"]
+__all__ = ["REFERENCE", "LeftOver", "changing_noise", "judges_reference", "jumps", "lines", "one_curve"]
 
+REFERENCE = "the reference"
+"""What the tachometer, encoder or command is called beside the channels."""
 _UNIT = 0.03
 _FEWEST_DIFFERENCES = 200
 _OF_READING = frozenset({"bias", "scale_factor", "quadratic"})
@@ -50,9 +52,20 @@ class LeftOver:
     instead: bool = False
 
 
+def judges_reference(segment: Segment) -> bool:
+    """Tell whether the reference leaves noise where nothing is amiss: a measurement, in steps finer than its noise.
+
+    A command is followed as well as the motor can, and errors of coarse steps do not average out.
+    """
+    return segment.model.drive_source != "command" and not segment.rounding.reference
+
+
 def lines(segment: Segment, fit: Fit, known: Sequence[Effect], channels: Sequence[str]) -> LeftOver:
-    """Test for narrow lines on one channel or on all, by the maximum of the periodogram."""
-    left = _whitened(segment, _left(segment, fit, known))
+    """Test for narrow lines on one channel, on the reference or on all, by the maximum of the periodogram."""
+    left = _whitened(segment, _left(segment, fit, known))  # (n, c + 1)
+    if not judges_reference(segment):
+        left = left[:, :-1]
+    series = [*(f"channel {name}" for name in channels), REFERENCE]
     n = len(left)
     power = np.abs(np.fft.rfft(left, 2 * n, axis=0)) ** 2 / n
     frequency = np.fft.rfftfreq(2 * n, segment.run.sample_period)
@@ -63,12 +76,13 @@ def lines(segment: Segment, fit: Fit, known: Sequence[Effect], channels: Sequenc
     channel = int(np.argmax(power.max(axis=0)))
     place = int(np.argmax(power[:, channel]))
     one = float(power[place, channel]) - np.log(n * left.shape[1])
-    summed = power.sum(axis=1)
+    summed = power[:, : len(channels)].sum(axis=1)
     peak = int(np.argmax(summed))
-    every = -float(chi2.logsf(2 * summed[peak], 2 * left.shape[1])) - np.log(n)
+    every = -float(chi2.logsf(2 * summed[peak], 2 * len(channels))) - np.log(n)
     if one >= every:
-        text = f"channel {channels[channel]} has a tone at {frequency[place]:.3f} Hz"
-        return LeftOver(one, text, {f"{channels[channel]}: tone at {frequency[place]:.4f} Hz": 1.0})
+        name = series[channel]
+        text = f"{name} has a tone at {frequency[place]:.3f} Hz"
+        return LeftOver(one, text, {f"{name.removeprefix('channel ')}: tone at {frequency[place]:.4f} Hz": 1.0})
     return LeftOver(every, f"several channels share a tone at {frequency[peak]:.3f} Hz", {})
 
 
@@ -79,7 +93,7 @@ def jumps(segment: Segment, fit: Fit, known: Sequence[Effect], channels: Sequenc
     its usual size in this run, by the median, which a jump does not move.
     """
     mask = segment.weight_mask[:, :-1]
-    left = _left(segment, fit, known) * mask
+    left = _left(segment, fit, known)[:, :-1] * mask
     sums = np.concatenate([np.zeros((1, left.shape[1])), np.cumsum(left, axis=0)])
     counts = np.concatenate([np.zeros((1, left.shape[1])), np.cumsum(mask, axis=0)])
     period, duration = segment.run.sample_period, segment.run.duration
@@ -115,7 +129,7 @@ def changing_noise(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequen
     """Test whether the noise level follows the rate, the acceleration or time."""
     best = LeftOver(-np.inf, "", {})
     for segment, known in zip(segments, fixed, strict=True):
-        left = np.diff(_left(segment, fit, known), n=2, axis=0) / np.sqrt(6.0)
+        left = np.diff(_left(segment, fit, known)[:, :-1], n=2, axis=0) / np.sqrt(6.0)
         mask = segment.weight_mask[:, :-1]
         use = mask[1:-1] & mask[:-2] & mask[2:]  # a second difference needs three samples
         power, count = np.where(use, left**2, 0.0).sum(axis=1), use.sum(axis=1)
@@ -200,12 +214,12 @@ def _with_cubic(
 
 
 def _left(segment: Segment, fit: Fit, known: Sequence[Effect]) -> NDArray[np.float64]:
-    """Return the residual in units of white noise, shape (n, c)."""
+    """Return the residual in units of white noise, shape (n, c + 1)."""
     residual = segment.working_residual([*known, *effects_of_run(fit.causes, segment.model.array, segment.index)])
-    return residual[:, :-1] / segment.levels.white[:-1]
+    return residual / segment.levels.white
 
 
 def _whitened(segment: Segment, left: NDArray[np.float64]) -> NDArray[np.float64]:
     """Take the excess of slow noise out in its own basis, where a wandering bias has no jump between its ends."""
-    share = 1.0 - np.sqrt(1.0 - segment.share[:, :-1])
+    share = 1.0 - np.sqrt(1.0 - segment.share)
     return np.asarray(left - segment.cosines @ (share * (segment.cosines.T @ left)))

@@ -17,12 +17,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import log_ndtr
 
-__all__ = ["COARSE", "WorkingResidual", "rounded_likelihood", "rounding_noise"]
+__all__ = ["COARSE", "Steps", "WorkingResidual", "common_step", "rounded_likelihood", "rounding_noise"]
 
 COARSE = 1.5
 """Steps per standard deviation of the noise from which rounding is no longer like noise."""
 _LEAST_WEIGHT = 0.02
+_LEAST_STEP = 1e-9
+_OFF_GRID = 0.05
 _FAR = 1e4  # standard deviations
+_LEAST_NOISE = 0.03  # of a reference's step: finer edges would tell more than the steps of real parts keep to
 _NOISE_FACTORS = np.geomspace(0.5, 6.0, 26)
 _LOG_ROOT_TWO_PI = 0.5 * np.log(2 * np.pi)
 
@@ -44,6 +47,92 @@ class WorkingResidual:
     residual: NDArray[np.float64]
     weight: NDArray[np.float64]
     deviance: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Steps:
+    """Steps that observations are rounded to where these are coarse, 0 where they are finer than the noise.
+
+    Parameters
+    ----------
+    channels : float
+        Of the c channels, m/s².
+    reference : float
+        Of the reference, rad/s or rad.
+    """
+
+    channels: float = 0.0
+    reference: float = 0.0
+
+    def weigh(
+        self, residual: NDArray[np.float64], white: NDArray[np.float64], valid: NDArray[np.bool_]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+        """Return working residuals and weights, each (n, c + 1), and what the residuals' squares lack of the deviance.
+
+        Parameters
+        ----------
+        residual : ndarray, shape (n, c + 1)
+            Measured minus predicted.
+        white : ndarray, shape (c + 1,)
+            White noise before rounding.
+        valid : ndarray of bool, shape (n, c + 1)
+            Which observations count.
+        """
+        working, weight, lacking = residual.copy(), valid.astype(float), 0.0
+        for columns, step in self._coarse:
+            rounded = rounded_likelihood(residual[:, columns], step, white[columns])
+            working[:, columns] = rounded.residual * valid[:, columns]
+            weight[:, columns] *= rounded.weight
+            lacking += float(((rounded.deviance - (rounded.residual / white[columns]) ** 2) * valid[:, columns]).sum())
+        return working, weight, lacking
+
+    def noise_before(
+        self, error: NDArray[np.float64], white: NDArray[np.float64], level: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Replace levels (c + 1,) by the white noise before rounding, which ``white`` is near, where steps are coarse.
+
+        ``error``, shape (n, c + 1), is measured minus predicted, NaN where invalid.
+        """
+        found = level.copy()
+        for columns, step in self._coarse:
+            found[columns] = rounding_noise(error[:, columns], step, white[columns])
+        found[-1] = max(found[-1], _LEAST_NOISE * self.reference)
+        return found
+
+    def reference_noise(self, white: float) -> float:
+        """Return the noise of the reference, rounding included, from the white noise before it."""
+        return float(np.hypot(white, self.reference / np.sqrt(12.0)))
+
+    @property
+    def coarse(self) -> bool:
+        """Whether any observation is rounded coarsely."""
+        return bool(self.channels or self.reference)
+
+    @property
+    def _coarse(self) -> list[tuple[slice, float]]:
+        both = ((slice(None, -1), self.channels), (slice(-1, None), self.reference))
+        return [(columns, step) for columns, step in both if step]
+
+    @classmethod
+    def of_reference(cls, values: NDArray[np.float64], noise: float) -> tuple[Steps, float]:
+        """Return the steps that a reference's values (n,) are in, if coarse, and its white noise before rounding."""
+        step = common_step(values)
+        if step is None:
+            return cls(), noise
+        before = max(np.sqrt(max(noise**2 - step**2 / 12.0, 0.0)), _LEAST_NOISE * step)
+        return (cls(reference=step), float(before)) if step > COARSE * before else (cls(), noise)
+
+
+def common_step(values: NDArray[np.float64]) -> float | None:
+    """Return the step that values (n,) are multiples of; None where there is none."""
+    different = np.unique(values)
+    gaps = np.diff(different)
+    gaps = gaps[gaps > _LEAST_STEP]
+    if len(gaps) < 2:
+        return None
+    step = float(gaps.min())
+    ratio = gaps / step
+    return step if np.max(np.abs(ratio - np.round(ratio))) < _OFF_GRID else None
 
 
 def rounded_likelihood(

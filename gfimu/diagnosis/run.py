@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,10 @@ MINIMUM_DURATION = 4.0
 _MINIMUM_SAMPLES = 80
 _REPEATING = 0.3
 _DIFFERING = 0.5
+_ALONE = 0.5
+_BRIDGED = 0.5  # s without a reference
+_BRIDGED_SPACINGS = 3.0
+_ONE_STEP = 1.5
 _MOVING = 8.0
 _REFERENCE_COLUMNS = {"tacho": "tacho_rad_s", "angle": "angle_rad", "command": "command_rad_s"}
 
@@ -50,6 +55,10 @@ class Run:
         Longest gap, s.
     name : str
         For people.
+    unreferenced : float
+        Time that is left out because the reference is missing for long, s.
+    resumed : tuple of int
+        Samples of a whole run at which the reference is back after that.
     """
 
     t: NDArray[np.float64]
@@ -62,6 +71,8 @@ class Run:
     lost: int
     longest_gap: float
     name: str = "run"
+    unreferenced: float = 0.0
+    resumed: tuple[int, ...] = ()
 
     @property
     def sample_period(self) -> float:
@@ -87,6 +98,7 @@ class Run:
             self.lost,
             self.longest_gap,
             self.name,
+            self.unreferenced,
         )
 
 
@@ -129,6 +141,10 @@ def prepare_run(recording: Recording, model: WorldModel, *, name: str = "run") -
     reference[place] = drive
     reference_valid[place] = np.isfinite(drive)
     reference[~reference_valid] = 0.0
+    unreferenced = _unreferenced(reference_valid, period) if model.drive_source != "gyro" else np.zeros(n, dtype=bool)
+    full[unreferenced] = 0.0
+    left_out = float((valid & unreferenced[:, None]).any(axis=1).sum()) * period
+    valid[unreferenced] = False
     temperature = recording.reference.get("temperature_degC")
     warm = None
     if temperature is not None and np.isfinite(temperature).sum() >= 2:
@@ -145,13 +161,28 @@ def prepare_run(recording: Recording, model: WorldModel, *, name: str = "run") -
         lost=n - len(recording),
         longest_gap=float(steps.max()) if len(steps) else 0.0,
         name=name,
+        unreferenced=left_out,
+        resumed=tuple((np.flatnonzero(np.diff(unreferenced.astype(int)) == -1) + 1).tolist()),
     )
+
+
+def _unreferenced(valid: NDArray[np.bool_], period: float) -> NDArray[np.bool_]:
+    """Mark the samples (n,) in gaps of the reference that the channels alone can't be trusted to bridge."""
+    known = np.flatnonzero(valid)
+    ends = np.concatenate([[-1], known, [len(valid)]])
+    longest = max(_BRIDGED / period, _BRIDGED_SPACINGS * float(np.median(np.diff(known))))
+    out = np.zeros(len(valid), dtype=bool)
+    for start, stop in pairwise(ends):
+        if stop - start > longest:
+            out[start + 1 : stop] = True
+    return out
 
 
 def _without_repeats(reference: NDArray[np.float64]) -> NDArray[np.float64]:
     """Leave out values that a slower reference repeats until its next reading comes.
 
-    Repeats are told from a coarse reference by how many different values there are.
+    Repeats are told from a table at rest by their being the rule, and from a coarse reference by how many different
+    values there are and by their differing by more than one step.
     """
     known = np.flatnonzero(np.isfinite(reference))
     values = reference[known]
@@ -159,7 +190,11 @@ def _without_repeats(reference: NDArray[np.float64]) -> NDArray[np.float64]:
         return reference
     repeated = np.concatenate([[False], np.diff(values) == 0.0])
     fresh = values[~repeated]
-    if repeated.mean() < _REPEATING or len(np.unique(fresh)) < _DIFFERING * len(fresh):
+    changes = np.abs(np.diff(fresh))
+    if len(changes) == 0 or np.median(changes) < _ONE_STEP * changes.min():
+        return reference
+    alone = np.diff(np.flatnonzero(np.append(~repeated, True))) == 1
+    if repeated.mean() < _REPEATING or alone.mean() > _ALONE or len(np.unique(fresh)) < _DIFFERING * len(fresh):
         return reference
     out = reference.copy()
     out[known[repeated]] = np.nan

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import copy
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +32,7 @@ from gfimu.diagnosis.drive_prior import DrivePrior
 from gfimu.diagnosis.linearisation import DriveElimination, DriveEquations, Linearisation
 from gfimu.diagnosis.model import Effect, Spin, WorldModel
 from gfimu.diagnosis.roughness import Roughness
-from gfimu.diagnosis.rounding import COARSE, rounded_likelihood, rounding_noise
+from gfimu.diagnosis.rounding import COARSE, Steps
 from gfimu.diagnosis.run import Run
 
 __all__ = ["Segment", "difference_noise", "known_walk"]
@@ -39,8 +40,11 @@ __all__ = ["Segment", "difference_noise", "known_walk"]
 KNOT_SPACING = 0.05
 TIME_MARGIN = 0.5
 _WALK = "bias_random_walk"
+_ROUNDING_ERROR = 1e-12
 _START_FACTOR = 2.0  # of the roughness prior, before the data have chosen
 _KNOWN_ANGLE_STD = 5e-3
+_FINEST_ANGLE = 2e-5  # rad
+_FINEST_RATE = 1e-4  # rad/s, and of the spread of the rate
 _LEAST_FACTOR = 0.05
 _BLUR = 0.3  # of the white noise: what an interval may miss of the acceleration at the longest arm
 _LEAST_WIDTH = 0.8  # sample periods of an interval that is cut in two
@@ -93,8 +97,7 @@ class Segment:
         self.is_angle = model.drive_source == "angle"
         self.weight_mask = np.column_stack([run.valid, run.reference_valid])  # (n, c + 1)
         self.row_weight = self.weight_mask.astype(float)
-        self.rounding = 0.0
-        self.levels = self._starting_levels()
+        self.rounding, self.levels = self._starting_levels()
         self.round_to(model.expected_noise(1.0 / period).quantum)
         self.calibration_residue: CalibrationResidue | None = None
         self._set_prior()
@@ -116,26 +119,35 @@ class Segment:
 
     # -- starting values -------------------------------------------------------------------------------------
 
-    def _starting_levels(self) -> NoiseLevels:
+    def _starting_levels(self) -> tuple[Steps, NoiseLevels]:
         expected = self.model.expected_noise(1.0 / self.run.sample_period)
         reference = self.run.reference[self.run.reference_valid]
-        white = np.append(expected.white, difference_noise(reference))
-        return NoiseLevels(white, np.append(np.full(len(expected.white), 2e-3), 0.0), known_walk(self.model))
+        steps, noise = Steps.of_reference(reference, difference_noise(reference))
+        white = np.append(expected.white, max(noise, self.finest))
+        flicker = np.append(np.full(len(expected.white), 2e-3), 0.0)
+        return steps, NoiseLevels(white, flicker, known_walk(self.model))
+
+    @property
+    def finest(self) -> float:
+        """Noise below which a spline can't follow the reference, and which no part keeps to, rad/s or rad."""
+        return _FINEST_ANGLE if self.is_angle else _FINEST_RATE * (1.0 + self._reference_spread)
+
+    @property
+    def _reference_noise(self) -> float:
+        return self.rounding.reference_noise(float(self.levels.white[-1]))
 
     def _set_prior(self) -> None:
         self.drive_prior = DrivePrior.of_run(
             self.roughness,
             self.run,
             is_angle=self.is_angle,
-            reference_noise=float(self.levels.white[-1]),
+            reference_noise=self._reference_noise,
             start_angle=(self.start_angle, self.start_angle_std),
         )
 
     def _starting_drive(self) -> NDArray[np.float64]:
         """Fit the spline to the reference alone."""
-        return self.drive_prior.with_reference(
-            self.run, is_angle=self.is_angle, reference_noise=float(self.levels.white[-1])
-        )
+        return self.drive_prior.with_reference(self.run, is_angle=self.is_angle, reference_noise=self._reference_noise)
 
     def _follow(self, spin: Spin, roughness: Roughness) -> None:
         """Take the drive that comes closest to a motion, on other knots."""
@@ -174,8 +186,12 @@ class Segment:
         allowed = _BLUR * float(np.median(self.levels.white[:-1])) / max(arm, 1e-3)  # rad/s²
         old = self.spline
         bend = self.roughness.bend(self.coefficients)
-        # What a piecewise parabola misses of an acceleration that bends by `bend` over its interval.
-        cut = (bend * old.widths**2 / 16.0 > allowed) & (old.widths > _LEAST_WIDTH * self.run.sample_period)
+        # What a piecewise parabola misses of an acceleration that bends by `bend` over its interval, and, as that goes
+        # to and fro once per interval, what it misses of the rate or the angle that the reference reads.
+        missed = bend * old.widths**2 / 16.0
+        misread = missed * (old.widths / (2 * np.pi)) ** (2 if self.is_angle else 1)
+        cut = (missed > allowed) | (misread > _BLUR * self._reference_noise)
+        cut &= old.widths > _LEAST_WIDTH * self.run.sample_period
         most = int(_MOST_INTERVALS * self.run.duration / KNOT_SPACING) - len(old.widths)
         if cut.sum() > most > 0:
             cut &= bend >= np.sort(bend[cut])[-most]
@@ -238,8 +254,12 @@ class Segment:
     @property
     def at_rest(self) -> bool:
         """Whether the reference shows no more than its noise."""
-        reference = self.run.reference[self.run.reference_valid]
-        return float(np.std(reference)) < _REST_FACTOR * float(self.levels.white[-1])
+        return self._reference_spread < _REST_FACTOR * self._reference_noise
+
+    @property
+    def _reference_spread(self) -> float:
+        known = self.run.reference_valid
+        return float(np.std(self.run.reference[known])) if known.any() else 0.0
 
     def set_levels(self, levels: NoiseLevels) -> None:
         """Take new noise levels."""
@@ -283,29 +303,25 @@ class Segment:
 
     def _weigh(self, residual: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
         """Set the weight of every sample; return the working residual and what its squares lack of the deviance."""
-        if not self.rounding:
+        if not self.rounding.coarse:
             return residual, 0.0
-        sigma = self.levels.white[:-1]
-        rounded = rounded_likelihood(residual[:, :-1], self.rounding, sigma)
-        self.row_weight = np.column_stack([rounded.weight, np.ones(len(residual))]) * self.weight_mask
-        working = np.column_stack([rounded.residual, residual[:, -1]]) * self.weight_mask
-        lacking = (rounded.deviance - (rounded.residual / sigma) ** 2) * self.weight_mask[:, :-1]
-        return working, float(lacking.sum())
+        working, self.row_weight, lacking = self.rounding.weigh(residual, self.levels.white, self.weight_mask)
+        return working, lacking
 
     def round_to(self, quantum: float) -> None:
         """Tell that readings are rounded to steps of ``quantum`` m/s² after the noise, where that is coarse."""
         analogue = self.model.expected_noise(1.0 / self.run.sample_period).analogue
         if quantum > COARSE * float(np.median(analogue)):
-            self.rounding = quantum
+            self.rounding = replace(self.rounding, channels=quantum)
             white = np.append(analogue, self.levels.white[-1])
             self.set_levels(NoiseLevels(white, self.levels.flicker, self.levels.walk))
 
     def noise_before_rounding(self, effects: Sequence[Effect], level: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Replace the channels' white noise in ``level`` by what it was before a coarse rounding, shape (c + 1,)."""
-        if not self.rounding:
+        """Replace white noise in ``level``, shape (c + 1,), by what it was before a coarse rounding."""
+        if not self.rounding.coarse:
             return level
-        error = np.where(self.weight_mask, self.residual(effects), np.nan)[:, :-1]
-        return np.append(rounding_noise(error, self.rounding, self.levels.white[:-1]), level[-1])
+        error = np.where(self.weight_mask, self.residual(effects), np.nan)
+        return self.rounding.noise_before(error, self.levels.white, level)
 
     # -- normal equations --------------------------------------------------------------------------------------
 
@@ -405,8 +421,11 @@ class Segment:
         if self.calibration_residue is not None:
             cross = np.vstack([cross, self.calibration_residue.correlate(signatures, damped, self.cosines, weights)])
         eliminated = solve_triangular(linear.drive.factor, cross, lower=True, check_finite=False)
+        told = gram.diagonal() * _ROUNDING_ERROR
         gram -= eliminated.T @ eliminated
         score -= eliminated.T @ linear.drive.forward
+        gone = gram.diagonal() <= told  # what the drive takes whole leaves rounding errors
+        gram[gone], gram[:, gone], score[gone] = 0.0, 0.0, 0.0
         return gram, score, eliminated
 
     def log_volume(self, drive: DriveElimination) -> float:
@@ -440,8 +459,8 @@ def known_walk(model: WorldModel) -> float:
 
 
 def difference_noise(reference: NDArray[np.float64]) -> float:
-    """Return the white noise of a smooth reference from its third differences (robust)."""
+    """Return the white noise of a smooth reference from its third differences (robust), rad/s or rad."""
     third = np.diff(reference, n=3)
-    spread = 1.4826 * float(np.median(np.abs(third - np.median(third)))) / np.sqrt(20.0)
-    floor = 1e-4 * float(np.std(reference)) + 1e-4
-    return max(spread, floor)
+    if not len(third):
+        return 0.0
+    return 1.4826 * float(np.median(np.abs(third - np.median(third)))) / np.sqrt(20.0)

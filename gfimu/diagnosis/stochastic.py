@@ -125,10 +125,12 @@ def white_factor(segments: Sequence[Segment]) -> tuple[float, float] | None:
     segment = segments[0]
     expected = segment.model.expected_noise(1.0 / segment.run.sample_period)
     measured = segment.levels.white[:-1]
-    ratio = measured / (expected.analogue if segment.rounding else expected.white)
+    ratio = measured / (expected.analogue if segment.rounding.channels else expected.white)
     if np.median(ratio) < _MEDIAN_FACTOR or ratio.min() < _EVERY_FACTOR:
         return None
-    analogue = measured if segment.rounding else np.sqrt(np.maximum(measured**2 - expected.quantum**2 / 12.0, 0.0))
+    analogue = (
+        measured if segment.rounding.channels else np.sqrt(np.maximum(measured**2 - expected.quantum**2 / 12.0, 0.0))
+    )
     factors = analogue / np.maximum(expected.analogue, 1e-6)
     factor = float(np.median(factors))
     return factor, factor / np.sqrt(len(segment.run.t) * len(ratio) / 4.0) + 0.01 * factor

@@ -22,10 +22,12 @@ def verdict_sentences(
     withdrawn: Sequence[str],
     *,
     residue: float = 0.0,
+    unreferenced: float = 0.0,
 ) -> tuple[str, ...]:
     """Return the verdict in sentences, the most important first.
 
-    ``residue`` is the size of a calibration residue, in units of what a good calibration leaves, where there is one.
+    ``residue`` is the size of a calibration residue, in units of what a good calibration leaves, where there is one;
+    ``unreferenced`` the time without a reference, s.
     """
     words = [_headline(verdict, causes, unexplained, residue)]
     words += [f"{cause.effect}: {cause.why}." for cause in causes if cause.why]
@@ -48,6 +50,8 @@ def verdict_sentences(
         words.append(f"Something is left that nothing in the library explains: {unexplained.signature}.")
     if residue > 0.0:
         words.append(_residue_sentence(residue))
+    if unreferenced > 0.0:
+        words.append(f"{unreferenced:.1f} s are left out, as the reference is missing there.")
     words += [f"{name} was withdrawn: it did not predict held-out data." for name in withdrawn]
     return tuple(words)
 

@@ -1,6 +1,25 @@
 """Physical effects: one small class each, in a registry; each knows its name, parameters, priors and place."""
 
 from sim.effects.base import Effect, Pattern, Size
-from sim.effects.registry import BODY_EFFECTS, EFFECTS, NOT_OF_A_BODY, apply_effects, make_effect
+from sim.effects.registry import (
+    BODY_EFFECTS,
+    EFFECTS,
+    ENCODER_EFFECTS,
+    NOT_OF_A_BODY,
+    NOT_OF_AN_ENCODER,
+    apply_effects,
+    make_effect,
+)
 
-__all__ = ["BODY_EFFECTS", "EFFECTS", "NOT_OF_A_BODY", "Effect", "Pattern", "Size", "apply_effects", "make_effect"]
+__all__ = [
+    "BODY_EFFECTS",
+    "EFFECTS",
+    "ENCODER_EFFECTS",
+    "NOT_OF_AN_ENCODER",
+    "NOT_OF_A_BODY",
+    "Effect",
+    "Pattern",
+    "Size",
+    "apply_effects",
+    "make_effect",
+]

@@ -11,7 +11,15 @@ from sim.effects import body, digital, mechanical, sensing, timing
 from sim.effects.base import Effect
 from sim.world import World
 
-__all__ = ["BODY_EFFECTS", "EFFECTS", "NOT_OF_A_BODY", "apply_effects", "make_effect"]
+__all__ = [
+    "BODY_EFFECTS",
+    "EFFECTS",
+    "ENCODER_EFFECTS",
+    "NOT_OF_AN_ENCODER",
+    "NOT_OF_A_BODY",
+    "apply_effects",
+    "make_effect",
+]
 
 EFFECTS: dict[str, type[Effect]] = {
     effect.name: effect
@@ -75,6 +83,17 @@ BODY_EFFECTS: dict[str, type[Effect]] = {
     **{effect.name: effect for effect in (body.ChipDelay, body.GyroLatency, body.GyroScale, body.GyroMisalignment)},
 }
 """Every effect of a free body with a gyro, by its contract name."""
+
+NOT_OF_AN_ENCODER: dict[str, str] = {
+    "tacho_scale": "the marks of an encoder are counted, its full turn has no gain",
+    "tacho_ripple": "the modulation of a rate; an angle has none",
+}
+"""Effects that a diagnosis of a table whose reference is an angle does not look for, and why."""
+
+ENCODER_EFFECTS: dict[str, type[Effect]] = {
+    name: effect for name, effect in EFFECTS.items() if name not in NOT_OF_AN_ENCODER
+}
+"""Every effect of a rig whose reference is an angle, by its contract name."""
 
 _PLACES = ("geometry", "motion", "timing", "sensing", "reference", "noise", "data")
 

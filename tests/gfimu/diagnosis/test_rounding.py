@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.stats import norm
 
-from gfimu.diagnosis.rounding import rounded_likelihood, rounding_noise
+from gfimu.diagnosis.rounding import Steps, common_step, rounded_likelihood, rounding_noise
 
 
 @pytest.mark.parametrize("quantum", [0.5, 3.0, 10.0])
@@ -50,3 +50,19 @@ def test_a_prediction_absurdly_far_off_keeps_a_finite_pull_towards_the_reading()
     assert_allclose(far.weight, 1.0, atol=0.01)
     assert_allclose(far.residual, error - np.sign(error) * 0.15, rtol=1e-3)
     assert_allclose(far.deviance, ((np.abs(error) - 0.15) / 0.03) ** 2, rtol=1e-3)
+
+
+@pytest.mark.parametrize(("noise", "step", "coarse"), [(0.02, 0.01, False), (0.02, 0.05, True), (0.0, 0.05, True)])
+def test_steps_of_a_reference(noise, step, coarse):
+    rng = np.random.default_rng(2)
+    values = np.round((np.linspace(0.0, 4.0, 3000) + noise * rng.standard_normal(3000)) / step) * step
+    steps, before = Steps.of_reference(values, float(np.hypot(noise, step / np.sqrt(12.0))))
+    assert steps.coarse == coarse
+    assert steps.reference == pytest.approx(step if coarse else 0.0)
+    assert steps.reference_noise(before) == pytest.approx(np.hypot(noise, step / np.sqrt(12.0)), rel=0.02)
+
+
+def test_values_in_no_steps_have_none():
+    assert common_step(np.random.default_rng(0).standard_normal(500)) is None
+    assert common_step(np.full(50, 0.3)) is None
+    assert common_step(3.0 * np.arange(40) * 0.7) == pytest.approx(2.1)

@@ -1,0 +1,120 @@
+"""The reference as people have it: encoders with counts, coarse tachometers, commands, references that fail."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from gfimu.array import AccelerometerArray
+from gfimu.diagnosis import diagnose
+from gfimu.diagnosis.run import prepare_run
+from gfimu.recording import Recording
+from sim.campaign import Measurement, hidden_effect, measure, random_profile
+from sim.effects import EFFECTS, ENCODER_EFFECTS, NOT_OF_AN_ENCODER, Effect
+from sim.twin import Twin
+
+SETTING = Measurement(duration=26.0)
+TURN = 2 * np.pi
+
+
+@pytest.fixture(scope="module")
+def twin():
+    return Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
+
+
+def in_steps(values, step):
+    return np.floor(values / step) * step
+
+
+def recorded(twin, seed, source, reference, name=None, size=300.0):
+    """A run whose reference is ``reference(motion, times it is read at, tachometer)``."""
+    rng = np.random.default_rng(seed)
+    motion = random_profile(rng, SETTING.duration)
+    hidden = [] if name is None else [hidden_effect(rng, twin, name, motion, size, SETTING)]
+    run = measure(rng, twin, hidden, SETTING, motion=motion)
+    moved = motion
+    for step in twin.world(hidden).motion_steps:
+        moved = step(moved, run.t_s)
+    read_at = twin.sample_times(run.t_s, hidden)[:, -1]
+    column = {"tacho": "tacho_rad_s", "angle": "angle_rad", "command": "command_rad_s"}[source]
+    values = reference(moved, read_at, run.reference["tacho_rad_s"])
+    recording = Recording.from_arrays(run.t_s, run.readings, twin.array, reference={column: values})
+    return recording, replace(twin, drive_source=source)
+
+
+@pytest.mark.parametrize("counts", [63, 6_000_000])
+def test_an_encoder_with_nothing_hidden(twin, counts):
+    step = TURN / counts
+    found = diagnose(*one(recorded(twin, 900, "angle", lambda spin, t, _: in_steps(spin.at(t).angle, step))))
+    assert found.verdict == "nothing_found", (found.causes, found.unexplained.signature)
+
+
+@pytest.mark.parametrize("name", ["table_tilt", "tacho_latency", "clock_error"])
+def test_an_encoder_finds_what_is_hidden(twin, name):
+    step = TURN / 4096
+    found = diagnose(*one(recorded(twin, 21, "angle", lambda spin, t, _: in_steps(spin.at(t).angle, step), name)))
+    assert [cause.effect for cause in found.causes] == [name]
+    assert found.gain.share_of_excess_removed > 0.97
+
+
+@pytest.mark.parametrize("step", [0.2])
+def test_a_coarse_tachometer_with_nothing_hidden(twin, step):
+    found = diagnose(*one(recorded(twin, 901, "tacho", lambda spin, t, tacho: np.round(tacho / step) * step)))
+    assert found.verdict == "nothing_found", (found.causes, found.unexplained.signature)
+
+
+def test_a_command_that_is_followed_exactly(twin):
+    found = diagnose(*one(recorded(twin, 902, "command", lambda spin, t, _: spin.at(t).rate)))
+    assert found.verdict == "nothing_found", (found.causes, found.unexplained.signature)
+
+
+@pytest.mark.parametrize(("start", "stop"), [(0.0, 9.0), (10.0, 18.0)])
+def test_a_reference_that_fails_for_long(twin, start, stop):
+    def failing(spin, t, tacho):
+        return np.where((t >= start) & (t < stop), np.nan, tacho)
+
+    found = diagnose(*one(recorded(twin, 903, "tacho", failing, "table_tilt")))
+    assert [cause.effect for cause in found.causes] == ["table_tilt"]
+    assert found.gain.share_of_excess_removed > 0.95
+    assert any(f"{stop - start:.1f} s are left out" in sentence for sentence in found.sentences)
+
+
+def test_a_table_at_rest_repeats_no_readings(twin):
+    def resting(spin, t, _):
+        return in_steps(np.interp(t, [0, 12, 30], [0, 0, 90]), TURN / 4096)
+
+    recording, with_encoder = recorded(twin, 904, "angle", resting)
+    assert prepare_run(recording, with_encoder).reference_valid.all()
+
+
+def test_an_encoder_has_no_gain(twin):
+    with_encoder = replace(twin, drive_source="angle")
+    assert with_encoder.families() == ENCODER_EFFECTS
+    assert set(EFFECTS) - set(ENCODER_EFFECTS) == set(NOT_OF_AN_ENCODER) == {"tacho_scale", "tacho_ripple"}
+    assert with_encoder.reference_gain([EFFECTS["tacho_scale"]({"ratio": 0.02})]) == 1.0
+
+
+@dataclass(frozen=True)
+class WithoutRipple(Twin):
+    """A twin that knows no ripple of the tachometer."""
+
+    def families(self) -> Mapping[str, type[Effect]]:
+        return {name: family for name, family in super().families().items() if name != "tacho_ripple"}
+
+
+@pytest.mark.parametrize("size", [60.0])
+def test_what_only_the_reference_shows_is_told_of_it(size):
+    blind = WithoutRipple(array=AccelerometerArray.load("cube12"), array_name="cube12")
+    recording, twin = recorded(blind, 905, "tacho", lambda spin, t, tacho: tacho, "tacho_ripple", size)
+    found = diagnose([recording], twin)
+    assert found.verdict == "unknown"
+    assert "the reference" in found.unexplained.signature
+
+
+def one(pair):
+    """Arguments of ``diagnose`` for one recording and its twin."""
+    recording, twin = pair
+    return [recording], twin
