@@ -11,7 +11,6 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
 
 from gfimu.diagnosis.causes import effects_of_run
 from gfimu.diagnosis.evidence import log_evidence, log_evidence_each
@@ -196,7 +195,7 @@ def _channelwise(
         matrix = line.jacobian.channel(channel)
         slow_jacobian = np.tensordot(line.jacobian.loading[:, channel], line.slow, axes=1)  # (m, K)
         cross[:, places] = weight * (matrix.T @ part - slow_jacobian @ damped)
-    eliminated = solve_triangular(line.drive.factor, cross, lower=True, check_finite=False)
+    eliminated = line.drive.eliminate(cross)
     gram -= eliminated.T @ eliminated
     score -= eliminated.T @ line.drive.forward
     return gram, score, eliminated

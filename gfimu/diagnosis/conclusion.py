@@ -32,7 +32,7 @@ from gfimu.diagnosis.stochastic import Walk, white_factor
 from gfimu.diagnosis.verdict import Diagnosis, Gain, NamedCause, Residual, RunView, Unexplained
 from gfimu.diagnosis.wording import verdict_sentences
 
-__all__ = ["conclude"]
+__all__ = ["conclude", "is_dominant"]
 
 _DOMINANT = 0.03
 _INEXACTNESS = 2.5e-3
@@ -58,12 +58,10 @@ def conclude(
     likely = probabilities(explanation)
     rivals = conflicting(explanation)
     named = _named(explanation, fit, likely, array)
-    removed = explanation.nothing.objective - fit.objective
-    # No model is exact: what is left must also stand out against what the causes explain.
-    significant = left.log_odds > (LEFT_OVER_ODDS if left.instead else max(LEFT_OVER_ODDS, _INEXACTNESS * removed))
+    significant = _stands_out(explanation, left)
     # Several causes that together still miss something, and a share of held-out data, coincide by chance.
     missed = len(fit.causes) > 1 and gain.share_of_excess_removed < 1.0 - _DOMINANT
-    dominant = significant and (left.instead or missed or 2 * left.log_odds > _DOMINANT * max(removed, 0.0))
+    dominant = significant and (missed or is_dominant(explanation, left))
     runs = tuple(_view(prepared, number, explanation, found) for number in range(len(prepared.runs)))
     extension = [cause.effect(array) for cause in fit.causes] if not dominant else []
     residue = () if loose is None else loose.effects
@@ -100,6 +98,19 @@ def conclude(
         unreferenced=sum(run.unreferenced for run in prepared.runs),
     )
     return Diagnosis(verdict, causes, residual, gain, unexplained, rival_list(explanation), twin, runs, words, noise)
+
+
+def is_dominant(explanation: Explanation, left: LeftOver) -> bool:
+    """Tell whether what is left weighs too much against what the causes explain for these to be believed."""
+    removed = explanation.nothing.objective - explanation.fit.objective
+    large = left.instead or 2 * left.log_odds > _DOMINANT * max(removed, 0.0)
+    return large and _stands_out(explanation, left)
+
+
+def _stands_out(explanation: Explanation, left: LeftOver) -> bool:
+    """Tell whether what is left is no chance, nor the inexactness that every model has."""
+    inexact = _INEXACTNESS * (explanation.nothing.objective - explanation.fit.objective)
+    return left.log_odds > (LEFT_OVER_ODDS if left.instead else max(LEFT_OVER_ODDS, inexact))
 
 
 def _named(explanation: Explanation, fit: Fit, likely: dict[str, float], array: AccelerometerArray) -> list[NamedCause]:

@@ -10,7 +10,7 @@ import numpy as np
 from gfimu.diagnosis.adequacy import left_over
 from gfimu.diagnosis.causes import effects_of_run
 from gfimu.diagnosis.coloured_noise import NoiseLevels
-from gfimu.diagnosis.conclusion import conclude
+from gfimu.diagnosis.conclusion import conclude, is_dominant
 from gfimu.diagnosis.engine import Explanation
 from gfimu.diagnosis.free_body.diagnose import diagnose_body
 from gfimu.diagnosis.holdout import Holdout, gate_gains, held_out_gain, split_segments
@@ -21,6 +21,7 @@ from gfimu.diagnosis.nuisances import settle_noise
 from gfimu.diagnosis.prepared_runs import PreparedRuns
 from gfimu.diagnosis.pruning import LEAST_EXTRA_ODDS, prune
 from gfimu.diagnosis.refinement import refine
+from gfimu.diagnosis.residual_tests import LeftOver
 from gfimu.diagnosis.segment import known_walk
 from gfimu.diagnosis.stochastic import UNEQUAL_WALK, WALK_ODDS, Walk, log_probability, walk_strength
 from gfimu.diagnosis.threads import one_blas_thread
@@ -97,18 +98,29 @@ def _diagnose_table(
     explanation, walk, loose = _explain(prepared, model, tell)
     tell(0.92, "hold out")
     pairs, label = _holdouts(explanation, held_out, model, () if loose is None else loose.effects)
-    halves = split_segments(explanation.segments, explanation.fixed, explanation.fit.causes, duration=np.inf)
-    judged = explanation if loose is None else loose.held
-    gated, withdrawn = _gate(judged, pairs if held_out else halves, other_recording=bool(held_out))
-    explanation = gated if withdrawn or loose is None else explanation
-    left = left_over(
-        explanation.segments, explanation.fit, explanation.fixed, prepared.spikes, rounded=prepared.rounded
-    )
+    left = _left_over(explanation, prepared)
+    withdrawn: list[str] = []
+    # Where too much is left for any cause to be believed there is nothing to withdraw.
+    if explanation.fit.causes and not is_dominant(explanation, left):
+        judged = explanation if loose is None else loose.held
+        if not held_out:
+            unseen = split_segments(explanation.segments, explanation.fixed, explanation.fit.causes, duration=np.inf)
+        else:
+            unseen = pairs
+        gated, withdrawn = _gate(judged, unseen, other_recording=bool(held_out))
+        if withdrawn:
+            explanation, left = gated, _left_over(gated, prepared)
     tell(0.97, "measure the gain")
     if loose is not None:
         pairs = relearned(loose, explanation.fit.causes, pairs)
     gain = _gain(explanation, pairs, label)
     return conclude(prepared, model, explanation, walk, loose, left, gain, withdrawn)
+
+
+def _left_over(explanation: Explanation, prepared: PreparedRuns) -> LeftOver:
+    return left_over(
+        explanation.segments, explanation.fit, explanation.fixed, prepared.spikes, rounded=prepared.rounded
+    )
 
 
 def _gain(explanation: Explanation, pairs: Sequence[Holdout], label: str) -> Gain:

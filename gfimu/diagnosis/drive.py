@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import solveh_banded
 from scipy.ndimage import gaussian_filter1d
 from scipy.sparse import csr_array
 
+from gfimu.diagnosis.drive_root import banded
 from gfimu.diagnosis.model import Spin, SpinState
 from gfimu.diagnosis.run import Run
 
@@ -146,10 +148,10 @@ class AngleSpline:
     def through(self, t: NDArray[np.float64], state: SpinState) -> NDArray[np.float64]:
         """Return the coefficients that come closest to a known motion at times ``t``."""
         angle, rate, acceleration = self.matrices(t)
-        lhs = (1e4 * angle.T @ angle + 1e2 * rate.T @ rate + acceleration.T @ acceleration).toarray()
-        lhs[np.diag_indices_from(lhs)] += 1e-9 * lhs.diagonal().mean()
+        lhs = banded(csr_array(1e4 * angle.T @ angle + 1e2 * rate.T @ rate + acceleration.T @ acceleration))
+        lhs[0] += 1e-9 * lhs[0].mean()
         rhs = 1e4 * angle.T @ state.angle + 1e2 * rate.T @ state.rate + acceleration.T @ state.acceleration
-        return np.asarray(np.linalg.solve(lhs, rhs), dtype=np.float64)
+        return np.asarray(solveh_banded(lhs, rhs, lower=True), dtype=np.float64)
 
     def spin(self, coefficients: NDArray[np.float64]) -> _SplineSpin:
         """Return the motion with these coefficients."""

@@ -7,10 +7,11 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import solveh_banded
 from scipy.sparse import csr_array, diags_array
 
 from gfimu.diagnosis.drive import AngleSpline
+from gfimu.diagnosis.drive_root import banded
 from gfimu.diagnosis.roughness import Roughness
 from gfimu.diagnosis.run import Run
 
@@ -84,7 +85,7 @@ class DrivePrior:
         angle, rate, _ = self.spline.matrices(run.t)
         weight = diags_array(run.reference_valid / reference_noise**2)
         observe = angle if is_angle else rate
-        lhs = (observe.T @ weight @ observe + self.precision).toarray()
-        lhs[np.diag_indices_from(lhs)] *= 1 + 1e-14
+        lhs = banded(csr_array(observe.T @ weight @ observe + self.precision))
+        lhs[0] *= 1 + 1e-14
         rhs = observe.T @ (weight @ run.reference) + self.begin.T @ self.begin_at
-        return np.asarray(cho_solve(cho_factor(lhs, lower=True), rhs))
+        return np.asarray(solveh_banded(lhs, rhs, lower=True))

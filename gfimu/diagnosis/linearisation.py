@@ -6,16 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import lapack, solve_triangular
-from scipy.linalg.blas import dsyr
+from scipy.sparse import csr_array
 
 from gfimu.diagnosis.drive_jacobian import DriveJacobian
 from gfimu.diagnosis.drive_prior import DrivePrior
+from gfimu.diagnosis.drive_root import InverseRoot
 from gfimu.diagnosis.model import SpinState
 
 __all__ = ["DriveElimination", "DriveEquations", "Linearisation"]
-
-_RIDGE = 1e-10
 
 
 @dataclass(frozen=True)
@@ -26,8 +24,10 @@ class DriveEquations:
     ----------
     residual, slow_residual, jacobian, slow
         As in `Linearisation`.
-    lhs : ndarray, shape (m, m)
-        Lower triangle of JᵀWJ.
+    information : csr_array, shape (m, m)
+        JᵀWJ under the white noise alone.
+    rows : ndarray, shape (k, m)
+        Uᵀ: what the slow noise takes away of it is UUᵀ.
     rhs : ndarray, shape (m,)
         JᵀWr.
     objective : float
@@ -40,7 +40,8 @@ class DriveEquations:
     slow_residual: NDArray[np.float64]
     jacobian: DriveJacobian
     slow: NDArray[np.float64]
-    lhs: NDArray[np.float64]
+    information: csr_array
+    rows: NDArray[np.float64]
     rhs: NDArray[np.float64]
     objective: float
     residue: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]] | None
@@ -55,25 +56,15 @@ class DriveEquations:
         """
         energy, pull = prior.energy(coefficients)
         rhs, objective = self.rhs + pull, self.objective + energy
-        precision = prior.precision.tocoo()
-        lhs = self.lhs.copy(order="F")
-        lhs[precision.row, precision.col] += precision.data
-        # A vanishing coupling keeps far entries of the factor out of the denormal range, where LAPACK crawls; its
-        # sign alternates, as a constant one would hold the mean angle, which the data hardly fix.
-        coupling = 1e-14 * float(np.mean(lhs.diagonal()))
-        lhs = dsyr(coupling, (-1.0) ** np.arange(len(lhs)), lower=1, a=lhs, overwrite_a=1)
-        if self.residue is not None:
+        matrix = csr_array(self.information + prior.precision)
+        if self.residue is None:
+            root = InverseRoot.of(matrix, self.rows)
+        else:
             inner, right, cross = self.residue
-            lhs = np.asfortranarray(np.block([[lhs, cross], [cross.T, inner]]))
+            root = InverseRoot.of(matrix, self.rows, (inner, cross))
             rhs = np.concatenate([rhs, right])
-        factor, failed = lapack.dpotrf(lhs, lower=1, clean=1)
-        if failed:  # a stretch of the drive that only its prior holds, and hardly
-            ridge = np.asfortranarray(lhs + np.diag(_RIDGE * lhs.diagonal()))
-            factor, failed = lapack.dpotrf(ridge, lower=1, clean=1, overwrite_a=1)
-        if failed:
-            raise np.linalg.LinAlgError("the normal equations of the drive are not positive definite")
-        forward = solve_triangular(factor, rhs, lower=True, check_finite=False)
-        return DriveElimination(factor, forward, objective - float(forward @ forward), len(self.rhs))
+        forward = root.apply(rhs)
+        return DriveElimination(root, forward, objective - float(forward @ forward), len(self.rhs))
 
 
 @dataclass(frozen=True)
@@ -82,55 +73,55 @@ class DriveElimination:
 
     Parameters
     ----------
-    factor : ndarray, shape (m + q, m + q)
-        Lower Cholesky factor L of H; the last q unknowns are the calibration residue, where it is admitted.
-    forward : ndarray, shape (m + q,)
-        x = L⁻¹(JᵀWr − Rd).
+    root : InverseRoot
+        W with WᵀW = H⁻¹; the last q unknowns are the calibration residue, where it is admitted.
+    forward : ndarray, shape (m + k + q,)
+        x = W(JᵀWr − Rd).
     objective : float
         rᵀWr + dᵀRd − xᵀx: twice the negative log likelihood, drive marginalised.
     size : int
         m.
     """
 
-    factor: NDArray[np.float64]
+    root: InverseRoot
     forward: NDArray[np.float64]
     objective: float
     size: int
 
+    def eliminate(self, cross: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return X = W JᵀWA of what couples signatures to the drive, JᵀWA (m + q, P), shape (m + k + q, P)."""
+        return self.root.apply(cross)
+
     def step(self, eliminated: NDArray[np.float64], step: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the step of the drive (m,) to its posterior mean, given the step of the signatures' coordinates."""
-        right = self.forward - eliminated @ step
-        return self._solve(right)[: self.size]
+        return self.root.transposed(self.forward - eliminated @ step)[: self.size]
 
     def response(self, eliminated: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return how the drive follows each of the signatures' coordinates, shape (m, P)."""
-        return -self._solve(eliminated)[: self.size]
+        return -self.root.transposed(eliminated)[: self.size]
 
     def alone(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the step of the drive (m,) and the sizes of the calibration residue (q,), the causes held."""
-        both = self._solve(self.forward)
+        both = self.root.transposed(self.forward)
         return both[: self.size], both[self.size :]
 
     def log_volume(self) -> float:
         """Return the log of the posterior's volume, up to a constant: −½ log det H."""
-        return -float(np.log(self.factor.diagonal()).sum())
+        return self.root.log_volume()
 
     def distance(self) -> float:
         """Return how far the drive is from its best, in squared standard deviations, the causes held."""
         total = float(self.forward @ self.forward)
-        if len(self.forward) == self.size:
+        if not len(self.root.corner):
             return total
-        corner = self.factor[self.size :]
-        right = corner @ self.forward
-        return total - float(right @ np.linalg.solve(corner @ corner.T, right))  # the residue free at any drive
+        border = np.concatenate([self.root.border, self.root.corner.T])  # (m + k + q, q)
+        right = border.T @ self.forward
+        return total - float(right @ np.linalg.solve(border.T @ border, right))  # the residue free at any drive
 
     def residue(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the information (q, q), prior included, and score (q,) of the residue, drive eliminated."""
-        corner = self.factor[self.size :, self.size :]
-        return corner @ corner.T, corner @ self.forward[self.size :]
-
-    def _solve(self, right: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.asarray(solve_triangular(self.factor, right, lower=True, trans=1, check_finite=False))
+        corner = self.root.corner
+        return corner @ corner.T, corner @ self.forward[len(self.root.border) :]
 
 
 @dataclass(frozen=True)

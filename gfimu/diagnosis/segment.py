@@ -3,7 +3,7 @@
 Observations are the c channels and the reference as one more. With the drive's spline coefficients d, the noise
 weight W and the roughness prior R, the drive is eliminated by
 
-    H = JᵀWJ + R = LLᵀ,  X = L⁻¹JᵀWA,  x = L⁻¹(JᵀWr − Rd),  G = AᵀWA − XᵀX,  b = AᵀWr − Xᵀx,
+    H = JᵀWJ + R,  H⁻¹ = VᵀV,  X = V JᵀWA,  x = V(JᵀWr − Rd),  G = AᵀWA − XᵀX,  b = AᵀWr − Xᵀx,
 
 so that everything after it is small algebra on G and b, whatever the length of the run.
 
@@ -20,8 +20,6 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
-from scipy.linalg.blas import dsyrk
 from scipy.sparse import csr_array
 
 from gfimu.diagnosis.calibration_residue import CalibrationResidue
@@ -353,15 +351,15 @@ class Segment:
         weights = self.inverse_variance
         rhs = jacobian.backward((residual - self.cosines @ damped) * weights)
         slow = jacobian.slow(self.cosines)
-        low = jacobian.slow_rows(slow, self.share, weights)
-        # Lower triangles only, here and in what follows.
-        lhs = dsyrk(-1.0, low.T, beta=1.0, c=jacobian.information().toarray(order="F"), lower=1, overwrite_c=1)
+        rows = jacobian.slow_rows(slow, self.share, weights)
         residue = None
         if self.calibration_residue is not None:
             residue = self.calibration_residue.normal_equations(
                 residual, jacobian, slow, self.cosines, self.share, weights
             )
-        return DriveEquations(residual, slow_residual, jacobian, slow, lhs, rhs, objective, residue)
+        return DriveEquations(
+            residual, slow_residual, jacobian, slow, jacobian.information(), rows, rhs, objective, residue
+        )
 
     def _misfit(self, predicted: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
         """Return the working residual r (n, c + 1), the same in the cosines (K, c + 1), and rᵀWr."""
@@ -400,7 +398,7 @@ class Segment:
     def whitened_products(
         self, linear: Linearisation, signatures: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Return G (P, P), b (P,) and X (m + q, P) of signatures (c + 1, P, n)."""
+        """Return G (P, P), b (P,) and X (m + k + q, P) of signatures (c + 1, P, n)."""
         count = signatures.shape[1]
         gram = np.zeros((count, count))
         score = np.zeros(count)
@@ -420,7 +418,7 @@ class Segment:
             cross -= slow @ np.tensordot(linear.jacobian.loading[r] * weights, damped, axes=1).T
         if self.calibration_residue is not None:
             cross = np.vstack([cross, self.calibration_residue.correlate(signatures, damped, self.cosines, weights)])
-        eliminated = solve_triangular(linear.drive.factor, cross, lower=True, check_finite=False)
+        eliminated = linear.drive.eliminate(cross)
         told = gram.diagonal() * _ROUNDING_ERROR
         gram -= eliminated.T @ eliminated
         score -= eliminated.T @ linear.drive.forward

@@ -1,0 +1,55 @@
+"""The banded root against dense linear algebra."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.sparse import csr_array, diags_array
+
+from gfimu.diagnosis.drive_root import InverseRoot, banded
+
+SIZE, BANDS, ROWS, RESIDUE = 60, 4, 7, 3
+
+
+@pytest.fixture(params=[(ROWS, RESIDUE), (ROWS, 0), (0, RESIDUE), (0, 0)], ids=str)
+def problem(request):
+    """B, Uᵀ, the border, and the dense matrix they make."""
+    rows_count, residue_count = request.param
+    rng = np.random.default_rng(7)
+    root = diags_array(list(rng.standard_normal((BANDS, SIZE))), offsets=range(BANDS), shape=(SIZE, SIZE))
+    matrix = csr_array(root.T @ root + 5.0 * diags_array(np.ones(SIZE)))
+    rows = 0.15 * rng.standard_normal((rows_count, SIZE))
+    coupling = rng.standard_normal((SIZE, residue_count))
+    information = 60.0 * np.eye(residue_count)
+    dense = np.block([[matrix.toarray() - rows.T @ rows, coupling], [coupling.T, information]])
+    return matrix, rows, (information, coupling) if residue_count else None, dense
+
+
+def test_the_root_is_of_the_inverse(problem):
+    matrix, rows, border, dense = problem
+    root = InverseRoot.of(matrix, rows, border)
+    columns = np.random.default_rng(1).standard_normal((len(dense), 5))
+    through = root.apply(columns)
+    assert through.shape == (len(dense) + len(rows), 5)
+    assert_allclose(through.T @ through, columns.T @ np.linalg.solve(dense, columns), rtol=1e-10, atol=1e-12)
+    assert_allclose(root.transposed(through), np.linalg.solve(dense, columns), rtol=1e-9, atol=1e-12)
+    assert_allclose(root.transposed(root.apply(columns[:, 0])), np.linalg.solve(dense, columns[:, 0]), atol=1e-12)
+    assert root.apply(columns[:, :0]).shape == (len(dense) + len(rows), 0)
+    assert root.transposed(through[:, :0]).shape == (len(dense), 0)
+
+
+def test_its_volume_is_that_of_the_determinant(problem):
+    matrix, rows, border, dense = problem
+    assert_allclose(InverseRoot.of(matrix, rows, border).log_volume(), -0.5 * np.linalg.slogdet(dense)[1], rtol=1e-12)
+
+
+def test_what_the_slow_noise_takes_whole_is_refused():
+    matrix = csr_array(diags_array(np.ones(SIZE)))
+    with pytest.raises(np.linalg.LinAlgError, match="not positive definite"):
+        InverseRoot.of(matrix, 1.1 * np.eye(SIZE)[:1])
+
+
+def test_bands_hold_the_lower_half():
+    matrix = np.array([[4.0, 1.0, 0.0], [1.0, 5.0, 2.0], [0.0, 2.0, 6.0]])
+    assert_allclose(banded(csr_array(matrix)), [[4.0, 5.0, 6.0], [1.0, 2.0, 0.0]])
