@@ -93,10 +93,9 @@ def make_segments(model: WorldModel, runs: Sequence[Run]) -> list[Segment]:
         noise = difference_noise(run.reference[run.reference_valid])
         for first, end in pairwise([0, *run.resumed, len(run.t)]):
             pieces = max(1, round((end - first) * run.sample_period / SEGMENT_DURATION))
-            lost = first > 0 or not run.valid[0].any()
             for start, stop in pairwise(np.linspace(first, end, pieces + 1).astype(int).tolist()):
                 drift = noise * np.sqrt(run.sample_period * (run.t[start] - run.t[0]))
-                std = _LOST_ANGLE_STD if lost else float(np.hypot(1e-4, 2.0 * drift))
+                std = _LOST_ANGLE_STD if first > 0 else float(np.hypot(1e-4, 2.0 * drift))
                 segments.append(
                     Segment(
                         model,

@@ -24,6 +24,7 @@ _DIFFERING = 0.5
 _ALONE = 0.5
 _BRIDGED = 0.5  # s without a reference
 _BRIDGED_SPACINGS = 3.0
+_SHORTEST = 2.0  # s between two gaps of the reference
 _ONE_STEP = 1.5
 _MOVING = 8.0
 _REFERENCE_COLUMNS = {"tacho": "tacho_rad_s", "angle": "angle_rad", "command": "command_rad_s"}
@@ -145,6 +146,11 @@ def prepare_run(recording: Recording, model: WorldModel, *, name: str = "run") -
     full[unreferenced] = 0.0
     left_out = float((valid & unreferenced[:, None]).any(axis=1).sum()) * period
     valid[unreferenced] = False
+    if valid.any(axis=1).sum() < _MINIMUM_SAMPLES:
+        raise InputError(
+            f"{name}: column {column} has no {_SHORTEST:.0f} s without a gap of {_BRIDGED} s or more; record the "
+            "reference without interruption"
+        )
     temperature = recording.reference.get("temperature_degC")
     warm = None
     if temperature is not None and np.isfinite(temperature).sum() >= 2:
@@ -172,9 +178,15 @@ def _unreferenced(valid: NDArray[np.bool_], period: float) -> NDArray[np.bool_]:
     ends = np.concatenate([[-1], known, [len(valid)]])
     longest = max(_BRIDGED / period, _BRIDGED_SPACINGS * float(np.median(np.diff(known))))
     out = np.zeros(len(valid), dtype=bool)
+    begin = 0
     for start, stop in pairwise(ends):
         if stop - start > longest:
-            out[start + 1 : stop] = True
+            # What lies between two gaps has to be long enough for a drive of its own.
+            island = start + 1 - begin < _SHORTEST / period and begin > 0
+            out[begin if island else start + 1 : stop] = True
+            begin = stop
+    if out.any() and len(valid) - begin < _SHORTEST / period:
+        out[begin:] = True
     return out
 
 

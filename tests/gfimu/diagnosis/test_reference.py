@@ -11,6 +11,7 @@ import pytest
 from gfimu.array import AccelerometerArray
 from gfimu.diagnosis import diagnose
 from gfimu.diagnosis.run import prepare_run
+from gfimu.errors import InputError
 from gfimu.recording import Recording
 from sim.campaign import Measurement, hidden_effect, measure, random_profile
 from sim.effects import EFFECTS, ENCODER_EFFECTS, NOT_OF_AN_ENCODER, Effect
@@ -118,3 +119,35 @@ def one(pair):
     """Arguments of ``diagnose`` for one recording and its twin."""
     recording, twin = pair
     return [recording], twin
+
+
+def with_gaps(twin, gaps, duration=20.0):
+    """A prepared run at rest whose tachometer is missing from ``start`` to ``stop`` s."""
+    t = np.arange(round(100 * duration)) / 100.0
+    tacho = 0.02 * np.random.default_rng(3).standard_normal(len(t))
+    for start, stop in gaps:
+        tacho[(t >= start) & (t < stop)] = np.nan
+    readings = np.zeros((len(t), 12))
+    return prepare_run(Recording.from_arrays(t, readings, twin.array, reference={"tacho_rad_s": tacho}), twin)
+
+
+@pytest.mark.parametrize(
+    ("gaps", "left_out", "resumed"),
+    [
+        ([(3.0, 3.4)], 0.0, ()),
+        ([(3.0, 5.0)], 2.0, (500,)),
+        ([(0.0, 4.0), (18.0, 20.0)], 6.0, (400,)),
+        ([(5.0, 7.0), (8.0, 11.0)], 6.0, (1100,)),  # too little between them
+        ([(5.0, 7.0), (18.5, 19.0)], 4.0 - 0.5, (700,)),
+    ],
+)
+def test_gaps_of_the_reference(twin, gaps, left_out, resumed):
+    run = with_gaps(twin, gaps)
+    assert run.unreferenced == pytest.approx(left_out, abs=0.02)
+    assert run.resumed == resumed
+    assert (~run.valid).any(axis=1).sum() == pytest.approx(100 * left_out, abs=2)
+
+
+def test_a_reference_in_short_bursts_is_refused(twin):
+    with pytest.raises(InputError, match="column tacho_rad_s has no 2 s without a gap"):
+        with_gaps(twin, [(second, second + 0.7) for second in np.arange(0.0, 20.0, 1.5)])
