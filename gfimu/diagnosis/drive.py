@@ -6,6 +6,8 @@ and from the channels, never by differentiating a noisy tachometer.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import solveh_banded
@@ -84,13 +86,13 @@ class AngleSpline:
         """Return the first coefficient (n,) that matters at each time, and what angle, rate and acceleration take
         from it and the four after it, shape (3, n, 5); constant rate beyond the ends.
         """  # noqa: D205
-        # The same few time axes are asked for thousands of times.
+        # The same few time axes are asked for thousands of times, by several threads.
         key = t.tobytes()
-        if key not in self._known:
-            if len(self._known) >= _REMEMBERED:
-                self._known.pop(next(iter(self._known)))
-            self._known[key] = self._local(t)
-        return self._known[key]
+        known = self._known.get(key)
+        if known is None:
+            known = self._local(t)
+            _remember(self._known, key, known)
+        return known
 
     def _local(self, t: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
         inside = np.clip(t, self.start, self.stop)
@@ -158,6 +160,13 @@ class AngleSpline:
         return _SplineSpin(self, coefficients)
 
 
+def _remember(known: dict[bytes, Any], key: bytes, value: Any) -> None:
+    """Keep a value, the oldest forgotten; a thread that finds nothing computes it anew."""
+    for old in tuple(known)[: len(known) + 1 - _REMEMBERED]:
+        known.pop(old, None)
+    known[key] = value
+
+
 def _pieces(knots: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the coefficients of 1, s, … s⁴ (s from an interval's start) of its five basis functions, (k, 5, 5).
 
@@ -194,14 +203,14 @@ class _SplineSpin:
         times = np.asarray(t, dtype=float)
         # Hundreds of effects ask for the same times of the same drive.
         key = times.tobytes()
-        if key not in self._known:
-            if len(self._known) >= _REMEMBERED:
-                self._known.pop(next(iter(self._known)))
+        known = self._known.get(key)
+        if known is None:
             first, values = self._spline.local(np.atleast_1d(times))
             local = self._coefficients[first[:, None] + np.arange(DEGREE + 1)]  # (n, 5)
             state = np.einsum("snj,nj->sn", values, local).reshape(3, *times.shape)
-            self._known[key] = SplineState(*state)
-        return self._known[key]
+            known = SplineState(*state)
+            _remember(self._known, key, known)
+        return known
 
 
 class ScaledSpin:
