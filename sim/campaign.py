@@ -41,12 +41,15 @@ class Measurement:
         Rms of 1/f noise per channel, m/s².
     tacho_noise : float
         White noise of the tachometer, rad/s.
+    encoder_step : float
+        Count of the table's encoder, rad; 0 where it has none.
     """
 
     duration: float = 40.0
     sample_rate: float = 100.0
     bias_instability: float = 0.15 * _MG
     tacho_noise: float = 0.02
+    encoder_step: float = 0.0
 
 
 def random_profile(rng: np.random.Generator, duration: float, *, top_rate: float = 15.0) -> SplineSpin:
@@ -138,13 +141,20 @@ def measure(
     for data_step in world.data_steps:
         readings = data_step(t, readings, rng)
     tacho = forward.reference(world, spin, t) + setting.tacho_noise * rng.standard_normal(len(t))
+    reference = {"tacho_rad_s": tacho, "temperature_degC": temperature}
+    if setting.encoder_step:
+        moved = spin
+        for motion_step in world.motion_steps:
+            moved = motion_step(moved, t)
+        angle = moved.at(t - world.tacho_delay).angle
+        reference["angle_rad"] = setting.encoder_step * np.floor(angle / setting.encoder_step)
     kept = np.isfinite(readings).any(axis=1)
     metadata = {} if mounting is None else {"mounting_rotvec_rad": [float(v) for v in mounting]}
     return Recording.from_arrays(
         t[kept],
         readings[kept],
         twin.array,
-        reference={"tacho_rad_s": tacho[kept], "temperature_degC": temperature[kept]},
+        reference={name: column[kept] for name, column in reference.items()},
         metadata={"array": twin.array_name or twin.array.name, **metadata},
     )
 

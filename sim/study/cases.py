@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from gfimu.errors import unknown_name
-from sim.effects import EFFECTS
+from sim.effects import EFFECTS, ENCODER_EFFECTS
 
 __all__ = ["EXOTICS", "STUDIES", "Case", "study_cases"]
 
@@ -83,6 +83,8 @@ class Case:
         Whether the nominal twin carries the residue of a calibration.
     without : str
         Effect taken out of the library, if any.
+    encoder_counts : int
+        Counts per revolution of an encoder that drives the twin instead of the tachometer; 0: none.
     """
 
     study: str
@@ -96,6 +98,7 @@ class Case:
     array: str = "cube12"
     residue: bool = False
     without: str = ""
+    encoder_counts: int = 0
 
     @property
     def key(self) -> str:
@@ -168,7 +171,8 @@ def _residue() -> list[Case]:
 def _elsewhere(study: str, first_seed: int, settings: Mapping[str, Any], count: int = 24) -> list[Case]:
     """Return cases away from the usual run: a third with nothing hidden, the rest with one effect."""
     rng = np.random.default_rng(first_seed)
-    order = [str(name) for name in rng.permutation(list(EFFECTS))]
+    library = ENCODER_EFFECTS if "encoder_counts" in settings else EFFECTS
+    order = [str(name) for name in rng.permutation(list(library))]
     cases = []
     for number in range(count):
         hidden = () if number % 3 == 0 else (order[number % len(order)],)
@@ -205,6 +209,8 @@ STUDIES: dict[str, Callable[[], list[Case]]] = {
     "corners8": lambda: _elsewhere("corners8", 64_000, {"array": "corners8"}),
     "three_plus_one": lambda: _elsewhere("three_plus_one", 65_000, {"array": "p3_three_plus_one"}),
     "noisy_tacho": lambda: _elsewhere("noisy_tacho", 66_000, {"tacho_noise": 0.05}),
+    "encoders": lambda: _elsewhere("encoders", 67_000, {"encoder_counts": 4096}),
+    "coarse_encoders": lambda: _elsewhere("coarse_encoders", 68_000, {"encoder_counts": 360}),
     "left_out": _left_out,
     "exotics": _exotics,
 }

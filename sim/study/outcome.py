@@ -93,11 +93,18 @@ def draw_world(case: Case, source: str = "") -> HiddenWorld:
         array_name=case.array,
         sample_rate=case.sample_rate,
         without=case.without,
+        drive_source="angle" if case.encoder_counts else "tacho",
     )
     if source:
         return _foreign_world(case, twin, source)
     rng = np.random.default_rng(case.seed)
-    setting = Measurement(case.duration, case.sample_rate, case.bias_instability_mg * _MG, case.tacho_noise)
+    setting = Measurement(
+        case.duration,
+        case.sample_rate,
+        case.bias_instability_mg * _MG,
+        case.tacho_noise,
+        encoder_step=_TURN / case.encoder_counts if case.encoder_counts else 0.0,
+    )
     motion = random_profile(rng, case.duration)
     while "saturation" in case.effects and not _reaches(twin, motion, setting, _CLIPPED_ABOVE * twin.gravity):
         motion = random_profile(rng, case.duration)
