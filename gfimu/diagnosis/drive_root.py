@@ -135,7 +135,7 @@ class InverseRoot:
 
 def _solved(band: NDArray[np.float64], right: NDArray[np.float64], trans: str = "N") -> NDArray[np.float64]:
     """Return L⁻¹ or, with ``trans`` T, L⁻ᵀ of columns (m, P)."""
-    if not right.size:
+    if not right.size:  # SciPy's wrapper of dtbtrs writes beyond an empty array
         return right.copy()
     return np.asarray(lapack.dtbtrs(band, np.asfortranarray(right), uplo="L", trans=trans)[0])
 

@@ -41,7 +41,8 @@ class LeftOver:
     signature : str
         Channels and dependence, in words.
     surrogate : dict of str to float
-        Coefficients of the data-driven term, m/s² per unit basis function, by ``"channel: basis function"``.
+        Coefficients of the data-driven term by ``"channel: basis function"``, m/s² per unit basis function; of the
+        reference, in its own unit.
     instead : bool
         Whether it takes the place of named causes, which then are a compromise, instead of adding to them.
     """
