@@ -14,13 +14,14 @@ from numpy.typing import NDArray
 
 from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.free_body.motion import BodyDrive
-from gfimu.diagnosis.model import ExpectedNoise
+from gfimu.diagnosis.model import BasisUnits, EffectFamily, ExpectedNoise
 from gfimu.errors import InputError
 from gfimu.model_files import find_model, read_toml
 from gfimu.units import STANDARD_GRAVITY
 from sim import forward
 from sim.body import body_channels
 from sim.effects import BODY_EFFECTS, EFFECTS, ENCODER_EFFECTS, Effect, apply_effects, make_effect
+from sim.effects.unknown import UnknownTerm
 from sim.world import World
 
 __all__ = ["Twin"]
@@ -173,6 +174,16 @@ class Twin:
     def families(self) -> Mapping[str, type[Effect]]:
         """Return the library of effects: those of a table with its kind of reference, or of a free body."""
         return {"gyro": BODY_EFFECTS, "angle": ENCODER_EFFECTS}.get(self.drive_source, EFFECTS)
+
+    def unnamed(self, dependence: str, units: BasisUnits, *, of_reference: bool = False) -> EffectFamily:
+        """Return what no effect of the library explains as one more, with a size per channel or one of the reference.
+
+        Raises
+        ------
+        InputError
+            If no function has the name ``dependence``.
+        """
+        return UnknownTerm(dependence, units, of_reference)
 
     def predict(
         self,

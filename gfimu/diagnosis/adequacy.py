@@ -12,10 +12,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.diagnosis.causes import effects_of_run
+from gfimu.diagnosis.causes import Cause, effects_of_run
 from gfimu.diagnosis.evidence import log_evidence, log_evidence_each
+from gfimu.diagnosis.generic_basis import FUNCTIONS, Motion
 from gfimu.diagnosis.linearisation import Linearisation
-from gfimu.diagnosis.model import Effect, SpinState
+from gfimu.diagnosis.model import BasisUnits, Effect, SpinState
 from gfimu.diagnosis.refinement import Fit
 from gfimu.diagnosis.residual_tests import (
     REFERENCE,
@@ -29,55 +30,28 @@ from gfimu.diagnosis.residual_tests import (
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.signatures import cause_columns
 
-__all__ = ["LEFT_OVER_ODDS", "generic_basis", "left_over"]
+__all__ = ["LEFT_OVER_ODDS", "generic_basis", "left_over", "series_products"]
 
 LEFT_OVER_ODDS = 10.0
 """Log odds from which what is left is called significant; one in 320 runs with nothing hidden reached it."""
 _UNIT = 0.03
-_STEPS = 8
-_SLOW = 10
-_ORDERS = (1, 2, 3, 4, 6, 8, 12)
 
 
 def generic_basis(segment: Segment, state: SpinState) -> tuple[list[str], NDArray[np.float64]]:
     """Return names and values (n, k) of smooth functions of rate, acceleration, angle and time, of unit rms."""
-    rate = state.rate / max(float(np.abs(state.rate).max()), 1e-6)
-    acceleration = state.acceleration / max(float(np.abs(state.acceleration).max()), 1e-6)
-    jerk = np.gradient(acceleration)
-    jerk = jerk / max(float(np.abs(jerk).max()), 1e-12)
-    turning = np.abs(state.rate) > 0.05
-    time = (segment.run.t - segment.run.t[0]) / max(segment.run.duration, 1e-9)
-    functions = {
-        "rate": rate,
-        "rate²": rate**2,
-        "rate³": rate**3,
-        "rate⁴": rate**4,
-        "|rate|": np.abs(rate),
-        "sign of rate": np.sign(rate) * turning,
-        "angular acceleration": acceleration,
-        "acceleration²": acceleration**2,
-        "|acceleration|": np.abs(acceleration),
-        "rate × acceleration": rate * acceleration,
-        "rate² × acceleration": rate**2 * acceleration,
-        "jerk": jerk,
-        "time × rate²": time * rate**2,
-        "time × acceleration": time * acceleration,
-        "turning": turning.astype(float),
-        "rate⁶": rate**6,
-    }
-    for order in _ORDERS:
-        for name, wave in (("sine", np.sin), ("cosine", np.cos)):
-            functions[f"{order} per revolution ({name})"] = wave(order * state.angle) * turning
-            functions[f"{order} per revolution × rate ({name})"] = wave(order * state.angle) * rate
-            functions[f"{order} per revolution × rate² ({name})"] = wave(order * state.angle) * rate**2
-    for mode in range(1, _SLOW + 1):
-        functions[f"slow time ({mode} half-waves)"] = np.cos(np.pi * mode * time)
-    for step in range(1, 2 * _STEPS):
-        functions[f"step at {step / (2 * _STEPS):.0%} of the run"] = (time > step / (2 * _STEPS)) - 0.5
-    values = np.column_stack(list(functions.values()))
+    units = BasisUnits(
+        max(float(np.abs(state.rate).max()), 1e-6),
+        max(float(np.abs(state.acceleration).max()), 1e-6),
+        max(segment.run.duration, 1e-9),
+    )
+    motion = Motion.of(state, segment.run.t - segment.run.t[0], units)
+    columns = {name: function(motion) for name, function in FUNCTIONS.items()}
+    columns["jerk"] = np.gradient(motion.acceleration)
+    values = np.column_stack(list(columns.values()))
     values = values - values.mean(axis=0)
     size = np.sqrt(np.mean(values**2, axis=0))
-    return list(functions), values * (_UNIT / np.maximum(size, 1e-9)) * (size > 1e-6)
+    least = np.where(np.array(list(columns)) == "jerk", 1e-12, 1e-6)
+    return list(columns), values * (_UNIT / np.maximum(size, least)) * (size > least)
 
 
 def left_over(
@@ -120,10 +94,7 @@ def _basis_terms(
     for segment, known in zip(segments, fixed, strict=True):
         line = segment.linearise([*known, *effects_of_run(fit.causes, segment.model.array, segment.index)])
         names, basis = generic_basis(segment, line.state)
-        part, right, cross = _channelwise(segment, line, basis)
-        named = cause_columns(segment, fit.causes, known, shapes=True)
-        if named.shape[1]:
-            part, right = _project_out(segment, line, basis, cross, part, right, named)
+        part, right = series_products(segment, line, basis, fit.causes, known)
         gram = part if gram is None else gram + part
         score = right if score is None else score + right
     assert gram is not None
@@ -173,18 +144,55 @@ def _basis_terms(
     return LeftOver(found.log_odds, found.signature, surrogate)
 
 
+def series_products(
+    segment: Segment,
+    line: Linearisation,
+    basis: NDArray[np.float64],
+    causes: Sequence[Cause],
+    known: Sequence[Effect],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return G and b of functions on each series, drive and causes projected out.
+
+    Parameters
+    ----------
+    segment : Segment
+        The data.
+    line : Linearisation
+        Linearised about the causes.
+    basis : ndarray, shape (n, k) or (c + 1, n, k)
+        The functions, the same for each channel and the reference or each its own.
+    causes : sequence of Cause
+        What is there already.
+    known : sequence of Effect
+        Effects known beforehand.
+
+    Returns
+    -------
+    gram : ndarray, shape ((c + 1) k, (c + 1) k)
+        G, series by series.
+    score : ndarray, shape ((c + 1) k,)
+        b.
+    """
+    each = np.broadcast_to(basis, (line.jacobian.observations, *basis.shape[-2:]))
+    gram, score, cross = _channelwise(segment, line, each)
+    named = cause_columns(segment, causes, known, shapes=True)
+    if named.shape[1]:
+        gram, score = _project_out(segment, line, each, cross, gram, score, named)
+    return gram, score
+
+
 def _channelwise(
     segment: Segment, line: Linearisation, basis: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Return G, b and X of one set of basis functions on each channel and the reference, drive marginalised."""
-    count = basis.shape[1]
+    """Return G, b and X of basis functions (c + 1, n, k) on each channel and the reference, drive marginalised."""
+    count = basis.shape[2]
     observed = line.jacobian.observations
     gram = np.zeros((count * observed, count * observed))
     score = np.zeros(count * observed)
     cross = np.zeros((segment.spline.size, count * observed))
     cosines, share = segment.cosines, segment.share
     for channel in range(observed):
-        part = basis * segment.row_weight[:, [channel]]
+        part = basis[channel] * segment.row_weight[:, [channel]]
         weight = segment.inverse_variance[channel]
         slow = cosines.T @ part
         damped = share[:, [channel]] * slow
@@ -212,14 +220,14 @@ def _project_out(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Make the basis orthogonal to the named causes' columns."""
     inner, right, crossed = segment.whitened_products(line, named)
-    count = basis.shape[1]
+    count = basis.shape[2]
     mixed = np.zeros((named.shape[1], gram.shape[0]))
     for channel in range(line.jacobian.observations):
         places = slice(channel * count, (channel + 1) * count)
         columns = named[channel]  # (K, n)
         if not columns.any():
             continue
-        part = basis * segment.row_weight[:, [channel]]
+        part = basis[channel] * segment.row_weight[:, [channel]]
         slow = segment.cosines.T @ part
         weight = segment.inverse_variance[channel]
         mixed[:, places] = weight * (

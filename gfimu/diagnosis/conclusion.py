@@ -32,7 +32,7 @@ from gfimu.diagnosis.stochastic import Walk, white_factor
 from gfimu.diagnosis.verdict import Diagnosis, Gain, NamedCause, Residual, RunView, Unexplained
 from gfimu.diagnosis.wording import verdict_sentences
 
-__all__ = ["conclude", "is_dominant"]
+__all__ = ["conclude", "is_dominant", "is_unknown"]
 
 _DOMINANT = 0.03
 _INEXACTNESS = 2.5e-3
@@ -47,8 +47,9 @@ def conclude(
     left: LeftOver,
     gain: Gain,
     withdrawn: Sequence[str],
+    described: Explanation | None = None,
 ) -> Diagnosis:
-    """Put everything together."""
+    """Put everything together; ``described`` holds the surrogate of an unknown."""
     array = model.array
     fit = explanation.fit
     found = [
@@ -59,11 +60,10 @@ def conclude(
     rivals = conflicting(explanation)
     named = _named(explanation, fit, likely, array)
     significant = _stands_out(explanation, left)
-    # Several causes that together still miss something, and a share of held-out data, coincide by chance.
-    missed = len(fit.causes) > 1 and gain.share_of_excess_removed < 1.0 - _DOMINANT
-    dominant = significant and (missed or is_dominant(explanation, left))
-    runs = tuple(_view(prepared, number, explanation, found) for number in range(len(prepared.runs)))
-    extension = [cause.effect(array) for cause in fit.causes] if not dominant else []
+    dominant = described is not None or is_unknown(explanation, left, gain)
+    believed = explanation if described is None else described
+    runs = tuple(_view(prepared, number, believed) for number in range(len(prepared.runs)))
+    extension = effects_of_run(believed.fit.causes, array, 0) if not dominant or described is not None else []
     residue = () if loose is None else loose.effects
     twin = model.extended([*_library_effects(model, found), *residue, *extension])
     if dominant:
@@ -77,9 +77,10 @@ def conclude(
         verdict, causes = "explained", (*found, *named)
     else:
         verdict, causes = "nothing_found", ()
-    unexplained = Unexplained(significant, left.signature if significant else "", left.log_odds, left.surrogate)
-    residual = Residual.of_views(runs, array.channels, _noise_floor(runs, explanation.segments[0]))
-    levels = explanation.segments[0].levels
+    surrogate = left.surrogate if described is None else _coefficients(described.fit.causes, array)
+    unexplained = Unexplained(significant, left.signature if significant else "", left.log_odds, surrogate)
+    residual = Residual.of_views(runs, array.channels, _noise_floor(runs, believed.segments[0]))
+    levels = believed.segments[0].levels
     expected = model.expected_noise(1.0 / prepared.runs[0].sample_period)
     noise = {
         "white_over_data_sheet": float(np.median(levels.white[:-1] / expected.white)),
@@ -96,8 +97,16 @@ def conclude(
         withdrawn,
         residue=noise["calibration_residue"],
         unreferenced=sum(run.unreferenced for run in prepared.runs),
+        terms=0 if described is None else len(described.fit.causes),
     )
     return Diagnosis(verdict, causes, residual, gain, unexplained, rival_list(explanation), twin, runs, words, noise)
+
+
+def is_unknown(explanation: Explanation, left: LeftOver, gain: Gain) -> bool:
+    """Tell whether the causes are not to be believed, their gain on held-out data being known."""
+    # Several causes that together still miss something, and a share of held-out data, coincide by chance.
+    missed = len(explanation.fit.causes) > 1 and gain.share_of_excess_removed < 1.0 - _DOMINANT
+    return _stands_out(explanation, left) and (missed or is_dominant(explanation, left))
 
 
 def is_dominant(explanation: Explanation, left: LeftOver) -> bool:
@@ -177,7 +186,17 @@ def _library_effects(model: WorldModel, causes: Sequence[NamedCause]) -> list[Ef
     return [families[cause.effect](cause.parameters) for cause in causes if cause.effect in families]
 
 
-def _view(prepared: PreparedRuns, number: int, explanation: Explanation, found: Sequence[NamedCause]) -> RunView:
+def _coefficients(surrogate: Sequence[Cause], array: AccelerometerArray) -> dict[str, float]:
+    """Return the coefficients of a surrogate's terms by what they are of, with its unit, and by function."""
+    return {
+        f"{size.key}: {cause.effect(array).parameters['dependence']}": float(value)
+        for cause in surrogate
+        for size, value in zip(cause.family.sizes(array), cause.sizes(array, 0), strict=True)
+        if value
+    }
+
+
+def _view(prepared: PreparedRuns, number: int, explanation: Explanation) -> RunView:
     """Collect one run for pictures: before is the given twin driven by the reference alone."""
     run = prepared.runs[number]
     mine = [

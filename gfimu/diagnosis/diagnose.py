@@ -10,7 +10,7 @@ import numpy as np
 from gfimu.diagnosis.adequacy import left_over
 from gfimu.diagnosis.causes import effects_of_run
 from gfimu.diagnosis.coloured_noise import NoiseLevels
-from gfimu.diagnosis.conclusion import conclude, is_dominant
+from gfimu.diagnosis.conclusion import conclude, is_dominant, is_unknown
 from gfimu.diagnosis.engine import Explanation
 from gfimu.diagnosis.free_body.diagnose import diagnose_body
 from gfimu.diagnosis.holdout import Holdout, gate_gains, held_out_gain, split_segments
@@ -24,6 +24,7 @@ from gfimu.diagnosis.refinement import refine
 from gfimu.diagnosis.residual_tests import LeftOver
 from gfimu.diagnosis.segment import known_walk
 from gfimu.diagnosis.stochastic import UNEQUAL_WALK, WALK_ODDS, Walk, log_probability, walk_strength
+from gfimu.diagnosis.surrogate import surrogates
 from gfimu.diagnosis.threads import one_blas_thread
 from gfimu.diagnosis.verdict import Diagnosis, Gain
 from gfimu.errors import InputError
@@ -111,10 +112,34 @@ def _diagnose_table(
         if withdrawn:
             explanation, left = gated, _left_over(gated, prepared)
     tell(0.97, "measure the gain")
-    if loose is not None:
-        pairs = relearned(loose, explanation.fit.causes, pairs)
-    gain = _gain(explanation, pairs, label)
-    return conclude(prepared, model, explanation, walk, loose, left, gain, withdrawn)
+    gain = Gain()
+    if not is_dominant(explanation, left):
+        if loose is not None:
+            pairs = relearned(loose, explanation.fit.causes, pairs)
+        gain = _gain(explanation, pairs, label)
+    described = None
+    if is_unknown(explanation, left, gain):
+        described, gain = _describe(explanation, left, held_out, model, () if loose is None else loose.effects)
+    return conclude(prepared, model, explanation, walk, loose, left, gain, withdrawn, described)
+
+
+def _describe(
+    explanation: Explanation,
+    left: LeftOver,
+    held_out: Sequence[Recording],
+    model: WorldModel,
+    residue: Sequence[Effect],
+) -> tuple[Explanation | None, Gain]:
+    """Describe what has no name by a surrogate, and keep it where it predicts data that its fit never saw."""
+    found = surrogates(explanation.segments, explanation.nothing, explanation.fixed, left.hints)
+    # The richest that predicts; if that was too rich, the poorest.
+    for surrogate in [*found[-1:], *found[:-1][:1]]:
+        described = replace(explanation, fit=surrogate.fit, segments=surrogate.segments)
+        pairs, label = _holdouts(described, held_out, model, residue)
+        gain = _gain(described, pairs, label)
+        if gain.log_likelihood_per_sample > 0.0:
+            return described, gain
+    return None, Gain()
 
 
 def _left_over(explanation: Explanation, prepared: PreparedRuns) -> LeftOver:

@@ -14,7 +14,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from gfimu.array import AccelerometerArray
 
-__all__ = ["Effect", "EffectFamily", "ExpectedNoise", "Pattern", "Size", "Spin", "SpinState", "WorldModel"]
+__all__ = [
+    "BasisUnits",
+    "Effect",
+    "EffectFamily",
+    "ExpectedNoise",
+    "Pattern",
+    "Size",
+    "Spin",
+    "SpinState",
+    "WorldModel",
+]
 
 
 class SpinState(Protocol):
@@ -145,6 +155,15 @@ class ExpectedNoise:
         return np.asarray(np.sqrt(np.maximum(power - self.quantum**2 / 12.0, 0.01 * power)))
 
 
+@dataclass(frozen=True)
+class BasisUnits:
+    """What rate (rad/s), acceleration (rad/s²) and time (s) are divided by in a generic basis; all positive."""
+
+    rate: float
+    acceleration: float
+    duration: float
+
+
 class WorldModel(Protocol):
     """A simulation that can be wrong."""
 
@@ -165,6 +184,10 @@ class WorldModel(Protocol):
 
     def families(self) -> Mapping[str, EffectFamily]:
         """Return all kinds of effects it could have, by name."""
+        ...
+
+    def unnamed(self, dependence: str, units: BasisUnits, *, of_reference: bool = False) -> EffectFamily:
+        """Return what no effect of the library explains as one more: a function of `generic_basis` per channel."""
         ...
 
     def predict(

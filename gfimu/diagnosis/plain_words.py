@@ -134,6 +134,8 @@ def story(diagnosis: Diagnosis) -> str:
         )
         text += f"With {what} put into the simulation it misses by {after:.3g} m/s²"
         text += ", which is noise. " if after < 1.05 * floor else ". "
+    if diagnosis.verdict == "unknown" and gain.held_out:
+        text += f"With a description that has no name in the simulation it misses by {after:.3g} m/s². "
     if math.isfinite(gain.share_of_excess_removed):
         text += (
             f"On data that the fit never saw ({gain.held_out}), {percent(gain.share_of_excess_removed)} of the error "
@@ -194,10 +196,9 @@ def next_steps(diagnosis: Diagnosis) -> list[str]:
             steps += [f"To tell the candidates apart, record: {remedy}." for remedy in remedies]
             steps.append("Give both recordings to one call of gfimu diagnose; it fits them together.")
         case "unknown":
-            steps.append(
-                "Look at the residual views of the report for where the discrepancy sits; the surrogate term in "
-                "verdict.json describes it, but does not name it."
-            )
+            steps.append("Look at the residual views of the report for where the discrepancy sits.")
+            if any(effect.name == "unknown" for effect in diagnosis.twin.effects):
+                steps.append("Until it has a name, simulate with twin.toml: its terms called unknown describe it.")
             steps.append("Record another run with another motion: what stays is in the rig or the sensors.")
         case _:
             more = "no more than what is left unexplained" if diagnosis.unexplained.significant else "nothing"

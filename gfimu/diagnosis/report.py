@@ -69,7 +69,8 @@ def _content(diagnosis: Diagnosis) -> Mapping[str, Any]:
         "sentences": diagnosis.sentences[1:],
         "figures_of_merit": _figures_of_merit(diagnosis),
         "causes": [_cause(diagnosis, cause) for cause in diagnosis.causes],
-        "surrogate": dict(diagnosis.unexplained.surrogate) if diagnosis.unexplained.significant else {},
+        "surrogate": _surrogate(diagnosis) if diagnosis.unexplained.significant else {},
+        "extended": diagnosis.verdict == "unknown" and bool(diagnosis.gain.held_out),
         "unexplained": diagnosis.unexplained,
         "rivals": diagnosis.rivals[:_MOST_RIVALS],
         "gain": diagnosis.gain,
@@ -98,11 +99,23 @@ def _content(diagnosis: Diagnosis) -> Mapping[str, Any]:
     }
 
 
+def _surrogate(diagnosis: Diagnosis) -> dict[str, Any]:
+    """Return the coefficients of a surrogate as a table: functions down, channels and the reference across."""
+    places = [key.split(": ", maxsplit=1) for key in diagnosis.unexplained.surrogate]
+    if not places or any(len(place) < 2 for place in places):
+        return {}
+    of = list(dict.fromkeys(series for series, _ in places))
+    rows: dict[str, list[str]] = {}
+    for (series, function), value in zip(places, diagnosis.unexplained.surrogate.values(), strict=True):
+        rows.setdefault(function, [""] * len(of))[of.index(series)] = f"{value:.3g}"
+    return {"columns": of, "rows": rows}
+
+
 def _figures_of_merit(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:
     """Return the numbers of the first screen: value, unit, what it is."""
     residual, gain = diagnosis.residual, diagnosis.gain
     merits = [(f"{residual.rms_before:.3g}", "m/s²", "prediction error, simulation as given")]
-    if diagnosis.causes:
+    if diagnosis.causes or (diagnosis.verdict == "unknown" and gain.held_out):
         merits.append((f"{residual.rms_after:.3g}", "m/s²", "prediction error, extended"))
     merits.append((f"{residual.noise_floor:.3g}", "m/s²", "the sensors' own noise"))
     if np.isfinite(gain.share_of_excess_removed):

@@ -11,6 +11,7 @@ from scipy.stats import chi2
 
 from gfimu.diagnosis.causes import effects_of_run
 from gfimu.diagnosis.evidence import log_evidence
+from gfimu.diagnosis.generic_basis import OF_READING, step_at
 from gfimu.diagnosis.model import Effect
 from gfimu.diagnosis.refinement import Fit, refine
 from gfimu.diagnosis.search import EXTRA_CAUSE
@@ -45,12 +46,15 @@ class LeftOver:
         reference, in its own unit.
     instead : bool
         Whether it takes the place of named causes, which then are a compromise, instead of adding to them.
+    hints : tuple of str
+        Functions (`gfimu.diagnosis.generic_basis`) beyond the usual ones that may describe it.
     """
 
     log_odds: float
     signature: str
     surrogate: dict[str, float]
     instead: bool = False
+    hints: tuple[str, ...] = ()
 
 
 def judges_reference(segment: Segment) -> bool:
@@ -122,7 +126,8 @@ def jumps(segment: Segment, fit: Fit, known: Sequence[Effect], channels: Sequenc
             size_si = float(change[place, channel] * segment.levels.white[channel])
             name = channels[channel]
             text = f"channel {name} jumps by {size_si:+.3g} m/s² at {when:.2f} s"
-            best = LeftOver(odds, text, {f"{name}: step at {when:.2f} s": size_si})
+            coefficient = {f"{name}: step at {when:.2f} s": size_si}
+            best = LeftOver(odds, text, coefficient, hints=(step_at(when - segment.start),))
     return best
 
 
@@ -178,7 +183,7 @@ def one_curve(
         odds = evidence + max(priors) - fit.log_evidence - sum(priors) - EXTRA_CAUSE * (len(mine) - 1)
         if odds > best.log_odds:
             text = f"channel {channel} follows a curve of its reading that the library has not (cubic)"
-            best = LeftOver(float(odds), text, {f"{channel}: reading³": coefficient}, instead=True)
+            best = LeftOver(float(odds), text, {f"{channel}: reading³": coefficient}, instead=True, hints=(OF_READING,))
     return best
 
 

@@ -23,11 +23,12 @@ def verdict_sentences(
     *,
     residue: float = 0.0,
     unreferenced: float = 0.0,
+    terms: int = 0,
 ) -> tuple[str, ...]:
     """Return the verdict in sentences, the most important first.
 
     ``residue`` is the size of a calibration residue, in units of what a good calibration leaves, where there is one;
-    ``unreferenced`` the time without a reference, s.
+    ``unreferenced`` the time without a reference, s; ``terms`` the number of terms that describe an unknown.
     """
     words = [_headline(verdict, causes, unexplained, residue)]
     words += [f"{cause.effect}: {cause.why}." for cause in causes if cause.why]
@@ -37,7 +38,9 @@ def verdict_sentences(
                 f"{', '.join(cause.not_distinguishable_from)} could imitate {cause.effect} in this data but would need "
                 f"a coincidence; {cause.would_be_separated_by} would settle it."
             )
-    if causes:
+    if verdict == "unknown":
+        words.append(_surrogate_sentence(terms))
+    if causes or terms:
         words.append(
             f"The residual falls from {residual.rms_before:.3g} to {residual.rms_after:.3g} m/s²; "
             f"the noise alone is {residual.noise_floor:.3g} m/s²."
@@ -70,6 +73,16 @@ def _headline(verdict: str, causes: Sequence[NamedCause], unexplained: Unexplain
         which = _listed([cause.effect for cause in contested])
         return f"The simulation is wrong, but this data cannot tell {which} apart; {by} would."
     return f"The simulation is wrong in a way that nothing in the library explains: {unexplained.signature}."
+
+
+def _surrogate_sentence(terms: int) -> str:
+    if not terms:
+        return (
+            "No function of the motion, the angle or time predicts it on data the fit never saw, so the extended twin "
+            "is without it."
+        )
+    many = f"{terms} functions of the motion, the angle or time describe" if terms > 1 else "One function describes"
+    return f"{many} it in the extended twin, without a name."
 
 
 def _residue_sentence(scale: float) -> str:

@@ -9,6 +9,7 @@ from gfimu.array import AccelerometerArray
 from gfimu.errors import unknown_name
 from sim.effects import body, digital, mechanical, sensing, timing
 from sim.effects.base import Effect
+from sim.effects.unknown import Unknown
 from sim.world import World
 
 __all__ = [
@@ -102,7 +103,7 @@ def make_effect(
     name: str, parameters: Mapping[str, Any] | None = None, array: AccelerometerArray | None = None
 ) -> Effect:
     """Build an effect by name; raises `InputError` for an unknown name or, given the array, an unknown key."""
-    known = EFFECTS | BODY_EFFECTS
+    known = EFFECTS | BODY_EFFECTS | {Unknown.name: Unknown}
     if name not in known:
         raise unknown_name("effect", name, known)
     effect = known[name](parameters or {})
@@ -114,7 +115,7 @@ def make_effect(
 _CHAIN = (
     *("sensor_position", "misalignment", "mount_tilt", "eccentricity", "centrifugal_flex", "table_tilt", "axis_wobble"),
     *("cross_axis", "scale_factor", "gain_drift", "quadratic", "vibration_rectification", "hysteresis"),
-    *("bias", "bias_temperature", "warm_up", "interference_tone", "sensor_lag"),
+    *("bias", "bias_temperature", "warm_up", "interference_tone", "sensor_lag", "unknown"),
 )
 
 

@@ -69,7 +69,7 @@ def made_diagnosis(verdict: str = "explained", *, seed: int = 1) -> Diagnosis:
         )
     unexplained = Unexplained()
     if verdict == "unknown":
-        unexplained = Unexplained(True, "once per revolution in a11 and a12", 240.0, {"a11: cos θ": 0.02})
+        unexplained = Unexplained(True, "once per revolution in a11 and a12", 240.0, {"a11_m_s2: cos θ": 0.02})
     rivals = (Rival(("axis_wobble",), -120.0, "its inertial part at high rate is not in the data"),)
     return Diagnosis(
         verdict,

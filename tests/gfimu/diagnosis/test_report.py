@@ -108,7 +108,7 @@ def test_each_verdict_has_its_own_words(pages):
     assert "remounted on its side" in words_of(pages["ambiguous"])
     assert "nothing in the library explains it" in words_of(pages["unknown"])
     assert "once per revolution in a11 and a12" in words_of(pages["unknown"])
-    assert "a11: cos θ" in words_of(pages["unknown"])
+    assert "function a11_m_s2 cos θ 0.02" in words_of(pages["unknown"])
     calm = words_of(pages["nothing_found"])
     assert "Nothing is wrong with the simulation that this recording could show." in calm
     assert "None named." in calm

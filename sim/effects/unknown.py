@@ -1,0 +1,135 @@
+"""What nothing in the library explains, as data: one function of the motion, the angle or time, sized per channel."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gfimu.array import AccelerometerArray
+from gfimu.diagnosis.generic_basis import OF_READING, Motion, basis_function, is_of_time
+from gfimu.diagnosis.model import BasisUnits
+from gfimu.errors import InputError
+from gfimu.units import STANDARD_GRAVITY
+from sim.effects.base import Effect, Pattern, Size
+from sim.motion import SpinState
+from sim.world import SampleContext, World
+
+__all__ = ["Unknown", "UnknownTerm"]
+
+_REFERENCE = Size("reference_rad_s", 0.1)
+_USUAL = 0.1  # m/s²
+_UNITS = ("rate_unit_rad_s", "acceleration_unit_rad_s2", "duration_s")
+
+
+class Unknown(Effect):
+    """A term that describes without a name: ``dependence`` times a coefficient per channel and of the reference."""
+
+    name = "unknown"
+    summary = "a dependence that the data show and nothing in the library explains"
+    place = "sensing"
+    separated_by = "another run with another motion: what stays is in the rig or the sensors"
+
+    @classmethod
+    def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
+        """One coefficient per channel, and one of the reference."""
+        return (*(Size(f"{channel}_m_s2", _USUAL) for channel in array.channels), _REFERENCE)
+
+    @classmethod
+    def parameter_keys(cls, array: AccelerometerArray) -> tuple[str, ...]:
+        """Return the coefficients, the function and its units."""
+        return (*(size.key for size in cls.sizes(array)), "dependence", *_UNITS)
+
+    @property
+    def units(self) -> BasisUnits:
+        """What rate, acceleration and time are divided by."""
+        return BasisUnits(*(self.value(key, 1.0) for key in _UNITS))
+
+    def check(self, array: AccelerometerArray) -> None:
+        """Raise `InputError` for a wrong key, a function that isn't there or a unit that is not positive."""
+        super().check(array)
+        self._function()
+        for key in _UNITS:
+            value = self.value(key, 1.0)
+            if not (math.isfinite(value) and value > 0):
+                raise InputError(f"effect {self.name!r}: {key} must be a positive number, not {value!r}")
+        name = str(self.parameters["dependence"])
+        if self.value(_REFERENCE.key) and (name == OF_READING or is_of_time(name)):
+            raise InputError(f"effect {self.name!r}: {_REFERENCE.key} needs a function of the motion or the angle")
+
+    def _function(self) -> Any:
+        name = str(self.parameters.get("dependence", ""))
+        if name == OF_READING:
+            return None
+        try:
+            return basis_function(name)
+        except InputError as error:
+            raise InputError(f"effect {self.name!r}: {error}") from None
+
+    def apply(self, world: World) -> World:
+        """Add coefficient · function to the readings and to the reference."""
+        keys = [f"{channel}_m_s2" for channel in world.array.channels]
+        sizes, of_reference = self.vector(keys), self.value(_REFERENCE.key)
+        function, units = self._function(), self.units
+
+        def sense(readings: NDArray[np.float64], context: SampleContext) -> NDArray[np.float64]:
+            if function is None:
+                return readings + sizes * (readings / STANDARD_GRAVITY) ** 3
+            values = function(Motion.of(context.spin, world.since_start(context.t), units))
+            return readings + np.outer(values, sizes)
+
+        def refer(reading: NDArray[np.float64], spin: SpinState) -> NDArray[np.float64]:
+            return reading + of_reference * function(Motion.of(spin, np.zeros(len(reading)), units))
+
+        if sizes.any():
+            world = world.changed(sensing_steps=(*world.sensing_steps, sense))
+        if of_reference:
+            world = world.changed(reference_steps=(*world.reference_steps, refer))
+        return world
+
+
+@dataclass(frozen=True)
+class UnknownTerm:
+    """One function as a family of effects: its sizes are those of the channels, or the one of the reference."""
+
+    dependence: str
+    units: BasisUnits
+    of_reference: bool = False
+
+    name = Unknown.name
+    summary = Unknown.summary
+    separated_by = Unknown.separated_by
+    place = Unknown.place
+    per_run = False
+    inexactness = 0.0
+    starts: tuple[float, ...] = ()
+
+    def __call__(self, parameters: Mapping[str, Any]) -> Effect:
+        """Build the effect from its coefficients."""
+        units = dict(zip(_UNITS, (self.units.rate, self.units.acceleration, self.units.duration), strict=True))
+        return Unknown({"dependence": self.dependence, **units, **parameters})
+
+    def sizes(self, array: AccelerometerArray) -> tuple[Size, ...]:
+        """Return the sizes of the channels, or the one of the reference."""
+        return (_REFERENCE,) if self.of_reference else Unknown.sizes(array)[:-1]
+
+    def patterns(self, array: AccelerometerArray) -> tuple[Pattern, ...]:
+        """Return one pattern: every size free."""
+        return (Pattern("", np.eye(len(self.sizes(array)))),)
+
+    def reach(self, array: AccelerometerArray) -> NDArray[np.bool_] | None:
+        """Return that each size changes its own channel."""
+        return None if self.of_reference else np.eye(array.n_channels, dtype=bool)
+
+    def shapes(self, duration: float, sample_rate: float) -> tuple[dict[str, float], ...]:
+        """Return no shape."""
+        return ({},)
+
+    def from_sizes(self, array: AccelerometerArray, values: NDArray[np.float64], shape: Mapping[str, float]) -> Effect:
+        """Build the effect from its coefficients; those that are zero are left out."""
+        keys = [size.key for size in self.sizes(array)]
+        return self({key: float(value) for key, value in zip(keys, values, strict=True) if value})
