@@ -191,18 +191,22 @@ def _channelwise(
     score = np.zeros(count * observed)
     cross = np.zeros((segment.spline.size, count * observed))
     cosines, share = segment.cosines, segment.share
+    same = basis.strides[0] == 0  # broadcast: the same functions for every series
     for channel in range(observed):
-        part = basis[channel] * segment.row_weight[:, [channel]]
-        weight = segment.inverse_variance[channel]
-        slow = cosines.T @ part
+        mask = segment.row_weight[:, channel]
+        # What depends on functions and weights alone is the same for most channels.
+        if channel == 0 or not (same and np.array_equal(mask, segment.row_weight[:, channel - 1])):
+            part = basis[channel] * mask[:, None]
+            slow, square = cosines.T @ part, part.T @ part
+            through = [matrix.T @ part for matrix in line.jacobian.parts]
+        weight, loading = segment.inverse_variance[channel], line.jacobian.loading[:, channel]
         damped = share[:, [channel]] * slow
         places = slice(channel * count, (channel + 1) * count)
         residual = line.residual[:, channel]
-        gram[places, places] = weight * (part.T @ part - slow.T @ damped)
+        gram[places, places] = weight * (square - slow.T @ damped)
         score[places] = weight * (part.T @ residual - damped.T @ (cosines.T @ residual))
-        matrix = line.jacobian.channel(channel)
-        slow_jacobian = np.tensordot(line.jacobian.loading[:, channel], line.slow, axes=1)  # (m, K)
-        cross[:, places] = weight * (matrix.T @ part - slow_jacobian @ damped)
+        for r in np.flatnonzero(loading):
+            cross[:, places] += weight * loading[r] * (through[r] - line.slow[r] @ damped)
     eliminated = line.drive.eliminate(cross)
     gram -= eliminated.T @ eliminated
     score -= eliminated.T @ line.drive.forward

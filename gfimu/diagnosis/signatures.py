@@ -224,7 +224,10 @@ def cause_columns(
     array = segment.model.array
     present = effects_of_run(causes, array, segment.index)
     nominal = segment.predict([*fixed, *present])
-    columns = []
+    mask = segment.row_weight.T  # (c + 1, n)
+    count = sum(len(cause.coordinates) + (len(cause.free_shape) if shapes else 0) for cause in causes)
+    out = np.zeros((nominal.shape[1], count, nominal.shape[0]))
+    first = 0
     for number, cause in enumerate(causes):
         # Effects do not commute: in another order the difference quotient would hold a commutator over a small step.
         before, after = [*fixed, *present[:number]], present[number + 1 :]
@@ -234,24 +237,22 @@ def cause_columns(
             # A tenth of the present size keeps one-sided, non-smooth effects on their side.
             step = max(step * 0.2, 0.05 * float(np.abs(cause.coordinates).max(initial=0.0)))
         reach = cause.reach(array)
-        mine = np.zeros((len(cause.coordinates), *nominal.shape))
-        for group in _disjoint(reach, len(mine)):
+        for group in _disjoint(reach, len(cause.coordinates)):
             moved = cause.coordinates.copy()
             moved[group] += step
             effect = cause.at(moved).effect(array, segment.index)
-            change = (segment.predict([*before, effect, *after]) - nominal) / step
+            change = (segment.predict([*before, effect, *after]) - nominal).T * (mask / step)
             for place in group:
                 reached = slice(None) if reach is None else np.flatnonzero(reach[place])
-                mine[place][:, reached] = change[:, reached]
-        columns += list(mine)
+                out[reached, first + place] = change[reached]
+        first += len(cause.coordinates)
         if shapes:
             for key, value in cause.free_shape.items():
                 moved_shape = {**cause.shape, key: shape_moved(key, value, _SHAPE_STEP)}
                 effect = cause.at(cause.coordinates, moved_shape).effect(array, segment.index)
-                columns.append((segment.predict([*before, effect, *after]) - nominal) / _SHAPE_STEP)
-    if not columns:
-        return np.zeros((nominal.shape[1], 0, nominal.shape[0]))
-    return np.stack([column.T for column in columns], axis=1) * segment.row_weight.T[:, None, :]
+                out[:, first] = (segment.predict([*before, effect, *after]) - nominal).T * (mask / _SHAPE_STEP)
+                first += 1
+    return out
 
 
 def shape_moved(key: str, value: float, step: float) -> float:

@@ -146,26 +146,32 @@ def _strongest(
 ) -> list[_Term]:
     """Take functions in, each where it makes the data most probable, until none does."""
     array = segments[0].model.array
-    names = list(dict.fromkeys(["constant", *FUNCTIONS, *hints, *_lines(segments, fit, fixed)]))
+    names = list(dict.fromkeys(["constant", *FUNCTIONS, *_lines(segments, fit, fixed), *hints]))
     gram: NDArray[np.float64] | None = None
     score: NDArray[np.float64] | None = None
     for segment, known in zip(segments, fixed, strict=True):
         effects = [*known, *effects_of_run(fit.causes, array, segment.index)]
         line = segment.linearise(effects)
         motion = Motion.of(line.state, segment.run.t - segment.start, units)
-        basis = np.zeros((array.n_channels + 1, len(segment.run.t), len(names)))
-        for place, name in enumerate(names):
-            if name == OF_READING:
-                # As predicted: the cube of a measured reading would follow the noise in it.
-                basis[:-1, :, place] = _UNIT * (segment.predict(effects)[:, :-1].T / STANDARD_GRAVITY) ** 3
-            else:
-                basis[:, :, place] = _UNIT * basis_function(name)(motion)
+        shared = np.column_stack([_UNIT * basis_function(n)(motion) for n in names if n != OF_READING])  # (n, k)
+        basis = shared if len(shared.T) == len(names) else _with_cubes(shared, segment.predict(effects))
         part, right = series_products(segment, line, basis, fit.causes, known)
         gram = part if gram is None else gram + part
         score = right if score is None else score + right
     assert gram is not None
     assert score is not None
     return _greedy(segments, names, gram, score, taken)
+
+
+def _with_cubes(shared: NDArray[np.float64], predicted: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Add the cube of each channel's reading, as predicted, to functions (n, k) for a basis (c + 1, n, k + 1).
+
+    The cube of a measured reading would follow the noise in it.
+    """
+    cubes = _UNIT * (predicted.T / STANDARD_GRAVITY) ** 3  # (c + 1, n)
+    cubes[-1] = 0.0
+    every = np.broadcast_to(shared, (len(cubes), *shared.shape))
+    return np.concatenate([every, cubes[:, :, None]], axis=2)
 
 
 def _greedy(
