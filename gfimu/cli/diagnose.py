@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, cast
 
@@ -34,6 +35,10 @@ def _diagnose(
         list[Path] | None,
         typer.Option("--held-out", metavar="RUN", help="Recording kept for measuring the gain; may be repeated."),
     ] = None,
+    calibration: Annotated[
+        Path | None,
+        typer.Option("--calibration", help="Calibration of the unit, applied first (JSON, from `gfimu calibrate`)."),
+    ] = None,
     json: JsonOption = False,
 ) -> None:
     """Show what a simulation gets wrong against recordings, name the cause, extend the simulation, measure the gain.
@@ -41,7 +46,11 @@ def _diagnose(
     Writes the verdict, the extended twin, a report for people and a rerun recording to a folder.
 
     Example: gfimu diagnose run.parquet --twin cube12_turntable --out diagnosis
+
+    A unit fresh from the bench: gfimu diagnose run.parquet --twin cube12_turntable --calibration cal.json --out d
     """
+    from gfimu.calibration.result import load_calibration
+    from gfimu.calibration.run_file import open_calibrated_run
     from gfimu.diagnosis.diagnose import diagnose
     from gfimu.diagnosis.folder import check_folder
     from gfimu.recording_formats import open_recording
@@ -49,8 +58,17 @@ def _diagnose(
 
     model = Twin.load(twin)
     check_folder(out)
-    recordings = [open_recording(path, array=model.array) for path in runs]
-    kept = [open_recording(path, array=model.array) for path in held_out or []]
+    if calibration is None:
+        recordings, kept = (
+            [open_recording(path, array=model.array) for path in paths] for paths in (runs, held_out or [])
+        )
+    else:
+        unit = load_calibration(calibration)
+        recordings, kept = (
+            [open_calibrated_run(path, unit, model.array)[0] for path in paths] for paths in (runs, held_out or [])
+        )
+        if unit.positions:
+            model = replace(model, array=unit.calibrated_array(model.array), array_name="array.toml")
     with progress("diagnosing", total=1.0) as done:
         found = diagnose(recordings, cast("WorldModel", model), held_out=kept, names=_names(runs), report=done)
         done(0.99, "write the report")

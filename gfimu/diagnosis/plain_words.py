@@ -37,6 +37,7 @@ _UNITS = {
     "_m": "m",
 }
 _ALONE = {key.lstrip("_"): unit for key, unit in _UNITS.items()}
+_OF_A_CALIBRATION = frozenset({"bias", "scale_factor", "misalignment", "cross_axis"})
 _SIGNIFICANT = 2.0
 _THOUSANDTHS = ("rad", "m", "s")
 _SMALL = 0.1
@@ -204,6 +205,15 @@ def next_steps(diagnosis: Diagnosis) -> list[str]:
             more = "no more than what is left unexplained" if diagnosis.unexplained.significant else "nothing"
             steps.append(f"Confirm on another recording: gfimu diagnose OTHER --twin twin.toml should find {more}.")
             steps.append("Correct the rig or calibrate it, or keep twin.toml as the simulation from now on.")
+    every = [cause.effect for cause in diagnosis.causes if cause.effect in _OF_A_CALIBRATION and "all" in cause.place]
+    if every:
+        steps.insert(
+            0,
+            f"If the unit is not calibrated, do that first: {_joined(every)} on all channels is what such a unit looks "
+            "like, and one run can't tell many wrong numbers from each other. Record static poses; then "
+            "gfimu calibrate twelve-position POSES --array ARRAY --out cal.json and "
+            "gfimu diagnose RUN --calibration cal.json.",
+        )
     if diagnosis.verdict == "explained":
         for cause in diagnosis.causes:
             if cause.not_distinguishable_from:

@@ -70,6 +70,53 @@ def test_a_hidden_cause_is_found_told_and_written(gfimu_command, eccentric, tmp_
     assert gfimu_command("simulate", out / "twin.toml", "--out", tmp_path / "again.parquet").code == 0
 
 
+def test_an_uncalibrated_unit_is_told_to_be_calibrated_and_then_only_the_rig_is_left(gfimu_command, tmp_path):
+    run, poses, cal = tmp_path / "run.parquet", tmp_path / "poses.parquet", tmp_path / "cal.json"
+    simulate(Scenario.load("eccentric_mount"), seed=3).slice(0, 2400).write(run)
+    simulate(Scenario.load("calibration_poses"), seed=3).write(poses)
+    raw = gfimu_command("diagnose", run, "--twin", TWIN, "--out", tmp_path / "raw")
+    assert raw.code == 0, raw.stderr
+    assert "If the unit is not calibrated, do that first" in " ".join(raw.stdout.split())
+    assert "If the unit is not calibrated, do that first" in (tmp_path / "raw" / "report.html").read_text()
+    made = gfimu_command("calibrate", "twelve-position", poses, "--array", "cube12", "--out", cal)
+    assert made.code == 0, made.stderr
+    done = gfimu_command("diagnose", run, "--twin", TWIN, "--calibration", cal, "--out", tmp_path / "cal", "--json")
+    assert done.code == 0, done.stderr
+    verdict = json.loads(done.stdout)
+    (cause,) = verdict["causes"]
+    assert cause["effect"] == "eccentricity"
+    for key, true in (("x_m", 0.003), ("y_m", -0.002)):
+        assert cause["parameters"][key]["value"] == pytest.approx(true, abs=4 * cause["parameters"][key]["std"])
+
+
+def test_a_calibration_of_another_unit_is_refused(gfimu_command, ordinary, tmp_path):
+    ordinary.write(tmp_path / "run.parquet")
+    (tmp_path / "cal.json").write_text("{}")
+    out = tmp_path / "out"
+    done = gfimu_command(
+        *("diagnose", tmp_path / "run.parquet", "--twin", TWIN, "--calibration", tmp_path / "cal.json", "--out", out)
+    )
+    assert done.code == 2
+    assert "cal.json" in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
+    assert not out.exists()
+
+
+def test_fitted_positions_of_a_calibration_are_the_twins(gfimu_command, ordinary, tmp_path):
+    run, cal, out = tmp_path / "run.parquet", tmp_path / "cal.json", tmp_path / "out"
+    ordinary.write(run)
+    for scenario in ("calibration_poses", "tumble"):
+        simulate(Scenario.load(scenario, changes=["sensor.errors=false"]), seed=3).write(
+            tmp_path / f"{scenario}.parquet"
+        )
+    files = (tmp_path / "calibration_poses.parquet", "--motion", tmp_path / "tumble.parquet")
+    assert gfimu_command("calibrate", "array", *files, "--array", "cube12", "--out", cal).code == 0
+    done = gfimu_command("diagnose", run, "--twin", TWIN, "--calibration", cal, "--out", out)
+    assert done.code == 0, done.stderr
+    fitted, drawn = (Twin.load(name).array.chip_positions for name in (out / "twin.toml", TWIN))
+    assert 0 < np.abs(fitted - drawn).max() < 0.01
+
+
 def test_an_array_file_moves_with_the_twin(gfimu_command, ordinary, tmp_path):
     (tmp_path / "mine.toml").write_text(AccelerometerArray.load("cube12").to_toml().replace('"cube12"', '"mine"'))
     (tmp_path / "twin.toml").write_text('array = "mine.toml"\n')
