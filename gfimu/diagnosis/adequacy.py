@@ -30,7 +30,7 @@ from gfimu.diagnosis.residual_tests import (
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.signatures import cause_columns
 
-__all__ = ["LEFT_OVER_ODDS", "generic_basis", "left_over", "series_products"]
+__all__ = ["LEFT_OVER_ODDS", "dependence_left", "generic_basis", "left_over", "series_products"]
 
 LEFT_OVER_ODDS = 10.0
 """Log odds from which what is left is called significant; one in 320 runs with nothing hidden reached it."""
@@ -73,7 +73,7 @@ def left_over(
         Whether readings are clipped or so coarse that their rounding follows the motion.
     """
     channels = segments[0].model.array.channels
-    candidates = [_basis_terms(segments, fit, fixed, channels)]
+    candidates = [dependence_left(segments, fit, fixed)]
     candidates += [lines(segment, fit, known, channels) for segment, known in zip(segments, fixed, strict=True)]
     candidates.append(one_curve(segments, fit, fixed, channels))
     candidates += [jumps(segment, fit, known, channels) for segment, known in zip(segments, fixed, strict=True)]
@@ -84,10 +84,9 @@ def left_over(
     return max(candidates, key=lambda found: found.log_odds)
 
 
-def _basis_terms(
-    segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]], channels: Sequence[str]
-) -> LeftOver:
+def dependence_left(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]]) -> LeftOver:
     """Score every basis function on every channel and the reference, on all channels, and each of them on all."""
+    channels = segments[0].model.array.channels
     gram: NDArray[np.float64] | None = None
     score: NDArray[np.float64] | None = None
     names: list[str] = []

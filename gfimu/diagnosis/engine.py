@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
+from gfimu.diagnosis.adequacy import dependence_left
 from gfimu.diagnosis.causes import Cause, effects_of_run
 from gfimu.diagnosis.drive import smooth_rate
 from gfimu.diagnosis.far_starts import every_mode, from_far
@@ -46,6 +47,9 @@ _WORTH_REFINING = -6.0
 FAIR_FIT = 1.6
 """Misfit per observation, in variances, above which something large is still missing."""
 _ITERATIONS = 7
+_FEWEST_ROUNDS = 2
+_SURELY_WRONG = 1.05  # misfit per observation
+_MUCH, _LITTLE, _MOST_OF_IT = 500.0, 10.0, 1.0  # nats that are left: at least; to those of a round; to half the misfit
 _FAINT = 500.0  # log odds of a mode whose frequency may not be settled
 
 
@@ -174,6 +178,8 @@ def explain(
         tell(0.1 + 0.8 * number / _ROUNDS, f"search {number + 1}")
         if search.round(first=number == 0, tell=tell):
             break
+        if number >= _FEWEST_ROUNDS and search.hopeless():
+            break
     tell(0.85, "prune")
     best, without, rivals = search.judged()
     tell(0.9, "compare")
@@ -219,7 +225,8 @@ class _Search:
         self._tried: dict[frozenset[tuple[str, str]], Fit] = {}
         # How far each set was behind, under the noise that both were judged by.
         self._behind: dict[frozenset[tuple[str, str]], float] = {}
-        self._settled = False
+        self._settled = self._hopeless = False
+        self._gained = np.inf
 
     def _is_fair(self, fit: Fit) -> bool:
         return fit.objective < FAIR_FIT * self._observations
@@ -239,6 +246,7 @@ class _Search:
         winner = max(fits.values(), key=_posterior)
         self._behind |= {key: winner.log_posterior - fit.log_posterior for key, fit in fits.items()}
         settled = winner.key == self._best.key
+        self._gained = winner.log_posterior - fits[self._best.key].log_posterior
         wider = widen_drives(segments, winner, fixed)
         if wider is not winner:
             winner, settled = wider, False
@@ -254,6 +262,17 @@ class _Search:
         done = settled and (self._settled or change < STEADY_NOISE)
         self._settled = settled
         return done
+
+    def hopeless(self) -> bool:
+        """Tell whether a round brought little of what a smooth function of the motion or of time would bring."""
+        if self._best.objective < _SURELY_WRONG * self._observations:
+            return False
+        for segment, drive in zip(self._segments, self._best.drives, strict=True):
+            segment.coefficients = drive
+        left = dependence_left(self._segments, self._best, self._fixed).log_odds
+        explained = self._fitted.objective - self._best.objective
+        self._hopeless = left > max(_MUCH, _LITTLE * self._gained, _MOST_OF_IT * explained)
+        return self._hopeless
 
     def _refined_leaders(self) -> dict[frozenset[tuple[str, str]], Fit]:
         """Refine the sets that lead the linear list; returns them and the best set so far by their keys."""
@@ -302,6 +321,8 @@ class _Search:
     def judged(self) -> tuple[Fit, dict[str, Fit], list[Fit]]:
         """Prune the best set and compare it with what came close: the best, the best without each cause, the rivals."""
         segments, fixed, best = self._segments, self._fixed, self._best
+        if self._hopeless:  # nothing of it will be believed
+            return best, {}, []
         done: dict[frozenset[tuple[str, str]], Fit] = {}
         best, without = prune(segments, best, fixed, done)
         near = [
@@ -321,7 +342,7 @@ class _Search:
         return best, without, list(unique.values())
 
     def screened(self, about: Fit) -> SignatureSet:
-        """Return the signatures about a set: the last ones where they are."""
-        if about.key == self._screened:
+        """Return the signatures about a set: the last ones where they are, or where no set is believed."""
+        if about.key == self._screened or self._hopeless:
             return self._signatures
         return screen(self._segments, about, self._fixed, self._runs)
