@@ -49,7 +49,7 @@ FAIR_FIT = 1.6
 _ITERATIONS = 7
 _FEWEST_ROUNDS = 2
 _SURELY_WRONG = 1.05  # misfit per observation
-_MUCH, _LITTLE, _MOST_OF_IT = 500.0, 10.0, 1.0  # nats that are left: at least; to those of a round; to half the misfit
+_MUCH, _LITTLE, _SHARE = 500.0, 10.0, 0.1  # nats that are left: at least; to those of a round; to the misfit explained
 _FAINT = 500.0  # log odds of a mode whose frequency may not be settled
 
 
@@ -271,7 +271,7 @@ class _Search:
             segment.coefficients = drive
         left = dependence_left(self._segments, self._best, self._fixed).log_odds
         explained = self._fitted.objective - self._best.objective
-        self._hopeless = left > max(_MUCH, _LITTLE * self._gained, _MOST_OF_IT * explained)
+        self._hopeless = left > max(_MUCH, _LITTLE * self._gained, _SHARE * explained)
         return self._hopeless
 
     def _refined_leaders(self) -> dict[frozenset[tuple[str, str]], Fit]:
