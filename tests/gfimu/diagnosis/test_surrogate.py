@@ -81,11 +81,24 @@ def test_a_dependence_without_a_name_extends_the_twin(twin, tmp_path, change, se
     assert again.verdict == "nothing_found", again.sentences
 
 
-def test_the_terms_are_those_of_the_motion_not_of_the_run(twin):
-    found = diagnose([recorded(twin, 3, pickup)], twin)
-    other = recorded(twin, 30, pickup)
-    assert diagnose([other], twin).verdict == "unknown"
-    assert diagnose([other], found.twin).verdict == "nothing_found"
+def test_runs_share_their_terms_with_a_run_that_was_not_there(twin):
+    found = diagnose([recorded(twin, 3, pickup), recorded(twin, 30, pickup)], twin)
+    assert found.verdict == "unknown"
+    (size,) = (term.parameters[f"{CHANNEL}_m_s2"] / term.units.rate for term in terms(found).values())
+    assert size == pytest.approx(0.02, rel=0.05)
+    assert diagnose([recorded(twin, 31, pickup)], found.twin).verdict == "nothing_found"
+
+
+def test_a_table_with_an_encoder_gets_terms_of_its_channels(twin):
+    encoder = replace(twin, drive_source="angle")
+    rng = np.random.default_rng(3)
+    motion = random_profile(rng, SETTING.duration)
+    run = measure(rng, encoder, (), replace(SETTING, encoder_step=2 * np.pi / 4096), motion=motion)
+    readings = run.readings.copy()
+    pickup(run.t_s, motion.at(run.t_s), readings, None)
+    found = diagnose([Recording.from_arrays(run.t_s, readings, twin.array, reference=run.reference)], encoder)
+    assert found.verdict == "unknown"
+    assert set(terms(found)) == {"2 per revolution × rate (cosine)"}
 
 
 def test_what_no_function_predicts_is_not_in_the_twin(twin):

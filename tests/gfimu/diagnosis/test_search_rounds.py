@@ -1,0 +1,72 @@
+"""The search for causes goes on while a round brings something, and ends where nothing of it would be believed."""
+
+import numpy as np
+import pytest
+
+from gfimu.array import AccelerometerArray
+from gfimu.diagnosis import engine
+from gfimu.diagnosis.prepared_runs import PreparedRuns
+from gfimu.recording import Recording
+from sim.campaign import Measurement, measure, random_profile
+from sim.effects import make_effect
+from sim.twin import Twin
+
+SETTING = Measurement(duration=12.0)
+ALL_ROUNDS = 6
+LIBRARY = {"bias", "scale_factor", "quadratic", "eccentricity"}
+
+
+class SmallLibrary(Twin):
+    """Few effects, so that a search is quick."""
+
+    def families(self):
+        return {name: family for name, family in super().families().items() if name in LIBRARY}
+
+
+@pytest.fixture(scope="module")
+def twin():
+    return SmallLibrary(array=AccelerometerArray.load("cube12"), array_name="cube12")
+
+
+def explained(twin, recording):
+    """The explanation of a recording and how many rounds the search took."""
+    prepared = PreparedRuns.build([recording], twin, ["run"])
+    told = []
+    found = engine.explain(*prepared.segments(twin), 1, report=lambda share, text: told.append(text))
+    return found, sum(text.startswith("search") for text in told)
+
+
+@pytest.fixture(scope="module")
+def foreign(twin):
+    """A ripple of three cycles per revolution that grows with the square of the rate, other in every channel."""
+    rng = np.random.default_rng(2)
+    motion = random_profile(rng, SETTING.duration)
+    run = measure(rng, twin, (), SETTING, motion=motion)
+    state = motion.at(run.t_s)
+    ripple = 0.002 * state.rate**2 * np.cos(3 * state.angle)
+    readings = run.readings + np.outer(ripple, np.arange(1, 13) / 6)
+    return Recording.from_arrays(run.t_s, readings, twin.array, reference=run.reference)
+
+
+def test_a_hopeless_search_ends_and_judges_no_rivals(twin, foreign, monkeypatch):
+    found, rounds = explained(twin, foreign)
+    assert rounds == 3
+    assert not found.rivals
+    assert not found.without
+    monkeypatch.setattr(engine, "_SURELY_WRONG", np.inf)
+    patient, rounds = explained(twin, foreign)
+    assert rounds == ALL_ROUNDS
+    assert patient.without
+    # What the other rounds would have brought.
+    assert found.fit.objective < 1.05 * patient.fit.objective
+
+
+def test_a_search_that_explains_goes_on_to_its_rivals(twin):
+    hidden = [
+        make_effect("eccentricity", {"x_m": 0.01, "y_m": -0.02}),
+        make_effect("quadratic", {"a13_s2_m": 0.01}, twin.array),
+    ]
+    found, rounds = explained(twin, measure(np.random.default_rng(3), twin, hidden, SETTING))
+    assert rounds < ALL_ROUNDS
+    assert found.fit.names == {"eccentricity", "quadratic"}
+    assert set(found.without) == {"eccentricity", "quadratic"}
