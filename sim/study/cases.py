@@ -125,6 +125,15 @@ def _singles() -> list[Case]:
     ]
 
 
+def _faint() -> list[Case]:
+    """Return sizes about the least that can be seen, where what is said is less certain."""
+    names = [name for name in EFFECTS if name not in SIZELESS]
+    return [
+        Case("faint", 15_000 + number, (name,), size, **_noise_of(number))
+        for number, (size, name) in enumerate(itertools.product((8.0, 10.0, 12.0), names))
+    ]
+
+
 def _nulls() -> list[Case]:
     return [
         Case("nulls", 20_000 + 1000 * level + number, **_noise_of(level)) for number in range(200) for level in range(3)
@@ -197,6 +206,7 @@ def _exotics() -> list[Case]:
 
 STUDIES: dict[str, Callable[[], list[Case]]] = {
     "singles": _singles,
+    "faint": _faint,
     "nulls": _nulls,
     "threshold_nulls": _threshold_nulls,
     "pairs": _pairs,
