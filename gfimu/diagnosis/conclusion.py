@@ -28,6 +28,7 @@ from gfimu.diagnosis.prepared_runs import PreparedRuns
 from gfimu.diagnosis.refinement import Fit
 from gfimu.diagnosis.residual_tests import LeftOver
 from gfimu.diagnosis.segment import Segment
+from gfimu.diagnosis.signatures import ANGLES
 from gfimu.diagnosis.stochastic import Walk, white_factor
 from gfimu.diagnosis.verdict import Diagnosis, Gain, NamedCause, Residual, RunView, Unexplained
 from gfimu.diagnosis.wording import verdict_sentences
@@ -36,6 +37,8 @@ __all__ = ["conclude", "is_dominant", "is_unknown"]
 
 _DOMINANT = 0.03
 _INEXACTNESS = 2.5e-3
+_TURNS = ANGLES | {"phase_rad"}
+_BEYOND_CHANCE = 4.0  # standard deviations of the misfit of noise
 
 
 def conclude(
@@ -98,6 +101,7 @@ def conclude(
         residue=noise["calibration_residue"],
         unreferenced=sum(run.unreferenced for run in prepared.runs),
         terms=0 if described is None else len(described.fit.causes),
+        rest=left.signature if left.log_odds > LEFT_OVER_ODDS else "",
     )
     return Diagnosis(verdict, causes, residual, gain, unexplained, rival_list(explanation), twin, runs, words, noise)
 
@@ -127,6 +131,7 @@ def _named(explanation: Explanation, fit: Fit, likely: dict[str, float], array: 
     segment = explanation.segments[0]
     known = explanation.fixed[0]
     runs = len({one.index for one in explanation.segments})
+    misfit = _misfit(explanation, fit)
     whole = segment.predict([*known, *effects_of_run(fit.causes, array, segment.index)])
     entries = []
     for cause in fit.causes:
@@ -134,9 +139,29 @@ def _named(explanation: Explanation, fit: Fit, likely: dict[str, float], array: 
         change = whole - segment.predict([*known, *effects_of_run(others, array, segment.index)])
         share = channel_share(change[:, :-1] * segment.weight_mask[:, :-1], array.channels)
         entry = name_cause(explanation, fit, cause, likely, array, share)
-        entry = replace(entry, why=entry.why + _other_runs(cause, array, runs))
+        entry = replace(entry, why=entry.why + _other_runs(cause, array, runs), std=_widened(entry, cause, misfit))
         entries.append((float(sum(value**2 for value in share.values())), entry))
     return [entry for _, entry in sorted(entries, key=lambda pair: -pair[0])]
+
+
+def _misfit(explanation: Explanation, fit: Fit) -> tuple[float, float]:
+    """Return the misfit beyond chance as a share of the noise, and of what the causes explain."""
+    observations = sum(int(segment.weight_mask.sum()) for segment in explanation.segments)
+    left = max(fit.objective - observations - _BEYOND_CHANCE * np.sqrt(2.0 * observations), 0.0)
+    removed = max(explanation.nothing.objective - fit.objective, 1.0)
+    return float(left / observations), float(left / (left + removed))
+
+
+def _widened(named: NamedCause, cause: Cause, misfit: tuple[float, float]) -> dict[str, float]:
+    """Widen standard deviations where a cause does not fit to the noise: all by the root of the misfit.
+
+    Where the model of the effect is a rough one, the misfit may be its own: a share ε of what a parameter explains is
+    what an error of √ε of that parameter leaves.
+    """
+    over, share = misfit
+    rough = np.sqrt(share) if cause.family.inexactness > 0.0 else 0.0
+    values = {key: 1.0 if key in _TURNS else float(named.parameters.get(key, 0.0)) for key in named.std}
+    return {key: float(np.hypot(std * np.sqrt(1.0 + over), rough * values[key])) for key, std in named.std.items()}
 
 
 def _other_runs(cause: Cause, array: AccelerometerArray, runs: int) -> str:

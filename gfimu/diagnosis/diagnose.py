@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gfimu.diagnosis.adequacy import left_over
+from gfimu.diagnosis.adequacy import LEFT_OVER_ODDS, left_over
 from gfimu.diagnosis.causes import effects_of_run
 from gfimu.diagnosis.coloured_noise import NoiseLevels
 from gfimu.diagnosis.conclusion import conclude, is_dominant, is_unknown
@@ -100,6 +100,8 @@ def _diagnose_table(
     tell(0.92, "hold out")
     pairs, label = _holdouts(explanation, held_out, model, () if loose is None else loose.effects)
     left = _left_over(explanation, prepared)
+    if not is_dominant(explanation, left):
+        explanation, left = _without_faint(explanation, left, prepared)
     withdrawn: list[str] = []
     # Where too much is left for any cause to be believed there is nothing to withdraw.
     if explanation.fit.causes and not is_dominant(explanation, left):
@@ -140,6 +142,25 @@ def _describe(
         if gain.log_likelihood_per_sample > 0.0:
             return described, gain
     return None, Gain()
+
+
+def _without_faint(explanation: Explanation, left: LeftOver, prepared: PreparedRuns) -> tuple[Explanation, LeftOver]:
+    """Leave out causes that explain less than what nothing explains: beside a large one they are made of its rest."""
+    fit, without = explanation.fit, explanation.without
+    while left.log_odds > LEFT_OVER_ODDS and len(fit.causes) > 1:
+        worth = {name: fit.log_posterior - other.log_posterior for name, other in without.items()}
+        largest = max(worth, key=worth.__getitem__)
+        kept = [cause for cause in fit.causes if cause.name == largest or worth[cause.name] > left.log_odds]
+        if len(kept) == len(fit.causes):
+            break
+        smaller = refine(explanation.segments, kept, explanation.fixed, drives=fit.drives)
+        fit, without = prune(explanation.segments, smaller, explanation.fixed)
+        for segment, drive in zip(explanation.segments, fit.drives, strict=True):
+            segment.coefficients = drive
+        rivals = tuple(rival for rival in explanation.rivals if rival.log_posterior < fit.log_posterior)
+        explanation = replace(explanation, fit=fit, without=without, rivals=rivals)
+        left = _left_over(explanation, prepared)
+    return explanation, left
 
 
 def _left_over(explanation: Explanation, prepared: PreparedRuns) -> LeftOver:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import gammaln
 from scipy.stats import chi2
 
 from gfimu.diagnosis.causes import effects_of_run
@@ -83,7 +84,7 @@ def lines(segment: Segment, fit: Fit, known: Sequence[Effect], channels: Sequenc
     one = float(power[place, channel]) - np.log(n * left.shape[1])
     summed = power[:, : len(channels)].sum(axis=1)
     peak = int(np.argmax(summed))
-    every = -float(chi2.logsf(2 * summed[peak], 2 * len(channels))) - np.log(n)
+    every = -_log_tail(2 * float(summed[peak]), 2 * len(channels)) - np.log(n)
     if one >= every:
         name = series[channel]
         text = f"{name} has a tone at {frequency[place]:.3f} Hz"
@@ -158,7 +159,7 @@ def changing_noise(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequen
             statistic = float(np.sum(freedom / 2 * (spread - 1) ** 2))
             # A change below ten per cent in power is within what a part's own noise does.
             if np.ptp(spread) > 0.25:
-                odds = -float(chi2.logsf(statistic, 5)) - np.log(3.0)
+                odds = -_log_tail(statistic, 5) - np.log(3.0)
                 if odds > best.log_odds:
                     best = LeftOver(odds, f"the noise of all channels changes with {name}", {})
     return best
@@ -217,6 +218,16 @@ def _with_cubic(
     score = score + gram @ values
     size = np.linalg.solve(gram + 1e-6 * np.eye(len(values)), score)[-1] * unit
     return volume - 0.5 * nothing + log_evidence(gram, score), float(size)
+
+
+def _log_tail(value: float, freedom: int) -> float:
+    """Return the log of the probability that χ² exceeds a value, far beyond the smallest number too."""
+    tail = float(chi2.logsf(value, freedom))
+    if np.isfinite(tail):
+        return tail
+    half, x = 0.5 * freedom, 0.5 * value
+    # Γ(a, x) ~ x^(a−1) e^(−x) (1 + (a − 1)/x), Abramowitz and Stegun 6.5.32.
+    return float((half - 1.0) * np.log(x) - x + np.log1p((half - 1.0) / x) - gammaln(half))
 
 
 def _left(segment: Segment, fit: Fit, known: Sequence[Effect]) -> NDArray[np.float64]:

@@ -12,6 +12,8 @@ from gfimu.units import STANDARD_GRAVITY
 
 __all__ = ["verdict_sentences"]
 
+_INEXACT = 1.1  # of the noise, from which what is left is told
+
 
 def verdict_sentences(
     verdict: str,
@@ -24,11 +26,13 @@ def verdict_sentences(
     residue: float = 0.0,
     unreferenced: float = 0.0,
     terms: int = 0,
+    rest: str = "",
 ) -> tuple[str, ...]:
     """Return the verdict in sentences, the most important first.
 
     ``residue`` is the size of a calibration residue, in units of what a good calibration leaves, where there is one;
-    ``unreferenced`` the time without a reference, s; ``terms`` the number of terms that describe an unknown.
+    ``unreferenced`` the time without a reference, s; ``terms`` the number of terms that describe an unknown;
+    ``rest`` what the strongest of what is left looks like.
     """
     words = [_headline(verdict, causes, unexplained, residue)]
     words += [f"{cause.effect}: {cause.why}." for cause in causes if cause.why]
@@ -51,6 +55,12 @@ def verdict_sentences(
         )
     if unexplained.significant and verdict != "unknown":
         words.append(f"Something is left that nothing in the library explains: {unexplained.signature}.")
+    over = residual.rms_after / max(residual.noise_floor, 1e-12)
+    if verdict == "explained" and not unexplained.significant and over > _INEXACT:
+        words.append(
+            f"What is left is {over:.2f} times the noise{f' ({rest})' if rest else ''}: "
+            "little against what is explained, and ± holds it."
+        )
     if residue > 0.0:
         words.append(_residue_sentence(residue))
     if unreferenced > 0.0:

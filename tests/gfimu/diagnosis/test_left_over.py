@@ -9,6 +9,9 @@ import pytest
 
 from gfimu.array import AccelerometerArray
 from gfimu.diagnosis import diagnose
+from gfimu.diagnosis.prepared_runs import PreparedRuns
+from gfimu.diagnosis.refinement import refine
+from gfimu.diagnosis.residual_tests import lines
 from gfimu.recording import Recording
 from gfimu.units import STANDARD_GRAVITY
 from sim.campaign import Measurement, measure
@@ -69,6 +72,25 @@ def test_a_scale_factor_and_a_quadratic_are_no_cubic(twin):
     assert not found.unexplained.significant
 
 
+def test_a_line_far_beyond_the_smallest_probability_has_finite_odds(twin):
+    amplitude = 2.0
+
+    def ring(t, readings):
+        readings += amplitude * np.sin(2 * np.pi * 11.0 * t)[:, None]
+
+    prepared = PreparedRuns.build([recorded(twin, 3, ring)], twin, ["run"])
+    segments, fixed = prepared.segments(twin)
+    for segment in segments:
+        segment.prepare_weights()
+    nothing = refine(segments, (), fixed, iterations=0)
+    found = lines(segments[0], nothing, fixed[0], twin.array.channels)
+    # |Σ y e^{−iωt}|²/n of a tone is nA²/4, in units of the noise; what leaks from it raises the floor it stands on.
+    noise = segments[0].levels.white[:-1]
+    most = np.sum(len(segments[0].run.t) * amplitude**2 / 4 / noise**2)
+    assert 0.1 * most < found.log_odds < most
+    assert "tone at 11.0" in found.signature
+
+
 def test_a_walk_beside_strong_bias_instability_is_no_warm_up():
     twin = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
     unstable = Measurement(duration=30.0, bias_instability=0.5e-3 * 9.80665)
@@ -87,3 +109,22 @@ def test_a_few_wandering_channels_are_no_walk_of_all(twin):
 
     found = diagnose([recorded(twin, 7, wander)], twin)
     assert "bias_random_walk" not in [cause.effect for cause in found.causes]
+
+
+def test_what_a_large_cause_leaves_widens_its_uncertainty_and_is_told(twin):
+    hidden = make_effect("eccentricity", {"x_m": 0.03, "y_m": -0.02})
+    place = twin.array.channels.index(CHANNEL)
+
+    def whistle(t, readings):
+        readings[:, place] += 0.15 * np.sin(2 * np.pi * 17.0 * t)
+
+    exact = diagnose([recorded(twin, 8, lambda t, readings: None, [hidden])], twin)
+    rough = diagnose([recorded(twin, 8, whistle, [hidden])], twin)
+    for found in (exact, rough):
+        assert [cause.effect for cause in found.causes] == ["eccentricity"]
+        (cause,) = found.causes
+        assert abs(cause.parameters["x_m"] - 0.03) < 3 * cause.std["x_m"]
+    told = f"times the noise (channel {CHANNEL} has a tone at 17.0"
+    assert not any("times the noise" in sentence for sentence in exact.sentences)
+    assert any(told in sentence for sentence in rough.sentences), rough.sentences
+    assert 1.02 < rough.causes[0].std["x_m"] / exact.causes[0].std["x_m"] < 2.0
