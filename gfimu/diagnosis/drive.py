@@ -139,6 +139,25 @@ class AngleSpline:
         """Return the centre of each knot interval, s."""
         return np.asarray(0.5 * (self.breaks[:-1] + self.breaks[1:]), dtype=np.float64)
 
+    def starts(self, functions: NDArray[np.intp]) -> NDArray[np.float64]:
+        """Return when basis functions start to differ from zero, s."""
+        return np.asarray(self.breaks[np.maximum(functions - DEGREE, 0)])
+
+    def apart(self, memory: float) -> list[NDArray[np.intp]]:
+        """Return groups of basis functions in each of which one starts when the one before is over for ``memory`` s."""
+        starts = self.starts(np.arange(self.size))
+        ends = np.concatenate([self.breaks[1:], np.full(DEGREE, self.stop)])
+        groups: list[list[int]] = []
+        over: list[float] = []
+        for function, (start, end) in enumerate(zip(starts, ends, strict=True)):
+            place = next((number for number, until in enumerate(over) if until <= start), len(over))
+            if place == len(over):
+                groups.append([])
+                over.append(0.0)
+            groups[place].append(function)
+            over[place] = float(end) + memory
+        return [np.array(group, dtype=np.intp) for group in groups]
+
     def moving_average(self, values: NDArray[np.float64], width: float) -> NDArray[np.float64]:
         """Return the average of values per interval (k,) over a width of time about each interval's centre, s."""
         area = np.concatenate([[0.0], np.cumsum(values * self.widths)])

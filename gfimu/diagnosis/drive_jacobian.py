@@ -20,6 +20,9 @@ from gfimu.diagnosis.drive import AngleSpline
 __all__ = ["DriveJacobian"]
 
 _LEAST_SHARE = 1e-14
+_FORGOTTEN = 1e-9  # of the largest derivative: what is smaller is rounding errors
+_NARROW = 20  # coefficients that a row holds
+_ROWS = 100  # of a dense block
 _COLUMNS = 32  # signatures that are taken at once, which bounds the memory
 _Delay = Callable[[csr_array], csr_array]
 
@@ -92,6 +95,38 @@ class DriveJacobian:
             parts, loadings = [csr_array((times.shape[0], spline.size))], [np.zeros(len(chips))]
         return cls(tuple(parts), np.array(loadings).reshape(len(parts), len(chips)))
 
+    @classmethod
+    def measured(
+        cls, changes: NDArray[np.float64], owners: NDArray[np.intp], size: int, weights: NDArray[np.float64]
+    ) -> DriveJacobian:
+        """Factor the derivative of a motion that remembers its drive, which no state of an instant tells.
+
+        Parameters
+        ----------
+        changes : ndarray, shape (p, n, c + 1)
+            Derivative of each observation with respect to several coefficients at once, so far apart that each sample
+            sees one of them only.
+        owners : ndarray of int, shape (p, n)
+            Which coefficient each sample sees; −1 for none.
+        size : int
+            m.
+        weights : ndarray, shape (c + 1,)
+            One over the variance of each observation; the factors are orthonormal under it.
+        """
+        root = np.sqrt(weights)
+        mine = changes * root
+        vectors = np.linalg.eigh(np.tensordot(mine, mine, axes=([0, 1], [0, 1])))[1]
+        functions = mine @ vectors  # (p, n, c + 1)
+        power = np.einsum("pnr,pnr->r", functions, functions)
+        kept = np.flatnonzero(power > _LEAST_SHARE * max(float(power.max()), 1e-30))
+        parts = []
+        for r in kept:
+            values = functions[:, :, r]
+            there = (owners >= 0) & (np.abs(values) > _FORGOTTEN * np.abs(values).max())
+            rows = np.broadcast_to(np.arange(values.shape[1]), values.shape)[there]
+            parts.append(csr_array((values[there], (rows, owners[there])), shape=(values.shape[1], size)))
+        return cls(tuple(parts), (vectors[:, kept] / root[:, None]).T)
+
     def channel(self, column: int) -> csr_array:
         """Return J_c, shape (n, m)."""
         used = np.flatnonzero(self.loading[:, column])
@@ -122,7 +157,17 @@ class DriveJacobian:
     def information(self) -> csr_array:
         """Return Σ_c w_c J_cᵀJ_c under the weights it was built with, shape (m, m)."""
         stacked = vstack(self.parts, format="csr")
-        return csr_array(stacked.T @ stacked)
+        if stacked.nnz < _NARROW * stacked.shape[0]:
+            return csr_array(stacked.T @ stacked)
+        total = np.zeros((stacked.shape[1], stacked.shape[1]))
+        for part in self.parts:  # sparse products of wide rows are slow
+            for start in range(0, part.shape[0], _ROWS):
+                block = part[start : start + _ROWS]
+                if block.nnz:
+                    first, last = int(block.indices.min()), int(block.indices.max()) + 1
+                    dense = block[:, first:last].toarray()
+                    total[first:last, first:last] += dense.T @ dense
+        return csr_array(total)
 
     def slow(self, cosines: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return J_rᵀC of cosines (n, K), shape (R, m, K)."""

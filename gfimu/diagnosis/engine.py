@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
-from gfimu.diagnosis.adequacy import dependence_left
+from gfimu.diagnosis.adequacy import LEFT_OVER_ODDS, dependence_left
 from gfimu.diagnosis.causes import Cause, effects_of_run
 from gfimu.diagnosis.drive import smooth_rate
-from gfimu.diagnosis.far_starts import every_mode, from_far
+from gfimu.diagnosis.far_starts import every_mode, from_far, remembered_mode
 from gfimu.diagnosis.linearisation import Linearisation
 from gfimu.diagnosis.model import Effect, WorldModel
 from gfimu.diagnosis.nuisances import STEADY_NOISE, learn_noise, sharpen_drives, tune_drives, widen_drives
@@ -337,9 +337,24 @@ class _Search:
             unique[best.key] = best
             best, without = prune(segments, better, fixed, done)
             unique.pop(best.key, None)
+        if "resonance" in without and len(segments) == 1:
+            best, without = self._with_memory(best, without, done)
         if "resonance" in without and best.log_posterior - without["resonance"].log_posterior < _FAINT:
             best = every_mode(segments, best, fixed)
         return best, without, list(unique.values())
+
+    def _with_memory(
+        self, best: Fit, without: dict[str, Fit], done: dict[frozenset[tuple[str, str]], Fit]
+    ) -> tuple[Fit, dict[str, Fit]]:
+        """Fit a mode that leaves something again, with a drive that knows how it rings on."""
+        segment = self._segments[0]
+        segment.coefficients = best.drives[0]
+        if dependence_left(self._segments, best, self._fixed).log_odds < LEFT_OVER_ODDS:
+            return best, without
+        better = remembered_mode(self._segments, best, self._fixed)
+        if better is best:
+            return best, without
+        return prune(self._segments, better, self._fixed, done)
 
     def screened(self, about: Fit) -> SignatureSet:
         """Return the signatures about a set: the last ones where they are, or where no set is believed."""

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.diagnosis.model import Effect
-from gfimu.diagnosis.refinement import Fit, refine_each
+from gfimu.diagnosis.refinement import Fit, refine, refine_each
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.signatures import Hypothesis
 from gfimu.diagnosis.threads import over_segments
 
-__all__ = ["every_mode", "from_far"]
+__all__ = ["every_mode", "from_far", "remembered_mode"]
 
 _ITERATIONS = 14
 _FEW_ITERATIONS = 3
@@ -22,6 +23,8 @@ _WORTH_STARTING = 1.2
 _SPACING = 0.1  # s, twice that of the fit
 _MODE_STARTS = 6
 _MODE_DAMPING = 0.05
+_NEARBY = (0.8, 0.92, 1.08, 1.25)
+_REMEMBERED = 2.0  # s
 # What the evidence of a mode may be wrong by: it bends the functions that the drive can follow (`signatures`).
 _AS_LIKELY = 10.0
 
@@ -56,6 +59,28 @@ def from_far(
     ]
     causes = [fit.causes for fit in best.values()]
     return refine_each(segments, causes, fixed, followed, iterations=_ITERATIONS)
+
+
+def remembered_mode(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]]) -> Fit:
+    """Fit a mode with a drive that knows how the mode remembers it; returns the better fit.
+
+    What rings on is not told by the drive of the instant: with that derivative a fit may stop far from its optimum, the
+    drive bent to do what the mode does.
+    """
+    place = next(number for number, cause in enumerate(fit.causes) if cause.name == "resonance")
+    mode = fit.causes[place]
+    remembering = [copy(segment) for segment in segments]
+    for segment in remembering:
+        segment.memory = _REMEMBERED
+    sets = []
+    for ratio in _NEARBY:
+        shape = {**mode.shape, "frequency_hz": ratio * mode.shape["frequency_hz"], "damping_ratio": _MODE_DAMPING}
+        sets.append([*fit.causes[:place], mode.at(mode.coordinates, shape), *fit.causes[place + 1 :]])
+    fits = refine_each(remembering, sets, fixed, [fit.drives] * len(sets), iterations=_ITERATIONS)
+    lowest = min(fits, key=lambda one: one.objective)
+    # Judged as all other fits are, where it is; how well the mode is known, only a drive with memory tells.
+    other = replace(refine(segments, lowest.causes, fixed, drives=lowest.drives, iterations=0), causes=lowest.causes)
+    return max(fit, other, key=lambda one: one.log_posterior)
 
 
 def every_mode(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]]) -> Fit:

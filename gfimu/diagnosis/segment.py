@@ -51,6 +51,7 @@ _FACTOR_STEPS = 4
 _REST_FACTOR = 1.3
 _LEAST_GAIN = 0.05
 _STATE_STEPS = (1e-5, 1e-4, 1e-3)
+_COEFFICIENT_STEP = 1e-6  # rad
 
 
 class Segment:
@@ -89,6 +90,8 @@ class Segment:
         times = np.append(model.sample_times(run.t), run.t[:, None], axis=1)
         spline = AngleSpline.uniform(times.min() - margin, times.max() + margin, spacing)
         self._take(Roughness(spline, _START_FACTOR))
+        # For how long the motion remembers its drive, s; 0 where a derivative by the state of the instant will do.
+        self.memory = 0.0
         # Fits are compared under the same knots, so these are chosen once.
         self.knots_chosen = False
         self.basis = CosineBasis(len(run.t), period, float(run.t[0] - start))
@@ -378,6 +381,8 @@ class Segment:
 
     def _jacobian(self, effects: Sequence[Effect], base: NDArray[np.float64]) -> DriveJacobian:
         """Differentiate the prediction ``base`` with respect to the drive's state and chain with the spline."""
+        if self.memory > 0.0:
+            return self._remembering_jacobian(effects, base)
         spin = self.spin
         slopes = np.empty((3, *base.shape))
         for place, step in enumerate(_STATE_STEPS):
@@ -394,6 +399,22 @@ class Segment:
 
         chips = np.append(self.model.array.chip_of_channel, times.shape[1] - 1)
         return DriveJacobian.build(self.spline, slopes, times, chips, self.inverse_variance, delay)
+
+    def _remembering_jacobian(self, effects: Sequence[Effect], base: NDArray[np.float64]) -> DriveJacobian:
+        """Differentiate with respect to the coefficients, at once where no sample remembers two of them."""
+        times = self.model.sample_times(self.run.t, effects)
+        late = times.max(axis=1)
+        groups = self.spline.apart(self.memory + float(np.max(late - times.min(axis=1))))
+        changes = np.empty((len(groups), *base.shape))
+        owners = np.empty((len(groups), len(base)), dtype=np.intp)
+        for place, group in enumerate(groups):
+            moved = self.coefficients.copy()
+            moved[group] += _COEFFICIENT_STEP
+            changes[place] = self.predict(effects, self.spline.spin(moved)) - base
+            last = np.searchsorted(self.spline.starts(group), late, side="right") - 1
+            owners[place] = np.where(last >= 0, group[np.maximum(last, 0)], -1)
+        changes *= self.row_weight / _COEFFICIENT_STEP
+        return DriveJacobian.measured(changes, owners, self.spline.size, self.inverse_variance)
 
     def whitened_products(
         self, linear: Linearisation, signatures: NDArray[np.float64]

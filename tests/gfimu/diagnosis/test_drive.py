@@ -210,3 +210,38 @@ def test_knots_are_finer_only_where_the_drive_bends():
     sharp = motion.grid[bend > 0.2 * bend[(motion.grid > 0) & (motion.grid < 20)].max()]
     near = np.abs(fine[:, None] - sharp[None, ::20]).min(axis=1)
     assert np.quantile(near, 0.9) < 0.3
+
+
+@pytest.mark.parametrize(
+    ("name", "parameters"),
+    [
+        ("resonance", {"gain": 1.0, "frequency_hz": 7.0, "damping_ratio": 0.1}),
+        ("cogging", {"amplitude_rad_s2": 15.0, "order": 6.0, "phase_rad": 0.4}),
+    ],
+)
+def test_a_motion_that_remembers_its_drive_is_differentiated_with_its_memory(name, parameters):
+    """Against central differences; the derivative by the state of the instant is off by a tenth and more."""
+    twin = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
+    effect = make_effect(name, parameters, twin.array)
+    recording = measure(np.random.default_rng(4), twin, [effect], Measurement(duration=6.0))
+    (segment,) = make_segments(twin, [prepare_run(recording, twin)])
+    segment.prepare_weights()
+    errors = []
+    for memory in (0.0, 3.0):
+        segment.memory = memory
+        jacobian = segment.linearise([effect]).jacobian
+        worst = 0.0
+        for place in (20, 47, 70):
+            moved = np.zeros(segment.spline.size)
+            moved[place] = 1e-5
+            up, down = (
+                segment.predict([effect], segment.spline.spin(segment.coefficients + sign * moved)) for sign in (1, -1)
+            )
+            true = (up - down) / 2e-5  # (n, c + 1)
+            found = np.column_stack(
+                [jacobian.channel(column).toarray()[:, place] for column in range(jacobian.observations)]
+            )
+            worst = max(worst, float(np.abs(found - true).max() / np.abs(true).max()))
+        errors.append(worst)
+    assert errors[0] > 0.1
+    assert errors[1] < 1e-3
