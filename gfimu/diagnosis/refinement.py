@@ -213,9 +213,11 @@ class _Point:
         """Misfit and prior energy, the drives at their best in a linear world."""
         return self.objective + _prior_energy(self.state.causes)
 
-    def moved(self, scale: float, array: AccelerometerArray) -> _State:
-        """Return the state after a share of the step."""
-        drives = tuple(drive + scale * move for drive, move in zip(self.state.drives, self.moves, strict=True))
+    def moved(self, scale: float, array: AccelerometerArray, *, held: bool = False) -> _State:
+        """Return the state after a share of the step, its drives held where asked."""
+        drives = self.state.drives
+        if not held:
+            drives = tuple(drive + scale * move for drive, move in zip(drives, self.moves, strict=True))
         return _State(_moved(self.state.causes, scale * self.step, array), drives)
 
 
@@ -230,6 +232,8 @@ def _descend(segments: Sequence[Segment], fixed: Sequence[Sequence[Effect]], sta
         if point.expected < _TOLERANCE:
             return _stepped(point, array)
         trials = [point.moved(share, array) for share in _SHARES]
+        # A derivative that does not see what the past does (play, a servo) errs in the drive first.
+        trials += [point.moved(share, array, held=True) for share in _SHARES if len(point.step)]
         downhill = (one for one in trials if _energy(segments, fixed, one) <= point.energy + _UPHILL)
         trial = next(downhill, None)
         try:
