@@ -186,3 +186,19 @@ def test_a_screened_set_starts_with_the_drive_that_follows_it(twin):
         segment.coefficients = drive
         energies.append(segment.energy(effects_of_run([cause], twin.array, 0)))
     assert energies[0] - energies[2] < 0.01 * (energies[1] - energies[2])
+
+
+def test_a_gross_play_is_fitted_though_its_drive_is_led_astray(twin):
+    # The derivative by the state of the instant doesn't know what a play remembers: with it the drive goes uphill.
+    lost, width = 1.05, 0.19
+    segment = _segment(twin, [make_effect("hysteresis", {"lost_m_s2": lost, "width_m_s2": width})])
+    family = segment.model.families()["hysteresis"]
+    size = lost / family.sizes(twin.array)[0].prior_std
+    ends = []
+    for share in (0.5, 1.5):
+        (play,) = hypotheses([Signature(family, {"width_m_s2": share * width}, np.arange(1))], twin.array, 1)
+        (found,) = refine([segment], [play.cause(np.array([size]))], [[]], iterations=14).causes
+        ends.append(found.effect(twin.array).parameters)
+    assert ends[0]["width_m_s2"] == pytest.approx(ends[1]["width_m_s2"], rel=0.02)
+    assert ends[0]["width_m_s2"] == pytest.approx(width, rel=0.3)
+    assert ends[0]["lost_m_s2"] == pytest.approx(lost, rel=0.02)
