@@ -81,7 +81,8 @@ def conclude(
     else:
         verdict, causes = "nothing_found", ()
     surrogate = left.surrogate if described is None else _coefficients(described.fit.causes, array)
-    unexplained = Unexplained(significant, left.signature if significant else "", left.log_odds, surrogate)
+    signature = left.signature if significant else ""
+    unexplained = Unexplained(significant, signature, left.log_odds, surrogate, described is not None)
     residual = Residual.of_views(runs, array.channels, _noise_floor(runs, believed.segments[0]))
     levels = believed.segments[0].levels
     expected = model.expected_noise(1.0 / prepared.runs[0].sample_period)

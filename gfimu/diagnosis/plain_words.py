@@ -135,7 +135,7 @@ def story(diagnosis: Diagnosis) -> str:
         )
         text += f"With {what} put into the simulation it misses by {after:.3g} m/s²"
         text += ", which is noise. " if after < 1.05 * floor else ". "
-    if diagnosis.verdict == "unknown" and gain.held_out:
+    if diagnosis.unexplained.extends_twin:
         text += f"With a description that has no name in the simulation it misses by {after:.3g} m/s². "
     if math.isfinite(gain.share_of_excess_removed):
         text += (
@@ -198,7 +198,7 @@ def next_steps(diagnosis: Diagnosis) -> list[str]:
             steps.append("Give both recordings to one call of gfimu diagnose; it fits them together.")
         case "unknown":
             steps.append("Look at the residual views of the report for where the discrepancy sits.")
-            if any(effect.name == "unknown" for effect in diagnosis.twin.effects):
+            if diagnosis.unexplained.extends_twin:
                 steps.append("Until it has a name, simulate with twin.toml: its terms called unknown describe it.")
             steps.append("Record another run with another motion: what stays is in the rig or the sensors.")
         case _:

@@ -70,7 +70,7 @@ def _content(diagnosis: Diagnosis) -> Mapping[str, Any]:
         "figures_of_merit": _figures_of_merit(diagnosis),
         "causes": [_cause(diagnosis, cause) for cause in diagnosis.causes],
         "surrogate": _surrogate(diagnosis) if diagnosis.unexplained.significant else {},
-        "extended": diagnosis.verdict == "unknown" and bool(diagnosis.gain.held_out),
+        "extended": diagnosis.unexplained.extends_twin,
         "unexplained": diagnosis.unexplained,
         "rivals": diagnosis.rivals[:_MOST_RIVALS],
         "gain": diagnosis.gain,
@@ -115,7 +115,7 @@ def _figures_of_merit(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:
     """Return the numbers of the first screen: value, unit, what it is."""
     residual, gain = diagnosis.residual, diagnosis.gain
     merits = [(f"{residual.rms_before:.3g}", "m/s²", "prediction error, simulation as given")]
-    if diagnosis.causes or (diagnosis.verdict == "unknown" and gain.held_out):
+    if diagnosis.causes or diagnosis.unexplained.extends_twin:
         merits.append((f"{residual.rms_after:.3g}", "m/s²", "prediction error, extended"))
     merits.append((f"{residual.noise_floor:.3g}", "m/s²", "the sensors' own noise"))
     if np.isfinite(gain.share_of_excess_removed):

@@ -168,13 +168,16 @@ class Unexplained:
     log_odds : float
         Log odds of the strongest term against chance.
     surrogate : mapping of str to float
-        Data-driven term that still extends the model: coefficients by ``"channel: basis function"``.
+        Data-driven terms: coefficients by what they are of, with its unit, and function: ``"a11_m_s2: rate²"``.
+    extends_twin : bool
+        Whether these terms are in the extended twin, as they predict data that their fit never saw.
     """
 
     significant: bool = False
     signature: str = ""
     log_odds: float = 0.0
     surrogate: Mapping[str, float] = field(default_factory=dict)
+    extends_twin: bool = False
 
 
 @dataclass(frozen=True)
@@ -279,6 +282,7 @@ class Diagnosis:
                 "signature": self.unexplained.signature,
                 "log_odds": self.unexplained.log_odds,
                 "surrogate": dict(self.unexplained.surrogate),
+                "extends_twin": self.unexplained.extends_twin,
             },
             "rivals": [{"effects": list(r.effects), "log_odds": r.log_odds, "why": r.why} for r in self.rivals],
             "noise": dict(self.noise),

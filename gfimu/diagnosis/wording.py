@@ -25,14 +25,14 @@ def verdict_sentences(
     *,
     residue: float = 0.0,
     unreferenced: float = 0.0,
-    terms: int = 0,
+    terms: int | None = None,
     rest: str = "",
 ) -> tuple[str, ...]:
     """Return the verdict in sentences, the most important first.
 
     ``residue`` is the size of a calibration residue, in units of what a good calibration leaves, where there is one;
-    ``unreferenced`` the time without a reference, s; ``terms`` the number of terms that describe an unknown;
-    ``rest`` what the strongest of what is left looks like.
+    ``unreferenced`` the time without a reference, s; ``terms`` the number of terms that describe an unknown, where it
+    was tried; ``rest`` what the strongest of what is left looks like.
     """
     words = [_headline(verdict, causes, unexplained, residue)]
     words += [f"{cause.effect}: {cause.why}." for cause in causes if cause.why]
@@ -42,7 +42,7 @@ def verdict_sentences(
                 f"{', '.join(cause.not_distinguishable_from)} could imitate {cause.effect} in this data but would need "
                 f"a coincidence; {cause.would_be_separated_by} would settle it."
             )
-    if verdict == "unknown":
+    if verdict == "unknown" and terms is not None:
         words.append(_surrogate_sentence(terms))
     if causes or terms:
         words.append(

@@ -73,6 +73,7 @@ def test_a_dependence_without_a_name_extends_the_twin(twin, tmp_path, change, se
     power = 2 if function == "rate²" else 1
     amplitude = np.hypot(*(np.pad([term.parameters[key] for term in told], (0, 2 - len(told)))))
     assert amplitude / unit**power == pytest.approx(size, rel=0.1)
+    assert found.unexplained.extends_twin
     assert found.gain.held_out
     assert found.gain.share_of_excess_removed > 0.9
     assert found.residual.rms_after < 1.05 * found.residual.noise_floor
@@ -111,6 +112,7 @@ def test_what_no_function_predicts_is_not_in_the_twin(twin):
     assert found.verdict == "unknown"
     assert "noise" in found.unexplained.signature
     assert not terms(found)
+    assert not found.unexplained.extends_twin
     assert any("No function of the motion" in sentence for sentence in found.sentences)
 
 
