@@ -73,8 +73,11 @@ def conclude(
         verdict, causes = "unknown", tuple(found)
     elif rivals:
         verdict = "ambiguous"
-        others = [cause for rival in rivals for cause in _named(explanation, rival, likely, array)]
-        every = [*named, *(other for other in others if other.effect not in fit.names)]
+        others: dict[str, NamedCause] = {}
+        for rival in rivals:
+            for cause in _named(explanation, rival, likely, array):
+                others.setdefault(cause.effect, cause)
+        every = [*named, *(other for name, other in others.items() if name not in fit.names)]
         causes = (*found, *contested(every, [fit, *rivals], model.families()))
     elif named or found:
         verdict, causes = "explained", (*found, *named)

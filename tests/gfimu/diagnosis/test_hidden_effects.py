@@ -97,6 +97,13 @@ def test_what_the_first_cause_may_get_wrong_is_no_further_cause(name):
     assert [cause["effect"] for cause in outcome(case, source)["causes"]] == [name]
 
 
+def test_a_candidate_is_listed_once_though_several_rivals_have_it():
+    faint = next(case for case in study_cases("singles") if case.key == "singles/10180")
+    told = [cause["effect"] for cause in outcome(faint, "")["causes"]]
+    assert "scale_factor" in told
+    assert len(told) == len(set(told)) > 1
+
+
 def test_parameters_lie_within_three_standard_deviations():
     z = [
         abs(value)
