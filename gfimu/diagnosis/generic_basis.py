@@ -107,6 +107,10 @@ def _functions() -> dict[str, Function]:
 FUNCTIONS: Mapping[str, Function] = _functions()
 """The functions that what is left is tested for, by name."""
 
+_FAMILIES = (
+    *("N per revolution (sine)", "N per revolution × rate (cosine)", "N per revolution × rate² (sine)"),
+    *("slow time (N half-waves)", "step at N% of the run", "step at X s", "tone at X Hz (cosine)"),
+)
 _TONE_NAME = re.compile(r"tone at ([\d.]+) Hz \((sine|cosine)\)")
 _RIPPLE_NAME = re.compile(r"(\d{1,3}) per revolution(?: × rate²?)? \((?:sine|cosine)\)")
 _STEP_NAME = re.compile(r"step at ([\d.]+) s")
@@ -150,5 +154,6 @@ def basis_function(name: str) -> Function:
     if found := _RIPPLE_NAME.fullmatch(name):
         return _ripples((int(found[1]),))[name]
     if name not in FUNCTIONS:
-        raise unknown_name("dependence", name, ["constant", OF_READING, step_at(1.0), tone(50.0, "sine"), *FUNCTIONS])
+        single = [one for one in FUNCTIONS if not re.search(r"\d+ per rev|slow time|step at", one)]
+        raise unknown_name("dependence", name, [*single, *_FAMILIES, "constant", OF_READING])
     return FUNCTIONS[name]

@@ -126,7 +126,7 @@ def test_named_causes_need_no_terms_without_a_name(twin):
 @pytest.mark.parametrize(
     ("parameters", "message"),
     [
-        ({"a11_m_s2": 0.1}, "unknown dependence ''; valid: .*2 per revolution"),
+        ({"a11_m_s2": 0.1}, "unknown dependence ''; valid: .*N per revolution"),
         ({"dependence": "rate!"}, "unknown dependence 'rate!'; valid: .*rate²"),
         ({"dependence": "rate", "rate_unit_rad_s": 0.0}, "rate_unit_rad_s must be a positive number, not 0.0"),
         ({"dependence": "rate", "duration_s": float("nan")}, "duration_s must be a positive number"),
