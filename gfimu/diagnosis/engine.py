@@ -50,6 +50,7 @@ _ITERATIONS = 7
 _FEWEST_ROUNDS = 2
 _SURELY_WRONG = 1.05  # misfit per observation
 _MUCH, _LITTLE, _SHARE = 500.0, 10.0, 0.1  # nats that are left: at least; to those of a round; to the misfit explained
+_ITS_OWN = 0.1  # of what a mode explains: what it leaves may be its own
 _FAINT = 500.0  # log odds of a mode whose frequency may not be settled
 
 
@@ -226,6 +227,8 @@ class _Search:
         # How far each set was behind, under the noise that both were judged by.
         self._behind: dict[frozenset[tuple[str, str]], float] = {}
         self._settled = self._hopeless = False
+        # What is left is judged once a residue of the calibration is held.
+        self._loose = any(segment.calibration_residue is not None for segment in segments)
         self._gained = np.inf
 
     def _is_fair(self, fit: Fit) -> bool:
@@ -265,7 +268,7 @@ class _Search:
 
     def hopeless(self) -> bool:
         """Tell whether a round brought little of what a smooth function of the motion or of time would bring."""
-        if self._best.objective < _SURELY_WRONG * self._observations:
+        if self._loose or self._best.objective < _SURELY_WRONG * self._observations:
             return False
         for segment, drive in zip(self._segments, self._best.drives, strict=True):
             segment.coefficients = drive
@@ -337,7 +340,7 @@ class _Search:
             unique[best.key] = best
             best, without = prune(segments, better, fixed, done)
             unique.pop(best.key, None)
-        if "resonance" in without and len(segments) == 1:
+        if "resonance" in without and len(segments) == 1 and not self._loose:
             best, without = self._with_memory(best, without, done)
         if "resonance" in without and best.log_posterior - without["resonance"].log_posterior < _FAINT:
             best = every_mode(segments, best, fixed)
@@ -347,9 +350,10 @@ class _Search:
         self, best: Fit, without: dict[str, Fit], done: dict[frozenset[tuple[str, str]], Fit]
     ) -> tuple[Fit, dict[str, Fit]]:
         """Fit a mode that leaves something again, with a drive that knows how it rings on."""
-        segment = self._segments[0]
-        segment.coefficients = best.drives[0]
-        if dependence_left(self._segments, best, self._fixed).log_odds < LEFT_OVER_ODDS:
+        self._segments[0].coefficients = best.drives[0]
+        left = dependence_left(self._segments, best, self._fixed).log_odds
+        worth = best.log_posterior - without["resonance"].log_posterior
+        if not LEFT_OVER_ODDS < left < _ITS_OWN * worth:
             return best, without
         better = remembered_mode(self._segments, best, self._fixed)
         if better is best:
