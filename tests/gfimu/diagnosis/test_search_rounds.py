@@ -69,7 +69,7 @@ def test_a_hopeless_search_ends_and_judges_no_rivals(twin, foreign, monkeypatch)
 
 def test_with_a_residue_of_the_calibration_admitted_a_search_goes_on(twin, foreign):
     found, rounds = explained(twin, foreign, loose=True)
-    assert rounds == ALL_ROUNDS
+    assert rounds > 3
     assert found.without
 
 
