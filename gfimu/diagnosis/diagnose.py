@@ -101,7 +101,11 @@ def _diagnose_table(
     pairs, label = _holdouts(explanation, held_out, model, () if loose is None else loose.effects)
     left = _left_over(explanation, prepared)
     if not is_dominant(explanation, left):
-        explanation, left = _without_faint(explanation, left, prepared)
+        if explanation.fit.causes and not explanation.without:  # a search given up too early
+            fit, without = prune(explanation.segments, explanation.fit, explanation.fixed)
+            explanation = replace(explanation, fit=fit, without=without)
+        if loose is None:  # beside a residue nothing is large
+            explanation, left = _without_faint(explanation, left, prepared)
     withdrawn: list[str] = []
     # Where too much is left for any cause to be believed there is nothing to withdraw.
     if explanation.fit.causes and not is_dominant(explanation, left):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gfimu.array import AccelerometerArray
-from gfimu.diagnosis import engine
+from gfimu.diagnosis import diagnose, engine
 from gfimu.diagnosis.calibration_residue import CalibrationResidue
 from gfimu.diagnosis.prepared_runs import PreparedRuns
 from gfimu.recording import Recording
@@ -71,6 +71,22 @@ def test_with_a_residue_of_the_calibration_admitted_a_search_goes_on(twin, forei
     found, rounds = explained(twin, foreign, loose=True)
     assert rounds > 3
     assert found.without
+
+
+def test_a_search_given_up_too_early_is_judged_after_all(twin, monkeypatch):
+    def give_up(search):
+        search._hopeless = True
+        return True
+
+    monkeypatch.setattr(engine, "_FEWEST_ROUNDS", 0)
+    monkeypatch.setattr(engine._Search, "hopeless", give_up)
+    hidden = [
+        make_effect("eccentricity", {"x_m": 0.01, "y_m": -0.02}),
+        make_effect("quadratic", {"a13_s2_m": 0.01}, twin.array),
+    ]
+    found = diagnose([measure(np.random.default_rng(3), twin, hidden, SETTING)], twin)
+    assert {cause.effect for cause in found.causes} == {"eccentricity", "quadratic"}
+    assert all(cause.log_odds > 0 for cause in found.causes)
 
 
 def test_a_search_that_explains_goes_on_to_its_rivals(twin):
