@@ -101,9 +101,9 @@ def _diagnose_table(
     pairs, label = _holdouts(explanation, held_out, model, () if loose is None else loose.effects)
     left = _left_over(explanation, prepared)
     if not is_dominant(explanation, left):
-        if explanation.fit.causes and not explanation.without:  # a search given up too early
+        if explanation.given_up:  # too early
             fit, without = prune(explanation.segments, explanation.fit, explanation.fixed)
-            explanation = replace(explanation, fit=fit, without=without)
+            explanation = replace(explanation, fit=fit, without=without, given_up=False)
         if loose is None:  # beside a residue nothing is large
             explanation, left = _without_faint(explanation, left, prepared)
     withdrawn: list[str] = []
@@ -222,6 +222,8 @@ def _explain(
         wandering = explain_any_length(other, fixed, runs, start=base.causes)
         odds = log_probability(other, wandering.fit) - np.log(len(model.families())) - plain_value
         found = wandering, walk
+        if wandering.given_up:
+            break
         before, base = other, wandering.fit
     if found is None or odds < LEAST_EXTRA_ODDS:
         return plain, None, loose

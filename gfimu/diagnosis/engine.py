@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
-from gfimu.diagnosis.adequacy import LEFT_OVER_ODDS, dependence_left
+from gfimu.diagnosis.adequacy import LEFT_OVER_ODDS, dependence_left, left_over
 from gfimu.diagnosis.causes import Cause, effects_of_run
 from gfimu.diagnosis.drive import smooth_rate
 from gfimu.diagnosis.far_starts import every_mode, from_far, remembered_mode
@@ -48,8 +48,9 @@ FAIR_FIT = 1.6
 """Misfit per observation, in variances, above which something large is still missing."""
 _ITERATIONS = 7
 _FEWEST_ROUNDS = 2
-_SURELY_WRONG = 1.05  # misfit per observation
+_SURELY_WRONG = 1.02  # misfit per observation
 _MUCH, _LITTLE, _SHARE = 500.0, 10.0, 0.1  # nats that are left: at least; to those of a round; to the misfit explained
+_SHARE_AT_END = 0.02  # no cause is believed then (`conclusion.is_dominant`)
 _ITS_OWN = 0.1  # of what a mode explains: what it leaves may be its own
 _FAINT = 500.0  # log odds of a mode whose frequency may not be settled
 
@@ -74,6 +75,8 @@ class Explanation:
         Effects of each segment's run found beforehand (integrity).
     signatures : SignatureSet
         The last screening, about the best set.
+    given_up : bool
+        Whether so much is left that the set was neither pruned nor compared with others.
     """
 
     fit: Fit
@@ -83,6 +86,7 @@ class Explanation:
     segments: tuple[Segment, ...]
     fixed: tuple[tuple[Effect, ...], ...]
     signatures: SignatureSet
+    given_up: bool = False
 
 
 def _posterior(fit: Fit) -> float:
@@ -177,9 +181,10 @@ def explain(
     search = _Search(segments, fixed, runs, start)
     for number in range(_ROUNDS):
         tell(0.1 + 0.8 * number / _ROUNDS, f"search {number + 1}")
-        if search.round(first=number == 0, tell=tell):
+        settled = search.round(first=number == 0, tell=tell)
+        if (settled or number >= _FEWEST_ROUNDS) and search.hopeless(settled=settled):
             break
-        if number >= _FEWEST_ROUNDS and search.hopeless():
+        if settled:
             break
     tell(0.85, "prune")
     best, without, rivals = search.judged()
@@ -195,6 +200,7 @@ def explain(
         tuple(segments),
         tuple(tuple(known) for known in fixed),
         search.screened(best),
+        search.given_up,
     )
 
 
@@ -226,7 +232,7 @@ class _Search:
         self._tried: dict[frozenset[tuple[str, str]], Fit] = {}
         # How far each set was behind, under the noise that both were judged by.
         self._behind: dict[frozenset[tuple[str, str]], float] = {}
-        self._settled = self._hopeless = False
+        self._settled = self.given_up = False
         # What is left is judged once a residue of the calibration is held.
         self._loose = any(segment.calibration_residue is not None for segment in segments)
         self._gained = np.inf
@@ -266,16 +272,19 @@ class _Search:
         self._settled = settled
         return done
 
-    def hopeless(self) -> bool:
-        """Tell whether a round brought little of what a smooth function of the motion or of time would bring."""
-        if self._loose or self._best.objective < _SURELY_WRONG * self._observations:
+    def hopeless(self, *, settled: bool) -> bool:
+        """Tell whether a round brought little of what is left, or all of them did not bring enough."""
+        # The usual end, without a look at the residuals.
+        if self._loose or (settled and self._best.objective < _SURELY_WRONG * self._observations):
             return False
         for segment, drive in zip(self._segments, self._best.drives, strict=True):
             segment.coefficients = drive
-        left = dependence_left(self._segments, self._best, self._fixed).log_odds
+        rounded = any(segment.rounding.channels > 0 for segment in self._segments)
+        left = left_over(self._segments, self._best, self._fixed, 0, rounded=rounded).log_odds
         explained = self._fitted.objective - self._best.objective
-        self._hopeless = left > max(_MUCH, _LITTLE * self._gained, _SHARE * explained)
-        return self._hopeless
+        share = _SHARE_AT_END if settled else _SHARE
+        self.given_up = left > max(_MUCH, _LITTLE * self._gained, share * explained)
+        return self.given_up
 
     def _refined_leaders(self) -> dict[frozenset[tuple[str, str]], Fit]:
         """Refine the sets that lead the linear list; returns them and the best set so far by their keys."""
@@ -324,7 +333,7 @@ class _Search:
     def judged(self) -> tuple[Fit, dict[str, Fit], list[Fit]]:
         """Prune the best set and compare it with what came close: the best, the best without each cause, the rivals."""
         segments, fixed, best = self._segments, self._fixed, self._best
-        if self._hopeless:  # nothing of it will be believed
+        if self.given_up:  # nothing of it will be believed
             return best, {}, []
         done: dict[frozenset[tuple[str, str]], Fit] = {}
         best, without = prune(segments, best, fixed, done)
@@ -362,6 +371,6 @@ class _Search:
 
     def screened(self, about: Fit) -> SignatureSet:
         """Return the signatures about a set: the last ones where they are, or where no set is believed."""
-        if about.key == self._screened or self._hopeless:
+        if about.key == self._screened or self.given_up:
             return self._signatures
         return screen(self._segments, about, self._fixed, self._runs)

@@ -68,8 +68,6 @@ def loosen(plain: Explanation, prepared: PreparedRuns, model: WorldModel) -> Loo
         value, scale, start = larger, _LARGE, other
     if value < reference:
         return None
-    if start.objective > FAIR_FIT * sum(int(segment.weight_mask.sum()) for segment in plain.segments):
-        return None  # what is missing is larger than any residue
     segments, _ = prepared.segments(model)
     fixed = plain.fixed
     for segment, old in zip(segments, plain.segments, strict=True):
@@ -127,11 +125,16 @@ def _fits(segment: Segment) -> bool:
 
 
 def _trial(plain: Explanation, causes: Sequence[Cause], tolerance: dict[str, float], scale: float) -> tuple[float, Fit]:
-    """Admit a residue beside causes and drop those that it makes superfluous; returns the log probability too."""
+    """Admit a residue beside causes and drop those that it makes superfluous; returns the log probability too.
+
+    It is nothing where what is missing is larger than any residue.
+    """
     segments, fixed = plain.segments, plain.fixed
     _admit(segments, causes, fixed, plain.fit.drives, tolerance, scale)
     try:
         fit = refine(segments, causes, fixed, drives=plain.fit.drives)
+        if fit.objective > FAIR_FIT * sum(int(segment.weight_mask.sum()) for segment in segments):
+            return -np.inf, fit
         fit = prune(segments, fit, fixed)[0]
         return log_probability(segments, fit), fit
     finally:

@@ -59,12 +59,22 @@ def test_a_hopeless_search_ends_and_judges_no_rivals(twin, foreign, monkeypatch)
     assert rounds == 3
     assert not found.rivals
     assert not found.without
-    monkeypatch.setattr(engine, "_SURELY_WRONG", np.inf)
+    monkeypatch.setattr(engine, "_MUCH", np.inf)
     patient, rounds = explained(twin, foreign)
     assert rounds == ALL_ROUNDS
     assert patient.without
     # What the other rounds would have brought.
     assert found.fit.objective < 1.05 * patient.fit.objective
+
+
+def test_a_tone_that_nothing_explains_ends_a_search(twin):
+    run = measure(np.random.default_rng(4), twin, (), SETTING)
+    readings = run.readings.copy()
+    readings[:, 4] += 0.8 * np.sin(2 * np.pi * 23.4 * run.t_s)
+    readings[:, 7] += 0.8 * np.sin(2 * np.pi * 14.9 * run.t_s)
+    found, rounds = explained(twin, Recording.from_arrays(run.t_s, readings, twin.array, reference=run.reference))
+    assert found.given_up
+    assert rounds <= 3
 
 
 def test_with_a_residue_of_the_calibration_admitted_a_search_goes_on(twin, foreign):
@@ -74,8 +84,8 @@ def test_with_a_residue_of_the_calibration_admitted_a_search_goes_on(twin, forei
 
 
 def test_a_search_given_up_too_early_is_judged_after_all(twin, monkeypatch):
-    def give_up(search):
-        search._hopeless = True
+    def give_up(search, *, settled):
+        search.given_up = True
         return True
 
     monkeypatch.setattr(engine, "_FEWEST_ROUNDS", 0)
