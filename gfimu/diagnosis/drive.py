@@ -94,13 +94,23 @@ class AngleSpline:
             _remember(self._known, key, known)
         return known
 
-    def _local(self, t: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+    def interval(self, t: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+        """Return the knot interval (n,) of each time, and the time since that interval's start, s; clipped at the ends."""
         inside = np.clip(t, self.start, self.stop)
         first = np.clip(np.searchsorted(self.breaks, inside, side="right") - 1, 0, len(self.widths) - 1)
-        powers = np.vander(inside - self.breaks[first], DEGREE + 1, increasing=True)[:, None]  # (n, 1, 5)
+        return first, inside - self.breaks[first]
+
+    def polynomials(self, coefficients: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the angle on each interval as coefficients of 1, s, … s⁴ from the interval's start, (5, k)."""
+        local = np.lib.stride_tricks.sliding_window_view(coefficients, DEGREE + 1)  # (k, 5)
+        return np.ascontiguousarray(np.einsum("kpj,kj->pk", self._pieces, local))
+
+    def _local(self, t: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+        first, since = self.interval(t)
+        powers = np.vander(since, DEGREE + 1, increasing=True)[:, None]  # (n, 1, 5)
         parts = (self._pieces, self._once, self._twice)
         values = np.stack([(powers[..., : part.shape[1]] @ part[first])[:, 0] for part in parts])
-        beyond = t - inside
+        beyond = t - np.clip(t, self.start, self.stop)
         if beyond.any():
             values[0] += values[1] * beyond[:, None]
         return first, values
@@ -214,7 +224,8 @@ class _SplineSpin:
     """Motion of a table as a spline."""
 
     def __init__(self, spline: AngleSpline, coefficients: NDArray[np.float64]) -> None:
-        self._spline, self._coefficients = spline, coefficients
+        self._spline = spline
+        self._polynomials = spline.polynomials(coefficients)
         self._known: dict[bytes, SplineState] = {}
 
     def at(self, t: ArrayLike) -> SpinState:
@@ -224,10 +235,13 @@ class _SplineSpin:
         key = times.tobytes()
         known = self._known.get(key)
         if known is None:
-            first, values = self._spline.local(np.atleast_1d(times))
-            local = self._coefficients[first[:, None] + np.arange(DEGREE + 1)]  # (n, 5)
-            state = np.einsum("snj,nj->sn", values, local).reshape(3, *times.shape)
-            known = SplineState(*state)
+            first, since = self._spline.interval(times)
+            c0, c1, c2, c3, c4 = (powers[first] for powers in self._polynomials)
+            rate = c1 + since * (2.0 * c2 + since * (3.0 * c3 + since * (4.0 * c4)))
+            angle = c0 + since * (c1 + since * (c2 + since * (c3 + since * c4)))
+            beyond = times - np.clip(times, self._spline.start, self._spline.stop)
+            acceleration = 2.0 * c2 + since * (6.0 * c3 + since * (12.0 * c4))
+            known = SplineState(angle + rate * beyond, rate, acceleration)
             _remember(self._known, key, known)
         return known
 

@@ -223,6 +223,10 @@ class _Search:
         best = refine(segments, start, fixed, iterations=6 if start else 0)
         fitted = refine(segments, start, fixed, iterations=8)
         self._fair = self._is_fair(fitted)
+        if not self._fair and any(over_segments(Segment.sharpen_by_reference, segments)):
+            best = refine(segments, start, fixed, iterations=6 if start else 0)
+            fitted = refine(segments, start, fixed, iterations=8)
+            self._fair = self._is_fair(fitted)
         if self._fair:
             # The channels sharpen the drive unless something gross twists it.
             tune_drives(segments, fitted, fixed)

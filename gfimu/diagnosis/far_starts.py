@@ -76,8 +76,9 @@ def remembered_mode(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Seque
     for ratio in _NEARBY:
         shape = {**mode.shape, "frequency_hz": ratio * mode.shape["frequency_hz"], "damping_ratio": _MODE_DAMPING}
         sets.append([*fit.causes[:place], mode.at(mode.coordinates, shape), *fit.causes[place + 1 :]])
-    fits = refine_each(remembering, sets, fixed, [fit.drives] * len(sets), iterations=_ITERATIONS)
+    fits = refine_each(remembering, sets, fixed, [fit.drives] * len(sets), iterations=_FEW_ITERATIONS)
     lowest = min(fits, key=lambda one: one.objective)
+    lowest = refine(remembering, lowest.causes, fixed, drives=lowest.drives, iterations=_ITERATIONS)
     # Judged as all other fits are, where it is; how well the mode is known, only a drive with memory tells.
     other = replace(refine(segments, lowest.causes, fixed, drives=lowest.drives, iterations=0), causes=lowest.causes)
     return max(fit, other, key=lambda one: one.log_posterior)

@@ -44,9 +44,12 @@ _KNOWN_ANGLE_STD = 5e-3
 _FINEST_ANGLE = 2e-5  # rad
 _FINEST_RATE = 1e-4  # rad/s, and of the spread of the rate
 _LEAST_FACTOR = 0.05
-_BLUR = 0.3  # of the white noise: what an interval may miss of the acceleration at the longest arm
-_LEAST_WIDTH = 0.8  # sample periods of an interval that is cut in two
-_MOST_INTERVALS = 1.7  # times as many as without finer ones, for the cost grows with their square
+_BLUR = 0.3  # of the white noise of the reference: what an interval may miss of it
+_BLUR_TOGETHER = 0.5  # the same of the acceleration, of the noise of all channels together
+_MOST_CUTS_BY_REFERENCE = 3
+_BEYOND_CHANCE = 3.0  # standard deviations of what the noise of the reference bends a drive by
+_LEAST_WIDTH = 0.4  # sample periods of an interval that is cut in two
+_MOST_INTERVALS = 3.0  # times as many as without finer ones, for each costs
 _FACTOR_STEPS = 4
 _REST_FACTOR = 1.3
 _LEAST_GAIN = 0.05
@@ -183,15 +186,32 @@ class Segment:
         """Cut the knot intervals where the drive bends faster than they follow; tells whether any was cut."""
         if self.knots_chosen:
             return False
-        arm = float(np.linalg.norm(self.model.array.positions, axis=1).max())
-        allowed = _BLUR * float(np.median(self.levels.white[:-1])) / max(arm, 1e-3)  # rad/s²
+        return self._cut(self.roughness.bend(self.coefficients))
+
+    def sharpen_by_reference(self) -> bool:
+        """Do the same by the drive of the reference alone, which nothing wrong with the channels bends."""
+        rng = np.random.default_rng(0)
+        cut = False
+        for _ in range(_MOST_CUTS_BY_REFERENCE):
+            chance = replace(self.run, reference=self._reference_noise * rng.standard_normal(len(self.run.t)))
+            noise = self.drive_prior.with_reference(
+                chance, is_angle=self.is_angle, reference_noise=self._reference_noise
+            )
+            bend, by_chance = (self.roughness.bend(drive) for drive in (self._reference_drive, noise))
+            self.coefficients = self._reference_drive
+            if not self._cut(np.sqrt(np.maximum(bend**2 - (_BEYOND_CHANCE * by_chance) ** 2, 0.0))):
+                break
+            cut = True
+        return cut
+
+    def _cut(self, bend: NDArray[np.float64]) -> bool:
+        """Cut the knot intervals that miss something of a drive which bends so sharply around each, rad/s⁴."""
         old = self.spline
-        bend = self.roughness.bend(self.coefficients)
         # What a piecewise parabola misses of an acceleration that bends by `bend` over its interval, and, as that goes
         # to and fro once per interval, what it misses of the rate or the angle that the reference reads.
         missed = bend * old.widths**2 / 16.0
         misread = missed * (old.widths / (2 * np.pi)) ** (2 if self.is_angle else 1)
-        cut = (missed > allowed) | (misread > _BLUR * self._reference_noise)
+        cut = (missed * self._acuity() > _BLUR_TOGETHER) | (misread > _BLUR * self._reference_noise)
         cut &= old.widths > _LEAST_WIDTH * self.run.sample_period
         most = int(_MOST_INTERVALS * self.run.duration / KNOT_SPACING) - len(old.widths)
         if cut.sum() > most > 0:
@@ -200,6 +220,12 @@ class Segment:
             return False
         self._follow(self.spin, self.roughness.on(old.halved(cut), corners=False))
         return True
+
+    def _acuity(self) -> float:
+        """Return how far an angular acceleration moves all channels together, standard deviations per rad/s²."""
+        pushed = self.predict((), ShiftedSpin(self.spin, 2, 1.0)) - self.predict(())
+        levers = np.sqrt(np.mean(pushed[:, :-1] ** 2, axis=0))  # m
+        return float(np.linalg.norm(levers / self.levels.white[:-1]))
 
     def reach_out(self, effects: Sequence[Effect]) -> bool:
         """Widen the spline to the motion that effects ask for (a slow clock, late chips); tells whether it was."""
