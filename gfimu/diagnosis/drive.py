@@ -95,7 +95,7 @@ class AngleSpline:
         return known
 
     def interval(self, t: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-        """Return the knot interval (n,) of each time, and the time since that interval's start, s; clipped at the ends."""
+        """Return the knot interval (n,) of each time, and the time since its start, s; clipped at the ends."""
         inside = np.clip(t, self.start, self.stop)
         first = np.clip(np.searchsorted(self.breaks, inside, side="right") - 1, 0, len(self.widths) - 1)
         return first, inside - self.breaks[first]
