@@ -27,6 +27,7 @@ from gfimu.diagnosis.coloured_noise import CosineBasis, NoiseLevels
 from gfimu.diagnosis.drive import AngleSpline, ScaledSpin, ShiftedSpin
 from gfimu.diagnosis.drive_jacobian import DriveJacobian, lag_matrix
 from gfimu.diagnosis.drive_prior import DrivePrior
+from gfimu.diagnosis.knots import KNOT_SPACING, intervals_to_cut
 from gfimu.diagnosis.linearisation import DriveElimination, DriveEquations, Linearisation
 from gfimu.diagnosis.model import Effect, Spin, WorldModel
 from gfimu.diagnosis.roughness import Roughness
@@ -35,7 +36,6 @@ from gfimu.diagnosis.run import Run
 
 __all__ = ["Segment", "difference_noise", "known_walk"]
 
-KNOT_SPACING = 0.05
 TIME_MARGIN = 0.5
 _WALK = "bias_random_walk"
 _ROUNDING_ERROR = 1e-12
@@ -44,12 +44,8 @@ _KNOWN_ANGLE_STD = 5e-3
 _FINEST_ANGLE = 2e-5  # rad
 _FINEST_RATE = 1e-4  # rad/s, and of the spread of the rate
 _LEAST_FACTOR = 0.05
-_BLUR = 0.3  # of the white noise of the reference: what an interval may miss of it
-_BLUR_TOGETHER = 0.5  # the same of the acceleration, of the noise of all channels together
 _MOST_CUTS_BY_REFERENCE = 3
 _BEYOND_CHANCE = 3.0  # standard deviations of what the noise of the reference bends a drive by
-_LEAST_WIDTH = 0.4  # sample periods of an interval that is cut in two
-_MOST_INTERVALS = 3.0  # times as many as without finer ones, for each costs
 _FACTOR_STEPS = 4
 _REST_FACTOR = 1.3
 _LEAST_GAIN = 0.05
@@ -151,7 +147,10 @@ class Segment:
 
     def _starting_drive(self) -> NDArray[np.float64]:
         """Fit the spline to the reference alone."""
-        return self.drive_prior.with_reference(self.run, is_angle=self.is_angle, reference_noise=self._reference_noise)
+        return self._reference_alone(self.run)
+
+    def _reference_alone(self, run: Run) -> NDArray[np.float64]:
+        return self.drive_prior.with_reference(run, is_angle=self.is_angle, reference_noise=self._reference_noise)
 
     def _follow(self, spin: Spin, roughness: Roughness) -> None:
         """Take the drive that comes closest to a motion, on other knots."""
@@ -184,48 +183,39 @@ class Segment:
 
     def sharpen(self) -> bool:
         """Cut the knot intervals where the drive bends faster than they follow; tells whether any was cut."""
-        if self.knots_chosen:
-            return False
-        return self._cut(self.roughness.bend(self.coefficients))
+        return not self.knots_chosen and self._cut(self.roughness.bend(self.coefficients))
 
     def sharpen_by_reference(self) -> bool:
         """Do the same by the drive of the reference alone, which nothing wrong with the channels bends."""
+        if self.knots_chosen:
+            return False
         rng = np.random.default_rng(0)
-        cut = False
-        for _ in range(_MOST_CUTS_BY_REFERENCE):
-            chance = replace(self.run, reference=self._reference_noise * rng.standard_normal(len(self.run.t)))
-            noise = self.drive_prior.with_reference(
-                chance, is_angle=self.is_angle, reference_noise=self._reference_noise
-            )
-            bend, by_chance = (self.roughness.bend(drive) for drive in (self._reference_drive, noise))
+        cuts = 0
+        while cuts < _MOST_CUTS_BY_REFERENCE:
+            noise = self._reference_noise * rng.standard_normal(len(self.run.t))
+            by_chance = self.roughness.bend(self._reference_alone(replace(self.run, reference=noise)))
+            bend = self.roughness.bend(self._reference_drive)
             self.coefficients = self._reference_drive
             if not self._cut(np.sqrt(np.maximum(bend**2 - (_BEYOND_CHANCE * by_chance) ** 2, 0.0))):
                 break
-            cut = True
-        return cut
+            cuts += 1
+        return cuts > 0
 
     def _cut(self, bend: NDArray[np.float64]) -> bool:
         """Cut the knot intervals that miss something of a drive which bends so sharply around each, rad/s⁴."""
-        old = self.spline
-        # What a piecewise parabola misses of an acceleration that bends by `bend` over its interval, and, as that goes
-        # to and fro once per interval, what it misses of the rate or the angle that the reference reads.
-        missed = bend * old.widths**2 / 16.0
-        misread = missed * (old.widths / (2 * np.pi)) ** (2 if self.is_angle else 1)
-        cut = (missed * self._acuity() > _BLUR_TOGETHER) | (misread > _BLUR * self._reference_noise)
-        cut &= old.widths > _LEAST_WIDTH * self.run.sample_period
-        most = int(_MOST_INTERVALS * self.run.duration / KNOT_SPACING) - len(old.widths)
-        if cut.sum() > most > 0:
-            cut &= bend >= np.sort(bend[cut])[-most]
-        if most <= 0 or not cut.any():
-            return False
-        self._follow(self.spin, self.roughness.on(old.halved(cut), corners=False))
-        return True
-
-    def _acuity(self) -> float:
-        """Return how far an angular acceleration moves all channels together, standard deviations per rad/s²."""
         pushed = self.predict((), ShiftedSpin(self.spin, 2, 1.0)) - self.predict(())
-        levers = np.sqrt(np.mean(pushed[:, :-1] ** 2, axis=0))  # m
-        return float(np.linalg.norm(levers / self.levels.white[:-1]))
+        levers = np.sqrt(np.mean(pushed[:, :-1] ** 2, axis=0))  # m, from the axis to the chips
+        chosen = intervals_to_cut(
+            self.spline.widths,
+            bend,
+            self.run,
+            acuity=float(np.linalg.norm(levers / self.levels.white[:-1])),
+            reference_noise=self._reference_noise,
+            is_angle=self.is_angle,
+        )
+        if chosen.any():
+            self._follow(self.spin, self.roughness.on(self.spline.halved(chosen), corners=False))
+        return bool(chosen.any())
 
     def reach_out(self, effects: Sequence[Effect]) -> bool:
         """Widen the spline to the motion that effects ask for (a slow clock, late chips); tells whether it was."""
