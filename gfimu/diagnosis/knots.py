@@ -5,8 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.diagnosis.run import Run
-
 __all__ = ["KNOT_SPACING", "intervals_to_cut"]
 
 KNOT_SPACING = 0.05
@@ -21,8 +19,8 @@ _MOST_INTERVALS = 3.0  # times as many as without finer ones, for each costs
 def intervals_to_cut(
     widths: NDArray[np.float64],
     bend: NDArray[np.float64],
-    run: Run,
     *,
+    sample_period: float,
     acuity: float,
     reference_noise: float,
     is_angle: bool,
@@ -35,8 +33,8 @@ def intervals_to_cut(
         Of the intervals, s.
     bend : ndarray, shape (k,)
         Rms third derivative of the rate around each, rad/s⁴.
-    run : Run
-        The stretch.
+    sample_period : float
+        Of the channels, s.
     acuity : float
         How far an angular acceleration moves all channels together, standard deviations per rad/s².
     reference_noise : float
@@ -49,8 +47,8 @@ def intervals_to_cut(
     missed = bend * widths**2 / 16.0
     misread = missed * (widths / (2 * np.pi)) ** (2 if is_angle else 1)
     cut = (missed * acuity > _BLUR_TOGETHER) | (misread > _BLUR * reference_noise)
-    cut &= widths > _LEAST_WIDTH * run.sample_period
-    most = int(_MOST_INTERVALS * run.duration / KNOT_SPACING) - len(widths)
+    cut &= widths > _LEAST_WIDTH * sample_period
+    most = int(_MOST_INTERVALS * widths.sum() / KNOT_SPACING) - len(widths)
     if cut.sum() > most > 0:
         cut &= bend >= np.sort(bend[cut])[-most]
     return np.asarray(cut & (most > 0))

@@ -208,7 +208,7 @@ class Segment:
         chosen = intervals_to_cut(
             self.spline.widths,
             bend,
-            self.run,
+            sample_period=self.run.sample_period,
             acuity=float(np.linalg.norm(levers / self.levels.white[:-1])),
             reference_noise=self._reference_noise,
             is_angle=self.is_angle,
