@@ -269,8 +269,9 @@ class _Search:
         self._best = refine(segments, winner.causes, fixed, drives=winner.drives, iterations=6)
         if not self._fair and self._is_fair(winner):
             self._fair = True
-            self._best = sharpen_drives(segments, self._best, fixed)
-            # On the same knots.
+            sharper = sharpen_drives(segments, self._best, fixed)
+            # On the same knots, and under the same prior of the drive, as what it is compared with.
+            self._best = refine(segments, sharper.causes, fixed, drives=sharper.drives, iterations=6)
             self._fitted = refine(segments, self._start, fixed, drives=self._best.drives, iterations=8)
         done = settled and (self._settled or change < STEADY_NOISE)
         self._settled = settled

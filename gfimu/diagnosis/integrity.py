@@ -26,6 +26,7 @@ _REMOVED = 0.7
 _SIGNIFICANT_RMS = 12.0
 _SPIKE = 8.0
 _PILE = 30
+_CAUGHT = 0.8  # of the samples that should be beyond a limit
 _DIFFERENT = 0.6  # share of values above which steps are finer than what is seen
 
 
@@ -153,7 +154,9 @@ def _clipping(
             # Coarse rounding shows the top for anything within half a step of it.
             clear = max(1.5 * sigma, 0.5 * quantum + sigma)
             beyond = sign * prediction[run.valid[:, channel], channel] > top + clear
-            if at_top.sum() < 8 or at_top.sum() <= 3 * below.sum() + 4:
+            # Nothing beyond it is read though it should be, even where a plateau is just below.
+            caught = sigma > 0.5 * quantum and (beyond & at_top).sum() > max(_CAUGHT * beyond.sum(), _PILE)
+            if at_top.sum() < 8 or not (caught or at_top.sum() > 3 * below.sum() + 4):
                 continue
             if (beyond & at_top).sum() > 0.5 * at_top.sum():
                 levels.append(top)
