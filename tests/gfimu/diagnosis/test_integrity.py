@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter1d
 
 from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.diagnose import diagnose
 from sim.campaign import Measurement, measure
 from sim.effects import make_effect
+from sim.motion import SplineSpin
 from sim.twin import Twin
 
 SWAP_Z = ("axis_swap", {"channels": ["a13", "a21"]})
@@ -35,3 +37,21 @@ def test_exchanged_and_inverted_channels_are_told_together(faults):
     for name, parameters in faults:
         for key, value in parameters.items():
             assert sorted(np.atleast_1d(told[name][key])) == sorted(np.atleast_1d(value))
+
+
+@pytest.mark.parametrize("below", [0.3, 1.0, 2.0])
+def test_a_plateau_just_below_the_limit_hides_no_clipping(below):
+    """Readings pile up one step below the limit too, where a slower plateau comes so close to it."""
+    twin = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
+    limit = 269.23 * 3.9e-3 * 9.80665
+    arm = 0.05
+    step = 3.9e-3 * 9.80665
+    fast, slow = np.sqrt(np.array([limit + 0.5, limit - below * step]) / arm)
+    t = np.arange(-2.0, 27.0, 5e-3)
+    rate = np.interp(t, [3.0, 4.0, 6.0, 7.0, 9.0, 10.0, 20.0, 21.0], [0.0, fast, fast, 0.0, 0.0, slow, slow, 0.0])
+    motion = SplineSpin.through(t, gaussian_filter1d(rate, 20.0))
+    hidden = [make_effect("saturation", {"limit_m_s2": limit})]
+    recording = measure(np.random.default_rng(11), twin, hidden, Measurement(duration=25.0), motion=motion)
+    found = diagnose([recording], twin)
+    assert {cause.effect for cause in found.causes} == {"saturation"}
+    assert found.causes[0].parameters["limit_m_s2"] == pytest.approx(limit, abs=1.1 * step)

@@ -108,3 +108,13 @@ def test_a_search_that_explains_goes_on_to_its_rivals(twin):
     assert rounds < ALL_ROUNDS
     assert found.fit.names == {"eccentricity", "quadratic"}
     assert set(found.without) == {"eccentricity", "quadratic"}
+
+
+@pytest.mark.parametrize("quadratic", [0.01, 0.0415])
+def test_what_is_the_same_in_the_data_is_told_as_a_set_at_any_size(twin, quadratic):
+    """A vertical channel of a level table always reads g: its offset, gain and second order are one."""
+    hidden = [make_effect("quadratic", {"a13_s2_m": quadratic}, twin.array)]
+    found = diagnose([measure(np.random.default_rng(3), twin, hidden, SETTING)], twin)
+    assert found.verdict == "ambiguous"
+    assert {"bias", "scale_factor"} <= {cause.effect for cause in found.causes}
+    assert "quadratic" in {name for cause in found.causes for name in (cause.effect, *cause.not_distinguishable_from)}
