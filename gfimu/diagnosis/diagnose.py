@@ -17,7 +17,7 @@ from gfimu.diagnosis.holdout import Holdout, gate_gains, held_out_gain, split_se
 from gfimu.diagnosis.long_run import explain_any_length
 from gfimu.diagnosis.loose_calibration import LooseCalibration, loosen, relearned
 from gfimu.diagnosis.model import Effect, WorldModel
-from gfimu.diagnosis.nuisances import settle_noise
+from gfimu.diagnosis.nuisances import settle_noise, sharpen_drives, tune_drives
 from gfimu.diagnosis.prepared_runs import PreparedRuns
 from gfimu.diagnosis.pruning import LEAST_EXTRA_ODDS, prune
 from gfimu.diagnosis.refinement import refine
@@ -102,8 +102,9 @@ def _diagnose_table(
     left = _left_over(explanation, prepared)
     if not is_dominant(explanation, left):
         if explanation.given_up:  # too early
-            fit, without = prune(explanation.segments, explanation.fit, explanation.fixed)
-            explanation = replace(explanation, fit=fit, without=without, given_up=False)
+            explanation = _pruned(explanation)
+            left = _left_over(explanation, prepared)
+            loose = None if loose is None else replace(loose, explanation=explanation, held=explanation)
         if loose is None:  # beside a residue nothing is large
             explanation, left = _without_faint(explanation, left, prepared)
     withdrawn: list[str] = []
@@ -127,6 +128,14 @@ def _diagnose_table(
     if is_unknown(explanation, left, gain):
         described, gain = _describe(explanation, left, held_out, model, () if loose is None else loose.effects)
     return conclude(prepared, model, explanation, walk, loose, left, gain, withdrawn, described)
+
+
+def _pruned(explanation: Explanation) -> Explanation:
+    """Judge the causes of a search that was given up, its drives at what is left of them."""
+    fit, without = prune(explanation.segments, explanation.fit, explanation.fixed)
+    for segment, drive in zip(explanation.segments, fit.drives, strict=True):
+        segment.coefficients = drive
+    return replace(explanation, fit=fit, without=without, given_up=False)
 
 
 def _describe(
@@ -252,6 +261,11 @@ def _holdouts(
         segment.reach_out([*effects, *effects_of_run(explanation.fit.causes, model.array, segment.index)])
     fitted = list(explanation.segments)
     kept = [[*effects, *residue] for effects in known]
+    # Its drive is no less free than those that were fitted.
+    fit = refine(segments, explanation.fit.causes, kept, shapes=False)
+    tune_drives(segments, fit, kept)
+    for segment, drive in zip(segments, sharpen_drives(segments, fit, kept).drives, strict=True):
+        segment.coefficients = drive
     return [Holdout(fitted, [list(f) for f in explanation.fixed], segments, kept)], "another recording"
 
 

@@ -191,7 +191,7 @@ class AngleSpline:
 
 def _remember(known: dict[bytes, Any], key: bytes, value: Any) -> None:
     """Keep a value, the oldest forgotten; a thread that finds nothing computes it anew."""
-    for old in tuple(known)[: len(known) + 1 - _REMEMBERED]:
+    for old in tuple(known)[: max(len(known) + 1 - _REMEMBERED, 0)]:
         known.pop(old, None)
     known[key] = value
 

@@ -213,8 +213,9 @@ def _thinned(t: NDArray[np.float64], values: NDArray[np.float64]) -> tuple[NDArr
     if group < 3:
         return t, values
     whole = len(t) // group * group
-    blocks = np.where(np.isfinite(values[:whole]), values[:whole], 0.0).reshape(-1, group)
-    ends = np.column_stack([blocks.min(axis=1), blocks.max(axis=1)]).ravel()
+    blocks = values[:whole].reshape(-1, group)
+    blocks = np.where(np.isfinite(blocks), blocks, np.nan)
+    ends = np.column_stack([np.fmin.reduce(blocks, axis=1), np.fmax.reduce(blocks, axis=1)]).ravel()
     return np.repeat(t[:whole:group], 2), ends
 
 

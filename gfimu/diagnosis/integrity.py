@@ -158,7 +158,7 @@ def _clipping(
             caught = sigma > 0.5 * quantum and (beyond & at_top).sum() > max(_CAUGHT * beyond.sum(), _PILE)
             if at_top.sum() < 8 or not (caught or at_top.sum() > 3 * below.sum() + 4):
                 continue
-            if (beyond & at_top).sum() > 0.5 * at_top.sum():
+            if caught or (beyond & at_top).sum() > 0.5 * at_top.sum():
                 levels.append(top)
             elif at_top.sum() >= _PILE and sigma > 0.5 * quantum:
                 piles.append(top)  # a steady signal at the limit: its noise would go beyond

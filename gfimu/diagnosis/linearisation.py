@@ -74,9 +74,9 @@ class DriveElimination:
     Parameters
     ----------
     root : InverseRoot
-        W with WᵀW = H⁻¹; the last q unknowns are the calibration residue, where it is admitted.
+        V with VᵀV = H⁻¹; the last q unknowns are the calibration residue, where it is admitted.
     forward : ndarray, shape (m + k + q,)
-        x = W(JᵀWr − Rd).
+        x = V(JᵀWr − Rd).
     objective : float
         rᵀWr + dᵀRd − xᵀx: twice the negative log likelihood, drive marginalised.
     size : int
@@ -89,7 +89,7 @@ class DriveElimination:
     size: int
 
     def eliminate(self, cross: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return X = W JᵀWA of what couples signatures to the drive, JᵀWA (m + q, P), shape (m + k + q, P)."""
+        """Return X = V JᵀWA of what couples signatures to the drive, JᵀWA (m + q, P), shape (m + k + q, P)."""
         return self.root.apply(cross)
 
     def step(self, eliminated: NDArray[np.float64], step: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -131,7 +131,7 @@ class Linearisation:
     Parameters
     ----------
     residual : ndarray, shape (n, c + 1)
-        Measured minus predicted; zero where invalid.
+        Measured minus predicted, or what stands for it where readings are coarse; zero where invalid.
     slow_residual : ndarray, shape (K, c + 1)
         The same in the cosines of slow noise.
     jacobian : DriveJacobian

@@ -79,7 +79,7 @@ def explain_any_length(
     learn_noise(segments, fit, fixed)
     fit = refine(segments, fit.causes, fixed, drives=fit.drives)
     tell(0.8, "prune")
-    fit, without = prune(segments, fit, fixed)
+    fit, without = (fit, {}) if part.given_up else prune(segments, fit, fixed)
     rivals = [refine(segments, rival.causes, fixed, drives=fit.drives) for rival in part.rivals[:RIVALS]]
     nothing = refine(segments, (), fixed, drives=fit.drives) if fit.causes else fit
     for segment, drive in zip(segments, fit.drives, strict=True):
@@ -92,4 +92,5 @@ def explain_any_length(
         tuple(segments),
         tuple(tuple(effects) for effects in fixed),
         part.signatures,
+        part.given_up,
     )

@@ -47,13 +47,14 @@ class PreparedRuns:
     @classmethod
     def build(cls, recordings: Sequence[Recording], model: WorldModel, names: Sequence[str]) -> PreparedRuns:
         """Read, check and label recordings (`prepare_run`, `check_integrity`)."""
-        runs, effects, why, spikes = [], [], {}, 0
+        runs, effects, spikes = [], [], 0
+        why: dict[str, str] = {}
         for recording, name in zip(recordings, names, strict=True):
             run = prepare_run(recording, model, name=name)
             checked = _check(model, run)
             runs.append(checked.run)
             effects.append(list(checked.effects))
-            why.update(checked.why)
+            why = {**checked.why, **why}  # of the run whose numbers are told, the first
             spikes += checked.spikes
         rounded = any(effect.name in _ROUNDING for known in (model.effects, *effects) for effect in known)
         return cls(runs, effects, why, spikes, rounded)

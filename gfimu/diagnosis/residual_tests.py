@@ -30,6 +30,7 @@ _JUMP_WIDTHS = (1.0, 2.0)
 _FEWEST_JUMPS = 12
 _FEWEST_IN_JUMP = 20
 _NORMAL_MEDIAN = 0.6745
+_STEADY_POWER = 0.25  # of the mean, from the quietest to the loudest of six parts
 
 
 @dataclass(frozen=True)
@@ -157,8 +158,8 @@ def changing_noise(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequen
             freedom = counts / 1.8
             spread = means / means.mean()
             statistic = float(np.sum(freedom / 2 * (spread - 1) ** 2))
-            # A change below ten per cent in power is within what a part's own noise does.
-            if np.ptp(spread) > 0.25:
+            # What changes less in power, a part's own noise does.
+            if np.ptp(spread) > _STEADY_POWER:
                 odds = -_log_tail(statistic, 5) - np.log(3.0)
                 if odds > best.log_odds:
                     best = LeftOver(odds, f"the noise of all channels changes with {name}", {})

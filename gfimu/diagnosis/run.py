@@ -129,7 +129,6 @@ def prepare_run(recording: Recording, model: WorldModel, *, name: str = "run") -
     n = int(place[-1]) + 1
     if n > 4 * len(recording):
         raise InputError(f"{name}: more samples are missing than present; record again without the long gaps")
-    t = recording.t_s[0] + period * np.arange(n)
     # The median step carries the rounding of the time stamps; the ends do not.
     t = recording.t_s[0] + (recording.t_s[-1] - recording.t_s[0]) / (n - 1) * np.arange(n)
     full = np.zeros((n, readings.shape[1]))

@@ -130,11 +130,12 @@ class Gain:
     Parameters
     ----------
     held_out : str
-        Which data: ``"another recording"``, ``"stretches of the recording"``, or empty where none could be held out.
+        Which data, in words: another recording, or blocks of this one; empty where none could be held out.
     rms_before, rms_after : float
         Residual rms on them, m/s².
     share_of_excess_removed : float
-        1 − (after² − floor²)/(before² − floor²); NaN where there was no excess.
+        1 − (after² − floor²)/(before² − floor²), channels and reference together in units of their noise, each with
+        the drive that suits it best; NaN where there was no excess.
     log_likelihood_per_sample, log_likelihood_std : float
         Gain per sample and its standard error.
     rate_rmse_before, rate_rmse_after : float

@@ -170,7 +170,7 @@ class AxisWobble(Effect):
 
     @classmethod
     def shapes(cls, duration: float, sample_rate: float) -> tuple[dict[str, float], ...]:
-        """Return horizontal directions of the nod axis (the world's x, or a quarter turn from it)."""
+        """Return horizontal directions of the nod axis from the world's x, an eighth of a turn apart."""
         return tuple({"direction_rad": float(psi)} for psi in (0.0, 0.25 * np.pi, 0.5 * np.pi, 0.75 * np.pi))
 
     @classmethod
@@ -309,7 +309,7 @@ class Resonance(Effect):
 
     @classmethod
     def shapes(cls, duration: float, sample_rate: float) -> tuple[dict[str, float], ...]:
-        """Return frequencies up to the Nyquist frequency and two dampings."""
+        """Return frequencies to a little below the Nyquist frequency, and two dampings."""
         top = 0.45 * sample_rate
         frequencies = np.geomspace(2.0, max(top, 2.5), 16)
         return tuple({"frequency_hz": float(f), "damping_ratio": zeta} for f in frequencies for zeta in (0.02, 0.1))

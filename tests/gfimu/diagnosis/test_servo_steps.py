@@ -72,3 +72,16 @@ def test_knots_are_set_by_the_arms_about_the_axis():
         assert segment.sharpen_by_reference()
         knots.append(segment.spline.size)
     assert knots[1] > knots[0]
+
+
+def test_a_recording_held_out_may_have_corners_too():
+    """Its drive is as free as that of the recording that was fitted."""
+    rng = np.random.default_rng(8)
+    twin = mounted(0.12)
+    hidden = [make_effect("eccentricity", {"x_m": 0.004, "y_m": -0.003})]
+    smooth = measure(rng, twin, hidden, Measurement(duration=DURATION))
+    cornered = measure(rng, twin, hidden, Measurement(duration=DURATION), motion=ServoSteps(rng))
+    found = diagnose([smooth], twin, held_out=[cornered])
+    assert [cause.effect for cause in found.causes] == ["eccentricity"]
+    assert found.gain.held_out == "another recording"
+    assert found.gain.share_of_excess_removed > 0.995
