@@ -13,9 +13,18 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from sim.motion import SpinMotion, SpinState
-from sim.world import SampleContext, World
+from sim.world import Nod, SampleContext, World
 
-__all__ = ["TableGeometry", "arm_growth", "channels", "growing_arms", "reference", "rigid_readings", "table_geometry"]
+__all__ = [
+    "TableGeometry",
+    "arm_growth",
+    "channels",
+    "growing_arms",
+    "nodding_motion",
+    "reference",
+    "rigid_readings",
+    "table_geometry",
+]
 
 _JERK_STEP = 1e-4  # s
 
@@ -71,7 +80,7 @@ def rigid_readings(world: World, spin: SpinState, geometry: TableGeometry | None
     cos, sin = np.cos(theta), np.sin(theta)
     up = Rotation.from_rotvec(world.axis_rotvec).as_matrix().T[:, 2]  # world's up in the tilted axis frame
     stretch = 1.0 + world.stretch * rate**2 if world.stretch else 1.0
-    if world.nod.amplitude == 0.0:
+    if not world.nod:
         gravity = world.gravity * np.stack(
             [cos * up[0] + sin * up[1], cos * up[1] - sin * up[0], np.full_like(cos, up[2])], axis=-1
         )  # (n, 3)
@@ -81,25 +90,26 @@ def rigid_readings(world: World, spin: SpinState, geometry: TableGeometry | None
     return _nodding_readings(world, spin, placed, up, stretch)
 
 
+def nodding_motion(nod: Nod, spin: SpinState) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return rotation vector, angular rate and acceleration of a spin whose axis nods, in the nodding axis frame.
+
+    With the nod n and the axis z: ω = ṅ + ω z, α = n̈ + α z + ω ṅ × z, to first order in n. Each (n, 3).
+    """
+    lean, omega, alpha = nod.lean(spin)
+    alpha[:, 0] += spin.rate * omega[:, 1]
+    alpha[:, 1] -= spin.rate * omega[:, 0]
+    omega[:, 2] += spin.rate
+    alpha[:, 2] += spin.acceleration
+    return lean, omega, alpha
+
+
 def _nodding_readings(
     world: World, spin: SpinState, placed: TableGeometry, up: NDArray[np.float64], stretch: NDArray[np.float64] | float
 ) -> NDArray[np.float64]:
     """Return the readings when the axis nods: the angular rate has parts across the axis."""
-    theta, rate, acceleration = spin.angle, spin.rate, spin.acceleration
-    nod = world.nod
-    along = np.array([np.cos(nod.direction), np.sin(nod.direction), 0.0])
-    across = np.array([along[1], -along[0], 0.0])  # along × z
-    cos, sin = np.cos(theta + nod.phase), np.sin(theta + nod.phase)
-    lean = nod.amplitude * cos
-    lean_rate = -nod.amplitude * sin * rate
-    lean_acceleration = -nod.amplitude * (cos * rate**2 + sin * acceleration)
-    zeros = np.zeros_like(rate)
-    # In the nodding axis frame: ω = ṅ e + ω z, α = n̈ e + α z + ω ṅ e × z.
-    omega = np.outer(lean_rate, along) + np.stack([zeros, zeros, rate], axis=-1)
-    alpha = np.outer(lean_acceleration, along) + np.outer(rate * lean_rate, across)
-    alpha[:, 2] += acceleration
-    gravity = world.gravity * Rotation.from_rotvec(np.outer(lean, along)).inv().apply(up)
-    turn = Rotation.from_rotvec(np.stack([zeros, zeros, theta], axis=-1)).inv()
+    lean, omega, alpha = nodding_motion(world.nod, spin)
+    gravity = world.gravity * Rotation.from_rotvec(lean).inv().apply(up)
+    turn = Rotation.from_rotvec(np.outer(spin.angle, [0.0, 0.0, 1.0])).inv()
     omega, alpha, gravity = turn.apply(omega), turn.apply(alpha), turn.apply(gravity)
     x, y, z = omega.T
     products = np.stack([x * x, y * y, z * z, x * y, x * z, y * z], axis=-1)  # (n, 6)

@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from gfimu.errors import InputError
 from gfimu.recording import Recording
+from sim.forward import nodding_motion
 from sim.motion import BodyState, SpinState
 from sim.world import World
 
@@ -36,22 +37,12 @@ def cube_state(world: World, spin: SpinState) -> BodyState:
         Position, velocity and acceleration of the cube's centre in the world; rotation, rate and angular acceleration
         in cube axes. The velocity of stretching and nodding arms is left out where the forward model leaves it out.
     """
-    zeros = np.zeros_like(spin.rate)
-    along = np.array([np.cos(world.nod.direction), np.sin(world.nod.direction), 0.0])
-    across = np.array([along[1], -along[0], 0.0])  # along × z
-    cos, sin = np.cos(spin.angle + world.nod.phase), np.sin(spin.angle + world.nod.phase)
-    lean_rate = -world.nod.amplitude * sin * spin.rate
-    lean_acceleration = -world.nod.amplitude * (cos * spin.rate**2 + sin * spin.acceleration)
-    # In the nodding axis frame.
-    omega = np.outer(lean_rate, along) + np.stack([zeros, zeros, spin.rate], axis=-1)
-    alpha = np.outer(lean_acceleration, along) + np.outer(spin.rate * lean_rate, across)
-    alpha[:, 2] += spin.acceleration
-    turn = Rotation.from_rotvec(np.stack([zeros, zeros, spin.angle], axis=-1))
+    lean, omega, alpha = nodding_motion(world.nod, spin)
+    turn = Rotation.from_rotvec(np.outer(spin.angle, [0.0, 0.0, 1.0]))
     arm = turn.apply(world.cube_offset) * (1.0 + world.stretch * spin.rate**2)[:, None]
     velocity = np.cross(omega, arm)
     acceleration = np.cross(alpha, arm) + np.cross(omega, velocity)
-    lean = Rotation.from_rotvec(np.outer(world.nod.amplitude * cos, along)).as_matrix()
-    to_world = Rotation.from_rotvec(world.axis_rotvec).as_matrix() @ lean  # (n, 3, 3)
+    to_world = Rotation.from_rotvec(world.axis_rotvec).as_matrix() @ Rotation.from_rotvec(lean).as_matrix()  # (n, 3, 3)
     attitude = turn.as_matrix() @ Rotation.from_rotvec(world.mount_rotvec).as_matrix()  # from cube to nodding axis
     return BodyState(
         position=np.einsum("nij,nj->ni", to_world, arm),

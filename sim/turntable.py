@@ -176,9 +176,8 @@ def _turntable(world: World) -> mujoco.MjSpec:
     spec = mujoco.MjSpec.from_file(str(find_model("mjcf", "turntable", suffix=".xml")))
     axis = spec.body("axis")
     axis.quat = _quaternion(Rotation.from_rotvec(world.axis_rotvec))
-    if world.nod.amplitude:
-        direction = [np.cos(world.nod.direction), np.sin(world.nod.direction), 0.0]
-        axis.add_joint(name=_NOD_JOINT, type=mujoco.mjtJoint.mjJNT_HINGE, axis=direction)
+    if world.nod:
+        axis.add_joint(name=_NOD_JOINT, type=mujoco.mjtJoint.mjJNT_HINGE, axis=_nod_axis(world))
     mount = Rotation.from_rotvec(world.mount_rotvec)
     arms = mount.inv().apply(world.cube_offset) + world.array.chip_positions  # from the axis, in cube axes
     cube = spec.body("cube")
@@ -186,6 +185,13 @@ def _turntable(world: World) -> mujoco.MjSpec:
     _fit_chips(spec, world.array, arms if world.stretch else None)
     spec.option.gravity = [0.0, 0.0, -world.gravity]
     return spec
+
+
+def _nod_axis(world: World) -> NDArray[np.float64]:
+    """Return the axis of the hinge that nods."""
+    if (direction := world.nod.direction) is None:
+        raise InputError("MuJoCo's axis nods about one line; give axis_wobble effects of one direction_rad")
+    return np.array([np.cos(direction), np.sin(direction), 0.0])
 
 
 def _free_cube(world: World) -> mujoco.MjSpec:
@@ -262,12 +268,10 @@ def _table_state(
     position, velocity, acceleration = (np.zeros((len(spin.angle), model.nv)) for _ in range(3))
     place = model.joint(_SPIN_JOINT).dofadr[0]
     position[:, place], velocity[:, place], acceleration[:, place] = spin.angle, spin.rate, spin.acceleration
-    if world.nod.amplitude:
+    if world.nod:
         place = model.joint(_NOD_JOINT).dofadr[0]
-        cos, sin = np.cos(spin.angle + world.nod.phase), np.sin(spin.angle + world.nod.phase)
-        position[:, place] = world.nod.amplitude * cos
-        velocity[:, place] = -world.nod.amplitude * sin * spin.rate
-        acceleration[:, place] = -world.nod.amplitude * (cos * spin.rate**2 + sin * spin.acceleration)
+        lean = (part @ _nod_axis(world) for part in world.nod.lean(spin))
+        position[:, place], velocity[:, place], acceleration[:, place] = lean
     if world.stretch:
         # Unless the arms are said to move, their own velocity is left out, as in the forward model.
         centre = Rotation.from_rotvec(world.mount_rotvec).inv().apply(world.cube_offset)

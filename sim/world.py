@@ -23,6 +23,8 @@ from sim.motion import SpinMotion, SpinState
 
 __all__ = ["DataStep", "MotionStep", "Nod", "ReferenceStep", "SampleContext", "SensingStep", "World"]
 
+_ONE_LINE = 1e-9  # of the square of a nod: what rounding leaves of an area
+
 
 @dataclass(frozen=True)
 class SampleContext:
@@ -79,14 +81,47 @@ class DataStep(Protocol):
 
 @dataclass(frozen=True)
 class Nod:
-    """Nod of the table's axis once per revolution about a horizontal direction of the world.
+    """Nod of the table's axis once per revolution: a horizontal rotation vector cosine·cos θ + sine·sin θ.
 
-    The rotation vector is amplitude·cos(θ + phase) along (cos direction, sin direction, 0).
+    Parameters
+    ----------
+    cosine, sine : tuple of float
+        Its parts along the world's x and y, rad.
     """
 
-    amplitude: float = 0.0
-    phase: float = 0.0
-    direction: float = 0.0
+    cosine: tuple[float, float] = (0.0, 0.0)
+    sine: tuple[float, float] = (0.0, 0.0)
+
+    @classmethod
+    def about(cls, direction: float, amplitude: float, phase: float) -> Nod:
+        """Return amplitude·cos(θ + phase) along (cos direction, sin direction, 0), all in rad."""
+        x, y = amplitude * np.cos(direction), amplitude * np.sin(direction)
+        cos, sin = np.cos(phase), -np.sin(phase)
+        return cls((float(x * cos), float(y * cos)), (float(x * sin), float(y * sin)))
+
+    def __bool__(self) -> bool:
+        return any((*self.cosine, *self.sine))
+
+    def __add__(self, other: Nod) -> Nod:
+        (a, b), (c, d) = np.add(self.cosine, other.cosine), np.add(self.sine, other.sine)
+        return Nod((float(a), float(b)), (float(c), float(d)))
+
+    @property
+    def direction(self) -> float | None:
+        """Of the horizontal line that it nods about, rad; None where it does not keep to one."""
+        (a, b), (c, d) = self.cosine, self.sine
+        size = np.hypot(np.hypot(a, b), np.hypot(c, d))
+        if abs(a * d - b * c) > _ONE_LINE * size**2:
+            return None
+        return float(np.arctan2(b, a) if np.hypot(a, b) > np.hypot(c, d) else np.arctan2(d, c))
+
+    def lean(self, spin: SpinState) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Return the rotation vector and its first two derivatives for a spin of the table, each (n, 3)."""
+        part = np.array([[*self.cosine, 0.0], [*self.sine, 0.0]])
+        waves = np.column_stack([np.cos(spin.angle), np.sin(spin.angle)])
+        slopes = np.column_stack([-waves[:, 1], waves[:, 0]])
+        rate, acceleration = spin.rate[:, None], spin.acceleration[:, None]
+        return waves @ part, (slopes * rate) @ part, (slopes * acceleration - waves * rate**2) @ part
 
 
 @dataclass(frozen=True)

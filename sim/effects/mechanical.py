@@ -193,8 +193,8 @@ class AxisWobble(Effect):
 
     def apply(self, world: World) -> World:
         """Let the axis nod."""
-        nod = Nod(self.value("amplitude_rad"), self.value("phase_rad"), self.value("direction_rad"))
-        return world.changed(nod=nod)
+        nod = Nod.about(self.value("direction_rad"), self.value("amplitude_rad"), self.value("phase_rad"))
+        return world.changed(nod=world.nod + nod)
 
 
 class Gravity(Effect):

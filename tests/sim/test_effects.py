@@ -18,12 +18,13 @@ from scipy.signal import lsim
 from gfimu.array import AccelerometerArray
 from gfimu.errors import InputError
 from sim import forward
+from sim.campaign import random_profile
 from sim.effects import EFFECTS, Effect, apply_effects, make_effect
 from sim.motion import SpinState, SplineSpin
 from sim.profiles import Chirp, Hold, Ramp, spin_profile
-from sim.turntable import prescribed_readings
+from sim.turntable import prescribed_readings, turntable_model
 from sim.twin import Twin
-from sim.world import SampleContext
+from sim.world import SampleContext, World
 
 # The contract's names with one valid set of parameters each.
 CONTRACT = {
@@ -421,3 +422,29 @@ def test_apply_effects_leaves_the_given_world_alone(cube12, twin):
     apply_effects(world, [make_effect(name, CONTRACT[name], cube12) for name in CONTRACT])
     assert world.gravity == twin.gravity
     assert world.sensing_steps == world.motion_steps == world.data_steps == ()
+
+
+@pytest.mark.parametrize("name", [name for name in CONTRACT if EFFECTS[name].sizes(AccelerometerArray.load("cube12"))])
+def test_an_effect_that_the_twin_has_already_grows_by_another(name):
+    """A little more of it reads as it does in a world without it: two plays in a row apart, effects add."""
+    twin = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
+    motion = random_profile(np.random.default_rng(1), 20.0)
+    t = np.arange(0.0, 20.0, 0.01)
+
+    def predicted(*effects):
+        warm = 20.0 + 5.0 * np.sin(t / 7.0)
+        return np.column_stack(twin.predict(motion, t, effects=effects, temperature=warm))
+
+    known = make_effect(name, CONTRACT[name], twin.array)
+    little = 0.05 * np.array([size.prior_std for size in EFFECTS[name].sizes(twin.array)])
+    more = EFFECTS[name].from_sizes(twin.array, little, known.shape_values())
+    alone = predicted(more) - predicted()
+    beside = predicted(known, more) - predicted(known)
+    assert np.linalg.norm(beside - alone) < (0.5 if name == "hysteresis" else 0.1) * np.linalg.norm(alone)
+
+
+def test_mujoco_refuses_a_nod_that_keeps_to_no_line(cube12):
+    nods = [{"amplitude_rad": 2e-3, "phase_rad": phase, "direction_rad": phase} for phase in (0.0, 1.0)]
+    world = apply_effects(World(cube12), [make_effect("axis_wobble", nod) for nod in nods])
+    with pytest.raises(InputError, match="one direction_rad"):
+        turntable_model(world)

@@ -46,7 +46,7 @@ def worlds(array):
         cube_offset=np.array([0.012, -0.02, 0.07]),
         mount_rotvec=np.array([0.3, 0.1, 2.0]),
         axis_rotvec=np.array([0.02, -0.05, 0.0]),
-        nod=Nod(0.01, 0.3, 0.7),
+        nod=Nod.about(0.7, 0.01, 0.3),
     )
     return {
         "nominal": nominal,
@@ -102,12 +102,10 @@ def test_prescribed_table_agrees_with_differenced_positions(cube12, name):
 
     def position_and_axis(times):
         theta = Swing().at(times).angle
-        nod = world.nod
-        lean = nod.amplitude * np.cos(theta + nod.phase)
-        along = np.array([np.cos(nod.direction), np.sin(nod.direction), 0.0])
+        lean = np.outer(np.cos(theta), [*world.nod.cosine, 0.0]) + np.outer(np.sin(theta), [*world.nod.sine, 0.0])
         frames = (
             Rotation.from_rotvec(world.axis_rotvec).as_matrix()
-            @ Rotation.from_rotvec(np.outer(lean, along)).as_matrix()
+            @ Rotation.from_rotvec(lean).as_matrix()
             @ Rotation.from_euler("z", theta[:, None]).as_matrix()
         )
         mount = Rotation.from_rotvec(world.mount_rotvec)
