@@ -92,7 +92,7 @@ def test_a_search_given_up_too_early_is_judged_after_all(twin, monkeypatch):
     monkeypatch.setattr(engine._Search, "hopeless", give_up)
     hidden = [
         make_effect("eccentricity", {"x_m": 0.01, "y_m": -0.02}),
-        make_effect("quadratic", {"a13_s2_m": 0.01}, twin.array),
+        make_effect("quadratic", {"a11_s2_m": 0.01}, twin.array),
     ]
     found = diagnose([measure(np.random.default_rng(3), twin, hidden, SETTING)], twin)
     assert {cause.effect for cause in found.causes} == {"eccentricity", "quadratic"}
@@ -102,7 +102,7 @@ def test_a_search_given_up_too_early_is_judged_after_all(twin, monkeypatch):
 def test_a_search_that_explains_goes_on_to_its_rivals(twin):
     hidden = [
         make_effect("eccentricity", {"x_m": 0.01, "y_m": -0.02}),
-        make_effect("quadratic", {"a13_s2_m": 0.01}, twin.array),
+        make_effect("quadratic", {"a11_s2_m": 0.01}, twin.array),
     ]
     found, rounds = explained(twin, measure(np.random.default_rng(3), twin, hidden, SETTING))
     assert rounds < ALL_ROUNDS
