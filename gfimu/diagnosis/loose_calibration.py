@@ -127,7 +127,7 @@ def _fits(segment: Segment) -> bool:
 def _trial(plain: Explanation, causes: Sequence[Cause], tolerance: dict[str, float], scale: float) -> tuple[float, Fit]:
     """Admit a residue beside causes and drop those that it makes superfluous; returns the log probability too.
 
-    It is nothing where what is missing is larger than any residue.
+    That is −∞ where what is missing is larger than any residue.
     """
     segments, fixed = plain.segments, plain.fixed
     _admit(segments, causes, fixed, plain.fit.drives, tolerance, scale)
