@@ -52,6 +52,7 @@ _SURELY_WRONG = 1.02  # misfit per observation
 _MUCH, _LITTLE, _SHARE = 500.0, 10.0, 0.1  # nats that are left: at least; to those of a round; to the misfit explained
 _SHARE_AT_END = 0.02  # no cause is believed then (`conclusion.is_dominant`)
 _ITS_OWN = 0.1  # of what a mode explains: what it leaves may be its own
+_FEW = 2
 _FAINT = 500.0  # log odds of a mode whose frequency may not be settled
 
 
@@ -268,7 +269,7 @@ class _Search:
         tune_drives(segments, winner, fixed)
         self._best = refine(segments, winner.causes, fixed, drives=winner.drives, iterations=6)
         if not self._fair and self._is_fair(winner):
-            self._fair = True
+            self._fair, settled = True, False
             sharper = sharpen_drives(segments, self._best, fixed)
             # On the same knots, and under the same prior of the drive, as what it is compared with.
             self._best = refine(segments, sharper.causes, fixed, drives=sharper.drives, iterations=6)
@@ -282,11 +283,10 @@ class _Search:
         # The usual end, without a look at the residuals.
         if self._loose or (settled and self._best.objective < _SURELY_WRONG * self._observations):
             return False
-        for segment, drive in zip(self._segments, self._best.drives, strict=True):
-            segment.coefficients = drive
-        rounded = any(segment.rounding.channels > 0 for segment in self._segments)
-        left = left_over(self._segments, self._best, self._fixed, 0, rounded=rounded).log_odds
-        explained = self._fitted.objective - self._best.objective
+        left = self._left(self._best)
+        # Under the noise that the best set left.
+        start = refine(self._segments, self._fitted.causes, self._fixed, drives=self._fitted.drives, iterations=2)
+        explained = start.objective - self._best.objective
         share = _SHARE_AT_END if settled else _SHARE
         self.given_up = left > max(_MUCH, _LITTLE * self._gained, share * explained)
         return self.given_up
@@ -354,25 +354,36 @@ class _Search:
             unique[best.key] = best
             best, without = prune(segments, better, fixed, done)
             unique.pop(best.key, None)
-        if "resonance" in without and len(segments) == 1 and not self._loose:
-            best, without = self._with_memory(best, without, done)
-        if "resonance" in without and best.log_posterior - without["resonance"].log_posterior < _FAINT:
-            best = every_mode(segments, best, fixed)
+        if "resonance" in without:
+            best, without = self._with_mode(best, without, done)
         return best, without, list(unique.values())
 
-    def _with_memory(
+    def _with_mode(
         self, best: Fit, without: dict[str, Fit], done: dict[frozenset[tuple[str, str]], Fit]
     ) -> tuple[Fit, dict[str, Fit]]:
-        """Fit a mode that leaves something again, with a drive that knows how it rings on."""
-        self._segments[0].coefficients = best.drives[0]
-        left = dependence_left(self._segments, best, self._fixed).log_odds
+        """Fit a mode again: one that leaves something with a drive that knows how it rings on, a faint one anew."""
+        segments, fixed = self._segments, self._fixed
+        for segment, drive in zip(segments, best.drives, strict=True):
+            segment.coefficients = drive
+        left = dependence_left(segments, best, fixed).log_odds
         worth = best.log_posterior - without["resonance"].log_posterior
-        if not LEFT_OVER_ODDS < left < _ITS_OWN * worth:
-            return best, without
-        better = remembered_mode(self._segments, best, self._fixed)
-        if better is best:
-            return best, without
-        return prune(self._segments, better, self._fixed, done)
+        # Many causes that together fit badly are made of something else, and so is their mode.
+        likely = len(best.causes) <= _FEW or self._is_fair(best)
+        if likely and LEFT_OVER_ODDS < left < _ITS_OWN * worth and len(segments) == 1 and not self._loose:
+            better = remembered_mode(segments, best, fixed)
+            if better is not best:
+                best, without = prune(segments, better, fixed, done)
+                worth = best.log_posterior - without["resonance"].log_posterior if "resonance" in without else np.inf
+        if worth < _FAINT and (self._loose or self._left(best) < worth):
+            best = every_mode(segments, best, fixed)
+        return best, without
+
+    def _left(self, fit: Fit) -> float:
+        """Return the log odds of the strongest thing that a fit leaves."""
+        for segment, drive in zip(self._segments, fit.drives, strict=True):
+            segment.coefficients = drive
+        rounded = any(segment.rounding.channels > 0 for segment in self._segments)
+        return left_over(self._segments, fit, self._fixed, 0, rounded=rounded).log_odds
 
     def screened(self, about: Fit) -> SignatureSet:
         """Return the signatures about a set: the last ones where they are, or where no set is believed."""

@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
+from gfimu.diagnosis.frozen import frozen_stretches, told_frozen
 from gfimu.diagnosis.model import Effect, WorldModel
 from gfimu.diagnosis.rounding import common_step
 from gfimu.diagnosis.run import Run
 
 __all__ = ["IntegrityReport", "check_integrity"]
 
-_LONGEST_EQUAL = 40
 _RANGE_FACTORS = (1 / 16, 1 / 8, 1 / 4, 1 / 2, 2.0, 4.0, 8.0, 16.0)
 _REMOVED = 0.7
 _SIGNIFICANT_RMS = 12.0
@@ -93,8 +93,11 @@ def check_integrity(model: WorldModel, run: Run, prediction: NDArray[np.float64]
     coarser = _range_factors(model.effects, model)
     limit = min(clipped_at) if clipped_at else _clipping(run, prediction, quantum * coarser, expected.white * coarser)
     at_limit = np.abs(run.readings) >= (np.inf if limit is None else limit - 0.6 * quantum)
-    # Clipped readings look like those of a chip in a wider range.
-    wiring = _wiring(model, replace(run, valid=run.valid & ~at_limit), prediction, expected.white, known)
+    # Clipped or dead readings look like those of a chip in a wider range.
+    alive = run.valid & ~at_limit
+    for channel, start, stop in frozen_stretches(run, prediction, quantum, limit):
+        alive[start:stop, channel] = False
+    wiring = _wiring(model, replace(run, valid=alive), prediction, expected.white, known)
     for name, parameters, sentence in wiring:
         add(name, parameters, sentence)
     rewired = [effect for effect in effects if effect.name in {"axis_swap", "sign_flip", "wrong_range"}]
@@ -109,15 +112,11 @@ def check_integrity(model: WorldModel, run: Run, prediction: NDArray[np.float64]
         clipped = (np.abs(run.readings) >= limit - 0.6 * quantum) | (np.abs(prediction) > limit - 4 * expected.white)
         run = replace(run, valid=run.valid & ~clipped)
     valid = run.valid.copy()
-    for channel, start, stop in _frozen(run, prediction, quantum, limit):
+    frozen = frozen_stretches(run, prediction, quantum, limit)
+    for channel, start, stop in frozen:
         valid[start:stop, channel] = False
-        if "stuck_channel" not in known and not any(effect.name == "stuck_channel" for effect in effects):
-            begin, end = float(run.t[start]), float(run.t[min(stop, len(run.t) - 1)])
-            add(
-                "stuck_channel",
-                {"channel": model.array.channels[channel], "start_s": begin, "stop_s": end},
-                f"channel {model.array.channels[channel]} holds one value from {begin:.2f} s to {end:.2f} s",
-            )
+    if frozen and "stuck_channel" not in known:
+        add("stuck_channel", *told_frozen(run, frozen, model.array.channels))
     run = replace(run, valid=valid)
     spikes = _spikes(run, expected.white * coarser, quantum * coarser)
     run = replace(run, valid=run.valid & ~spikes)
@@ -168,28 +167,6 @@ def _clipping(
     limit = float(np.median(levels))
     close = np.abs(np.array(levels) - limit) < 1.5 * float(steps.min())
     return limit if close.sum() >= max(1, len(levels) // 2) else None
-
-
-def _frozen(
-    run: Run, prediction: NDArray[np.float64], quantum: float, limit: float | None
-) -> list[tuple[int, int, int]]:
-    """Return (channel, start, stop) of stretches in which a channel holds one value though it should not."""
-    found = []
-    for channel in range(run.readings.shape[1]):
-        mine = run.readings[:, channel]
-        change = np.flatnonzero((np.abs(np.diff(mine)) > 1e-12) | ~run.valid[1:, channel])
-        edges = np.concatenate([[-1], change, [len(mine) - 1]])
-        lengths = np.diff(edges)
-        # How much the channel usually changes: away from the stretches in question.
-        alive = np.repeat(lengths <= _LONGEST_EQUAL, lengths) & run.valid[:, channel]
-        usual = float(np.median(np.abs(np.diff(mine[alive])))) if alive.sum() > 10 else 0.0
-        for place in np.flatnonzero(lengths > _LONGEST_EQUAL):
-            start, stop = int(edges[place]) + 1, int(edges[place + 1]) + 1
-            at_limit = limit is not None and abs(mine[start]) >= limit - 0.6 * quantum
-            moving = float(np.ptp(prediction[start:stop, channel])) > 2.5 * quantum
-            if not at_limit and run.valid[start:stop, channel].any() and (moving or usual > 0.3 * quantum):
-                found.append((channel, start, stop))
-    return found
 
 
 def _range_factors(effects: Sequence[Effect], model: WorldModel) -> NDArray[np.float64]:

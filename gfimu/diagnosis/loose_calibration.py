@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gfimu.diagnosis.adequacy import left_over
 from gfimu.diagnosis.calibration_residue import CalibrationResidue, tolerance_of
 from gfimu.diagnosis.causes import Cause, Signature, effects_of_run
 from gfimu.diagnosis.engine import FAIR_FIT, Explanation
@@ -28,6 +29,7 @@ from gfimu.diagnosis.stochastic import LARGEST_USUAL_FLICKER, log_probability
 __all__ = ["LooseCalibration", "loosen", "relearned"]
 
 _USUAL, _LARGE = 1.0, 3.0  # of the tolerances
+_MUCH = 500.0
 _LEAST_ODDS = 3.0  # no more: that everything is a little off is what anybody expects
 
 
@@ -67,6 +69,9 @@ def loosen(plain: Explanation, prepared: PreparedRuns, model: WorldModel) -> Loo
     if larger > value:
         value, scale, start = larger, _LARGE, other
     if value < reference:
+        return None
+    left = left_over(plain.segments, plain.fit, plain.fixed, prepared.spikes, rounded=prepared.rounded)
+    if left.log_odds > max(_MUCH, value - reference):  # of something that is no residue
         return None
     segments, _ = prepared.segments(model)
     fixed = plain.fixed

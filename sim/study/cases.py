@@ -17,6 +17,8 @@ __all__ = ["EXOTICS", "STUDIES", "Case", "study_cases"]
 SIZES = (15.0, 60.0, 300.0, 1500.0, 6000.0)
 """Sizes as d′: from just detectable to gross."""
 
+_FAINT_SIZES = (8.0, 10.0, 12.0, 7.0, 9.0, 11.0, 13.0, 14.0, 16.0, 18.0, 20.0, 22.0)
+
 SIZELESS = tuple(name for name, family in EFFECTS.items() if family.place in {"data", "noise"})
 """Effects without a continuous size; the generators draw what occurs in practice."""
 
@@ -130,7 +132,7 @@ def _faint() -> list[Case]:
     names = [name for name in EFFECTS if name not in SIZELESS]
     return [
         Case("faint", 15_000 + number, (name,), size, **_noise_of(number))
-        for number, (size, name) in enumerate(itertools.product((8.0, 10.0, 12.0), names))
+        for number, (size, name) in enumerate(itertools.product(_FAINT_SIZES, names))
     ]
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d
@@ -55,3 +57,30 @@ def test_a_plateau_just_below_the_limit_hides_no_clipping(below):
     found = diagnose([recording], twin)
     assert {cause.effect for cause in found.causes} == {"saturation"}
     assert found.causes[0].parameters["limit_m_s2"] == pytest.approx(limit, abs=1.1 * step)
+
+
+def test_a_dead_chip_is_told_with_all_its_channels():
+    """All channels that stop together are one fault, in the extended twin too; others are told in the sentence."""
+    twin = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
+    chip = {"channel": ["a21", "a22", "a23"], "start_s": 3.0, "stop_s": 9.0}
+    later = {"channel": "a31", "start_s": 6.0, "stop_s": 7.5}
+    effects = [make_effect("stuck_channel", one, twin.array) for one in (chip, later)]
+    found = diagnose([measure(np.random.default_rng(11), twin, effects, Measurement(duration=12.0))], twin)
+    (cause,) = found.causes
+    assert cause.effect == "stuck_channel"
+    assert cause.parameters["channel"] == chip["channel"]
+    assert cause.parameters["start_s"] == pytest.approx(3.0, abs=0.3)
+    assert cause.parameters["stop_s"] == pytest.approx(9.0, abs=0.3)
+    assert "a21, a22, a23" in cause.why
+    assert "a31" in cause.why
+    assert found.twin.effects[-1].parameters["channel"] == chip["channel"]
+
+
+def test_a_chip_that_was_never_read_is_told():
+    twin = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
+    recording = measure(np.random.default_rng(11), twin, [], Measurement(duration=12.0))
+    readings = recording.readings.copy()
+    readings[:, 3:6] = 0.0
+    found = diagnose([replace(recording, readings=readings)], twin)
+    assert [cause.effect for cause in found.causes] == ["stuck_channel"]
+    assert found.causes[0].parameters["channel"] == ["a21", "a22", "a23"]
