@@ -24,10 +24,14 @@ __all__ = ["IntegrityReport", "check_integrity"]
 _RANGE_FACTORS = (1 / 16, 1 / 8, 1 / 4, 1 / 2, 2.0, 4.0, 8.0, 16.0)
 _REMOVED = 0.7
 _SIGNIFICANT_RMS = 12.0
+_MANY = 3  # inverted channels that are more likely than exchanged ones
 _SPIKE = 8.0
 _PILE = 30
 _CAUGHT = 0.8  # of the samples that should be beyond a limit
 _DIFFERENT = 0.6  # share of values above which steps are finer than what is seen
+
+_Option = tuple[float, str, dict[str, object], str, NDArray[np.float64]]
+"""Misfit removed, effect, its parameters, a sentence, and the prediction with it."""
 
 
 @dataclass(frozen=True)
@@ -200,10 +204,14 @@ def _wiring(
     found: list[tuple[str, dict[str, object], str]] = []
     prediction = prediction.copy()
     chip_of = model.array.chip_of_channel
+    many = [] if "sign_flip" in known else _many_inverted(run, prediction, white)
+    if many:
+        found += [("sign_flip", {"channel": names[channel]}, "") for channel in many]
+        prediction[:, many] *= -1.0
     for _ in range(4):
         misfit, inverted = _misfits(run, prediction, white), _misfits(run, -prediction, white)
         own, flipped = np.diag(misfit), np.diag(inverted)
-        options: list[tuple[float, str, dict[str, object], str, NDArray[np.float64]]] = []
+        options: list[_Option] = []
         for one, two in combinations(range(len(names)), 2):
             before = own[one] + own[two]
             after = misfit[one, two] + misfit[two, one]
@@ -224,6 +232,7 @@ def _wiring(
                         prediction[:, order],
                     )
                 )
+        options += _exchanged_chips(model, misfit, prediction, max((option[0] for option in options), default=0.0))
         for one in range(len(names)):
             if _clears(flipped[one], own[one]):
                 sign = np.ones(len(names))
@@ -261,6 +270,28 @@ def _wiring(
     return _merged_flips(found)
 
 
+def _exchanged_chips(
+    model: WorldModel, misfit: NDArray[np.float64], prediction: NDArray[np.float64], by_two: float
+) -> list[_Option]:
+    """Return whole chips that may be exchanged, where that clears more than the exchange of two channels does."""
+    options: list[_Option] = []
+    chips, names = model.array.chips, model.array.channels
+    channels = [np.flatnonzero(model.array.chip_of_channel == number) for number in range(len(chips))]
+    for one, two in combinations(range(len(chips)), 2):
+        if len(channels[one]) != len(channels[two]) or len(channels[one]) < 2:
+            continue
+        pairs = np.column_stack([channels[one], channels[two]])  # (axes, 2)
+        before = float(misfit[pairs, pairs].sum())
+        after = float((misfit[pairs[:, 0], pairs[:, 1]] + misfit[pairs[:, 1], pairs[:, 0]]).sum())
+        if before - after > by_two + 2 * _SIGNIFICANT_RMS**2 and after < (1 - _REMOVED) * before:
+            order = np.arange(len(names))
+            order[pairs] = pairs[:, ::-1]
+            told = f"chips {chips[one].name} and {chips[two].name} read what the other should"
+            swapped = [names[channel] for channel in pairs.ravel()]
+            options.append((before - after, "axis_swap", {"channels": swapped}, told, prediction[:, order]))
+    return options
+
+
 def _signed(misfit: NDArray[np.float64], inverted: NDArray[np.float64], *places: tuple[int, int]) -> float:
     """Return the summed misfit of channels to predictions, each inverted where that clears it."""
     return sum(float(inverted[at] if _clears(inverted[at], misfit[at]) else misfit[at]) for at in places)
@@ -282,6 +313,15 @@ def _misfits(run: Run, prediction: NDArray[np.float64], white: NDArray[np.float6
     return out
 
 
+def _many_inverted(run: Run, prediction: NDArray[np.float64], white: NDArray[np.float64]) -> list[int]:
+    """Return the channels that fit inverted, if they are several and that does it: in pairs they look exchanged."""
+    own = np.diag(_misfits(run, prediction, white))
+    flipped = np.diag(_misfits(run, -prediction, white))
+    many = [channel for channel in range(len(own)) if _clears(flipped[channel], own[channel])]
+    left = own.sum() - own[many].sum() + flipped[many].sum()
+    return many if len(many) >= _MANY and left < (1 - _REMOVED) * own.sum() else []
+
+
 def _merged_flips(
     found: list[tuple[str, dict[str, object], str]],
 ) -> list[tuple[str, dict[str, object], str]]:
@@ -299,8 +339,9 @@ def _rewire(prediction: NDArray[np.float64], effects: Sequence[Effect], model: W
     prediction = prediction.copy()
     for effect in effects:
         if effect.name == "axis_swap":
-            one, two = (model.array.index(name) for name in effect.parameters["channels"])
-            prediction[:, [one, two]] = prediction[:, [two, one]]
+            places = [model.array.index(name) for name in effect.parameters["channels"]]
+            one, two = places[::2], places[1::2]
+            prediction[:, [*one, *two]] = prediction[:, [*two, *one]]
         elif effect.name == "sign_flip":
             value = effect.parameters["channel"]
             for name in [value] if isinstance(value, str) else value:

@@ -6,10 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gfimu.diagnosis.engine import make_segments
 from gfimu.diagnosis.integrity import IntegrityReport, check_integrity
 from gfimu.diagnosis.model import Effect, WorldModel
+from gfimu.diagnosis.plausibility import refuse_implausible
 from gfimu.diagnosis.run import Run, prepare_run
 from gfimu.diagnosis.segment import Segment
 from gfimu.recording import Recording
@@ -70,7 +72,11 @@ class PreparedRuns:
 
 
 def _check(model: WorldModel, run: Run) -> IntegrityReport:
-    prediction = np.concatenate([segment.predict([])[:, :-1] for segment in make_segments(model, [run])])
+    def predict(other: Run) -> NDArray[np.float64]:
+        return np.concatenate([segment.predict([])[:, :-1] for segment in make_segments(model, [other])])
+
+    prediction = predict(run)
+    refuse_implausible(model, run, prediction, predict)
     return check_integrity(model, run, prediction)
 
 

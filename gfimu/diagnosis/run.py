@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -12,10 +13,12 @@ from gfimu.diagnosis.model import WorldModel
 from gfimu.errors import InputError
 from gfimu.recording import Recording
 
-__all__ = ["GYRO_COLUMNS", "Run", "prepare_run"]
+__all__ = ["GYRO_COLUMNS", "REFERENCE_COLUMNS", "Run", "prepare_run"]
 
 GYRO_COLUMNS = ("gyro_x_rad_s", "gyro_y_rad_s", "gyro_z_rad_s")
 """Columns of the gyro that drives the twin of a free body."""
+REFERENCE_COLUMNS: Mapping[str, str] = {"tacho": "tacho_rad_s", "angle": "angle_rad", "command": "command_rad_s"}
+"""Column of the reference of a table, by the drive source of the twin."""
 
 MINIMUM_DURATION = 4.0
 _MINIMUM_SAMPLES = 80
@@ -27,7 +30,6 @@ _BRIDGED_SPACINGS = 3.0
 _SHORTEST = 2.0  # s between two gaps of the reference
 _ONE_STEP = 1.5
 _MOVING = 8.0
-_REFERENCE_COLUMNS = {"tacho": "tacho_rad_s", "angle": "angle_rad", "command": "command_rad_s"}
 
 
 @dataclass(frozen=True)
@@ -119,6 +121,8 @@ def prepare_run(recording: Recording, model: WorldModel, *, name: str = "run") -
         )
     if not np.isfinite(readings).any():
         raise InputError(f"{name}: no channel has a value; record the channels of array {model.array.name!r}")
+    if not any(np.ptp(one[np.isfinite(one)]) > 0.0 for one in readings.T if np.isfinite(one).any()):
+        raise InputError(f"{name}: every channel holds one value throughout; check that the board was read")
     column, drive = _drive(recording, model, name)
     if np.isfinite(drive).sum() < 20:
         raise InputError(f"{name}: column {column} has fewer than 20 values; record the reference with the channels")
@@ -223,9 +227,9 @@ def _drive(recording: Recording, model: WorldModel, name: str) -> tuple[str, NDA
                     "with the channels"
                 )
         return "gyro", np.linalg.norm(np.column_stack([have[column] for column in GYRO_COLUMNS]), axis=1)
-    column = _REFERENCE_COLUMNS[model.drive_source]
+    column = REFERENCE_COLUMNS[model.drive_source]
     if column not in have:
-        others = [source for source, key in _REFERENCE_COLUMNS.items() if key in have]
+        others = [source for source, key in REFERENCE_COLUMNS.items() if key in have]
         raise InputError(
             f"{name}: column {column} is missing, but the twin's drive source is {model.drive_source!r}; "
             + (

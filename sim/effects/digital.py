@@ -125,13 +125,13 @@ class AxisSwap(_Discrete):
     keys = ("channels",)
 
     def apply(self, world: World) -> World:
-        """Exchange the two channels."""
+        """Exchange the two channels, or the two of each pair where several follow each other."""
         names = self.names("channels")
-        if len(names) != 2:
-            raise InputError("effect 'axis_swap': channels must hold two channel names")
-        first, second = (world.array.index(name) for name in names)
+        if not names or len(names) % 2 or len(set(names)) < len(names):
+            raise InputError("effect 'axis_swap': channels must hold two channel names, or pairs of different ones")
+        places = [world.array.index(name) for name in names]
         order = np.arange(world.array.n_channels)
-        order[[first, second]] = order[[second, first]]
+        order[places[::2]], order[places[1::2]] = places[1::2], places[::2]
         return _with_data_step(world, lambda t, readings, rng: readings[:, order])
 
 
@@ -151,10 +151,10 @@ class SignFlip(_Discrete):
 
 
 class StuckChannel(_Discrete):
-    """A channel frozen for a while."""
+    """One or several channels frozen for a while."""
 
     name = "stuck_channel"
-    summary = "a channel is frozen for a while"
+    summary = "one or several channels are frozen for a while"
     keys = ("channel", "start_s", "stop_s")
 
     def apply(self, world: World) -> World:
