@@ -12,20 +12,20 @@ from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import median_filter
 
 from gfimu.diagnosis.frozen import frozen_stretches, told_frozen
 from gfimu.diagnosis.model import Effect, WorldModel
 from gfimu.diagnosis.rounding import common_step
 from gfimu.diagnosis.run import Run
+from gfimu.diagnosis.spikes import channel_spikes
 
 __all__ = ["IntegrityReport", "check_integrity"]
 
 _RANGE_FACTORS = (1 / 16, 1 / 8, 1 / 4, 1 / 2, 2.0, 4.0, 8.0, 16.0)
 _REMOVED = 0.7
+_FITTING = 0.6  # of the power of the readings
 _SIGNIFICANT_RMS = 12.0
 _MANY = 3  # inverted channels that are more likely than exchanged ones
-_SPIKE = 8.0
 _PILE = 30
 _CAUGHT = 0.8  # of the samples that should be beyond a limit
 _DIFFERENT = 0.6  # share of values above which steps are finer than what is seen
@@ -122,7 +122,7 @@ def check_integrity(model: WorldModel, run: Run, prediction: NDArray[np.float64]
     if frozen and "stuck_channel" not in known:
         add("stuck_channel", *told_frozen(run, frozen, model.array.channels))
     run = replace(run, valid=valid)
-    spikes = _spikes(run, expected.white * coarser, quantum * coarser)
+    spikes = channel_spikes(run, expected.white * coarser, quantum * coarser)
     run = replace(run, valid=run.valid & ~spikes)
     return IntegrityReport(run, tuple(effects), why, int(spikes.sum()))
 
@@ -184,18 +184,6 @@ def _range_factors(effects: Sequence[Effect], model: WorldModel) -> NDArray[np.f
     return factors
 
 
-def _spikes(run: Run, white: NDArray[np.float64], quantum: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Mark isolated samples far off the median of their five neighbours; white noise and step per channel (c,)."""
-    readings = run.readings.copy()
-    for column, valid in zip(readings.T, run.valid.T, strict=True):
-        if valid.any():  # a gap is no neighbour
-            column[~valid] = np.interp(run.t[~valid], run.t[valid], column[valid])
-    smooth = median_filter(readings, size=(5, 1), mode="nearest")
-    jump = np.abs(readings - smooth)
-    rough = median_filter(np.abs(np.diff(readings, axis=0, prepend=readings[:1])), size=(9, 1), mode="nearest")
-    return run.valid & (jump > _SPIKE * np.maximum(white, 0.5 * quantum) + 6 * rough)
-
-
 def _wiring(
     model: WorldModel, run: Run, prediction: NDArray[np.float64], white: NDArray[np.float64], known: set[str]
 ) -> list[tuple[str, dict[str, object], str]]:
@@ -204,6 +192,7 @@ def _wiring(
     found: list[tuple[str, dict[str, object], str]] = []
     prediction = prediction.copy()
     chip_of = model.array.chip_of_channel
+    power = np.diag(_misfits(run, np.zeros_like(prediction), white))
     many = [] if "sign_flip" in known else _many_inverted(run, prediction, white)
     if many:
         found += [("sign_flip", {"channel": names[channel]}, "") for channel in many]
@@ -250,11 +239,14 @@ def _wiring(
             scaled = np.diag(_misfits(run, factor * prediction, white))
             for number, chip in enumerate(model.array.chips):
                 mine = chip_of == number
-                if own[mine].sum() > 2 * _SIGNIFICANT_RMS**2 and scaled[mine].sum() < (1 - _REMOVED) * own[mine].sum():
+                after, before = float(scaled[mine].sum()), float(own[mine].sum())
+                # A prediction that is too large by far comes nearer by any factor.
+                limit = min((1 - _REMOVED) * before, _FITTING * float(power[mine].sum()))
+                if before > 2 * _SIGNIFICANT_RMS**2 and after < limit:
                     gain = np.where(mine, factor, 1.0)
                     options.append(
                         (
-                            float(own[mine].sum() - scaled[mine].sum()),
+                            before - after,
                             "wrong_range",
                             {"chip": chip.name, "factor": factor},
                             f"chip {chip.name} reads {factor:g} times what it should",

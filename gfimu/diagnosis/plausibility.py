@@ -1,4 +1,4 @@
-"""Plausibility: recordings that fit the twin only in another unit, turned over, or with the reference reversed.
+"""Plausibility: recordings that fit the twin only in another unit, turned over, with another drive, or not at all.
 
 No effect of the library is that: such a file is wrong about itself, and what is wrong is told instead of a diagnosis.
 """
@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import label
 
 from gfimu.diagnosis.model import WorldModel
 from gfimu.diagnosis.run import REFERENCE_COLUMNS, Run
@@ -22,6 +23,9 @@ _SIGNIFICANT_RMS, _LARGE_RMS = 2.0, 12.0  # of the misfit, in noise units: for a
 _REMOVED = 0.8  # of the misfit, by another reading of the file
 _MISSED, _MISSED_VARYING = 0.05, 0.3  # of the power of the readings, and of what varies in them, by one that fits
 _NOISE = 4.0
+_AT_REST = 0.05  # of the largest rate
+_FEWEST = 20
+_UNRELATED = 0.1  # correlation
 _KEPT = 3  # quarters of the channels
 _TURN = 2 * np.pi
 _REVERSED = -1.0
@@ -89,7 +93,7 @@ def refuse_implausible(
         for words, scale in scales.items()
         for other in [replace(run, reference=run.reference / scale)]
     ]
-    options = list(references)
+    options = [*references, *_signed_in_parts(run, prediction, references, expected.white, predict)]
     if misfit.whole > _LARGE_RMS**2:
         options += _in_units([_Reading("", run, prediction), *references], expected.quantum)
         options += _turned(run, predict)
@@ -104,6 +108,11 @@ def refuse_implausible(
             found.append((left, option.text))
     if found:
         raise InputError(f"{run.name}: {min(found)[1]}")
+    if _is_unrelated(run, prediction, expected.white):
+        raise InputError(
+            f"{run.name}: no channel follows the motion that column {column} tells; "
+            "are they of the same run, and was the board on the table?"
+        )
 
 
 @dataclass(frozen=True)
@@ -125,6 +134,49 @@ class _Misfit:
 
     whole: float
     varying: float
+
+
+def _signed_in_parts(
+    run: Run,
+    prediction: NDArray[np.float64],
+    references: Sequence[_Reading],
+    white: NDArray[np.float64],
+    predict: Callable[[Run], NDArray[np.float64]],
+) -> list[_Reading]:
+    """Return the run with the reference reversed between some of its rests, as one without a direction needs it."""
+    reverse = next((one for one in references if "opposite sign" in one.text), None)
+    if reverse is None:
+        return []
+    known = run.reference_valid
+    size = np.abs(np.interp(run.t, run.t[known], run.reference[known]))
+    parts, count = label(size > _AT_REST * size.max())
+    reference = run.reference.copy()
+    turned = 0
+    for number in range(1, count + 1):
+        rows = parts == number
+        as_told, other = (
+            float(np.sum(np.where(run.valid[rows], (run.readings[rows] - told[rows]) / white, 0.0) ** 2))
+            for told in (prediction, reverse.prediction)
+        )
+        if other < (1.0 - _REMOVED) * as_told:
+            reference[rows] *= -1.0
+            turned += 1
+    if turned == 0:
+        return []
+    signed = replace(run, reference=reference)
+    text = f"{reverse.text.partition(' has ')[0]} has the wrong sign in {turned} of {count} turns; give it a direction"
+    return [_Reading(text, signed, predict(signed), steady=False)]
+
+
+def _is_unrelated(run: Run, prediction: NDArray[np.float64], white: NDArray[np.float64]) -> bool:
+    """Tell whether much should vary and no channel goes with what it should read."""
+    related = []
+    for mine, told, valid, sigma in zip(run.readings.T, prediction.T, run.valid.T, white, strict=True):
+        if valid.sum() < _FEWEST or np.std(told[valid]) < _LARGE_RMS * sigma:
+            continue
+        spread = float(np.std(mine[valid]))
+        related.append(abs(float(np.corrcoef(mine[valid], told[valid])[0, 1])) if spread > 0.0 else 0.0)
+    return len(related) > prediction.shape[1] // 3 and max(related) < _UNRELATED
 
 
 def _in_units(references: Sequence[_Reading], quantum: float) -> list[_Reading]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from gfimu.diagnosis.model import Effect, WorldModel
 from gfimu.diagnosis.plausibility import refuse_implausible
 from gfimu.diagnosis.run import Run, prepare_run
 from gfimu.diagnosis.segment import Segment
+from gfimu.diagnosis.spikes import reference_spikes
 from gfimu.recording import Recording
 
 __all__ = ["PreparedRuns"]
@@ -35,7 +36,7 @@ class PreparedRuns:
     why : dict of str to str
         One sentence per effect name.
     spikes : int
-        Isolated samples far off their neighbours, over all runs.
+        Isolated samples and values of the reference far off their neighbours, over all runs.
     rounded : bool
         Whether readings are clipped or coarse, so that their error follows the motion.
     """
@@ -53,11 +54,15 @@ class PreparedRuns:
         why: dict[str, str] = {}
         for recording, name in zip(recordings, names, strict=True):
             run = prepare_run(recording, model, name=name)
+            wrong = reference_spikes(run)
+            run = replace(
+                run, reference=np.where(wrong, 0.0, run.reference), reference_valid=run.reference_valid & ~wrong
+            )
             checked = _check(model, run)
             runs.append(checked.run)
             effects.append(list(checked.effects))
             why = {**checked.why, **why}  # of the run whose numbers are told, the first
-            spikes += checked.spikes
+            spikes += checked.spikes + int(wrong.sum())
         rounded = any(effect.name in _ROUNDING for known in (model.effects, *effects) for effect in known)
         return cls(runs, effects, why, spikes, rounded)
 

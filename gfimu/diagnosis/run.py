@@ -22,6 +22,7 @@ REFERENCE_COLUMNS: Mapping[str, str] = {"tacho": "tacho_rad_s", "angle": "angle_
 
 MINIMUM_DURATION = 4.0
 _MINIMUM_SAMPLES = 80
+_LONGEST_PERIOD = 0.2  # s
 _REPEATING = 0.3
 _DIFFERING = 0.5
 _ALONE = 0.5
@@ -128,6 +129,11 @@ def prepare_run(recording: Recording, model: WorldModel, *, name: str = "run") -
         raise InputError(f"{name}: column {column} has fewer than 20 values; record the reference with the channels")
     _refuse_dead_reference(readings, drive, column, model, recording.sample_rate, name)
     period = recording.sample_period
+    if period > _LONGEST_PERIOD:
+        raise InputError(
+            f"{name}: one sample every {period:g} s is too slow to diagnose; is column t_s in seconds? "
+            f"Record at {1 / _LONGEST_PERIOD:g} Hz at least"
+        )
     steps = np.diff(recording.t_s)
     place = np.concatenate([[0], np.cumsum(np.maximum(1, np.rint(steps / period).astype(int)))])
     n = int(place[-1]) + 1

@@ -63,6 +63,35 @@ def test_a_dead_chip_besides_hides_no_wrong_unit(sound):
         diagnose([replace(sound, readings=readings)], TWIN)
 
 
+def test_a_reference_without_a_direction_is_refused(sound):
+    """As of a tachometer that counts pulses: the runs of the campaign turn both ways."""
+    reference = {**sound.reference, "tacho_rad_s": np.abs(sound.reference["tacho_rad_s"])}
+    with pytest.raises(InputError, match="wrong sign in"):
+        diagnose([replace(sound, reference=reference)], TWIN)
+
+
+def test_channels_that_follow_no_motion_are_refused(sound):
+    noise = np.random.default_rng(1).normal(0.0, 3.0, sound.readings.shape)
+    with pytest.raises(InputError, match="no channel follows"):
+        diagnose([replace(sound, readings=noise)], TWIN)
+
+
+def test_times_in_milliseconds_are_refused(sound):
+    with pytest.raises(InputError, match="is column t_s in seconds"):
+        diagnose([replace(sound, t_s=1000.0 * sound.t_s)], TWIN)
+
+
+def test_isolated_values_of_the_reference_are_told_and_spoil_nothing(sound):
+    """Pulses too many, some close to each other: they are left out, and what is hidden besides is still fitted."""
+    wrong = np.random.default_rng(1).random(len(sound)) < 0.01
+    reference = {**sound.reference, "tacho_rad_s": sound.reference["tacho_rad_s"] + np.where(wrong, 30.0, 0.0)}
+    found = diagnose([replace(sound, reference=reference)], TWIN)
+    assert found.verdict == "unknown"
+    assert found.unexplained.signature.startswith(f"{wrong.sum()} isolated")
+    assert not found.causes
+    assert found.residual.rms_after < 1.02 * found.residual.noise_floor
+
+
 def test_a_cube_that_lies_otherwise_than_its_metadata_say_is_refused():
     turned = measure(np.random.default_rng(5), TWIN, [], SHORT, mounting=UPSIDE_DOWN)
     assert diagnose([turned], TWIN).verdict == "nothing_found"
