@@ -19,9 +19,9 @@ from gfimu.diagnosis.model import Effect, WorldModel
 from gfimu.diagnosis.nuisances import STEADY_NOISE, learn_noise, sharpen_drives, tune_drives, widen_drives
 from gfimu.diagnosis.pruning import RIVALS, near_rivals, prune
 from gfimu.diagnosis.refinement import Fit, Start, refine, refine_each
-from gfimu.diagnosis.run import Run
+from gfimu.diagnosis.run import Run, difference_noise
 from gfimu.diagnosis.search import search
-from gfimu.diagnosis.segment import Segment, difference_noise
+from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.signatures import SignatureSet, hypotheses, plan_signatures, signature_columns
 from gfimu.diagnosis.threads import over_segments
 

@@ -13,7 +13,7 @@ from gfimu.diagnosis.model import WorldModel
 from gfimu.errors import InputError
 from gfimu.recording import Recording
 
-__all__ = ["GYRO_COLUMNS", "REFERENCE_COLUMNS", "Run", "prepare_run"]
+__all__ = ["GYRO_COLUMNS", "REFERENCE_COLUMNS", "Run", "difference_noise", "prepare_run"]
 
 GYRO_COLUMNS = ("gyro_x_rad_s", "gyro_y_rad_s", "gyro_z_rad_s")
 """Columns of the gyro that drives the twin of a free body."""
@@ -23,6 +23,9 @@ REFERENCE_COLUMNS: Mapping[str, str] = {"tacho": "tacho_rad_s", "angle": "angle_
 MINIMUM_DURATION = 4.0
 _MINIMUM_SAMPLES = 80
 _LONGEST_PERIOD = 0.2  # s
+_HELD = 5  # equal values of a reference whose noise shows
+_FINE, _FEW_REPEATS = 1e-4, 0.01  # noise to the largest value, and equal neighbours, of such a reference
+_JUMP = 20.0  # noise
 _REPEATING = 0.3
 _DIFFERING = 0.5
 _ALONE = 0.5
@@ -222,6 +225,29 @@ def _without_repeats(reference: NDArray[np.float64]) -> NDArray[np.float64]:
     return out
 
 
+def _without_holds(reference: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Leave out stretches in which a noisy reference holds one value: it has stopped, or lost its pulses.
+
+    A table at rest may be told as zero to the last digit; zero that the reference jumps to is no rest.
+    """
+    known = np.flatnonzero(np.isfinite(reference))
+    values = reference[known]
+    edges = np.concatenate([[0], np.flatnonzero(np.diff(values)) + 1, [len(values)]])
+    lengths = np.diff(edges)
+    held = np.repeat(lengths >= _HELD, lengths)
+    moving = values[~held]
+    noise = difference_noise(moving)
+    repeats = lengths[lengths < _HELD] - 1
+    if not held.any() or not noise > _FINE * np.abs(values).max() or repeats.sum() > _FEW_REPEATS * len(moving):
+        return reference
+    out = reference.copy()
+    for start, stop in zip(edges[:-1][lengths >= _HELD], edges[1:][lengths >= _HELD], strict=True):
+        around = np.abs(values[[max(start - 1, 0), min(stop, len(values) - 1)]] - values[start])
+        if values[start] != 0.0 or around.max() > _JUMP * noise:
+            out[known[start:stop]] = np.nan
+    return out
+
+
 def _drive(recording: Recording, model: WorldModel, name: str) -> tuple[str, NDArray[np.float64]]:
     """Return the column that drives the twin and its values: the rate or angle, or the magnitude of a gyro's rate."""
     have = recording.reference
@@ -244,7 +270,8 @@ def _drive(recording: Recording, model: WorldModel, name: str) -> tuple[str, NDA
                 else "record a tachometer, angle or command"
             )
         )
-    return column, _without_repeats(np.asarray(have[column], dtype=float))
+    reference = _without_repeats(np.asarray(have[column], dtype=float))
+    return column, _without_holds(reference) if model.drive_source == "tacho" else reference
 
 
 def _refuse_dead_reference(
@@ -266,3 +293,11 @@ def _refuse_dead_reference(
             f"{name}: column {column} is {known[0]:g} throughout although the channels move; "
             "check that the reference was connected"
         )
+
+
+def difference_noise(reference: NDArray[np.float64]) -> float:
+    """Return the white noise of a smooth reference from its third differences (robust), rad/s or rad."""
+    third = np.diff(reference, n=3)
+    if not len(third):
+        return 0.0
+    return 1.4826 * float(np.median(np.abs(third - np.median(third)))) / np.sqrt(20.0)

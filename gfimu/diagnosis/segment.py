@@ -32,9 +32,9 @@ from gfimu.diagnosis.linearisation import DriveElimination, DriveEquations, Line
 from gfimu.diagnosis.model import Effect, Spin, WorldModel
 from gfimu.diagnosis.roughness import Roughness
 from gfimu.diagnosis.rounding import COARSE, Steps
-from gfimu.diagnosis.run import Run
+from gfimu.diagnosis.run import Run, difference_noise
 
-__all__ = ["Segment", "difference_noise", "known_walk"]
+__all__ = ["Segment", "known_walk"]
 
 TIME_MARGIN = 0.5
 _WALK = "bias_random_walk"
@@ -491,11 +491,3 @@ def known_walk(model: WorldModel) -> float:
     """Return the random walk of the biases that the model has already, m/s² per √s."""
     walks = [float(effect.parameters["strength_m_s2_rts"]) for effect in model.effects if effect.name == _WALK]
     return float(np.linalg.norm(walks))
-
-
-def difference_noise(reference: NDArray[np.float64]) -> float:
-    """Return the white noise of a smooth reference from its third differences (robust), rad/s or rad."""
-    third = np.diff(reference, n=3)
-    if not len(third):
-        return 0.0
-    return 1.4826 * float(np.median(np.abs(third - np.median(third)))) / np.sqrt(20.0)

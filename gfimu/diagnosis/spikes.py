@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
-from gfimu.diagnosis.run import Run
-from gfimu.diagnosis.segment import difference_noise
+from gfimu.diagnosis.run import Run, difference_noise
 
 __all__ = ["channel_spikes", "reference_spikes"]
 

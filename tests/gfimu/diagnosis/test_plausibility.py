@@ -10,6 +10,7 @@ import pytest
 from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.diagnose import diagnose
 from gfimu.diagnosis.prepared_runs import PreparedRuns
+from gfimu.diagnosis.run import prepare_run
 from gfimu.errors import InputError
 from gfimu.units import STANDARD_GRAVITY
 from sim.campaign import Measurement, hidden_effect, measure, random_profile
@@ -90,6 +91,29 @@ def test_isolated_values_of_the_reference_are_told_and_spoil_nothing(sound):
     assert found.unexplained.signature.startswith(f"{wrong.sum()} isolated")
     assert not found.causes
     assert found.residual.rms_after < 1.02 * found.residual.noise_floor
+
+
+@pytest.mark.parametrize(
+    ("lost", "value"),
+    [((6.0, 9.0), None), ((6.0, 9.0), 0.0), ((8.0, 8.2), 0.0)],
+    ids=["holds its last", "falls to zero", "falls to zero for a moment"],
+)
+def test_a_reference_that_stops_for_a_while_counts_as_lost(sound, lost, value):
+    tacho = sound.reference["tacho_rad_s"].copy()
+    gone = (sound.t_s >= lost[0]) & (sound.t_s < lost[1])
+    tacho[gone] = tacho[gone][0] if value is None else value
+    found = diagnose([replace(sound, reference={**sound.reference, "tacho_rad_s": tacho})], TWIN)
+    assert found.verdict == "nothing_found"
+    assert any("the reference is missing" in line for line in found.sentences) == (lost[1] - lost[0] > 0.5)
+
+
+def test_zero_to_the_last_digit_at_rest_is_no_lost_reference():
+    """A tachometer of pulses tells rest without noise."""
+    recording = measure(np.random.default_rng(5), TWIN, [], SHORT)
+    tacho = recording.reference["tacho_rad_s"].copy()
+    tacho[np.abs(tacho) < 0.08] = 0.0
+    run = prepare_run(replace(recording, reference={**recording.reference, "tacho_rad_s": tacho}), TWIN)
+    assert run.reference_valid.all()
 
 
 def test_a_cube_that_lies_otherwise_than_its_metadata_say_is_refused():
