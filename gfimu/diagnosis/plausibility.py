@@ -85,6 +85,7 @@ def refuse_implausible(
     if misfit.varying < _SIGNIFICANT_RMS**2 and misfit.whole < _LARGE_RMS**2:
         return
     column = REFERENCE_COLUMNS[model.drive_source]
+    _refuse_unrelated(run, prediction, expected.white, column)
     scales = _ANGLES if model.drive_source == "angle" else _RATES
     if misfit.whole < _LARGE_RMS**2:
         scales = {words: scale for words, scale in scales.items() if scale == _REVERSED}
@@ -108,11 +109,6 @@ def refuse_implausible(
             found.append((left, option.text))
     if found:
         raise InputError(f"{run.name}: {min(found)[1]}")
-    if _is_unrelated(run, prediction, expected.white):
-        raise InputError(
-            f"{run.name}: no channel follows the motion that column {column} tells; "
-            "are they of the same run, and was the board on the table?"
-        )
 
 
 @dataclass(frozen=True)
@@ -168,15 +164,24 @@ def _signed_in_parts(
     return [_Reading(text, signed, predict(signed), steady=False)]
 
 
-def _is_unrelated(run: Run, prediction: NDArray[np.float64], white: NDArray[np.float64]) -> bool:
-    """Tell whether much should vary and no channel goes with what it should read."""
-    related = []
+def _refuse_unrelated(run: Run, prediction: NDArray[np.float64], white: NDArray[np.float64], column: str) -> None:
+    """Refuse a run in which much should vary and no channel goes with what it should read."""
+    related, spreads = [], []
     for mine, told, valid, sigma in zip(run.readings.T, prediction.T, run.valid.T, white, strict=True):
         if valid.sum() < _FEWEST or np.std(told[valid]) < _LARGE_RMS * sigma:
             continue
-        spread = float(np.std(mine[valid]))
-        related.append(abs(float(np.corrcoef(mine[valid], told[valid])[0, 1])) if spread > 0.0 else 0.0)
-    return len(related) > prediction.shape[1] // 3 and max(related) < _UNRELATED
+        spreads.append(float(np.ptp(mine[valid])))
+        related.append(abs(float(np.corrcoef(mine[valid], told[valid])[0, 1])) if spreads[-1] > 0.0 else 0.0)
+    if len(related) <= prediction.shape[1] // 3 or max(related) > _UNRELATED:
+        return
+    if not any(spreads):
+        raise InputError(
+            f"{run.name}: the channels hold one value while the table turns; check that the board was read"
+        )
+    raise InputError(
+        f"{run.name}: no channel follows the motion that column {column} tells; "
+        "are they of the same run, and was the board on the table?"
+    )
 
 
 def _in_units(references: Sequence[_Reading], quantum: float) -> list[_Reading]:

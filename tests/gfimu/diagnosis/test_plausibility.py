@@ -134,7 +134,7 @@ def test_no_gross_effect_is_taken_for_a_wrong_file(name):
 
 
 def test_a_board_that_was_not_read_is_refused(sound):
-    with pytest.raises(InputError, match="every channel holds one value"):
+    with pytest.raises(InputError, match="the channels hold one value"):
         diagnose([replace(sound, readings=np.tile(sound.readings[:1], (len(sound), 1)))], TWIN)
 
 
