@@ -52,7 +52,7 @@ _SURELY_WRONG = 1.02  # misfit per observation
 _MUCH, _LITTLE, _SHARE = 500.0, 10.0, 0.1  # nats that are left: at least; to those of a round; to the misfit explained
 _SHARE_AT_END = 0.02  # no cause is believed then (`conclusion.is_dominant`)
 _ITS_OWN = 0.1  # of what a mode explains: what it leaves may be its own
-_FEW = 2
+_FEW = 2  # causes of which one may be a mode though they fit badly
 _FAINT = 500.0  # log odds of a mode whose frequency may not be settled
 
 

@@ -94,7 +94,10 @@ def refuse_implausible(
         for words, scale in scales.items()
         for other in [replace(run, reference=run.reference / scale)]
     ]
-    options = [*references, *_signed_in_parts(run, prediction, references, expected.white, predict)]
+    options = list(references)
+    if model.drive_source != "angle":
+        reverse = references[list(scales.values()).index(_REVERSED)]
+        options += _signed_in_parts(run, prediction, reverse, expected.white, predict, column)
     if misfit.whole > _LARGE_RMS**2:
         options += _in_units([_Reading("", run, prediction), *references], expected.quantum)
         options += _turned(run, predict)
@@ -135,14 +138,12 @@ class _Misfit:
 def _signed_in_parts(
     run: Run,
     prediction: NDArray[np.float64],
-    references: Sequence[_Reading],
+    reverse: _Reading,
     white: NDArray[np.float64],
     predict: Callable[[Run], NDArray[np.float64]],
+    column: str,
 ) -> list[_Reading]:
     """Return the run with the reference reversed between some of its rests, as one without a direction needs it."""
-    reverse = next((one for one in references if "opposite sign" in one.text), None)
-    if reverse is None:
-        return []
     known = run.reference_valid
     size = np.abs(np.interp(run.t, run.t[known], run.reference[known]))
     parts, count = label(size > _AT_REST * size.max())
@@ -160,7 +161,7 @@ def _signed_in_parts(
     if turned == 0:
         return []
     signed = replace(run, reference=reference)
-    text = f"{reverse.text.partition(' has ')[0]} has the wrong sign in {turned} of {count} turns; give it a direction"
+    text = f"column {column} has the wrong sign in {turned} of {count} turns; give it a direction"
     return [_Reading(text, signed, predict(signed), steady=False)]
 
 

@@ -83,7 +83,7 @@ def test_times_in_milliseconds_are_refused(sound):
 
 
 def test_isolated_values_of_the_reference_are_told_and_spoil_nothing(sound):
-    """Pulses too many, some close to each other: they are left out, and what is hidden besides is still fitted."""
+    """Pulses too many, some close to each other: they are left out, and what remains fits to the noise."""
     wrong = np.random.default_rng(1).random(len(sound)) < 0.01
     reference = {**sound.reference, "tacho_rad_s": sound.reference["tacho_rad_s"] + np.where(wrong, 30.0, 0.0)}
     found = diagnose([replace(sound, reference=reference)], TWIN)
