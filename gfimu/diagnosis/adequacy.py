@@ -8,6 +8,7 @@ with the drive and the named causes projected out; what the generic basis is bli
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,10 +74,11 @@ def left_over(
         Whether readings are clipped or so coarse that their rounding follows the motion.
     """
     channels = segments[0].model.array.channels
-    candidates = [dependence_left(segments, fit, fixed)]
-    candidates += [lines(segment, fit, known, channels) for segment, known in zip(segments, fixed, strict=True)]
-    candidates.append(one_curve(segments, fit, fixed, channels))
-    candidates += [jumps(segment, fit, known, channels) for segment, known in zip(segments, fixed, strict=True)]
+    candidates = [dependence_left(segments, fit, fixed), one_curve(segments, fit, fixed, channels)]
+    for test in (lines, jumps):
+        each = [test(segment, fit, known, channels) for segment, known in zip(segments, fixed, strict=True)]
+        # Each stretch is one more place to find something by chance.
+        candidates += [replace(one, log_odds=one.log_odds - np.log(len(segments))) for one in each]
     if not rounded:
         candidates.append(changing_noise(segments, fit, fixed))
     if spikes > max(3, 1e-4 * sum(segment.weight_mask.size for segment in segments)):
@@ -173,39 +175,56 @@ def series_products(
         b.
     """
     each = np.broadcast_to(basis, (line.jacobian.observations, *basis.shape[-2:]))
-    gram, score, cross = _channelwise(segment, line, each)
+    masked = _masked(segment, each)
+    gram, score, cross = _channelwise(segment, line, masked)
     named = cause_columns(segment, causes, known, shapes=True)
     if named.shape[1]:
-        gram, score = _project_out(segment, line, each, cross, gram, score, named)
+        gram, score = _project_out(segment, line, masked, cross, gram, score, named)
     return gram, score
 
 
+_Masked = list[tuple[NDArray[np.float64], NDArray[np.float64]]]
+
+
+def _masked(segment: Segment, basis: NDArray[np.float64]) -> _Masked:
+    """Return basis functions (c + 1, n, k) by series as its samples weigh them, (n, k) and in the cosines (K, k).
+
+    What is the same for several series, as for most channels, is the same object.
+    """
+    same = basis.strides[0] == 0  # broadcast: the same functions for every series
+    found: _Masked = []
+    for series, functions in enumerate(basis):
+        mask = segment.row_weight[:, series]
+        if not (found and same and np.array_equal(mask, segment.row_weight[:, series - 1])):
+            part = functions * mask[:, None]
+            found.append((part, segment.cosines.T @ part))
+        else:
+            found.append(found[-1])
+    return found
+
+
 def _channelwise(
-    segment: Segment, line: Linearisation, basis: NDArray[np.float64]
+    segment: Segment, line: Linearisation, masked: _Masked
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Return G, b and X of basis functions (c + 1, n, k) on each channel and the reference, drive marginalised."""
-    count = basis.shape[2]
+    """Return G, b and X of basis functions on each channel and the reference, drive marginalised."""
+    count = masked[0][0].shape[1]
     observed = line.jacobian.observations
     gram = np.zeros((count * observed, count * observed))
     score = np.zeros(count * observed)
     cross = np.zeros((segment.spline.size, count * observed))
-    cosines, share = segment.cosines, segment.share
-    same = basis.strides[0] == 0  # broadcast: the same functions for every series
-    for channel in range(observed):
-        mask = segment.row_weight[:, channel]
-        # What depends on functions and weights alone is the same for most channels.
-        if channel == 0 or not (same and np.array_equal(mask, segment.row_weight[:, channel - 1])):
-            part = basis[channel] * mask[:, None]
-            slow, square = cosines.T @ part, part.T @ part
+    for channel, (part, slow) in enumerate(masked):
+        if channel == 0 or part is not masked[channel - 1][0]:
+            square = part.T @ part
             through = [matrix.T @ part for matrix in line.jacobian.parts]
         weight, loading = segment.inverse_variance[channel], line.jacobian.loading[:, channel]
-        damped = share[:, [channel]] * slow
+        damped = segment.share[:, [channel]] * slow
         places = slice(channel * count, (channel + 1) * count)
-        residual = line.residual[:, channel]
         gram[places, places] = weight * (square - slow.T @ damped)
-        score[places] = weight * (part.T @ residual - damped.T @ (cosines.T @ residual))
-        for r in np.flatnonzero(loading):
-            cross[:, places] += weight * loading[r] * (through[r] - line.slow[r] @ damped)
+        score[places] = weight * (part.T @ line.residual[:, channel] - damped.T @ line.slow_residual[:, channel])
+        used = np.flatnonzero(loading)
+        if len(used):
+            slowly = np.tensordot(loading[used], line.slow[used], axes=1)  # J_cᵀC (m, K)
+            cross[:, places] = weight * (sum(loading[r] * through[r] for r in used) - slowly @ damped)
     eliminated = line.drive.eliminate(cross)
     gram -= eliminated.T @ eliminated
     score -= eliminated.T @ line.drive.forward
@@ -215,7 +234,7 @@ def _channelwise(
 def _project_out(
     segment: Segment,
     line: Linearisation,
-    basis: NDArray[np.float64],
+    masked: _Masked,
     eliminated: NDArray[np.float64],
     gram: NDArray[np.float64],
     score: NDArray[np.float64],
@@ -223,17 +242,15 @@ def _project_out(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Make the basis orthogonal to the named causes' columns."""
     inner, right, crossed = segment.whitened_products(line, named)
-    count = basis.shape[2]
+    count = masked[0][0].shape[1]
     mixed = np.zeros((named.shape[1], gram.shape[0]))
-    for channel in range(line.jacobian.observations):
-        places = slice(channel * count, (channel + 1) * count)
-        columns = named[channel]  # (K, n)
-        if not columns.any():
+    for channel, (part, slow) in enumerate(masked):
+        reaching = np.flatnonzero(named[channel].any(axis=1))
+        if not len(reaching):
             continue
-        part = basis[channel] * segment.row_weight[:, [channel]]
-        slow = segment.cosines.T @ part
-        weight = segment.inverse_variance[channel]
-        mixed[:, places] = weight * (
+        places = slice(channel * count, (channel + 1) * count)
+        columns = named[channel, reaching]  # (P, n)
+        mixed[reaching, places] = segment.inverse_variance[channel] * (
             columns @ part - (columns @ segment.cosines) @ (segment.share[:, [channel]] * slow)
         )
     mixed -= crossed.T @ eliminated

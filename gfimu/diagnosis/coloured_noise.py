@@ -11,7 +11,7 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import dct
+from scipy.fft import dct, idct
 
 __all__ = ["CosineBasis", "NoiseLevels", "estimate_flicker", "white_level"]
 
@@ -57,20 +57,24 @@ class CosineBasis:
     """
 
     def __init__(self, n: int, period: float, elapsed: float = 0.0) -> None:
-        self.n, self.period = n, period
-        duration = n * period
-        k = np.arange(max(2, min(int(2 * duration * _TOP_FREQUENCY), n // 4)))
-        self.frequency = k / (2 * duration)
-        omega = 2 * np.pi * self.frequency
-        spectrum = sum(2 * tau / (1 + (omega * tau) ** 2) for tau in _TIMES) / (len(_TIMES) * period)
+        self.n, self.period, self._elapsed = n, period, elapsed
+        self._duration = n * period
+        count = max(2, min(int(2 * self._duration * _TOP_FREQUENCY), n // 4))
+        self.frequency = np.arange(count) / (2 * self._duration)
+        self.flicker_spectrum, self.walk_spectrum = self._spectra(count)
+
+    def _spectra(self, count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the spectra of bias instability and of a random walk, of unit size, on the first cosines."""
+        duration, period = self._duration, self.period
+        omega = np.pi * np.arange(count) / duration
+        flicker = sum(2 * tau / (1 + (omega * tau) ** 2) for tau in _TIMES) / (len(_TIMES) * period)
         ratio = _TIMES / duration
-        spectrum[0] = n * np.mean(2 * ratio * (1 + ratio * np.expm1(-1 / ratio)))
-        self.flicker_spectrum = spectrum
+        flicker[0] = self.n * np.mean(2 * ratio * (1 + ratio * np.expm1(-1 / ratio)))
         # Random walk from the start of the run: 1/(ω²) above, and its mean's variance at zero.
-        walk = np.empty(len(k))
+        walk = np.empty(count)
         walk[1:] = 1.0 / (omega[1:] ** 2 * period)
-        walk[0] = n * (elapsed + duration / 3.0)
-        self.walk_spectrum = walk
+        walk[0] = self.n * (self._elapsed + duration / 3.0)
+        return flicker, walk
 
     def matrix(self, count: int) -> NDArray[np.float64]:
         """Return the first ``count`` orthonormal cosines, shape (n, count), for reading only."""
@@ -78,12 +82,21 @@ class CosineBasis:
 
     def corrections(self, levels: NoiseLevels) -> NDArray[np.float64]:
         """Return 1 − σ²/S_k per mode and channel, shape (K, c + 1), cut where it no longer matters."""
-        white = levels.white**2
-        walk = np.append(np.full(len(white) - 1, levels.walk**2), 0.0)
-        spectrum = white + np.outer(self.flicker_spectrum, levels.flicker**2) + np.outer(self.walk_spectrum, walk)
-        share = 1.0 - white / spectrum
+        share = self._shares(levels, self.flicker_spectrum, self.walk_spectrum)
         strong = np.flatnonzero((share > _WEAKEST_CORRECTION).any(axis=1))
         return share[: int(strong[-1]) + 1 if len(strong) else 1]
+
+    @staticmethod
+    def _shares(levels: NoiseLevels, flicker: NDArray[np.float64], walk: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return 1 − σ²/S_k of each spectrum's modes (K,), shape (K, c + 1)."""
+        white = levels.white**2
+        walks = np.append(np.full(len(white) - 1, levels.walk**2), 0.0)
+        return 1.0 - white / (white + np.outer(flicker, levels.flicker**2) + np.outer(walk, walks))
+
+    def whitened(self, residual: NDArray[np.float64], levels: NoiseLevels) -> NDArray[np.float64]:
+        """Return residuals (n, c + 1), in units of white noise, without the excess of slow noise at any frequency."""
+        kept = np.sqrt(1.0 - self._shares(levels, *self._spectra(self.n)))
+        return np.asarray(idct(self.transform(residual) * kept, type=2, norm="ortho", axis=0))
 
     def transform(self, residual: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return all cosine coefficients of residuals (n, c)."""

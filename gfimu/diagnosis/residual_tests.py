@@ -69,7 +69,8 @@ def judges_reference(segment: Segment) -> bool:
 
 def lines(segment: Segment, fit: Fit, known: Sequence[Effect], channels: Sequence[str]) -> LeftOver:
     """Test for narrow lines on one channel, on the reference or on all, by the maximum of the periodogram."""
-    left = _whitened(segment, _left(segment, fit, known))  # (n, c + 1)
+    # In its own basis, where a wandering bias has no jump between its ends.
+    left = segment.basis.whitened(_left(segment, fit, known), segment.levels)  # (n, c + 1)
     if not judges_reference(segment):
         left = left[:, :-1]
     series = [*(f"channel {name}" for name in channels), REFERENCE]
@@ -160,7 +161,7 @@ def changing_noise(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequen
             statistic = float(np.sum(freedom / 2 * (spread - 1) ** 2))
             # What changes less in power, a part's own noise does.
             if np.ptp(spread) > _STEADY_POWER:
-                odds = -_log_tail(statistic, 5) - np.log(3.0)
+                odds = -_log_tail(statistic, 5) - np.log(3.0 * len(segments))
                 if odds > best.log_odds:
                     best = LeftOver(odds, f"the noise of all channels changes with {name}", {})
     return best
@@ -235,9 +236,3 @@ def _left(segment: Segment, fit: Fit, known: Sequence[Effect]) -> NDArray[np.flo
     """Return the residual in units of white noise, shape (n, c + 1)."""
     residual = segment.working_residual([*known, *effects_of_run(fit.causes, segment.model.array, segment.index)])
     return residual / segment.levels.white
-
-
-def _whitened(segment: Segment, left: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Take the excess of slow noise out in its own basis, where a wandering bias has no jump between its ends."""
-    share = 1.0 - np.sqrt(1.0 - segment.share)
-    return np.asarray(left - segment.cosines @ (share * (segment.cosines.T @ left)))
