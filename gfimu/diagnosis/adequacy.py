@@ -56,7 +56,13 @@ def generic_basis(segment: Segment, state: SpinState) -> tuple[list[str], NDArra
 
 
 def left_over(
-    segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]], spikes: int, *, rounded: bool = False
+    segments: Sequence[Segment],
+    fit: Fit,
+    fixed: Sequence[Sequence[Effect]],
+    spikes: int,
+    *,
+    rounded: bool = False,
+    smooth: bool = True,
 ) -> LeftOver:
     """Find the strongest thing that the named causes leave unexplained.
 
@@ -72,9 +78,11 @@ def left_over(
         Isolated samples that the integrity check took out.
     rounded : bool
         Whether readings are clipped or so coarse that their rounding follows the motion.
+    smooth : bool
+        Whether smooth functions are looked at too, which takes the most time.
     """
     channels = segments[0].model.array.channels
-    candidates = [dependence_left(segments, fit, fixed), one_curve(segments, fit, fixed, channels)]
+    candidates = [dependence_left(segments, fit, fixed), one_curve(segments, fit, fixed, channels)] if smooth else []
     for test in (lines, jumps):
         each = [test(segment, fit, known, channels) for segment, known in zip(segments, fixed, strict=True)]
         # Each stretch is one more place to find something by chance.

@@ -50,6 +50,7 @@ _ITERATIONS = 7
 _FEWEST_ROUNDS = 2
 _SURELY_WRONG = 1.02  # misfit per observation
 _MUCH, _LITTLE, _SHARE = 500.0, 10.0, 0.1  # nats that are left: at least; to those of a round; to the misfit explained
+# Before the last rounds, as much as is explained: right sets that still lacked a cause left a thirtieth of it at most.
 _SHARE_AT_END = 0.02  # no cause is believed then (`conclusion.is_dominant`)
 _ITS_OWN = 0.1  # of what a mode explains: what it leaves may be its own
 _FEW = 2  # causes of which one may be a mode though they fit badly
@@ -183,9 +184,7 @@ def explain(
     for number in range(_ROUNDS):
         tell(0.1 + 0.8 * number / _ROUNDS, f"search {number + 1}")
         settled = search.round(first=number == 0, tell=tell)
-        if (settled or number >= _FEWEST_ROUNDS) and search.hopeless(settled=settled):
-            break
-        if settled:
+        if search.hopeless(number, settled=settled) or settled:
             break
     tell(0.85, "prune")
     best, without, rivals = search.judged()
@@ -278,17 +277,20 @@ class _Search:
         self._settled = settled
         return done
 
-    def hopeless(self, *, settled: bool) -> bool:
+    def hopeless(self, number: int, *, settled: bool) -> bool:
         """Tell whether a round brought little of what is left, or all of them did not bring enough."""
+        good = self._best.objective < _SURELY_WRONG * self._observations
         # The usual end, without a look at the residuals.
-        if self._loose or (settled and self._best.objective < _SURELY_WRONG * self._observations):
+        if self._loose or (settled and good):
             return False
-        left = self._left(self._best)
+        early = not settled and number < _FEWEST_ROUNDS
+        left = self._left(self._best, smooth=not (early and good))
         # Under the noise that the best set left.
         start = refine(self._segments, self._fitted.causes, self._fixed, drives=self._fitted.drives, iterations=2)
         explained = start.objective - self._best.objective
         share = _SHARE_AT_END if settled else _SHARE
-        self.given_up = left > max(_MUCH, _LITTLE * self._gained, share * explained)
+        enough = explained if early else max(_LITTLE * self._gained, share * explained)
+        self.given_up = left > max(_MUCH, enough)
         return self.given_up
 
     def _refined_leaders(self) -> dict[frozenset[tuple[str, str]], Fit]:
@@ -378,12 +380,12 @@ class _Search:
             best = every_mode(segments, best, fixed)
         return best, without
 
-    def _left(self, fit: Fit) -> float:
-        """Return the log odds of the strongest thing that a fit leaves."""
+    def _left(self, fit: Fit, *, smooth: bool = True) -> float:
+        """Return the log odds of the strongest thing that a fit leaves, of smooth dependences or but of the others."""
         for segment, drive in zip(self._segments, fit.drives, strict=True):
             segment.coefficients = drive
         rounded = any(segment.rounding.channels > 0 for segment in self._segments)
-        return left_over(self._segments, fit, self._fixed, 0, rounded=rounded).log_odds
+        return left_over(self._segments, fit, self._fixed, 0, rounded=rounded, smooth=smooth).log_odds
 
     def screened(self, about: Fit) -> SignatureSet:
         """Return the signatures about a set: the last ones where they are, or where no set is believed."""

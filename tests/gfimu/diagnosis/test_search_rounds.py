@@ -56,7 +56,7 @@ def foreign(twin):
 
 def test_a_hopeless_search_ends_and_judges_no_rivals(twin, foreign, monkeypatch):
     found, rounds = explained(twin, foreign)
-    assert rounds == 3
+    assert rounds == 1
     assert not found.rivals
     assert not found.without
     monkeypatch.setattr(engine, "_MUCH", np.inf)
@@ -84,11 +84,10 @@ def test_with_a_residue_of_the_calibration_admitted_a_search_goes_on(twin, forei
 
 
 def test_a_search_given_up_too_early_is_judged_after_all(twin, monkeypatch):
-    def give_up(search, *, settled):
+    def give_up(search, number, *, settled):
         search.given_up = True
         return True
 
-    monkeypatch.setattr(engine, "_FEWEST_ROUNDS", 0)
     monkeypatch.setattr(engine._Search, "hopeless", give_up)
     hidden = [
         make_effect("eccentricity", {"x_m": 0.01, "y_m": -0.02}),
