@@ -50,7 +50,7 @@ _ITERATIONS = 7
 _FEWEST_ROUNDS = 2
 _SURELY_WRONG = 1.02  # misfit per observation
 _MUCH, _LITTLE, _SHARE = 500.0, 10.0, 0.1  # nats that are left: at least; to those of a round; to the misfit explained
-# Before the last rounds, as much as is explained: right sets that still lacked a cause left a thirtieth of it at most.
+# Before the last rounds, as much as is explained: right sets that still lacked a cause left a third of it at most.
 _SHARE_AT_END = 0.02  # no cause is believed then (`conclusion.is_dominant`)
 _ITS_OWN = 0.1  # of what a mode explains: what it leaves may be its own
 _FEW = 2  # causes of which one may be a mode though they fit badly

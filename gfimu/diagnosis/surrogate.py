@@ -29,7 +29,8 @@ __all__ = ["Surrogate", "surrogates"]
 
 _MOST_TERMS = 16
 _MOST_PER_ROUND = 6
-_ROUNDS = 6
+_ROUNDS = 3
+_ITERATIONS = 3  # the terms are linear; only the drive is not
 _LEAST_ODDS = 8.0
 _COMPARABLE = 0.1  # of a round's best: what is weaker waits until that is fitted, for a large term is far from linear
 _NEARLY_ALL = 0.9  # of what a function explains on all channels
@@ -99,11 +100,11 @@ def surrogates(
         terms = [*known, *more]
         causes = [*known.values(), *(_cause(mine[0], term, units) for term in more)]
         before = fit.objective
-        fit = refine(mine, causes, fixed, drives=fit.drives)
+        fit = refine(mine, causes, fixed, drives=fit.drives, iterations=_ITERATIONS)
         if not before - fit.objective > _LEAST_SHARE * max(before - observations, 0.0):
             break
         learn_noise(mine, fit, fixed)
-        fit = refine(mine, fit.causes, fixed, drives=fit.drives)
+        fit = refine(mine, fit.causes, fixed, drives=fit.drives, iterations=_ITERATIONS)
         mine = _at(mine, fit)
         found.append(Surrogate(fit, tuple(mine)))
     return found

@@ -77,7 +77,8 @@ def _servo_error(torque, turns, order, a, b, stiffness, damping):  # type: ignor
         mean = 0.5 * (here + there)
         angle[k + 1] = free + b[0] * mean
         rate[k + 1] = a[1, 0] * angle[k] + a[1, 1] * rate[k] + b[1] * mean
-        here = torque[k + 1] * np.sin(turns[k + 1] + order * angle[k + 1])
+        # What the mean moves the angle by beside the prediction is of the third order in the step.
+        here = there
         acceleration[k + 1] = here - stiffness * angle[k + 1] - damping * rate[k + 1]
     return angle, rate, acceleration
 
