@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gfimu.diagnosis.adequacy import LEFT_OVER_ODDS, left_over
+from gfimu.diagnosis.adequacy import LEFT_OVER_ODDS, dependence_left, left_over
 from gfimu.diagnosis.causes import effects_of_run
 from gfimu.diagnosis.coloured_noise import NoiseLevels
 from gfimu.diagnosis.conclusion import conclude, is_dominant, is_unknown
@@ -20,9 +20,9 @@ from gfimu.diagnosis.model import Effect, WorldModel
 from gfimu.diagnosis.nuisances import settle_noise, sharpen_drives, tune_drives
 from gfimu.diagnosis.prepared_runs import PreparedRuns
 from gfimu.diagnosis.pruning import LEAST_EXTRA_ODDS, prune
-from gfimu.diagnosis.refinement import refine
+from gfimu.diagnosis.refinement import Fit, refine
 from gfimu.diagnosis.residual_tests import LeftOver
-from gfimu.diagnosis.segment import known_walk
+from gfimu.diagnosis.segment import Segment, known_walk
 from gfimu.diagnosis.stochastic import UNEQUAL_WALK, WALK_ODDS, Walk, log_probability, walk_strength
 from gfimu.diagnosis.surrogate import surrogates
 from gfimu.diagnosis.threads import one_blas_thread
@@ -38,6 +38,7 @@ LEAST_GAIN = 2.0
 """Log predictive gain on held-out blocks below which a cause is withdrawn."""
 _WALK_ROUNDS = 3
 _HOPELESS = 300.0  # `Walk.unequal` with all other causes in place
+_MUCH = 500.0  # log odds of what a walk leaves of a search that was given up: more is something else
 _SLOW = frozenset(
     {"bias", "warm_up", "bias_temperature", "gain_drift", "scale_factor", "quadratic", "gravity", "cross_axis"}
 )
@@ -182,6 +183,13 @@ def _left_over(explanation: Explanation, prepared: PreparedRuns) -> LeftOver:
     )
 
 
+def _smooth_left(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]]) -> float:
+    """Return the log odds of the strongest smooth dependence that a fit leaves."""
+    for segment, drive in zip(segments, fit.drives, strict=True):
+        segment.coefficients = drive
+    return dependence_left(segments, fit, fixed).log_odds
+
+
 def _gain(explanation: Explanation, pairs: Sequence[Holdout], label: str) -> Gain:
     """Measure what all that was found is worth on data the fit never saw."""
     if not explanation.fit.causes and not any(explanation.fixed):
@@ -228,6 +236,8 @@ def _explain(
             segment.prepare_weights()
         # What was taken for bias instability is the walk now.
         settle_noise(other, base.causes, fixed)
+        if plain.given_up and _smooth_left(other, refine(other, base.causes, fixed), fixed) > _MUCH:
+            break
         wandering = explain_any_length(other, fixed, runs, start=base.causes)
         odds = log_probability(other, wandering.fit) - np.log(len(model.families())) - plain_value
         found = wandering, walk
