@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from gfimu.diagnosis.adequacy import LEFT_OVER_ODDS, dependence_left, left_over
-from gfimu.diagnosis.causes import effects_of_run
+from gfimu.diagnosis.adequacy import LEFT_OVER_ODDS, left_over
+from gfimu.diagnosis.causes import Cause, effects_of_run
 from gfimu.diagnosis.coloured_noise import NoiseLevels
 from gfimu.diagnosis.conclusion import conclude, is_dominant, is_unknown
 from gfimu.diagnosis.engine import Explanation
@@ -20,7 +20,7 @@ from gfimu.diagnosis.model import Effect, WorldModel
 from gfimu.diagnosis.nuisances import settle_noise, sharpen_drives, tune_drives
 from gfimu.diagnosis.prepared_runs import PreparedRuns
 from gfimu.diagnosis.pruning import LEAST_EXTRA_ODDS, prune
-from gfimu.diagnosis.refinement import Fit, refine
+from gfimu.diagnosis.refinement import refine
 from gfimu.diagnosis.residual_tests import LeftOver
 from gfimu.diagnosis.segment import Segment, known_walk
 from gfimu.diagnosis.stochastic import UNEQUAL_WALK, WALK_ODDS, Walk, log_probability, walk_strength
@@ -183,11 +183,14 @@ def _left_over(explanation: Explanation, prepared: PreparedRuns) -> LeftOver:
     )
 
 
-def _smooth_left(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]]) -> float:
-    """Return the log odds of the strongest smooth dependence that a fit leaves."""
+def _leaves_much(
+    segments: Sequence[Segment], causes: Sequence[Cause], fixed: Sequence[Sequence[Effect]], prepared: PreparedRuns
+) -> bool:
+    """Tell whether causes, under the noise of the segments, leave more than any search would find."""
+    fit = refine(segments, causes, fixed)
     for segment, drive in zip(segments, fit.drives, strict=True):
         segment.coefficients = drive
-    return dependence_left(segments, fit, fixed).log_odds
+    return left_over(segments, fit, fixed, prepared.spikes, rounded=prepared.rounded).log_odds > _MUCH
 
 
 def _gain(explanation: Explanation, pairs: Sequence[Holdout], label: str) -> Gain:
@@ -236,7 +239,7 @@ def _explain(
             segment.prepare_weights()
         # What was taken for bias instability is the walk now.
         settle_noise(other, base.causes, fixed)
-        if plain.given_up and _smooth_left(other, refine(other, base.causes, fixed), fixed) > _MUCH:
+        if plain.given_up and _leaves_much(other, base.causes, fixed, prepared):
             break
         wandering = explain_any_length(other, fixed, runs, start=base.causes)
         odds = log_probability(other, wandering.fit) - np.log(len(model.families())) - plain_value

@@ -264,7 +264,8 @@ class _Search:
         if wider is not winner:
             winner, settled = wider, False
             self._fitted = refine(segments, self._start, fixed, drives=winner.drives, iterations=8)
-        change = learn_noise(segments, winner, fixed)
+        # What a gross misfit leaves is no bias instability.
+        change = learn_noise(segments, winner, fixed, slow=self._is_fair(winner))
         tune_drives(segments, winner, fixed)
         self._best = refine(segments, winner.causes, fixed, drives=winner.drives, iterations=6)
         if not self._fair and self._is_fair(winner):

@@ -24,8 +24,13 @@ _MOST_CUTS = 3
 _LEAST_VALID = 0.01
 
 
-def learn_noise(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]]) -> float:
-    """Re-estimate the noise of every segment from what the fit leaves; returns the largest relative change."""
+def learn_noise(
+    segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]], *, slow: bool = True
+) -> float:
+    """Re-estimate the noise of every segment from what the fit leaves; returns the largest relative change.
+
+    Without ``slow`` the bias instability stays what it is.
+    """
     array = segments[0].model.array
     change = 0.0
     coefficients, whites = [], []
@@ -56,6 +61,7 @@ def learn_noise(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[
         flicker[-1] = 0.0
         for place in mine:
             old = segments[place].levels
+            flicker = flicker if slow else old.flicker
             change = max(
                 change,
                 float(np.max(np.abs(white / old.white - 1))),
