@@ -1,15 +1,23 @@
 """The search for causes goes on while a round brings something, and ends where nothing of it would be believed."""
 
+from importlib import import_module
+
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 from gfimu.array import AccelerometerArray
 from gfimu.diagnosis import diagnose, engine
 from gfimu.diagnosis.calibration_residue import CalibrationResidue
+from gfimu.diagnosis.long_run import explain_any_length
+from gfimu.diagnosis.nuisances import learn_noise
 from gfimu.diagnosis.prepared_runs import PreparedRuns
+from gfimu.diagnosis.refinement import refine
 from gfimu.recording import Recording
 from sim.campaign import Measurement, measure, random_profile
 from sim.effects import make_effect
+from sim.study.cases import Case
+from sim.study.outcome import draw_world
 from sim.twin import Twin
 
 SETTING = Measurement(duration=12.0)
@@ -117,3 +125,41 @@ def test_what_is_the_same_in_the_data_is_told_as_a_set_at_any_size(twin, quadrat
     assert found.verdict == "ambiguous"
     assert {"bias", "scale_factor"} <= {cause.effect for cause in found.causes}
     assert "quadratic" in {name for cause in found.causes for name in (cause.effect, *cause.not_distinguishable_from)}
+
+
+def test_a_gross_misfit_is_not_learnt_as_bias_instability(twin):
+    rng = np.random.default_rng(9)
+    run = measure(rng, twin, (), SETTING)
+    readings = run.readings + 3.0 * np.sin(0.9 * run.t_s)[:, None] * np.sign(np.arange(12) - 5.5)
+    recording = Recording.from_arrays(run.t_s, readings, twin.array, reference=run.reference)
+    prepared = PreparedRuns.build([recording], twin, ["run"])
+    segments, fixed = prepared.segments(twin)
+    for segment in segments:
+        segment.prepare_weights()
+    nothing = refine(segments, (), fixed, iterations=8)
+    before = segments[0].levels
+    learn_noise(segments, nothing, fixed, slow=False)
+    assert_allclose(segments[0].levels.flicker, before.flicker)
+    learn_noise(segments, nothing, fixed)
+    assert segments[0].levels.flicker[:-1].min() > 3 * before.flicker[:-1].max()
+
+
+def test_what_no_walk_explains_starts_no_search_for_one(twin, monkeypatch):
+    """An axis that nods, in a library without it, looks like wandering biases at first sight."""
+    world = draw_world(
+        Case(
+            "left_out", 80045, ("axis_wobble",), 1000.0, duration=40.0, bias_instability_mg=0.05, without="axis_wobble"
+        )
+    )
+    searches = []
+    search = explain_any_length
+
+    def counted(*args, **kwargs):
+        searches.append(kwargs.get("start", ()))
+        return search(*args, **kwargs)
+
+    # The package holds the function under the name of its module.
+    monkeypatch.setattr(import_module("gfimu.diagnosis.diagnose"), "explain_any_length", counted)
+    found = diagnose([world.recording], world.twin)
+    assert found.verdict == "unknown"
+    assert len(searches) == 1
