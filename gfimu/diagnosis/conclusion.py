@@ -38,6 +38,7 @@ __all__ = ["conclude", "is_dominant", "is_unknown"]
 _DOMINANT = 0.03
 _INEXACTNESS = 2.5e-3
 _TURNS = ANGLES | {"phase_rad"}
+_CLOSE_RESIDUE = 4.0  # log odds against a residue of the calibration in place of a cause, below which it is told
 _BEYOND_CHANCE = 4.0  # standard deviations of the misfit of noise
 
 
@@ -143,7 +144,8 @@ def _named(explanation: Explanation, fit: Fit, likely: dict[str, float], array: 
         change = whole - segment.predict([*known, *effects_of_run(others, array, segment.index)])
         share = channel_share(change[:, :-1] * segment.weight_mask[:, :-1], array.channels)
         entry = name_cause(explanation, fit, cause, likely, array, share)
-        entry = replace(entry, why=entry.why + _other_runs(cause, array, runs), std=_widened(entry, cause, misfit))
+        why = entry.why + _other_runs(cause, array, runs) + _or_residue(explanation, cause)
+        entry = replace(entry, why=why, std=_widened(entry, cause, misfit))
         entries.append((float(sum(value**2 for value in share.values())), entry))
     return [entry for _, entry in sorted(entries, key=lambda pair: -pair[0])]
 
@@ -166,6 +168,16 @@ def _widened(named: NamedCause, cause: Cause, misfit: tuple[float, float]) -> di
     rough = np.sqrt(share) if cause.family.inexactness > 0.0 else 0.0
     values = {key: 1.0 if key in _TURNS else float(named.parameters.get(key, 0.0)) for key in named.std}
     return {key: float(np.hypot(std * np.sqrt(1.0 + over), rough * values[key])) for key, std in named.std.items()}
+
+
+def _or_residue(explanation: Explanation, cause: Cause) -> str:
+    """Tell where a calibration that is a little off everywhere would leave nothing of a cause."""
+    other = explanation.beside_residue
+    if other is None or cause.name in other.names:
+        return ""
+    if other.log_posterior < explanation.fit.log_posterior - _CLOSE_RESIDUE:
+        return ""
+    return "; a calibration that is a little off in all its numbers would do as well: calibrate the unit anew"
 
 
 def _other_runs(cause: Cause, array: AccelerometerArray, runs: int) -> str:

@@ -209,7 +209,7 @@ def _explain(
     runs = len(prepared.runs)
     plain = explain_any_length(segments, fixed, runs, report=lambda share, text: tell(0.05 + 0.7 * share, text))
     tell(0.76, "calibration residue")
-    loose = loosen(plain, prepared, model)
+    loose, plain = loosen(plain, prepared, model)
     judged = plain
     if loose is not None:
         plain, judged = loose.explanation, loose.held

@@ -79,6 +79,8 @@ class Explanation:
         The last screening, about the best set.
     given_up : bool
         Whether so much is left that the set was neither pruned nor compared with others.
+    beside_residue : Fit, optional
+        What would be named if all numbers of the calibration were a little off, where that is about as probable.
     """
 
     fit: Fit
@@ -89,6 +91,7 @@ class Explanation:
     fixed: tuple[tuple[Effect, ...], ...]
     signatures: SignatureSet
     given_up: bool = False
+    beside_residue: Fit | None = None
 
 
 def _posterior(fit: Fit) -> float:

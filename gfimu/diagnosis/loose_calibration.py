@@ -56,11 +56,16 @@ class LooseCalibration:
     held: Explanation
 
 
-def loosen(plain: Explanation, prepared: PreparedRuns, model: WorldModel) -> LooseCalibration | None:
-    """Return the explanation with a calibration residue where it is more probable than the one without, or None."""
+def loosen(
+    plain: Explanation, prepared: PreparedRuns, model: WorldModel
+) -> tuple[LooseCalibration | None, Explanation]:
+    """Return the explanation with a calibration residue where it is more probable than the one without.
+
+    Besides, the one without, which knows what would be named with a residue.
+    """
     tolerance = tolerance_of(model.families())
     if not tolerance or not all(_fits(segment) for segment in plain.segments):
-        return None
+        return None, plain
     runs = len(prepared.runs)
     reference = log_probability(plain.segments, plain.fit)
     value, start = _trial(plain, plain.fit.causes, tolerance, _USUAL)
@@ -69,18 +74,19 @@ def loosen(plain: Explanation, prepared: PreparedRuns, model: WorldModel) -> Loo
     if larger > value:
         value, scale, start = larger, _LARGE, other
     if value < reference:
-        return None
+        return None, _with_rival(plain, start, value - reference)
     left = left_over(plain.segments, plain.fit, plain.fixed, prepared.spikes, rounded=prepared.rounded)
     if left.log_odds > max(_MUCH, value - reference):  # of something that is no residue
-        return None
+        return None, plain
     segments, _ = prepared.segments(model)
     fixed = plain.fixed
     for segment, old in zip(segments, plain.segments, strict=True):
         segment.adopt(old)
     _admit(segments, start.causes, fixed, start.drives, tolerance, scale)
     found = explain_any_length(segments, fixed, runs, start=start.causes)
-    if log_probability(segments, found.fit) - reference < _LEAST_ODDS:
-        return None
+    odds = log_probability(segments, found.fit) - reference
+    if odds < _LEAST_ODDS:
+        return None, _with_rival(plain, found.fit, odds)
     effects = _most_probable(segments, found.fit, fixed, tolerance, scale)
     known = tuple((*before, *effects) for before in fixed)
     for segment in segments:
@@ -98,7 +104,15 @@ def loosen(plain: Explanation, prepared: PreparedRuns, model: WorldModel) -> Loo
     for segment, drive in zip(segments, fit.drives, strict=True):
         segment.coefficients = drive
     whole = replace(found.fit, drives=fit.drives)
-    return LooseCalibration(scale, effects, replace(found, fit=whole, fixed=known), held)
+    return LooseCalibration(scale, effects, replace(found, fit=whole, fixed=known), held), plain
+
+
+def _with_rival(plain: Explanation, beside: Fit, odds: float) -> Explanation:
+    """Let an explanation know what would be named beside a residue; ``odds`` are those of the data for it."""
+    if not np.isfinite(odds):
+        return plain
+    # What a residue has to be worth to be believed are its prior odds.
+    return replace(plain, beside_residue=replace(beside, log_posterior=plain.fit.log_posterior + odds - _LEAST_ODDS))
 
 
 def relearned(loose: LooseCalibration, causes: Sequence[Cause], pairs: Sequence[Holdout]) -> list[Holdout]:

@@ -41,6 +41,8 @@ _MIMIC_ENERGY = 6.0
 def probabilities(explanation: Explanation) -> dict[str, float]:
     """Return the probability of each effect to be among the causes, over all sets that were refined."""
     fits = _all_fits(explanation)
+    if explanation.beside_residue is not None:
+        fits.append(explanation.beside_residue)
     weight = softmax(np.array([fit.log_posterior for fit in fits]) / TEMPERATURE)
     names = {name for fit in fits for name in fit.names}
     return {

@@ -15,7 +15,7 @@ from gfimu.diagnosis.engine import make_segments
 from gfimu.diagnosis.run import prepare_run
 from sim.campaign import Measurement, measure
 from sim.effects import make_effect
-from sim.study.cases import Case
+from sim.study.cases import Case, study_cases
 from sim.study.outcome import draw_world
 from sim.twin import Twin
 
@@ -106,6 +106,17 @@ def test_a_single_small_error_is_not_called_a_residue():
     found = diagnose([recording], TWIN)
     assert found.noise["calibration_residue"] == 0.0
     assert "bias" in {cause.effect for cause in found.causes}
+    assert not any("calibrate the unit" in cause.why for cause in found.causes)
+
+
+def test_a_cause_that_a_residue_would_replace_as_well_is_not_told_surely():
+    """Small errors of all numbers and strong bias instability: one effect alone is as probable as all together."""
+    case = next(one for one in study_cases("residue") if one.seed == 50002)
+    world = draw_world(case)
+    found = diagnose([world.recording], world.twin)
+    for cause in found.causes:
+        assert cause.probability < 0.95  # 0.995 without the residue among its rivals
+        assert "calibrate the unit" in cause.why
 
 
 def test_the_gain_of_a_residue_is_that_of_the_part_it_was_not_fitted_to(monkeypatch):
