@@ -47,7 +47,7 @@ _WORTH_REFINING = -6.0
 FAIR_FIT = 1.6
 """Misfit per observation, in variances, above which something large is still missing."""
 _ITERATIONS = 7
-_FEWEST_ROUNDS = 2
+_FEWEST_ROUNDS = 2  # before a search that explains more than it leaves may be given up
 _SURELY_WRONG = 1.02  # misfit per observation
 _MUCH, _LITTLE, _SHARE = 500.0, 10.0, 0.1  # nats that are left: at least; to those of a round; to the misfit explained
 # Before the last rounds, as much as is explained: right sets that still lacked a cause left a third of it at most.
@@ -385,7 +385,7 @@ class _Search:
         return best, without
 
     def _left(self, fit: Fit, *, smooth: bool = True) -> float:
-        """Return the log odds of the strongest thing that a fit leaves, of smooth dependences or but of the others."""
+        """Return the log odds of the strongest thing that a fit leaves; without ``smooth``, of no smooth dependence."""
         for segment, drive in zip(self._segments, fit.drives, strict=True):
             segment.coefficients = drive
         rounded = any(segment.rounding.channels > 0 for segment in self._segments)
