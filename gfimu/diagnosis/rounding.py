@@ -92,7 +92,12 @@ class Steps:
     reference: float = 0.0
 
     def weigh(
-        self, residual: NDArray[np.float64], white: NDArray[np.float64], valid: NDArray[np.bool_]
+        self,
+        residual: NDArray[np.float64],
+        white: NDArray[np.float64],
+        valid: NDArray[np.bool_],
+        *,
+        evenly: bool = True,
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
         """Return working residuals and weights, each (n, c + 1), and what the residuals' squares lack of the deviance.
 
@@ -106,11 +111,13 @@ class Steps:
             White noise before rounding.
         valid : ndarray of bool, shape (n, c + 1)
             Which observations count.
+        evenly : bool
+            False lets each sample of a channel have a weight of its own.
         """
         working, weight, lacking = residual.copy(), valid.astype(float), 0.0
         for columns, step in self._coarse:
             rounded = rounded_likelihood(residual[:, columns], step, white[columns])
-            if columns == _CHANNELS:
+            if evenly and columns == _CHANNELS:
                 rounded = rounded.evenly(
                     mean_information(residual[:, columns], step, white[columns], valid[:, columns])
                 )

@@ -7,9 +7,12 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.stats import norm
 
+from gfimu.diagnosis import diagnose
 from gfimu.diagnosis.coloured_noise import CosineBasis, estimate_flicker
 from gfimu.diagnosis.rounding import Steps, common_step, mean_information, rounded_likelihood, rounding_noise
 from sim.campaign import bias_instability
+from sim.study.cases import study_cases
+from sim.study.outcome import draw_world
 
 
 @pytest.mark.parametrize("quantum", [0.5, 3.0, 10.0])
@@ -97,3 +100,11 @@ def test_bias_instability_is_seen_through_coarse_steps(moving):
     found = estimate_flicker(basis.transform(working[:, :-1]), noise[:-1], basis) / np.median(weight[:, :-1], axis=0)
     # Ten correlation times or so in each of twelve channels: to a fifth.
     assert np.sqrt(np.mean(found**2)) == pytest.approx(flicker, rel=0.2)
+
+
+def test_coarse_steps_at_rest_are_no_jumps():
+    """Steps of eleven standard deviations: at rest some channels are near an edge, others far from both."""
+    world = draw_world(next(case for case in study_cases("singles") if case.seed == 10323))
+    found = diagnose([world.recording], world.twin)
+    assert found.verdict == "explained"
+    assert [cause.effect for cause in found.causes] == ["coarse_resolution"]
