@@ -234,5 +234,5 @@ def _log_tail(value: float, freedom: int) -> float:
 
 def _left(segment: Segment, fit: Fit, known: Sequence[Effect]) -> NDArray[np.float64]:
     """Return the residual in units of white noise, shape (n, c + 1)."""
-    residual = segment.sample_residual([*known, *effects_of_run(fit.causes, segment.model.array, segment.index)])
+    residual = segment.working_residual([*known, *effects_of_run(fit.causes, segment.model.array, segment.index)])
     return residual / segment.levels.white

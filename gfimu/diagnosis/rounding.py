@@ -7,29 +7,17 @@ A reading y in steps of q says only that the value before rounding lay within y 
 is log-concave in the prediction x; score and curvature give each sample a working residual and a weight, so that the
 same least squares serves (iteratively reweighted, McCullagh and Nelder 1989, §2.5). In the middle of a step a sample
 says next to nothing, at the edges nearly as much as an unrounded one.
-
-Slow noise needs more than that: only where all samples of a channel have one weight is it as stationary in the working
-residual as it was before rounding. That weight is Fisher's, so that the working residual has the variance of the noise.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from functools import lru_cache
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import log_ndtr, ndtr
+from scipy.special import log_ndtr
 
-__all__ = [
-    "COARSE",
-    "Steps",
-    "WorkingResidual",
-    "common_step",
-    "mean_information",
-    "rounded_likelihood",
-    "rounding_noise",
-]
+__all__ = ["COARSE", "Steps", "WorkingResidual", "common_step", "rounded_likelihood", "rounding_noise"]
 
 COARSE = 1.5
 """Steps per standard deviation of the noise from which rounding is no longer like noise."""
@@ -38,12 +26,8 @@ _LEAST_STEP = 1e-9
 _OFF_GRID = 0.05
 _FAR = 1e4  # standard deviations
 _LEAST_NOISE = 0.03  # of a reference's step: finer edges would tell more than the steps of real parts keep to
-_UNLIKELY = 3.0  # standard deviations beyond the step of a reading: the prediction is off
-_REACH = 8.0  # standard deviations to which steps are looked at
-_POSITIONS = 201  # in half a step, at which the information is tabulated
 _NOISE_FACTORS = np.geomspace(0.5, 6.0, 26)
 _LOG_ROOT_TWO_PI = 0.5 * np.log(2 * np.pi)
-_CHANNELS = slice(None, -1)
 
 
 @dataclass(frozen=True)
@@ -58,22 +42,11 @@ class WorkingResidual:
         Share of an unrounded sample's amplitude, 0 to 1; derivatives are multiplied by it.
     deviance : ndarray, shape (n, c)
         −2 log p(y | x).
-    beyond : ndarray, shape (n, c)
-        How far the prediction is from the step of the reading, in standard deviations; negative inside.
     """
 
     residual: NDArray[np.float64]
     weight: NDArray[np.float64]
     deviance: NDArray[np.float64]
-    beyond: NDArray[np.float64]
-
-    def evenly(self, information: NDArray[np.float64]) -> WorkingResidual:
-        """Return the same score with one weight for each channel, whose mean information (c,) is known.
-
-        A prediction that is far off keeps its weight: there the likelihood bends as if nothing were rounded.
-        """
-        weight = np.where(self.beyond > _UNLIKELY, self.weight, np.sqrt(information))
-        return replace(self, residual=self.residual * self.weight / weight, weight=weight)
 
 
 @dataclass(frozen=True)
@@ -92,16 +65,9 @@ class Steps:
     reference: float = 0.0
 
     def weigh(
-        self,
-        residual: NDArray[np.float64],
-        white: NDArray[np.float64],
-        valid: NDArray[np.bool_],
-        *,
-        evenly: bool = True,
+        self, residual: NDArray[np.float64], white: NDArray[np.float64], valid: NDArray[np.bool_]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
         """Return working residuals and weights, each (n, c + 1), and what the residuals' squares lack of the deviance.
-
-        A channel's samples share one weight, for the sake of slow noise; the reference, which has none, weighs each.
 
         Parameters
         ----------
@@ -111,16 +77,10 @@ class Steps:
             White noise before rounding.
         valid : ndarray of bool, shape (n, c + 1)
             Which observations count.
-        evenly : bool
-            False lets each sample of a channel have a weight of its own.
         """
         working, weight, lacking = residual.copy(), valid.astype(float), 0.0
         for columns, step in self._coarse:
             rounded = rounded_likelihood(residual[:, columns], step, white[columns])
-            if evenly and columns == _CHANNELS:
-                rounded = rounded.evenly(
-                    mean_information(residual[:, columns], step, white[columns], valid[:, columns])
-                )
             working[:, columns] = rounded.residual * valid[:, columns]
             weight[:, columns] *= rounded.weight
             lacking += float(((rounded.deviance - (rounded.residual / white[columns]) ** 2) * valid[:, columns]).sum())
@@ -150,7 +110,7 @@ class Steps:
 
     @property
     def _coarse(self) -> list[tuple[slice, float]]:
-        both = ((_CHANNELS, self.channels), (slice(-1, None), self.reference))
+        both = ((slice(None, -1), self.channels), (slice(-1, None), self.reference))
         return [(columns, step) for columns, step in both if step]
 
     @classmethod
@@ -203,47 +163,7 @@ def rounded_likelihood(
     score = density_lower - density_upper + beyond  # σ d log p/dx
     curvature = (score - beyond) ** 2 - (lower * density_lower - upper * density_upper)  # −σ² d² log p/dx²
     weight = np.sqrt(np.clip(curvature, _LEAST_WEIGHT**2, 1.0))
-    deviance = beyond * (true_lower + lower) - 2.0 * log_p
-    return WorkingResidual(side * sigma * score / weight, weight, deviance, true_lower)
-
-
-def mean_information(
-    error: NDArray[np.float64], quantum: float, sigma: NDArray[np.float64], valid: NDArray[np.bool_]
-) -> NDArray[np.float64]:
-    """Return Fisher's information of a rounded reading, as a share of an unrounded one's, its mean by channel (c,).
-
-    Parameters
-    ----------
-    error : ndarray, shape (n, c)
-        Reading minus prediction, m/s²; it tells where in a step the prediction lies.
-    quantum : float
-        Rounding step, m/s².
-    sigma : ndarray, shape (c,)
-        White noise before rounding, m/s².
-    valid : ndarray of bool, shape (n, c)
-        Which readings count.
-    """
-    steps = np.abs(error / quantum - np.round(error / quantum))  # 0 in the middle of a step, 0.5 at an edge
-    found = np.empty(len(sigma))
-    for channel, noise in enumerate(sigma):
-        positions, information = _information(float(quantum / noise))
-        there = valid[:, channel]
-        found[channel] = np.interp(steps[there, channel], positions, information).mean() if there.any() else 1.0
-    return np.maximum(found, _LEAST_WEIGHT**2)
-
-
-@lru_cache(maxsize=64)
-def _information(ratio: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return positions (p,) in half a step, in steps, and the information there, for steps of ``ratio`` deviations."""
-    positions = np.linspace(0.0, 0.5, _POSITIONS)
-    far = int(np.ceil(_REACH / ratio)) + 1
-    edges = (np.arange(-far, far + 2) - 0.5 - positions[:, None]) * ratio  # (p, edges)
-    density = np.exp(-0.5 * edges**2 - _LOG_ROOT_TWO_PI)
-    # Differences of the nearer tail keep their digits.
-    upper, lower = edges[:, 1:], edges[:, :-1]
-    share = np.where(lower > 0, ndtr(-lower) - ndtr(-upper), ndtr(upper) - ndtr(lower))
-    rise = np.diff(density, axis=1)
-    return positions, np.sum(rise**2 / np.maximum(share, np.finfo(float).tiny), axis=1)
+    return WorkingResidual(side * sigma * score / weight, weight, beyond * (true_lower + lower) - 2.0 * log_p)
 
 
 def rounding_noise(error: NDArray[np.float64], quantum: float, sigma: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -314,19 +314,9 @@ class Segment:
     def working_residual(self, effects: Sequence[Effect]) -> NDArray[np.float64]:
         """Return the residual as the normal equations take it, shape (n, c + 1).
 
-        The plain one, unless readings are so coarse that they have weights (`rounded_likelihood`).
+        The plain one, unless readings are so coarse that each has a weight of its own (`rounded_likelihood`).
         """
         return self._weigh(self.residual(effects))[0]
-
-    def sample_residual(self, effects: Sequence[Effect]) -> NDArray[np.float64]:
-        """Return the residual for tests of a few samples, shape (n, c + 1): coarse readings with a weight each.
-
-        Near the edge of a step a reading tells far more than the channel's readings do in the mean.
-        """
-        residual = self.residual(effects)
-        if not self.rounding.coarse:
-            return residual
-        return self.rounding.weigh(residual, self.levels.white, self.weight_mask, evenly=False)[0]
 
     def _weigh(self, residual: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
         """Set the weight of every sample; return the working residual and what its squares lack of the deviance."""

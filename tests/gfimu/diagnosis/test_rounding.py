@@ -7,12 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.stats import norm
 
-from gfimu.diagnosis import diagnose
-from gfimu.diagnosis.coloured_noise import CosineBasis, estimate_flicker
-from gfimu.diagnosis.rounding import Steps, common_step, mean_information, rounded_likelihood, rounding_noise
-from sim.campaign import bias_instability
-from sim.study.cases import study_cases
-from sim.study.outcome import draw_world
+from gfimu.diagnosis.rounding import Steps, common_step, rounded_likelihood, rounding_noise
 
 
 @pytest.mark.parametrize("quantum", [0.5, 3.0, 10.0])
@@ -71,40 +66,3 @@ def test_values_in_no_steps_have_none():
     assert common_step(np.random.default_rng(0).standard_normal(500)) is None
     assert common_step(np.full(50, 0.3)) is None
     assert common_step(3.0 * np.arange(40) * 0.7) == pytest.approx(2.1)
-
-
-@pytest.mark.parametrize("position", [0.0, 0.1, 0.37, 0.5])
-def test_a_working_residual_of_one_weight_has_the_variance_of_the_noise(position):
-    step, sigma, n = 0.153, np.array([0.041]), 200_000
-    before = position * step + sigma * np.random.default_rng(4).standard_normal((n, 1))
-    error = step * np.round(before / step) - position * step
-    information = mean_information(error, step, sigma, np.ones((n, 1), dtype=bool))
-    found = rounded_likelihood(error, step, sigma).evenly(information)
-    # Fisher's information is the variance of the score.
-    assert_allclose(np.mean((found.residual / sigma) ** 2), 1.0, rtol=0.02)
-    assert abs(found.residual.mean() / sigma[0]) < 4 / np.sqrt(n)
-    assert np.ptp(found.weight[found.beyond < 3.0]) == 0.0
-
-
-@pytest.mark.parametrize("moving", [False, True])
-def test_bias_instability_is_seen_through_coarse_steps(moving):
-    rng = np.random.default_rng(5)
-    step, sigma, flicker, n = 0.153, 0.027, 0.005, 12_000
-    truth = 0.3 * step + (2.0 * np.sin(np.arange(n) / 170.0) if moving else np.zeros(n))
-    slow = flicker * bias_instability(rng, n, 12, 1.0)
-    readings = step * np.round((truth[:, None] + slow + sigma * rng.standard_normal((n, 12))) / step)
-    noise, valid = np.full(13, sigma), np.ones((n, 13), dtype=bool)
-    error = np.column_stack([readings - truth[:, None], np.zeros(n)])
-    working, weight, _ = Steps(channels=step).weigh(error, noise, valid)
-    basis = CosineBasis(n, 0.01)
-    found = estimate_flicker(basis.transform(working[:, :-1]), noise[:-1], basis) / np.median(weight[:, :-1], axis=0)
-    # Ten correlation times or so in each of twelve channels: to a fifth.
-    assert np.sqrt(np.mean(found**2)) == pytest.approx(flicker, rel=0.2)
-
-
-def test_coarse_steps_at_rest_are_no_jumps():
-    """Steps of eleven standard deviations: at rest some channels are near an edge, others far from both."""
-    world = draw_world(next(case for case in study_cases("singles") if case.seed == 10323))
-    found = diagnose([world.recording], world.twin)
-    assert found.verdict == "explained"
-    assert [cause.effect for cause in found.causes] == ["coarse_resolution"]
