@@ -50,7 +50,6 @@ _ITERATIONS = 7
 _FEWEST_ROUNDS = 2  # before a search that explains more than it leaves may be given up
 _SURELY_WRONG = 1.02  # misfit per observation
 _MUCH, _LITTLE, _SHARE = 500.0, 10.0, 0.1  # nats that are left: at least; to those of a round; to the misfit explained
-# Before the last rounds, as much as is explained: right sets that still lacked a cause left a third of it at most.
 _SHARE_AT_END = 0.02  # no cause is believed then (`conclusion.is_dominant`)
 _ITS_OWN = 0.1  # of what a mode explains: what it leaves may be its own
 _FEW = 2  # causes of which one may be a mode though they fit badly
@@ -282,7 +281,7 @@ class _Search:
         return done
 
     def hopeless(self, number: int, *, settled: bool) -> bool:
-        """Tell whether a round brought little of what is left, or all of them did not bring enough."""
+        """Tell whether too much is left: early, more than is explained; later, far more than a round brought."""
         good = self._best.objective < _SURELY_WRONG * self._observations
         # The usual end, without a look at the residuals.
         if self._loose or (settled and good):
@@ -293,6 +292,7 @@ class _Search:
         start = refine(self._segments, self._fitted.causes, self._fixed, drives=self._fitted.drives, iterations=2)
         explained = start.objective - self._best.objective
         share = _SHARE_AT_END if settled else _SHARE
+        # Right sets that still lacked a cause left a third of what they explained at most.
         enough = explained if early else max(_LITTLE * self._gained, share * explained)
         self.given_up = left > max(_MUCH, enough)
         return self.given_up
