@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,7 @@ from gfimu.diagnosis.evidence import log_evidence, log_evidence_each
 from gfimu.diagnosis.generic_basis import FUNCTIONS, Motion
 from gfimu.diagnosis.linearisation import Linearisation
 from gfimu.diagnosis.model import BasisUnits, Effect, SpinState
+from gfimu.diagnosis.parallel import over_segments
 from gfimu.diagnosis.refinement import Fit
 from gfimu.diagnosis.residual_tests import (
     REFERENCE,
@@ -84,7 +86,7 @@ def left_over(
     channels = segments[0].model.array.channels
     candidates = [dependence_left(segments, fit, fixed), one_curve(segments, fit, fixed, channels)] if smooth else []
     for test in (lines, jumps):
-        each = [test(segment, fit, known, channels) for segment, known in zip(segments, fixed, strict=True)]
+        each = over_segments(partial(test, fit=fit, channels=channels), segments, fixed)
         # Each stretch is one more place to find something by chance.
         candidates += [replace(one, log_odds=one.log_odds - np.log(len(segments))) for one in each]
     if not rounded:
@@ -97,17 +99,18 @@ def left_over(
 def dependence_left(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]]) -> LeftOver:
     """Score every basis function on every channel and the reference, on all channels, and each of them on all."""
     channels = segments[0].model.array.channels
-    gram: NDArray[np.float64] | None = None
-    score: NDArray[np.float64] | None = None
-    names: list[str] = []
-    for segment, known in zip(segments, fixed, strict=True):
+
+    def products(
+        segment: Segment, known: Sequence[Effect]
+    ) -> tuple[list[str], NDArray[np.float64], NDArray[np.float64]]:
         line = segment.linearise([*known, *effects_of_run(fit.causes, segment.model.array, segment.index)])
         names, basis = generic_basis(segment, line.state)
-        part, right = series_products(segment, line, basis, fit.causes, known)
-        gram = part if gram is None else gram + part
-        score = right if score is None else score + right
-    assert gram is not None
-    assert score is not None
+        return names, *series_products(segment, line, basis, fit.causes, known)
+
+    each = over_segments(products, segments, fixed)
+    names = each[0][0]
+    gram = np.sum([part for _, part, _ in each], axis=0)
+    score = np.sum([right for _, _, right in each], axis=0)
     count = len(names)
     observed = len(channels)
     series = [f"channel {name}" for name in channels]

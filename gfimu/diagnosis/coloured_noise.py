@@ -54,10 +54,13 @@ class CosineBasis:
         Sample period, s.
     elapsed : float
         Time since the run began, for which biases have wandered already, s.
+    stretches : int
+        How many such stretches the run is cut into. Their means are taken for independent, but a bias is much the same
+        in neighbouring ones: each mean has as many times the variance of the whole run's mean.
     """
 
-    def __init__(self, n: int, period: float, elapsed: float = 0.0) -> None:
-        self.n, self.period, self._elapsed = n, period, elapsed
+    def __init__(self, n: int, period: float, elapsed: float = 0.0, *, stretches: int = 1) -> None:
+        self.n, self.period, self._elapsed, self._stretches = n, period, elapsed, stretches
         self._duration = n * period
         count = max(2, min(int(2 * self._duration * _TOP_FREQUENCY), n // 4))
         self.frequency = np.arange(count) / (2 * self._duration)
@@ -68,12 +71,13 @@ class CosineBasis:
         duration, period = self._duration, self.period
         omega = np.pi * np.arange(count) / duration
         flicker = sum(2 * tau / (1 + (omega * tau) ** 2) for tau in _TIMES) / (len(_TIMES) * period)
-        ratio = _TIMES / duration
-        flicker[0] = self.n * np.mean(2 * ratio * (1 + ratio * np.expm1(-1 / ratio)))
+        ratio = _TIMES / (self._stretches * duration)
+        flicker[0] = self.n * self._stretches * np.mean(2 * ratio * (1 + ratio * np.expm1(-1 / ratio)))
         # Random walk from the start of the run: 1/(ω²) above, and its mean's variance at zero.
         walk = np.empty(count)
         walk[1:] = 1.0 / (omega[1:] ** 2 * period)
-        walk[0] = self.n * (self._elapsed + duration / 3.0)
+        whole = self._stretches**2 * duration / 3.0
+        walk[0] = self.n * (whole if self._stretches > 1 else self._elapsed + duration / 3.0)
         return flicker, walk
 
     def matrix(self, count: int) -> NDArray[np.float64]:

@@ -8,8 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from gfimu.diagnosis.adequacy import LEFT_OVER_ODDS, left_over
-from gfimu.diagnosis.causes import Cause, effects_of_run
-from gfimu.diagnosis.coloured_noise import NoiseLevels
+from gfimu.diagnosis.causes import effects_of_run
 from gfimu.diagnosis.conclusion import conclude, is_dominant, is_unknown
 from gfimu.diagnosis.engine import Explanation
 from gfimu.diagnosis.free_body.diagnose import diagnose_body
@@ -17,16 +16,16 @@ from gfimu.diagnosis.holdout import Holdout, gate_gains, held_out_gain, split_se
 from gfimu.diagnosis.long_run import explain_any_length
 from gfimu.diagnosis.loose_calibration import LooseCalibration, loosen, relearned
 from gfimu.diagnosis.model import Effect, WorldModel
-from gfimu.diagnosis.nuisances import settle_noise, sharpen_drives, tune_drives
+from gfimu.diagnosis.nuisances import sharpen_drives, tune_drives
+from gfimu.diagnosis.parallel import one_blas_thread
 from gfimu.diagnosis.prepared_runs import PreparedRuns
-from gfimu.diagnosis.pruning import LEAST_EXTRA_ODDS, prune
+from gfimu.diagnosis.pruning import prune
 from gfimu.diagnosis.refinement import refine
 from gfimu.diagnosis.residual_tests import LeftOver
-from gfimu.diagnosis.segment import Segment, known_walk
-from gfimu.diagnosis.stochastic import UNEQUAL_WALK, WALK_ODDS, Walk, log_probability, walk_strength
+from gfimu.diagnosis.stochastic import Walk
 from gfimu.diagnosis.surrogate import surrogates
-from gfimu.diagnosis.threads import one_blas_thread
 from gfimu.diagnosis.verdict import Diagnosis, Gain
+from gfimu.diagnosis.wandering_biases import with_walk
 from gfimu.errors import InputError
 from gfimu.recording import Recording
 
@@ -36,12 +35,6 @@ Report = Callable[[float, str], None]
 
 LEAST_GAIN = 2.0
 """Log predictive gain on held-out blocks below which a cause is withdrawn."""
-_WALK_ROUNDS = 3
-_HOPELESS = 300.0  # `Walk.unequal` with all other causes in place
-_MUCH = 500.0  # log odds of what a walk leaves of a search that was given up: more is something else
-_SLOW = frozenset(
-    {"bias", "warm_up", "bias_temperature", "gain_drift", "scale_factor", "quadratic", "gravity", "cross_axis"}
-)
 
 
 def diagnose(
@@ -183,16 +176,6 @@ def _left_over(explanation: Explanation, prepared: PreparedRuns) -> LeftOver:
     )
 
 
-def _leaves_much(
-    segments: Sequence[Segment], causes: Sequence[Cause], fixed: Sequence[Sequence[Effect]], prepared: PreparedRuns
-) -> bool:
-    """Tell whether causes, under the noise of the segments, leave more than any search would find."""
-    fit = refine(segments, causes, fixed)
-    for segment, drive in zip(segments, fit.drives, strict=True):
-        segment.coefficients = drive
-    return left_over(segments, fit, fixed, prepared.spikes, rounded=prepared.rounded).log_odds > _MUCH
-
-
 def _gain(explanation: Explanation, pairs: Sequence[Holdout], label: str) -> Gain:
     """Measure what all that was found is worth on data the fit never saw."""
     if not explanation.fit.causes and not any(explanation.fixed):
@@ -213,48 +196,13 @@ def _explain(
     judged = plain
     if loose is not None:
         plain, judged = loose.explanation, loose.held
-        segments, fixed = list(judged.segments), [list(known) for known in judged.fixed]
-    # A walk passes for anything slow, so it is looked for in what the other causes leave.
-    quick = [cause for cause in judged.fit.causes if cause.name not in _SLOW]
-    same = len(quick) == len(judged.fit.causes)
-    base = judged.fit if same else refine(segments, quick, fixed, drives=judged.fit.drives)
-    plain_value = log_probability(segments, judged.fit)
-    found: tuple[Explanation, Walk] | None = None
-    odds = 0.0
-    before = segments
-    for _ in range(_WALK_ROUNDS):
-        walk = walk_strength(before, base, fixed)
-        if found is None and (walk.log_odds < WALK_ODDS or known_walk(model) > 0):
-            break
-        if found is None and min(walk.unequal, walk_strength(segments, judged.fit, fixed).unequal) > _HOPELESS:
-            break  # whatever else were found beside it
-        if found is not None and abs(walk.strength - found[1].strength) < walk.std:
-            found = found[0], walk
-            break
-        tell(0.8, "wandering biases")
-        other, _ = prepared.segments(model)
-        for segment, old in zip(other, before, strict=True):
-            segment.adopt(old)
-            segment.set_levels(NoiseLevels(old.levels.white, old.levels.flicker, walk.strength))
-            segment.prepare_weights()
-        # What was taken for bias instability is the walk now.
-        settle_noise(other, base.causes, fixed)
-        if plain.given_up and _leaves_much(other, base.causes, fixed, prepared):
-            break
-        wandering = explain_any_length(other, fixed, runs, start=base.causes)
-        odds = log_probability(other, wandering.fit) - np.log(len(model.families())) - plain_value
-        found = wandering, walk
-        if wandering.given_up:
-            break
-        before, base = other, wandering.fit
-    if found is None or odds < LEAST_EXTRA_ODDS:
+    found = with_walk(judged, prepared, model, given_up=plain.given_up, report=lambda text: tell(0.8, text))
+    if found is None:
         return plain, None, loose
-    walk = found[1]
-    if walk.log_odds < WALK_ODDS or walk.unequal > UNEQUAL_WALK:  # another cause was taken for a walk at first
-        return plain, None, loose
+    wandering, walk = found
     if loose is not None:
-        loose = replace(loose, explanation=found[0], held=found[0])
-    return found[0], replace(found[1], log_odds=float(odds)), loose
+        loose = replace(loose, explanation=wandering, held=wandering)
+    return wandering, walk, loose
 
 
 def _holdouts(

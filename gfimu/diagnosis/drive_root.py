@@ -14,6 +14,7 @@ calibration residue with few sizes is bordered on, as one more step of the elimi
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,9 +23,12 @@ from scipy.linalg import lapack, solve_triangular
 from scipy.linalg.blas import dsyrk
 from scipy.sparse import csr_array
 
+from gfimu.diagnosis.parallel import wide_algebra
+
 __all__ = ["InverseRoot", "banded"]
 
 _RIDGE = 1e-10
+_WIDE = 400  # rows from which several processors are faster than one
 _Border = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 
@@ -150,6 +154,7 @@ def _factored(
     low = _solved(band, rows.T)
     if not len(rows):
         return band, low, np.zeros((0, 0))
-    left = dsyrk(-1.0, low, trans=1, beta=1.0, c=np.eye(len(rows), order="F"), lower=1, overwrite_c=1)
-    inner, failed = lapack.dpotrf(left, lower=1, clean=1, overwrite_a=1)
+    with wide_algebra() if len(rows) >= _WIDE else nullcontext():
+        left = dsyrk(-1.0, low, trans=1, beta=1.0, c=np.eye(len(rows), order="F"), lower=1, overwrite_c=1)
+        inner, failed = lapack.dpotrf(left, lower=1, clean=1, overwrite_a=1)
     return None if failed else (band, low, inner)

@@ -17,13 +17,13 @@ from gfimu.diagnosis.far_starts import every_mode, from_far, remembered_mode
 from gfimu.diagnosis.linearisation import Linearisation
 from gfimu.diagnosis.model import Effect, WorldModel
 from gfimu.diagnosis.nuisances import STEADY_NOISE, learn_noise, sharpen_drives, tune_drives, widen_drives
+from gfimu.diagnosis.parallel import over_segments
 from gfimu.diagnosis.pruning import RIVALS, near_rivals, prune
 from gfimu.diagnosis.refinement import Fit, Start, refine, refine_each
 from gfimu.diagnosis.run import Run, difference_noise
 from gfimu.diagnosis.search import search
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.signatures import SignatureSet, hypotheses, plan_signatures, signature_columns
-from gfimu.diagnosis.threads import over_segments
 
 __all__ = [
     "FAIR_FIT",
@@ -51,6 +51,7 @@ _FEWEST_ROUNDS = 2  # before a search that explains more than it leaves may be g
 _SURELY_WRONG = 1.02  # misfit per observation
 _MUCH, _LITTLE, _SHARE = 500.0, 10.0, 0.1  # nats that are left: at least; to those of a round; to the misfit explained
 _SHARE_AT_END = 0.02  # no cause is believed then (`conclusion.is_dominant`)
+_STALLED, _WORTH_FINDING = 0.1, 100.0  # share of what is left that a round may bring to be the last; nats, at least
 _ITS_OWN = 0.1  # of what a mode explains: what it leaves may be its own
 _FEW = 2  # causes of which one may be a mode though they fit badly
 _FAINT = 500.0  # log odds of a mode whose frequency may not be settled
@@ -104,21 +105,24 @@ def make_segments(model: WorldModel, runs: Sequence[Run]) -> list[Segment]:
         rate = smooth_rate(run, is_angle=model.drive_source == "angle")
         turned = cumulative_trapezoid(rate, run.t, initial=0.0)
         noise = difference_noise(run.reference[run.reference_valid])
+        stretches = []
         for first, end in pairwise([0, *run.resumed, len(run.t)]):
             pieces = max(1, round((end - first) * run.sample_period / SEGMENT_DURATION))
-            for start, stop in pairwise(np.linspace(first, end, pieces + 1).astype(int).tolist()):
-                drift = noise * np.sqrt(run.sample_period * (run.t[start] - run.t[0]))
-                std = _LOST_ANGLE_STD if first > 0 else float(np.hypot(1e-4, 2.0 * drift))
-                segments.append(
-                    Segment(
-                        model,
-                        run.rows(start, stop),
-                        index,
-                        float(run.t[0]),
-                        start_angle=float(turned[start]),
-                        start_angle_std=std,
-                    )
+            edges = np.linspace(first, end, pieces + 1).astype(int).tolist()
+            stretches += [(start, stop, first > 0) for start, stop in pairwise(edges)]
+        for start, stop, lost in stretches:
+            drift = noise * np.sqrt(run.sample_period * (run.t[start] - run.t[0]))
+            segments.append(
+                Segment(
+                    model,
+                    run.rows(start, stop),
+                    index,
+                    float(run.t[0]),
+                    start_angle=float(turned[start]),
+                    start_angle_std=_LOST_ANGLE_STD if lost else float(np.hypot(1e-4, 2.0 * drift)),
+                    stretches=len(stretches),
                 )
+            )
     return segments
 
 
@@ -186,7 +190,7 @@ def explain(
     for number in range(_ROUNDS):
         tell(0.1 + 0.8 * number / _ROUNDS, f"search {number + 1}")
         settled = search.round(first=number == 0, tell=tell)
-        if search.hopeless(number, settled=settled) or settled:
+        if search.ends(number, settled=settled):
             break
     tell(0.85, "prune")
     best, without, rivals = search.judged()
@@ -280,22 +284,29 @@ class _Search:
         self._settled = settled
         return done
 
-    def hopeless(self, number: int, *, settled: bool) -> bool:
-        """Tell whether too much is left: early, more than is explained; later, far more than a round brought."""
+    def ends(self, number: int, *, settled: bool) -> bool:
+        """Tell whether the search is over: nothing changes, little of what is left is found, or it is given up.
+
+        It is given up where too much is left: after a first round more than is explained, later far more than a round
+        brought.
+        """
         good = self._best.objective < _SURELY_WRONG * self._observations
         # The usual end, without a look at the residuals.
         if self._loose or (settled and good):
-            return False
-        early = not settled and number < _FEWEST_ROUNDS
-        left = self._left(self._best, smooth=not (early and good))
-        # Under the noise that the best set left.
-        start = refine(self._segments, self._fitted.causes, self._fixed, drives=self._fitted.drives, iterations=2)
-        explained = start.objective - self._best.objective
-        share = _SHARE_AT_END if settled else _SHARE
+            return settled
+        first = not settled and number == 0
+        left = self._left(self._best, smooth=not (first and good and self._best.causes))
+        stalled = number > 0 and self._gained < _STALLED * left and left > _WORTH_FINDING
+        early = not (settled or stalled) and number < _FEWEST_ROUNDS
+        explained = 0.0
+        if self._best.key != self._fitted.key:  # under the noise that the best set left
+            start = refine(self._segments, self._fitted.causes, self._fixed, drives=self._fitted.drives, iterations=2)
+            explained = start.objective - self._best.objective
+        share = _SHARE_AT_END if settled or stalled else _SHARE
         # Right sets that still lacked a cause left a third of what they explained at most.
         enough = explained if early else max(_LITTLE * self._gained, share * explained)
         self.given_up = left > max(_MUCH, enough)
-        return self.given_up
+        return settled or stalled or self.given_up
 
     def _refined_leaders(self) -> dict[frozenset[tuple[str, str]], Fit]:
         """Refine the sets that lead the linear list; returns them and the best set so far by their keys."""

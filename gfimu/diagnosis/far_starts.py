@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.diagnosis.model import Effect
+from gfimu.diagnosis.parallel import over_segments
 from gfimu.diagnosis.refinement import Fit, refine, refine_each
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.signatures import Hypothesis
-from gfimu.diagnosis.threads import over_segments
 
 __all__ = ["every_mode", "from_far", "remembered_mode"]
 

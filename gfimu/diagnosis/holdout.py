@@ -66,7 +66,8 @@ def split_segments(
         pairs = max(1, round(segment.run.duration / (2 * duration)))
         edges = np.linspace(0, len(segment.run.t), 2 * pairs + 1).astype(int)
         for place, (start, stop) in enumerate(pairwise(edges)):
-            block = Segment(segment.model, segment.run.rows(int(start), int(stop)), segment.index, segment.start)
+            rows = segment.run.rows(int(start), int(stop))
+            block = Segment(segment.model, rows, segment.index, segment.start, stretches=segment.stretches)
             block.adopt(segment, present)
             parts[place % 2].append(block)
             known[place % 2].append(list(effects))

@@ -92,10 +92,6 @@ class DriveElimination:
         """Return X = V JᵀWA of what couples signatures to the drive, JᵀWA (m + q, P), shape (m + k + q, P)."""
         return self.root.apply(cross)
 
-    def step(self, eliminated: NDArray[np.float64], step: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the step of the drive (m,) to its posterior mean, given the step of the signatures' coordinates."""
-        return self.root.transposed(self.forward - eliminated @ step)[: self.size]
-
     def response(self, eliminated: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return how the drive follows each of the signatures' coordinates, shape (m, P)."""
         return -self.root.transposed(eliminated)[: self.size]

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from gfimu.diagnosis.causes import Cause, effects_of_run
 from gfimu.diagnosis.coloured_noise import NoiseLevels, estimate_flicker, white_level
 from gfimu.diagnosis.model import Effect
+from gfimu.diagnosis.parallel import over_segments
 from gfimu.diagnosis.refinement import Fit, refine
 from gfimu.diagnosis.segment import Segment
-from gfimu.diagnosis.threads import over_segments
 
 __all__ = ["STEADY_NOISE", "learn_noise", "settle_noise", "sharpen_drives", "tune_drives", "widen_drives"]
 

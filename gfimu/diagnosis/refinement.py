@@ -16,12 +16,11 @@ from numpy.typing import NDArray
 from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.causes import Cause, effects_of_run
 from gfimu.diagnosis.evidence import SCALES, inverse, log_evidence
-from gfimu.diagnosis.linearisation import DriveElimination
 from gfimu.diagnosis.model import Effect
+from gfimu.diagnosis.parallel import each_apart, over_segments
 from gfimu.diagnosis.search import EXTRA_CAUSE
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.signatures import ANGLES, cause_columns, shape_moved
-from gfimu.diagnosis.threads import at_once, over_segments
 
 __all__ = ["Fit", "Start", "refine", "refine_each", "without"]
 
@@ -170,10 +169,7 @@ def refine_each(
     shapes: bool = True,
     others: Sequence[Start | None] = (),
 ) -> list[Fit]:
-    """Fit several sets of causes, each from its own drives, at once where there is one segment only.
-
-    Several segments are worked on at once within each fit.
-    """
+    """Fit several sets of causes, each from its own drives, at once."""
 
     def fitted(task: tuple[Sequence[Cause], Sequence[NDArray[np.float64]] | None, Start | None]) -> Fit:
         causes, start, other = task
@@ -182,7 +178,7 @@ def refine_each(
         return refine(mine, causes, fixed, drives=start, iterations=iterations, shapes=shapes, other=other)
 
     tasks = list(zip(sets, drives, others or [None] * len(sets), strict=True))
-    return at_once(fitted, tasks) if len(segments) == 1 else [fitted(task) for task in tasks]
+    return each_apart(fitted, tasks)
 
 
 @dataclass(frozen=True)
@@ -219,6 +215,31 @@ class _Point:
         if not held:
             drives = tuple(drive + scale * move for drive, move in zip(drives, self.moves, strict=True))
         return _State(_moved(self.state.causes, scale * self.step, array), drives)
+
+
+@dataclass(frozen=True)
+class _Stretch:
+    """What a step needs of a linearised segment; the rest of it would fill the memory in long recordings.
+
+    Parameters
+    ----------
+    gram, score : ndarray, shape (P, P) and (P,)
+        Normal equations of the causes' columns, drive marginalised.
+    objective, log_volume, distance : float
+        As of `DriveElimination`.
+    drive_step : ndarray, shape (m,)
+        The step of the drive, the causes held.
+    response : ndarray, shape (m, P)
+        How the drive follows each column.
+    """
+
+    gram: NDArray[np.float64]
+    score: NDArray[np.float64]
+    objective: float
+    log_volume: float
+    distance: float
+    drive_step: NDArray[np.float64]
+    response: NDArray[np.float64]
 
 
 def _descend(segments: Sequence[Segment], fixed: Sequence[Sequence[Effect]], start: _State, iterations: int) -> _Point:
@@ -259,10 +280,12 @@ def _stepped(point: _Point, array: AccelerometerArray) -> _Point:
 
 def _energy(segments: Sequence[Segment], fixed: Sequence[Sequence[Effect]], state: _State) -> float:
     """Return misfit and prior energy of a state, its drives held."""
-    total = _prior_energy(state.causes)
-    for segment, known, drive in zip(segments, fixed, state.drives, strict=True):
+
+    def energy(segment: Segment, known: Sequence[Effect], drive: NDArray[np.float64]) -> float:
         segment.coefficients = drive
-        total += segment.energy([*known, *effects_of_run(state.causes, segment.model.array, segment.index)])
+        return segment.energy([*known, *effects_of_run(state.causes, segment.model.array, segment.index)])
+
+    total = _prior_energy(state.causes) + sum(over_segments(energy, segments, fixed, state.drives))
     return total if np.isfinite(total) else np.inf
 
 
@@ -270,38 +293,42 @@ def _evaluate(segments: Sequence[Segment], fixed: Sequence[Sequence[Effect]], st
     """Linearise every segment about a state and solve for the step of causes and drives."""
     coordinates = _places(state.causes)[0]
 
-    def linearised(
-        segment: Segment, known: Sequence[Effect], drive: NDArray[np.float64]
-    ) -> tuple[DriveElimination, tuple[NDArray[np.float64], ...], NDArray[np.float64]]:
+    def linearised(segment: Segment, known: Sequence[Effect], drive: NDArray[np.float64]) -> _Stretch:
         segment.coefficients = drive
         line = segment.linearise([*known, *effects_of_run(state.causes, segment.model.array, segment.index)])
-        products = segment.whitened_products(line, cause_columns(segment, state.causes, known, shapes=True))
-        # The rest of the line would fill the memory in long recordings.
-        return line.drive, products, line.drive.response(products[2][:, coordinates])
+        columns = cause_columns(segment, state.causes, known, shapes=True)
+        gram, score, eliminated = segment.whitened_products(line, columns)
+        drive_step, _ = line.drive.alone()
+        return _Stretch(
+            gram,
+            score,
+            line.drive.objective,
+            line.drive.log_volume(),
+            line.drive.distance(),
+            drive_step,
+            line.drive.response(eliminated),
+        )
 
     done = over_segments(linearised, segments, fixed, state.drives)
-    eliminations, products, responses = zip(*done, strict=True)
-    gram = np.sum([product[0] for product in products], axis=0)
-    score = np.sum([product[1] for product in products], axis=0)
+    gram = np.sum([one.gram for one in done], axis=0)
+    score = np.sum([one.score for one in done], axis=0)
     precision, pull = _prior(state.causes)
     information = gram + np.diag(precision)
     step = inverse(information) @ (score + pull) if len(score) else np.zeros(0)
     step = _limited(state.causes, step)
-    moves = tuple(
-        elimination.step(product[2], step) for elimination, product in zip(eliminations, products, strict=True)
-    )
+    objective, distance = sum(one.objective for one in done), sum(one.distance for one in done)
     return _Point(
         state,
-        sum(elimination.objective for elimination in eliminations),
+        objective,
         gram,
         score,
         step,
-        moves,
+        tuple(one.drive_step + one.response @ step for one in done),
         # What the step promises, and how far the drives still are from their best.
-        float(step @ information @ step) + _DRIVE_SHARE * sum(one.distance() for one in eliminations),
-        sum(one.log_volume() for one in eliminations),
-        responses,
-        sum(one.objective + one.distance() for one in eliminations) + _prior_energy(state.causes),
+        float(step @ information @ step) + _DRIVE_SHARE * distance,
+        sum(one.log_volume for one in done),
+        tuple(one.response[:, coordinates] for one in done),
+        objective + distance + _prior_energy(state.causes),
     )
 
 

@@ -67,7 +67,7 @@ def judges_reference(segment: Segment) -> bool:
     return segment.model.drive_source != "command" and not segment.rounding.reference
 
 
-def lines(segment: Segment, fit: Fit, known: Sequence[Effect], channels: Sequence[str]) -> LeftOver:
+def lines(segment: Segment, known: Sequence[Effect], *, fit: Fit, channels: Sequence[str]) -> LeftOver:
     """Test for narrow lines on one channel, on the reference or on all, by the maximum of the periodogram."""
     # In its own basis, where a wandering bias has no jump between its ends.
     left = segment.basis.whitened(_left(segment, fit, known), segment.levels)  # (n, c + 1)
@@ -94,7 +94,7 @@ def lines(segment: Segment, fit: Fit, known: Sequence[Effect], channels: Sequenc
     return LeftOver(every, f"several channels share a tone at {frequency[peak]:.3f} Hz", {})
 
 
-def jumps(segment: Segment, fit: Fit, known: Sequence[Effect], channels: Sequence[str]) -> LeftOver:
+def jumps(segment: Segment, known: Sequence[Effect], *, fit: Fit, channels: Sequence[str]) -> LeftOver:
     """Test whether a channel jumps: means of some seconds before and after every instant.
 
     Bias instability is learnt from the residual and would take a jump for its own; so the difference is compared with

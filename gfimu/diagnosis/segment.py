@@ -68,6 +68,8 @@ class Segment:
         Time at which the whole run began, s.
     start_angle, start_angle_std : float
         Table angle at the first sample and its standard deviation, rad.
+    stretches : int
+        How many such stretches the run is cut into.
     """
 
     def __init__(
@@ -79,8 +81,9 @@ class Segment:
         *,
         start_angle: float = 0.0,
         start_angle_std: float = 1e-4,
+        stretches: int = 1,
     ) -> None:
-        self.model, self.run, self.index, self.start = model, run, index, start
+        self.model, self.run, self.index, self.start, self.stretches = model, run, index, start, stretches
         self.start_angle, self.start_angle_std = start_angle, start_angle_std
         period = run.sample_period
         spacing = max(KNOT_SPACING, period)
@@ -93,7 +96,7 @@ class Segment:
         self.memory = 0.0
         # Fits are compared under the same knots, so these are chosen once.
         self.knots_chosen = False
-        self.basis = CosineBasis(len(run.t), period, float(run.t[0] - start))
+        self.basis = CosineBasis(len(run.t), period, float(run.t[0] - start), stretches=stretches)
         self.is_angle = model.drive_source == "angle"
         self.weight_mask = np.column_stack([run.valid, run.reference_valid])  # (n, c + 1)
         self.row_weight = self.weight_mask.astype(float)

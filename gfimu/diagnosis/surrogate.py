@@ -18,6 +18,7 @@ from gfimu.diagnosis.adequacy import series_products
 from gfimu.diagnosis.causes import Cause, effects_of_run
 from gfimu.diagnosis.evidence import log_evidence, log_evidence_each
 from gfimu.diagnosis.generic_basis import FUNCTIONS, OF_READING, Motion, basis_function, is_of_time, ripples, tone
+from gfimu.diagnosis.long_run import MOST_SEARCHED, spread_over_runs
 from gfimu.diagnosis.model import BasisUnits, Effect
 from gfimu.diagnosis.nuisances import learn_noise
 from gfimu.diagnosis.refinement import Fit, refine
@@ -75,6 +76,8 @@ def surrogates(
 ) -> list[Surrogate]:
     """Describe what a fit without causes leaves, ever more richly; empty where no function predicts it.
 
+    In long recordings the terms are chosen on some stretches and fitted to all, the poorest and the richest only.
+
     Parameters
     ----------
     segments : sequence of Segment
@@ -86,9 +89,35 @@ def surrogates(
     hints : sequence of str
         Functions of `gfimu.diagnosis.generic_basis` to look at besides its own.
     """
+    units = _units(segments, start)
+    chosen = spread_over_runs([segment.index for segment in segments], MOST_SEARCHED)
+    if len(chosen) < len(segments):
+        some = [segments[place] for place in chosen]
+        found = _ever_richer(some, start.of(chosen), [fixed[place] for place in chosen], units, hints)
+        ends = found if len(found) < 3 else [found[0], found[-1]]
+        return [_everywhere(segments, one.fit.causes, start, fixed) for one in ends]
+    return _ever_richer(segments, start, fixed, units, hints)
+
+
+def _everywhere(
+    segments: Sequence[Segment], causes: Sequence[Cause], start: Fit, fixed: Sequence[Sequence[Effect]]
+) -> Surrogate:
+    """Fit terms to all segments and learn the noise that they leave."""
+    mine = _at(segments, start)
+    fit = refine(mine, causes, fixed, drives=start.drives, iterations=_ITERATIONS)
+    learn_noise(mine, fit, fixed)
+    return Surrogate(fit, tuple(_at(mine, fit)))
+
+
+def _ever_richer(
+    segments: Sequence[Segment],
+    start: Fit,
+    fixed: Sequence[Sequence[Effect]],
+    units: BasisUnits,
+    hints: Sequence[str],
+) -> list[Surrogate]:
     observations = sum(int(segment.weight_mask.sum()) for segment in segments)
     mine = _at(segments, start)
-    units = _units(mine, start)
     fit = start
     terms: list[_Term] = []
     found: list[Surrogate] = []

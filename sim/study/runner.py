@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
 from functools import partial
+from multiprocessing.queues import SimpleQueue
 from pathlib import Path
 from typing import Any
 
@@ -42,8 +43,28 @@ def open_executor(workers: int, cluster: str = "") -> Iterator[Executor]:
     for variable in _ONE_THREAD:
         os.environ.setdefault(variable, "1")
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, context, initializer=_end_with_parent, initargs=(os.getpid(),)) as pool:
+    shares = context.SimpleQueue()
+    for share in _shares(workers):
+        shares.put(share)
+    with ProcessPoolExecutor(workers, context, initializer=_begin, initargs=(os.getpid(), shares)) as pool:
         yield pool
+
+
+def _shares(workers: int) -> list[set[int]]:
+    """Deal the processors out to the workers, so that what one does on several of them takes none from another."""
+    if not hasattr(os, "sched_getaffinity"):
+        return [set() for _ in range(workers)]
+    processors = sorted(os.sched_getaffinity(0))
+    if workers >= len(processors):
+        return [{processors[worker % len(processors)]} for worker in range(workers)]
+    return [set(processors[worker::workers]) for worker in range(workers)]
+
+
+def _begin(parent: int, shares: SimpleQueue[set[int]]) -> None:
+    share = shares.get()
+    if share:
+        os.sched_setaffinity(0, share)
+    _end_with_parent(parent)
 
 
 def _end_with_parent(parent: int) -> None:

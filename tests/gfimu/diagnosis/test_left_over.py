@@ -83,7 +83,7 @@ def test_a_line_far_beyond_the_smallest_probability_has_finite_odds(twin):
     for segment in segments:
         segment.prepare_weights()
     nothing = refine(segments, (), fixed, iterations=0)
-    found = lines(segments[0], nothing, fixed[0], twin.array.channels)
+    found = lines(segments[0], fixed[0], fit=nothing, channels=twin.array.channels)
     # |Σ y e^{−iωt}|²/n of a tone is nA²/4, in units of the noise; what leaks from it raises the floor it stands on.
     noise = segments[0].levels.white[:-1]
     most = np.sum(len(segments[0].run.t) * amplitude**2 / 4 / noise**2)
