@@ -55,8 +55,8 @@ class CosineBasis:
     elapsed : float
         Time since the run began, for which biases have wandered already, s.
     stretches : int
-        How many such stretches the run is cut into. Their means are taken for independent, but a bias is much the same
-        in neighbouring ones: each mean has as many times the variance of the whole run's mean.
+        How many such stretches the run is cut into. Their means are taken for independent though a bias is much the
+        same in neighbouring ones; so each is as uncertain as makes the mean of all as uncertain as it is.
     """
 
     def __init__(self, n: int, period: float, elapsed: float = 0.0, *, stretches: int = 1) -> None:
@@ -71,13 +71,13 @@ class CosineBasis:
         duration, period = self._duration, self.period
         omega = np.pi * np.arange(count) / duration
         flicker = sum(2 * tau / (1 + (omega * tau) ** 2) for tau in _TIMES) / (len(_TIMES) * period)
-        ratio = _TIMES / (self._stretches * duration)
-        flicker[0] = self.n * self._stretches * np.mean(2 * ratio * (1 + ratio * np.expm1(-1 / ratio)))
+        whole = self._stretches * duration
+        ratio = _TIMES / whole
+        flicker[0] = whole / period * np.mean(2 * ratio * (1 + ratio * np.expm1(-1 / ratio)))
         # Random walk from the start of the run: 1/(ω²) above, and its mean's variance at zero.
         walk = np.empty(count)
         walk[1:] = 1.0 / (omega[1:] ** 2 * period)
-        whole = self._stretches**2 * duration / 3.0
-        walk[0] = self.n * (whole if self._stretches > 1 else self._elapsed + duration / 3.0)
+        walk[0] = whole / period * (whole / 3.0 if self._stretches > 1 else self._elapsed + duration / 3.0)
         return flicker, walk
 
     def matrix(self, count: int) -> NDArray[np.float64]:

@@ -70,22 +70,34 @@ def log_evidence(
     positive : ndarray of bool, shape (k,), optional
         Coordinates that can only be positive.
     """
+    values = _unsigned(gram, score) if positive is None or not positive.any() else _signed(gram, score, positive)
+    return float(np.logaddexp.reduce(values + _SCALE_WEIGHTS))
+
+
+def _unsigned(gram: NDArray[np.float64], score: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the log evidence at each scale; −∞ at all where G is not positive, even with the prior."""
+    square = np.square(SCALES)[:, None]
+    power, vectors = np.linalg.eigh(gram)
+    total = 1.0 + square * power  # (scales, k)
+    if not (total > 0.0).all():
+        return np.full(len(SCALES), -np.inf)
+    return np.asarray(0.5 * np.sum(square * (score @ vectors) ** 2 / total - np.log(total), axis=1))
+
+
+def _signed(gram: NDArray[np.float64], score: NDArray[np.float64], positive: NDArray[np.bool_]) -> NDArray[np.float64]:
     count = len(score)
-    signed = positive is not None and positive.any()
     values = np.empty(len(SCALES))
     for place, scale in enumerate(SCALES):
         matrix = gram * scale**2
         matrix.flat[:: count + 1] += 1.0
         factor, info = lapack.dpotrf(matrix, lower=1)
         if info:
-            return -np.inf
+            return np.full(len(SCALES), -np.inf)
         half, _ = lapack.dtrtrs(factor, score * scale, lower=1)
-        value = 0.5 * float(half @ half) - float(np.log(factor.diagonal()).sum())
-        if signed:
-            inverse, _ = lapack.dpotri(factor, lower=1)
-            inverse = np.tril(inverse) + np.tril(inverse, -1).T
-            mean = inverse @ (score * scale)
-            for sign in np.flatnonzero(positive if positive is not None else []):
-                value += float(log_ndtr(mean[sign] / np.sqrt(inverse[sign, sign]))) + np.log(2.0)
-        values[place] = value
-    return float(np.logaddexp.reduce(values + _SCALE_WEIGHTS))
+        inverse, _ = lapack.dpotri(factor, lower=1)
+        inverse = np.tril(inverse) + np.tril(inverse, -1).T
+        mean = inverse @ (score * scale)
+        values[place] = 0.5 * float(half @ half) - float(np.log(factor.diagonal()).sum())
+        for sign in np.flatnonzero(positive):
+            values[place] += float(log_ndtr(mean[sign] / np.sqrt(inverse[sign, sign]))) + np.log(2.0)
+    return values

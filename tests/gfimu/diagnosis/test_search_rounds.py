@@ -73,6 +73,15 @@ def test_a_hopeless_search_ends_and_judges_no_rivals(twin, foreign, monkeypatch)
     assert found.fit.objective < 1.05 * patient.fit.objective
 
 
+def test_a_search_ends_where_a_round_brings_little_of_what_is_left(twin, foreign, monkeypatch):
+    monkeypatch.setattr(engine, "_MUCH", np.inf)
+    found, rounds = explained(twin, foreign)
+    monkeypatch.setattr(engine, "_STALLED", 0.0)
+    patient, more = explained(twin, foreign)
+    assert rounds < more
+    assert found.fit.objective < 1.02 * patient.fit.objective
+
+
 def test_a_tone_that_nothing_explains_ends_a_search(twin):
     run = measure(np.random.default_rng(4), twin, (), SETTING)
     readings = run.readings.copy()
@@ -160,3 +169,22 @@ def test_what_no_walk_explains_starts_no_search_for_one(twin, monkeypatch):
     found = diagnose([world.recording], world.twin)
     assert found.verdict == "unknown"
     assert not searches
+
+
+def test_slow_causes_that_leave_no_walk_start_no_search_for_one(monkeypatch):
+    world = draw_world(Case("pairs", 30112, ("gain_drift", "warm_up"), 300.0, duration=40.0))
+    searches = []
+
+    def counted(*args, **kwargs):
+        searches.append(args)
+        return explain_any_length(*args, **kwargs)
+
+    monkeypatch.setattr(wandering_biases, "explain_any_length", counted)
+    found = diagnose([world.recording], world.twin)
+    assert {cause.effect for cause in found.causes} == {"gain_drift", "warm_up"}
+    assert not searches
+    # Without them there would be a walk to look for.
+    monkeypatch.setattr(wandering_biases, "_WORSE", np.inf)
+    again = diagnose([world.recording], world.twin)
+    assert searches
+    assert {cause.effect for cause in again.causes} == {"gain_drift", "warm_up"}
