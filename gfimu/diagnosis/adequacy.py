@@ -19,7 +19,7 @@ from gfimu.diagnosis.evidence import log_evidence, log_evidence_each
 from gfimu.diagnosis.generic_basis import FUNCTIONS, Motion
 from gfimu.diagnosis.linearisation import Linearisation
 from gfimu.diagnosis.model import BasisUnits, Effect, SpinState
-from gfimu.diagnosis.parallel import over_segments
+from gfimu.diagnosis.parallel import each_apart, over_segments
 from gfimu.diagnosis.refinement import Fit
 from gfimu.diagnosis.residual_tests import (
     REFERENCE,
@@ -107,7 +107,7 @@ def dependence_left(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Seque
         names, basis = generic_basis(segment, line.state)
         return names, *series_products(segment, line, basis, fit.causes, known)
 
-    each = over_segments(products, segments, fixed)
+    each = each_apart(lambda row: products(*row), list(zip(segments, fixed, strict=True)))
     names = each[0][0]
     gram = np.sum([part for _, part, _ in each], axis=0)
     score = np.sum([right for _, _, right in each], axis=0)

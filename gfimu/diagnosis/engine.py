@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +20,7 @@ from gfimu.diagnosis.far_starts import every_mode, from_far, remembered_mode
 from gfimu.diagnosis.linearisation import Linearisation
 from gfimu.diagnosis.model import Effect, WorldModel
 from gfimu.diagnosis.nuisances import STEADY_NOISE, learn_noise, sharpen_drives, tune_drives, widen_drives
-from gfimu.diagnosis.parallel import over_segments
+from gfimu.diagnosis.parallel import each_apart, over_segments
 from gfimu.diagnosis.pruning import RIVALS, near_rivals, prune
 from gfimu.diagnosis.refinement import Fit, Start, refine, refine_each
 from gfimu.diagnosis.run import Run, difference_noise
@@ -243,6 +246,7 @@ class _Search:
         # How far each set was behind, under the noise that both were judged by.
         self._behind: dict[frozenset[tuple[str, str]], float] = {}
         self._settled = self.given_up = False
+        self._ahead: SignatureSet | None = None
         # What is left is judged once a residue of the calibration is held.
         self._loose = any(segment.calibration_residue is not None for segment in segments)
         self._gained = np.inf
@@ -253,7 +257,8 @@ class _Search:
     def round(self, *, first: bool, tell: Report) -> bool:
         """Screen about the best set, refine what leads, relearn the noise; tells whether nothing changes any more."""
         segments, fixed = self._segments, self._fixed
-        self._signatures, self._screened = screen(segments, self._best, fixed, self._runs), self._best.key
+        self._signatures = self._ahead or self._screen()
+        self._screened, self._ahead = self._best.key, None
         fits = self._refined_leaders()
         # A start has been through this.
         if first and not self._start and not any(self._is_fair(fit) for fit in fits.values()):
@@ -295,18 +300,33 @@ class _Search:
         if self._loose or (settled and good):
             return settled
         first = not settled and number == 0
-        left = self._left(self._best, smooth=not (first and good and self._best.causes))
+
+        smooth = not (first and good and self._best.causes)
+        # What the next round begins with, or the end asks for, is computed beside.
+        ahead: list[Callable[[], Any]] = [self._screen, partial(self._left, self._best, smooth=smooth), self._explained]
+        self._ahead, left, explained = each_apart(lambda work: work(), ahead)
         stalled = number > 0 and self._gained < _STALLED * left and left > _WORTH_FINDING
         early = not (settled or stalled) and number < _FEWEST_ROUNDS
-        explained = 0.0
-        if self._best.key != self._fitted.key:  # under the noise that the best set left
-            start = refine(self._segments, self._fitted.causes, self._fixed, drives=self._fitted.drives, iterations=2)
-            explained = start.objective - self._best.objective
         share = _SHARE_AT_END if settled or stalled else _SHARE
         # Right sets that still lacked a cause left a third of what they explained at most.
         enough = explained if early else max(_LITTLE * self._gained, share * explained)
         self.given_up = left > max(_MUCH, enough)
         return settled or stalled or self.given_up
+
+    def _explained(self) -> float:
+        """Return how much the best set takes off the misfit of the start, under the noise that it leaves."""
+        if self._best.key == self._fitted.key:
+            return 0.0
+        segments = self._copies()
+        start = refine(segments, self._fitted.causes, self._fixed, drives=self._fitted.drives, iterations=2)
+        return start.objective - self._best.objective
+
+    def _screen(self) -> SignatureSet:
+        return screen(self._copies(), self._best, self._fixed, self._runs)
+
+    def _copies(self) -> list[Segment]:
+        """Return the segments for work whose drives nothing else moves."""
+        return [copy(segment) for segment in self._segments]
 
     def _refined_leaders(self) -> dict[frozenset[tuple[str, str]], Fit]:
         """Refine the sets that lead the linear list; returns them and the best set so far by their keys."""
@@ -397,13 +417,16 @@ class _Search:
 
     def _left(self, fit: Fit, *, smooth: bool = True) -> float:
         """Return the log odds of the strongest thing that a fit leaves; without ``smooth``, of no smooth dependence."""
-        for segment, drive in zip(self._segments, fit.drives, strict=True):
+        segments = self._copies()
+        for segment, drive in zip(segments, fit.drives, strict=True):
             segment.coefficients = drive
-        rounded = any(segment.rounding.channels > 0 for segment in self._segments)
-        return left_over(self._segments, fit, self._fixed, 0, rounded=rounded, smooth=smooth).log_odds
+        rounded = any(segment.rounding.channels > 0 for segment in segments)
+        return left_over(segments, fit, self._fixed, 0, rounded=rounded, smooth=smooth).log_odds
 
     def screened(self, about: Fit) -> SignatureSet:
         """Return the signatures about a set: the last ones where they are, or where no set is believed."""
+        if self._ahead is not None:
+            self._signatures, self._screened = self._ahead, self._best.key
         if about.key == self._screened or self.given_up:
             return self._signatures
-        return screen(self._segments, about, self._fixed, self._runs)
+        return screen(self._copies(), about, self._fixed, self._runs)

@@ -309,7 +309,7 @@ def _evaluate(segments: Sequence[Segment], fixed: Sequence[Sequence[Effect]], st
             line.drive.response(eliminated),
         )
 
-    done = over_segments(linearised, segments, fixed, state.drives)
+    done = each_apart(lambda row: linearised(*row), list(zip(segments, fixed, state.drives, strict=True)))
     gram = np.sum([one.gram for one in done], axis=0)
     score = np.sum([one.score for one in done], axis=0)
     precision, pull = _prior(state.causes)

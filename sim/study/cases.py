@@ -142,6 +142,11 @@ def _nulls() -> list[Case]:
     ]
 
 
+def _long_nulls() -> list[Case]:
+    """Return long runs with nothing hidden: bias instability over minutes looks like a drift."""
+    return [Case("long_nulls", 69_000 + number, duration=600.0, **_noise_of(number)) for number in range(24)]
+
+
 def _threshold_nulls() -> list[Case]:
     """Return runs on which the thresholds may be chosen; the figures come from ``nulls`` alone."""
     return [
@@ -210,6 +215,7 @@ STUDIES: dict[str, Callable[[], list[Case]]] = {
     "singles": _singles,
     "faint": _faint,
     "nulls": _nulls,
+    "long_nulls": _long_nulls,
     "threshold_nulls": _threshold_nulls,
     "pairs": _pairs,
     "triples": _triples,
