@@ -402,11 +402,12 @@ class _Search:
         segments, fixed = self._segments, self._fixed
         for segment, drive in zip(segments, best.drives, strict=True):
             segment.coefficients = drive
-        left = dependence_left(segments, best, fixed).log_odds
         worth = best.log_posterior - without["resonance"].log_posterior
         # Many causes that together fit badly are made of something else, and so is their mode.
         likely = len(best.causes) <= _FEW or self._is_fair(best)
-        if likely and LEFT_OVER_ODDS < left < _ITS_OWN * worth and len(segments) == 1 and not self._loose:
+        # What is left beside a residue of the calibration is judged once that is held.
+        left = dependence_left(segments, best, fixed).log_odds if likely and not self._loose else -np.inf
+        if LEFT_OVER_ODDS < left < _ITS_OWN * worth and len(segments) == 1:
             better = remembered_mode(segments, best, fixed)
             if better is not best:
                 best, without = prune(segments, better, fixed, done)
