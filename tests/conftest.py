@@ -1,4 +1,4 @@
-"""Shared fixtures; pins the linear algebra to one thread, because several collapse on few cores."""
+"""Shared fixtures; one thread of linear algebra and a share of the processors per process, as more collapse on few."""
 
 import os
 from pathlib import Path
@@ -9,6 +9,13 @@ from hypothesis import settings
 # NumPy reads these when it is first imported, which no import above does.
 for _variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_variable, "1")
+
+# Each of several test processes keeps to its share of the processors, as a diagnosis takes all that it may.
+_share = os.environ.get("PYTEST_XDIST_WORKER", "")
+if _share and hasattr(os, "sched_setaffinity"):
+    _processors = sorted(os.sched_getaffinity(0))
+    _number, _count = int(_share.removeprefix("gw")), int(os.environ["PYTEST_XDIST_WORKER_COUNT"])
+    os.sched_setaffinity(0, _processors[_number::_count] or {_processors[_number % len(_processors)]})
 
 settings.register_profile("gfimu", deadline=None, derandomize=True, max_examples=50)
 settings.load_profile("gfimu")

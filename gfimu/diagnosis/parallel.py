@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import pickle
 import signal
 import sys
 import threading
@@ -39,7 +40,8 @@ def each_apart(work: Callable[[Item], Result], items: Sequence[Item]) -> list[Re
     """Call ``work``, which changes nothing, with each item; results in the order of the items.
 
     Where the system can split a process, on as many as there are processors: threads would wait for the interpreter
-    half of their time. What `work` needs is there already in a process that is split off; only results are sent.
+    half of their time. What `work` needs is there already in a process that is split off; only results are sent, and
+    one that can't be sent is computed here again.
 
     Raises
     ------
@@ -54,10 +56,15 @@ def each_apart(work: Callable[[Item], Result], items: Sequence[Item]) -> list[Re
     # Items are dealt out while they are done, as some take much longer than others.
     todo = iter(range(len(items)))
     results: dict[int, Result] = {}
-    processes = [_Apart(work, items) for _ in range(workers)]
+    processes: list[_Apart] = []
+    busy: list[Connection] = []
     try:
-        busy: list[Connection] = []
-        for process in processes:
+        for _ in range(workers):
+            try:
+                process = _Apart(work, items)
+            except OSError:  # no more processes, or no memory for one
+                break
+            processes.append(process)
             process.pipe.send(next(todo))
             busy.append(process.pipe)
         while busy:
@@ -69,7 +76,9 @@ def each_apart(work: Callable[[Item], Result], items: Sequence[Item]) -> list[Re
                     raise RuntimeError(
                         "a process of the diagnosis ended without an answer; is there memory enough?"
                     ) from None
-                if error is not None:
+                if isinstance(error, _UnsendableError):
+                    result = work(items[number])
+                elif error is not None:
                     raise error
                 results[number] = result
                 following = next(todo, None)
@@ -79,12 +88,16 @@ def each_apart(work: Callable[[Item], Result], items: Sequence[Item]) -> list[Re
     finally:
         for process in processes:
             process.end()
-    return [results[number] for number in range(len(items))]
+    return [results[number] if number in results else work(item) for number, item in enumerate(items)]
 
 
 def _on_threads(work: Callable[[Item], Result], items: Sequence[Item], workers: int) -> list[Result]:
     with one_blas_thread(), ThreadPoolExecutor(workers) as pool:
         return list(pool.map(work, items))
+
+
+class _UnsendableError(Exception):
+    """A result that no pipe takes, as where an effect of another simulator is made of local functions."""
 
 
 class _Apart:
@@ -130,7 +143,10 @@ def _serve(work: Callable[[Item], Result], items: Sequence[Item], pipe: Connecti
                 answer: tuple[int, Result | None, Exception | None] = (number, work(items[number]), None)
             except Exception as error:  # noqa: BLE001 - raised again where the answer is received
                 answer = (number, None, error)
-            pipe.send(answer)
+            try:
+                pipe.send(answer)
+            except (pickle.PicklingError, AttributeError, TypeError):
+                pipe.send((number, None, _UnsendableError()))
 
 
 def _processors() -> int:

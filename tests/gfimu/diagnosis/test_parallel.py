@@ -8,11 +8,23 @@ import time
 
 import pytest
 
+from gfimu.diagnosis import parallel
 from gfimu.diagnosis.parallel import each_apart, over_segments
 
-SPLITS = pytest.mark.skipif(
-    sys.platform != "linux" or len(os.sched_getaffinity(0)) < 2, reason="one processor, or none is split off"
-)
+
+@pytest.fixture
+def several_processors():
+    """As many processors as the machine lets this process have; the tests keep to their share otherwise."""
+    if sys.platform != "linux":
+        pytest.skip("no process is split off here")
+    share = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, range(os.cpu_count() or 1))
+    try:
+        if len(os.sched_getaffinity(0)) < 2:
+            pytest.skip("one processor")
+        yield
+    finally:
+        os.sched_setaffinity(0, share)
 
 
 def test_results_come_in_the_order_of_the_items():
@@ -24,7 +36,7 @@ def test_results_come_in_the_order_of_the_items():
     assert each_apart(late, []) == []
 
 
-@SPLITS
+@pytest.mark.usefixtures("several_processors")
 def test_what_is_changed_elsewhere_stays_as_it_was_here():
     state = {"changed": 0}
 
@@ -37,7 +49,7 @@ def test_what_is_changed_elsewhere_stays_as_it_was_here():
     assert state["changed"] == 0
 
 
-@SPLITS
+@pytest.mark.usefixtures("several_processors")
 def test_an_error_is_raised_here_and_no_process_is_left():
     def fail(number):
         if number == 2:
@@ -50,7 +62,7 @@ def test_an_error_is_raised_here_and_no_process_is_left():
     assert not multiprocessing.active_children()
 
 
-@SPLITS
+@pytest.mark.usefixtures("several_processors")
 def test_a_process_that_is_killed_is_told():
     def die(number):
         if number == 1:
@@ -62,7 +74,21 @@ def test_a_process_that_is_killed_is_told():
     assert not multiprocessing.active_children()
 
 
-@SPLITS
+@pytest.mark.usefixtures("several_processors")
+def test_a_result_that_cannot_be_sent_is_computed_here():
+    results = each_apart(lambda number: lambda: number, range(3))
+    assert [result() for result in results] == [0, 1, 2]
+
+
+def test_without_processes_the_work_is_done_all_the_same(monkeypatch):
+    def refuse(*_):
+        raise BlockingIOError("no more processes")
+
+    monkeypatch.setattr(parallel, "_Apart", refuse)
+    assert each_apart(lambda number: number**2, range(4)) == [0, 1, 4, 9]
+
+
+@pytest.mark.usefixtures("several_processors")
 def test_a_process_that_was_split_off_splits_off_none():
     def nested(number):
         inner = each_apart(lambda _: os.getpid(), range(3))
