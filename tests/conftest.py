@@ -1,6 +1,7 @@
 """Shared fixtures; one thread of linear algebra and a share of the processors per process, as more collapse on few."""
 
 import os
+import sys
 from pathlib import Path
 
 import pytest
@@ -21,6 +22,21 @@ settings.register_profile("gfimu", deadline=None, derandomize=True, max_examples
 settings.load_profile("gfimu")
 
 PROJECT_ROOT = Path(__file__).resolve().parents[1]
+
+
+@pytest.fixture
+def several_processors():
+    """As many processors as the machine lets this process have; the tests keep to their share otherwise."""
+    if sys.platform != "linux":
+        pytest.skip("no process is split off here")
+    share = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, range(os.cpu_count() or 1))
+    try:
+        if len(os.sched_getaffinity(0)) < 2:
+            pytest.skip("one processor")
+        yield
+    finally:
+        os.sched_setaffinity(0, share)
 
 
 @pytest.fixture(scope="session")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from copy import copy
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
@@ -22,7 +21,7 @@ from gfimu.diagnosis.model import Effect, WorldModel
 from gfimu.diagnosis.nuisances import STEADY_NOISE, learn_noise, sharpen_drives, tune_drives, widen_drives
 from gfimu.diagnosis.parallel import each_apart, over_segments
 from gfimu.diagnosis.pruning import RIVALS, near_rivals, prune
-from gfimu.diagnosis.refinement import Fit, Start, refine, refine_each
+from gfimu.diagnosis.refinement import Fit, Start, refine, refine_each, segments_at
 from gfimu.diagnosis.run import Run, difference_noise
 from gfimu.diagnosis.search import search
 from gfimu.diagnosis.segment import Segment
@@ -300,7 +299,6 @@ class _Search:
         if self._loose or (settled and good):
             return settled
         first = not settled and number == 0
-
         smooth = not (first and good and self._best.causes)
         # What the next round begins with, or the end asks for, is computed beside.
         ahead: list[Callable[[], Any]] = [self._screen, partial(self._left, self._best, smooth=smooth), self._explained]
@@ -317,16 +315,14 @@ class _Search:
         """Return how much the best set takes off the misfit of the start, under the noise that it leaves."""
         if self._best.key == self._fitted.key:
             return 0.0
-        segments = self._copies()
+        segments = segments_at(self._segments, self._fitted)
         start = refine(segments, self._fitted.causes, self._fixed, drives=self._fitted.drives, iterations=2)
         return start.objective - self._best.objective
 
-    def _screen(self) -> SignatureSet:
-        return screen(self._copies(), self._best, self._fixed, self._runs)
-
-    def _copies(self) -> list[Segment]:
-        """Return the segments for work whose drives nothing else moves."""
-        return [copy(segment) for segment in self._segments]
+    def _screen(self, about: Fit | None = None) -> SignatureSet:
+        """Return the signatures about a set, the best one by default."""
+        base = about or self._best
+        return screen(segments_at(self._segments, base), base, self._fixed, self._runs)
 
     def _refined_leaders(self) -> dict[frozenset[tuple[str, str]], Fit]:
         """Refine the sets that lead the linear list; returns them and the best set so far by their keys."""
@@ -418,9 +414,7 @@ class _Search:
 
     def _left(self, fit: Fit, *, smooth: bool = True) -> float:
         """Return the log odds of the strongest thing that a fit leaves; without ``smooth``, of no smooth dependence."""
-        segments = self._copies()
-        for segment, drive in zip(segments, fit.drives, strict=True):
-            segment.coefficients = drive
+        segments = segments_at(self._segments, fit)
         rounded = any(segment.rounding.channels > 0 for segment in segments)
         return left_over(segments, fit, self._fixed, 0, rounded=rounded, smooth=smooth).log_odds
 
@@ -430,4 +424,4 @@ class _Search:
             self._signatures, self._screened = self._ahead, self._best.key
         if about.key == self._screened or self.given_up:
             return self._signatures
-        return screen(self._copies(), about, self._fixed, self._runs)
+        return self._screen(about)

@@ -40,7 +40,7 @@ def each_apart(work: Callable[[Item], Result], items: Sequence[Item]) -> list[Re
     """Call ``work``, which changes nothing, with each item; results in the order of the items.
 
     Where the system can split a process, on as many as there are processors: threads would wait for the interpreter
-    half of their time. What `work` needs is there already in a process that is split off; only results are sent, and
+    half of their time. What ``work`` needs is there already in a process that is split off; only results are sent, and
     one that can't be sent is computed here again.
 
     Raises

@@ -22,7 +22,7 @@ from gfimu.diagnosis.search import EXTRA_CAUSE
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.signatures import ANGLES, cause_columns, shape_moved
 
-__all__ = ["Fit", "Start", "refine", "refine_each", "without"]
+__all__ = ["Fit", "Start", "refine", "refine_each", "segments_at", "without"]
 
 _SHAPE_LIMIT = 0.3
 _SHAPE_PRIOR = 0.7
@@ -115,6 +115,14 @@ def without(fit: Fit, number: int, array: AccelerometerArray) -> Start:
     causes = [cause.at(new[owners == place]) for place, cause in enumerate(fit.causes) if place != number]
     moves = [response @ (new - old) for response in fit.responses]
     return Start(causes, [drive + move for drive, move in zip(fit.drives, moves, strict=True)])
+
+
+def segments_at(segments: Sequence[Segment], fit: Fit) -> list[Segment]:
+    """Return copies of segments at the drives of a fit, for work that nothing else is to notice."""
+    copies = [copy(segment) for segment in segments]
+    for segment, drive in zip(copies, fit.drives, strict=True):
+        segment.coefficients = drive
+    return copies
 
 
 def refine(

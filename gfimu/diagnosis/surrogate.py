@@ -8,7 +8,6 @@ leave. What a surrogate is worth is measured as for a cause: on data that its fi
 from __future__ import annotations
 
 from collections.abc import Sequence
-from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,7 +20,7 @@ from gfimu.diagnosis.generic_basis import FUNCTIONS, OF_READING, Motion, basis_f
 from gfimu.diagnosis.long_run import MOST_SEARCHED, spread_over_runs
 from gfimu.diagnosis.model import BasisUnits, Effect
 from gfimu.diagnosis.nuisances import learn_noise
-from gfimu.diagnosis.refinement import Fit, refine
+from gfimu.diagnosis.refinement import Fit, refine, segments_at
 from gfimu.diagnosis.residual_tests import judges_reference
 from gfimu.diagnosis.segment import Segment
 from gfimu.units import STANDARD_GRAVITY
@@ -103,10 +102,10 @@ def _everywhere(
     segments: Sequence[Segment], causes: Sequence[Cause], start: Fit, fixed: Sequence[Sequence[Effect]]
 ) -> Surrogate:
     """Fit terms to all segments and learn the noise that they leave."""
-    mine = _at(segments, start)
+    mine = segments_at(segments, start)
     fit = refine(mine, causes, fixed, drives=start.drives, iterations=_ITERATIONS)
     learn_noise(mine, fit, fixed)
-    return Surrogate(fit, tuple(_at(mine, fit)))
+    return Surrogate(fit, tuple(segments_at(mine, fit)))
 
 
 def _ever_richer(
@@ -117,7 +116,7 @@ def _ever_richer(
     hints: Sequence[str],
 ) -> list[Surrogate]:
     observations = sum(int(segment.weight_mask.sum()) for segment in segments)
-    mine = _at(segments, start)
+    mine = segments_at(segments, start)
     fit = start
     terms: list[_Term] = []
     found: list[Surrogate] = []
@@ -134,17 +133,9 @@ def _ever_richer(
             break
         learn_noise(mine, fit, fixed)
         fit = refine(mine, fit.causes, fixed, drives=fit.drives, iterations=_ITERATIONS)
-        mine = _at(mine, fit)
+        mine = segments_at(mine, fit)
         found.append(Surrogate(fit, tuple(mine)))
     return found
-
-
-def _at(segments: Sequence[Segment], fit: Fit) -> list[Segment]:
-    """Return copies of segments at the drives of a fit."""
-    copies = [copy(segment) for segment in segments]
-    for segment, drive in zip(copies, fit.drives, strict=True):
-        segment.coefficients = drive
-    return copies
 
 
 def _units(segments: Sequence[Segment], fit: Fit) -> BasisUnits:

@@ -18,7 +18,7 @@ from gfimu.diagnosis.model import Effect, WorldModel
 from gfimu.diagnosis.nuisances import settle_noise
 from gfimu.diagnosis.prepared_runs import PreparedRuns
 from gfimu.diagnosis.pruning import LEAST_EXTRA_ODDS
-from gfimu.diagnosis.refinement import Fit, refine
+from gfimu.diagnosis.refinement import Fit, refine, segments_at
 from gfimu.diagnosis.segment import Segment, known_walk
 from gfimu.diagnosis.stochastic import UNEQUAL_WALK, WALK_ODDS, Walk, log_probability, walk_strength
 
@@ -109,6 +109,5 @@ def _leaves_much(
     segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]], prepared: PreparedRuns
 ) -> bool:
     """Tell whether a fit, under the noise of the segments, leaves more than any search would find."""
-    for segment, drive in zip(segments, fit.drives, strict=True):
-        segment.coefficients = drive
-    return left_over(segments, fit, fixed, prepared.spikes, rounded=prepared.rounded).log_odds > _MUCH
+    at = segments_at(segments, fit)
+    return left_over(at, fit, fixed, prepared.spikes, rounded=prepared.rounded).log_odds > _MUCH

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from gfimu.array import AccelerometerArray
-from gfimu.diagnosis import diagnose, engine, long_run
+from gfimu.diagnosis import diagnose, engine, long_run, surrogate
 from gfimu.diagnosis.long_run import spread_over_runs
-from sim.campaign import Measurement, measure
+from gfimu.recording import Recording
+from sim.campaign import Measurement, measure, random_profile
 from sim.effects import make_effect
 from sim.twin import Twin
 
@@ -60,3 +61,18 @@ def test_nothing_is_found_in_a_long_quiet_recording(short_stretches, monkeypatch
     monkeypatch.setattr(long_run, "MOST_SEARCHED", 2)
     recording = measure(np.random.default_rng(12), twin, [], Measurement(duration=50.0))
     assert diagnose([recording], twin).verdict == "nothing_found"
+
+
+def test_what_has_no_name_is_described_on_some_stretches_and_fitted_to_all(short_stretches, monkeypatch):
+    twin = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
+    rng = np.random.default_rng(13)
+    motion = random_profile(rng, 50.0)
+    run = measure(rng, twin, [], Measurement(duration=50.0), motion=motion)
+    readings = run.readings.copy()
+    readings[:, 4] += 0.004 * motion.at(run.t_s).rate ** 3
+    monkeypatch.setattr(long_run, "MOST_SEARCHED", 2)
+    monkeypatch.setattr(surrogate, "MOST_SEARCHED", 2)
+    found = diagnose([Recording.from_arrays(run.t_s, readings, twin.array, reference=run.reference)], twin)
+    assert found.verdict == "unknown"
+    assert any(effect.name == "unknown" for effect in found.twin.effects)
+    assert found.gain.share_of_excess_removed > 0.9

@@ -3,28 +3,12 @@
 import multiprocessing
 import os
 import signal
-import sys
 import time
 
 import pytest
 
 from gfimu.diagnosis import parallel
 from gfimu.diagnosis.parallel import each_apart, over_segments
-
-
-@pytest.fixture
-def several_processors():
-    """As many processors as the machine lets this process have; the tests keep to their share otherwise."""
-    if sys.platform != "linux":
-        pytest.skip("no process is split off here")
-    share = os.sched_getaffinity(0)
-    os.sched_setaffinity(0, range(os.cpu_count() or 1))
-    try:
-        if len(os.sched_getaffinity(0)) < 2:
-            pytest.skip("one processor")
-        yield
-    finally:
-        os.sched_setaffinity(0, share)
 
 
 def test_results_come_in_the_order_of_the_items():

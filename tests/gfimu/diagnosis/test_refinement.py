@@ -99,6 +99,7 @@ def test_screening_about_a_set_varies_its_effects_in_their_order(twin):
     assert_allclose(columns, cause_columns(segment, causes[:1], [], shapes=False), atol=0.05 * np.abs(columns).max())
 
 
+@pytest.mark.usefixtures("several_processors")
 def test_sets_refined_at_once_are_as_one_after_the_other_and_leave_the_drive_alone(twin):
     segment = _segment(twin, [make_effect("bias", {"a12_m_s2": 0.2})])
     sets = [_causes(segment, [name], [{}], twin.array) for name in ("bias", "scale_factor", "cross_axis", "quadratic")]

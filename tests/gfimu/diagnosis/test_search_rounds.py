@@ -1,5 +1,7 @@
 """The search for causes goes on while a round brings something, and ends where nothing of it would be believed."""
 
+import os
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -122,6 +124,17 @@ def test_a_search_that_explains_goes_on_to_its_rivals(twin):
     assert rounds < ALL_ROUNDS
     assert found.fit.names == {"eccentricity", "quadratic"}
     assert set(found.without) == {"eccentricity", "quadratic"}
+
+
+def test_several_processors_find_what_one_finds(twin, foreign, several_processors, monkeypatch):
+    monkeypatch.setattr(engine, "_MUCH", np.inf)  # for all rounds and the judgement of the rivals
+    found, rounds = explained(twin, foreign)
+    os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
+    alone, as_many = explained(twin, foreign)
+    assert rounds == as_many
+    assert found.fit.key == alone.fit.key
+    assert set(found.without) == set(alone.without)
+    assert_allclose(found.fit.log_posterior, alone.fit.log_posterior, rtol=1e-6)
 
 
 @pytest.mark.parametrize("quadratic", [0.01, 0.0415])
