@@ -25,7 +25,7 @@ from gfimu.diagnosis.residual_tests import LeftOver
 from gfimu.diagnosis.stochastic import Walk
 from gfimu.diagnosis.surrogate import surrogates
 from gfimu.diagnosis.verdict import Diagnosis, Gain
-from gfimu.diagnosis.wandering_biases import with_walk
+from gfimu.diagnosis.wandering_biases import wanders, with_walk
 from gfimu.errors import InputError
 from gfimu.recording import Recording
 
@@ -190,7 +190,18 @@ def _explain(
     """Search for causes, then again with a calibration residue and with wandering biases, and compare."""
     segments, fixed = prepared.segments(model)
     runs = len(prepared.runs)
-    plain = explain_any_length(segments, fixed, runs, report=lambda share, text: tell(0.05 + 0.7 * share, text))
+
+
+    def told(share: float, text: str) -> None:
+        tell(0.05 + 0.7 * share, text)
+
+    plain = explain_any_length(segments, fixed, runs, instead=wanders, report=told)
+    if plain.interrupted:
+        found = with_walk(plain, prepared, model, given_up=False, report=lambda text: tell(0.6, text))
+        if found is not None:
+            return (*found, None)
+        segments, fixed = prepared.segments(model)
+        plain = explain_any_length(segments, fixed, runs, report=told)
     tell(0.76, "calibration residue")
     loose, plain = loosen(plain, prepared, model)
     judged = plain

@@ -37,6 +37,7 @@ __all__ = [
 ]
 
 Report = Callable[[float, str], None]
+Instead = Callable[[Sequence[Segment], Fit, Sequence[Sequence[Effect]]], bool]
 
 SEGMENT_DURATION = 64.0
 _LOST_ANGLE_STD = 3.0  # rad
@@ -83,6 +84,8 @@ class Explanation:
         Whether so much is left that the set was neither pruned nor compared with others.
     beside_residue : Fit, optional
         What would be named if all numbers of the calibration were a little off, where that is about as probable.
+    interrupted : bool
+        Whether the search was left for something better that it does not look for.
     """
 
     fit: Fit
@@ -94,6 +97,7 @@ class Explanation:
     signatures: SignatureSet
     given_up: bool = False
     beside_residue: Fit | None = None
+    interrupted: bool = False
 
 
 def _posterior(fit: Fit) -> float:
@@ -170,6 +174,7 @@ def explain(
     runs: int,
     *,
     start: Sequence[Cause] = (),
+    instead: Instead | None = None,
     report: Report | None = None,
 ) -> Explanation:
     """Find the most probable set of causes.
@@ -184,6 +189,9 @@ def explain(
         Number of runs.
     start : sequence of Cause
         Causes to start from.
+    instead : callable, optional
+        Called with segments, fit and fixed effects where the first round leaves much: whether to leave the search for
+        something better that it does not look for.
     report : callable, optional
         Called with the share done and a line of text.
     """
@@ -192,12 +200,15 @@ def explain(
     for number in range(_ROUNDS):
         tell(0.1 + 0.8 * number / _ROUNDS, f"search {number + 1}")
         settled = search.round(first=number == 0, tell=tell)
+        if number == 0 and not settled and instead is not None and search.is_left_for(instead):
+            break
         if search.ends(number, settled=settled):
             break
     tell(0.85, "prune")
     best, without, rivals = search.judged()
     tell(0.9, "compare")
-    nothing = refine(segments, (), fixed, drives=best.drives, iterations=8) if best.causes else best
+    believed = best.causes and not search.interrupted
+    nothing = refine(segments, (), fixed, drives=best.drives, iterations=8) if believed else best
     for segment, drive in zip(segments, best.drives, strict=True):
         segment.coefficients = drive
     return Explanation(
@@ -209,6 +220,7 @@ def explain(
         tuple(tuple(known) for known in fixed),
         search.screened(best),
         search.given_up,
+        interrupted=search.interrupted,
     )
 
 
@@ -244,7 +256,7 @@ class _Search:
         self._tried: dict[frozenset[tuple[str, str]], Fit] = {}
         # How far each set was behind, under the noise that both were judged by.
         self._behind: dict[frozenset[tuple[str, str]], float] = {}
-        self._settled = self.given_up = False
+        self._settled = self.given_up = self.interrupted = False
         self._ahead: SignatureSet | None = None
         # What is left is judged once a residue of the calibration is held.
         self._loose = any(segment.calibration_residue is not None for segment in segments)
@@ -287,6 +299,13 @@ class _Search:
         done = settled and (self._settled or change < STEADY_NOISE)
         self._settled = settled
         return done
+
+    def is_left_for(self, instead: Instead) -> bool:
+        """Tell whether the search is left for something better that it does not look for, as much is left."""
+        poor = self._best.objective > _SURELY_WRONG * self._observations
+        if poor and instead(segments_at(self._segments, self._best), self._best, self._fixed):
+            self.given_up = self.interrupted = True
+        return self.interrupted
 
     def ends(self, number: int, *, settled: bool) -> bool:
         """Tell whether the search is over: nothing changes, little of what is left is found, or it is given up.

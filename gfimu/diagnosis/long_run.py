@@ -6,11 +6,12 @@ The search asks for hundreds of simulations of every stretch, the judgement for 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from gfimu.diagnosis.causes import Cause
-from gfimu.diagnosis.engine import Explanation, Report, explain
+from gfimu.diagnosis.engine import Explanation, Instead, Report, explain
 from gfimu.diagnosis.model import Effect
 from gfimu.diagnosis.nuisances import learn_noise, sharpen_drives, widen_drives
 from gfimu.diagnosis.pruning import RIVALS, prune
@@ -21,6 +22,7 @@ __all__ = ["MOST_SEARCHED", "explain_any_length", "spread_over_runs"]
 
 MOST_SEARCHED = 8
 """Stretches that are searched for causes, where there are as many runs at most."""
+_FEW_ITERATIONS = 2
 
 
 def spread_over_runs(runs: Sequence[int], most: int) -> list[int]:
@@ -47,18 +49,20 @@ def explain_any_length(
     runs: int,
     *,
     start: Sequence[Cause] = (),
+    instead: Instead | None = None,
     report: Report | None = None,
 ) -> Explanation:
     """Find the most probable set of causes (`explain`); in long recordings from some stretches, judged on all."""
     chosen = spread_over_runs([segment.index for segment in segments], MOST_SEARCHED)
     if len(chosen) == len(segments):
-        return explain(segments, fixed, runs, start=start, report=report)
+        return explain(segments, fixed, runs, start=start, instead=instead, report=report)
     tell = report or (lambda share, text: None)
     part = explain(
         [segments[place] for place in chosen],
         [fixed[place] for place in chosen],
         runs,
         start=start,
+        instead=instead,
         report=lambda share, text: tell(0.6 * share, text),
     )
     tell(0.6, "the whole length")
@@ -68,6 +72,12 @@ def explain_any_length(
         segments[place].set_levels(like.levels)
         segments[place].roughness.factor, segments[place].rounding = like.roughness.factor, like.rounding
         segments[place].prepare_weights()
+    if part.interrupted:  # nothing of it will be believed
+        fit = refine(segments, part.fit.causes, fixed, iterations=_FEW_ITERATIONS)
+        for segment, drive in zip(segments, fit.drives, strict=True):
+            segment.coefficients = drive
+        everywhere = tuple(tuple(effects) for effects in fixed)
+        return replace(part, fit=fit, rivals=(), nothing=fit, segments=tuple(segments), fixed=everywhere)
     fit = widen_drives(segments, refine(segments, part.fit.causes, fixed), fixed)
     others, known = [segments[place] for place in rest], [fixed[place] for place in rest]
     for segment, drive in zip(others, fit.of(rest).drives, strict=True):

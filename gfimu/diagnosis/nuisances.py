@@ -33,20 +33,24 @@ def learn_noise(
     """
     array = segments[0].model.array
     change = 0.0
-    coefficients, whites = [], []
-    for segment, known, drive in zip(segments, fixed, fit.drives, strict=True):
+
+    def level_left(
+        segment: Segment, known: Sequence[Effect], drive: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         segment.coefficients = drive
         effects = [*known, *effects_of_run(fit.causes, array, segment.index)]
         line = segment.linearise(effects)
         segment.move_drive(line)
         left = segment.working_residual(effects) - segment.residue_readings(line)
-        coefficients.append(segment.basis.transform(left))
+        coefficients = segment.basis.transform(left)
         # Above this frequency the drive has no freedom to follow the noise.
         slowest = 0.6 / segment.spline.spacing
-        level = white_level(coefficients[-1], slowest, segment.run.sample_period)
+        level = white_level(coefficients, slowest, segment.run.sample_period)
         # Missing samples stand as zeros, as where the reference comes at a lower rate.
         level = level / np.sqrt(np.maximum(segment.weight_mask.mean(axis=0), _LEAST_VALID))
-        whites.append(segment.noise_before_rounding(effects, level))
+        return coefficients, segment.noise_before_rounding(effects, level)
+
+    coefficients, whites = zip(*over_segments(level_left, segments, fixed, fit.drives), strict=True)
     for index in {segment.index for segment in segments}:
         mine = [place for place, segment in enumerate(segments) if segment.index == index]
         shares = np.array([segments[place].weight_mask.sum(axis=0) for place in mine], dtype=float)  # (segments, c + 1)

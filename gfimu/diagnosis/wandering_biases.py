@@ -22,15 +22,44 @@ from gfimu.diagnosis.refinement import Fit, refine, segments_at
 from gfimu.diagnosis.segment import Segment, known_walk
 from gfimu.diagnosis.stochastic import UNEQUAL_WALK, WALK_ODDS, Walk, log_probability, walk_strength
 
-__all__ = ["with_walk"]
+__all__ = ["wanders", "with_walk"]
 
 _ROUNDS = 3
 _HOPELESS = 300.0  # `Walk.unequal` with all other causes in place
 _MUCH = 500.0  # log odds of what a walk leaves of a search that was given up: more is something else
+_FAR_BETTER = 1000.0  # log odds for a walk over what a search found at first, to look for the walk at once
+_FITS = 1.1  # misfit per observation of what a walk explains
 _WORSE = 20.0  # log odds against a walk that no other cause would bring back, where no walk is left without it
 _SLOW = frozenset(
     {"bias", "warm_up", "bias_temperature", "gain_drift", "scale_factor", "quadratic", "gravity", "cross_axis"}
 )
+
+
+def wanders(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]]) -> bool:
+    """Tell whether wandering biases explain what a search found at first no causes for, and far better than these.
+
+    Parameters
+    ----------
+    segments : sequence of Segment
+        The data.
+    fit : Fit
+        What was found at first.
+    fixed : sequence of sequence of Effect
+        Effects known beforehand, per segment.
+    """
+    if known_walk(segments[0].model) > 0 or walk_strength(segments, fit, fixed).log_odds < WALK_ODDS:
+        return False
+    base = _without_slow(segments, fit, fixed)
+    walk = walk_strength(segments, base, fixed)
+    if walk.log_odds < WALK_ODDS or walk.unequal > UNEQUAL_WALK:
+        return False
+    other = segments_at(segments, base)
+    _let_wander(other, walk)
+    settle_noise(other, base.causes, fixed)
+    found = refine(other, base.causes, fixed)
+    observations = sum(int(segment.weight_mask.sum()) for segment in segments)
+    better = log_probability(other, found) - log_probability(segments, fit)
+    return found.objective < _FITS * observations and better > _FAR_BETTER
 
 
 def with_walk(
@@ -60,9 +89,8 @@ def with_walk(
         return None
     segments, fixed = list(judged.segments), [list(known) for known in judged.fixed]
     # It is looked for in what the other causes leave.
-    quick = [cause for cause in judged.fit.causes if cause.name not in _SLOW]
-    same = len(quick) == len(judged.fit.causes)
-    base = judged.fit if same else refine(segments, quick, fixed, drives=judged.fit.drives)
+    base = _without_slow(segments, judged.fit, fixed)
+    same = base is judged.fit
     walk = walk_strength(segments, base, fixed)
     if walk.log_odds < WALK_ODDS:
         return None
@@ -78,6 +106,13 @@ def with_walk(
         settle_noise(other, base.causes, fixed)
         if number == 0:
             fit = refine(other, base.causes, fixed)
+            # Bias instability lets the drive follow the walk.
+            freed = walk_strength(other, fit, fixed)
+            if abs(freed.strength - walk.strength) > walk.std:
+                walk = freed
+                _let_wander(other, walk)
+                settle_noise(other, base.causes, fixed)
+                fit = refine(other, base.causes, fixed)
             if given_up and _leaves_much(other, fit, fixed, prepared):
                 return None
             if beside.log_odds < WALK_ODDS and log_probability(other, fit) - without < -_WORSE:
@@ -95,13 +130,25 @@ def with_walk(
     return found, replace(walk, log_odds=float(odds))
 
 
+def _without_slow(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]]) -> Fit:
+    """Return a fit, or, where it has causes that a walk passes for, one without these."""
+    quick = [cause for cause in fit.causes if cause.name not in _SLOW]
+    return fit if len(quick) == len(fit.causes) else refine(segments, quick, fixed, drives=fit.drives)
+
+
+def _let_wander(segments: Sequence[Segment], walk: Walk) -> None:
+    """Let biases wander."""
+    for segment in segments:
+        segment.set_levels(NoiseLevels(segment.levels.white, segment.levels.flicker, walk.strength))
+        segment.prepare_weights()
+
+
 def _wandering(segments: Sequence[Segment], walk: Walk, prepared: PreparedRuns, model: WorldModel) -> list[Segment]:
     """Return the segments anew, with biases that wander and the drives as they are."""
     fresh, _ = prepared.segments(model)
     for segment, old in zip(fresh, segments, strict=True):
         segment.adopt(old)
-        segment.set_levels(NoiseLevels(old.levels.white, old.levels.flicker, walk.strength))
-        segment.prepare_weights()
+    _let_wander(fresh, walk)
     return fresh
 
 
