@@ -198,7 +198,7 @@ _Masked = list[tuple[NDArray[np.float64], NDArray[np.float64]]]
 
 
 def _masked(segment: Segment, basis: NDArray[np.float64]) -> _Masked:
-    """Return basis functions (c + 1, n, k) by series as its samples weigh them, (n, k) and in the cosines (K, k).
+    """Return basis functions (c + 1, n, k) by series as its samples weigh them, (n, k) and in the slow modes (K, k).
 
     What is the same for several series, as for most channels, is the same object.
     """
@@ -208,7 +208,7 @@ def _masked(segment: Segment, basis: NDArray[np.float64]) -> _Masked:
         mask = segment.row_weight[:, series]
         if not (found and same and np.array_equal(mask, segment.row_weight[:, series - 1])):
             part = functions * mask[:, None]
-            found.append((part, segment.cosines.T @ part))
+            found.append((part, segment.modes.of(part.T, series).T))
         else:
             found.append(found[-1])
     return found
@@ -228,14 +228,13 @@ def _channelwise(
             square = part.T @ part
             through = [matrix.T @ part for matrix in line.jacobian.parts]
         weight, loading = segment.inverse_variance[channel], line.jacobian.loading[:, channel]
-        damped = segment.share[:, [channel]] * slow
+        damped = segment.modes.share[:, [channel]] * slow
         places = slice(channel * count, (channel + 1) * count)
         gram[places, places] = weight * (square - slow.T @ damped)
         score[places] = weight * (part.T @ line.residual[:, channel] - damped.T @ line.slow_residual[:, channel])
         used = np.flatnonzero(loading)
         if len(used):
-            slowly = np.tensordot(loading[used], line.slow[used], axes=1)  # J_cᵀC (m, K)
-            cross[:, places] = weight * (sum(loading[r] * through[r] for r in used) - slowly @ damped)
+            cross[:, places] = weight * (sum(loading[r] * through[r] for r in used) - line.slow.of(channel) @ damped)
     eliminated = line.drive.eliminate(cross)
     gram -= eliminated.T @ eliminated
     score -= eliminated.T @ line.drive.forward
@@ -262,7 +261,7 @@ def _project_out(
         places = slice(channel * count, (channel + 1) * count)
         columns = named[channel, reaching]  # (P, n)
         mixed[reaching, places] = segment.inverse_variance[channel] * (
-            columns @ part - (columns @ segment.cosines) @ (segment.share[:, [channel]] * slow)
+            columns @ part - segment.modes.of(columns, channel) @ (segment.modes.share[:, [channel]] * slow)
         )
     mixed -= crossed.T @ eliminated
     gain = np.linalg.solve(inner + np.eye(len(right)) * 1e-6 * (1 + inner.diagonal().mean()), mixed)

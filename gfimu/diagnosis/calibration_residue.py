@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.diagnosis.drive_jacobian import DriveJacobian
+from gfimu.diagnosis.slow_modes import DriveModes, SlowModes
 from gfimu.units import STANDARD_GRAVITY
 
 __all__ = ["TOLERANCE", "CalibrationResidue", "tolerance_of"]
@@ -55,63 +55,57 @@ class CalibrationResidue:
     def normal_equations(
         self,
         residual: NDArray[np.float64],
-        jacobian: DriveJacobian,
-        slow: NDArray[np.float64],
-        cosines: NDArray[np.float64],
-        share: NDArray[np.float64],
+        slow: DriveModes,
+        modes: SlowModes,
         weights: NDArray[np.float64],
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Return AᵀWA + I (q, q), AᵀWr (q,) and JᵀWA (m, q) under noise that is white plus slow cosines.
+        """Return AᵀWA + I (q, q), AᵀWr (q,) and JᵀWA (m, q) under noise that is white plus slow modes.
 
         Parameters
         ----------
         residual : ndarray, shape (n, c + 1)
             r.
-        jacobian : DriveJacobian
-            J.
-        slow : ndarray, shape (R, m, K)
-            Its parts in the cosines.
-        cosines : ndarray, shape (n, K)
-            Cosines of slow noise.
-        share : ndarray, shape (K, c + 1)
-            Correction of each cosine in each observation.
+        slow : DriveModes
+            The drive's Jacobian in the modes.
+        modes : SlowModes
+            Modes of slow noise.
         weights : ndarray, shape (c + 1,)
             One over the variance of each observation.
         """
-        gram, score, damped = self._own_equations(residual, cosines, share, weights)
-        cross = np.zeros((slow.shape[1], self.count))
-        for r, matrix in enumerate(jacobian.parts):
-            scale = jacobian.loading[r] * weights
-            cross += matrix.T @ self._mixed(self.parts, scale) - slow[r] @ self._mixed(damped, scale)
+        gram, score, damped = self._own_equations(residual, modes, weights)
+        everywhere = np.zeros((len(weights), self.count, len(modes.share)))  # (c + 1, q, K)
+        for channel, (at, part) in enumerate(zip(self.places, damped, strict=True)):
+            everywhere[channel, at] = part.T
+        cross = -slow.through(everywhere, weights)
+        for matrix, loading in zip(slow.jacobian.parts, slow.jacobian.loading, strict=True):
+            cross += matrix.T @ self._mixed(self.parts, loading * weights)
         return gram, score, cross
 
     def explained(
         self,
         residual: NDArray[np.float64],
-        cosines: NDArray[np.float64],
-        share: NDArray[np.float64],
+        modes: SlowModes,
         weights: NDArray[np.float64],
     ) -> float:
         """Return how much of rᵀWr the residue takes at its best, its prior counted, the drive held."""
-        gram, score, _ = self._own_equations(residual, cosines, share, weights)
+        gram, score, _ = self._own_equations(residual, modes, weights)
         return float(score @ np.linalg.solve(gram, score))
 
     def _own_equations(
         self,
         residual: NDArray[np.float64],
-        cosines: NDArray[np.float64],
-        share: NDArray[np.float64],
+        modes: SlowModes,
         weights: NDArray[np.float64],
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], list[NDArray[np.float64]]]:
-        """Return AᵀWA + I (q, q), AᵀWr (q,) and each channel's damped cosines (K, k)."""
+        """Return AᵀWA + I (q, q), AᵀWr (q,) and each channel's damped modes (K, k)."""
         gram, score = np.eye(self.count), np.zeros(self.count)
         damped = []
         for channel, (at, part) in enumerate(zip(self.places, self.parts, strict=True)):
-            low = cosines.T @ part  # (K, k)
-            damped.append(share[:, [channel]] * low)
+            low = modes.of(part.T, channel).T  # (K, k)
+            damped.append(modes.share[:, [channel]] * low)
             gram[np.ix_(at, at)] += weights[channel] * (part.T @ part - low.T @ damped[-1])
             mine = residual[:, channel]
-            score[at] += weights[channel] * (part.T @ mine - damped[-1].T @ (cosines.T @ mine))
+            score[at] += weights[channel] * (part.T @ mine - modes.of(mine[None], channel)[0] @ damped[-1])
         return gram, score, damped
 
     def _mixed(self, blocks: Sequence[NDArray[np.float64]], scale: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -126,13 +120,13 @@ class CalibrationResidue:
         self,
         signatures: NDArray[np.float64],
         damped: NDArray[np.float64],
-        cosines: NDArray[np.float64],
+        modes: SlowModes,
         weights: NDArray[np.float64],
     ) -> NDArray[np.float64]:
-        """Return AᵀWS of signatures (c + 1, P, n), whose damped cosines are (c + 1, P, K), shape (q, P)."""
+        """Return AᵀWS of signatures (c + 1, P, n), whose damped modes are (c + 1, P, K), shape (q, P)."""
         total = np.zeros((self.count, signatures.shape[1]))
         for channel, (at, part) in enumerate(zip(self.places, self.parts, strict=True)):
-            low = cosines.T @ part
+            low = modes.of(part.T, channel).T
             total[at] += weights[channel] * (part.T @ signatures[channel].T - low.T @ damped[channel].T)
         return total
 

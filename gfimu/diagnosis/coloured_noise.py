@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import dct, idct
 
-__all__ = ["CosineBasis", "NoiseLevels", "estimate_flicker", "white_level"]
+__all__ = ["CosineBasis", "NoiseLevels", "estimate_flicker", "likeliest_flicker", "white_level"]
 
 _TIMES = 0.25 * 3.2 ** np.arange(7)
 _TOP_FREQUENCY = 2.5
@@ -84,27 +84,32 @@ class CosineBasis:
         """Return the first ``count`` orthonormal cosines, shape (n, count), for reading only."""
         return _cosines(self.n, count)
 
+    def variances(self, levels: NoiseLevels, count: int) -> NDArray[np.float64]:
+        """Return the variances of slow noise on the first ``count`` cosines, shape (K, c + 1)."""
+        return _variances(levels, self.flicker_spectrum[:count], self.walk_spectrum[:count])
+
     def corrections(self, levels: NoiseLevels) -> NDArray[np.float64]:
         """Return 1 − σ²/S_k per mode and channel, shape (K, c + 1), cut where it no longer matters."""
-        share = self._shares(levels, self.flicker_spectrum, self.walk_spectrum)
+        white = levels.white**2
+        share = 1.0 - white / (white + self.variances(levels, len(self.frequency)))
         strong = np.flatnonzero((share > _WEAKEST_CORRECTION).any(axis=1))
         return share[: int(strong[-1]) + 1 if len(strong) else 1]
 
-    @staticmethod
-    def _shares(levels: NoiseLevels, flicker: NDArray[np.float64], walk: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return 1 − σ²/S_k of each spectrum's modes (K,), shape (K, c + 1)."""
-        white = levels.white**2
-        walks = np.append(np.full(len(white) - 1, levels.walk**2), 0.0)
-        return 1.0 - white / (white + np.outer(flicker, levels.flicker**2) + np.outer(walk, walks))
-
     def whitened(self, residual: NDArray[np.float64], levels: NoiseLevels) -> NDArray[np.float64]:
         """Return residuals (n, c + 1), in units of white noise, without the excess of slow noise at any frequency."""
-        kept = np.sqrt(1.0 - self._shares(levels, *self._spectra(self.n)))
+        white = levels.white**2
+        kept = np.sqrt(white / (white + _variances(levels, *self._spectra(self.n))))
         return np.asarray(idct(self.transform(residual) * kept, type=2, norm="ortho", axis=0))
 
     def transform(self, residual: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return all cosine coefficients of residuals (n, c)."""
         return np.asarray(dct(residual, type=2, norm="ortho", axis=0))
+
+
+def _variances(levels: NoiseLevels, flicker: NDArray[np.float64], walk: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the variances of slow noise on modes with the spectra (K,) of unit size, shape (K, c + 1)."""
+    walks = np.append(np.full(len(levels.white) - 1, levels.walk**2), 0.0)
+    return np.outer(flicker, levels.flicker**2) + np.outer(walk, walks)
 
 
 @lru_cache(maxsize=8)
@@ -128,8 +133,6 @@ def estimate_flicker(
 ) -> NDArray[np.float64]:
     """Bias instability per channel by Whittle likelihood of the slow coefficients.
 
-    Channels share a common level with a log-normal prior, and each may differ from it by a factor of about two.
-
     Parameters
     ----------
     coefficients : ndarray, shape (n, c)
@@ -147,12 +150,35 @@ def estimate_flicker(
         Rms of the bias instability per channel, m/s².
     """
     slow = coefficients[1 : len(basis.frequency)] ** 2  # (K, c): the mean itself may be a bias
-    shape = basis.flicker_spectrum[1:]
     fixed = basis.walk_spectrum[1:] * walk**2
-    likelihood = np.empty((len(_FLICKER_GRID), slow.shape[1]))
+    return likeliest_flicker(slow, white, basis.flicker_spectrum[1:, None], fixed[:, None])
+
+
+def likeliest_flicker(
+    power: NDArray[np.float64],
+    white: NDArray[np.float64],
+    shape: NDArray[np.float64],
+    fixed: NDArray[np.float64] | float = 0.0,
+) -> NDArray[np.float64]:
+    """Bias instability per channel from independent sizes of slow modes.
+
+    Channels share a common level with a log-normal prior, and each may differ from it by a factor of about two.
+
+    Parameters
+    ----------
+    power : ndarray, shape (K, c)
+        Squared sizes.
+    white : ndarray, shape (c,)
+        White noise per channel.
+    shape : ndarray, shape (K, c) or (K, 1)
+        Variances that bias instability of unit size gives them.
+    fixed : ndarray, shape (K, c) or (K, 1), or float
+        Variances that they have besides.
+    """
+    likelihood = np.empty((len(_FLICKER_GRID), power.shape[1]))
     for row, level in enumerate(_FLICKER_GRID):
-        spectrum = white**2 + (shape * level**2 + fixed)[:, None]
-        likelihood[row] = -0.5 * np.sum(np.log(spectrum) + slow / spectrum, axis=0)
+        spectrum = white**2 + (shape * level**2 + fixed)
+        likelihood[row] = -0.5 * np.sum(np.log(spectrum) + power / spectrum, axis=0)
     grid = np.log(_FLICKER_GRID)
     tie = -0.5 * ((grid[:, None] - grid[None, :]) / _CHANNEL_SPREAD) ** 2  # channel level against common level
     joint = likelihood[:, None, :] + tie[:, :, None]  # (channel level, common level, c)

@@ -191,7 +191,6 @@ def _explain(
     segments, fixed = prepared.segments(model)
     runs = len(prepared.runs)
 
-
     def told(share: float, text: str) -> None:
         tell(0.05 + 0.7 * share, text)
 

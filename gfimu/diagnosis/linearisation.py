@@ -12,6 +12,7 @@ from gfimu.diagnosis.drive_jacobian import DriveJacobian
 from gfimu.diagnosis.drive_prior import DrivePrior
 from gfimu.diagnosis.drive_root import InverseRoot
 from gfimu.diagnosis.model import SpinState
+from gfimu.diagnosis.slow_modes import DriveModes
 
 __all__ = ["DriveElimination", "DriveEquations", "Linearisation"]
 
@@ -26,8 +27,6 @@ class DriveEquations:
         As in `Linearisation`.
     information : csr_array, shape (m, m)
         JᵀWJ under the white noise alone.
-    rows : ndarray, shape (k, m)
-        Uᵀ: what the slow noise takes away of it is UUᵀ.
     rhs : ndarray, shape (m,)
         JᵀWr.
     objective : float
@@ -39,9 +38,8 @@ class DriveEquations:
     residual: NDArray[np.float64]
     slow_residual: NDArray[np.float64]
     jacobian: DriveJacobian
-    slow: NDArray[np.float64]
+    slow: DriveModes
     information: csr_array
-    rows: NDArray[np.float64]
     rhs: NDArray[np.float64]
     objective: float
     residue: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]] | None
@@ -58,10 +56,10 @@ class DriveEquations:
         rhs, objective = self.rhs + pull, self.objective + energy
         matrix = csr_array(self.information + prior.precision)
         if self.residue is None:
-            root = InverseRoot.of(matrix, self.rows)
+            root = InverseRoot.of(matrix, self.slow.rows)
         else:
             inner, right, cross = self.residue
-            root = InverseRoot.of(matrix, self.rows, (inner, cross))
+            root = InverseRoot.of(matrix, self.slow.rows, (inner, cross))
             rhs = np.concatenate([rhs, right])
         forward = root.apply(rhs)
         return DriveElimination(root, forward, objective - float(forward @ forward), len(self.rhs))
@@ -129,11 +127,11 @@ class Linearisation:
     residual : ndarray, shape (n, c + 1)
         Measured minus predicted, or what stands for it where readings are coarse; zero where invalid.
     slow_residual : ndarray, shape (K, c + 1)
-        The same in the cosines of slow noise.
+        The same in the modes of slow noise.
     jacobian : DriveJacobian
         Derivative of each observation with respect to the drive's coefficients.
-    slow : ndarray, shape (R, m, K)
-        The Jacobian's parts in the cosines of slow noise.
+    slow : DriveModes
+        The Jacobian in the modes of slow noise.
     drive : DriveElimination
         The drive's step and the likelihood without it.
     state : SpinState
@@ -143,6 +141,6 @@ class Linearisation:
     residual: NDArray[np.float64]
     slow_residual: NDArray[np.float64]
     jacobian: DriveJacobian
-    slow: NDArray[np.float64]
+    slow: DriveModes
     drive: DriveElimination
     state: SpinState

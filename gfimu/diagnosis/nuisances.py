@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.diagnosis.causes import Cause, effects_of_run
-from gfimu.diagnosis.coloured_noise import NoiseLevels, estimate_flicker, white_level
+from gfimu.diagnosis.coloured_noise import NoiseLevels, estimate_flicker, likeliest_flicker, white_level
 from gfimu.diagnosis.model import Effect
 from gfimu.diagnosis.parallel import over_segments
 from gfimu.diagnosis.refinement import Fit, refine
 from gfimu.diagnosis.segment import Segment
+from gfimu.diagnosis.slow_modes import WeighedPowers
 
 __all__ = ["STEADY_NOISE", "learn_noise", "settle_noise", "sharpen_drives", "tune_drives", "widen_drives"]
 
@@ -36,7 +37,7 @@ def learn_noise(
 
     def level_left(
         segment: Segment, known: Sequence[Effect], drive: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         segment.coefficients = drive
         effects = [*known, *effects_of_run(fit.causes, array, segment.index)]
         line = segment.linearise(effects)
@@ -48,9 +49,9 @@ def learn_noise(
         level = white_level(coefficients, slowest, segment.run.sample_period)
         # Missing samples stand as zeros, as where the reference comes at a lower rate.
         level = level / np.sqrt(np.maximum(segment.weight_mask.mean(axis=0), _LEAST_VALID))
-        return coefficients, segment.noise_before_rounding(effects, level)
+        return left, coefficients, segment.noise_before_rounding(effects, level)
 
-    coefficients, whites = zip(*over_segments(level_left, segments, fixed, fit.drives), strict=True)
+    lefts, coefficients, whites = zip(*over_segments(level_left, segments, fixed, fit.drives), strict=True)
     for index in {segment.index for segment in segments}:
         mine = [place for place, segment in enumerate(segments) if segment.index == index]
         shares = np.array([segments[place].weight_mask.sum(axis=0) for place in mine], dtype=float)  # (segments, c + 1)
@@ -60,7 +61,7 @@ def learn_noise(
         white[:-1] = np.maximum(white[:-1], 0.5 * floor)
         white[-1] = max(white[-1], segments[mine[0]].finest)
         walk = segments[mine[0]].levels.walk
-        flickers = [estimate_flicker(coefficients[place], white, segments[place].basis, walk) for place in mine]
+        flickers = [_flicker(segments[place], lefts[place], coefficients[place], white, walk) for place in mine]
         flicker = np.sqrt(np.sum([share * one**2 for share, one in zip(shares, flickers, strict=True)], axis=0))
         flicker[-1] = 0.0
         for place in mine:
@@ -74,6 +75,20 @@ def learn_noise(
             segments[place].set_levels(NoiseLevels(white, flicker, walk))
             segments[place].prepare_weights()
     return change
+
+
+def _flicker(
+    segment: Segment,
+    left: NDArray[np.float64],
+    coefficients: NDArray[np.float64],
+    white: NDArray[np.float64],
+    walk: float,
+) -> NDArray[np.float64]:
+    """Return the bias instability of channels and reference, given what is left of them and its cosines."""
+    if not segment.rounding.channels:
+        return estimate_flicker(coefficients, white, segment.basis, walk)
+    slow = WeighedPowers.of(segment.basis, left, segment.row_weight)
+    return likeliest_flicker(slow.power, white, slow.flicker, slow.walk * walk**2)
 
 
 def settle_noise(segments: Sequence[Segment], causes: Sequence[Cause], fixed: Sequence[Sequence[Effect]]) -> None:

@@ -33,6 +33,7 @@ from gfimu.diagnosis.model import Effect, Spin, WorldModel
 from gfimu.diagnosis.roughness import Roughness
 from gfimu.diagnosis.rounding import COARSE, Steps
 from gfimu.diagnosis.run import Run, difference_noise
+from gfimu.diagnosis.slow_modes import SlowModes, WeighedModes
 
 __all__ = ["Segment", "known_walk"]
 
@@ -99,7 +100,7 @@ class Segment:
         self.basis = CosineBasis(len(run.t), period, float(run.t[0] - start), stretches=stretches)
         self.is_angle = model.drive_source == "angle"
         self.weight_mask = np.column_stack([run.valid, run.reference_valid])  # (n, c + 1)
-        self.row_weight = self.weight_mask.astype(float)
+        self.row_weight, self._weighed = self.weight_mask.astype(float), False
         self.rounding, self.levels = self._starting_levels()
         self.round_to(model.expected_noise(1.0 / period).quantum)
         self.calibration_residue: CalibrationResidue | None = None
@@ -325,6 +326,7 @@ class Segment:
         """Set the weight of every sample; return the working residual and what its squares lack of the deviance."""
         if not self.rounding.coarse:
             return residual, 0.0
+        self._weighed = True
         working, self.row_weight, lacking = self.rounding.weigh(residual, self.levels.white, self.weight_mask)
         return working, lacking
 
@@ -346,9 +348,13 @@ class Segment:
     # -- normal equations --------------------------------------------------------------------------------------
 
     def prepare_weights(self) -> None:
-        """Compute the noise weights for the present levels."""
-        self.share = self.basis.corrections(self.levels)  # (K, c + 1)
-        self.cosines = self.basis.matrix(len(self.share))  # (n, K)
+        """Compute the noise weights for the present levels, and for the weights of coarse readings as they are now."""
+        if not self.rounding.channels:
+            self.modes = SlowModes(self.basis, self.levels)
+        else:
+            if not self._weighed:
+                self.working_residual(())
+            self.modes = WeighedModes(self.basis, self.levels, self.row_weight)
         self.inverse_variance = 1.0 / self.levels.white**2
 
     def linearise(self, effects: Sequence[Effect]) -> Linearisation:
@@ -369,33 +375,27 @@ class Segment:
         predicted = self.predict(effects)
         residual, slow_residual, objective = self._misfit(predicted)
         jacobian = self._jacobian(effects, predicted)
-        damped = self.share * slow_residual
         weights = self.inverse_variance
-        rhs = jacobian.backward((residual - self.cosines @ damped) * weights)
-        slow = jacobian.slow(self.cosines)
-        rows = jacobian.slow_rows(slow, self.share, weights)
+        rhs = jacobian.backward((residual - self.modes.back(self.modes.share * slow_residual)) * weights)
+        slow = self.modes.of_drive(jacobian, weights)
         residue = None
         if self.calibration_residue is not None:
-            residue = self.calibration_residue.normal_equations(
-                residual, jacobian, slow, self.cosines, self.share, weights
-            )
-        return DriveEquations(
-            residual, slow_residual, jacobian, slow, jacobian.information(), rows, rhs, objective, residue
-        )
+            residue = self.calibration_residue.normal_equations(residual, slow, self.modes, weights)
+        return DriveEquations(residual, slow_residual, jacobian, slow, jacobian.information(), rhs, objective, residue)
 
     def _misfit(self, predicted: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
-        """Return the working residual r (n, c + 1), the same in the cosines (K, c + 1), and rᵀWr."""
+        """Return the working residual r (n, c + 1), the same in the slow modes (K, c + 1), and rᵀWr."""
         measured = np.column_stack([self.run.readings, self.run.reference])
         residual, misfit = self._weigh(np.where(self.weight_mask, measured - predicted, 0.0))
-        slow = self.cosines.T @ residual
-        power = np.sum(residual**2, axis=0) - np.sum(slow**2 * self.share, axis=0)
+        slow = self.modes.of_each(residual)
+        power = np.sum(residual**2, axis=0) - np.sum(slow**2 * self.modes.share, axis=0)
         return residual, slow, misfit + float(self.inverse_variance @ power)
 
     def energy(self, effects: Sequence[Effect]) -> float:
         """Return rᵀWr + dᵀRd at the present drive, which is held; a calibration residue is at its best there."""
         residual, _, misfit = self._misfit(self.predict(effects))
         if self.calibration_residue is not None:
-            misfit -= self.calibration_residue.explained(residual, self.cosines, self.share, self.inverse_variance)
+            misfit -= self.calibration_residue.explained(residual, self.modes, self.inverse_variance)
         return misfit + self.drive_prior.energy(self.coefficients)[0]
 
     def _jacobian(self, effects: Sequence[Effect], base: NDArray[np.float64]) -> DriveJacobian:
@@ -443,21 +443,19 @@ class Segment:
         gram = np.zeros((count, count))
         score = np.zeros(count)
         weights = self.inverse_variance
-        damped = np.zeros((len(weights), count, len(self.share)))  # (c + 1, P, K)
+        damped = np.zeros((len(weights), count, len(self.modes.share)))  # (c + 1, P, K)
         reached = [np.flatnonzero(mine.any(axis=1)) for mine in signatures]
         for column, used in enumerate(reached):
             part = signatures[column, used]  # (P, n)
-            slow = part @ self.cosines  # (P, K)
-            damped[column, used] = slow * self.share[:, column]
+            slow = self.modes.of(part, column)  # (P, K)
+            damped[column, used] = slow * self.modes.share[:, column]
             gram[np.ix_(used, used)] += weights[column] * (part @ part.T - slow @ damped[column, used].T)
             score[used] += weights[column] * (
                 part @ linear.residual[:, column] - damped[column, used] @ linear.slow_residual[:, column]
             )
-        cross = linear.jacobian.correlate(signatures, weights)  # (m, P)
-        for r, slow in enumerate(linear.slow):
-            cross -= slow @ np.tensordot(linear.jacobian.loading[r] * weights, damped, axes=1).T
+        cross = linear.jacobian.correlate(signatures, weights) - linear.slow.through(damped, weights)  # (m, P)
         if self.calibration_residue is not None:
-            cross = np.vstack([cross, self.calibration_residue.correlate(signatures, damped, self.cosines, weights)])
+            cross = np.vstack([cross, self.calibration_residue.correlate(signatures, damped, self.modes, weights)])
         eliminated = linear.drive.eliminate(cross)
         told = gram.diagonal() * _ROUNDING_ERROR
         gram -= eliminated.T @ eliminated
@@ -486,8 +484,7 @@ class Segment:
     def whitened_residual(self, linear: Linearisation) -> NDArray[np.float64]:
         """Return W(r − Jδ) with δ the drive's posterior step, shape (n, c + 1): for scans over tones and orders."""
         left = linear.residual - linear.jacobian.forward(linear.drive.alone()[0]) - self.residue_readings(linear)
-        slow = self.cosines.T @ left
-        return (left - self.cosines @ (self.share * slow)) * self.inverse_variance
+        return (left - self.modes.back(self.modes.share * self.modes.of_each(left))) * self.inverse_variance
 
 
 def known_walk(model: WorldModel) -> float:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from gfimu.diagnosis.causes import effects_of_run
-from gfimu.diagnosis.coloured_noise import NoiseLevels, estimate_flicker
+from gfimu.diagnosis.coloured_noise import estimate_flicker
 from gfimu.diagnosis.model import Effect
 from gfimu.diagnosis.refinement import Fit
 from gfimu.diagnosis.segment import Segment
@@ -101,20 +101,8 @@ def log_probability(segments: Sequence[Segment], fit: Fit) -> float:
     """
     total = fit.log_posterior
     for segment in segments:
-        total += _noise_log_determinant(segment) - segment.drive_prior.log_roughness
+        total -= 0.5 * segment.modes.log_determinant + segment.drive_prior.log_roughness
     return total
-
-
-def _noise_log_determinant(segment: Segment) -> float:
-    """Return −½ log det of the channels' noise covariance."""
-    levels: NoiseLevels = segment.levels
-    white = levels.white[:-1] ** 2
-    spectrum = (
-        white
-        + np.outer(segment.basis.flicker_spectrum, levels.flicker[:-1] ** 2)
-        + (segment.basis.walk_spectrum * levels.walk**2)[:, None]
-    )
-    return -0.5 * float(np.sum(np.log(spectrum)) + (len(segment.run.t) - len(spectrum)) * np.sum(np.log(white)))
 
 
 def white_factor(segments: Sequence[Segment]) -> tuple[float, float] | None:

@@ -32,8 +32,9 @@ def segment():
 
 def noise_of(segment, column):
     """Covariance (n, n) of one observation's noise: white plus slow cosines of bias instability."""
-    sigma, share = segment.levels.white[column], segment.share[:, column]
-    precision = (np.eye(len(segment.cosines)) - (segment.cosines * share) @ segment.cosines.T) / sigma**2
+    sigma, share = segment.levels.white[column], segment.modes.share[:, column]
+    low = segment.modes.of(np.eye(len(segment.run.t)), column)  # (n, K)
+    precision = (np.eye(len(low)) - (low * share) @ low.T) / sigma**2
     return np.linalg.inv(precision)
 
 

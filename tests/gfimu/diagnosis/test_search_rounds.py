@@ -7,17 +7,14 @@ import pytest
 from numpy.testing import assert_allclose
 
 from gfimu.array import AccelerometerArray
-from gfimu.diagnosis import diagnose, engine, wandering_biases
+from gfimu.diagnosis import diagnose, engine
 from gfimu.diagnosis.calibration_residue import CalibrationResidue
-from gfimu.diagnosis.long_run import explain_any_length
 from gfimu.diagnosis.nuisances import learn_noise
 from gfimu.diagnosis.prepared_runs import PreparedRuns
 from gfimu.diagnosis.refinement import refine
 from gfimu.recording import Recording
 from sim.campaign import Measurement, measure, random_profile
 from sim.effects import make_effect
-from sim.study.cases import Case
-from sim.study.outcome import draw_world
 from sim.twin import Twin
 
 SETTING = Measurement(duration=12.0)
@@ -162,42 +159,3 @@ def test_a_gross_misfit_is_not_learnt_as_bias_instability(twin):
     assert_allclose(segments[0].levels.flicker, before.flicker)
     learn_noise(segments, nothing, fixed)
     assert segments[0].levels.flicker[:-1].min() > 3 * before.flicker[:-1].max()
-
-
-def test_what_no_walk_explains_starts_no_search_for_one(twin, monkeypatch):
-    """An axis that nods, in a library without it, looks like wandering biases at first sight."""
-    world = draw_world(
-        Case(
-            "left_out", 80045, ("axis_wobble",), 1000.0, duration=40.0, bias_instability_mg=0.05, without="axis_wobble"
-        )
-    )
-    searches = []
-    search = explain_any_length
-
-    def counted(*args, **kwargs):
-        searches.append(kwargs.get("start", ()))
-        return search(*args, **kwargs)
-
-    monkeypatch.setattr(wandering_biases, "explain_any_length", counted)
-    found = diagnose([world.recording], world.twin)
-    assert found.verdict == "unknown"
-    assert not searches
-
-
-def test_slow_causes_that_leave_no_walk_start_no_search_for_one(monkeypatch):
-    world = draw_world(Case("pairs", 30112, ("gain_drift", "warm_up"), 300.0, duration=40.0))
-    searches = []
-
-    def counted(*args, **kwargs):
-        searches.append(args)
-        return explain_any_length(*args, **kwargs)
-
-    monkeypatch.setattr(wandering_biases, "explain_any_length", counted)
-    found = diagnose([world.recording], world.twin)
-    assert {cause.effect for cause in found.causes} == {"gain_drift", "warm_up"}
-    assert not searches
-    # Without them there would be a walk to look for.
-    monkeypatch.setattr(wandering_biases, "_WORSE", np.inf)
-    again = diagnose([world.recording], world.twin)
-    assert searches
-    assert {cause.effect for cause in again.causes} == {"gain_drift", "warm_up"}

@@ -1,0 +1,232 @@
+"""Modes of slow noise (bias instability, a random walk) as the observations of a stretch see them.
+
+The noise of observation c is white but for a few modes, orthonormal columns Q_c with shares s_c, so that
+
+    W_c = (I − Q_c diag(s_c) Q_cᵀ) / σ_c².
+
+Where every sample counts alike the modes are cosines, the same for all observations. A coarse reading tells more at the
+edge of a step than in its middle (`gfimu.diagnosis.rounding`), so slow noise comes through with the weight w of each
+sample: with B = diag(w/rms w) C and the variances S of the cosines C,
+
+    S^½ BᵀB S^½/σ² = V Λ Vᵀ,  Q = B S^½/σ V Λ^−½,  s = Λ/(1 + Λ).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gfimu.diagnosis.coloured_noise import CosineBasis, NoiseLevels
+from gfimu.diagnosis.drive_jacobian import DriveJacobian
+
+__all__ = ["DriveModes", "SlowModes", "WeighedModes", "WeighedPowers"]
+
+_WEAKEST = 0.05
+_MOST_COSINES = 128
+_NO_POWER = 1e-12
+
+
+class SlowModes:
+    """Modes that are the same for all observations: cosines.
+
+    Parameters
+    ----------
+    basis : CosineBasis
+        The cosines.
+    levels : NoiseLevels
+        The noise.
+    """
+
+    def __init__(self, basis: CosineBasis, levels: NoiseLevels) -> None:
+        self.share = basis.corrections(levels)  # (K, c + 1)
+        self._cosines = basis.matrix(len(self.share))  # (n, K)
+        self.log_determinant = _log_determinant(basis, levels)
+
+    def of(self, values: NDArray[np.float64], column: int) -> NDArray[np.float64]:
+        """Return what each mode has of rows (p, n) of one observation, shape (p, K)."""
+        return np.asarray(values @ self._cosines)
+
+    def of_each(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return what each mode has of all observations (n, c + 1), shape (K, c + 1)."""
+        return np.asarray(self._cosines.T @ values)
+
+    def back(self, sizes: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return all observations (n, c + 1) that sizes (K, c + 1) of the modes make."""
+        return np.asarray(self._cosines @ sizes)
+
+    def of_drive(self, jacobian: DriveJacobian, weights: NDArray[np.float64]) -> DriveModes:
+        """Return what each mode has of the drive's coefficients.
+
+        Parameters
+        ----------
+        jacobian : DriveJacobian
+            J.
+        weights : ndarray, shape (c + 1,)
+            One over the white variance of each observation.
+        """
+        slow = jacobian.slow(self._cosines)
+        return DriveModes(jacobian, slow, None, jacobian.slow_rows(slow, self.share, weights))
+
+
+class WeighedModes(SlowModes):
+    """Modes of observations whose samples count differently, each observation's its own.
+
+    Parameters
+    ----------
+    basis, levels
+        As `SlowModes` takes them.
+    weight : ndarray, shape (n, c + 1)
+        Share of an unrounded sample's amplitude, 0 to 1.
+    """
+
+    def __init__(self, basis: CosineBasis, levels: NoiseLevels, weight: NDArray[np.float64]) -> None:
+        self._weight, cosines = _relative(weight), _cosine_count(basis, levels)
+        self._cosines = basis.matrix(cosines)
+        variances = basis.variances(levels, cosines)  # (K, c + 1)
+        found = [
+            _modes(self._cosines, self._weight[:, column], variances[:, column] / levels.white[column] ** 2)
+            for column in range(len(levels.white))
+        ]
+        count = max(1, *(int(np.sum(power > _WEAKEST * (1.0 + power))) for power, _ in found))
+        self.share = np.zeros((count, len(found)))
+        self._mixing = np.zeros((len(found), cosines, count))  # Q_c = diag(w_c) C mixing_c
+        for column, (power, mixing) in enumerate(found):
+            used = int(np.sum(power > _WEAKEST * (1.0 + power)))
+            self.share[:used, column] = power[:used] / (1.0 + power[:used])
+            self._mixing[column, :, :used] = mixing[:, :used]
+        white = len(weight) * float(np.sum(np.log(levels.white[:-1] ** 2)))
+        self.log_determinant = white + float(sum(np.log1p(power).sum() for power, _ in found[:-1]))
+
+    def of(self, values: NDArray[np.float64], column: int) -> NDArray[np.float64]:
+        """Return what each mode has of rows (p, n) of one observation, shape (p, K)."""
+        return np.asarray((values * self._weight[:, column]) @ self._cosines @ self._mixing[column])
+
+    def of_each(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return what each mode has of all observations (n, c + 1), shape (K, c + 1)."""
+        return np.asarray(np.einsum("ckm,kc->mc", self._mixing, self._cosines.T @ (values * self._weight)))
+
+    def back(self, sizes: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return all observations (n, c + 1) that sizes (K, c + 1) of the modes make."""
+        return np.asarray(self._cosines @ np.einsum("ckm,mc->kc", self._mixing, sizes) * self._weight)
+
+    def of_drive(self, jacobian: DriveJacobian, weights: NDArray[np.float64]) -> DriveModes:
+        """Return what each mode has of the drive's coefficients (`SlowModes.of_drive`)."""
+        each, rows = [], []
+        for column, mixing in enumerate(self._mixing):
+            part = jacobian.channel(column)
+            slow = np.asarray(part.T @ (self._cosines * self._weight[:, [column]])) @ mixing  # (m, K)
+            each.append(slow)
+            rows.append((slow * np.sqrt(weights[column] * self.share[:, column])).T)
+        stacked = np.vstack(rows)
+        size = np.einsum("km,km->k", stacked, stacked)
+        return DriveModes(jacobian, None, each, stacked[size > _NO_POWER * size.max(initial=0.0)])
+
+
+@dataclass(frozen=True)
+class DriveModes:
+    """What each mode of slow noise has of the drive's coefficients.
+
+    Parameters
+    ----------
+    jacobian : DriveJacobian
+        J.
+    slow : ndarray, shape (R, m, K), optional
+        The Jacobian's parts in modes that all observations share.
+    each : list of ndarray, each (m, K), optional
+        J_cᵀQ_c where they do not.
+    rows : ndarray, shape (k, m)
+        Uᵀ: what the slow noise takes away of JᵀWJ is UUᵀ.
+    """
+
+    jacobian: DriveJacobian
+    slow: NDArray[np.float64] | None
+    each: list[NDArray[np.float64]] | None
+    rows: NDArray[np.float64]
+
+    def of(self, column: int) -> NDArray[np.float64]:
+        """Return J_cᵀQ_c, shape (m, K)."""
+        if self.each is not None:
+            return self.each[column]
+        assert self.slow is not None
+        used = np.flatnonzero(self.jacobian.loading[:, column])
+        return np.asarray(np.tensordot(self.jacobian.loading[used, column], self.slow[used], axes=1))
+
+    def through(self, damped: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return Σ_c w_c J_cᵀQ_c D_c of columns in the modes, D (c + 1, P, K), shape (m, P)."""
+        if self.each is not None:
+            return np.asarray(sum(w * slow @ mine.T for w, slow, mine in zip(weights, self.each, damped, strict=True)))
+        assert self.slow is not None
+        loading = self.jacobian.loading * weights
+        return np.asarray(
+            sum(slow @ np.tensordot(row, damped, axes=1).T for row, slow in zip(loading, self.slow, strict=True))
+        )
+
+
+@dataclass(frozen=True)
+class WeighedPowers:
+    """Sizes of slow modes in residuals whose samples count differently, and what slow noise of unit size gives them.
+
+    Parameters
+    ----------
+    power : ndarray, shape (K, c)
+        Squared sizes, in units of the residuals.
+    flicker, walk : ndarray, shape (K, c)
+        Variances that bias instability and a random walk of unit size give them.
+    """
+
+    power: NDArray[np.float64]
+    flicker: NDArray[np.float64]
+    walk: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, basis: CosineBasis, residual: NDArray[np.float64], weight: NDArray[np.float64]) -> WeighedPowers:
+        """Take weighted residuals (n, c) and their weights; a constant is left out, as it may be a bias."""
+        relative = _relative(weight)
+        count = min(len(basis.frequency), _MOST_COSINES)
+        flicker, walk = basis.flicker_spectrum[1:count], basis.walk_spectrum[1:count]
+        root = np.sqrt(flicker)
+        found = cls(*np.zeros((3, count - 1, residual.shape[1])))
+        for column, mine in enumerate(relative.T):
+            columns = basis.matrix(count)[:, 1:] * mine[:, None]
+            columns -= np.outer(mine, mine @ columns) / max(float(mine @ mine), _NO_POWER)
+            gram = columns.T @ columns
+            power, vectors = np.linalg.eigh(gram * np.outer(root, root))
+            there = power > _NO_POWER * max(float(power[-1]), _NO_POWER)
+            analysis = (root[:, None] * vectors[:, there] / np.sqrt(power[there])).T  # of Bᵀr
+            found.power[there, column] = (analysis @ (columns.T @ residual[:, column])) ** 2
+            found.flicker[there, column] = power[there]
+            found.walk[there, column] = (analysis @ gram) ** 2 @ walk
+        return found
+
+
+def _relative(weight: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return weights (n, c) over their rms."""
+    return weight / np.sqrt(np.maximum(np.mean(weight**2, axis=0), _NO_POWER))
+
+
+def _cosine_count(basis: CosineBasis, levels: NoiseLevels) -> int:
+    """Return how many cosines matter: more than where all samples count alike, as a few may count for most."""
+    louder = NoiseLevels(levels.white, 2.0 * levels.flicker, 2.0 * levels.walk)
+    return min(len(basis.corrections(louder)), _MOST_COSINES)
+
+
+def _modes(
+    cosines: NDArray[np.float64], weight: NDArray[np.float64], variance: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return Λ, largest first, and the mixing S^½ V Λ^−½/σ of the cosines, given S/σ²."""
+    columns = cosines * weight[:, None]
+    root = np.sqrt(variance)
+    power, vectors = np.linalg.eigh(columns.T @ columns * np.outer(root, root))
+    power, vectors = np.maximum(power[::-1], 0.0), vectors[:, ::-1]
+    there = power > _NO_POWER * max(float(power[0]), _NO_POWER)
+    power, vectors = power[there], vectors[:, there]
+    return power, root[:, None] * vectors / np.sqrt(power)
+
+
+def _log_determinant(basis: CosineBasis, levels: NoiseLevels) -> float:
+    """Return log det of the channels' noise covariance."""
+    white = levels.white[:-1] ** 2
+    spectrum = white + basis.variances(levels, len(basis.frequency))[:, :-1]
+    return float(np.sum(np.log(spectrum)) + (basis.n - len(spectrum)) * np.sum(np.log(white)))

@@ -1,0 +1,85 @@
+"""Wandering biases: looked for where they are likely, at once where they explain far more than anything else."""
+
+import sys
+
+import numpy as np
+import pytest
+
+from gfimu.diagnosis import diagnose, wandering_biases
+from gfimu.diagnosis.engine import explain
+from gfimu.diagnosis.long_run import explain_any_length
+from gfimu.diagnosis.prepared_runs import PreparedRuns
+from sim.study.cases import Case
+from sim.study.outcome import draw_world
+
+
+def left_for_a_walk(effects, size, seed):
+    """Whether the search of a recording is left for wandering biases, and how many rounds it takes."""
+    world = draw_world(Case("walks", seed, effects, size, duration=40.0))
+    segments, fixed = PreparedRuns.build([world.recording], world.twin, ["run"]).segments(world.twin)
+    told = []
+    found = explain(segments, fixed, 1, instead=wandering_biases.wanders, report=lambda _, text: told.append(text))
+    return found.interrupted, sum(text.startswith("search") for text in told)
+
+
+@pytest.mark.parametrize(
+    ("effects", "left"),
+    [(("bias_random_walk",), True), (("warm_up",), False), (("gain_drift", "bias"), False), ((), False)],
+)
+def test_a_search_is_left_for_a_walk_and_for_nothing_else(effects, left):
+    interrupted, rounds = left_for_a_walk(effects, 1000.0, 91001)
+    assert interrupted == left
+    if left:
+        assert rounds == 1
+
+
+def test_a_search_that_is_left_for_a_walk_finds_it_and_what_is_beside_it():
+    world = draw_world(Case("walks", 91002, ("bias_random_walk", "eccentricity"), 1000.0, duration=40.0))
+    found = diagnose([world.recording], world.twin)
+    assert {cause.effect for cause in found.causes} == {"bias_random_walk", "eccentricity"}
+
+
+def test_a_search_left_for_a_walk_that_is_none_is_taken_up_again(monkeypatch):
+    monkeypatch.setattr(sys.modules[diagnose.__module__], "wanders", lambda *_: True)
+    world = draw_world(Case("walks", 91003, ("hysteresis",), 1000.0, duration=40.0))
+    found = diagnose([world.recording], world.twin)
+    assert [cause.effect for cause in found.causes] == ["hysteresis"]
+
+
+def test_what_no_walk_explains_starts_no_search_for_one(monkeypatch):
+    """An axis that nods, in a library without it, looks like wandering biases at first sight."""
+    world = draw_world(
+        Case(
+            "left_out", 80045, ("axis_wobble",), 1000.0, duration=40.0, bias_instability_mg=0.05, without="axis_wobble"
+        )
+    )
+    searches = []
+    search = explain_any_length
+
+    def counted(*args, **kwargs):
+        searches.append(kwargs.get("start", ()))
+        return search(*args, **kwargs)
+
+    monkeypatch.setattr(wandering_biases, "explain_any_length", counted)
+    found = diagnose([world.recording], world.twin)
+    assert found.verdict == "unknown"
+    assert not searches
+
+
+def test_slow_causes_that_leave_no_walk_start_no_search_for_one(monkeypatch):
+    world = draw_world(Case("pairs", 30112, ("gain_drift", "warm_up"), 300.0, duration=40.0))
+    searches = []
+
+    def counted(*args, **kwargs):
+        searches.append(args)
+        return explain_any_length(*args, **kwargs)
+
+    monkeypatch.setattr(wandering_biases, "explain_any_length", counted)
+    found = diagnose([world.recording], world.twin)
+    assert {cause.effect for cause in found.causes} == {"gain_drift", "warm_up"}
+    assert not searches
+    # Without them there would be a walk to look for.
+    monkeypatch.setattr(wandering_biases, "_WORSE", np.inf)
+    again = diagnose([world.recording], world.twin)
+    assert searches
+    assert {cause.effect for cause in again.causes} == {"gain_drift", "warm_up"}
