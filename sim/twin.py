@@ -14,13 +14,14 @@ from numpy.typing import NDArray
 
 from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.free_body.motion import BodyDrive
-from gfimu.diagnosis.model import BasisUnits, EffectFamily, ExpectedNoise
+from gfimu.diagnosis.model import BasisUnits, EffectFamily, ExpectedNoise, Play
 from gfimu.errors import InputError
 from gfimu.model_files import find_model, read_toml
 from gfimu.units import STANDARD_GRAVITY
 from sim import forward
 from sim.body import body_channels
 from sim.effects import BODY_EFFECTS, EFFECTS, ENCODER_EFFECTS, Effect, apply_effects, make_effect
+from sim.effects.sensing import Hysteresis
 from sim.effects.unknown import UnknownTerm
 from sim.world import World
 
@@ -243,6 +244,16 @@ class Twin:
     def sensing_lag(self, effects: Sequence[Any] = ()) -> float:
         """Return the time constant of the sensing chain's first-order lag, s."""
         return float(sum(e.value("time_constant_s") for e in (*self.effects, *effects) if e.name == "sensor_lag"))
+
+    def play(self, effects: Sequence[Any] = ()) -> Play | None:
+        """Return what holds a share of the readings, of several the largest; None where nothing does."""
+        plays = [effect for effect in (*self.effects, *effects) if isinstance(effect, Hysteresis) and effect.share]
+        if not plays:
+            return None
+        largest = max(plays, key=lambda play: play.share)
+        own = tuple(effect for effect in self.effects if not isinstance(effect, Hysteresis))
+        others = [effect for effect in effects if not isinstance(effect, Hysteresis)]
+        return Play(largest.share, largest.value("lost_m_s2"), replace(self, effects=own), others, largest.last_moved)
 
     def reference_gain(self, effects: Sequence[Any] = ()) -> float:
         """Return what the reference reads per unit of motion once effects are added, relative to the twin's own."""

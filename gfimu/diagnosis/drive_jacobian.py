@@ -96,6 +96,43 @@ class DriveJacobian:
         return cls(tuple(parts), np.array(loadings).reshape(len(parts), len(chips)))
 
     @classmethod
+    def held(
+        cls,
+        spline: AngleSpline,
+        slopes: NDArray[np.float64],
+        times: NDArray[np.float64],
+        chips: NDArray[np.intp],
+        weights: NDArray[np.float64],
+        row_weight: NDArray[np.float64],
+        play: tuple[float, NDArray[np.intp]],
+        delay: _Delay | None = None,
+    ) -> DriveJacobian:
+        """Take the derivative of readings of which a play holds a share, each at the drive of an earlier time.
+
+        Parameters
+        ----------
+        spline, times, chips, weights, delay
+            As `build` takes them.
+        slopes : ndarray, shape (3, n, c + 1)
+            The same as there but without the play and the weights of the samples.
+        row_weight : ndarray, shape (n, c + 1)
+            Weight of every sample.
+        play : tuple of float and ndarray of int, shape (n, c)
+            The share, and the sample that each held part is of.
+        """
+        share, sources = play
+        root = np.sqrt(weights)
+        parts = []
+        for column, chip in enumerate(chips):
+            sensed = bool(chip < times.shape[1] - 1)
+            part = spline.matrix(times[:, chip], slopes[:, :, column])
+            if sensed:
+                part = csr_array((1.0 - share) * part + share * part[sources[:, column]])
+                part = delay(part) if delay is not None else part
+            parts.append(csr_array(part.multiply(root[column] * row_weight[:, [column]])))
+        return cls(tuple(parts), np.diag(1.0 / root))
+
+    @classmethod
     def measured(
         cls, changes: NDArray[np.float64], owners: NDArray[np.intp], size: int, weights: NDArray[np.float64]
     ) -> DriveJacobian:

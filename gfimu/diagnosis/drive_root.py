@@ -10,6 +10,9 @@ so that with V = L⁻¹U and I − VᵀV = MMᵀ (Woodbury)
 
 W has k rows more than H, but any root serves: only inner products of columns that went through it are ever used. A
 calibration residue with few sizes is bordered on, as one more step of the elimination.
+
+Where readings hold what the drive did long before (a play), the bands are as wide as the matrix; then H is factored
+whole and k is 0.
 """
 
 from __future__ import annotations
@@ -28,6 +31,8 @@ from gfimu.diagnosis.parallel import wide_algebra
 __all__ = ["InverseRoot", "banded"]
 
 _RIDGE = 1e-10
+_WIDE_BANDS = 0.05  # of the matrix, from which it is factored whole
+_UNFELT = 1e-9  # of the largest row
 _WIDE = 400  # rows from which several processors are faster than one
 _Border = tuple[NDArray[np.float64], NDArray[np.float64]]
 
@@ -48,8 +53,8 @@ class InverseRoot:
 
     Parameters
     ----------
-    band : ndarray, shape (b + 1, m)
-        L in lower bands.
+    band : ndarray, shape (b + 1, m) or (m, m)
+        L in lower bands, or whole.
     low : ndarray, shape (m, k)
         V.
     inner : ndarray, shape (k, k)
@@ -65,6 +70,7 @@ class InverseRoot:
     inner: NDArray[np.float64]
     border: NDArray[np.float64]
     corner: NDArray[np.float64]
+    whole: bool = False
 
     @classmethod
     def of(cls, matrix: csr_array, rows: NDArray[np.float64], residue: _Border | None = None) -> InverseRoot:
@@ -84,32 +90,36 @@ class InverseRoot:
         numpy.linalg.LinAlgError
             If H is not positive definite, even with a ridge of 1e-10.
         """
-        bands = banded(matrix)
-        factored = _factored(bands, rows)
+        size = matrix.shape[0]
+        entries = matrix.tocoo()
+        whole = bool(np.max(entries.row - entries.col, initial=0) > _WIDE_BANDS * size)
+        form = matrix.toarray(order="F") if whole else banded(matrix)
+        factor = _factored_whole if whole else _factored
+        factored = factor(form, rows)
         if factored is None:  # a stretch of the drive that only its prior holds, and hardly
-            bands[0] *= 1.0 + _RIDGE
-            factored = _factored(bands, rows)
+            form[np.diag_indices(size) if whole else 0] *= 1.0 + _RIDGE
+            factored = factor(form, rows)
         if factored is None:
             raise np.linalg.LinAlgError("the normal equations of the drive are not positive definite")
-        drive = cls(*factored, np.zeros((len(bands[0]) + len(rows), 0)), np.zeros((0, 0)))
+        drive = cls(*factored, np.zeros((size + len(factored[2]), 0)), np.zeros((0, 0)), whole)
         if residue is None:
             return drive
         information, coupling = residue
         border = drive.apply(coupling)
         corner = np.linalg.cholesky(information - border.T @ border)
-        return cls(*factored, border, np.asarray(corner, dtype=np.float64))
+        return cls(*factored, border, np.asarray(corner, dtype=np.float64), whole)
 
     def apply(self, columns: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return W x of columns (m + q, P) or one (m + q,)."""
         size = len(self.low)
         flat = columns if columns.ndim == 2 else columns[:, None]
-        whole = _solved(self.band, flat[:size])
-        parts = [whole, self._inside(self.low.T @ whole)]
+        drive = self._solved(flat[:size])
+        parts = [drive, self._inside(self.low.T @ drive)]
         if len(self.corner):
             inside = flat[size:] - self.border.T @ np.concatenate(parts)
             parts.append(solve_triangular(self.corner, inside, lower=True, check_finite=False))
-        whole = np.concatenate(parts)
-        return whole if columns.ndim == 2 else whole[:, 0]
+        both = np.concatenate(parts)
+        return both if columns.ndim == 2 else both[:, 0]
 
     def transposed(self, columns: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return Wᵀ y of columns (m + k + q, P) or one (m + k + q,): H⁻¹x of what was ``apply(x)``."""
@@ -122,14 +132,22 @@ class InverseRoot:
         middle = upper[size:]
         if middle.size:
             middle = solve_triangular(self.inner, middle, lower=True, trans=1, check_finite=False)
-        whole = _solved(self.band, upper[:size] + self.low @ middle, trans="T")
-        both = np.concatenate([whole, last])
+        both = np.concatenate([self._solved(upper[:size] + self.low @ middle, trans="T"), last])
         return both if columns.ndim == 2 else both[:, 0]
 
     def log_volume(self) -> float:
         """Return −½ log det H, the residue's part included."""
-        diagonals = (self.band[0], self.inner.diagonal(), self.corner.diagonal())
+        diagonals = (
+            self.band.diagonal() if self.whole else self.band[0],
+            self.inner.diagonal(),
+            self.corner.diagonal(),
+        )
         return -float(sum(np.log(one).sum() for one in diagonals))
+
+    def _solved(self, right: NDArray[np.float64], trans: str = "N") -> NDArray[np.float64]:
+        if self.whole:
+            return np.asarray(solve_triangular(self.band, right, lower=True, trans=trans, check_finite=False))
+        return _solved(self.band, right, trans)
 
     def _inside(self, right: NDArray[np.float64]) -> NDArray[np.float64]:
         if not right.size:
@@ -142,6 +160,18 @@ def _solved(band: NDArray[np.float64], right: NDArray[np.float64], trans: str = 
     if not right.size:  # SciPy's wrapper of dtbtrs writes beyond an empty array
         return right.copy()
     return np.asarray(lapack.dtbtrs(band, np.asfortranarray(right), uplo="L", trans=trans)[0])
+
+
+def _factored_whole(
+    matrix: NDArray[np.float64], rows: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]] | None:
+    """Return L with LLᵀ = H whole, and V and M of no rows; None if there is none."""
+    size = np.einsum("km,km->k", rows, rows)
+    felt = rows[size > _UNFELT * size.max(initial=0.0)]  # many channels hardly see the drive
+    with wide_algebra():
+        left = dsyrk(-1.0, felt, trans=1, beta=1.0, c=matrix, lower=1) if len(felt) else matrix
+        root, failed = lapack.dpotrf(left, lower=1, clean=1)
+    return None if failed else (root, np.zeros((len(root), 0)), np.zeros((0, 0)))
 
 
 def _factored(

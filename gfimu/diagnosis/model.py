@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -164,6 +164,31 @@ class BasisUnits:
     duration: float
 
 
+@dataclass(frozen=True)
+class Play:
+    """What holds a share of every reading until the specific force has taken up a play.
+
+    Parameters
+    ----------
+    share : float
+        Share of a reading that is held.
+    lost : float
+        Most that a reading is off by it, m/s².
+    model : WorldModel
+        The simulation without the play.
+    effects : sequence of Effect
+        The effects that were added, without the play.
+    sources : callable
+        From the readings (n, c) without the play, the sample (n, c) at which what is held of each was last moved.
+    """
+
+    share: float
+    lost: float
+    model: WorldModel
+    effects: Sequence[Effect]
+    sources: Callable[[NDArray[np.float64]], NDArray[np.intp]]
+
+
 class WorldModel(Protocol):
     """A simulation that can be wrong."""
 
@@ -209,6 +234,10 @@ class WorldModel(Protocol):
 
     def sensing_lag(self, effects: Sequence[Effect] = ()) -> float:
         """Return the time constant of the sensing chain's first-order lag, s; zero where it has none."""
+        ...
+
+    def play(self, effects: Sequence[Effect] = ()) -> Play | None:
+        """Return what holds a share of the readings once effects are added; None where nothing does."""
         ...
 
     def reference_gain(self, effects: Sequence[Effect] = ()) -> float:

@@ -161,10 +161,17 @@ def refine(
             start = min(start, _State(tuple(other.causes), tuple(other.drives)), key=partial(_energy, segments, fixed))
         if not shapes:
             start = replace(start, causes=tuple(replace(cause, frozen=True) for cause in start.causes))
+        if iterations and _is_held(segments, fixed, start):
+            # Far off, what a play holds is of the wrong instants: as if it held nothing comes nearer, and is cheaper.
+            for segment in segments:
+                segment.holding = False
+            start = _descend(segments, fixed, start, iterations).state
+            for segment in segments:
+                segment.holding = True
         return _result(segments, _descend(segments, fixed, start, iterations))
     finally:
         for segment, drive in zip(segments, kept, strict=True):
-            segment.coefficients = drive
+            segment.coefficients, segment.holding = drive, True
 
 
 def refine_each(
@@ -248,6 +255,15 @@ class _Stretch:
     distance: float
     drive_step: NDArray[np.float64]
     response: NDArray[np.float64]
+
+
+def _is_held(segments: Sequence[Segment], fixed: Sequence[Sequence[Effect]], state: _State) -> bool:
+    """Tell whether a play holds a share of any readings."""
+    array = segments[0].model.array
+    return any(
+        segment.felt_play([*known, *effects_of_run(state.causes, array, segment.index)]) is not None
+        for segment, known in zip(segments, fixed, strict=True)
+    )
 
 
 def _descend(segments: Sequence[Segment], fixed: Sequence[Sequence[Effect]], start: _State, iterations: int) -> _Point:

@@ -29,7 +29,7 @@ from gfimu.diagnosis.drive_jacobian import DriveJacobian, lag_matrix
 from gfimu.diagnosis.drive_prior import DrivePrior
 from gfimu.diagnosis.knots import KNOT_SPACING, intervals_to_cut
 from gfimu.diagnosis.linearisation import DriveElimination, DriveEquations, Linearisation
-from gfimu.diagnosis.model import Effect, Spin, WorldModel
+from gfimu.diagnosis.model import Effect, Play, Spin, WorldModel
 from gfimu.diagnosis.roughness import Roughness
 from gfimu.diagnosis.rounding import COARSE, Steps
 from gfimu.diagnosis.run import Run, difference_noise
@@ -52,6 +52,7 @@ _REST_FACTOR = 1.3
 _LEAST_GAIN = 0.05
 _STATE_STEPS = (1e-5, 1e-4, 1e-3)
 _COEFFICIENT_STEP = 1e-6  # rad
+_FELT_PLAY = 2.0  # standard deviations of the noise
 
 
 class Segment:
@@ -95,6 +96,8 @@ class Segment:
         self._take(Roughness(spline, _START_FACTOR))
         # For how long the motion remembers its drive, s; 0 where a derivative by the state of the instant will do.
         self.memory = 0.0
+        # Whether the derivative knows what a play holds.
+        self.holding = True
         # Fits are compared under the same knots, so these are chosen once.
         self.knots_chosen = False
         self.basis = CosineBasis(len(run.t), period, float(run.t[0] - start), stretches=stretches)
@@ -290,8 +293,11 @@ class Segment:
 
     def predict(self, effects: Sequence[Effect], spin: Spin | None = None) -> NDArray[np.float64]:
         """Predict channels and reference, shape (n, c + 1)."""
-        channels, reference = self.model.predict(
-            self.motion(effects, spin),
+        return self._predicted_by(self.model, effects, self.motion(effects, spin))
+
+    def _predicted_by(self, model: WorldModel, effects: Sequence[Effect], motion: Spin) -> NDArray[np.float64]:
+        channels, reference = model.predict(
+            motion,
             self.run.t,
             effects=effects,
             temperature=self.run.temperature,
@@ -402,11 +408,14 @@ class Segment:
         """Differentiate the prediction ``base`` with respect to the drive's state and chain with the spline."""
         if self.memory > 0.0:
             return self._remembering_jacobian(effects, base)
-        spin = self.spin
+        play = self.felt_play(effects) if self.holding else None
+        # The state of the instant moves what a play lets through, that of an earlier one what it holds.
+        model, moving = (self.model, effects) if play is None else (play.model, play.effects)
+        unheld = base if play is None else self._predicted_by(model, moving, self.motion(effects))
         slopes = np.empty((3, *base.shape))
         for place, step in enumerate(_STATE_STEPS):
-            moved = self.predict(effects, ShiftedSpin(spin, place, step))
-            slopes[place] = (moved - base) / step * self.row_weight
+            moved = self._predicted_by(model, moving, self.motion(effects, ShiftedSpin(self.spin, place, step)))
+            slopes[place] = (moved - unheld) / step
         times = self.model.sample_times(self.run.t, effects)
         lag = self.model.sensing_lag(effects)
         delay = None
@@ -417,7 +426,17 @@ class Segment:
                 return csr_array(matrix @ part)
 
         chips = np.append(self.model.array.chip_of_channel, times.shape[1] - 1)
-        return DriveJacobian.build(self.spline, slopes, times, chips, self.inverse_variance, delay)
+        weights = self.inverse_variance
+        if play is not None:
+            held = (play.share, play.sources(unheld[:, :-1]))
+            return DriveJacobian.held(self.spline, slopes, times, chips, weights, self.row_weight, held, delay)
+        return DriveJacobian.build(self.spline, slopes * self.row_weight, times, chips, weights, delay)
+
+    def felt_play(self, effects: Sequence[Effect]) -> Play | None:
+        """Return what holds a share of the readings, where that is more than their noise."""
+        play = self.model.play(effects)
+        noise = float(np.median(self.levels.white[:-1]))
+        return None if play is None or play.lost < _FELT_PLAY * noise else play
 
     def _remembering_jacobian(self, effects: Sequence[Effect], base: NDArray[np.float64]) -> DriveJacobian:
         """Differentiate with respect to the coefficients, at once where no sample remembers two of them."""

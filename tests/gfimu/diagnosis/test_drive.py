@@ -103,6 +103,31 @@ def test_factored_derivative_is_the_plain_one(spline, lagged):
     assert_allclose(fewer.T @ fewer, np.einsum("c,kc,cki,ckj->ij", weights, share, slow, slow), atol=1e-5)
 
 
+def test_a_play_holds_what_the_drive_did_before():
+    """The derivative against a small change of each coefficient, between the instants at which the play turns."""
+    twin = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
+    rng = np.random.default_rng(11)
+    play = make_effect("hysteresis", {"lost_m_s2": 0.3, "width_m_s2": 0.2})
+    recording = measure(rng, twin, [play], Measurement(duration=20.0))
+    (segment,) = make_segments(twin, [prepare_run(recording, twin)])
+    segment.prepare_weights()
+    jacobian = segment.linearise([play]).jacobian
+    drive = segment.coefficients
+    base = segment.predict([play])
+    for _ in range(3):
+        step = 1e-8 * rng.standard_normal(len(drive))
+        segment.coefficients = drive + step
+        change = segment.predict([play]) - base
+        segment.coefficients = drive
+        told = jacobian.forward(step)
+        turning = np.abs(told - change) > 1e-3 * np.abs(change).max()
+        assert turning.mean() < 0.01
+        assert_allclose(told[~turning], change[~turning], atol=1e-3 * np.abs(change).max())
+    assert twin.play([play]).share == pytest.approx(1.5)
+    assert twin.play() is None
+    assert twin.extended([play]).play().lost == pytest.approx(0.3)
+
+
 def tuned(rate):
     """A segment of a quiet run whose drive's roughness was learnt, at a sample rate, Hz."""
     twin = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12", sample_rate=rate)

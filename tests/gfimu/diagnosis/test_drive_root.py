@@ -1,4 +1,4 @@
-"""The banded root against dense linear algebra."""
+"""The root, in bands and whole, against dense linear algebra."""
 
 from __future__ import annotations
 
@@ -9,15 +9,26 @@ from scipy.sparse import csr_array, diags_array
 
 from gfimu.diagnosis.drive_root import InverseRoot, banded
 
-SIZE, BANDS, ROWS, RESIDUE = 60, 4, 7, 3
+SIZE, NARROW, WIDE, ROWS, RESIDUE = 60, 4, 20, 7, 3
 
 
-@pytest.fixture(params=[(ROWS, RESIDUE), (ROWS, 0), (0, RESIDUE), (0, 0)], ids=str)
+@pytest.fixture(
+    params=[
+        (NARROW, ROWS, RESIDUE),
+        (NARROW, ROWS, 0),
+        (NARROW, 0, RESIDUE),
+        (NARROW, 0, 0),
+        (WIDE, ROWS, RESIDUE),
+        (WIDE, ROWS, 0),
+        (WIDE, 0, 0),
+    ],
+    ids=str,
+)
 def problem(request):
     """B, Uᵀ, the border, and the dense matrix they make."""
-    rows_count, residue_count = request.param
+    bands, rows_count, residue_count = request.param
     rng = np.random.default_rng(7)
-    root = diags_array(list(rng.standard_normal((BANDS, SIZE))), offsets=range(BANDS), shape=(SIZE, SIZE))
+    root = diags_array(list(rng.standard_normal((bands, SIZE))), offsets=range(bands), shape=(SIZE, SIZE))
     matrix = csr_array(root.T @ root + 5.0 * diags_array(np.ones(SIZE)))
     rows = 0.15 * rng.standard_normal((rows_count, SIZE))
     coupling = rng.standard_normal((SIZE, residue_count))
@@ -31,11 +42,12 @@ def test_the_root_is_of_the_inverse(problem):
     root = InverseRoot.of(matrix, rows, border)
     columns = np.random.default_rng(1).standard_normal((len(dense), 5))
     through = root.apply(columns)
-    assert through.shape == (len(dense) + len(rows), 5)
+    size = len(dense) + (0 if root.whole else len(rows))
+    assert through.shape == (size, 5)
     assert_allclose(through.T @ through, columns.T @ np.linalg.solve(dense, columns), rtol=1e-10, atol=1e-12)
     assert_allclose(root.transposed(through), np.linalg.solve(dense, columns), rtol=1e-9, atol=1e-12)
     assert_allclose(root.transposed(root.apply(columns[:, 0])), np.linalg.solve(dense, columns[:, 0]), atol=1e-12)
-    assert root.apply(columns[:, :0]).shape == (len(dense) + len(rows), 0)
+    assert root.apply(columns[:, :0]).shape == (size, 0)
     assert root.transposed(through[:, :0]).shape == (len(dense), 0)
 
 
@@ -44,10 +56,18 @@ def test_its_volume_is_that_of_the_determinant(problem):
     assert_allclose(InverseRoot.of(matrix, rows, border).log_volume(), -0.5 * np.linalg.slogdet(dense)[1], rtol=1e-12)
 
 
-def test_what_the_slow_noise_takes_whole_is_refused():
-    matrix = csr_array(diags_array(np.ones(SIZE)))
+def test_wide_bands_are_factored_whole(problem):
+    matrix, rows, border, _ = problem
+    assert InverseRoot.of(matrix, rows, border).whole == (len(banded(matrix)) == WIDE)
+
+
+@pytest.mark.parametrize("coupled", [1, SIZE - 1])
+def test_what_the_slow_noise_takes_whole_is_refused(coupled):
+    matrix = csr_array(
+        diags_array([np.ones(SIZE), *[np.full(SIZE - coupled, 0.1)] * 2], offsets=[0, coupled, -coupled])
+    )
     with pytest.raises(np.linalg.LinAlgError, match="not positive definite"):
-        InverseRoot.of(matrix, 1.1 * np.eye(SIZE)[:1])
+        InverseRoot.of(matrix, 1.2 * np.eye(SIZE)[:1])
 
 
 def test_bands_hold_the_lower_half():
