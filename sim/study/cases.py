@@ -127,6 +127,20 @@ def _singles() -> list[Case]:
     ]
 
 
+def _fresh_singles() -> list[Case]:
+    """Return single effects of any size in runs of 40 to 60 s: seeds on which nothing was developed."""
+    rng = np.random.default_rng(95_000)
+    cases = []
+    for number in range(140):
+        name = list(EFFECTS)[number % len(EFFECTS)]
+        size = float(np.exp(rng.uniform(np.log(SIZES[0]), np.log(SIZES[-1]))))
+        duration = float(rng.choice([40.0, 50.0, 60.0]))
+        noise = _noise_of(number // len(EFFECTS) + number)
+        hidden = 0.0 if name in SIZELESS else size
+        cases.append(Case("fresh_singles", 95_000 + number, (name,), hidden, duration=duration, **noise))
+    return cases
+
+
 def _faint() -> list[Case]:
     """Return sizes about the least that can be seen, where what is said is less certain."""
     names = [name for name in EFFECTS if name not in SIZELESS]
@@ -213,6 +227,7 @@ def _exotics() -> list[Case]:
 
 STUDIES: dict[str, Callable[[], list[Case]]] = {
     "singles": _singles,
+    "fresh_singles": _fresh_singles,
     "faint": _faint,
     "nulls": _nulls,
     "long_nulls": _long_nulls,
