@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,7 +19,9 @@ __all__ = [
     "Effect",
     "EffectFamily",
     "ExpectedNoise",
+    "ModelWithPlay",
     "Pattern",
+    "Play",
     "Size",
     "Spin",
     "SpinState",
@@ -236,10 +238,6 @@ class WorldModel(Protocol):
         """Return the time constant of the sensing chain's first-order lag, s; zero where it has none."""
         ...
 
-    def play(self, effects: Sequence[Effect] = ()) -> Play | None:
-        """Return what holds a share of the readings once effects are added; None where nothing does."""
-        ...
-
     def reference_gain(self, effects: Sequence[Effect] = ()) -> float:
         """Return what the reference reads per unit of motion once effects are added, relative to without them."""
         ...
@@ -254,4 +252,13 @@ class WorldModel(Protocol):
 
     def to_toml(self) -> str:
         """Return the twin file."""
+        ...
+
+
+@runtime_checkable
+class ModelWithPlay(Protocol):
+    """A `WorldModel` some of whose effects hold readings; others need not say so."""
+
+    def play(self, effects: Sequence[Effect] = ()) -> Play | None:
+        """Return what holds a share of the readings once effects are added; None where nothing does."""
         ...

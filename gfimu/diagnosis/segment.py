@@ -29,7 +29,7 @@ from gfimu.diagnosis.drive_jacobian import DriveJacobian, lag_matrix
 from gfimu.diagnosis.drive_prior import DrivePrior
 from gfimu.diagnosis.knots import KNOT_SPACING, intervals_to_cut
 from gfimu.diagnosis.linearisation import DriveElimination, DriveEquations, Linearisation
-from gfimu.diagnosis.model import Effect, Play, Spin, WorldModel
+from gfimu.diagnosis.model import Effect, ModelWithPlay, Play, Spin, WorldModel
 from gfimu.diagnosis.roughness import Roughness
 from gfimu.diagnosis.rounding import COARSE, Steps
 from gfimu.diagnosis.run import Run, difference_noise
@@ -434,7 +434,7 @@ class Segment:
 
     def felt_play(self, effects: Sequence[Effect]) -> Play | None:
         """Return what holds a share of the readings, where that is more than their noise."""
-        play = self.model.play(effects)
+        play = self.model.play(effects) if isinstance(self.model, ModelWithPlay) else None
         noise = float(np.median(self.levels.white[:-1]))
         return None if play is None or play.lost < _FELT_PLAY * noise else play
 

@@ -103,6 +103,18 @@ def test_factored_derivative_is_the_plain_one(spline, lagged):
     assert_allclose(fewer.T @ fewer, np.einsum("c,kc,cki,ckj->ij", weights, share, slow, slow), atol=1e-5)
 
 
+class OtherSimulation:
+    """A twin that knows nothing of plays."""
+
+    def __init__(self, twin):
+        self._twin = twin
+
+    def __getattr__(self, name):
+        if name == "play":
+            raise AttributeError(name)
+        return getattr(self._twin, name)
+
+
 def test_a_play_holds_what_the_drive_did_before():
     """The derivative against a small change of each coefficient, between the instants at which the play turns."""
     twin = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
@@ -126,6 +138,11 @@ def test_a_play_holds_what_the_drive_did_before():
     assert twin.play([play]).share == pytest.approx(1.5)
     assert twin.play() is None
     assert twin.extended([play]).play().lost == pytest.approx(0.3)
+    assert segment.felt_play([play]) is not None
+    # Another simulation need not say so.
+    segment.model = OtherSimulation(twin)
+    assert segment.felt_play([play]) is None
+    assert len(segment.linearise([play]).jacobian.parts) < len(jacobian.parts)
 
 
 def tuned(rate):
