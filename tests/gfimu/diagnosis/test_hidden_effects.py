@@ -97,6 +97,12 @@ def test_what_the_first_cause_may_get_wrong_is_no_further_cause(name):
     assert [cause["effect"] for cause in outcome(case, source)["causes"]] == [name]
 
 
+def test_a_gross_play_draws_in_no_other_cause():
+    """With a drive that knows the state of the instant only, a mode, a lag and a slow clock are named for its rest."""
+    world = draw_world(Case("reduced", 91003, ("hysteresis",), 1000.0, duration=40.0))
+    assert [cause.effect for cause in diagnose([world.recording], world.twin).causes] == ["hysteresis"]
+
+
 def test_a_candidate_is_listed_once_though_several_rivals_have_it():
     faint = next(case for case in study_cases("singles") if case.key == "singles/10180")
     told = [cause["effect"] for cause in outcome(faint, "")["causes"]]

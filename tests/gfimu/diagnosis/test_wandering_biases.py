@@ -5,7 +5,7 @@ import sys
 import numpy as np
 import pytest
 
-from gfimu.diagnosis import diagnose, wandering_biases
+from gfimu.diagnosis import diagnose, engine, wandering_biases
 from gfimu.diagnosis.engine import explain
 from gfimu.diagnosis.long_run import explain_any_length
 from gfimu.diagnosis.prepared_runs import PreparedRuns
@@ -40,10 +40,20 @@ def test_a_search_that_is_left_for_a_walk_finds_it_and_what_is_beside_it():
 
 
 def test_a_search_left_for_a_walk_that_is_none_is_taken_up_again(monkeypatch):
-    monkeypatch.setattr(sys.modules[diagnose.__module__], "wanders", lambda *_: True)
-    world = draw_world(Case("walks", 91003, ("hysteresis",), 1000.0, duration=40.0))
+    searches = []
+
+    def noted(*args, **kwargs):
+        searches.append(explain_any_length(*args, **kwargs))
+        return searches[-1]
+
+    module = sys.modules[diagnose.__module__]
+    monkeypatch.setattr(module, "wanders", lambda *_: True)
+    monkeypatch.setattr(module, "explain_any_length", noted)
+    monkeypatch.setattr(engine, "_SURELY_WRONG", 0.0)  # so that a walk is thought of whatever the first round leaves
+    world = draw_world(Case("walks", 91004, ("eccentricity", "clock_error"), 1000.0, duration=20.0))
     found = diagnose([world.recording], world.twin)
-    assert [cause.effect for cause in found.causes] == ["hysteresis"]
+    assert [search.interrupted for search in searches] == [True, False]
+    assert {cause.effect for cause in found.causes} == {"eccentricity", "clock_error"}
 
 
 def test_what_no_walk_explains_starts_no_search_for_one(monkeypatch):
