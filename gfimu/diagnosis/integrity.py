@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from gfimu.diagnosis.frozen import frozen_stretches, told_frozen
 from gfimu.diagnosis.model import Effect, WorldModel
 from gfimu.diagnosis.rounding import common_step
-from gfimu.diagnosis.run import Run
+from gfimu.diagnosis.run import Run, difference_noise
 from gfimu.diagnosis.spikes import channel_spikes
 
 __all__ = ["IntegrityReport", "check_integrity"]
@@ -28,6 +28,7 @@ _SIGNIFICANT_RMS = 12.0
 _MANY = 3  # inverted channels that are more likely than exchanged ones
 _PILE = 30
 _CAUGHT = 0.8  # of the samples that should be beyond a limit
+_SURELY_MISSING = 15.0  # samples above the largest value of several channels, of which none is there
 _DIFFERENT = 0.6  # share of values above which steps are finer than what is seen
 
 _Option = tuple[float, str, dict[str, object], str, NDArray[np.float64]]
@@ -144,10 +145,12 @@ def _clipping(
 ) -> float | None:
     """Return the level at which readings pile up, m/s²; step and white noise per channel (c,)."""
     levels, piles = [], []
+    lacking: list[tuple[float, float]] = []
     for channel, (quantum, sigma) in enumerate(zip(steps, white, strict=True)):
         mine = run.readings[run.valid[:, channel], channel]
         if len(mine) < 50 or np.ptp(mine) < 2 * quantum:
             continue  # a channel that holds one value is dead, not clipped
+        noise = min(sigma, difference_noise(mine))
         for sign in (1.0, -1.0):
             top = float((sign * mine).max())
             if top <= 0.0:
@@ -159,18 +162,42 @@ def _clipping(
             beyond = sign * prediction[run.valid[:, channel], channel] > top + clear
             # Nothing beyond it is read though it should be, even where a plateau is just below.
             caught = sigma > 0.5 * quantum and (beyond & at_top).sum() > max(_CAUGHT * beyond.sum(), _PILE)
+            if sigma > 0.5 * quantum:
+                lacking.append((top, _missing_above(int(at_top.sum()), int(below.sum()), noise / quantum)))
             if at_top.sum() < 8 or not (caught or at_top.sum() > 3 * below.sum() + 4):
                 continue
             if caught or (beyond & at_top).sum() > 0.5 * at_top.sum():
                 levels.append(top)
             elif at_top.sum() >= _PILE and sigma > 0.5 * quantum:
                 piles.append(top)  # a steady signal at the limit: its noise would go beyond
-    levels = levels or (piles if len(piles) > 1 else [])
+    levels = levels or (piles if len(piles) > 1 else []) or _cut_off(lacking, float(steps.min()))
     if not levels:
         return None
     limit = float(np.median(levels))
     close = np.abs(np.array(levels) - limit) < 1.5 * float(steps.min())
     return limit if close.sum() >= max(1, len(levels) // 2) else None
+
+
+def _cut_off(lacking: Sequence[tuple[float, float]], step: float) -> list[float]:
+    """Return the largest values of channels that end at one level, above which many samples are missing in all."""
+    tops, missing = np.array(lacking).reshape(-1, 2).T
+    for top in np.unique(tops):
+        here = np.abs(tops - top) < 0.6 * step
+        if here.sum() > 1 and missing[here].sum() > _SURELY_MISSING:
+            return [float(one) for one in tops[here]]
+    return []
+
+
+def _missing_above(at_top: int, below: int, noise: float) -> float:
+    """Return how many samples are missing above the largest value, at least.
+
+    What is read is the signal plus Gaussian noise of σ steps, whatever the signal. The density of any such sum, over
+    the Gaussian's own, is log-convex, so the counts of three neighbouring steps keep n₊ n₋ ≥ n₀² exp(−1/σ²).
+    """
+    if noise <= 0.0:
+        return 0.0
+    fewest, most = max(at_top - 2.0 * at_top**0.5, 0.0), below + 2.0 * below**0.5 + 1.0
+    return float(fewest**2 / most * np.exp(-1.0 / noise**2))
 
 
 def _range_factors(effects: Sequence[Effect], model: WorldModel) -> NDArray[np.float64]:

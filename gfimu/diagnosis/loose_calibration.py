@@ -30,7 +30,8 @@ __all__ = ["LooseCalibration", "loosen", "relearned"]
 
 _USUAL, _LARGE = 1.0, 3.0  # of the tolerances
 _MUCH = 500.0
-_LEAST_ODDS = 3.0  # no more: that everything is a little off is what anybody expects
+# That everything is a little off is what anybody expects; that all is three times as much, hardly.
+_LEAST_ODDS = {_USUAL: 3.0, _LARGE: 7.0}
 
 
 @dataclass(frozen=True)
@@ -74,7 +75,7 @@ def loosen(
     if larger > value:
         value, scale, start = larger, _LARGE, other
     if value < reference:
-        return None, _with_rival(plain, start, value - reference)
+        return None, _with_rival(plain, start, value - reference - _LEAST_ODDS[scale])
     left = left_over(plain.segments, plain.fit, plain.fixed, prepared.spikes, rounded=prepared.rounded)
     if left.log_odds > max(_MUCH, value - reference):  # of something that is no residue
         return None, plain
@@ -85,8 +86,8 @@ def loosen(
     _admit(segments, start.causes, fixed, start.drives, tolerance, scale)
     found = explain_any_length(segments, fixed, runs, start=start.causes)
     odds = log_probability(segments, found.fit) - reference
-    if odds < _LEAST_ODDS:
-        return None, _with_rival(plain, found.fit, odds)
+    if odds < _LEAST_ODDS[scale]:
+        return None, _with_rival(plain, found.fit, odds - _LEAST_ODDS[scale])
     effects = _most_probable(segments, found.fit, fixed, tolerance, scale)
     known = tuple((*before, *effects) for before in fixed)
     for segment in segments:
@@ -108,11 +109,10 @@ def loosen(
 
 
 def _with_rival(plain: Explanation, beside: Fit, odds: float) -> Explanation:
-    """Let an explanation know what would be named beside a residue; ``odds`` are those of the data for it."""
+    """Let an explanation know what would be named beside a residue, and the log odds for that, prior odds included."""
     if not np.isfinite(odds):
         return plain
-    # What a residue has to be worth to be believed are its prior odds.
-    return replace(plain, beside_residue=replace(beside, log_posterior=plain.fit.log_posterior + odds - _LEAST_ODDS))
+    return replace(plain, beside_residue=replace(beside, log_posterior=plain.fit.log_posterior + odds))
 
 
 def relearned(loose: LooseCalibration, causes: Sequence[Cause], pairs: Sequence[Holdout]) -> list[Holdout]:

@@ -10,11 +10,14 @@ from scipy.ndimage import gaussian_filter1d
 
 from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.diagnose import diagnose
+from gfimu.diagnosis.integrity import check_integrity
+from gfimu.diagnosis.run import prepare_run
 from sim.campaign import Measurement, measure
 from sim.effects import make_effect
 from sim.motion import SplineSpin
 from sim.twin import Twin
 
+FASTEST = 20.0  # rad/s: the highest readings are centripetal
 SWAP_Z = ("axis_swap", {"channels": ["a13", "a21"]})
 
 
@@ -57,6 +60,34 @@ def test_a_plateau_just_below_the_limit_hides_no_clipping(below):
     found = diagnose([recording], twin)
     assert {cause.effect for cause in found.causes} == {"saturation"}
     assert found.causes[0].parameters["limit_m_s2"] == pytest.approx(limit, abs=1.1 * step)
+
+
+def _checked(seed, effects):
+    """Return the faults told of a run that nears its highest readings slowly."""
+    twin = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
+    t = np.arange(-2.0, 27.0, 5e-3)
+    rate = np.interp(t, [3.0, 7.0, 20.0, 24.0], [0.0, FASTEST - 0.1, FASTEST, 0.0])
+    motion = SplineSpin.through(t, gaussian_filter1d(rate, 20.0))
+    recording = measure(np.random.default_rng(seed), twin, effects, Measurement(duration=25.0), motion=motion)
+    run = prepare_run(recording, twin)
+    prediction = twin.predict(motion, run.t)[0]
+    return check_integrity(twin, run, prediction).effects, float(np.abs(prediction).max())
+
+
+@pytest.mark.parametrize("above", [-1.0, -0.5, 0.0])
+def test_clipping_at_the_very_peak_of_the_motion_is_told(above):
+    """Noise would be read above the level where the motion alone hardly reaches it."""
+    step = 3.9e-3 * 9.80665
+    (_, peak) = _checked(1, [])
+    limit = (round(peak / step) + above) * step
+    effects, _ = _checked(2, [make_effect("saturation", {"limit_m_s2": limit})])
+    assert [effect.name for effect in effects] == ["saturation"]
+    assert effects[0].parameters["limit_m_s2"] == pytest.approx(limit, abs=1.1 * step)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_plateau_whose_noise_is_read_is_no_clipping(seed):
+    assert not _checked(seed, [])[0]
 
 
 def test_a_dead_chip_is_told_with_all_its_channels():
