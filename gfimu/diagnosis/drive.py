@@ -100,6 +100,11 @@ class AngleSpline:
         first = np.clip(np.searchsorted(self.breaks, inside, side="right") - 1, 0, len(self.widths) - 1)
         return first, inside - self.breaks[first]
 
+    @property
+    def accelerations(self) -> NDArray[np.float64]:
+        """Acceleration of each interval's five basis functions as coefficients of 1, s, s², shape (k, 3, 5)."""
+        return self._twice
+
     def polynomials(self, coefficients: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the angle on each interval as coefficients of 1, s, … s⁴ from the interval's start, (5, k)."""
         local = np.lib.stride_tricks.sliding_window_view(coefficients, DEGREE + 1)  # (k, 5)
@@ -148,25 +153,6 @@ class AngleSpline:
     def interval_centres(self) -> NDArray[np.float64]:
         """Return the centre of each knot interval, s."""
         return np.asarray(0.5 * (self.breaks[:-1] + self.breaks[1:]), dtype=np.float64)
-
-    def starts(self, functions: NDArray[np.intp]) -> NDArray[np.float64]:
-        """Return when basis functions start to differ from zero, s."""
-        return np.asarray(self.breaks[np.maximum(functions - DEGREE, 0)])
-
-    def apart(self, memory: float) -> list[NDArray[np.intp]]:
-        """Return groups of basis functions in each of which one starts when the one before is over for ``memory`` s."""
-        starts = self.starts(np.arange(self.size))
-        ends = np.concatenate([self.breaks[1:], np.full(DEGREE, self.stop)])
-        groups: list[list[int]] = []
-        over: list[float] = []
-        for function, (start, end) in enumerate(zip(starts, ends, strict=True)):
-            place = next((number for number, until in enumerate(over) if until <= start), len(over))
-            if place == len(over):
-                groups.append([])
-                over.append(0.0)
-            groups[place].append(function)
-            over[place] = float(end) + memory
-        return [np.array(group, dtype=np.intp) for group in groups]
 
     def moving_average(self, values: NDArray[np.float64], width: float) -> NDArray[np.float64]:
         """Return the average of values per interval (k,) over a width of time about each interval's centre, s."""

@@ -7,7 +7,7 @@ eliminated against the drive is summed over channels first and multiplied by the
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array, vstack
 
 from gfimu.diagnosis.drive import AngleSpline
+from gfimu.diagnosis.ringing import Ringing
 
 __all__ = ["DriveJacobian"]
 
 _LEAST_SHARE = 1e-14
-_FORGOTTEN = 1e-9  # of the largest derivative: what is smaller is rounding errors
 _NARROW = 20  # coefficients that a row holds
 _ROWS = 100  # of a dense block
 _COLUMNS = 32  # signatures that are taken at once, which bounds the memory
@@ -51,6 +51,7 @@ class DriveJacobian:
         chips: NDArray[np.intp],
         weights: NDArray[np.float64],
         delay: _Delay | None = None,
+        ringing: Sequence[Ringing] = (),
     ) -> DriveJacobian:
         """Factor the derivative.
 
@@ -68,6 +69,8 @@ class DriveJacobian:
             One over the variance of each observation; the factors are orthonormal under it.
         delay : callable, optional
             Applies the sensing chain's lag to a matrix (n, m); the reference has none.
+        ringing : sequence of Ringing
+            What rings between the table, which the reference sees, and the array.
         """
         groups: dict[tuple[bytes, bool], list[int]] = {}
         for column, chip in enumerate(chips):
@@ -85,8 +88,9 @@ class DriveJacobian:
             power = np.einsum("snr,snr->r", functions, functions)
             large = power > _LEAST_SHARE * max(float(power.max()), 1e-30)
             kept, functions = vectors[:, large], functions[:, :, large]  # (C, R), (3, n, R)
+            state = _State(spline, times[:, chips[columns[0]]], ringing if sensed else ())
             for place in range(kept.shape[1]):
-                part = spline.matrix(times[:, chips[columns[0]]], functions[:, :, place])
+                part = state.matrix(functions[:, :, place])
                 parts.append(delay(part) if delay is not None and sensed else part)
                 row = np.zeros(len(chips))
                 row[columns] = kept[:, place] / root
@@ -106,12 +110,13 @@ class DriveJacobian:
         row_weight: NDArray[np.float64],
         play: tuple[float, NDArray[np.intp]],
         delay: _Delay | None = None,
+        ringing: Sequence[Ringing] = (),
     ) -> DriveJacobian:
         """Take the derivative of readings of which a play holds a share, each at the drive of an earlier time.
 
         Parameters
         ----------
-        spline, times, chips, weights, delay
+        spline, times, chips, weights, delay, ringing
             As `build` takes them.
         slopes : ndarray, shape (3, n, c + 1)
             The same as there but without the play and the weights of the samples.
@@ -122,47 +127,17 @@ class DriveJacobian:
         """
         share, sources = play
         root = np.sqrt(weights)
+        sensed_last = times.shape[1] - 1
+        states = [_State(spline, at, ringing if chip < sensed_last else ()) for chip, at in enumerate(times.T)]
         parts = []
         for column, chip in enumerate(chips):
-            sensed = bool(chip < times.shape[1] - 1)
-            part = spline.matrix(times[:, chip], slopes[:, :, column])
+            sensed = bool(chip < sensed_last)
+            part = states[chip].matrix(slopes[:, :, column])
             if sensed:
                 part = csr_array((1.0 - share) * part + share * part[sources[:, column]])
                 part = delay(part) if delay is not None else part
             parts.append(csr_array(part.multiply(root[column] * row_weight[:, [column]])))
         return cls(tuple(parts), np.diag(1.0 / root))
-
-    @classmethod
-    def measured(
-        cls, changes: NDArray[np.float64], owners: NDArray[np.intp], size: int, weights: NDArray[np.float64]
-    ) -> DriveJacobian:
-        """Factor the derivative of a motion that remembers its drive, which no state of an instant tells.
-
-        Parameters
-        ----------
-        changes : ndarray, shape (p, n, c + 1)
-            Derivative of each observation with respect to several coefficients at once, so far apart that each sample
-            sees one of them only.
-        owners : ndarray of int, shape (p, n)
-            Which coefficient each sample sees; −1 for none.
-        size : int
-            m.
-        weights : ndarray, shape (c + 1,)
-            One over the variance of each observation; the factors are orthonormal under it.
-        """
-        root = np.sqrt(weights)
-        mine = changes * root
-        vectors = np.linalg.eigh(np.tensordot(mine, mine, axes=([0, 1], [0, 1])))[1]
-        functions = mine @ vectors  # (p, n, c + 1)
-        power = np.einsum("pnr,pnr->r", functions, functions)
-        kept = np.flatnonzero(power > _LEAST_SHARE * max(float(power.max()), 1e-30))
-        parts = []
-        for r in kept:
-            values = functions[:, :, r]
-            there = (owners >= 0) & (np.abs(values) > _FORGOTTEN * np.abs(values).max())
-            rows = np.broadcast_to(np.arange(values.shape[1]), values.shape)[there]
-            parts.append(csr_array((values[there], (rows, owners[there])), shape=(values.shape[1], size)))
-        return cls(tuple(parts), (vectors[:, kept] / root[:, None]).T)
 
     def channel(self, column: int) -> csr_array:
         """Return J_c, shape (n, m)."""
@@ -236,6 +211,21 @@ class DriveJacobian:
     def observations(self) -> int:
         """Number of observations, the reference included."""
         return int(self.loading.shape[1])
+
+
+class _State:
+    """The motion that the array, or the reference, sees at given times as a function of the drive's coefficients."""
+
+    def __init__(self, spline: AngleSpline, t: NDArray[np.float64], ringing: Sequence[Ringing]) -> None:
+        self._spline, self._t = spline, t
+        self._rung = [one.response(t) for one in ringing]
+
+    def matrix(self, slopes: NDArray[np.float64]) -> csr_array:
+        """Return the matrix (n, m) to Σ slopes · (angle, rate, acceleration); slopes are (3, n)."""
+        total = self._spline.matrix(self._t, slopes)
+        for response in self._rung:
+            total = csr_array(total + response.matrix(slopes))
+        return total
 
 
 def lag_matrix(n: int, samples: float) -> csr_array:

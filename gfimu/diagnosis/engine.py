@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
-from gfimu.diagnosis.adequacy import LEFT_OVER_ODDS, dependence_left, left_over
+from gfimu.diagnosis.adequacy import left_over
 from gfimu.diagnosis.causes import Cause, effects_of_run
 from gfimu.diagnosis.drive import smooth_rate
-from gfimu.diagnosis.far_starts import every_mode, from_far, remembered_mode
+from gfimu.diagnosis.far_starts import every_mode, from_far
 from gfimu.diagnosis.linearisation import Linearisation
 from gfimu.diagnosis.model import Effect, WorldModel
 from gfimu.diagnosis.nuisances import STEADY_NOISE, learn_noise, sharpen_drives, tune_drives, widen_drives
@@ -55,8 +55,6 @@ _SURELY_WRONG = 1.02  # misfit per observation
 _MUCH, _LITTLE, _SHARE = 500.0, 10.0, 0.1  # nats that are left: at least; to those of a round; to the misfit explained
 _SHARE_AT_END = 0.02  # no cause is believed then (`conclusion.is_dominant`)
 _STALLED, _WORTH_FINDING = 0.1, 100.0  # share of what is left that a round may bring to be the last; nats, at least
-_ITS_OWN = 0.1  # of what a mode explains: what it leaves may be its own
-_FEW = 2  # causes of which one may be a mode though they fit badly
 _FAINT = 500.0  # log odds of a mode whose frequency may not be settled
 
 
@@ -407,29 +405,11 @@ class _Search:
             best, without = prune(segments, better, fixed, done)
             unique.pop(best.key, None)
         if "resonance" in without:
-            best, without = self._with_mode(best, without, done)
+            worth = best.log_posterior - without["resonance"].log_posterior
+            # What is left beside a residue of the calibration is judged once that is held.
+            if worth < _FAINT and (self._loose or self._left(best) < worth):
+                best = every_mode(segments, best, fixed)
         return best, without, list(unique.values())
-
-    def _with_mode(
-        self, best: Fit, without: dict[str, Fit], done: dict[frozenset[tuple[str, str]], Fit]
-    ) -> tuple[Fit, dict[str, Fit]]:
-        """Fit a mode again: one that leaves something with a drive that knows how it rings on, a faint one anew."""
-        segments, fixed = self._segments, self._fixed
-        for segment, drive in zip(segments, best.drives, strict=True):
-            segment.coefficients = drive
-        worth = best.log_posterior - without["resonance"].log_posterior
-        # Many causes that together fit badly are made of something else, and so is their mode.
-        likely = len(best.causes) <= _FEW or self._is_fair(best)
-        # What is left beside a residue of the calibration is judged once that is held.
-        left = dependence_left(segments, best, fixed).log_odds if likely and not self._loose else -np.inf
-        if LEFT_OVER_ODDS < left < _ITS_OWN * worth and len(segments) == 1:
-            better = remembered_mode(segments, best, fixed)
-            if better is not best:
-                best, without = prune(segments, better, fixed, done)
-                worth = best.log_posterior - without["resonance"].log_posterior if "resonance" in without else np.inf
-        if worth < _FAINT and (self._loose or self._left(best) < worth):
-            best = every_mode(segments, best, fixed)
-        return best, without
 
     def _left(self, fit: Fit, *, smooth: bool = True) -> float:
         """Return the log odds of the strongest thing that a fit leaves; without ``smooth``, of no smooth dependence."""

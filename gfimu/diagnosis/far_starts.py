@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from gfimu.diagnosis.model import Effect
 from gfimu.diagnosis.parallel import over_segments
-from gfimu.diagnosis.refinement import Fit, refine, refine_each
+from gfimu.diagnosis.refinement import Fit, refine_each
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.signatures import Hypothesis
 
-__all__ = ["every_mode", "from_far", "remembered_mode"]
+__all__ = ["every_mode", "from_far"]
 
 _ITERATIONS = 14
 _FEW_ITERATIONS = 3
@@ -23,8 +23,7 @@ _WORTH_STARTING = 1.2
 _SPACING = 0.1  # s, twice that of the fit
 _MODE_STARTS = 6
 _MODE_DAMPING = 0.05
-_NEARBY = (0.8, 0.92, 1.08, 1.25)
-_REMEMBERED = 2.0  # s
+_NEAREST = 2
 # What the evidence of a mode may be wrong by: it bends the functions that the drive can follow (`signatures`).
 _AS_LIKELY = 10.0
 
@@ -61,29 +60,6 @@ def from_far(
     return refine_each(segments, causes, fixed, followed, iterations=_ITERATIONS)
 
 
-def remembered_mode(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]]) -> Fit:
-    """Fit a mode with a drive that knows how the mode remembers it; returns the better fit.
-
-    What rings on is not told by the drive of the instant: with that derivative a fit may stop far from its optimum, the
-    drive bent to do what the mode does.
-    """
-    place = next(number for number, cause in enumerate(fit.causes) if cause.name == "resonance")
-    mode = fit.causes[place]
-    remembering = [copy(segment) for segment in segments]
-    for segment in remembering:
-        segment.memory = _REMEMBERED
-    sets = []
-    for ratio in _NEARBY:
-        shape = {**mode.shape, "frequency_hz": ratio * mode.shape["frequency_hz"], "damping_ratio": _MODE_DAMPING}
-        sets.append([*fit.causes[:place], mode.at(mode.coordinates, shape), *fit.causes[place + 1 :]])
-    fits = refine_each(remembering, sets, fixed, [fit.drives] * len(sets), iterations=_FEW_ITERATIONS)
-    lowest = min(fits, key=lambda one: one.objective)
-    lowest = refine(remembering, lowest.causes, fixed, drives=lowest.drives, iterations=_ITERATIONS)
-    # Judged as all other fits are, where it is; how well the mode is known, only a drive with memory tells.
-    other = replace(refine(segments, lowest.causes, fixed, drives=lowest.drives, iterations=0), causes=lowest.causes)
-    return max(fit, other, key=lambda one: one.log_posterior)
-
-
 def every_mode(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]]) -> Fit:
     """Fit a mode that is hardly rung from everywhere; what its frequency could as well be goes into its covariance.
 
@@ -98,8 +74,17 @@ def every_mode(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[E
     for frequency in frequencies:
         shape = {**mode.shape, "frequency_hz": frequency, "damping_ratio": _MODE_DAMPING}
         sets.append([*fit.causes[:place], mode.at(mode.coordinates, shape), *fit.causes[place + 1 :]])
-    fits = [fit, *refine_each(segments, sets, fixed, [fit.drives] * len(sets), iterations=_ITERATIONS)]
-    best = max(fits, key=lambda fit: fit.log_posterior)
+    # A drive that does not know how a mode rings on comes near for less; those that came nearest are fitted in full.
+    unaware = [copy(segment) for segment in segments]
+    for segment in unaware:
+        segment.ringing = False
+    near = refine_each(unaware, sets, fixed, [fit.drives] * len(sets), iterations=_ITERATIONS)
+    near.sort(key=lambda one: one.log_posterior, reverse=True)
+    leading = near[:_NEAREST]
+    drives = [one.drives for one in leading]
+    full = refine_each(segments, [one.causes for one in leading], fixed, drives, iterations=_ITERATIONS)
+    fits = [fit, *full, *near[_NEAREST:]]
+    best = max([fit, *full], key=lambda one: one.log_posterior)
     modes = [other.causes[place] for other in fits if other.log_posterior > best.log_posterior - _AS_LIKELY]
     mode = best.causes[place]
     apart = np.mean([np.square(other.coordinates - mode.coordinates) for other in modes], axis=0)

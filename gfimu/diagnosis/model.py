@@ -19,6 +19,8 @@ __all__ = [
     "Effect",
     "EffectFamily",
     "ExpectedNoise",
+    "Mode",
+    "ModelWithModes",
     "ModelWithPlay",
     "Pattern",
     "Play",
@@ -191,6 +193,25 @@ class Play:
     sources: Callable[[NDArray[np.float64]], NDArray[np.intp]]
 
 
+@dataclass(frozen=True)
+class Mode:
+    """A mode between table and array that the table's angular acceleration α rings: φ'' + 2ζω₀φ' + ω₀²φ = −α.
+
+    Parameters
+    ----------
+    gain : float
+        Share of the twist φ that the array takes part in.
+    natural : float
+        ω₀, rad/s.
+    damping : float
+        ζ.
+    """
+
+    gain: float
+    natural: float
+    damping: float
+
+
 class WorldModel(Protocol):
     """A simulation that can be wrong."""
 
@@ -261,4 +282,13 @@ class ModelWithPlay(Protocol):
 
     def play(self, effects: Sequence[Effect] = ()) -> Play | None:
         """Return what holds a share of the readings once effects are added; None where nothing does."""
+        ...
+
+
+@runtime_checkable
+class ModelWithModes(Protocol):
+    """A `WorldModel` in which something may ring between the table and the array; others need not say so."""
+
+    def modes(self, effects: Sequence[Effect] = ()) -> Sequence[Mode]:
+        """Return what rings once effects are added."""
         ...

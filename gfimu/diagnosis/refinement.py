@@ -155,6 +155,7 @@ def refine(
         Another start of the same set, taken if the simulation comes closer to the data there.
     """
     kept = [segment.coefficients for segment in segments]
+    ringing = [segment.ringing for segment in segments]
     try:
         start = _State(tuple(causes), tuple(kept if drives is None else drives))
         if other is not None:
@@ -168,10 +169,18 @@ def refine(
             start = _descend(segments, fixed, start, iterations).state
             for segment in segments:
                 segment.holding = True
-        return _result(segments, _descend(segments, fixed, start, iterations))
+        point = _descend(segments, fixed, start, iterations)
+        fit = _result(segments, point)
+        if not any(ringing) or not _rings(segments, fixed, point.state):
+            return fit
+        # A mode leaves less freedom to a drive that it rings for, which a prior learnt with that mode would give back:
+        # sets are compared as if the drive's derivative did not know.
+        for segment in segments:
+            segment.ringing = False
+        return replace(_result(segments, _evaluate(segments, fixed, point.state)), causes=fit.causes)
     finally:
-        for segment, drive in zip(segments, kept, strict=True):
-            segment.coefficients, segment.holding = drive, True
+        for segment, drive, told in zip(segments, kept, ringing, strict=True):
+            segment.coefficients, segment.holding, segment.ringing = drive, True, told
 
 
 def refine_each(
@@ -255,6 +264,15 @@ class _Stretch:
     distance: float
     drive_step: NDArray[np.float64]
     response: NDArray[np.float64]
+
+
+def _rings(segments: Sequence[Segment], fixed: Sequence[Sequence[Effect]], state: _State) -> bool:
+    """Tell whether anything rings between the table and the array."""
+    array = segments[0].model.array
+    return any(
+        segment.felt_modes([*known, *effects_of_run(state.causes, array, segment.index)])
+        for segment, known in zip(segments, fixed, strict=True)
+    )
 
 
 def _is_held(segments: Sequence[Segment], fixed: Sequence[Sequence[Effect]], state: _State) -> bool:

@@ -29,7 +29,8 @@ from gfimu.diagnosis.drive_jacobian import DriveJacobian, lag_matrix
 from gfimu.diagnosis.drive_prior import DrivePrior
 from gfimu.diagnosis.knots import KNOT_SPACING, intervals_to_cut
 from gfimu.diagnosis.linearisation import DriveElimination, DriveEquations, Linearisation
-from gfimu.diagnosis.model import Effect, ModelWithPlay, Play, Spin, WorldModel
+from gfimu.diagnosis.model import Effect, Mode, ModelWithModes, ModelWithPlay, Play, Spin, WorldModel
+from gfimu.diagnosis.ringing import Ringing
 from gfimu.diagnosis.roughness import Roughness
 from gfimu.diagnosis.rounding import COARSE, Steps
 from gfimu.diagnosis.run import Run, difference_noise
@@ -51,7 +52,6 @@ _FACTOR_STEPS = 4
 _REST_FACTOR = 1.3
 _LEAST_GAIN = 0.05
 _STATE_STEPS = (1e-5, 1e-4, 1e-3)
-_COEFFICIENT_STEP = 1e-6  # rad
 _FELT_PLAY = 2.0  # standard deviations of the noise
 
 
@@ -94,10 +94,10 @@ class Segment:
         times = np.append(model.sample_times(run.t), run.t[:, None], axis=1)
         spline = AngleSpline.uniform(times.min() - margin, times.max() + margin, spacing)
         self._take(Roughness(spline, _START_FACTOR))
-        # For how long the motion remembers its drive, s; 0 where a derivative by the state of the instant will do.
-        self.memory = 0.0
         # Whether the derivative knows what a play holds.
         self.holding = True
+        # Whether it knows what rings on.
+        self.ringing = True
         # Fits are compared under the same knots, so these are chosen once.
         self.knots_chosen = False
         self.basis = CosineBasis(len(run.t), period, float(run.t[0] - start), stretches=stretches)
@@ -406,8 +406,6 @@ class Segment:
 
     def _jacobian(self, effects: Sequence[Effect], base: NDArray[np.float64]) -> DriveJacobian:
         """Differentiate the prediction ``base`` with respect to the drive's state and chain with the spline."""
-        if self.memory > 0.0:
-            return self._remembering_jacobian(effects, base)
         play = self.felt_play(effects) if self.holding else None
         # The state of the instant moves what a play lets through, that of an earlier one what it holds.
         model, moving = (self.model, effects) if play is None else (play.model, play.effects)
@@ -427,32 +425,22 @@ class Segment:
 
         chips = np.append(self.model.array.chip_of_channel, times.shape[1] - 1)
         weights = self.inverse_variance
+        modes = self.felt_modes(effects) if self.ringing else ()
+        ringing = [Ringing(self.spline, mode, float(self.run.t[0])) for mode in modes]
         if play is not None:
             held = (play.share, play.sources(unheld[:, :-1]))
-            return DriveJacobian.held(self.spline, slopes, times, chips, weights, self.row_weight, held, delay)
-        return DriveJacobian.build(self.spline, slopes * self.row_weight, times, chips, weights, delay)
+            return DriveJacobian.held(self.spline, slopes, times, chips, weights, self.row_weight, held, delay, ringing)
+        return DriveJacobian.build(self.spline, slopes * self.row_weight, times, chips, weights, delay, ringing)
+
+    def felt_modes(self, effects: Sequence[Effect]) -> Sequence[Mode]:
+        """Return what rings between the table and the array."""
+        return self.model.modes(effects) if isinstance(self.model, ModelWithModes) else ()
 
     def felt_play(self, effects: Sequence[Effect]) -> Play | None:
         """Return what holds a share of the readings, where that is more than their noise."""
         play = self.model.play(effects) if isinstance(self.model, ModelWithPlay) else None
         noise = float(np.median(self.levels.white[:-1]))
         return None if play is None or play.lost < _FELT_PLAY * noise else play
-
-    def _remembering_jacobian(self, effects: Sequence[Effect], base: NDArray[np.float64]) -> DriveJacobian:
-        """Differentiate with respect to the coefficients, at once where no sample remembers two of them."""
-        times = self.model.sample_times(self.run.t, effects)
-        late = times.max(axis=1)
-        groups = self.spline.apart(self.memory + float(np.max(late - times.min(axis=1))))
-        changes = np.empty((len(groups), *base.shape))
-        owners = np.empty((len(groups), len(base)), dtype=np.intp)
-        for place, group in enumerate(groups):
-            moved = self.coefficients.copy()
-            moved[group] += _COEFFICIENT_STEP
-            changes[place] = self.predict(effects, self.spline.spin(moved)) - base
-            last = np.searchsorted(self.spline.starts(group), late, side="right") - 1
-            owners[place] = np.where(last >= 0, group[np.maximum(last, 0)], -1)
-        changes *= self.row_weight / _COEFFICIENT_STEP
-        return DriveJacobian.measured(changes, owners, self.spline.size, self.inverse_variance)
 
     def whitened_products(
         self, linear: Linearisation, signatures: NDArray[np.float64]

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from gfimu.array import AccelerometerArray
+from gfimu.diagnosis.model import Mode
 from sim.effects.base import Effect, Pattern, Size, chip_patterns
 from sim.effects.table_dynamics import RippledSpin, TwistingSpin
 from sim.motion import SpinMotion
@@ -314,11 +315,17 @@ class Resonance(Effect):
         frequencies = np.geomspace(2.0, max(top, 2.5), 16)
         return tuple({"frequency_hz": float(f), "damping_ratio": zeta} for f in frequencies for zeta in (0.02, 0.1))
 
+    @property
+    def mode(self) -> Mode:
+        """Participation, natural frequency, rad/s, and damping ratio."""
+        natural = 2 * np.pi * self.value("frequency_hz", 10.0)
+        return Mode(self.value("gain"), natural, self.value("damping_ratio", 0.03))
+
     def apply(self, world: World) -> World:
         """Let the cube twist."""
-        mode = (self.value("gain"), 2 * np.pi * self.value("frequency_hz", 10.0), self.value("damping_ratio", 0.03))
+        mode = self.mode
 
         def step(motion: SpinMotion, t: NDArray[np.float64]) -> SpinMotion:
-            return TwistingSpin(motion, t, *mode)
+            return TwistingSpin(motion, t, mode.gain, mode.natural, mode.damping)
 
         return world.changed(mount_steps=(*world.mount_steps, step))
