@@ -23,7 +23,7 @@ from gfimu.diagnosis.model import Mode
 
 __all__ = ["Response", "Ringing"]
 
-_FORGOTTEN = 1e-2  # of an amplitude: what rings on below it is left out
+_FORGOTTEN = 3e-3  # of an amplitude: what rings on below it is left out
 _MOST_DAMPING = 0.98
 
 

@@ -52,6 +52,7 @@ _FACTOR_STEPS = 4
 _REST_FACTOR = 1.3
 _LEAST_GAIN = 0.05
 _STATE_STEPS = (1e-5, 1e-4, 1e-3)
+_SAME_PHASE = 0.1  # rad of a mode between the first chip and the last
 _FELT_PLAY = 2.0  # standard deviations of the noise
 
 
@@ -427,6 +428,8 @@ class Segment:
         weights = self.inverse_variance
         modes = self.felt_modes(effects) if self.ringing else ()
         ringing = [Ringing(self.spline, mode, float(self.run.t[0])) for mode in modes]
+        if modes and np.ptp(times[:, :-1], axis=1).max() * max(mode.natural for mode in modes) < _SAME_PHASE:
+            times[:, :-1] = times[:, :-1].mean(axis=1, keepdims=True)  # one ringing for all chips, not one for each
         if play is not None:
             held = (play.share, play.sources(unheld[:, :-1]))
             return DriveJacobian.held(self.spline, slopes, times, chips, weights, self.row_weight, held, delay, ringing)

@@ -264,7 +264,8 @@ def test_a_drive_that_a_mode_remembers_is_differentiated_with_its_ringing(freque
     recording = measure(np.random.default_rng(4), twin, effects, Measurement(duration=6.0))
     (segment,) = make_segments(twin, [prepare_run(recording, twin)])
     segment.prepare_weights()
-    for told, least, most in ((twin, 0.0, 0.015), (Silent(**vars(twin)), 0.1, np.inf)):
+    most_known = 0.05 if skew else 0.015  # chips that are sampled in turn share one ringing
+    for told, least, most in ((twin, 0.0, most_known), (Silent(**vars(twin)), 0.1, np.inf)):
         segment.model = told
         jacobian = segment.linearise(effects).jacobian
         worst = 0.0
