@@ -23,7 +23,7 @@ _WORTH_STARTING = 1.2
 _SPACING = 0.1  # s, twice that of the fit
 _MODE_STARTS = 6
 _MODE_DAMPING = 0.05
-_NEAREST = 2
+_NEAREST = 3
 # What the evidence of a mode may be wrong by: it bends the functions that the drive can follow (`signatures`).
 _AS_LIKELY = 10.0
 
@@ -60,25 +60,34 @@ def from_far(
     return refine_each(segments, causes, fixed, followed, iterations=_ITERATIONS)
 
 
-def every_mode(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]]) -> Fit:
-    """Fit a mode that is hardly rung from everywhere; what its frequency could as well be goes into its covariance.
+def every_mode(
+    segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]], *, misfit: bool = False
+) -> Fit:
+    """Fit a mode from everywhere; what its frequency could as well be goes into its covariance.
 
-    Far below its frequency a mode only bends the ramps, and many modes bend them alike.
+    Far below its frequency a mode only bends the ramps, and many modes bend them alike. One that was fitted and leaves
+    something (``misfit``) may be at a wrong frequency, to which the drive was bent; then all are tried with a drive
+    that knows how they ring on, and with the whole inertia behind the spring.
     """
     place = next(number for number, cause in enumerate(fit.causes) if cause.name == "resonance")
     mode = fit.causes[place]
     duration = max(segment.run.duration for segment in segments)
     grid = mode.family.shapes(duration, 1.0 / segments[0].run.sample_period)
-    frequencies = sorted({shape["frequency_hz"] for shape in grid})[:: max(len(grid) // (2 * _MODE_STARTS), 1)]
+    frequencies = sorted({shape["frequency_hz"] for shape in grid})
+    coordinates, damping, iterations = 1.0 / np.array([mode.family.sizes(segments[0].model.array)[0].prior_std]), 0.1, 3
+    starting = segments
+    if not misfit:
+        frequencies = frequencies[:: max(len(grid) // (2 * _MODE_STARTS), 1)]
+        coordinates, damping, iterations = mode.coordinates, _MODE_DAMPING, _ITERATIONS
+        # A drive that does not know how a mode rings on comes near for less.
+        starting = [copy(segment) for segment in segments]
+        for segment in starting:
+            segment.ringing = False
     sets = []
     for frequency in frequencies:
-        shape = {**mode.shape, "frequency_hz": frequency, "damping_ratio": _MODE_DAMPING}
-        sets.append([*fit.causes[:place], mode.at(mode.coordinates, shape), *fit.causes[place + 1 :]])
-    # A drive that does not know how a mode rings on comes near for less; those that came nearest are fitted in full.
-    unaware = [copy(segment) for segment in segments]
-    for segment in unaware:
-        segment.ringing = False
-    near = refine_each(unaware, sets, fixed, [fit.drives] * len(sets), iterations=_ITERATIONS)
+        shape = {**mode.shape, "frequency_hz": frequency, "damping_ratio": damping}
+        sets.append([*fit.causes[:place], mode.at(coordinates, shape), *fit.causes[place + 1 :]])
+    near = refine_each(starting, sets, fixed, [fit.drives] * len(sets), iterations=iterations)
     near.sort(key=lambda one: one.log_posterior, reverse=True)
     leading = near[:_NEAREST]
     drives = [one.drives for one in leading]
