@@ -23,7 +23,7 @@ _WORTH_STARTING = 1.2
 _SPACING = 0.1  # s, twice that of the fit
 _MODE_STARTS = 6
 _MODE_DAMPING = 0.05
-_NEAREST = 3
+_NEAREST = 2
 # What the evidence of a mode may be wrong by: it bends the functions that the drive can follow (`signatures`).
 _AS_LIKELY = 10.0
 
@@ -73,11 +73,10 @@ def every_mode(
     mode = fit.causes[place]
     duration = max(segment.run.duration for segment in segments)
     grid = mode.family.shapes(duration, 1.0 / segments[0].run.sample_period)
-    frequencies = sorted({shape["frequency_hz"] for shape in grid})
+    frequencies = sorted({shape["frequency_hz"] for shape in grid})[:: max(len(grid) // (2 * _MODE_STARTS), 1)]
     coordinates, damping, iterations = 1.0 / np.array([mode.family.sizes(segments[0].model.array)[0].prior_std]), 0.1, 3
     starting = segments
     if not misfit:
-        frequencies = frequencies[:: max(len(grid) // (2 * _MODE_STARTS), 1)]
         coordinates, damping, iterations = mode.coordinates, _MODE_DAMPING, _ITERATIONS
         # A drive that does not know how a mode rings on comes near for less.
         starting = [copy(segment) for segment in segments]

@@ -24,6 +24,7 @@ from gfimu.diagnosis.model import Mode
 __all__ = ["Response", "Ringing"]
 
 _FORGOTTEN = 3e-3  # of an amplitude: what rings on below it is left out
+_LONGEST = 5.0  # s, as which a mode with hardly any damping rings on
 _MOST_DAMPING = 0.98
 
 
@@ -146,7 +147,7 @@ class Ringing:
         at the interval's start, (k, L).
         """  # noqa: D205
         breaks = self.spline.breaks
-        memory = -np.log(_FORGOTTEN) / -self._pole.real
+        memory = min(np.log(_FORGOTTEN) / self._pole.real, _LONGEST)
         starts = breaks[:-1]
         # Function j is over at break j + 1.
         earliest = np.searchsorted(breaks[1:], starts - memory)
