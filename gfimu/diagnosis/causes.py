@@ -120,6 +120,13 @@ class Cause:
         rows = np.tile(sign, len(self.mixing) // len(sign))
         return np.asarray((np.abs(self.mixing[rows]) > 0).any(axis=0))
 
+    def most(self, array: AccelerometerArray) -> NDArray[np.float64]:
+        """Return the largest coordinates that physics allows, shape (k,); infinite for all but positive sizes."""
+        largest = np.array([size.most / size.prior_std for size in self.family.sizes(array)])
+        rows = np.tile(largest, len(self.mixing) // len(largest))[:, None]
+        with np.errstate(divide="ignore"):
+            return np.asarray(np.min(rows / np.abs(self.mixing), axis=0))
+
 
 def effects_of_run(causes: Sequence[Cause], array: AccelerometerArray, run: int) -> list[Effect]:
     """Return the effects of a set of causes as they act in one run."""

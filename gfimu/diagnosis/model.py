@@ -51,7 +51,7 @@ class Spin(Protocol):
 
 
 class Size(Protocol):
-    """One linear coordinate of an effect: key, physical prior, sign, finite-difference step."""
+    """One linear coordinate of an effect: key, physical prior, sign, finite-difference step, largest size."""
 
     @property
     def key(self) -> str: ...  # noqa: D102
@@ -61,6 +61,8 @@ class Size(Protocol):
     def positive(self) -> bool: ...  # noqa: D102
     @property
     def step(self) -> float: ...  # noqa: D102
+    @property
+    def most(self) -> float: ...  # noqa: D102
 
 
 class Pattern(Protocol):

@@ -170,14 +170,13 @@ def refine(
             for segment in segments:
                 segment.holding = True
         point = _descend(segments, fixed, start, iterations)
-        fit = _result(segments, point)
-        if not any(ringing) or not _rings(segments, fixed, point.state):
-            return fit
-        # A mode leaves less freedom to a drive that it rings for, which a prior learnt with that mode would give back:
-        # sets are compared as if the drive's derivative did not know.
-        for segment in segments:
-            segment.ringing = False
-        return replace(_result(segments, _evaluate(segments, fixed, point.state)), causes=fit.causes)
+        if any(ringing) and _rings(segments, fixed, point.state):
+            # A mode leaves less freedom to a drive that it rings for, which a prior learnt with that mode would give
+            # back: the volumes that sets are compared by are those of a derivative that does not know.
+            for segment in segments:
+                segment.ringing = False
+            point = replace(point, log_volume=_evaluate(segments, fixed, point.state).log_volume)
+        return _result(segments, point)
     finally:
         for segment, drive, told in zip(segments, kept, ringing, strict=True):
             segment.coefficients, segment.holding, segment.ringing = drive, True, told
@@ -418,6 +417,7 @@ def _moved(causes: Sequence[Cause], step: NDArray[np.float64], array: Accelerome
         width = len(cause.coordinates)
         coordinates = cause.coordinates + step[place : place + width]
         coordinates = np.where(cause.positive(array), np.maximum(coordinates, _SMALLEST_POSITIVE), coordinates)
+        coordinates = np.minimum(coordinates, cause.most(array))
         place += width
         shape = dict(cause.shape)
         for key, value in cause.free_shape.items():
@@ -430,7 +430,7 @@ def _moved(causes: Sequence[Cause], step: NDArray[np.float64], array: Accelerome
 def _result(segments: Sequence[Segment], point: _Point) -> Fit:
     """Return the fit at a point: covariances, and Laplace's evidence relative to no effect."""
     array = segments[0].model.array
-    causes, gram, score = point.state.causes, point.gram, point.score
+    causes, gram, score = point.state.causes, point.gram, point.score.copy()
     prior = sum(cause.log_prior for cause in causes) + EXTRA_CAUSE * max(len(causes) - 1, 0)
     if not causes:
         evidence = point.log_volume - 0.5 * point.objective
@@ -442,6 +442,9 @@ def _result(segments: Sequence[Segment], point: _Point) -> Fit:
     values = np.concatenate([cause.coordinates for cause in causes])
     covariance = inverse(gram + np.diag(_prior(causes)[0]))
     inner = gram[np.ix_(coordinates, coordinates)]
+    # At the largest size that physics allows, what would pull it on is not believed.
+    at_most = values >= np.concatenate([cause.most(array) for cause in causes])
+    score[coordinates[at_most]] = np.minimum(score[coordinates[at_most]], 0.0)
     total = score[coordinates] + inner @ values
     positive = np.concatenate([cause.positive(array) for cause in causes])
     nothing = point.objective + 2 * float(score[coordinates] @ values) + float(values @ inner @ values)

@@ -31,12 +31,15 @@ class Size:
         True where physics allows one sign only.
     step : float
         Finite-difference step as a share of ``prior_std``; large for effects that are not smooth in their size.
+    most : float
+        Largest size that physics allows, in that unit.
     """
 
     key: str
     prior_std: float
     positive: bool = False
     step: float = 1e-3
+    most: float = np.inf
 
 
 @dataclass(frozen=True)

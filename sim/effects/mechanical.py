@@ -295,6 +295,10 @@ class Cogging(Effect):
         return world.changed(motion_steps=(*world.motion_steps, step))
 
 
+_WHOLE_INERTIA = 1.25
+"""Participation beyond which nothing hangs on one spring; a little more than 1 for the inexactness of an estimate."""
+
+
 class Resonance(Effect):
     """A torsional mode of the mounting, rung by angular acceleration."""
 
@@ -306,7 +310,7 @@ class Resonance(Effect):
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
         """Participation: 1 is the whole inertia behind one spring."""
-        return (Size("gain", 0.3, positive=True),)
+        return (Size("gain", 0.3, positive=True, most=_WHOLE_INERTIA),)
 
     @classmethod
     def shapes(cls, duration: float, sample_rate: float) -> tuple[dict[str, float], ...]:
