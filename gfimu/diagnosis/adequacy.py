@@ -65,7 +65,6 @@ def left_over(
     *,
     rounded: bool = False,
     smooth: bool = True,
-    reaction: bool = True,
 ) -> LeftOver:
     """Find the strongest thing that the named causes leave unexplained.
 
@@ -83,15 +82,9 @@ def left_over(
         Whether readings are clipped or so coarse that their rounding follows the motion.
     smooth : bool
         Whether smooth functions are looked at too, which takes the most time.
-    reaction : bool
-        Whether a mode among the causes may push the table back (`dependence_left`).
     """
     channels = segments[0].model.array.channels
-    candidates = (
-        [dependence_left(segments, fit, fixed, reaction=reaction), one_curve(segments, fit, fixed, channels)]
-        if smooth
-        else []
-    )
+    candidates = [dependence_left(segments, fit, fixed), one_curve(segments, fit, fixed, channels)] if smooth else []
     for test in (lines, jumps):
         each = over_segments(partial(test, fit=fit, channels=channels), segments, fixed)
         # Each stretch is one more place to find something by chance.
@@ -103,13 +96,11 @@ def left_over(
     return max(candidates, key=lambda found: found.log_odds)
 
 
-def dependence_left(
-    segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]], *, reaction: bool = True
-) -> LeftOver:
+def dependence_left(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]]) -> LeftOver:
     """Score every basis function on every channel and the reference, on all channels, and each of them on all.
 
     What rings on the table pushes it back. A drive held for smoother than that is too smooth by a share of its jerk,
-    which the reference shows: with ``reaction`` and a mode among the causes that is no sign of anything else.
+    which the reference shows: beside a mode whose ringing the drive knows, that is no sign of anything else.
     """
     channels = segments[0].model.array.channels
 
@@ -131,7 +122,7 @@ def dependence_left(
         series.append(REFERENCE)
     total = count * len(series)
     gram, score = gram[:total, :total], score[:total]
-    if reaction and "resonance" in fit.names and series[-1] == REFERENCE:
+    if segments[0].ringing and "resonance" in fit.names and series[-1] == REFERENCE:
         jerk = (len(series) - 1) * count + names.index("jerk")
         gram[jerk], gram[:, jerk], score[jerk] = 0.0, 0.0, 0.0
     diagonal = np.maximum(gram.diagonal(), 0.0)

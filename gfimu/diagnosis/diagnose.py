@@ -228,7 +228,7 @@ def _holdouts(
     for segment, effects in zip(segments, known, strict=True):
         segment.set_levels(explanation.segments[0].levels)
         segment.prepare_weights()
-        segment.index = 0
+        segment.index, segment.ringing = 0, explanation.segments[0].ringing
         segment.reach_out([*effects, *effects_of_run(explanation.fit.causes, model.array, segment.index)])
     fitted = list(explanation.segments)
     kept = [[*effects, *residue] for effects in known]

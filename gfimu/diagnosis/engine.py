@@ -15,7 +15,7 @@ from scipy.integrate import cumulative_trapezoid
 from gfimu.diagnosis.adequacy import LEFT_OVER_ODDS, left_over
 from gfimu.diagnosis.causes import Cause, effects_of_run
 from gfimu.diagnosis.drive import smooth_rate
-from gfimu.diagnosis.far_starts import every_mode, from_far
+from gfimu.diagnosis.far_starts import every_mode, from_far, with_honest_mode
 from gfimu.diagnosis.linearisation import Linearisation
 from gfimu.diagnosis.model import Effect, WorldModel
 from gfimu.diagnosis.nuisances import STEADY_NOISE, learn_noise, sharpen_drives, tune_drives, widen_drives
@@ -55,7 +55,6 @@ _SURELY_WRONG = 1.02  # misfit per observation
 _MUCH, _LITTLE, _SHARE = 500.0, 10.0, 0.1  # nats that are left: at least; to those of a round; to the misfit explained
 _SHARE_AT_END = 0.02  # no cause is believed then (`conclusion.is_dominant`)
 _STALLED, _WORTH_FINDING = 0.1, 100.0  # share of what is left that a round may bring to be the last; nats, at least
-_FAR_BETTER = 20.0  # nats that a mode of another frequency has to be better
 _FAINT = 500.0  # log odds of a mode whose frequency may not be settled
 
 
@@ -201,7 +200,7 @@ def explain(
         settled = search.round(first=number == 0, tell=tell)
         if number == 0 and not settled and instead is not None and search.is_left_for(instead):
             break
-        if search.ends(number, settled=settled) and not search.finds_other_mode():
+        if search.ends(number, settled=settled) and not search.hears_mode_ring():
             break
     tell(0.85, "prune")
     best, without, rivals = search.judged()
@@ -260,7 +259,6 @@ class _Search:
         # What is left is judged once a residue of the calibration is held.
         self._loose = any(segment.calibration_residue is not None for segment in segments)
         self._gained = np.inf
-        self._looked_elsewhere = False
 
     def _is_fair(self, fit: Fit) -> bool:
         return fit.objective < FAIR_FIT * self._observations
@@ -330,29 +328,24 @@ class _Search:
         self.given_up = left > max(_MUCH, enough)
         return settled or stalled or self.given_up
 
-    def finds_other_mode(self) -> bool:
-        """Look for the mode elsewhere, once, where a set has one and leaves something; tells whether it changed.
+    def hears_mode_ring(self) -> bool:
+        """Let the drives know how a mode rings on, once, where the best set has one and leaves something.
 
-        At a wrong frequency a mode is worth much too, as the drive is bent to ring at the right one.
+        Without that the drive is bent to ring itself, perhaps at another frequency: the mode is looked for at all, and
+        the knots are chosen anew. Tells whether the search has to go on.
         """
-        if self._looked_elsewhere or self._loose or "resonance" not in self._best.names:
-            return False
-        if self._left(self._best, reaction=False) < LEFT_OVER_ODDS:
-            return False
-        self._looked_elsewhere = True
         segments, fixed = self._segments, self._fixed
-        other = every_mode(segments, self._best, fixed, misfit=True)
-        better = other.log_posterior > self._best.log_posterior + _FAR_BETTER
-        # The knots were chosen for a drive without this mode; its own may ring against it.
-        for segment in segments:
-            segment.knots_chosen = False
-        fit = other if better else self._best
-        sharper = sharpen_drives(segments, fit, fixed)
-        if sharper is fit and not better:
+        if self._loose or segments[0].ringing or "resonance" not in self._best.names:
             return False
-        learn_noise(segments, sharper, fixed, slow=self._is_fair(sharper))
-        tune_drives(segments, sharper, fixed)
-        self._best = refine(segments, sharper.causes, fixed, drives=sharper.drives, iterations=6)
+        if self._left(self._best) < LEFT_OVER_ODDS:
+            return False
+        for segment in segments:
+            segment.ringing, segment.knots_chosen = True, False
+        here = refine(segments, self._best.causes, fixed, drives=self._best.drives, iterations=_ITERATIONS)
+        fit = sharpen_drives(segments, every_mode(segments, here, fixed, misfit=True), fixed)
+        learn_noise(segments, fit, fixed, slow=self._is_fair(fit))
+        tune_drives(segments, fit, fixed)
+        self._best = refine(segments, fit.causes, fixed, drives=fit.drives, iterations=6)
         self._fitted = refine(segments, self._start, fixed, drives=self._best.drives, iterations=8)
         self._tried, self._behind = {}, {}
         self._ahead, self._settled, self.given_up = None, False, False
@@ -439,13 +432,15 @@ class _Search:
             # What is left beside a residue of the calibration is judged once that is held.
             if worth < _FAINT and (self._loose or self._left(best) < worth):
                 best = every_mode(segments, best, fixed)
+            if segments[0].ringing:
+                best = with_honest_mode(segments, best, fixed)
         return best, without, list(unique.values())
 
-    def _left(self, fit: Fit, *, smooth: bool = True, reaction: bool = True) -> float:
+    def _left(self, fit: Fit, *, smooth: bool = True) -> float:
         """Return the log odds of the strongest thing that a fit leaves; without ``smooth``, of no smooth dependence."""
         segments = segments_at(self._segments, fit)
         rounded = any(segment.rounding.channels > 0 for segment in segments)
-        return left_over(segments, fit, self._fixed, 0, rounded=rounded, smooth=smooth, reaction=reaction).log_odds
+        return left_over(segments, fit, self._fixed, 0, rounded=rounded, smooth=smooth).log_odds
 
     def screened(self, about: Fit) -> SignatureSet:
         """Return the signatures about a set: the last ones where they are, or where no set is believed."""

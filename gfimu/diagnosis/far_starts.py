@@ -9,13 +9,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gfimu.diagnosis.causes import Cause
 from gfimu.diagnosis.model import Effect
 from gfimu.diagnosis.parallel import over_segments
-from gfimu.diagnosis.refinement import Fit, refine_each
+from gfimu.diagnosis.refinement import Fit, refine, refine_each
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.signatures import Hypothesis
 
-__all__ = ["every_mode", "from_far"]
+__all__ = ["every_mode", "from_far", "with_honest_mode"]
 
 _ITERATIONS = 14
 _FEW_ITERATIONS = 3
@@ -94,11 +95,30 @@ def every_mode(
     fits = [fit, *full, *near[_NEAREST:]]
     best = max([fit, *full], key=lambda one: one.log_posterior)
     modes = [other.causes[place] for other in fits if other.log_posterior > best.log_posterior - _AS_LIKELY]
-    mode = best.causes[place]
+    return _widened(best, place, modes)
+
+
+def with_honest_mode(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]]) -> Fit:
+    """Widen what is said of a mode by how much it depends on what the drive knows of its ringing.
+
+    The prior of the drive is learnt from a drive that may ring itself, and what rings, drive or mode, is told apart by
+    that prior: the covariance alone is too small.
+    """
+    place = next(number for number, cause in enumerate(fit.causes) if cause.name == "resonance")
+    unaware = [copy(segment) for segment in segments]
+    for segment in unaware:
+        segment.ringing = False
+    other = refine(unaware, fit.causes, fixed, drives=fit.drives, iterations=_ITERATIONS)
+    return _widened(fit, place, [other.causes[place]])
+
+
+def _widened(fit: Fit, place: int, modes: Sequence[Cause]) -> Fit:
+    """Let the covariance of a mode hold other modes that it may as well be."""
+    mode = fit.causes[place]
     apart = np.mean([np.square(other.coordinates - mode.coordinates) for other in modes], axis=0)
     shape_std = {
         key: float(np.hypot(std, np.sqrt(np.mean([(other.shape[key] - mode.shape[key]) ** 2 for other in modes]))))
         for key, std in mode.shape_std.items()
     }
     wide = replace(mode, covariance=mode.covariance + np.diag(apart), shape_std=shape_std)
-    return replace(best, causes=(*best.causes[:place], wide, *best.causes[place + 1 :]))
+    return replace(fit, causes=(*fit.causes[:place], wide, *fit.causes[place + 1 :]))

@@ -97,8 +97,8 @@ class Segment:
         self._take(Roughness(spline, _START_FACTOR))
         # Whether the derivative knows what a play holds.
         self.holding = True
-        # Whether it knows what rings on.
-        self.ringing = True
+        # Whether it knows what rings on, which takes more time.
+        self.ringing = False
         # Fits are compared under the same knots, so these are chosen once.
         self.knots_chosen = False
         self.basis = CosineBasis(len(run.t), period, float(run.t[0] - start), stretches=stretches)
@@ -173,7 +173,7 @@ class Segment:
         The drive reaches as far as it does there, or, in a part, as effects ask for.
         """
         self.levels = whole.levels
-        self.rounding, self.knots_chosen = whole.rounding, whole.knots_chosen
+        self.rounding, self.knots_chosen, self.ringing = whole.rounding, whole.knots_chosen, whole.ringing
         start, stop = whole.spline.start, whole.spline.stop
         if len(self.run.t) < len(whole.run.t):
             times = self.model.sample_times(self.run.t, effects)

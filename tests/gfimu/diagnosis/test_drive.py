@@ -266,7 +266,7 @@ def test_a_drive_that_a_mode_remembers_is_differentiated_with_its_ringing(freque
     segment.prepare_weights()
     most_known = 0.05 if skew else 0.015  # chips that are sampled in turn share one ringing
     for told, least, most in ((twin, 0.0, most_known), (Silent(**vars(twin)), 0.1, np.inf)):
-        segment.model = told
+        segment.model, segment.ringing = told, True
         jacobian = segment.linearise(effects).jacobian
         worst = 0.0
         for place in (12, 20, 47, 70):
