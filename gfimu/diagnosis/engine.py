@@ -432,8 +432,7 @@ class _Search:
             # What is left beside a residue of the calibration is judged once that is held.
             if worth < _FAINT and (self._loose or self._left(best) < worth):
                 best = every_mode(segments, best, fixed)
-            if segments[0].ringing:
-                best = with_honest_mode(segments, best, fixed)
+            best = with_honest_mode(segments, best, fixed)
         return best, without, list(unique.values())
 
     def _left(self, fit: Fit, *, smooth: bool = True) -> float:

@@ -25,6 +25,7 @@ _SPACING = 0.1  # s, twice that of the fit
 _MODE_STARTS = 6
 _MODE_DAMPING = 0.05
 _NEAREST = 2
+_UNSETTLED = 0.4  # of frequency and damping
 # What the evidence of a mode may be wrong by: it bends the functions that the drive can follow (`signatures`).
 _AS_LIKELY = 10.0
 
@@ -75,10 +76,10 @@ def every_mode(
     duration = max(segment.run.duration for segment in segments)
     grid = mode.family.shapes(duration, 1.0 / segments[0].run.sample_period)
     frequencies = sorted({shape["frequency_hz"] for shape in grid})[:: max(len(grid) // (2 * _MODE_STARTS), 1)]
-    coordinates, damping, iterations = 1.0 / np.array([mode.family.sizes(segments[0].model.array)[0].prior_std]), 0.1, 3
-    starting = segments
+    whole = 1.0 / np.array([mode.family.sizes(segments[0].model.array)[0].prior_std])
+    damping, iterations, starting = 0.1, 3, segments
     if not misfit:
-        coordinates, damping, iterations = mode.coordinates, _MODE_DAMPING, _ITERATIONS
+        damping, iterations = _MODE_DAMPING, _ITERATIONS
         # A drive that does not know how a mode rings on comes near for less.
         starting = [copy(segment) for segment in segments]
         for segment in starting:
@@ -86,6 +87,9 @@ def every_mode(
     sets = []
     for frequency in frequencies:
         shape = {**mode.shape, "frequency_hz": frequency, "damping_ratio": damping}
+        # Far below its frequency the twist is -α gain/ω².
+        alike = mode.coordinates * (frequency / mode.shape["frequency_hz"]) ** 2
+        coordinates = whole if misfit else np.minimum(alike, whole)
         sets.append([*fit.causes[:place], mode.at(coordinates, shape), *fit.causes[place + 1 :]])
     near = refine_each(starting, sets, fixed, [fit.drives] * len(sets), iterations=iterations)
     near.sort(key=lambda one: one.log_posterior, reverse=True)
@@ -95,7 +99,8 @@ def every_mode(
     fits = [fit, *full, *near[_NEAREST:]]
     best = max([fit, *full], key=lambda one: one.log_posterior)
     modes = [other.causes[place] for other in fits if other.log_posterior > best.log_posterior - _AS_LIKELY]
-    return _widened(best, place, modes)
+    found = _widened(best, place, modes)
+    return found if misfit else _unsettled(found, place)
 
 
 def with_honest_mode(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]]) -> Fit:
@@ -105,11 +110,21 @@ def with_honest_mode(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequ
     that prior: the covariance alone is too small.
     """
     place = next(number for number, cause in enumerate(fit.causes) if cause.name == "resonance")
-    unaware = [copy(segment) for segment in segments]
-    for segment in unaware:
-        segment.ringing = False
-    other = refine(unaware, fit.causes, fixed, drives=fit.drives, iterations=_ITERATIONS)
+    otherwise = [copy(segment) for segment in segments]
+    for segment in otherwise:
+        segment.ringing = not segment.ringing
+    other = refine(otherwise, fit.causes, fixed, drives=fit.drives, iterations=_ITERATIONS)
     return _widened(fit, place, [other.causes[place]])
+
+
+def _unsettled(fit: Fit, place: int) -> Fit:
+    """Widen what is said of a mode that is hardly rung: of gain, frequency and damping only gain/ω² is well known."""
+    mode = fit.causes[place]
+    shape_std = {key: max(std, _UNSETTLED * mode.shape[key]) for key, std in mode.shape_std.items()}
+    # In units of the prior, which is all that is known of the gain then.
+    least = np.diag(np.maximum(1.0 - mode.covariance.diagonal(), 0.0))
+    wide = replace(mode, covariance=mode.covariance + least, shape_std=shape_std)
+    return replace(fit, causes=(*fit.causes[:place], wide, *fit.causes[place + 1 :]))
 
 
 def _widened(fit: Fit, place: int, modes: Sequence[Cause]) -> Fit:

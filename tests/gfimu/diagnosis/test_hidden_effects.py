@@ -103,6 +103,14 @@ def test_a_gross_play_draws_in_no_other_cause():
     assert [cause.effect for cause in diagnose([world.recording], world.twin).causes] == ["hysteresis"]
 
 
+def test_a_mode_that_pushes_its_table_back_is_named_alone():
+    """A drive that does not know how the mode rings on is bent to ring itself, and leaves something."""
+    outcome = run_case(Case("reduced", 511, ("resonance",), 600.0, duration=20.0), OTHER_GENERATOR)
+    assert (outcome["verdict"], [cause["effect"] for cause in outcome["causes"]]) == ("explained", ["resonance"])
+    assert not outcome["unexplained"]
+    assert all(abs(z) < 3.0 for z in outcome["causes"][0]["z"].values())
+
+
 def test_a_candidate_is_listed_once_though_several_rivals_have_it():
     faint = next(case for case in study_cases("singles") if case.key == "singles/10180")
     told = [cause["effect"] for cause in outcome(faint, "")["causes"]]
