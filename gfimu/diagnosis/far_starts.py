@@ -24,6 +24,7 @@ _WORTH_STARTING = 1.2
 _SPACING = 0.1  # s, twice that of the fit
 _MODE_STARTS = 6
 _MODE_DAMPING = 0.05
+_WIDE_DAMPING = 0.1  # comes near from farther off
 _NEAREST = 2
 _UNSETTLED = 0.4  # of frequency and damping
 # What the evidence of a mode may be wrong by: it bends the functions that the drive can follow (`signatures`).
@@ -77,7 +78,7 @@ def every_mode(
     grid = mode.family.shapes(duration, 1.0 / segments[0].run.sample_period)
     frequencies = sorted({shape["frequency_hz"] for shape in grid})[:: max(len(grid) // (2 * _MODE_STARTS), 1)]
     whole = 1.0 / np.array([mode.family.sizes(segments[0].model.array)[0].prior_std])
-    damping, iterations, starting = 0.1, 3, segments
+    damping, iterations, starting = _WIDE_DAMPING, _FEW_ITERATIONS, segments
     if not misfit:
         damping, iterations = _MODE_DAMPING, _ITERATIONS
         # A drive that does not know how a mode rings on comes near for less.
