@@ -157,9 +157,11 @@ def refine(
     kept = [segment.coefficients for segment in segments]
     ringing = [segment.ringing for segment in segments]
     try:
-        start = _State(tuple(causes), tuple(kept if drives is None else drives))
+        array = segments[0].model.array
+        start = _State(_allowed(causes, array), tuple(kept if drives is None else drives))
         if other is not None:
-            start = min(start, _State(tuple(other.causes), tuple(other.drives)), key=partial(_energy, segments, fixed))
+            second = _State(_allowed(other.causes, array), tuple(other.drives))
+            start = min(start, second, key=partial(_energy, segments, fixed))
         if not shapes:
             start = replace(start, causes=tuple(replace(cause, frozen=True) for cause in start.causes))
         if iterations and _is_held(segments, fixed, start):
@@ -408,6 +410,11 @@ def _limited(causes: Sequence[Cause], step: NDArray[np.float64]) -> NDArray[np.f
     for _, _, place in _places(causes)[1]:
         limited[place] = np.clip(step[place], -_SHAPE_LIMIT, _SHAPE_LIMIT)
     return limited
+
+
+def _allowed(causes: Sequence[Cause], array: AccelerometerArray) -> tuple[Cause, ...]:
+    """Return causes no larger than physics allows; a linear form may have asked for more."""
+    return tuple(cause.at(np.minimum(cause.coordinates, cause.most(array))) for cause in causes)
 
 
 def _moved(causes: Sequence[Cause], step: NDArray[np.float64], array: AccelerometerArray) -> tuple[Cause, ...]:
