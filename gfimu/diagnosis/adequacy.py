@@ -122,7 +122,8 @@ def dependence_left(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Seque
         series.append(REFERENCE)
     total = count * len(series)
     gram, score = gram[:total, :total], score[:total]
-    if segments[0].ringing and "resonance" in fit.names and series[-1] == REFERENCE:
+    present = [*fixed[0], *effects_of_run(fit.causes, segments[0].model.array, segments[0].index)]
+    if segments[0].ringing and segments[0].felt_modes(present) and series[-1] == REFERENCE:
         jerk = (len(series) - 1) * count + names.index("jerk")
         gram[jerk], gram[:, jerk], score[jerk] = 0.0, 0.0, 0.0
     diagonal = np.maximum(gram.diagonal(), 0.0)

@@ -121,8 +121,9 @@ class Cause:
         return np.asarray((np.abs(self.mixing[rows]) > 0).any(axis=0))
 
     def most(self, array: AccelerometerArray) -> NDArray[np.float64]:
-        """Return the largest coordinates that physics allows, shape (k,); infinite for all but positive sizes."""
-        largest = np.array([size.most / size.prior_std for size in self.family.sizes(array)])
+        """Return the largest coordinates that physics allows, shape (k,); infinite where it sets no limit."""
+        # Other simulations need not say so.
+        largest = np.array([getattr(size, "most", np.inf) / size.prior_std for size in self.family.sizes(array)])
         rows = np.tile(largest, len(self.mixing) // len(largest))[:, None]
         with np.errstate(divide="ignore"):
             return np.asarray(np.min(rows / np.abs(self.mixing), axis=0))

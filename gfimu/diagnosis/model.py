@@ -51,7 +51,7 @@ class Spin(Protocol):
 
 
 class Size(Protocol):
-    """One linear coordinate of an effect: key, physical prior, sign, finite-difference step, largest size."""
+    """One linear coordinate of an effect: key, physical prior, sign, finite-difference step; ``most``, if it has it."""
 
     @property
     def key(self) -> str: ...  # noqa: D102
@@ -61,8 +61,6 @@ class Size(Protocol):
     def positive(self) -> bool: ...  # noqa: D102
     @property
     def step(self) -> float: ...  # noqa: D102
-    @property
-    def most(self) -> float: ...  # noqa: D102
 
 
 class Pattern(Protocol):

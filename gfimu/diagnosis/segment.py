@@ -97,8 +97,8 @@ class Segment:
         self._take(Roughness(spline, _START_FACTOR))
         # Whether the derivative knows what a play holds.
         self.holding = True
-        # Whether it knows what rings on, which takes more time.
-        self.ringing = False
+        # Whether it knows what rings on, which takes more time: from the start where the model has a mode already.
+        self.ringing = bool(self.felt_modes(()))
         # Fits are compared under the same knots, so these are chosen once.
         self.knots_chosen = False
         self.basis = CosineBasis(len(run.t), period, float(run.t[0] - start), stretches=stretches)

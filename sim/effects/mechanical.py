@@ -30,6 +30,9 @@ __all__ = [
 
 _DEGREE = np.pi / 180.0
 
+_WHOLE_INERTIA = 1.25
+"""Participation beyond which nothing hangs on one spring; a little more than 1 for the inexactness of an estimate."""
+
 
 class Misalignment(Effect):
     """A chip's sensing axes turned against the body."""
@@ -293,10 +296,6 @@ class Cogging(Effect):
             return RippledSpin(motion, t, *ripple)
 
         return world.changed(motion_steps=(*world.motion_steps, step))
-
-
-_WHOLE_INERTIA = 1.25
-"""Participation beyond which nothing hangs on one spring; a little more than 1 for the inexactness of an estimate."""
 
 
 class Resonance(Effect):
