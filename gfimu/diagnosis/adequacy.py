@@ -85,7 +85,9 @@ def left_over(
     """
     channels = segments[0].model.array.channels
     candidates = [dependence_left(segments, fit, fixed), one_curve(segments, fit, fixed, channels)] if smooth else []
-    for test in (lines, jumps):
+    # The quickest part of a walk over coarse steps is cut from its modes, and is nothing but jumps.
+    cut_short = any(segment.rounding.channels and segment.levels.walk > 0.0 for segment in segments)
+    for test in (lines,) if cut_short else (lines, jumps):
         each = over_segments(partial(test, fit=fit, channels=channels), segments, fixed)
         # Each stretch is one more place to find something by chance.
         candidates += [replace(one, log_odds=one.log_odds - np.log(len(segments))) for one in each]

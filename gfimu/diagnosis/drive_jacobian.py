@@ -13,6 +13,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg.blas import dsyrk
 from scipy.sparse import csr_array, diags_array, vstack
 
 from gfimu.diagnosis.drive import AngleSpline
@@ -166,20 +167,24 @@ class DriveJacobian:
                 total[:, start : start + _COLUMNS] += part.T @ mine.T
         return total
 
-    def information(self) -> csr_array:
-        """Return Σ_c w_c J_cᵀJ_c under the weights it was built with, shape (m, m)."""
-        stacked = vstack(self.parts, format="csr")
-        if stacked.nnz < _NARROW * stacked.shape[0]:
+    def information(self) -> csr_array | NDArray[np.float64]:
+        """Return Σ_c w_c J_cᵀJ_c under the weights it was built with, shape (m, m); if dense, the lower triangle."""
+        rows, size = self.parts[0].shape
+        if sum(part.nnz for part in self.parts) < _NARROW * len(self.parts) * rows:
+            stacked = vstack(self.parts, format="csr")
             return csr_array(stacked.T @ stacked)
-        total = np.zeros((stacked.shape[1], stacked.shape[1]))
-        for part in self.parts:  # sparse products of wide rows are slow
-            for start in range(0, part.shape[0], _ROWS):
-                block = part[start : start + _ROWS]
-                if block.nnz:
-                    first, last = int(block.indices.min()), int(block.indices.max()) + 1
-                    dense = block[:, first:last].toarray()
-                    total[first:last, first:last] += dense.T @ dense
-        return csr_array(total)
+        total = np.zeros((size, size), order="F")
+        for start in range(0, rows, _ROWS):  # sparse products of wide rows are slow
+            blocks = [_block(part, start, min(start + _ROWS, rows)) for part in self.parts]
+            reached = [columns for _, columns, _ in blocks if len(columns)]
+            if not reached:
+                continue
+            first, last = min(int(one.min()) for one in reached), max(int(one.max()) for one in reached) + 1
+            dense = np.zeros((len(blocks) * _ROWS, last - first))
+            for number, (row, columns, values) in enumerate(blocks):
+                dense[number * _ROWS + row, columns - first] = values
+            total[first:last, first:last] += dsyrk(1.0, dense.T, lower=1)
+        return total
 
     def slow(self, cosines: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return J_rᵀC of cosines (n, K), shape (R, m, K)."""
@@ -211,6 +216,13 @@ class DriveJacobian:
     def observations(self) -> int:
         """Number of observations, the reference included."""
         return int(self.loading.shape[1])
+
+
+def _block(part: csr_array, start: int, stop: int) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float64]]:
+    """Return row, from ``start``, column and value of the entries of some rows."""
+    ends = part.indptr[start : stop + 1]
+    held = slice(int(ends[0]), int(ends[-1]))
+    return np.repeat(np.arange(stop - start), np.diff(ends)), part.indices[held], part.data[held]
 
 
 class _State:

@@ -73,13 +73,15 @@ class InverseRoot:
     whole: bool = False
 
     @classmethod
-    def of(cls, matrix: csr_array, rows: NDArray[np.float64], residue: _Border | None = None) -> InverseRoot:
+    def of(
+        cls, matrix: csr_array | NDArray[np.float64], rows: NDArray[np.float64], residue: _Border | None = None
+    ) -> InverseRoot:
         """Factor H = B − rowsᵀ rows.
 
         Parameters
         ----------
-        matrix : csr_array, shape (m, m)
-            B.
+        matrix : csr_array or ndarray, shape (m, m)
+            B; of a dense one the lower triangle, which is overwritten.
         rows : ndarray, shape (k, m)
             Uᵀ.
         residue : tuple of ndarray, optional
@@ -91,9 +93,12 @@ class InverseRoot:
             If H is not positive definite, even with a ridge of 1e-10.
         """
         size = matrix.shape[0]
-        entries = matrix.tocoo()
-        whole = bool(np.max(entries.row - entries.col, initial=0) > _WIDE_BANDS * size)
-        form = matrix.toarray(order="F") if whole else banded(matrix)
+        if isinstance(matrix, csr_array):
+            entries = matrix.tocoo()
+            whole = bool(np.max(entries.row - entries.col, initial=0) > _WIDE_BANDS * size)
+            form = matrix.toarray(order="F") if whole else banded(matrix)
+        else:
+            whole, form = True, matrix
         factor = _factored_whole if whole else _factored
         factored = factor(form, rows)
         if factored is None:  # a stretch of the drive that only its prior holds, and hardly

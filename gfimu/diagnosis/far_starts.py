@@ -27,6 +27,7 @@ _MODE_DAMPING = 0.05
 _WIDE_DAMPING = 0.1  # comes near from farther off
 _NEAREST = 2
 _UNSETTLED = 0.4  # of frequency and damping
+_DOUBT = 3.0  # times the standard deviation: what modes that were followed were off by, rms, in eight worlds
 # What the evidence of a mode may be wrong by: it bends the functions that the drive can follow (`signatures`).
 _AS_LIKELY = 10.0
 
@@ -108,14 +109,23 @@ def with_honest_mode(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequ
     """Widen what is said of a mode by how much it depends on what the drive knows of its ringing.
 
     The prior of the drive is learnt from a drive that may ring itself, and what rings, drive or mode, is told apart by
-    that prior: the covariance alone is too small.
+    that prior: the covariance alone is too small. Where the drive was never told of the ringing, only gain/ω² is known.
     """
     place = next(number for number, cause in enumerate(fit.causes) if cause.name == "resonance")
     otherwise = [copy(segment) for segment in segments]
     for segment in otherwise:
         segment.ringing = not segment.ringing
     other = refine(otherwise, fit.causes, fixed, drives=fit.drives, iterations=_ITERATIONS)
-    return _widened(fit, place, [other.causes[place]])
+    wide = _widened(fit, place, [other.causes[place]])
+    return _doubted(wide, place) if segments[0].ringing else _unsettled(wide, place)
+
+
+def _doubted(fit: Fit, place: int) -> Fit:
+    """Widen what is said of a mode whose ringing was followed by as much as the errors of such fits ask for."""
+    mode = fit.causes[place]
+    shape_std = {key: _DOUBT * std for key, std in mode.shape_std.items()}
+    wide = replace(mode, covariance=_DOUBT**2 * mode.covariance, shape_std=shape_std)
+    return replace(fit, causes=(*fit.causes[:place], wide, *fit.causes[place + 1 :]))
 
 
 def _unsettled(fit: Fit, place: int) -> Fit:

@@ -29,6 +29,7 @@ _MANY = 3  # inverted channels that are more likely than exchanged ones
 _PILE = 30
 _CAUGHT = 0.8  # of the samples that should be beyond a limit
 _SURELY_MISSING = 15.0  # samples above the largest value of several channels, of which none is there
+_ONE_CHIP, _GARBAGE = 3, 5  # channels, and samples of each, that may read more than a limit
 _DIFFERENT = 0.6  # share of values above which steps are finer than what is seen
 
 _Option = tuple[float, str, dict[str, object], str, NDArray[np.float64]]
@@ -114,7 +115,9 @@ def check_integrity(model: WorldModel, run: Run, prediction: NDArray[np.float64]
     if limit is not None:
         if "saturation" not in known and limit < 0.97 * expected.full_scale:
             add("saturation", {"limit_m_s2": limit}, f"readings pile up at ±{limit:.2f} m/s² and never exceed it")
-        clipped = (np.abs(run.readings) >= limit - 0.6 * quantum) | (np.abs(prediction) > limit - 4 * expected.white)
+        # Just below the limit only those samples are whole whose noise points down.
+        near = np.abs(prediction) > limit - 4.0 * _noise_seen(run, expected.white)
+        clipped = (np.abs(run.readings) >= limit - 0.6 * quantum) | near
         run = replace(run, valid=run.valid & ~clipped)
     valid = run.valid.copy()
     frozen = frozen_stretches(run, prediction, quantum, limit)
@@ -175,7 +178,10 @@ def _clipping(
         return None
     limit = float(np.median(levels))
     close = np.abs(np.array(levels) - limit) < 1.5 * float(steps.min())
-    return limit if close.sum() >= max(1, len(levels) // 2) else None
+    beyond_it = np.abs(np.where(run.valid, run.readings, 0.0)) > limit + np.maximum(0.6 * steps, 4.0 * white)
+    # One chip in another range may read more, and single samples may be garbage.
+    contradicted = np.sum(beyond_it.sum(axis=0) > _GARBAGE) > _ONE_CHIP
+    return limit if close.sum() >= max(1, len(levels) // 2) and not contradicted else None
 
 
 def _cut_off(lacking: Sequence[tuple[float, float]], step: float) -> list[float]:
@@ -198,6 +204,12 @@ def _missing_above(at_top: int, below: int, noise: float) -> float:
         return 0.0
     fewest, most = max(at_top - 2.0 * at_top**0.5, 0.0), below + 2.0 * below**0.5 + 1.0
     return float(fewest**2 / most * np.exp(-1.0 / noise**2))
+
+
+def _noise_seen(run: Run, white: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the white noise of each channel (c,), at least what is expected."""
+    seen = [difference_noise(mine[valid]) for mine, valid in zip(run.readings.T, run.valid.T, strict=True)]
+    return np.maximum(white, seen)
 
 
 def _range_factors(effects: Sequence[Effect], model: WorldModel) -> NDArray[np.float64]:

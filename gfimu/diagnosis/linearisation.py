@@ -25,8 +25,8 @@ class DriveEquations:
     ----------
     residual, slow_residual, jacobian, slow
         As in `Linearisation`.
-    information : csr_array, shape (m, m)
-        JᵀWJ under the white noise alone.
+    information : csr_array or ndarray, shape (m, m)
+        JᵀWJ under the white noise alone; if dense, the lower triangle.
     rhs : ndarray, shape (m,)
         JᵀWr.
     objective : float
@@ -39,7 +39,7 @@ class DriveEquations:
     slow_residual: NDArray[np.float64]
     jacobian: DriveJacobian
     slow: DriveModes
-    information: csr_array
+    information: csr_array | NDArray[np.float64]
     rhs: NDArray[np.float64]
     objective: float
     residue: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]] | None
@@ -54,7 +54,7 @@ class DriveEquations:
         """
         energy, pull = prior.energy(coefficients)
         rhs, objective = self.rhs + pull, self.objective + energy
-        matrix = csr_array(self.information + prior.precision)
+        matrix = _sum(self.information, prior.precision)
         if self.residue is None:
             root = InverseRoot.of(matrix, self.slow.rows)
         else:
@@ -63,6 +63,15 @@ class DriveEquations:
             rhs = np.concatenate([rhs, right])
         forward = root.apply(rhs)
         return DriveElimination(root, forward, objective - float(forward @ forward), len(self.rhs))
+
+
+def _sum(matrix: csr_array | NDArray[np.float64], added: csr_array) -> csr_array | NDArray[np.float64]:
+    """Return the sum of two symmetric matrices, dense if the first is."""
+    if isinstance(matrix, csr_array):
+        return csr_array(matrix + added)
+    total, entries = matrix.copy(order="F"), added.tocoo()
+    total[entries.row, entries.col] += entries.data
+    return total
 
 
 @dataclass(frozen=True)

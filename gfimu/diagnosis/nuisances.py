@@ -15,7 +15,15 @@ from gfimu.diagnosis.refinement import Fit, refine
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.slow_modes import WeighedPowers
 
-__all__ = ["STEADY_NOISE", "learn_noise", "settle_noise", "sharpen_drives", "tune_drives", "widen_drives"]
+__all__ = [
+    "STEADY_NOISE",
+    "learn_noise",
+    "settle_noise",
+    "sharpen_drives",
+    "tune_drives",
+    "uncut_drives",
+    "widen_drives",
+]
 
 STEADY_NOISE = 0.1
 """Relative change of the noise below which it is known."""
@@ -115,6 +123,16 @@ def sharpen_drives(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequen
     if fit is not before:
         tune_drives(segments, fit, fixed)
     return fit
+
+
+def uncut_drives(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]]) -> Fit:
+    """Give the drives their usual knots again; returns the fit with its drives on them."""
+    for segment, drive in zip(segments, fit.drives, strict=True):
+        segment.coefficients = drive
+        segment.uncut()
+    fit = refine(segments, fit.causes, fixed, iterations=_ITERATIONS)
+    tune_drives(segments, fit, fixed)
+    return refine(segments, fit.causes, fixed, drives=fit.drives, iterations=_ITERATIONS)
 
 
 def widen_drives(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]]) -> Fit:

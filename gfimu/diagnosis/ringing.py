@@ -34,26 +34,36 @@ class Response:
 
     Parameters
     ----------
-    values : ndarray, shape (3, e)
-        The entries for angle, rate and acceleration.
+    free : ndarray, shape (2, e)
+        Real and imaginary part of what each coefficient rings with at the start of the time's interval.
+    turned : ndarray of complex, shape (n,)
+        How far that has turned, and decayed, since.
+    pole : complex
+        What the free ringing is multiplied by when differentiated, 1/s.
+    forced : ndarray, shape (3, n, 5)
+        What the functions of the interval, the last five of each row, add to angle, rate and acceleration.
     columns, ends : ndarray of int, shape (e,) and (n + 1,)
         Coefficient of each entry, and where each row's entries end.
-    rows : ndarray of int, shape (e,)
-        Row of each entry.
     size : int
         m.
     """
 
-    values: NDArray[np.float64]
+    free: NDArray[np.float64]
+    turned: NDArray[np.complex128]
+    pole: complex
+    forced: NDArray[np.float64]
     columns: NDArray[np.intp]
     ends: NDArray[np.intp]
-    rows: NDArray[np.intp]
     size: int
 
     def matrix(self, slopes: NDArray[np.float64]) -> csr_array:
         """Return the matrix (n, m) from the coefficients to Σ slopes · (angle, rate, acceleration); slopes (3, n)."""
-        mixed = sum(slope[self.rows] * mine for slope, mine in zip(slopes, self.values, strict=True))
-        return csr_array((mixed, self.columns, self.ends), shape=(len(self.ends) - 1, self.size))
+        mixed = (slopes[0] + self.pole * (slopes[1] + self.pole * slopes[2])) * self.turned  # (n,)
+        lengths = np.diff(self.ends)
+        values = np.repeat(mixed.real, lengths) * self.free[0] - np.repeat(mixed.imag, lengths) * self.free[1]
+        own = self.ends[1:, None] + np.arange(-DEGREE - 1, 0)  # (n, 5)
+        values[own] += np.einsum("sn,snj->nj", slopes, self.forced)
+        return csr_array((values, self.columns, self.ends), shape=(len(lengths), self.size))
 
 
 @dataclass(frozen=True)
@@ -83,19 +93,19 @@ class Ringing:
         over = first - earliest[first]
         lengths = over + DEGREE + 1
         ends = np.concatenate([[0], np.cumsum(lengths)])
-        rows = np.repeat(np.arange(len(t)), lengths)
-        order = np.arange(ends[-1]) - ends[rows]
+        order = np.arange(ends[-1]) - np.repeat(ends[:-1], lengths)
+        interval = np.repeat(first, lengths)
+        padded = np.concatenate([past, np.zeros((len(past), DEGREE + 1))], axis=1)
+        free = self.mode.gain * padded.ravel()[interval * padded.shape[1] + order]
         own = ends[1:, None] + np.arange(-DEGREE - 1, 0)  # (n, 5)
-        turned = np.exp(self._pole * since)  # (n,)
-        free = np.empty(ends[-1], dtype=complex)
-        ringing = order < over[rows]
-        free[ringing] = (past[first] * turned[:, None])[rows[ringing], order[ringing]]
-        free[own] = inside[first] * turned[:, None]
-        values = np.stack([free.real, (self._pole * free).real, (self._pole**2 * free).real])
+        free[own] = self.mode.gain * inside[first]
         b0, b1, b2 = self._forced[first].transpose(1, 0, 2)  # each (n, 5)
         s = since[:, None]
-        values[:, own] += np.stack([b0 + s * (b1 + s * b2), b1 + 2.0 * s * b2, 2.0 * b2])
-        return Response(self.mode.gain * values, earliest[first][rows] + order, ends, rows, self.spline.size)
+        forced = self.mode.gain * np.stack([b0 + s * (b1 + s * b2), b1 + 2.0 * s * b2, 2.0 * b2])
+        columns = np.repeat(earliest[first], lengths) + order
+        turned = np.exp(self._pole * since)  # (n,)
+        parts = np.stack([free.real, free.imag])
+        return Response(parts, turned, self._pole, forced, columns, ends, self.spline.size)
 
     @cached_property
     def _pole(self) -> complex:
@@ -120,27 +130,28 @@ class Ringing:
     @cached_property
     def _amplitudes(self) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
         """Return C of each interval's basis functions from its start, (k, 5), and of each once it is over, (m,)."""
-        spline, pole, forced = self.spline, self._pole, self._forced
-        widths, count = spline.widths, len(spline.widths)
-        inside = np.zeros((count, DEGREE + 1), dtype=complex)
-        after = np.zeros(spline.size, dtype=complex)
+        spline, pole = self.spline, self._pole
+        b0, b1, b2 = self._forced.transpose(1, 0, 2)  # each (k, 5)
+        h = spline.widths[:, None]
+        starting = self._amplitude(b0, b1)
+        ending = self._amplitude(b0 + h * (b1 + h * b2), b1 + 2.0 * h * b2)
+        decay = np.exp(pole * spline.widths)
         first, offset = spline.interval(np.array([self.start]))
         began, since = int(first[0]), float(offset[0])
-        carried = np.zeros(DEGREE + 1, dtype=complex)  # free amplitude of the interval's functions at its start
-        for k in range(began, count):
-            b0, b1, b2 = forced[k]
-            if k == began:  # steady at the start: φ = −α/ω₀², at rest
-                steady = -(spline.accelerations[k].T @ since ** np.arange(3.0)) / self.mode.natural**2
-                here, rate = b0 + since * (b1 + since * b2), b1 + 2.0 * since * b2
-                carried = self._amplitude(steady - here, -rate) * np.exp(-pole * since)
-            else:
-                carried = carried - self._amplitude(b0, b1)
-            inside[k] = carried
-            h = widths[k]
-            ended = self._amplitude(b0 + h * (b1 + h * b2), b1 + 2.0 * h * b2) + carried * np.exp(pole * h)
-            after[k] = ended[0]
-            carried = np.append(ended[1:], 0.0)
-        return inside, after
+        # Steady at the start: φ = −α/ω₀², at rest.
+        steady = -(spline.accelerations[began].T @ since ** np.arange(3.0)) / self.mode.natural**2
+        here = b0[began] + since * (b1[began] + since * b2[began])
+        rate = b1[began] + 2.0 * since * b2[began]
+        inside = np.zeros((len(decay), DEGREE + 1), dtype=complex)
+        ended = np.zeros(len(decay), dtype=complex)
+        # A function is the last of an interval first, and the first of one at last.
+        for place in range(DEGREE, -1, -1):
+            inside[1:, place] = ended[:-1] - starting[1:, place]
+            inside[:began, place] = 0.0
+            inside[began, place] = self._amplitude(steady - here, -rate)[place] * np.exp(-pole * since)
+            ended = ending[:, place] + inside[:, place] * decay
+            ended[:began] = 0.0
+        return inside, np.append(ended, np.zeros(spline.size - len(ended)))
 
     def _past(self, after: NDArray[np.complex128]) -> tuple[NDArray[np.intp], NDArray[np.complex128]]:
         """Return the first function that still rings in each interval, (k,), and amplitudes of it and those after it

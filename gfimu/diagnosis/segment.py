@@ -53,6 +53,7 @@ _REST_FACTOR = 1.3
 _LEAST_GAIN = 0.05
 _STATE_STEPS = (1e-5, 1e-4, 1e-3)
 _SAME_PHASE = 0.1  # rad of a mode between the first chip and the last
+_SLOW_ROUNDS, _SLOW_STEP = 10, 0.05  # to the most probable slow noise; of the white noise, below which it is found
 _FELT_PLAY = 2.0  # standard deviations of the noise
 
 
@@ -105,6 +106,8 @@ class Segment:
         self.is_angle = model.drive_source == "angle"
         self.weight_mask = np.column_stack([run.valid, run.reference_valid])  # (n, c + 1)
         self.row_weight, self._weighed = self.weight_mask.astype(float), False
+        # Where the slow noise of coarse readings most probably is: they are expanded about it.
+        self._wandered: NDArray[np.float64] | float = 0.0
         self.rounding, self.levels = self._starting_levels()
         self.round_to(model.expected_noise(1.0 / period).quantum)
         self.calibration_residue: CalibrationResidue | None = None
@@ -235,6 +238,12 @@ class Segment:
         self._follow(self.spin, self.roughness.on(spline, corners=True))
         return True
 
+    def uncut(self) -> None:
+        """Put the knots of the drive at their usual distance again, at the present drive."""
+        spacing = max(KNOT_SPACING, self.run.sample_period)
+        spline = AngleSpline.uniform(self.spline.start, self.spline.stop, spacing)
+        self._follow(self.spin, self.roughness.on(spline, corners=False))
+
     def coarser(self, spacing: float) -> Segment:
         """Return a copy whose knots are all ``spacing`` s apart, at the present drive."""
         other = copy(self)
@@ -334,8 +343,13 @@ class Segment:
         if not self.rounding.coarse:
             return residual, 0.0
         self._weighed = True
-        working, self.row_weight, lacking = self.rounding.weigh(residual, self.levels.white, self.weight_mask)
-        return working, lacking
+        self._follow_slow_noise(residual)
+        return self._weigh_about(residual)
+
+    def _weigh_about(self, residual: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
+        about = residual - self._wandered * self.weight_mask
+        working, self.row_weight, lacking = self.rounding.weigh(about, self.levels.white, self.weight_mask)
+        return working + self.row_weight * self._wandered, lacking
 
     def round_to(self, quantum: float) -> None:
         """Tell that readings are rounded to steps of ``quantum`` m/s² after the noise, where that is coarse."""
@@ -349,7 +363,7 @@ class Segment:
         """Replace white noise in ``level``, shape (c + 1,), by what it was before a coarse rounding."""
         if not self.rounding.coarse:
             return level
-        error = np.where(self.weight_mask, self.residual(effects), np.nan)
+        error = np.where(self.weight_mask, self.residual(effects) - self._wandered, np.nan)
         return self.rounding.noise_before(error, self.levels.white, level)
 
     # -- normal equations --------------------------------------------------------------------------------------
@@ -363,6 +377,22 @@ class Segment:
                 self.working_residual(())
             self.modes = WeighedModes(self.basis, self.levels, self.row_weight)
         self.inverse_variance = 1.0 / self.levels.white**2
+
+    def _follow_slow_noise(self, residual: NDArray[np.float64]) -> None:
+        """Expand coarse readings about the most probable walk of their biases, given measured minus predicted.
+
+        A walk over steps moves the edges at which they tell much (penalised quasi-likelihood, Breslow and Clayton
+        1993); bias instability keeps well within a step.
+        """
+        if not (self.rounding.channels and self.levels.walk > 0.0):
+            return
+        for _ in range(_SLOW_ROUNDS):
+            before = self._wandered
+            working, _ = self._weigh_about(residual)
+            self.modes = WeighedModes(self.basis, self.levels, self.row_weight)
+            self._wandered = self.modes.slow_noise(self.modes.share * self.modes.of_each(working))
+            if np.abs((self._wandered - before) / self.levels.white).max() < _SLOW_STEP:
+                break
 
     def linearise(self, effects: Sequence[Effect]) -> Linearisation:
         """Linearise about effects and the present drive, and eliminate the drive."""

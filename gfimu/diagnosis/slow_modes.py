@@ -6,7 +6,7 @@ The noise of observation c is white but for a few modes, orthonormal columns Q_c
 
 Where every sample counts alike the modes are cosines, the same for all observations. A coarse reading tells more at the
 edge of a step than in its middle (`gfimu.diagnosis.rounding`), so slow noise comes through with the weight w of each
-sample: with B = diag(w/rms w) C and the variances S of the cosines C,
+sample: with B = diag(w) C and the variances S of the cosines C,
 
     S^½ BᵀB S^½/σ² = V Λ Vᵀ,  Q = B S^½/σ V Λ^−½,  s = Λ/(1 + Λ).
 """
@@ -82,7 +82,7 @@ class WeighedModes(SlowModes):
     """
 
     def __init__(self, basis: CosineBasis, levels: NoiseLevels, weight: NDArray[np.float64]) -> None:
-        self._weight, cosines = _relative(weight), _cosine_count(basis, levels)
+        self._weight, cosines = weight, _cosine_count(basis, levels)
         self._cosines = basis.matrix(cosines)
         variances = basis.variances(levels, cosines)  # (K, c + 1)
         found = [
@@ -110,6 +110,10 @@ class WeighedModes(SlowModes):
     def back(self, sizes: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return all observations (n, c + 1) that sizes (K, c + 1) of the modes make."""
         return np.asarray(self._cosines @ np.einsum("ckm,mc->kc", self._mixing, sizes) * self._weight)
+
+    def slow_noise(self, sizes: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the slow noise (n, c + 1) that comes through with the weights as sizes (K, c + 1) of the modes."""
+        return np.asarray(self._cosines @ np.einsum("ckm,mc->kc", self._mixing, sizes))
 
     def of_drive(self, jacobian: DriveJacobian, weights: NDArray[np.float64]) -> DriveModes:
         """Return what each mode has of the drive's coefficients (`SlowModes.of_drive`)."""
@@ -172,7 +176,7 @@ class WeighedPowers:
     ----------
     power : ndarray, shape (K, c)
         Squared sizes, in units of the residuals.
-    flicker, walk : ndarray, shape (K, c)
+    flicker, walk : ndarray, shape (K, c) or (K, 1)
         Variances that bias instability and a random walk of unit size give them.
     """
 
@@ -183,12 +187,11 @@ class WeighedPowers:
     @classmethod
     def of(cls, basis: CosineBasis, residual: NDArray[np.float64], weight: NDArray[np.float64]) -> WeighedPowers:
         """Take weighted residuals (n, c) and their weights; a constant is left out, as it may be a bias."""
-        relative = _relative(weight)
         count = min(len(basis.frequency), _MOST_COSINES)
         flicker, walk = basis.flicker_spectrum[1:count], basis.walk_spectrum[1:count]
         root = np.sqrt(flicker)
         found = cls(*np.zeros((3, count - 1, residual.shape[1])))
-        for column, mine in enumerate(relative.T):
+        for column, mine in enumerate(weight.T):
             columns = basis.matrix(count)[:, 1:] * mine[:, None]
             columns -= np.outer(mine, mine @ columns) / max(float(mine @ mine), _NO_POWER)
             gram = columns.T @ columns
@@ -199,11 +202,6 @@ class WeighedPowers:
             found.flicker[there, column] = power[there]
             found.walk[there, column] = (analysis @ gram) ** 2 @ walk
         return found
-
-
-def _relative(weight: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return weights (n, c) over their rms."""
-    return weight / np.sqrt(np.maximum(np.mean(weight**2, axis=0), _NO_POWER))
 
 
 def _cosine_count(basis: CosineBasis, levels: NoiseLevels) -> int:

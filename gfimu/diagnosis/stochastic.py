@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from gfimu.diagnosis.causes import effects_of_run
-from gfimu.diagnosis.coloured_noise import estimate_flicker
+from gfimu.diagnosis.coloured_noise import likeliest_flicker
 from gfimu.diagnosis.model import Effect
 from gfimu.diagnosis.refinement import Fit
 from gfimu.diagnosis.segment import Segment
+from gfimu.diagnosis.slow_modes import WeighedPowers
 from gfimu.units import STANDARD_GRAVITY
 
 __all__ = [
@@ -68,16 +69,19 @@ def walk_strength(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequenc
         kept, segment.coefficients = segment.coefficients, drive
         left = segment.working_residual([*known, *effects_of_run(fit.causes, array, segment.index)])[:, :-1]
         segment.coefficients = kept
-        coefficients = segment.basis.transform(left)
+        slow = _slow_powers(segment, left)
         white = segment.levels.white[:-1]
-        slow = coefficients[1 : len(segment.basis.frequency)] ** 2
-        shape, drift = segment.basis.flicker_spectrum[1:], segment.basis.walk_spectrum[1:]
 
-        usual = np.minimum(estimate_flicker(coefficients, white, segment.basis), LARGEST_USUAL_FLICKER)
-        without += float(_whittle(slow, white**2 + np.outer(shape, usual**2)).sum())
+        def spectrum(
+            walk: float, slow: WeighedPowers = slow, white: NDArray[np.float64] = white
+        ) -> NDArray[np.float64]:
+            drift = slow.walk * walk**2
+            flicker = np.minimum(likeliest_flicker(slow.power, white, slow.flicker, drift), LARGEST_USUAL_FLICKER)
+            return np.asarray(white**2 + slow.flicker * flicker**2 + drift)
+
+        without += float(_whittle(slow.power, spectrum(0.0)).sum())
         for place, strength in enumerate(_WALK_GRID):
-            flicker = np.minimum(estimate_flicker(coefficients, white, segment.basis, strength), LARGEST_USUAL_FLICKER)
-            totals[place] += _whittle(slow, white**2 + np.outer(shape, flicker**2) + (drift * strength**2)[:, None])
+            totals[place] += _whittle(slow.power, spectrum(strength))
     common = totals.sum(axis=1)
     best = int(np.argmax(common))
     weight = np.exp(common - common[best])
@@ -87,6 +91,15 @@ def walk_strength(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequenc
     unequal = -float(chi2.logsf(apart, array.n_channels - 1))
     odds = float(common[best] - without) if mean > _WEAKEST_WALK else 0.0
     return Walk(mean, float(np.hypot(std, _DRIVE_TAKES * mean)), odds, unequal)
+
+
+def _slow_powers(segment: Segment, left: NDArray[np.float64]) -> WeighedPowers:
+    """Return squared sizes of the slow modes in residuals (n, c), and what slow noise of unit size gives them."""
+    if segment.rounding.channels:
+        return WeighedPowers.of(segment.basis, left, segment.row_weight[:, :-1])
+    basis = segment.basis
+    power = basis.transform(left)[1 : len(basis.frequency)] ** 2  # (K, c)
+    return WeighedPowers(power, basis.flicker_spectrum[1:, None], basis.walk_spectrum[1:, None])
 
 
 def _whittle(power: NDArray[np.float64], spectrum: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -102,6 +115,9 @@ def log_probability(segments: Sequence[Segment], fit: Fit) -> float:
     total = fit.log_posterior
     for segment in segments:
         total -= 0.5 * segment.modes.log_determinant + segment.drive_prior.log_roughness
+        if segment.rounding.channels:
+            # The deviance of rounded readings is that of probabilities, which have no density of white noise to add.
+            total += len(segment.run.t) * float(np.sum(np.log(segment.levels.white[:-1])))
     return total
 
 

@@ -8,6 +8,7 @@ import functools
 import itertools
 from pathlib import Path
 
+import numpy as np
 import pytest
 from scipy.stats import binom
 
@@ -138,7 +139,8 @@ def test_the_extension_removes_the_excess_on_data_the_fit_never_saw():
         for case, source in SINGLES
         if case.size >= 300 and score(outcome(case, source))["exact"]
     ]
-    shares = sorted(share for share in shares if share is not None)
+    # Undefined where there was no excess: nothing but noise, faults and walks.
+    shares = sorted(share for share in shares if share is not None and np.isfinite(share))
     assert len(shares) >= 10
     assert shares[len(shares) // 2] >= 0.98
     assert shares[len(shares) // 10] >= 0.9

@@ -90,6 +90,40 @@ def test_a_plateau_whose_noise_is_read_is_no_clipping(seed):
     assert not _checked(seed, [])[0]
 
 
+def test_loud_readings_just_below_a_limit_are_left_out_as_far_as_their_noise_reaches():
+    """Of those only the ones whose noise points down are whole, and their mean is off."""
+    twin = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
+    t = np.arange(-2.0, 62.0, 5e-3)
+    motion = SplineSpin.through(t, gaussian_filter1d(np.interp(t, [3.0, 57.0], [0.0, FASTEST]), 20.0))
+    limit, factor = 15.0, 6.0
+    hidden = [make_effect("noise", {"factor": factor}), make_effect("saturation", {"limit_m_s2": limit})]
+    run = prepare_run(measure(np.random.default_rng(11), twin, hidden, Measurement(duration=60.0), motion=motion), twin)
+    prediction = twin.predict(motion, run.t)[0]
+    valid = check_integrity(twin, run, prediction).run.valid
+    noise = factor * float(np.median(twin.expected_noise(100.0).white))
+    below = limit - np.abs(prediction)
+    assert not (valid & (below < 2.0 * noise)).any()
+    assert (valid & (below > 5.0 * noise)).any(axis=0).all()
+
+
+@pytest.mark.parametrize("channels", [1, 12])
+def test_a_limit_that_most_channels_read_beyond_is_none(channels):
+    """One channel that wandering biases hold a coarse step below its prediction looks clipped."""
+    twin = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
+    step = 80 * 3.9e-3 * 9.80665
+    t = np.arange(-2.0, 27.0, 5e-3)
+    rate = np.interp(t, [3.0, 4.0, 20.0, 24.0], [0.0, FASTEST, FASTEST, 0.0])
+    motion = SplineSpin.through(t, gaussian_filter1d(rate, 20.0))
+    hidden = [make_effect("coarse_resolution", {"step_m_s2": step}, twin.array)]
+    run = prepare_run(measure(np.random.default_rng(11), twin, hidden, Measurement(duration=25.0), motion=motion), twin)
+    readings, prediction = run.readings.copy(), twin.predict(motion, run.t)[0]
+    held = np.argsort(-np.abs(prediction).max(axis=0))[:channels]
+    level = (np.round(np.abs(prediction[:, held]).max() / step) - 2.0) * step
+    readings[:, held] = np.clip(readings[:, held], -level, level)
+    effects = check_integrity(twin, replace(run, readings=readings), prediction).effects
+    assert ("saturation" in {effect.name for effect in effects}) == (channels == 12)
+
+
 def test_a_dead_chip_is_told_with_all_its_channels():
     """All channels that stop together are one fault, in the extended twin too; others are told in the sentence."""
     twin = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")

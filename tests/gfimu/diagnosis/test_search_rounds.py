@@ -1,6 +1,7 @@
 """The search for causes goes on while a round brings something, and ends where nothing of it would be believed."""
 
 import os
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,6 +16,8 @@ from gfimu.diagnosis.refinement import refine
 from gfimu.recording import Recording
 from sim.campaign import Measurement, measure, random_profile
 from sim.effects import make_effect
+from sim.study.cases import Case
+from sim.study.outcome import draw_world
 from sim.twin import Twin
 
 SETTING = Measurement(duration=12.0)
@@ -159,3 +162,29 @@ def test_a_gross_misfit_is_not_learnt_as_bias_instability(twin):
     assert_allclose(segments[0].levels.flicker, before.flicker)
     learn_noise(segments, nothing, fixed)
     assert segments[0].levels.flicker[:-1].min() > 3 * before.flicker[:-1].max()
+
+
+def test_a_ripple_of_the_tachometer_does_not_leave_its_knots_to_the_drive():
+    """The reference's drive bends with the ripple; on knots that follow it a mode would be named for the rest."""
+    world = draw_world(Case("reduced", 91031, ("axis_wobble", "tacho_ripple"), 1000.0, duration=20.0))
+    segments, fixed = PreparedRuns.build([world.recording], world.twin, ["run"]).segments(world.twin)
+    usual = len(segments[0].coefficients)
+    found = engine.explain(segments, fixed, 1)
+    assert found.fit.names == {"axis_wobble", "tacho_ripple"}
+    assert len(found.segments[0].coefficients) < 1.5 * usual
+
+
+def test_a_mode_that_pruning_takes_out_is_heard_ringing(monkeypatch):
+    """It may be hardly anything as it bends the ramps, and plain as it rings."""
+    generator = str(Path(__file__).parents[2] / "independent_world.py:hide")
+    world = draw_world(Case("reduced", 600, ("resonance",), 40.0, duration=20.0), generator)
+    pruned = engine.prune
+
+    def pruned_if_rung(segments, best, fixed, *done):
+        if segments[0].ringing:
+            return pruned(segments, best, fixed, *done)
+        return refine(segments, (), fixed, drives=best.drives), {}
+
+    monkeypatch.setattr(engine, "prune", pruned_if_rung)
+    segments, fixed = PreparedRuns.build([world.recording], world.twin, ["run"]).segments(world.twin)
+    assert engine.explain(segments, fixed, 1).fit.names == {"resonance"}

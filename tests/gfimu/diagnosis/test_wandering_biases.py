@@ -39,6 +39,17 @@ def test_a_search_that_is_left_for_a_walk_finds_it_and_what_is_beside_it():
     assert {cause.effect for cause in found.causes} == {"bias_random_walk", "eccentricity"}
 
 
+def test_a_walk_over_coarse_steps_is_told_with_its_strength():
+    """The edges at which coarse readings tell much move with the biases."""
+    world = draw_world(Case("walks", 91023, ("bias_random_walk", "coarse_resolution"), 1000.0, duration=20.0))
+    found = diagnose([world.recording], world.twin)
+    assert found.verdict == "explained"
+    told = {cause.effect: cause for cause in found.causes}
+    assert set(told) == {"bias_random_walk", "coarse_resolution"}
+    walk, key = told["bias_random_walk"], "strength_m_s2_rts"
+    assert abs(walk.parameters[key] - dict(world.truth)["bias_random_walk"][key]) < 3.0 * walk.std[key]
+
+
 def test_a_search_left_for_a_walk_that_is_none_is_taken_up_again(monkeypatch):
     searches = []
 
