@@ -7,7 +7,7 @@ import sys
 from collections.abc import Sequence
 from typing import Any
 
-from gfimu.errors import GfimuError
+from gfimu.errors import GfimuError, InputError
 from sim.study.baselines import METHODS
 from sim.study.cases import STUDIES, study_cases
 from sim.study.report import summarise, write_report
@@ -32,7 +32,14 @@ def _run(options: argparse.Namespace) -> None:
 
 
 def _report(options: argparse.Namespace) -> None:
-    outcomes = [outcome for file in options.outcomes for outcome in read_outcomes(file)]
+    latest: dict[tuple[str, str, str], dict[str, Any]] = {}
+    for file in options.outcomes:
+        found = read_outcomes(file)
+        if not found:
+            raise InputError(f"{file}: no outcomes; give a file that `python -m sim.study run` wrote")
+        for outcome in found:
+            latest[outcome["key"], outcome["source"], outcome.get("method", "")] = outcome
+    outcomes = list(latest.values())
     if options.out:
         for path in write_report(outcomes, options.out):
             sys.stdout.write(f"{path}\n")
@@ -54,8 +61,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     run.add_argument("--method", default="", choices=["", *METHODS], help="a simpler method instead of the diagnosis")
     run.set_defaults(work=_run)
     report = commands.add_parser("report", help="tables and figures from outcomes")
-    report.add_argument("outcomes", nargs="+")
-    report.add_argument("--out", help="folder for diagnosis-study.md and figures/; without it a summary is printed")
+    report.add_argument("outcomes", nargs="+", help="files of outcomes; what a later one has again replaces an earlier")
+    report.add_argument(
+        "--out",
+        help="folder for diagnosis-study.md, figures/ and the outcomes (diagnosis-study.jsonl.xz); "
+        "without it a summary is printed",
+    )
     report.set_defaults(work=_report)
     options = parser.parse_args(arguments)
     try:

@@ -15,6 +15,7 @@ from scipy.stats import beta
 from gfimu.atomic_file import write_text
 from gfimu.errors import InputError
 from sim.study.figures import draw_confusion, draw_detection, draw_reliability
+from sim.study.runner import keep_outcomes
 
 __all__ = ["Tally", "rate_with_interval", "score", "summarise", "visible", "write_report"]
 
@@ -422,10 +423,12 @@ def write_report(outcomes: Sequence[Outcome], folder: str | Path) -> list[Path]:
         "Hidden worlds are drawn from fixed seeds; noise levels are not told to the tool. A size is "
         "d′ = √Σ(Δ/σ)² over all channels and the tachometer with the drive known. Made by\n\n"
         "```\npython -m sim.study run STUDY ... --out outcomes.jsonl\n"
-        "python -m sim.study report outcomes.jsonl --out docs\n```\n\n"
+        "python -m sim.study report docs/diagnosis-study.jsonl.xz outcomes.jsonl --out docs\n```\n\n"
+        "Every outcome is in `diagnosis-study.jsonl.xz`; what is run again replaces what was there.\n\n"
         f"{_REMARKS}\n{remarks}\n{_END_OF_REMARKS}\n\n"
         + summarise(outcomes)
         + "".join(f"## {title}\n\n![{name}](figures/{path.name})\n\n" for name, title, path in figures)
     )
     write_text(place / "diagnosis-study.md", text.rstrip("\n") + "\n")
-    return [place / "diagnosis-study.md", *(path for _, _, path in figures)]
+    kept = keep_outcomes(outcomes, place / "diagnosis-study.jsonl.xz")
+    return [place / "diagnosis-study.md", kept, *(path for _, _, path in figures)]

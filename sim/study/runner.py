@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
+import lzma
 import multiprocessing
 import os
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
 from functools import partial
@@ -17,14 +18,16 @@ from typing import Any
 
 import numpy as np
 
+from gfimu.atomic_file import atomic_path
 from gfimu.errors import InputError
 from sim.study.baselines import run_baseline
 from sim.study.cases import Case
 from sim.study.outcome import run_case
 
-__all__ = ["open_executor", "read_outcomes", "run_study"]
+__all__ = ["keep_outcomes", "open_executor", "read_outcomes", "run_study"]
 
 _WATCH_PERIOD = 2.0
+_PACKED = ".xz"
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
@@ -79,17 +82,40 @@ def _end_with_parent(parent: int) -> None:
 
 
 def read_outcomes(path: str | Path) -> list[dict[str, Any]]:
-    """Read the outcomes of a study; a last line cut off by an interruption is left out."""
+    """Read the outcomes of a study, packed (``.xz``) or not; a last line cut off by an interruption is left out."""
     file = Path(path)
     if not file.exists():
         return []
+    try:
+        packed = file.suffix == _PACKED
+        text = lzma.decompress(file.read_bytes()).decode() if packed else file.read_text(encoding="utf-8")
+    except (lzma.LZMAError, UnicodeDecodeError):
+        raise InputError(f"{file}: not a file of outcomes; give one that `python -m sim.study run` wrote") from None
     outcomes = []
-    for line in file.read_text(encoding="utf-8").splitlines():
+    for line in text.splitlines():
         try:
             outcomes.append(json.loads(line))
         except json.JSONDecodeError:
             continue
     return outcomes
+
+
+def keep_outcomes(outcomes: Sequence[Mapping[str, Any]], path: str | Path) -> Path:
+    """Write outcomes packed (``.xz``), numbers to six digits, to make the tables again from; return the path."""
+    lines = [json.dumps(_rounded(outcome)) + "\n" for outcome in outcomes]
+    file = Path(path)
+    file.parent.mkdir(parents=True, exist_ok=True)
+    with atomic_path(file) as temporary:
+        temporary.write_bytes(lzma.compress("".join(lines).encode(), preset=9))
+    return file
+
+
+def _rounded(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _rounded(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_rounded(item) for item in value]
+    return float(f"{value:.6g}") if isinstance(value, float) else value
 
 
 def run_study(

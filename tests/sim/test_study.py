@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import json
+
 import pytest
 
 from gfimu.errors import InputError
+from sim.study.__main__ import main
 from sim.study.cases import Case
 from sim.study.outcome import draw_world
 from sim.study.report import rate_with_interval, reliability, score, summarise, write_report
+from sim.study.runner import read_outcomes
 
 
 def outcome(effects=(), causes=(), verdict="nothing_found", **more):
@@ -102,3 +106,39 @@ def test_the_report_keeps_what_was_written_by_hand(tmp_path):
     with pytest.raises(InputError, match="remarks"):
         write_report(outcomes, tmp_path)
     assert remark in page.read_text()
+
+
+def test_the_tables_can_be_made_again_from_what_is_kept_beside_them(tmp_path):
+    outcomes = [
+        outcome(["bias"], [("bias", 1.0 / 3.0, ())], "explained", drive_unknown=None, z=[1.0 / 3.0]),
+        outcome(["noise"], key="singles/2"),
+    ]
+    page, kept = write_report(outcomes, tmp_path / "first")[:2]
+    again = tmp_path / "new.jsonl"
+    again.write_text(json.dumps(outcome(["noise"], [("noise", 0.9, ())], "explained", key="singles/2")) + "\n")
+    assert main(["report", str(kept), "--out", str(tmp_path / "second")]) == 0
+    assert (tmp_path / "second" / page.name).read_text() == page.read_text()
+    assert main(["report", str(kept), str(again), "--out", str(tmp_path / "third")]) == 0
+    assert [one["verdict"] for one in read_outcomes(tmp_path / "third" / kept.name)] == ["explained", "explained"]
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("outcomes.jsonl.xz", b""),
+        ("outcomes.jsonl.xz", b"\xfd7zXZ\x00 cut off"),
+        ("outcomes.jsonl.xz", b"no archive"),
+        ("outcomes.jsonl", b""),
+        ("outcomes.jsonl", b"\xff\xfe"),
+        ("outcomes.jsonl", None),
+    ],
+)
+def test_a_file_without_outcomes_is_one_clear_line(tmp_path, name, content, capsys):
+    file = tmp_path / name
+    if content is not None:
+        file.write_bytes(content)
+    assert main(["report", str(file), "--out", str(tmp_path / "page")]) == 2
+    told = capsys.readouterr().err
+    assert told.count("\n") == 1
+    assert str(file) in told
+    assert not (tmp_path / "page").exists()
