@@ -195,6 +195,9 @@ class DriveJacobian:
     ) -> NDArray[np.float64]:
         """Return rows whose Gram matrix is Σ_ck w_c share_kc (J_cᵀC)_k (J_cᵀC)_kᵀ, shape (R·K, m).
 
+        Those of a cosine are orthogonal, so that as few as possible are large: channels that are sampled hardly apart
+        see nearly the same.
+
         Parameters
         ----------
         slow : ndarray, shape (R, m, K)
@@ -209,6 +212,9 @@ class DriveJacobian:
         there = power.max(axis=0) > _LEAST_SHARE  # the reference has no slow noise
         power, vectors = power[:, there], vectors[:, :, there]
         roots = vectors * np.sqrt(np.maximum(power, 0.0))[:, None, :]  # S_k = roots rootsᵀ
+        parts = slow.transpose(2, 0, 1)  # (K, R, m)
+        turned = np.linalg.eigh(roots.transpose(0, 2, 1) @ (parts @ parts.transpose(0, 2, 1)) @ roots)[1]
+        roots = roots @ turned
         rows = np.einsum("krq,rmk->qkm", roots, slow, optimize=True)
         return np.asarray(rows.reshape(-1, slow.shape[1]))
 

@@ -11,8 +11,8 @@ so that with V = L⁻¹U and I − VᵀV = MMᵀ (Woodbury)
 W has k rows more than H, but any root serves: only inner products of columns that went through it are ever used. A
 calibration residue with few sizes is bordered on, as one more step of the elimination.
 
-Where readings hold what the drive did long before (a play), the bands are as wide as the matrix; then H is factored
-whole and k is 0.
+Where that is cheaper H is factored whole and k is 0: where readings hold what the drive did long before (a play), so
+that the bands are as wide as the matrix, and where slow noise comes through in more ways than the drive has numbers.
 """
 
 from __future__ import annotations
@@ -24,14 +24,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lapack, solve_triangular
 from scipy.linalg.blas import dsyrk
-from scipy.sparse import csr_array
+from scipy.sparse import csr_array, diags_array
 
+from gfimu.diagnosis.cholesky import BandFactor, BlockFactor, Factor, WholeFactor
 from gfimu.diagnosis.parallel import wide_algebra
 
 __all__ = ["InverseRoot", "banded"]
 
 _RIDGE = 1e-10
-_WIDE_BANDS = 0.05  # of the matrix, from which it is factored whole
+_WIDE_BANDS = 50  # from which blocks of a dense matrix are faster
 _UNFELT = 1e-9  # of the largest row
 _WIDE = 400  # rows from which several processors are faster than one
 _Border = tuple[NDArray[np.float64], NDArray[np.float64]]
@@ -53,8 +54,8 @@ class InverseRoot:
 
     Parameters
     ----------
-    band : ndarray, shape (b + 1, m) or (m, m)
-        L in lower bands, or whole.
+    factor : Factor
+        L.
     low : ndarray, shape (m, k)
         V.
     inner : ndarray, shape (k, k)
@@ -65,12 +66,11 @@ class InverseRoot:
         Lower Cholesky factor of the residue's information, the drive eliminated.
     """
 
-    band: NDArray[np.float64]
+    factor: Factor
     low: NDArray[np.float64]
     inner: NDArray[np.float64]
     border: NDArray[np.float64]
     corner: NDArray[np.float64]
-    whole: bool = False
 
     @classmethod
     def of(
@@ -81,7 +81,7 @@ class InverseRoot:
         Parameters
         ----------
         matrix : csr_array or ndarray, shape (m, m)
-            B; of a dense one the lower triangle, which is overwritten.
+            B; of a dense one the lower triangle, which may be overwritten.
         rows : ndarray, shape (k, m)
             Uᵀ.
         residue : tuple of ndarray, optional
@@ -92,33 +92,36 @@ class InverseRoot:
         numpy.linalg.LinAlgError
             If H is not positive definite, even with a ridge of 1e-10.
         """
-        size = matrix.shape[0]
-        if isinstance(matrix, csr_array):
-            entries = matrix.tocoo()
-            whole = bool(np.max(entries.row - entries.col, initial=0) > _WIDE_BANDS * size)
-            form = matrix.toarray(order="F") if whole else banded(matrix)
-        else:
-            whole, form = True, matrix
-        factor = _factored_whole if whole else _factored
-        factored = factor(form, rows)
+        size = np.einsum("km,km->k", rows, rows)
+        felt = rows[size > _UNFELT * size.max(initial=0.0)]  # many channels hardly see the drive
+        factored = _factored(matrix, felt)
         if factored is None:  # a stretch of the drive that only its prior holds, and hardly
-            form[np.diag_indices(size) if whole else 0] *= 1.0 + _RIDGE
-            factored = factor(form, rows)
+            diagonal = matrix.diagonal()
+            if isinstance(matrix, csr_array):
+                matrix = csr_array(matrix + diags_array(_RIDGE * diagonal))
+            else:
+                matrix[np.diag_indices(len(matrix))] = (1.0 + _RIDGE) * diagonal
+            factored = _factored(matrix, felt)
         if factored is None:
             raise np.linalg.LinAlgError("the normal equations of the drive are not positive definite")
-        drive = cls(*factored, np.zeros((size + len(factored[2]), 0)), np.zeros((0, 0)), whole)
+        drive = cls(*factored, np.zeros((sum(factored[1].shape), 0)), np.zeros((0, 0)))
         if residue is None:
             return drive
         information, coupling = residue
         border = drive.apply(coupling)
         corner = np.linalg.cholesky(information - border.T @ border)
-        return cls(*factored, border, np.asarray(corner, dtype=np.float64), whole)
+        return cls(*factored, border, np.asarray(corner, dtype=np.float64))
+
+    @property
+    def whole(self) -> bool:
+        """Whether H was factored whole."""
+        return isinstance(self.factor, WholeFactor)
 
     def apply(self, columns: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return W x of columns (m + q, P) or one (m + q,)."""
         size = len(self.low)
         flat = columns if columns.ndim == 2 else columns[:, None]
-        drive = self._solved(flat[:size])
+        drive = self.factor.solve(flat[:size])
         parts = [drive, self._inside(self.low.T @ drive)]
         if len(self.corner):
             inside = flat[size:] - self.border.T @ np.concatenate(parts)
@@ -137,22 +140,14 @@ class InverseRoot:
         middle = upper[size:]
         if middle.size:
             middle = solve_triangular(self.inner, middle, lower=True, trans=1, check_finite=False)
-        both = np.concatenate([self._solved(upper[:size] + self.low @ middle, trans="T"), last])
+        drive = self.factor.solve(upper[:size] + self.low @ middle, transposed=True)
+        both = np.concatenate([drive, last])
         return both if columns.ndim == 2 else both[:, 0]
 
     def log_volume(self) -> float:
         """Return −½ log det H, the residue's part included."""
-        diagonals = (
-            self.band.diagonal() if self.whole else self.band[0],
-            self.inner.diagonal(),
-            self.corner.diagonal(),
-        )
+        diagonals = (self.factor.diagonal(), self.inner.diagonal(), self.corner.diagonal())
         return -float(sum(np.log(one).sum() for one in diagonals))
-
-    def _solved(self, right: NDArray[np.float64], trans: str = "N") -> NDArray[np.float64]:
-        if self.whole:
-            return np.asarray(solve_triangular(self.band, right, lower=True, trans=trans, check_finite=False))
-        return _solved(self.band, right, trans)
 
     def _inside(self, right: NDArray[np.float64]) -> NDArray[np.float64]:
         if not right.size:
@@ -160,36 +155,51 @@ class InverseRoot:
         return np.asarray(solve_triangular(self.inner, right, lower=True, check_finite=False))
 
 
-def _solved(band: NDArray[np.float64], right: NDArray[np.float64], trans: str = "N") -> NDArray[np.float64]:
-    """Return L⁻¹ or, with ``trans`` T, L⁻ᵀ of columns (m, P)."""
-    if not right.size:  # SciPy's wrapper of dtbtrs writes beyond an empty array
-        return right.copy()
-    return np.asarray(lapack.dtbtrs(band, np.asfortranarray(right), uplo="L", trans=trans)[0])
-
-
-def _factored_whole(
-    matrix: NDArray[np.float64], rows: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]] | None:
-    """Return L with LLᵀ = H whole, and V and M of no rows; None if there is none."""
-    size = np.einsum("km,km->k", rows, rows)
-    felt = rows[size > _UNFELT * size.max(initial=0.0)]  # many channels hardly see the drive
-    with wide_algebra():
-        left = dsyrk(-1.0, felt, trans=1, beta=1.0, c=matrix, lower=1) if len(felt) else matrix
-        root, failed = lapack.dpotrf(left, lower=1, clean=1)
-    return None if failed else (root, np.zeros((len(root), 0)), np.zeros((0, 0)))
-
-
 def _factored(
-    bands: NDArray[np.float64], rows: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]] | None:
-    """Return L in bands, V and M; None if there are none."""
-    band, failed = lapack.dpbtrf(bands, lower=1)
-    if failed:
-        return None
-    low = _solved(band, rows.T)
-    if not len(rows):
-        return band, low, np.zeros((0, 0))
-    with wide_algebra() if len(rows) >= _WIDE else nullcontext():
-        left = dsyrk(-1.0, low, trans=1, beta=1.0, c=np.eye(len(rows), order="F"), lower=1, overwrite_c=1)
+    matrix: csr_array | NDArray[np.float64], rows: NDArray[np.float64]
+) -> tuple[Factor, NDArray[np.float64], NDArray[np.float64]] | None:
+    """Return L, V and M, the latter without rows where H was factored whole; None if there are none."""
+    size, count, bandwidth = matrix.shape[0], len(rows), _bandwidth(matrix)
+    factor: Factor | None
+    with wide_algebra() if count >= _WIDE or bandwidth >= _WIDE_BANDS else nullcontext():
+        if _cost_whole(size, count) < _cost_apart(size, count, bandwidth):
+            whole = _dense(matrix)
+            if count:
+                whole = dsyrk(-1.0, rows, trans=1, beta=1.0, c=whole, lower=1)
+            factor = WholeFactor.of(whole)
+            return None if factor is None else (factor, np.zeros((size, 0)), np.zeros((0, 0)))
+        if isinstance(matrix, csr_array) and bandwidth < _WIDE_BANDS:
+            factor = BandFactor.of(banded(matrix))
+        else:
+            factor = BlockFactor.of(_dense(matrix), bandwidth)
+        if factor is None:
+            return None
+        low = factor.solve(rows.T)
+        if not count:
+            return factor, low, np.zeros((0, 0))
+        left = dsyrk(-1.0, low, trans=1, beta=1.0, c=np.eye(count, order="F"), lower=1, overwrite_c=1)
         inner, failed = lapack.dpotrf(left, lower=1, clean=1, overwrite_a=1)
-    return None if failed else (band, low, inner)
+        return None if failed else (factor, low, inner)
+
+
+def _cost_whole(size: int, count: int) -> float:
+    """Return the multiplications that a whole factor takes."""
+    return size**3 / 3.0 + size**2 * count
+
+
+def _cost_apart(size: int, count: int, bandwidth: int) -> float:
+    """Return the multiplications that a factor in bands takes, and slow noise with it."""
+    return 2.0 * size * bandwidth * (bandwidth + 2.0 * count) + size * count**2 + count**3 / 3.0
+
+
+def _bandwidth(matrix: csr_array | NDArray[np.float64]) -> int:
+    """Return how far below the diagonal the entries reach."""
+    if isinstance(matrix, csr_array):
+        entries = matrix.tocoo()
+        return int(np.max(entries.row - entries.col, initial=0))
+    last = len(matrix) - 1 - (matrix != 0)[::-1].argmax(axis=0)
+    return int(np.max(last - np.arange(len(matrix)), initial=0))
+
+
+def _dense(matrix: csr_array | NDArray[np.float64]) -> NDArray[np.float64]:
+    return matrix.toarray(order="F") if isinstance(matrix, csr_array) else matrix

@@ -21,14 +21,13 @@ from gfimu.diagnosis.model import Effect, WorldModel
 from gfimu.diagnosis.nuisances import STEADY_NOISE, learn_noise, sharpen_drives, tune_drives, uncut_drives, widen_drives
 from gfimu.diagnosis.parallel import each_apart, over_segments
 from gfimu.diagnosis.pruning import RIVALS, near_rivals, prune
-from gfimu.diagnosis.refinement import Fit, Start, refine, refine_each, segments_at
+from gfimu.diagnosis.refinement import FAIR_FIT, Fit, Start, refine, refine_each, segments_at
 from gfimu.diagnosis.run import Run, difference_noise
 from gfimu.diagnosis.search import search
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.signatures import SignatureSet, hypotheses, plan_signatures, signature_columns
 
 __all__ = [
-    "FAIR_FIT",
     "Explanation",
     "Report",
     "explain",
@@ -47,8 +46,6 @@ _MOST_CAUSES = 4
 _CLOSE = 12.0
 _GROSS = 150.0
 _WORTH_REFINING = -6.0
-FAIR_FIT = 1.6
-"""Misfit per observation, in variances, above which something large is still missing."""
 _ITERATIONS = 7
 _FEWEST_ROUNDS = 2  # before a search that explains more than it leaves may be given up
 _SURELY_WRONG = 1.02  # misfit per observation
@@ -57,6 +54,7 @@ _SHARE_AT_END = 0.02  # no cause is believed then (`conclusion.is_dominant`)
 _STALLED, _WORTH_FINDING = 0.1, 100.0  # share of what is left that a round may bring to be the last; nats, at least
 _MOST_RUNG = 4.0  # misfit per observation of a right mode whose ringing the drive does not know; 2.2 was seen
 _FAINT = 500.0  # log odds of a mode whose frequency may not be settled
+_PLAIN = 20.0  # standard deviations; modes at a false frequency had 4 to 8
 
 
 @dataclass(frozen=True)
@@ -355,14 +353,22 @@ class _Search:
         segments, fixed = self._segments, self._fixed
         for segment in segments:
             segment.ringing, segment.knots_chosen = True, False
-        here = refine(segments, self._best.causes, fixed, drives=self._best.drives, iterations=_ITERATIONS)
-        fit = sharpen_drives(segments, every_mode(segments, here, fixed, misfit=True), fixed)
+        fit = refine(segments, self._best.causes, fixed, drives=self._best.drives, iterations=2 * _ITERATIONS)
+        if not self._is_plain(fit):
+            fit = every_mode(segments, fit, fixed, misfit=True)
+        fit = sharpen_drives(segments, fit, fixed)
         learn_noise(segments, fit, fixed, slow=self._is_fair(fit))
         tune_drives(segments, fit, fixed)
         self._best = refine(segments, fit.causes, fixed, drives=fit.drives, iterations=6)
         self._fitted = refine(segments, self._start, fixed, drives=self._best.drives, iterations=8)
         self._tried, self._behind = {}, {}
         self._ahead, self._settled, self.given_up = None, False, False
+
+    def _is_plain(self, fit: Fit) -> bool:
+        """Tell whether a fit whose drives know how its mode rings on leaves no doubt of the mode's frequency."""
+        mode = next(cause for cause in fit.causes if cause.name == "resonance")
+        sure = bool(np.all(mode.coordinates > _PLAIN * np.sqrt(mode.covariance.diagonal())))
+        return sure and fit.objective < _SURELY_WRONG * self._observations and self._left(fit) < LEFT_OVER_ODDS
 
     def _explained(self) -> float:
         """Return how much the best set takes off the misfit of the start, under the noise that it leaves."""

@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 from gfimu.diagnosis.adequacy import left_over
 from gfimu.diagnosis.calibration_residue import CalibrationResidue, tolerance_of
 from gfimu.diagnosis.causes import Cause, Signature, effects_of_run
-from gfimu.diagnosis.engine import FAIR_FIT, Explanation
+from gfimu.diagnosis.engine import Explanation
 from gfimu.diagnosis.holdout import Holdout
 from gfimu.diagnosis.long_run import explain_any_length
 from gfimu.diagnosis.model import Effect, EffectFamily, WorldModel
 from gfimu.diagnosis.prepared_runs import PreparedRuns
 from gfimu.diagnosis.pruning import prune
-from gfimu.diagnosis.refinement import Fit, refine
+from gfimu.diagnosis.refinement import FAIR_FIT, Fit, refine
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.signatures import signature_columns
 from gfimu.diagnosis.stochastic import LARGEST_USUAL_FLICKER, log_probability
@@ -30,6 +30,7 @@ __all__ = ["LooseCalibration", "loosen", "relearned"]
 
 _USUAL, _LARGE = 1.0, 3.0  # of the tolerances
 _MUCH = 500.0
+_PLAIN = 25.0  # standard deviations: some 300 nats, and a cause is kept from 4 to 15
 # That everything is a little off is what anybody expects; that all is three times as much, hardly.
 _LEAST_ODDS = {_USUAL: 3.0, _LARGE: 7.0}
 
@@ -154,11 +155,18 @@ def _trial(plain: Explanation, causes: Sequence[Cause], tolerance: dict[str, flo
         fit = refine(segments, causes, fixed, drives=plain.fit.drives)
         if fit.objective > FAIR_FIT * sum(int(segment.weight_mask.sum()) for segment in segments):
             return -np.inf, fit
-        fit = prune(segments, fit, fixed)[0]
+        if not all(_is_beyond_residue(cause) for cause in fit.causes):
+            fit = prune(segments, fit, fixed)[0]
         return log_probability(segments, fit), fit
     finally:
         for segment, drive in zip(segments, plain.fit.drives, strict=True):
             segment.calibration_residue, segment.coefficients = None, drive
+
+
+def _is_beyond_residue(cause: Cause) -> bool:
+    """Tell whether a cause is so plain beside a residue that it need not be tried without it."""
+    power = float(cause.coordinates @ np.linalg.pinv(cause.covariance) @ cause.coordinates)
+    return power > _PLAIN**2
 
 
 def _families(model: WorldModel, tolerance: dict[str, float]) -> list[tuple[EffectFamily, NDArray[np.float64]]]:

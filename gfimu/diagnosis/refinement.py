@@ -22,7 +22,7 @@ from gfimu.diagnosis.search import EXTRA_CAUSE
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.signatures import ANGLES, cause_columns, shape_moved
 
-__all__ = ["Fit", "Start", "refine", "refine_each", "segments_at", "without"]
+__all__ = ["FAIR_FIT", "Fit", "Start", "refine", "refine_each", "segments_at", "without"]
 
 _SHAPE_LIMIT = 0.3
 _SHAPE_PRIOR = 0.7
@@ -32,6 +32,8 @@ _UPHILL = 0.5
 _STALLED = 0.5
 _SHARES = (1.0, 0.3, 0.08)
 _SMALLEST_POSITIVE = 1e-6
+FAIR_FIT = 1.6
+"""Misfit per observation, in variances, above which something large is still missing."""
 
 
 @dataclass(frozen=True)
@@ -164,7 +166,7 @@ def refine(
             start = min(start, second, key=partial(_energy, segments, fixed))
         if not shapes:
             start = replace(start, causes=tuple(replace(cause, frozen=True) for cause in start.causes))
-        if iterations and _is_held(segments, fixed, start):
+        if iterations and _is_held(segments, fixed, start) and _is_far(segments, fixed, start):
             # Far off, what a play holds is of the wrong instants: as if it held nothing comes nearer, and is cheaper.
             for segment in segments:
                 segment.holding = False
@@ -283,6 +285,12 @@ def _is_held(segments: Sequence[Segment], fixed: Sequence[Sequence[Effect]], sta
         segment.felt_play([*known, *effects_of_run(state.causes, array, segment.index)]) is not None
         for segment, known in zip(segments, fixed, strict=True)
     )
+
+
+def _is_far(segments: Sequence[Segment], fixed: Sequence[Sequence[Effect]], state: _State) -> bool:
+    """Tell whether a state leaves more than noise."""
+    observations = sum(int(segment.weight_mask.sum()) for segment in segments)
+    return _energy(segments, fixed, state) > FAIR_FIT * observations
 
 
 def _descend(segments: Sequence[Segment], fixed: Sequence[Sequence[Effect]], start: _State, iterations: int) -> _Point:

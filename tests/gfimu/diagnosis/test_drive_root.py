@@ -1,4 +1,4 @@
-"""The root, in bands and whole, against dense linear algebra."""
+"""The root, in bands, in blocks and whole, against dense linear algebra."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.sparse import csr_array, diags_array
 
+from gfimu.diagnosis.cholesky import BandFactor, BlockFactor, WholeFactor
 from gfimu.diagnosis.drive_root import InverseRoot, banded
 
-SIZE, NARROW, WIDE, ROWS, RESIDUE = 60, 4, 20, 7, 3
+SIZE, NARROW, MEDIUM, WIDE, ROWS, MANY_ROWS, RESIDUE = 300, 4, 60, 200, 7, 600, 3
 
 
 @pytest.fixture(
@@ -18,6 +19,9 @@ SIZE, NARROW, WIDE, ROWS, RESIDUE = 60, 4, 20, 7, 3
         (NARROW, ROWS, 0),
         (NARROW, 0, RESIDUE),
         (NARROW, 0, 0),
+        (NARROW, MANY_ROWS, RESIDUE),
+        (MEDIUM, ROWS, RESIDUE),
+        (MEDIUM, 0, 0),
         (WIDE, ROWS, RESIDUE),
         (WIDE, ROWS, 0),
         (WIDE, 0, 0),
@@ -30,7 +34,7 @@ def problem(request):
     rng = np.random.default_rng(7)
     root = diags_array(list(rng.standard_normal((bands, SIZE))), offsets=range(bands), shape=(SIZE, SIZE))
     matrix = csr_array(root.T @ root + 5.0 * diags_array(np.ones(SIZE)))
-    rows = 0.15 * rng.standard_normal((rows_count, SIZE))
+    rows = 0.04 * rng.standard_normal((rows_count, SIZE))
     coupling = rng.standard_normal((SIZE, residue_count))
     information = 60.0 * np.eye(residue_count)
     dense = np.block([[matrix.toarray() - rows.T @ rows, coupling], [coupling.T, information]])
@@ -56,9 +60,19 @@ def test_its_volume_is_that_of_the_determinant(problem):
     assert_allclose(InverseRoot.of(matrix, rows, border).log_volume(), -0.5 * np.linalg.slogdet(dense)[1], rtol=1e-12)
 
 
-def test_wide_bands_are_factored_whole(problem):
+def test_a_dense_matrix_is_read_from_its_lower_triangle(problem):
     matrix, rows, border, _ = problem
-    assert InverseRoot.of(matrix, rows, border).whole == (len(banded(matrix)) == WIDE)
+    dense = np.asfortranarray(np.tril(matrix.toarray()))
+    volume = InverseRoot.of(matrix, rows, border).log_volume()
+    assert_allclose(InverseRoot.of(dense, rows, border).log_volume(), volume, rtol=1e-12)
+
+
+def test_the_cheapest_form_is_taken(problem):
+    matrix, rows, border, _ = problem
+    form = {NARROW: BandFactor, MEDIUM: BlockFactor, WIDE: WholeFactor}[len(banded(matrix))]
+    if len(rows) == MANY_ROWS:  # more than the drive has numbers
+        form = WholeFactor
+    assert isinstance(InverseRoot.of(matrix, rows, border).factor, form)
 
 
 @pytest.mark.parametrize("coupled", [1, SIZE - 1])
