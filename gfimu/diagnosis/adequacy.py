@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 
 from gfimu.diagnosis.causes import Cause, effects_of_run
 from gfimu.diagnosis.evidence import log_evidence, log_evidence_each
+from gfimu.diagnosis.fit import Fit
 from gfimu.diagnosis.generic_basis import FUNCTIONS, Motion
 from gfimu.diagnosis.linearisation import Linearisation
 from gfimu.diagnosis.model import BasisUnits, Effect, SpinState
 from gfimu.diagnosis.parallel import each_apart, over_segments
-from gfimu.diagnosis.refinement import Fit
 from gfimu.diagnosis.residual_tests import (
     REFERENCE,
     LeftOver,

@@ -11,7 +11,8 @@ from scipy.special import expit
 from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.adequacy import LEFT_OVER_ODDS
 from gfimu.diagnosis.causes import Cause, effects_of_run
-from gfimu.diagnosis.engine import Explanation
+from gfimu.diagnosis.explanation import Explanation
+from gfimu.diagnosis.fit import Fit
 from gfimu.diagnosis.loose_calibration import LooseCalibration
 from gfimu.diagnosis.model import Effect, WorldModel
 from gfimu.diagnosis.named_causes import contested, fault_causes, name_cause
@@ -25,7 +26,6 @@ from gfimu.diagnosis.naming import (
     rival_list,
 )
 from gfimu.diagnosis.prepared_runs import PreparedRuns
-from gfimu.diagnosis.refinement import Fit
 from gfimu.diagnosis.residual_tests import LeftOver
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.signatures import ANGLES

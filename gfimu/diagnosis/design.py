@@ -19,11 +19,11 @@ from gfimu.diagnosis.distinguishability import (
     normal_equations,
     plan_contenders,
 )
-from gfimu.diagnosis.engine import make_segments
 from gfimu.diagnosis.model import Effect, WorldModel
 from gfimu.diagnosis.profile_search import Limits, improve, plain_profile, profile_of, starting_points
 from gfimu.diagnosis.proposal import SEPARATED, Proposal, in_words, scenario_of
 from gfimu.diagnosis.run import MINIMUM_DURATION, Run
+from gfimu.diagnosis.stretches import make_segments
 from gfimu.diagnosis.table_profile import TableProfile
 from gfimu.errors import InputError
 

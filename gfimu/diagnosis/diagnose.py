@@ -10,7 +10,7 @@ import numpy as np
 from gfimu.diagnosis.adequacy import LEFT_OVER_ODDS, left_over
 from gfimu.diagnosis.causes import effects_of_run
 from gfimu.diagnosis.conclusion import conclude, is_dominant, is_unknown
-from gfimu.diagnosis.engine import Explanation
+from gfimu.diagnosis.explanation import Explanation
 from gfimu.diagnosis.free_body.diagnose import diagnose_body
 from gfimu.diagnosis.holdout import Holdout, gate_gains, held_out_gain, split_segments
 from gfimu.diagnosis.long_run import explain_any_length

@@ -3,43 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import partial
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.integrate import cumulative_trapezoid
 
 from gfimu.diagnosis.adequacy import LEFT_OVER_ODDS, left_over
-from gfimu.diagnosis.causes import Cause, effects_of_run
-from gfimu.diagnosis.drive import smooth_rate
+from gfimu.diagnosis.causes import Cause
+from gfimu.diagnosis.explanation import Explanation
 from gfimu.diagnosis.far_starts import every_mode, from_far, with_honest_mode
-from gfimu.diagnosis.linearisation import Linearisation
-from gfimu.diagnosis.model import Effect, WorldModel
+from gfimu.diagnosis.fit import Fit, Start, segments_at
+from gfimu.diagnosis.model import Effect
 from gfimu.diagnosis.nuisances import STEADY_NOISE, learn_noise, sharpen_drives, tune_drives, uncut_drives, widen_drives
 from gfimu.diagnosis.parallel import each_apart, over_segments
 from gfimu.diagnosis.pruning import RIVALS, near_rivals, prune
-from gfimu.diagnosis.refinement import FAIR_FIT, Fit, Start, refine, refine_each, segments_at
-from gfimu.diagnosis.run import Run, difference_noise
+from gfimu.diagnosis.refinement import FAIR_FIT, refine, refine_each
+from gfimu.diagnosis.screening import screen
 from gfimu.diagnosis.search import search
 from gfimu.diagnosis.segment import Segment
-from gfimu.diagnosis.signatures import SignatureSet, hypotheses, plan_signatures, signature_columns
+from gfimu.diagnosis.signatures import SignatureSet
 
-__all__ = [
-    "Explanation",
-    "Report",
-    "explain",
-    "make_segments",
-    "screen",
-]
+__all__ = ["Instead", "Report", "explain"]
 
 Report = Callable[[float, str], None]
 Instead = Callable[[Sequence[Segment], Fit, Sequence[Sequence[Effect]]], bool]
 
-SEGMENT_DURATION = 64.0
-_LOST_ANGLE_STD = 3.0  # rad
 _ROUNDS = 6
 _REFINED = 6
 _MOST_CAUSES = 4
@@ -57,112 +45,8 @@ _FAINT = 500.0  # log odds of a mode whose frequency may not be settled
 _PLAIN = 20.0  # standard deviations; modes at a false frequency had 4 to 8
 
 
-@dataclass(frozen=True)
-class Explanation:
-    """What the search ended with.
-
-    Parameters
-    ----------
-    fit : Fit
-        The best set of causes.
-    rivals : tuple of Fit
-        Every other refined set, best first, under the same noise.
-    nothing : Fit
-        No cause at all, under the same noise.
-    without : dict of str to Fit
-        The best fit without each cause.
-    segments : tuple of Segment
-        The data with their drives at the best set.
-    fixed : tuple of tuple of Effect
-        Effects of each segment's run found beforehand (integrity).
-    signatures : SignatureSet
-        The last screening, about the best set.
-    given_up : bool
-        Whether so much is left that the set was neither pruned nor compared with others.
-    beside_residue : Fit, optional
-        What would be named if all numbers of the calibration were a little off, where that is about as probable.
-    interrupted : bool
-        Whether the search was left for something better that it does not look for.
-    """
-
-    fit: Fit
-    rivals: tuple[Fit, ...]
-    nothing: Fit
-    without: dict[str, Fit]
-    segments: tuple[Segment, ...]
-    fixed: tuple[tuple[Effect, ...], ...]
-    signatures: SignatureSet
-    given_up: bool = False
-    beside_residue: Fit | None = None
-    interrupted: bool = False
-
-
 def _posterior(fit: Fit) -> float:
     return fit.log_posterior
-
-
-def make_segments(model: WorldModel, runs: Sequence[Run]) -> list[Segment]:
-    """Cut runs into stretches that are short enough for one drive, and where the reference was lost."""
-    segments = []
-    for index, run in enumerate(runs):
-        rate = smooth_rate(run, is_angle=model.drive_source == "angle")
-        turned = cumulative_trapezoid(rate, run.t, initial=0.0)
-        noise = difference_noise(run.reference[run.reference_valid])
-        stretches = []
-        for first, end in pairwise([0, *run.resumed, len(run.t)]):
-            pieces = max(1, round((end - first) * run.sample_period / SEGMENT_DURATION))
-            edges = np.linspace(first, end, pieces + 1).astype(int).tolist()
-            stretches += [(start, stop, first > 0) for start, stop in pairwise(edges)]
-        for start, stop, lost in stretches:
-            drift = noise * np.sqrt(run.sample_period * (run.t[start] - run.t[0]))
-            segments.append(
-                Segment(
-                    model,
-                    run.rows(start, stop),
-                    index,
-                    float(run.t[0]),
-                    start_angle=float(turned[start]),
-                    start_angle_std=_LOST_ANGLE_STD if lost else float(np.hypot(1e-4, 2.0 * drift)),
-                    stretches=len(stretches),
-                )
-            )
-    return segments
-
-
-def screen(segments: Sequence[Segment], base: Fit, fixed: Sequence[Sequence[Effect]], runs: int) -> SignatureSet:
-    """Compute all signatures about a base and their normal equations relative to no effects."""
-    model = segments[0].model
-    array = model.array
-    for segment, drive in zip(segments, base.drives, strict=True):
-        segment.coefficients = drive
-    linear = over_segments(
-        lambda segment, known: segment.linearise([*known, *effects_of_run(base.causes, array, segment.index)]),
-        segments,
-        fixed,
-    )
-    signatures, count = plan_signatures(model.families(), segments, linear, base.causes, runs)
-    gram, score = np.zeros((count, count)), np.zeros(count)
-
-    def products(
-        segment: Segment, line: Linearisation, known: Sequence[Effect]
-    ) -> tuple[NDArray[np.intp], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        columns, numbers = signature_columns(segment, signatures, base.causes, known)
-        part, part_score, eliminated = segment.whitened_products(line, columns)
-        response = np.zeros((segment.spline.size, count))
-        response[:, numbers] = line.drive.response(eliminated)
-        return numbers, part, part_score, response
-
-    responses = []
-    for numbers, part, part_score, response in over_segments(products, segments, linear, fixed):
-        gram[np.ix_(numbers, numbers)] += part
-        score[numbers] += part_score
-        responses.append(response)
-    at = np.zeros(count)
-    for cause in base.causes:
-        signature = next(one for one in signatures if one.family.name == cause.name)
-        at[signature.columns] = cause.mixing @ cause.coordinates
-    places = tuple(hypotheses(signatures, array, runs))
-    return SignatureSet(tuple(signatures), gram, score + gram @ at, places, at, tuple(responses))
 
 
 def explain(

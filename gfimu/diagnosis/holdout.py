@@ -17,8 +17,9 @@ from scipy.integrate import cumulative_trapezoid
 
 from gfimu.diagnosis.causes import Cause, effects_of_run
 from gfimu.diagnosis.drive import smooth_rate
+from gfimu.diagnosis.fit import Fit
 from gfimu.diagnosis.model import Effect
-from gfimu.diagnosis.refinement import Fit, refine, refine_each
+from gfimu.diagnosis.refinement import refine, refine_each
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.verdict import Gain
 

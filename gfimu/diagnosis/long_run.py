@@ -11,7 +11,8 @@ from dataclasses import replace
 import numpy as np
 
 from gfimu.diagnosis.causes import Cause
-from gfimu.diagnosis.engine import Explanation, Instead, Report, explain
+from gfimu.diagnosis.engine import Instead, Report, explain
+from gfimu.diagnosis.explanation import Explanation
 from gfimu.diagnosis.model import Effect
 from gfimu.diagnosis.nuisances import learn_noise, sharpen_drives, widen_drives
 from gfimu.diagnosis.pruning import RIVALS, prune

@@ -7,10 +7,10 @@ from dataclasses import replace
 
 from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.causes import Cause
-from gfimu.diagnosis.engine import Explanation
+from gfimu.diagnosis.explanation import Explanation
+from gfimu.diagnosis.fit import Fit
 from gfimu.diagnosis.model import Effect, EffectFamily
 from gfimu.diagnosis.naming import MOST_CERTAIN, cause_parameters, describe, mimics
-from gfimu.diagnosis.refinement import Fit
 from gfimu.diagnosis.verdict import NamedCause
 
 __all__ = ["contested", "fault_causes", "name_cause"]

@@ -12,8 +12,8 @@ from scipy.stats import chi2
 
 from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.causes import WHOLE_NUMBERS, Cause
-from gfimu.diagnosis.engine import Explanation
-from gfimu.diagnosis.refinement import Fit
+from gfimu.diagnosis.explanation import Explanation
+from gfimu.diagnosis.fit import Fit
 from gfimu.diagnosis.verdict import Rival
 
 __all__ = [

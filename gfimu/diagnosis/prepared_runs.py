@@ -8,13 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.diagnosis.engine import make_segments
 from gfimu.diagnosis.integrity import IntegrityReport, check_integrity
 from gfimu.diagnosis.model import Effect, WorldModel
 from gfimu.diagnosis.plausibility import refuse_implausible
 from gfimu.diagnosis.run import Run, prepare_run
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.spikes import reference_spikes
+from gfimu.diagnosis.stretches import make_segments
 from gfimu.recording import Recording
 
 __all__ = ["PreparedRuns"]

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from gfimu.diagnosis.fit import Fit, without
 from gfimu.diagnosis.model import Effect
-from gfimu.diagnosis.refinement import Fit, refine_each, without
+from gfimu.diagnosis.refinement import refine_each
 from gfimu.diagnosis.segment import Segment
 
 __all__ = ["LEAST_EXTRA_ODDS", "LEAST_ODDS", "RIVALS", "near_rivals", "prune"]

@@ -12,13 +12,14 @@ import numpy as np
 
 from gfimu.diagnosis.adequacy import left_over
 from gfimu.diagnosis.coloured_noise import NoiseLevels
-from gfimu.diagnosis.engine import Explanation
+from gfimu.diagnosis.explanation import Explanation
+from gfimu.diagnosis.fit import Fit, segments_at
 from gfimu.diagnosis.long_run import explain_any_length
 from gfimu.diagnosis.model import Effect, WorldModel
 from gfimu.diagnosis.nuisances import settle_noise
 from gfimu.diagnosis.prepared_runs import PreparedRuns
 from gfimu.diagnosis.pruning import LEAST_EXTRA_ODDS
-from gfimu.diagnosis.refinement import Fit, refine, segments_at
+from gfimu.diagnosis.refinement import refine
 from gfimu.diagnosis.segment import Segment, known_walk
 from gfimu.diagnosis.stochastic import UNEQUAL_WALK, WALK_ODDS, Walk, log_probability, walk_strength
 

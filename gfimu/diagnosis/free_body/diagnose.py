@@ -13,7 +13,8 @@ from scipy.spatial.transform import Rotation
 from gfimu.attitude import from_rotation, integrate_attitude, to_rotation
 from gfimu.diagnosis.adequacy import LEFT_OVER_ODDS
 from gfimu.diagnosis.causes import Cause, effects_of_run
-from gfimu.diagnosis.engine import Explanation
+from gfimu.diagnosis.explanation import Explanation
+from gfimu.diagnosis.fit import Fit
 from gfimu.diagnosis.free_body.engine import explain, without_cause
 from gfimu.diagnosis.free_body.holdout import (
     BodyHoldout,
@@ -30,7 +31,6 @@ from gfimu.diagnosis.integrity import check_integrity
 from gfimu.diagnosis.model import Effect, WorldModel
 from gfimu.diagnosis.named_causes import contested, fault_causes, name_cause
 from gfimu.diagnosis.naming import channel_share, conflicting, probabilities, rival_list
-from gfimu.diagnosis.refinement import Fit
 from gfimu.diagnosis.residual_tests import LeftOver
 from gfimu.diagnosis.verdict import Diagnosis, Gain, NamedCause, Residual, RunView, Unexplained
 from gfimu.diagnosis.wording import verdict_sentences

@@ -11,8 +11,8 @@ from numpy.testing import assert_allclose
 from gfimu.array import AccelerometerArray
 from gfimu.diagnosis import diagnose
 from gfimu.diagnosis.calibration_residue import TOLERANCE, CalibrationResidue
-from gfimu.diagnosis.engine import make_segments
 from gfimu.diagnosis.run import prepare_run
+from gfimu.diagnosis.stretches import make_segments
 from sim.campaign import Measurement, measure
 from sim.effects import make_effect
 from sim.study.cases import Case, study_cases

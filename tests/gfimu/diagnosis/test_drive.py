@@ -12,9 +12,9 @@ from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.diagnose import diagnose
 from gfimu.diagnosis.drive import AngleSpline
 from gfimu.diagnosis.drive_jacobian import DriveJacobian, lag_matrix
-from gfimu.diagnosis.engine import make_segments
 from gfimu.diagnosis.refinement import refine
 from gfimu.diagnosis.run import prepare_run
+from gfimu.diagnosis.stretches import make_segments
 from sim.campaign import Measurement, measure
 from sim.effects import make_effect
 from sim.motion import SpinState
@@ -97,6 +97,10 @@ def test_factored_derivative_is_the_plain_one(spline, lagged):
     rows = jacobian.slow_rows(jacobian.slow(cosines), share, weights)
     slow = np.einsum("cnm,nk->ckm", stacked, cosines)
     assert_allclose(rows.T @ rows, np.einsum("c,kc,cki,ckj->ij", weights, share, slow, slow), atol=1e-5)
+    each = rows.reshape(-1, 3, spline.size).transpose(1, 0, 2)  # (K, R, m)
+    power = np.linalg.norm(each, axis=2)
+    angles = each @ each.transpose(0, 2, 1) / np.maximum(power[:, :, None] * power[:, None, :], 1e-12)
+    assert_allclose(angles - np.eye(angles.shape[1]) * angles, 0.0, atol=1e-4)
     share[:, -1] = 0.0  # no slow noise in the reference: its rows are not there
     fewer = jacobian.slow_rows(jacobian.slow(cosines), share, weights)
     assert len(fewer) < len(rows)

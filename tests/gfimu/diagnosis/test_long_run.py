@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gfimu.array import AccelerometerArray
-from gfimu.diagnosis import diagnose, engine, long_run, surrogate
+from gfimu.diagnosis import diagnose, long_run, stretches, surrogate
 from gfimu.diagnosis.long_run import spread_over_runs
 from gfimu.recording import Recording
 from sim.campaign import Measurement, measure, random_profile
@@ -29,7 +29,7 @@ def test_stretches_are_spread_and_every_run_gives_one(runs, most, chosen):
 
 @pytest.fixture
 def short_stretches(monkeypatch):
-    monkeypatch.setattr(engine, "SEGMENT_DURATION", 10.0)
+    monkeypatch.setattr(stretches, "SEGMENT_DURATION", 10.0)
 
 
 def test_a_cause_found_in_part_is_measured_on_all(short_stretches, monkeypatch):

@@ -9,11 +9,13 @@ from numpy.testing import assert_allclose
 from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.calibration_residue import CalibrationResidue
 from gfimu.diagnosis.causes import effects_of_run
-from gfimu.diagnosis.engine import make_segments, screen
-from gfimu.diagnosis.refinement import Start, refine, refine_each, without
+from gfimu.diagnosis.fit import Start, without
+from gfimu.diagnosis.refinement import refine, refine_each
 from gfimu.diagnosis.run import prepare_run
+from gfimu.diagnosis.screening import screen
 from gfimu.diagnosis.search import Blocks
 from gfimu.diagnosis.signatures import Signature, cause_columns, hypotheses, signature_columns
+from gfimu.diagnosis.stretches import make_segments
 from sim.campaign import Measurement, measure
 from sim.effects import make_effect
 from sim.twin import Twin
@@ -207,3 +209,21 @@ def test_a_gross_play_is_fitted_from_any_width(twin, monkeypatch):
     (blind,) = refine([segment], [play.cause(np.array([size]))], [[]], iterations=14).causes
     assert blind.effect(twin.array).parameters["width_m_s2"] != pytest.approx(width, rel=0.1)
     assert ends[0]["lost_m_s2"] == pytest.approx(lost, rel=0.02)
+
+
+def test_a_play_that_fits_is_followed_from_there(twin, monkeypatch):
+    """As if it held nothing, which comes nearer from far off, a fit would go away first."""
+    lost, width = 1.05, 0.19
+    segment = _segment(twin, [make_effect("hysteresis", {"lost_m_s2": lost, "width_m_s2": width})])
+    family = segment.model.families()["hysteresis"]
+    (play,) = hypotheses([Signature(family, {"width_m_s2": width}, np.arange(1))], twin.array, 1)
+    held = []
+    linearised = segment.linearise
+    monkeypatch.setattr(segment, "linearise", lambda effects: held.append(segment.holding) or linearised(effects))
+    fit = refine([segment], [play.cause(np.array([lost / family.sizes(twin.array)[0].prior_std]))], [[]], iterations=14)
+    assert not all(held)
+    held.clear()
+    again = refine([segment], fit.causes, [[]], drives=fit.drives, iterations=14)
+    assert held
+    assert all(held)
+    assert again.objective == pytest.approx(fit.objective, abs=20.0)

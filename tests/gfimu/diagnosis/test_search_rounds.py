@@ -1,18 +1,22 @@
 """The search for causes goes on while a round brings something, and ends where nothing of it would be believed."""
 
 import os
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
 from gfimu.array import AccelerometerArray
-from gfimu.diagnosis import diagnose, engine
+from gfimu.diagnosis import diagnose, engine, loose_calibration
 from gfimu.diagnosis.calibration_residue import CalibrationResidue
+from gfimu.diagnosis.fit import Fit
 from gfimu.diagnosis.nuisances import learn_noise
 from gfimu.diagnosis.prepared_runs import PreparedRuns
 from gfimu.diagnosis.refinement import refine
+from gfimu.diagnosis.signatures import Signature, hypotheses
 from gfimu.recording import Recording
 from sim.campaign import Measurement, measure, random_profile
 from sim.effects import make_effect
@@ -188,3 +192,29 @@ def test_a_mode_that_pruning_takes_out_is_heard_ringing(monkeypatch):
     monkeypatch.setattr(engine, "prune", pruned_if_rung)
     segments, fixed = PreparedRuns.build([world.recording], world.twin, ["run"]).segments(world.twin)
     assert engine.explain(segments, fixed, 1).fit.names == {"resonance"}
+
+
+@pytest.mark.parametrize(
+    ("scores", "misfit", "left", "plain"),
+    [(50.0, 1.0, 2.0, True), (8.0, 1.0, 2.0, False), (50.0, 1.1, 2.0, False), (50.0, 1.0, 40.0, False)],
+)
+def test_a_mode_is_looked_for_elsewhere_unless_it_is_plain(scores, misfit, left, plain):
+    whole = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
+    shape = {"frequency_hz": 7.0, "damping_ratio": 0.05}
+    (mode,) = hypotheses([Signature(whole.families()["resonance"], shape, np.arange(1))], whole.array, 1)
+    cause = replace(mode.cause(np.array([0.5])), covariance=np.array([[(0.5 / scores) ** 2]]))
+    fit = Fit((cause,), 0.0, 0.0, 1000.0 * misfit, (), np.eye(1), np.zeros(1))
+    state = SimpleNamespace(_observations=1000, _left=lambda fit: left)
+    assert engine._Search._is_plain(state, fit) is plain
+
+
+@pytest.mark.parametrize(("size_m_s2", "tried"), [(1.0, False), (0.01, True)])
+def test_only_a_faint_cause_is_tried_without_beside_a_residue(twin, monkeypatch, size_m_s2, tried):
+    sets = []
+    pruned = loose_calibration.prune
+    monkeypatch.setattr(
+        loose_calibration, "prune", lambda segments, fit, *rest: sets.append(fit.names) or pruned(segments, fit, *rest)
+    )
+    recording = measure(np.random.default_rng(8), twin, [make_effect("bias", {"a21_m_s2": size_m_s2})], SETTING)
+    assert [cause.effect for cause in diagnose([recording], twin).causes] == ["bias"]
+    assert any(sets) is tried
