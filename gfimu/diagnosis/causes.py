@@ -14,8 +14,11 @@ from gfimu.diagnosis.model import Effect, EffectFamily, Pattern
 
 WHOLE_NUMBERS = frozenset({"order", "moving_arms"})
 """Shape parameters that are whole numbers, picked from a grid and not refined."""
+LEVEL_ERROR = 0.2
+"""What a level of a reading is found to at best, in units of its white noise: half-widths of ten narrow plays were off
+by 0.2, rms."""
 
-__all__ = ["WHOLE_NUMBERS", "Cause", "Signature", "effects_of_run"]
+__all__ = ["LEVEL_ERROR", "WHOLE_NUMBERS", "Cause", "Signature", "effects_of_run"]
 
 
 @dataclass(frozen=True)
@@ -92,6 +95,19 @@ class Cause:
         if self.frozen:
             return {}
         return {key: value for key, value in self.shape.items() if key not in WHOLE_NUMBERS}
+
+    @property
+    def levels(self) -> dict[str, float]:
+        """Shape parameters that are levels of a reading at which something happens, m/s²."""
+        return {key: value for key, value in self.shape.items() if key.endswith("_m_s2")}
+
+    def inexactness(self, noise: float) -> float:
+        """Return the share of what the cause explains that it may leave, given the white noise of a reading, m/s².
+
+        What happens at a level is found only as well as the reading that gets there is estimated.
+        """
+        levels = np.array(list(self.levels.values()))
+        return self.family.inexactness + float(np.sum((LEVEL_ERROR * noise / levels) ** 2))
 
     def at(self, coordinates: NDArray[np.float64], shape: Mapping[str, float] | None = None) -> Cause:
         """Return the cause with other coordinates and, where given, another shape."""

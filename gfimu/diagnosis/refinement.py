@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.array import AccelerometerArray
-from gfimu.diagnosis.causes import Cause, effects_of_run
+from gfimu.diagnosis.causes import LEVEL_ERROR, Cause, effects_of_run
 from gfimu.diagnosis.evidence import SCALES, inverse, log_evidence
 from gfimu.diagnosis.fit import SMALLEST_POSITIVE, Fit, Start
 from gfimu.diagnosis.model import Effect
@@ -374,11 +374,13 @@ def _result(segments: Sequence[Segment], point: _Point) -> Fit:
     nothing = point.objective + 2 * float(score[coordinates] @ values) + float(values @ inner @ values)
     # A cause that reshapes what the drive can do, as a mode does, is charged for it by the volume.
     evidence = point.log_volume - 0.5 * nothing + log_evidence(inner, total, positive)
+    noise = float(np.median(segments[0].levels.white[:-1]))
     done = []
     ends = np.cumsum([len(cause.coordinates) for cause in causes])
     for number, (cause, mine) in enumerate(zip(causes, np.split(coordinates, ends[:-1]), strict=True)):
         stds = {key: float(np.sqrt(covariance[p, p])) for owner, key, p in shapes if owner == number}
         scaled = {key: std if key in ANGLES else std * abs(cause.shape[key]) for key, std in stds.items()}
+        scaled |= {key: float(np.hypot(scaled[key], LEVEL_ERROR * noise)) for key in cause.levels if key in scaled}
         done.append(replace(cause, covariance=covariance[np.ix_(mine, mine)], shape_std=scaled))
     drives = point.state.drives
     return Fit(tuple(done), evidence, evidence + prior, point.objective, drives, inner, total, point.responses)

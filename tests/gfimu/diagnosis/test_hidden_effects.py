@@ -104,6 +104,13 @@ def test_a_gross_play_draws_in_no_other_cause():
     assert [cause.effect for cause in diagnose([world.recording], world.twin).causes] == ["hysteresis"]
 
 
+def test_the_width_of_a_narrow_play_is_told_no_better_than_readings_are_estimated():
+    outcome = run_case(Case("reduced", 970_003, ("hysteresis",), 30.0), OTHER_GENERATOR)
+    (cause,) = outcome["causes"]
+    assert cause["effect"] == "hysteresis"
+    assert max(abs(z) for z in cause["z"].values()) < 3.0  # 11 without
+
+
 def test_a_mode_that_pushes_its_table_back_is_named_alone():
     """A drive that does not know how the mode rings on is bent to ring itself, and leaves something."""
     outcome = run_case(Case("reduced", 511, ("resonance",), 600.0, duration=20.0), OTHER_GENERATOR)

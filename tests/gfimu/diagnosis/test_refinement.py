@@ -227,3 +227,12 @@ def test_a_play_that_fits_is_followed_from_there(twin, monkeypatch):
     assert held
     assert all(held)
     assert again.objective == pytest.approx(fit.objective, abs=20.0)
+
+
+@pytest.mark.parametrize(("name", "shape", "share"), [("hysteresis", {"width_m_s2": 0.06}, 0.02), ("bias", {}, 0.0)])
+def test_what_happens_at_a_level_of_the_readings_may_leave_more(twin, name, shape, share):
+    """A level is found to 0.2 of the noise, here a tenth of it, whose square is left."""
+    family = twin.families()[name]
+    places = hypotheses([Signature(family, shape, np.arange(len(family.sizes(twin.array))))], twin.array, 1)
+    cause = places[0].cause(np.ones(places[0].mixing.shape[1]))
+    assert cause.inexactness(0.03) == pytest.approx(share)
