@@ -97,6 +97,11 @@ class Cause:
         return {key: value for key, value in self.shape.items() if key not in WHOLE_NUMBERS}
 
     @property
+    def power(self) -> float:
+        """Squared distance from nothing in standard deviations."""
+        return float(self.coordinates @ np.linalg.pinv(self.covariance) @ self.coordinates)
+
+    @property
     def levels(self) -> dict[str, float]:
         """Shape parameters that are levels of a reading at which something happens, m/s²."""
         return {key: value for key, value in self.shape.items() if key.endswith("_m_s2")}

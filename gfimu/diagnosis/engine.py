@@ -230,7 +230,12 @@ class _Search:
     def _may_hear_mode_ring(self) -> bool:
         # What leaves more than this is not the ringing of a mode.
         near = self._best.objective < _MOST_RUNG * self._observations
-        return near and not (self._loose or self._segments[0].ringing) and "resonance" in self._best.names
+        if not near or self._loose or self._segments[0].ringing or "resonance" not in self._best.names:
+            return False
+        # Beside a cause whose model is rough a mode that explains less than that leaves would be dropped at last.
+        noise = float(np.median(self._segments[0].levels.white[:-1]))
+        mode = next(cause for cause in self._best.causes if cause.name == "resonance")
+        return mode.power > sum(cause.inexactness(noise) * cause.power for cause in self._best.causes)
 
     def _let_mode_ring(self) -> None:
         """Fit the best set anew with drives that know how its mode rings on."""

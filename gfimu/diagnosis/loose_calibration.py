@@ -156,18 +156,12 @@ def _trial(plain: Explanation, causes: Sequence[Cause], tolerance: dict[str, flo
         fit = refine(segments, causes, fixed, drives=plain.fit.drives)
         if fit.objective > FAIR_FIT * sum(int(segment.weight_mask.sum()) for segment in segments):
             return -np.inf, fit
-        if not all(_is_beyond_residue(cause) for cause in fit.causes):
+        if any(cause.power < _PLAIN**2 for cause in fit.causes):  # others need not be tried without
             fit = prune(segments, fit, fixed)[0]
         return log_probability(segments, fit), fit
     finally:
         for segment, drive in zip(segments, plain.fit.drives, strict=True):
             segment.calibration_residue, segment.coefficients = None, drive
-
-
-def _is_beyond_residue(cause: Cause) -> bool:
-    """Tell whether a cause is so plain beside a residue that it need not be tried without it."""
-    power = float(cause.coordinates @ np.linalg.pinv(cause.covariance) @ cause.coordinates)
-    return power > _PLAIN**2
 
 
 def _families(model: WorldModel, tolerance: dict[str, float]) -> list[tuple[EffectFamily, NDArray[np.float64]]]:

@@ -194,18 +194,37 @@ def test_a_mode_that_pruning_takes_out_is_heard_ringing(monkeypatch):
     assert engine.explain(segments, fixed, 1).fit.names == {"resonance"}
 
 
+def cause_of(name, shape, scores):
+    """A cause so many standard deviations from nothing, in coordinates of 0.5."""
+    whole = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
+    (place, *_) = hypotheses([Signature(whole.families()[name], shape, np.arange(1))], whole.array, 1)
+    return replace(place.cause(np.array([0.5])), covariance=np.array([[(0.5 / scores) ** 2]]))
+
+
+def fit_of(*causes, objective=1000.0):
+    return Fit(causes, 0.0, 0.0, objective, (), np.eye(len(causes)), np.zeros(len(causes)))
+
+
+MODE = {"frequency_hz": 7.0, "damping_ratio": 0.05}
+
+
 @pytest.mark.parametrize(
     ("scores", "misfit", "left", "plain"),
     [(50.0, 1.0, 2.0, True), (8.0, 1.0, 2.0, False), (50.0, 1.1, 2.0, False), (50.0, 1.0, 40.0, False)],
 )
 def test_a_mode_is_looked_for_elsewhere_unless_it_is_plain(scores, misfit, left, plain):
-    whole = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
-    shape = {"frequency_hz": 7.0, "damping_ratio": 0.05}
-    (mode,) = hypotheses([Signature(whole.families()["resonance"], shape, np.arange(1))], whole.array, 1)
-    cause = replace(mode.cause(np.array([0.5])), covariance=np.array([[(0.5 / scores) ** 2]]))
-    fit = Fit((cause,), 0.0, 0.0, 1000.0 * misfit, (), np.eye(1), np.zeros(1))
     state = SimpleNamespace(_observations=1000, _left=lambda fit: left)
+    fit = fit_of(cause_of("resonance", MODE, scores), objective=1000.0 * misfit)
     assert engine._Search._is_plain(state, fit) is plain
+
+
+@pytest.mark.parametrize(("scores", "heard"), [(50.0, True), (10.0, False)])
+def test_a_mode_within_what_a_rough_cause_leaves_is_not_listened_to(scores, heard):
+    """Of 100 standard deviations of torque ripple 2 % of the power may be left, which is 14."""
+    segment = SimpleNamespace(ringing=False, levels=SimpleNamespace(white=np.full(13, 0.03)))
+    best = fit_of(cause_of("resonance", MODE, scores), cause_of("cogging", {"order": 10.0}, 100.0))
+    state = SimpleNamespace(_observations=1000, _best=best, _segments=[segment], _loose=False)
+    assert engine._Search._may_hear_mode_ring.fget(state) is heard
 
 
 @pytest.mark.parametrize(("size_m_s2", "tried"), [(1.0, False), (0.01, True)])
