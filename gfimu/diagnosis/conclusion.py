@@ -37,6 +37,7 @@ __all__ = ["conclude", "is_dominant", "is_unknown"]
 
 _DOMINANT = 0.03
 _INEXACTNESS = 2.5e-3
+_BESIDE_DRIVE = "motion"  # place of effects that the drive can stand in for
 _TURNS = ANGLES | {"phase_rad"}
 _CLOSE_RESIDUE = 4.0  # log odds against a residue of the calibration in place of a cause, below which it is told
 _BEYOND_CHANCE = 4.0  # standard deviations of the misfit of noise
@@ -162,10 +163,13 @@ def _widened(named: NamedCause, cause: Cause, misfit: tuple[float, float]) -> di
     """Widen standard deviations where a cause does not fit to the noise: all by the root of the misfit.
 
     Where the model of the effect is a rough one, the misfit may be its own: a share ε of what a parameter explains is
-    what an error of √ε of that parameter leaves.
+    what an error of √ε of that parameter leaves. Where such an effect moves the table, the drive takes up what its
+    model gets wrong, and nothing is seen of it.
     """
     over, share = misfit
-    rough = np.sqrt(share) if cause.family.inexactness > 0.0 else 0.0
+    inexactness = cause.family.inexactness
+    hidden = inexactness if cause.family.place == _BESIDE_DRIVE else 0.0
+    rough = np.sqrt(share + hidden) if inexactness > 0.0 else 0.0
     values = {key: 1.0 if key in _TURNS else float(named.parameters.get(key, 0.0)) for key in named.std}
     return {key: float(np.hypot(std * np.sqrt(1.0 + over), rough * values[key])) for key, std in named.std.items()}
 

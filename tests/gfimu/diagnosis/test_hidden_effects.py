@@ -111,6 +111,13 @@ def test_the_width_of_a_narrow_play_is_told_no_better_than_readings_are_estimate
     assert max(abs(z) for z in cause["z"].values()) < 3.0  # 11 without
 
 
+def test_torque_ripple_is_told_as_uncertain_as_the_servo_that_answers_it():
+    case = next(case for case in study_cases("singles") if case.key == "singles/10046")
+    (cause,) = outcome(case, OTHER_GENERATOR)["causes"]
+    assert cause["effect"] == "cogging"
+    assert max(abs(z) for z in cause["z"].values()) < 3.0  # 4.2 with the covariance alone
+
+
 def test_a_mode_that_pushes_its_table_back_is_named_alone():
     """A drive that does not know how the mode rings on is bent to ring itself, and leaves something."""
     outcome = run_case(Case("reduced", 511, ("resonance",), 600.0, duration=20.0), OTHER_GENERATOR)
