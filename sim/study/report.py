@@ -47,6 +47,7 @@ LEAST_APART = 15.0
 just detectable."""
 
 LEAST_VISIBLE = 7.0
+_ROUNDED = 1e-5  # kept outcomes are
 """Size d′ below which an effect is at or below the information limit."""
 
 
@@ -92,7 +93,7 @@ def _inseparable(outcome: Outcome, rivals: set[str]) -> bool:
 def visible(outcome: Outcome) -> bool:
     """Whether what is hidden can be seen in the recording at all."""
     reached = outcome.get("reached")
-    return reached is None or reached >= LEAST_VISIBLE
+    return reached is None or reached >= (1.0 - _ROUNDED) * LEAST_VISIBLE
 
 
 def rate_with_interval(hits: int, cases: int) -> tuple[float, float, float]:
