@@ -47,8 +47,8 @@ LEAST_APART = 15.0
 just detectable."""
 
 LEAST_VISIBLE = 7.0
-_ROUNDED = 1e-5  # kept outcomes are
 """Size d′ below which an effect is at or below the information limit."""
+_ROUNDED = 1e-5  # of a size that is kept
 
 
 def score(outcome: Outcome) -> dict[str, bool]:
