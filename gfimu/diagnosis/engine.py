@@ -233,7 +233,7 @@ class _Search:
         if not near or self._loose or self._segments[0].ringing or "resonance" not in self._best.names:
             return False
         # Beside a cause whose model is rough a mode that explains less than that leaves would be dropped at last.
-        noise = float(np.median(self._segments[0].levels.white[:-1]))
+        noise = self._segments[0].levels.of_reading
         mode = next(cause for cause in self._best.causes if cause.name == "resonance")
         return mode.power > sum(cause.inexactness(noise) * cause.power for cause in self._best.causes)
 
@@ -256,7 +256,7 @@ class _Search:
     def _is_plain(self, fit: Fit) -> bool:
         """Tell whether a fit whose drives know how its mode rings on leaves no doubt of the mode's frequency."""
         mode = next(cause for cause in fit.causes if cause.name == "resonance")
-        sure = bool(np.all(mode.coordinates > _PLAIN * np.sqrt(mode.covariance.diagonal())))
+        sure = mode.power > _PLAIN**2
         return sure and fit.objective < _SURELY_WRONG * self._observations and self._left(fit) < LEFT_OVER_ODDS
 
     def _explained(self) -> float:

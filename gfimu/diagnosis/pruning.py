@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from gfimu.diagnosis.fit import Fit, without
 from gfimu.diagnosis.model import Effect
 from gfimu.diagnosis.refinement import refine_each
@@ -76,7 +74,7 @@ def prune(
         weakest = min(lost, key=lost.__getitem__)
         needed = LEAST_ODDS if len(fit.causes) == 1 and not faults else LEAST_EXTRA_ODDS
         needed = _LEAST_ROUNDED_ODDS if rounded else needed
-        noise = float(np.median(segments[0].levels.white[:-1]))
+        noise = segments[0].levels.of_reading
         needed += sum(cause.inexactness(noise) * lost[cause.name] for cause in fit.causes if cause.name != weakest)
         if lost[weakest] >= needed:
             return fit, fewer

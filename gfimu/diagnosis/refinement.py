@@ -374,7 +374,7 @@ def _result(segments: Sequence[Segment], point: _Point) -> Fit:
     nothing = point.objective + 2 * float(score[coordinates] @ values) + float(values @ inner @ values)
     # A cause that reshapes what the drive can do, as a mode does, is charged for it by the volume.
     evidence = point.log_volume - 0.5 * nothing + log_evidence(inner, total, positive)
-    noise = float(np.median(segments[0].levels.white[:-1]))
+    noise = segments[0].levels.of_reading
     done = []
     ends = np.cumsum([len(cause.coordinates) for cause in causes])
     for number, (cause, mine) in enumerate(zip(causes, np.split(coordinates, ends[:-1]), strict=True)):

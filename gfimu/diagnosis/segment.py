@@ -472,7 +472,7 @@ class Segment:
     def felt_play(self, effects: Sequence[Effect]) -> Play | None:
         """Return what holds a share of the readings, where that is more than their noise."""
         play = self.model.play(effects) if isinstance(self.model, ModelWithPlay) else None
-        noise = float(np.median(self.levels.white[:-1]))
+        noise = self.levels.of_reading
         return None if play is None or play.lost < _FELT_PLAY * noise else play
 
     def whitened_products(

@@ -221,7 +221,7 @@ def test_a_mode_is_looked_for_elsewhere_unless_it_is_plain(scores, misfit, left,
 @pytest.mark.parametrize(("scores", "heard"), [(50.0, True), (10.0, False)])
 def test_a_mode_within_what_a_rough_cause_leaves_is_not_listened_to(scores, heard):
     """Of 100 standard deviations of torque ripple 2 % of the power may be left, which is 14."""
-    segment = SimpleNamespace(ringing=False, levels=SimpleNamespace(white=np.full(13, 0.03)))
+    segment = SimpleNamespace(ringing=False, levels=SimpleNamespace(of_reading=0.03))
     best = fit_of(cause_of("resonance", MODE, scores), cause_of("cogging", {"order": 10.0}, 100.0))
     state = SimpleNamespace(_observations=1000, _best=best, _segments=[segment], _loose=False)
     assert engine._Search._may_hear_mode_ring.fget(state) is heard
