@@ -203,12 +203,14 @@ class Twin:
         not, as they have no noise-free form.
         """
         world = self.world(effects, mounting, start)
+        if world.motion_steps:  # once for the channels and the reference
+            for step in world.motion_steps:
+                spin = step(spin, t)
+            world = world.changed(motion_steps=())
         readings = forward.channels(world, spin, t, temperature)
         if world.data_steps:
             readings = self._digital(readings, (*self.effects, *effects), world, t)
         if self.drive_source == "angle":
-            for step in world.motion_steps:
-                spin = step(spin, t)
             return readings, spin.at(t - world.tacho_delay).angle
         return readings, forward.reference(world, spin, t)
 

@@ -198,7 +198,7 @@ def series_products(
     each = np.broadcast_to(basis, (line.jacobian.observations, *basis.shape[-2:]))
     masked = _masked(segment, each)
     gram, score, cross = _channelwise(segment, line, masked)
-    named = cause_columns(segment, causes, known, shapes=True)
+    named = cause_columns(segment, causes, known, line.prediction, shapes=True)
     if named.shape[1]:
         gram, score = _project_out(segment, line, masked, cross, gram, score, named)
     return gram, score

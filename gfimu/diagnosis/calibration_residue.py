@@ -8,10 +8,11 @@ marginalised with them.
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import cho_solve
 
 from gfimu.diagnosis.slow_modes import DriveModes, SlowModes
 from gfimu.units import STANDARD_GRAVITY
@@ -25,6 +26,18 @@ TOLERANCE = {
     "sensor_position": 5e-5,
 }
 """Standard deviations that a good calibration leaves, by effect: m/s², ratio, rad, m."""
+
+
+@dataclass(frozen=True)
+class _UnderNoise:
+    """What a residue has under one noise: AᵀWA + I (q, q), its lower root, each channel's modes (K, k), and damped."""
+
+    modes: SlowModes
+    weights: NDArray[np.float64]
+    gram: NDArray[np.float64]
+    root: NDArray[np.float64]
+    low: list[NDArray[np.float64]]
+    damped: list[NDArray[np.float64]]
 
 
 @dataclass(frozen=True)
@@ -44,6 +57,7 @@ class CalibrationResidue:
     count: int
     places: tuple[NDArray[np.intp], ...]
     parts: tuple[NDArray[np.float64], ...]
+    _known: list[_UnderNoise] = field(default_factory=list, init=False, repr=False, compare=False)
 
     @classmethod
     def of_columns(cls, columns: NDArray[np.float64]) -> CalibrationResidue:
@@ -72,14 +86,14 @@ class CalibrationResidue:
         weights : ndarray, shape (c + 1,)
             One over the variance of each observation.
         """
-        gram, score, damped = self._own_equations(residual, modes, weights)
+        mine = self._under(modes, weights)
         everywhere = np.zeros((len(weights), self.count, len(modes.share)))  # (c + 1, q, K)
-        for channel, (at, part) in enumerate(zip(self.places, damped, strict=True)):
+        for channel, (at, part) in enumerate(zip(self.places, mine.damped, strict=True)):
             everywhere[channel, at] = part.T
         cross = -slow.through(everywhere, weights)
         for matrix, loading in zip(slow.jacobian.parts, slow.jacobian.loading, strict=True):
             cross += matrix.T @ self._mixed(self.parts, loading * weights)
-        return gram, score, cross
+        return mine.gram, self._score(residual, mine), cross
 
     def explained(
         self,
@@ -88,25 +102,33 @@ class CalibrationResidue:
         weights: NDArray[np.float64],
     ) -> float:
         """Return how much of rᵀWr the residue takes at its best, its prior counted, the drive held."""
-        gram, score, _ = self._own_equations(residual, modes, weights)
-        return float(score @ np.linalg.solve(gram, score))
+        mine = self._under(modes, weights)
+        score = self._score(residual, mine)
+        return float(score @ cho_solve((mine.root, True), score))
 
-    def _own_equations(
-        self,
-        residual: NDArray[np.float64],
-        modes: SlowModes,
-        weights: NDArray[np.float64],
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], list[NDArray[np.float64]]]:
-        """Return AᵀWA + I (q, q), AᵀWr (q,) and each channel's damped modes (K, k)."""
-        gram, score = np.eye(self.count), np.zeros(self.count)
-        damped = []
+    def _under(self, modes: SlowModes, weights: NDArray[np.float64]) -> _UnderNoise:
+        """Return what does not change from step to step as long as the noise does not."""
+        for known in list(self._known):
+            if known.modes is modes and np.array_equal(known.weights, weights):
+                return known
+        gram = np.eye(self.count)
+        low: list[NDArray[np.float64]] = []
+        damped: list[NDArray[np.float64]] = []
         for channel, (at, part) in enumerate(zip(self.places, self.parts, strict=True)):
-            low = modes.of(part.T, channel).T  # (K, k)
-            damped.append(modes.share[:, [channel]] * low)
-            gram[np.ix_(at, at)] += weights[channel] * (part.T @ part - low.T @ damped[-1])
-            mine = residual[:, channel]
-            score[at] += weights[channel] * (part.T @ mine - modes.of(mine[None], channel)[0] @ damped[-1])
-        return gram, score, damped
+            low.append(modes.of(part.T, channel).T)  # (K, k)
+            damped.append(modes.share[:, [channel]] * low[-1])
+            gram[np.ix_(at, at)] += weights[channel] * (part.T @ part - low[-1].T @ damped[-1])
+        found = _UnderNoise(modes, weights, gram, np.asarray(np.linalg.cholesky(gram)), low, damped)
+        self._known[:] = [found]
+        return found
+
+    def _score(self, residual: NDArray[np.float64], noise: _UnderNoise) -> NDArray[np.float64]:
+        """Return AᵀWr, shape (q,)."""
+        score = np.zeros(self.count)
+        slow = noise.modes.of_each(residual)  # (K, c + 1)
+        for channel, (at, part, damped) in enumerate(zip(self.places, self.parts, noise.damped, strict=True)):
+            score[at] += noise.weights[channel] * (part.T @ residual[:, channel] - slow[:, channel] @ damped)
+        return score
 
     def _mixed(self, blocks: Sequence[NDArray[np.float64]], scale: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the sum over channels of their columns (n, k), each at its places, shape (n, q)."""
@@ -125,8 +147,8 @@ class CalibrationResidue:
     ) -> NDArray[np.float64]:
         """Return AᵀWS of signatures (c + 1, P, n), whose damped modes are (c + 1, P, K), shape (q, P)."""
         total = np.zeros((self.count, signatures.shape[1]))
-        for channel, (at, part) in enumerate(zip(self.places, self.parts, strict=True)):
-            low = modes.of(part.T, channel).T
+        slow = self._under(modes, weights).low
+        for channel, (at, part, low) in enumerate(zip(self.places, self.parts, slow, strict=True)):
             total[at] += weights[channel] * (part.T @ signatures[channel].T - low.T @ damped[channel].T)
         return total
 

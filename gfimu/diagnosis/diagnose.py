@@ -195,14 +195,20 @@ def _explain(
         tell(0.05 + 0.7 * share, text)
 
     plain = explain_any_length(segments, fixed, runs, instead=wanders, report=told)
-    if plain.interrupted:
+    loose = None
+    if plain.left_for == "walk":
         found = with_walk(plain, prepared, model, given_up=False, report=lambda text: tell(0.6, text))
         if found is not None:
             return (*found, None)
+    elif plain.left_for == "residue":
+        tell(0.6, "calibration residue")
+        loose, _ = loosen(plain, prepared, model)
+    if plain.left_for and loose is None:
         segments, fixed = prepared.segments(model)
         plain = explain_any_length(segments, fixed, runs, report=told)
-    tell(0.76, "calibration residue")
-    loose, plain = loosen(plain, prepared, model)
+    if loose is None:
+        tell(0.76, "calibration residue")
+        loose, plain = loosen(plain, prepared, model)
     judged = plain
     if loose is not None:
         plain, judged = loose.explanation, loose.held

@@ -14,7 +14,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg.blas import dsyrk
-from scipy.sparse import csr_array, diags_array, vstack
+from scipy.signal import lfilter
+from scipy.sparse import csc_array, csr_array, vstack
 
 from gfimu.diagnosis.drive import AngleSpline
 from gfimu.diagnosis.ringing import Ringing
@@ -24,6 +25,7 @@ __all__ = ["DriveJacobian"]
 _LEAST_SHARE = 1e-14
 _NARROW = 20  # coefficients that a row holds
 _ROWS = 100  # of a dense block
+_FORGOTTEN = 12.0  # time constants of a lag
 _COLUMNS = 32  # signatures that are taken at once, which bounds the memory
 _Delay = Callable[[csr_array], csr_array]
 
@@ -246,13 +248,23 @@ class _State:
         return total
 
 
-def lag_matrix(n: int, samples: float) -> csr_array:
-    """Return the first-order lag of ``samples`` sample periods as a matrix (n, n), inputs joined by straight lines."""
+def lagged(part: csr_array, samples: float) -> csr_array:
+    """Return columns (n, m) after a first-order lag of ``samples`` sample periods, inputs joined by straight lines."""
     x = 1.0 / samples
     decay = np.exp(-x)
     mean_decay = -np.expm1(-x) / x
-    length = min(int(np.ceil(12.0 * samples)) + 2, n)
-    response = np.empty(length)
-    response[0] = 1.0 - mean_decay
-    response[1:] = (decay * (1.0 - mean_decay) + mean_decay - decay) * decay ** np.arange(length - 1)
-    return csr_array(diags_array(list(response), offsets=[-k for k in range(length)], shape=(n, n)))
+    rise = 1.0 - mean_decay
+    n, m = part.shape
+    columns = csc_array(part)
+    counts = np.diff(columns.indptr)
+    first, last = np.zeros(m, dtype=np.intp), np.full(m, -1, dtype=np.intp)
+    first[counts > 0] = columns.indices[columns.indptr[:-1][counts > 0]]
+    last[counts > 0] = columns.indices[columns.indptr[1:][counts > 0] - 1]
+    # Each column is dense from its first entry on, and forgotten some time after its last.
+    lengths = np.where(counts > 0, np.minimum(last + int(_FORGOTTEN * samples) + 2, n) - first, 0)
+    inside = np.arange(int(lengths.max(initial=1))) < lengths[:, None]  # (m, L)
+    dense = np.zeros(inside.shape)
+    dense[np.repeat(np.arange(m), counts), columns.indices - np.repeat(first, counts)] = columns.data
+    dense = lfilter([rise, mean_decay - decay], [1.0, -decay], dense, axis=1)
+    rows = (first[:, None] + np.arange(inside.shape[1]))[inside]
+    return csr_array(csc_array((dense[inside], rows, np.concatenate([[0], np.cumsum(lengths)])), shape=(n, m)))

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from gfimu.diagnosis.adequacy import LEFT_OVER_ODDS, left_over
+from gfimu.diagnosis.calibration_residue import tolerance_of
 from gfimu.diagnosis.causes import Cause
 from gfimu.diagnosis.explanation import Explanation
 from gfimu.diagnosis.far_starts import every_mode, from_far, with_honest_mode
@@ -19,7 +20,7 @@ from gfimu.diagnosis.parallel import each_apart, over_segments
 from gfimu.diagnosis.pruning import RIVALS, near_rivals, prune
 from gfimu.diagnosis.refinement import FAIR_FIT, refine, refine_each
 from gfimu.diagnosis.screening import screen
-from gfimu.diagnosis.search import search
+from gfimu.diagnosis.search import Blocks, Candidate, log_odds_beside_residue, search
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.signatures import SignatureSet
 
@@ -27,6 +28,7 @@ __all__ = ["Instead", "Report", "explain"]
 
 Report = Callable[[float, str], None]
 Instead = Callable[[Sequence[Segment], Fit, Sequence[Sequence[Effect]]], bool]
+_Found = tuple[list[Candidate], list[Candidate], Blocks]
 
 _ROUNDS = 6
 _REFINED = 6
@@ -42,6 +44,7 @@ _SHARE_AT_END = 0.02  # no cause is believed then (`conclusion.is_dominant`)
 _STALLED, _WORTH_FINDING = 0.1, 100.0  # share of what is left that a round may bring to be the last; nats, at least
 _MOST_RUNG = 4.0  # misfit per observation of a right mode whose ringing the drive does not know; 2.2 was seen
 _FAINT = 500.0  # log odds of a mode whose frequency may not be settled
+_RESIDUE = 12.0  # log odds for a calibration residue over all that a round may find; at most 0 was seen without one
 _PLAIN = 20.0  # standard deviations; modes at a false frequency had 4 to 8
 
 
@@ -72,7 +75,8 @@ def explain(
         Causes to start from.
     instead : callable, optional
         Called with segments, fit and fixed effects where the first round leaves much: whether to leave the search for
-        something better that it does not look for.
+        wandering biases, which it does not look for. Where this is given the search is left for a calibration residue
+        too.
     report : callable, optional
         Called with the share done and a line of text.
     """
@@ -80,15 +84,18 @@ def explain(
     search = _Search(segments, fixed, runs, start)
     for number in range(_ROUNDS):
         tell(0.1 + 0.8 * number / _ROUNDS, f"search {number + 1}")
-        settled = search.round(first=number == 0, tell=tell)
-        if number == 0 and not settled and instead is not None and search.is_left_for(instead):
+        found = search.look()
+        if number > 0 and instead is not None and search.is_left_for_residue(found):
+            break
+        settled = search.round(found, first=number == 0, tell=tell)
+        if number == 0 and not settled and instead is not None and search.is_left_for_walk(instead):
             break
         if search.ends(number, settled=settled) and not search.hears_mode_ring():
             break
     tell(0.85, "prune")
     best, without, rivals = search.judged()
     tell(0.9, "compare")
-    believed = best.causes and not search.interrupted
+    believed = best.causes and not search.left_for
     nothing = refine(segments, (), fixed, drives=best.drives, iterations=8) if believed else best
     for segment, drive in zip(segments, best.drives, strict=True):
         segment.coefficients = drive
@@ -101,7 +108,7 @@ def explain(
         tuple(tuple(known) for known in fixed),
         search.screened(best),
         search.given_up,
-        interrupted=search.interrupted,
+        left_for=search.left_for,
     )
 
 
@@ -138,7 +145,8 @@ class _Search:
         self._tried: dict[frozenset[tuple[str, str]], Fit] = {}
         # How far each set was behind, under the noise that both were judged by.
         self._behind: dict[frozenset[tuple[str, str]], float] = {}
-        self._settled = self.given_up = self.interrupted = False
+        self._settled = self.given_up = False
+        self.left_for = ""
         self._ahead: SignatureSet | None = None
         # What is left is judged once a residue of the calibration is held.
         self._loose = any(segment.calibration_residue is not None for segment in segments)
@@ -147,12 +155,16 @@ class _Search:
     def _is_fair(self, fit: Fit) -> bool:
         return fit.objective < FAIR_FIT * self._observations
 
-    def round(self, *, first: bool, tell: Report) -> bool:
-        """Screen about the best set, refine what leads, relearn the noise; tells whether nothing changes any more."""
-        segments, fixed = self._segments, self._fixed
+    def look(self) -> _Found:
+        """Screen about the best set and search the normal equations; returns what `search` does."""
         self._signatures = self._ahead or self._screen()
         self._screened, self._ahead = self._best.key, None
-        fits = self._refined_leaders()
+        return search(self._signatures, most=max(2, min(len(self._best.causes) + 1, _MOST_CAUSES)))
+
+    def round(self, found: _Found, *, first: bool, tell: Report) -> bool:
+        """Refine what leads, relearn the noise; tells whether nothing changes any more."""
+        segments, fixed = self._segments, self._fixed
+        fits = self._refined_leaders(found)
         # A start has been through this.
         if first and not self._start and not any(self._is_fair(fit) for fit in fits.values()):
             tell(0.1, "large sizes")
@@ -185,12 +197,29 @@ class _Search:
         self._settled = settled
         return done
 
-    def is_left_for(self, instead: Instead) -> bool:
-        """Tell whether the search is left for something better that it does not look for, as much is left."""
+    def is_left_for_walk(self, instead: Instead) -> bool:
+        """Tell whether the search is left for wandering biases, as much is left."""
         poor = self._best.objective > _SURELY_WRONG * self._observations
         if poor and instead(segments_at(self._segments, self._best), self._best, self._fixed):
-            self.given_up = self.interrupted = True
-        return self.interrupted
+            self.given_up, self.left_for = True, "walk"
+        return bool(self.left_for)
+
+    def is_left_for_residue(self, found: _Found) -> bool:
+        """Tell whether the search is left for a calibration residue, which is better than all that was found."""
+        candidates, _, blocks = found
+        array = self._segments[0].model.array
+        tolerance = tolerance_of(self._segments[0].model.families())
+        # What a mode leaves that the drives do not know ringing passes for anything.
+        if not (tolerance and self._fair) or self._may_hear_mode_ring:
+            return False
+        if any(segment.rounding.channels for segment in self._segments):
+            return False
+        places = {(one.name, one.pattern): number for number, one in enumerate(blocks.hypotheses)}
+        members = [places[cause.key] for cause in self._best.causes]
+        beside = log_odds_beside_residue(self._signatures, members, tolerance, array)
+        if beside > candidates[0].log_odds + _RESIDUE:
+            self.given_up, self.left_for = True, "residue"
+        return bool(self.left_for)
 
     def ends(self, number: int, *, settled: bool) -> bool:
         """Tell whether the search is over: nothing changes, little of what is left is found, or it is given up.
@@ -272,16 +301,15 @@ class _Search:
         base = about or self._best
         return screen(segments_at(self._segments, base), base, self._fixed, self._runs)
 
-    def _refined_leaders(self) -> dict[frozenset[tuple[str, str]], Fit]:
+    def _refined_leaders(self, found: _Found) -> dict[frozenset[tuple[str, str]], Fit]:
         """Refine the sets that lead the linear list; returns them and the best set so far by their keys."""
-        candidates, singles, blocks = search(
-            self._signatures, most=max(2, min(len(self._best.causes) + 1, _MOST_CAUSES))
-        )
+        candidates, singles, blocks = found
         fits = {self._best.key: self._best}
         gross = candidates[0].log_odds > _GROSS
         leading = candidates[:_REFINED]
-        if gross and not self._settled:
-            # A large effect is far from linear: the right cause may be well down the linear list.
+        if gross and not (self._settled or (self._start and self._fair)):
+            # A large effect is far from linear: the right cause may be well down the linear list. A start that fits
+            # has been through this.
             leading = [*candidates[:3], *(one for one in singles[:_REFINED] if one not in candidates[:3])]
         keys: list[frozenset[tuple[str, str]]] = []
         sets: list[Sequence[Cause]] = []
@@ -302,8 +330,9 @@ class _Search:
                 drives = [drive + move for drive, move in zip(self._best.drives, moves, strict=True)]
             else:
                 causes = list(self._tried[key].causes)
-            # Ripples locked to the angle lose their phase where the drive's angle has drifted.
-            again = [self._fitted] if new and any("order" in cause.shape for cause in causes) else []
+            # Ripples locked to the angle lose their phase where the angle of a drive that lacks them has drifted.
+            ripples = {cause.name for cause in causes if "order" in cause.shape}
+            again = [self._fitted] if new and ripples - self._best.names else []
             for base in (self._best, *again):
                 keys.append(key)
                 sets.append(causes)

@@ -36,8 +36,8 @@ class Explanation:
         Whether so much is left that the set was neither pruned nor compared with others.
     beside_residue : Fit, optional
         What would be named if all numbers of the calibration were a little off, where that is about as probable.
-    interrupted : bool
-        Whether the search was left for something better that it does not look for.
+    left_for : str
+        What the search was left for as that is better and not looked for: "walk", "residue", or nothing.
     """
 
     fit: Fit
@@ -49,4 +49,4 @@ class Explanation:
     signatures: SignatureSet
     given_up: bool = False
     beside_residue: Fit | None = None
-    interrupted: bool = False
+    left_for: str = ""

@@ -23,7 +23,7 @@ class DriveEquations:
 
     Parameters
     ----------
-    residual, slow_residual, jacobian, slow
+    prediction, residual, slow_residual, jacobian, slow
         As in `Linearisation`.
     information : csr_array or ndarray, shape (m, m)
         JᵀWJ under the white noise alone; if dense, the lower triangle.
@@ -35,6 +35,7 @@ class DriveEquations:
         Where a calibration residue is admitted, its information (q, q), score (q,) and coupling to the drive (m, q).
     """
 
+    prediction: NDArray[np.float64]
     residual: NDArray[np.float64]
     slow_residual: NDArray[np.float64]
     jacobian: DriveJacobian
@@ -133,6 +134,8 @@ class Linearisation:
 
     Parameters
     ----------
+    prediction : ndarray, shape (n, c + 1)
+        Channels and reference.
     residual : ndarray, shape (n, c + 1)
         Measured minus predicted, or what stands for it where readings are coarse; zero where invalid.
     slow_residual : ndarray, shape (K, c + 1)
@@ -147,6 +150,7 @@ class Linearisation:
         The table's motion at the samples, each (n,).
     """
 
+    prediction: NDArray[np.float64]
     residual: NDArray[np.float64]
     slow_residual: NDArray[np.float64]
     jacobian: DriveJacobian

@@ -73,7 +73,7 @@ def explain_any_length(
         segments[place].set_levels(like.levels)
         segments[place].roughness.factor, segments[place].rounding = like.roughness.factor, like.rounding
         segments[place].prepare_weights()
-    if part.interrupted:  # nothing of it will be believed
+    if part.left_for:  # nothing of it will be believed
         fit = refine(segments, part.fit.causes, fixed, iterations=_FEW_ITERATIONS)
         for segment, drive in zip(segments, fit.drives, strict=True):
             segment.coefficients = drive

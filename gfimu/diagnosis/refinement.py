@@ -256,7 +256,7 @@ def _evaluate(segments: Sequence[Segment], fixed: Sequence[Sequence[Effect]], st
     def linearised(segment: Segment, known: Sequence[Effect], drive: NDArray[np.float64]) -> _Stretch:
         segment.coefficients = drive
         line = segment.linearise([*known, *effects_of_run(state.causes, segment.model.array, segment.index)])
-        columns = cause_columns(segment, state.causes, known, shapes=True)
+        columns = cause_columns(segment, state.causes, known, line.prediction, shapes=True)
         gram, score, eliminated = segment.whitened_products(line, columns)
         drive_step, _ = line.drive.alone()
         return _Stretch(

@@ -210,7 +210,7 @@ def _with_cubic(
     for segment, mine, known, cube, drive in zip(segments, effects, fixed, cubes, fit.drives, strict=True):
         kept, segment.coefficients = segment.coefficients, drive
         line = segment.linearise(mine)
-        causes = cause_columns(segment, fit.causes, known, shapes=False)  # (c + 1, K, n)
+        causes = cause_columns(segment, fit.causes, known, line.prediction, shapes=False)  # (c + 1, K, n)
         column = np.zeros((causes.shape[0], 1, causes.shape[2]))
         column[channel, 0] = cube * unit
         part, right, _ = segment.whitened_products(line, np.concatenate([causes, column], axis=1))

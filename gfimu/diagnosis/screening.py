@@ -35,7 +35,7 @@ def screen(segments: Sequence[Segment], base: Fit, fixed: Sequence[Sequence[Effe
     def products(
         segment: Segment, line: Linearisation, known: Sequence[Effect]
     ) -> tuple[NDArray[np.intp], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        columns, numbers = signature_columns(segment, signatures, base.causes, known)
+        columns, numbers = signature_columns(segment, signatures, base.causes, known, line.prediction)
         part, part_score, eliminated = segment.whitened_products(line, columns)
         response = np.zeros((segment.spline.size, count))
         response[:, numbers] = line.drive.response(eliminated)

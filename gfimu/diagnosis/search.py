@@ -6,17 +6,18 @@ forward selection, whose first pick is a compromise between two causes.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import block_diag
+from scipy.linalg import block_diag, solve_triangular
 
+from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.evidence import SCALES, inverse, log_evidence, log_evidence_each, posterior
 from gfimu.diagnosis.signatures import Hypothesis, SignatureSet
 
-__all__ = ["EXTRA_CAUSE", "Blocks", "Candidate", "search"]
+__all__ = ["EXTRA_CAUSE", "Blocks", "Candidate", "log_odds_beside_residue", "search"]
 
 EXTRA_CAUSE = float(np.log(0.3))
 """Log prior odds for each cause beyond the first."""
@@ -154,3 +155,43 @@ def _distinct(candidates: Sequence[Candidate], hypotheses: Sequence[Hypothesis],
             if len(kept) == count:
                 break
     return kept
+
+
+def log_odds_beside_residue(
+    signatures: SignatureSet, members: Sequence[int], tolerance: Mapping[str, float], array: AccelerometerArray
+) -> float:
+    """Return the log odds of a set beside a calibration residue, without members that it makes superfluous.
+
+    Parameters
+    ----------
+    signatures : SignatureSet
+        Normal equations and hypotheses.
+    members : sequence of int
+        The hypotheses of the set.
+    tolerance : mapping
+        Standard deviation of the sizes of each effect that the residue has.
+    array : AccelerometerArray
+        The array.
+    """
+    columns, spread = [], []
+    for signature in signatures.signatures:
+        if signature.family.name in tolerance:
+            prior = np.array([size.prior_std for size in signature.family.sizes(array)])
+            columns.append(signature.columns)
+            spread.append(np.tile(tolerance[signature.family.name] / prior, len(signature.columns) // len(prior)))
+    places, scale = np.concatenate(columns), np.concatenate(spread)
+    information = signatures.gram[np.ix_(places, places)] * np.outer(scale, scale) + np.eye(len(scale))
+    root = np.linalg.cholesky(0.5 * (information + information.T))
+    low = solve_triangular(root, scale[:, None] * signatures.gram[places], lower=True)  # (q, P)
+    forward = solve_triangular(root, scale * signatures.score[places], lower=True)
+    alone = 0.5 * float(forward @ forward) - float(np.log(root.diagonal()).sum())
+    beside = replace(signatures, gram=signatures.gram - low.T @ low, score=signatures.score - low.T @ forward)
+    blocks = Blocks(beside)
+    left = list(members)
+    best = alone if not left else alone + blocks.log_odds(left)
+    while left:
+        fewer = [[other for other in left if other != member] for member in left]
+        odds = [alone + (blocks.log_odds(some) if some else 0.0) for some in fewer]
+        left = fewer[int(np.argmax(odds))]
+        best = max(best, *odds)
+    return best

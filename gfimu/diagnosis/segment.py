@@ -17,15 +17,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
 
 from gfimu.diagnosis.calibration_residue import CalibrationResidue
 from gfimu.diagnosis.coloured_noise import CosineBasis, NoiseLevels
 from gfimu.diagnosis.drive import AngleSpline, ScaledSpin, ShiftedSpin
-from gfimu.diagnosis.drive_jacobian import DriveJacobian, lag_matrix
+from gfimu.diagnosis.drive_jacobian import DriveJacobian, lagged
 from gfimu.diagnosis.drive_prior import DrivePrior
 from gfimu.diagnosis.knots import KNOT_SPACING, intervals_to_cut
 from gfimu.diagnosis.linearisation import DriveElimination, DriveEquations, Linearisation
@@ -399,6 +399,7 @@ class Segment:
         data = self._equations(effects)
         state = self.motion(effects).at(self.run.t)
         return Linearisation(
+            data.prediction,
             data.residual,
             data.slow_residual,
             data.jacobian,
@@ -418,7 +419,9 @@ class Segment:
         residue = None
         if self.calibration_residue is not None:
             residue = self.calibration_residue.normal_equations(residual, slow, self.modes, weights)
-        return DriveEquations(residual, slow_residual, jacobian, slow, jacobian.information(), rhs, objective, residue)
+        return DriveEquations(
+            predicted, residual, slow_residual, jacobian, slow, jacobian.information(), rhs, objective, residue
+        )
 
     def _misfit(self, predicted: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
         """Return the working residual r (n, c + 1), the same in the slow modes (K, c + 1), and rᵀWr."""
@@ -447,13 +450,7 @@ class Segment:
             slopes[place] = (moved - unheld) / step
         times = self.model.sample_times(self.run.t, effects)
         lag = self.model.sensing_lag(effects)
-        delay = None
-        if lag > 0:
-            matrix = lag_matrix(len(times), lag / self.run.sample_period)
-
-            def delay(part: csr_array) -> csr_array:
-                return csr_array(matrix @ part)
-
+        delay = partial(lagged, samples=lag / self.run.sample_period) if lag > 0 else None
         chips = np.append(self.model.array.chip_of_channel, times.shape[1] - 1)
         weights = self.inverse_variance
         modes = self.felt_modes(effects) if self.ringing else ()

@@ -164,12 +164,19 @@ def plan_signatures(
 
 
 def signature_columns(
-    segment: Segment, signatures: Sequence[Signature], base: Sequence[Cause], fixed: Sequence[Effect]
+    segment: Segment,
+    signatures: Sequence[Signature],
+    base: Sequence[Cause],
+    fixed: Sequence[Effect],
+    predicted: NDArray[np.float64] | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
-    """Compute the columns (c + 1, P, n) of a segment and the numbers (P,) that they have in the whole set."""
+    """Compute the columns (c + 1, P, n) of a segment and the numbers (P,) that they have in the whole set.
+
+    ``predicted`` is what is predicted with the base, where it is at hand.
+    """
     array = segment.model.array
     present = effects_of_run(base, array, segment.index)
-    nominal = segment.predict([*fixed, *present])
+    nominal = segment.predict([*fixed, *present]) if predicted is None else predicted
     numbers = []
     for signature in signatures:
         count = len(signature.family.sizes(array))
@@ -218,12 +225,20 @@ def _disjoint(reach: NDArray[np.bool_] | None, count: int) -> list[list[int]]:
 
 
 def cause_columns(
-    segment: Segment, causes: Sequence[Cause], fixed: Sequence[Effect], *, shapes: bool
+    segment: Segment,
+    causes: Sequence[Cause],
+    fixed: Sequence[Effect],
+    predicted: NDArray[np.float64] | None = None,
+    *,
+    shapes: bool,
 ) -> NDArray[np.float64]:
-    """Compute the columns (c + 1, K, n) of the coordinates of a set of causes and, if asked, of their log shapes."""
+    """Compute the columns (c + 1, K, n) of the coordinates of a set of causes and, if asked, of their log shapes.
+
+    ``predicted`` is what is predicted with the set, where it is at hand.
+    """
     array = segment.model.array
     present = effects_of_run(causes, array, segment.index)
-    nominal = segment.predict([*fixed, *present])
+    nominal = segment.predict([*fixed, *present]) if predicted is None else predicted
     mask = segment.row_weight.T  # (c + 1, n)
     count = sum(len(cause.coordinates) + (len(cause.free_shape) if shapes else 0) for cause in causes)
     out = np.zeros((nominal.shape[1], count, nominal.shape[0]))

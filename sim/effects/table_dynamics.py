@@ -55,12 +55,8 @@ class RippledSpin:
 
     def at(self, t: ArrayLike) -> SpinState:
         """State of the rippled spin at times (n,), s."""
-        t = np.asarray(t, dtype=float)
-        spin = self._motion.at(t)
-        return SpinState(
-            spin.angle + np.interp(t, self._grid, self._angle),
-            spin.rate + np.interp(t, self._grid, self._rate),
-            spin.acceleration + np.interp(t, self._grid, self._acceleration),
+        return _added(
+            self._motion, np.asarray(t, dtype=float), self._grid, (self._angle, self._rate, self._acceleration)
         )
 
 
@@ -116,12 +112,8 @@ class TwistingSpin:
 
     def at(self, t: ArrayLike) -> SpinState:
         """State of the cube's spin at times (n,), s."""
-        t = np.asarray(t, dtype=float)
-        spin = self._motion.at(t)
-        return SpinState(
-            spin.angle + np.interp(t, self._grid, self._angle),
-            spin.rate + np.interp(t, self._grid, self._rate),
-            spin.acceleration + np.interp(t, self._grid, self._acceleration),
+        return _added(
+            self._motion, np.asarray(t, dtype=float), self._grid, (self._angle, self._rate, self._acceleration)
         )
 
 
@@ -137,3 +129,28 @@ def _numerator(
     return np.array(
         [markov[0], markov[1] + poles[1] * markov[0], markov[2] + poles[1] * markov[1] + poles[2] * markov[0]]
     )
+
+
+def _added(
+    motion: SpinMotion, t: NDArray[np.float64], grid: NDArray[np.float64], more: tuple[NDArray[np.float64], ...]
+) -> SpinState:
+    """Return the state of a motion at times (n,) with angle, rate and acceleration given on an even grid added."""
+    spin = motion.at(t)
+    flat = np.ravel(t)
+    angle, rate, acceleration = _between((flat - grid[0]) / (grid[1] - grid[0]), *more).reshape(3, *t.shape)
+    return SpinState(spin.angle + angle, spin.rate + rate, spin.acceleration + acceleration)
+
+
+@njit(cache=True, nogil=True)
+def _between(places, first, second, third):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Interpolate three series linearly at fractional places, the ends held."""
+    last = len(first) - 1
+    out = np.empty((3, len(places)))
+    for k in range(len(places)):
+        place = min(max(places[k], 0.0), float(last))
+        left = min(int(place), last - 1)
+        share = place - left
+        out[0, k] = first[left] + share * (first[left + 1] - first[left])
+        out[1, k] = second[left] + share * (second[left + 1] - second[left])
+        out[2, k] = third[left] + share * (third[left + 1] - third[left])
+    return out

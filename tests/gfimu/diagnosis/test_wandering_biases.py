@@ -19,16 +19,16 @@ def left_for_a_walk(effects, size, seed):
     segments, fixed = PreparedRuns.build([world.recording], world.twin, ["run"]).segments(world.twin)
     told = []
     found = explain(segments, fixed, 1, instead=wandering_biases.wanders, report=lambda _, text: told.append(text))
-    return found.interrupted, sum(text.startswith("search") for text in told)
+    return found.left_for, sum(text.startswith("search") for text in told)
 
 
 @pytest.mark.parametrize(
     ("effects", "left"),
-    [(("bias_random_walk",), True), (("warm_up",), False), (("gain_drift", "bias"), False), ((), False)],
+    [(("bias_random_walk",), "walk"), (("warm_up",), ""), (("gain_drift", "bias"), ""), ((), "")],
 )
 def test_a_search_is_left_for_a_walk_and_for_nothing_else(effects, left):
-    interrupted, rounds = left_for_a_walk(effects, 1000.0, 91001)
-    assert interrupted == left
+    left_for, rounds = left_for_a_walk(effects, 1000.0, 91001)
+    assert left_for == left
     if left:
         assert rounds == 1
 
@@ -63,7 +63,7 @@ def test_a_search_left_for_a_walk_that_is_none_is_taken_up_again(monkeypatch):
     monkeypatch.setattr(engine, "_SURELY_WRONG", 0.0)  # so that a walk is thought of whatever the first round leaves
     world = draw_world(Case("walks", 91004, ("eccentricity", "clock_error"), 1000.0, duration=20.0))
     found = diagnose([world.recording], world.twin)
-    assert [search.interrupted for search in searches] == [True, False]
+    assert [search.left_for for search in searches] == ["walk", ""]
     assert {cause.effect for cause in found.causes} == {"eccentricity", "clock_error"}
 
 
