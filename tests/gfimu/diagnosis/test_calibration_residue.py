@@ -9,9 +9,16 @@ import pytest
 from numpy.testing import assert_allclose
 
 from gfimu.array import AccelerometerArray
-from gfimu.diagnosis import diagnose
+from gfimu.diagnosis import diagnose, engine
 from gfimu.diagnosis.calibration_residue import TOLERANCE, CalibrationResidue
+from gfimu.diagnosis.engine import explain
+from gfimu.diagnosis.evidence import SCALES
+from gfimu.diagnosis.long_run import explain_any_length
+from gfimu.diagnosis.prepared_runs import PreparedRuns
+from gfimu.diagnosis.refinement import refine
 from gfimu.diagnosis.run import prepare_run
+from gfimu.diagnosis.screening import screen
+from gfimu.diagnosis.search import log_odds_beside_residue
 from gfimu.diagnosis.stretches import make_segments
 from sim.campaign import Measurement, measure
 from sim.effects import make_effect
@@ -98,6 +105,74 @@ def test_a_cause_beside_a_residue_is_named_alone():
     ((_, truth),) = world.truth
     (cause,) = found.causes
     assert abs(cause.parameters["ratio"] - truth["ratio"]) < 4 * cause.std["ratio"]
+
+
+@pytest.fixture
+def screened(segment):
+    """Normal equations of the library about no cause, for a recording with nothing hidden."""
+    fit = refine([segment], (), [()], iterations=8)
+    return screen([segment], fit, [()], 1)
+
+
+def test_odds_beside_a_residue_are_those_of_all_sizes_marginalised_together(screened, segment):
+    """A set beside a residue, against the residue's sizes and the set's integrated out at once."""
+    array = segment.model.array
+    member = next(k for k, one in enumerate(screened.hypotheses) if one.name == "eccentricity")
+    cause = screened.hypotheses[member]
+    columns, spread = [], []
+    for signature in screened.signatures:
+        if signature.family.name in TOLERANCE:
+            prior = np.array([size.prior_std for size in signature.family.sizes(array)])
+            columns += list(signature.columns)
+            spread += list(TOLERANCE[signature.family.name] / prior)
+    basis = np.zeros((len(screened.score), len(columns) + cause.mixing.shape[1]))
+    basis[columns, np.arange(len(columns))] = spread
+    basis[np.ix_(cause.signature.columns, np.arange(len(columns), basis.shape[1]))] = cause.mixing
+    gram, score = basis.T @ screened.gram @ basis, basis.T @ screened.score
+
+    def evidence(scale):
+        """Of the residue at its own spread and the cause at a scale of its prior."""
+        precision = np.append(np.ones(len(columns)), np.full(cause.mixing.shape[1], scale**-2))
+        whole = gram + np.diag(precision)
+        value = 0.5 * score @ np.linalg.solve(whole, score) - 0.5 * np.linalg.slogdet(whole)[1]
+        return value + 0.5 * np.log(precision).sum()
+
+    weights = np.array([0.07, 0.13, 0.14, 0.14, 0.14, 0.13, 0.10, 0.07, 0.05, 0.03])
+    both = np.logaddexp.reduce([evidence(scale) for scale in SCALES] + np.log(weights)) + cause.log_prior
+    residue = slice(len(columns))
+    whole = gram[residue, residue] + np.eye(len(columns))
+    alone = 0.5 * score[residue] @ np.linalg.solve(whole, score[residue]) - 0.5 * np.linalg.slogdet(whole)[1]
+    found = log_odds_beside_residue(screened, [member], TOLERANCE, array)
+    assert found == pytest.approx(max(both, alone), abs=1e-3)
+    assert log_odds_beside_residue(screened, [], TOLERANCE, array) == pytest.approx(alone, abs=1e-6)
+
+
+@pytest.mark.parametrize(("residue", "left_for"), [(True, "residue"), (False, "")])
+def test_a_search_is_left_for_a_residue_that_is_better_than_all_it_may_find(residue, left_for):
+    world = draw_world(Case("reduced", 702, ("tacho_latency",), 1500.0, residue=residue, duration=20.0))
+    segments, fixed = PreparedRuns.build([world.recording], world.twin, ["run"]).segments(world.twin)
+    rounds = []
+    found = explain(segments, fixed, 1, instead=lambda *_: False, report=lambda _, text: rounds.append(text))
+    assert found.left_for == left_for
+    if residue:
+        assert rounds.count("search 2") == 1
+        assert "search 3" not in rounds
+
+
+def test_a_search_left_for_a_residue_that_is_none_is_taken_up_again(monkeypatch):
+    searches = []
+
+    def noted(*args, **kwargs):
+        searches.append(explain_any_length(*args, **kwargs))
+        return searches[-1]
+
+    module = sys.modules[diagnose.__module__]
+    monkeypatch.setattr(module, "explain_any_length", noted)
+    monkeypatch.setattr(engine, "log_odds_beside_residue", lambda *_: np.inf)
+    world = draw_world(Case("reduced", 703, ("eccentricity", "clock_error"), 1000.0, duration=20.0))
+    found = diagnose([world.recording], world.twin)
+    assert [search.left_for for search in searches] == ["residue", ""]
+    assert {cause.effect for cause in found.causes} == {"eccentricity", "clock_error"}
 
 
 def test_a_mode_beside_a_residue_is_named_alone():
