@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 
 from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.free_body.motion import BodyDrive
-from gfimu.diagnosis.model import BasisUnits, EffectFamily, ExpectedNoise, Mode, Play
+from gfimu.diagnosis.model import BasisUnits, EffectFamily, ExpectedNoise, Mode, Play, Ripple
 from gfimu.errors import InputError
 from gfimu.model_files import find_model, read_toml
 from gfimu.units import STANDARD_GRAVITY
 from sim import forward
 from sim.body import body_channels
 from sim.effects import BODY_EFFECTS, EFFECTS, ENCODER_EFFECTS, Effect, apply_effects, make_effect
-from sim.effects.mechanical import Resonance
+from sim.effects.mechanical import Cogging, Resonance
 from sim.effects.sensing import Hysteresis
 from sim.effects.unknown import UnknownTerm
 from sim.world import World
@@ -257,6 +257,15 @@ class Twin:
         own = tuple(effect for effect in self.effects if not isinstance(effect, Hysteresis))
         others = [effect for effect in effects if not isinstance(effect, Hysteresis)]
         return Play(largest.share, largest.value("lost_m_s2"), replace(self, effects=own), others, largest.last_moved)
+
+    def ripple(self, effects: Sequence[Any] = ()) -> Ripple | None:
+        """Return what the table ripples by once effects are added; None where nothing does, or several things do."""
+        ripples = [effect for effect in (*self.effects, *effects) if isinstance(effect, Cogging)]
+        if len(ripples) != 1:
+            return None
+        own = tuple(effect for effect in self.effects if not isinstance(effect, Cogging))
+        others = [effect for effect in effects if not isinstance(effect, Cogging)]
+        return Ripple(ripples[0].steepness, replace(self, effects=own), others, ripples[0].rippled)
 
     def modes(self, effects: Sequence[Any] = ()) -> tuple[Mode, ...]:
         """Return what rings between the table and the cube once effects are added."""

@@ -18,7 +18,8 @@ from scipy.signal import lfilter
 from scipy.sparse import csc_array, csr_array, vstack
 
 from gfimu.diagnosis.drive import AngleSpline
-from gfimu.diagnosis.ringing import Ringing
+from gfimu.diagnosis.ringing import Response, Ringing
+from gfimu.diagnosis.rippling import RippleResponse, Rippling
 
 __all__ = ["DriveJacobian"]
 
@@ -55,6 +56,7 @@ class DriveJacobian:
         weights: NDArray[np.float64],
         delay: _Delay | None = None,
         ringing: Sequence[Ringing] = (),
+        rippling: Rippling | None = None,
     ) -> DriveJacobian:
         """Factor the derivative.
 
@@ -74,6 +76,8 @@ class DriveJacobian:
             Applies the sensing chain's lag to a matrix (n, m); the reference has none.
         ringing : sequence of Ringing
             What rings between the table, which the reference sees, and the array.
+        rippling : Rippling, optional
+            What the table itself ripples by.
         """
         groups: dict[tuple[bytes, bool], list[int]] = {}
         for column, chip in enumerate(chips):
@@ -91,7 +95,7 @@ class DriveJacobian:
             power = np.einsum("snr,snr->r", functions, functions)
             large = power > _LEAST_SHARE * max(float(power.max()), 1e-30)
             kept, functions = vectors[:, large], functions[:, :, large]  # (C, R), (3, n, R)
-            state = _State(spline, times[:, chips[columns[0]]], ringing if sensed else ())
+            state = _State(spline, times[:, chips[columns[0]]], ringing if sensed else (), rippling)
             for place in range(kept.shape[1]):
                 part = state.matrix(functions[:, :, place])
                 parts.append(delay(part) if delay is not None and sensed else part)
@@ -114,12 +118,13 @@ class DriveJacobian:
         play: tuple[float, NDArray[np.intp]],
         delay: _Delay | None = None,
         ringing: Sequence[Ringing] = (),
+        rippling: Rippling | None = None,
     ) -> DriveJacobian:
         """Take the derivative of readings of which a play holds a share, each at the drive of an earlier time.
 
         Parameters
         ----------
-        spline, times, chips, weights, delay, ringing
+        spline, times, chips, weights, delay, ringing, rippling
             As `build` takes them.
         slopes : ndarray, shape (3, n, c + 1)
             The same as there but without the play and the weights of the samples.
@@ -131,7 +136,9 @@ class DriveJacobian:
         share, sources = play
         root = np.sqrt(weights)
         sensed_last = times.shape[1] - 1
-        states = [_State(spline, at, ringing if chip < sensed_last else ()) for chip, at in enumerate(times.T)]
+        states = [
+            _State(spline, at, ringing if chip < sensed_last else (), rippling) for chip, at in enumerate(times.T)
+        ]
         parts = []
         for column, chip in enumerate(chips):
             sensed = bool(chip < sensed_last)
@@ -236,15 +243,23 @@ def _block(part: csr_array, start: int, stop: int) -> tuple[NDArray[np.intp], ND
 class _State:
     """The motion that the array, or the reference, sees at given times as a function of the drive's coefficients."""
 
-    def __init__(self, spline: AngleSpline, t: NDArray[np.float64], ringing: Sequence[Ringing]) -> None:
+    def __init__(
+        self,
+        spline: AngleSpline,
+        t: NDArray[np.float64],
+        ringing: Sequence[Ringing],
+        rippling: Rippling | None,
+    ) -> None:
         self._spline, self._t = spline, t
-        self._rung = [one.response(t) for one in ringing]
+        self._answers: list[Response | RippleResponse] = [one.response(t) for one in ringing]
+        if rippling is not None:
+            self._answers.append(rippling.response(t))
 
     def matrix(self, slopes: NDArray[np.float64]) -> csr_array:
         """Return the matrix (n, m) to Σ slopes · (angle, rate, acceleration); slopes are (3, n)."""
         total = self._spline.matrix(self._t, slopes)
-        for response in self._rung:
-            total = csr_array(total + response.matrix(slopes))
+        for answer in self._answers:
+            total = csr_array(total + answer.matrix(slopes))
         return total
 
 

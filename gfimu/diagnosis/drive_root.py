@@ -17,7 +17,6 @@ that the bands are as wide as the matrix, and where slow noise comes through in 
 
 from __future__ import annotations
 
-from contextlib import nullcontext
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,14 +26,12 @@ from scipy.linalg.blas import dsyrk
 from scipy.sparse import csr_array, diags_array
 
 from gfimu.diagnosis.cholesky import BandFactor, BlockFactor, Factor, WholeFactor
-from gfimu.diagnosis.parallel import wide_algebra
 
 __all__ = ["InverseRoot", "banded"]
 
 _RIDGE = 1e-10
 _WIDE_BANDS = 50  # from which blocks of a dense matrix are faster
 _UNFELT = 1e-9  # of the largest row
-_WIDE = 400  # rows from which several processors are faster than one
 _Border = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 
@@ -161,25 +158,24 @@ def _factored(
     """Return L, V and M, the latter without rows where H was factored whole; None if there are none."""
     size, count, bandwidth = matrix.shape[0], len(rows), _bandwidth(matrix)
     factor: Factor | None
-    with wide_algebra() if count >= _WIDE or bandwidth >= _WIDE_BANDS else nullcontext():
-        if _cost_whole(size, count) < _cost_apart(size, count, bandwidth):
-            whole = _dense(matrix)
-            if count:
-                whole = dsyrk(-1.0, rows, trans=1, beta=1.0, c=whole, lower=1)
-            factor = WholeFactor.of(whole)
-            return None if factor is None else (factor, np.zeros((size, 0)), np.zeros((0, 0)))
-        if isinstance(matrix, csr_array) and bandwidth < _WIDE_BANDS:
-            factor = BandFactor.of(banded(matrix))
-        else:
-            factor = BlockFactor.of(_dense(matrix), bandwidth)
-        if factor is None:
-            return None
-        low = factor.solve(rows.T)
-        if not count:
-            return factor, low, np.zeros((0, 0))
-        left = dsyrk(-1.0, low, trans=1, beta=1.0, c=np.eye(count, order="F"), lower=1, overwrite_c=1)
-        inner, failed = lapack.dpotrf(left, lower=1, clean=1, overwrite_a=1)
-        return None if failed else (factor, low, inner)
+    if _cost_whole(size, count) < _cost_apart(size, count, bandwidth):
+        whole = _dense(matrix)
+        if count:
+            whole = dsyrk(-1.0, rows, trans=1, beta=1.0, c=whole, lower=1)
+        factor = WholeFactor.of(whole)
+        return None if factor is None else (factor, np.zeros((size, 0)), np.zeros((0, 0)))
+    if isinstance(matrix, csr_array) and bandwidth < _WIDE_BANDS:
+        factor = BandFactor.of(banded(matrix))
+    else:
+        factor = BlockFactor.of(_dense(matrix), bandwidth)
+    if factor is None:
+        return None
+    low = factor.solve(rows.T)
+    if not count:
+        return factor, low, np.zeros((0, 0))
+    left = dsyrk(-1.0, low, trans=1, beta=1.0, c=np.eye(count, order="F"), lower=1, overwrite_c=1)
+    inner, failed = lapack.dpotrf(left, lower=1, clean=1, overwrite_a=1)
+    return None if failed else (factor, low, inner)
 
 
 def _cost_whole(size: int, count: int) -> float:

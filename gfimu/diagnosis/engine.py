@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -10,7 +11,7 @@ import numpy as np
 
 from gfimu.diagnosis.adequacy import LEFT_OVER_ODDS, left_over
 from gfimu.diagnosis.calibration_residue import tolerance_of
-from gfimu.diagnosis.causes import Cause
+from gfimu.diagnosis.causes import Cause, effects_of_run
 from gfimu.diagnosis.explanation import Explanation
 from gfimu.diagnosis.far_starts import every_mode, from_far, with_honest_mode
 from gfimu.diagnosis.fit import Fit, Start, segments_at
@@ -37,6 +38,7 @@ _CLOSE = 12.0
 _GROSS = 150.0
 _WORTH_REFINING = -6.0
 _ITERATIONS = 7
+_RIPPLED = 12  # iterations with a drive that knows how a strong ripple answers it
 _FEWEST_ROUNDS = 2  # before a search that explains more than it leaves may be given up
 _SURELY_WRONG = 1.02  # misfit per observation
 _MUCH, _LITTLE, _SHARE = 500.0, 10.0, 0.1  # nats that are left: at least; to those of a round; to the misfit explained
@@ -180,6 +182,8 @@ class _Search:
         if wider is not winner:
             winner, settled = wider, False
             self._fitted = refine(segments, self._start, fixed, drives=winner.drives, iterations=8)
+        if not self._is_fair(winner):
+            winner = self._rippled(winner)
         # What a gross misfit leaves is no bias instability.
         change = learn_noise(segments, winner, fixed, slow=self._is_fair(winner))
         tune_drives(segments, winner, fixed)
@@ -188,7 +192,7 @@ class _Search:
             self._fair, settled = True, False
             if self._cut_by_reference and any("order" in cause.shape for cause in self._best.causes):
                 # What bent the drive of the reference was no motion but its ripple.
-                self._best = uncut_drives(segments, self._best, fixed)
+                self._best = self._rippled(uncut_drives(segments, self._best, fixed))
             sharper = sharpen_drives(segments, self._best, fixed)
             # On the same knots, and under the same prior of the drive, as what it is compared with.
             self._best = refine(segments, sharper.causes, fixed, drives=sharper.drives, iterations=6)
@@ -209,8 +213,8 @@ class _Search:
         candidates, _, blocks = found
         array = self._segments[0].model.array
         tolerance = tolerance_of(self._segments[0].model.families())
-        # What a mode leaves that the drives do not know ringing passes for anything.
-        if not (tolerance and self._fair) or self._may_hear_mode_ring:
+        # What a mode or a strong ripple leaves that the drives do not know answering them passes for anything.
+        if not (tolerance and self._fair) or self._may_hear_mode_ring or self._ripples(self._best):
             return False
         if any(segment.rounding.channels for segment in self._segments):
             return False
@@ -288,6 +292,18 @@ class _Search:
         sure = mode.power > _PLAIN**2
         return sure and fit.objective < _SURELY_WRONG * self._observations and self._left(fit) < LEFT_OVER_ODDS
 
+    def _rippled(self, fit: Fit) -> Fit:
+        """Fit a set anew with drives that know how a torque ripple of it answers them, where it has a strong one."""
+        if not self._ripples(fit):
+            return fit
+        return refine(self._segments, fit.causes, self._fixed, drives=fit.drives, iterations=_RIPPLED, rippling=True)
+
+    def _ripples(self, fit: Fit) -> bool:
+        """Tell whether the torque of a set's table ripples strongly."""
+        segment = self._segments[0]
+        present = effects_of_run(fit.causes, segment.model.array, segment.index)
+        return segment.felt_ripple([*self._fixed[0], *present]) is not None
+
     def _explained(self) -> float:
         """Return how much the best set takes off the misfit of the start, under the noise that it leaves."""
         if self._best.key == self._fitted.key:
@@ -330,9 +346,9 @@ class _Search:
                 drives = [drive + move for drive, move in zip(self._best.drives, moves, strict=True)]
             else:
                 causes = list(self._tried[key].causes)
-            # Ripples locked to the angle lose their phase where the angle of a drive that lacks them has drifted.
+            # Ripples locked to the angle lose their phase where the drive's angle has drifted for want of them.
             ripples = {cause.name for cause in causes if "order" in cause.shape}
-            again = [self._fitted] if new and ripples - self._best.names else []
+            again = [self._fitted] if new and ripples and not (self._fair and ripples <= self._best.names) else []
             for base in (self._best, *again):
                 keys.append(key)
                 sets.append(causes)
@@ -374,6 +390,8 @@ class _Search:
             if worth < _FAINT and (self._loose or self._left(best) < worth):
                 best = every_mode(segments, best, fixed)
             best = with_honest_mode(segments, best, fixed)
+        # What sets are compared by is of the same derivative for all.
+        best = replace(self._rippled(best), log_posterior=best.log_posterior)
         return best, without, list(unique.values())
 
     def _left(self, fit: Fit, *, smooth: bool = True) -> float:

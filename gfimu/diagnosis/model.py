@@ -22,8 +22,11 @@ __all__ = [
     "Mode",
     "ModelWithModes",
     "ModelWithPlay",
+    "ModelWithRipple",
     "Pattern",
     "Play",
+    "Ripple",
+    "RippledMotion",
     "Size",
     "Spin",
     "SpinState",
@@ -193,6 +196,57 @@ class Play:
     sources: Callable[[NDArray[np.float64]], NDArray[np.intp]]
 
 
+class RippledMotion(Protocol):
+    """Motion of a table whose drive ripples, which depends on all that was commanded before."""
+
+    @property
+    def grid(self) -> NDArray[np.float64]:
+        """Times at which it is computed, s, shape (g,)."""
+        ...
+
+    def at(self, t: ArrayLike) -> SpinState:
+        """Return the state at times (n,), s."""
+        ...
+
+    def derivative(
+        self,
+        first: NDArray[np.intp],
+        angle: NDArray[np.float64],
+        rate: NDArray[np.float64],
+        size: int,
+        t: NDArray[np.float64],
+    ) -> tuple[NDArray[np.float64], NDArray[np.intp], NDArray[np.intp]]:
+        """Differentiate what the ripple adds at times ``t`` by the ``size`` coefficients of the command.
+
+        Given are, at each time of the grid, the first coefficient that matters (g,) and what angle and rate take from
+        it and those after it (g, p); returned are the derivatives of angle, rate and acceleration (3, e), coefficient
+        by coefficient, the time of each (e,) and where each coefficient's end (m + 1,).
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class Ripple:
+    """A ripple of the drive's torque that is locked to the table's angle.
+
+    Parameters
+    ----------
+    steepness : float
+        Most that its torque changes with the angle, relative to what takes it back.
+    model : WorldModel
+        The simulation without the ripple.
+    effects : sequence of Effect
+        The effects that were added, without the ripple.
+    motion : callable
+        From the commanded motion and the times (n,), s, of the recording, the table's motion.
+    """
+
+    steepness: float
+    model: WorldModel
+    effects: Sequence[Effect]
+    motion: Callable[[Spin, NDArray[np.float64]], RippledMotion]
+
+
 @dataclass(frozen=True)
 class Mode:
     """A mode between table and array that the table's angular acceleration α rings: φ'' + 2ζω₀φ' + ω₀²φ = −α.
@@ -282,6 +336,15 @@ class ModelWithPlay(Protocol):
 
     def play(self, effects: Sequence[Effect] = ()) -> Play | None:
         """Return what holds a share of the readings once effects are added; None where nothing does."""
+        ...
+
+
+@runtime_checkable
+class ModelWithRipple(Protocol):
+    """A `WorldModel` whose table may ripple with its angle; others need not say so."""
+
+    def ripple(self, effects: Sequence[Effect] = ()) -> Ripple | None:
+        """Return what the table ripples by once effects are added; None where nothing does, or several things do."""
         ...
 
 

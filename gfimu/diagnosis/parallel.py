@@ -7,18 +7,17 @@ import os
 import pickle
 import signal
 import sys
-import threading
 import warnings
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager
 from functools import cache
 from multiprocessing.connection import Connection, wait
 from typing import Any, TypeVar
 
 from threadpoolctl import ThreadpoolController
 
-__all__ = ["each_apart", "one_blas_thread", "over_segments", "wide_algebra"]
+__all__ = ["each_apart", "one_blas_thread", "over_segments"]
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -163,13 +162,6 @@ def one_blas_thread() -> AbstractContextManager[Any]:
     processors takes a quarter longer with them.
     """
     return _thread_pools().limit(limits=1, user_api="blas")  # type: ignore[no-any-return]
-
-
-def wide_algebra() -> AbstractContextManager[Any]:
-    """Let one large product take all processors while the context lasts, where nothing else is at work."""
-    if threading.current_thread() is not threading.main_thread() or _processors() < 2:
-        return nullcontext()
-    return _thread_pools().limit(limits=_processors(), user_api="blas")  # type: ignore[no-any-return]
 
 
 @cache

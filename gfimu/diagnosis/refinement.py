@@ -45,6 +45,7 @@ def refine(
     iterations: int = 6,
     shapes: bool = True,
     other: Start | None = None,
+    rippling: bool = False,
 ) -> Fit:
     """Fit a set of causes with the full simulation.
 
@@ -64,6 +65,8 @@ def refine(
         Whether shape parameters are fitted too.
     other : Start, optional
         Another start of the same set, taken if the simulation comes closer to the data there.
+    rippling : bool
+        Whether the drive's derivative knows how a torque ripple answers the drive, which takes several times as long.
     """
     kept = [segment.coefficients for segment in segments]
     ringing = [segment.ringing for segment in segments]
@@ -82,17 +85,20 @@ def refine(
             start = _descend(segments, fixed, start, iterations).state
             for segment in segments:
                 segment.holding = True
+        for segment in segments:
+            segment.rippling = rippling
         point = _descend(segments, fixed, start, iterations)
-        if any(ringing) and _rings(segments, fixed, point.state):
+        if rippling or (any(ringing) and _rings(segments, fixed, point.state)):
             # A mode leaves less freedom to a drive that it rings for, which a prior learnt with that mode would give
             # back: the volumes that sets are compared by are those of a derivative that does not know.
             for segment in segments:
-                segment.ringing = False
+                segment.ringing = segment.rippling = False
             point = replace(point, log_volume=_evaluate(segments, fixed, point.state).log_volume)
         return _result(segments, point)
     finally:
         for segment, drive, told in zip(segments, kept, ringing, strict=True):
-            segment.coefficients, segment.holding, segment.ringing = drive, True, told
+            segment.coefficients, segment.ringing = drive, told
+            segment.holding, segment.rippling = True, False
 
 
 def refine_each(

@@ -29,8 +29,19 @@ from gfimu.diagnosis.drive_jacobian import DriveJacobian, lagged
 from gfimu.diagnosis.drive_prior import DrivePrior
 from gfimu.diagnosis.knots import KNOT_SPACING, intervals_to_cut
 from gfimu.diagnosis.linearisation import DriveElimination, DriveEquations, Linearisation
-from gfimu.diagnosis.model import Effect, Mode, ModelWithModes, ModelWithPlay, Play, Spin, WorldModel
+from gfimu.diagnosis.model import (
+    Effect,
+    Mode,
+    ModelWithModes,
+    ModelWithPlay,
+    ModelWithRipple,
+    Play,
+    Ripple,
+    Spin,
+    WorldModel,
+)
 from gfimu.diagnosis.ringing import Ringing
+from gfimu.diagnosis.rippling import Rippling
 from gfimu.diagnosis.roughness import Roughness
 from gfimu.diagnosis.rounding import COARSE, Steps
 from gfimu.diagnosis.run import Run, difference_noise
@@ -55,6 +66,7 @@ _STATE_STEPS = (1e-5, 1e-4, 1e-3)
 _SAME_PHASE = 0.1  # rad of a mode between the first chip and the last
 _SLOW_ROUNDS, _SLOW_STEP = 10, 0.05  # to the most probable slow noise; of the white noise, below which it is found
 _FELT_PLAY = 2.0  # standard deviations of the noise
+_FELT_STEEPNESS = 0.1
 
 
 class Segment:
@@ -98,6 +110,8 @@ class Segment:
         self._take(Roughness(spline, _START_FACTOR))
         # Whether the derivative knows what a play holds.
         self.holding = True
+        # Whether it knows how a torque ripple answers the drive, which takes several times as long.
+        self.rippling = False
         # Whether it knows what rings on, which takes more time: from the start where the model has a mode already.
         self.ringing = bool(self.felt_modes(()))
         # Fits are compared under the same knots, so these are chosen once.
@@ -318,9 +332,12 @@ class Segment:
 
     def motion(self, effects: Sequence[Effect], spin: Spin | None = None) -> Spin:
         """Return the table's motion for a drive (the present one) under effects."""
-        drive = self.spin if spin is None else spin
+        drive, gain = self.spin if spin is None else spin, self._gain(effects)
+        return drive if gain == 1.0 else ScaledSpin(drive, gain)
+
+    def _gain(self, effects: Sequence[Effect]) -> float:
         gain = self.model.reference_gain(effects)
-        return drive if gain == 1.0 else ScaledSpin(drive, np.copysign(max(abs(gain), _LEAST_GAIN), gain))
+        return float(np.copysign(max(abs(gain), _LEAST_GAIN), gain))
 
     def reference_prediction(self, effects: Sequence[Effect]) -> NDArray[np.float64]:
         """Predict channels and reference, shape (n, c + 1), with the drive that the reference alone gives."""
@@ -444,10 +461,19 @@ class Segment:
         # The state of the instant moves what a play lets through, that of an earlier one what it holds.
         model, moving = (self.model, effects) if play is None else (play.model, play.effects)
         unheld = base if play is None else self._predicted_by(model, moving, self.motion(effects))
+        ripple, rippling = self.felt_ripple(moving, model) if self.rippling else None, None
         slopes = np.empty((3, *base.shape))
+        if ripple is not None:
+            # The state of the instant is that of the table, which the drive of earlier ones moves too.
+            model, moving = ripple.model, ripple.effects
+            table = ripple.motion(self.motion(effects), self.run.t)
+            rippling, gain = Rippling(self.spline, table), self._gain(effects)
         for place, step in enumerate(_STATE_STEPS):
-            moved = self._predicted_by(model, moving, self.motion(effects, ShiftedSpin(self.spin, place, step)))
-            slopes[place] = (moved - unheld) / step
+            if ripple is None:
+                motion = self.motion(effects, ShiftedSpin(self.spin, place, step))
+            else:
+                motion = ShiftedSpin(table, place, step / gain)
+            slopes[place] = (self._predicted_by(model, moving, motion) - unheld) / step
         times = self.model.sample_times(self.run.t, effects)
         lag = self.model.sensing_lag(effects)
         delay = partial(lagged, samples=lag / self.run.sample_period) if lag > 0 else None
@@ -459,8 +485,12 @@ class Segment:
             times[:, :-1] = times[:, :-1].mean(axis=1, keepdims=True)  # one ringing for all chips, not one for each
         if play is not None:
             held = (play.share, play.sources(unheld[:, :-1]))
-            return DriveJacobian.held(self.spline, slopes, times, chips, weights, self.row_weight, held, delay, ringing)
-        return DriveJacobian.build(self.spline, slopes * self.row_weight, times, chips, weights, delay, ringing)
+            return DriveJacobian.held(
+                self.spline, slopes, times, chips, weights, self.row_weight, held, delay, ringing, rippling
+            )
+        return DriveJacobian.build(
+            self.spline, slopes * self.row_weight, times, chips, weights, delay, ringing, rippling
+        )
 
     def felt_modes(self, effects: Sequence[Effect]) -> Sequence[Mode]:
         """Return what rings between the table and the array."""
@@ -471,6 +501,12 @@ class Segment:
         play = self.model.play(effects) if isinstance(self.model, ModelWithPlay) else None
         noise = self.levels.of_reading
         return None if play is None or play.lost < _FELT_PLAY * noise else play
+
+    def felt_ripple(self, effects: Sequence[Effect], model: WorldModel | None = None) -> Ripple | None:
+        """Return what the table ripples by, where that holds the table by more than a little of what the servo does."""
+        model = model or self.model
+        ripple = model.ripple(effects) if isinstance(model, ModelWithRipple) else None
+        return None if ripple is None or ripple.steepness < _FELT_STEEPNESS else ripple
 
     def whitened_products(
         self, linear: Linearisation, signatures: NDArray[np.float64]

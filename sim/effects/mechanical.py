@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.model import Mode
 from sim.effects.base import Effect, Pattern, Size, chip_patterns
-from sim.effects.table_dynamics import RippledSpin, TwistingSpin
+from sim.effects.table_dynamics import SERVO_STIFFNESS, RippledSpin, TwistingSpin
 from sim.motion import SpinMotion
 from sim.world import Nod, World
 
@@ -288,14 +289,18 @@ class Cogging(Effect):
         """Return the contract's keys."""
         return ("amplitude_rad_s2", "order", "phase_rad")
 
+    @property
+    def steepness(self) -> float:
+        """Most that its torque changes with the angle, relative to the servo's."""
+        return abs(self.value("amplitude_rad_s2")) * self.value("order", 1.0) / SERVO_STIFFNESS
+
+    def rippled(self, motion: SpinMotion | Any, t: NDArray[np.float64]) -> RippledSpin:
+        """Return the table's motion under a command over times (n,), s."""
+        return RippledSpin(motion, t, self.value("amplitude_rad_s2"), self.value("order", 1.0), self.value("phase_rad"))
+
     def apply(self, world: World) -> World:
         """Add the ripple to the table's motion."""
-        ripple = (self.value("amplitude_rad_s2"), self.value("order", 1.0), self.value("phase_rad"))
-
-        def step(motion: SpinMotion, t: NDArray[np.float64]) -> SpinMotion:
-            return RippledSpin(motion, t, *ripple)
-
-        return world.changed(motion_steps=(*world.motion_steps, step))
+        return world.changed(motion_steps=(*world.motion_steps, self.rippled))
 
 
 class Resonance(Effect):

@@ -150,6 +150,23 @@ def _faint() -> list[Case]:
     ]
 
 
+def _fresh_faint() -> list[Case]:
+    """Return sizes from hardly to plainly seen: seeds on which nothing was developed, for the stated probabilities."""
+    rng = np.random.default_rng(96_000)
+    names = [name for name in EFFECTS if name not in SIZELESS]
+    sizes = np.exp(rng.uniform(np.log(8.0), np.log(30.0), 280))
+    return [
+        Case(
+            "fresh_faint",
+            96_000 + number,
+            (names[number % len(names)],),
+            float(size),
+            **_noise_of(number // 3 + number),
+        )
+        for number, size in enumerate(sizes)
+    ]
+
+
 def _nulls() -> list[Case]:
     return [
         Case("nulls", 20_000 + 1000 * level + number, **_noise_of(level)) for number in range(200) for level in range(3)
@@ -229,6 +246,7 @@ STUDIES: dict[str, Callable[[], list[Case]]] = {
     "singles": _singles,
     "fresh_singles": _fresh_singles,
     "faint": _faint,
+    "fresh_faint": _fresh_faint,
     "nulls": _nulls,
     "long_nulls": _long_nulls,
     "threshold_nulls": _threshold_nulls,
