@@ -308,3 +308,34 @@ class Silent(Twin):
 
     def modes(self, effects=()):
         return ()
+
+
+def test_the_derivative_knows_how_a_strong_ripple_answers_the_drive():
+    """Against a small change of each coefficient, also where the reference's gain is off and chips are late."""
+    twin = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
+    effects = [
+        make_effect("cogging", {"amplitude_rad_s2": 8.0, "order": 10.0, "phase_rad": 0.7}),
+        make_effect("tacho_scale", {"ratio": 0.04}),
+        make_effect("channel_skew", {"per_chip_s": 2e-3}),
+    ]
+    recording = measure(np.random.default_rng(6), twin, effects, Measurement(duration=8.0))
+    (segment,) = make_segments(twin, [prepare_run(recording, twin)])
+    segment.prepare_weights()
+    base = segment.coefficients
+    off = {}
+    for segment.rippling in (False, True):
+        jacobian = segment.linearise(effects).jacobian
+        off[segment.rippling] = []
+        for column in (40, 90, 140):
+            step = np.zeros(segment.spline.size)
+            step[column] = 1.0
+            told = jacobian.forward(step)
+            segment.coefficients = base + 1e-6 * step
+            up = segment.predict(effects)
+            segment.coefficients = base - 1e-6 * step
+            change = (up - segment.predict(effects)) / 2e-6
+            segment.coefficients = base
+            off[segment.rippling].append(np.abs(told - change).max() / np.abs(change).max())
+    assert max(off[True]) < 5e-4
+    assert min(off[False]) > 4e-3
+    assert max(off[False]) > 0.03

@@ -118,6 +118,17 @@ def test_torque_ripple_is_told_as_uncertain_as_the_servo_that_answers_it():
     assert max(abs(z) for z in cause["z"].values()) < 3.0  # 4.2 with the covariance alone
 
 
+def test_a_strong_torque_ripple_is_told_with_its_phase():
+    """It holds its table: steps of a drive that does not know that ended 0.8 rad off."""
+    world = draw_world(Case("reduced", 709, ("cogging",), 1500.0, duration=20.0))
+    (cause,) = diagnose([world.recording], world.twin).causes
+    ((name, truth),) = world.truth
+    assert cause.effect == name == "cogging"
+    assert cause.parameters["amplitude_rad_s2"] == pytest.approx(truth["amplitude_rad_s2"], rel=0.01)
+    off = cause.parameters["phase_rad"] - truth["phase_rad"]
+    assert abs((off + np.pi) % (2 * np.pi) - np.pi) < 0.1
+
+
 def test_a_mode_that_pushes_its_table_back_is_named_alone():
     """A drive that does not know how the mode rings on is bent to ring itself, and leaves something."""
     outcome = run_case(Case("reduced", 511, ("resonance",), 600.0, duration=20.0), OTHER_GENERATOR)
