@@ -219,6 +219,8 @@ class _Search:
         if any(segment.rounding.channels for segment in self._segments):
             return False
         places = {(one.name, one.pattern): number for number, one in enumerate(blocks.hypotheses)}
+        if any(cause.key not in places for cause in self._best.causes):
+            return False
         members = [places[cause.key] for cause in self._best.causes]
         beside = log_odds_beside_residue(self._signatures, members, tolerance, array)
         if beside > candidates[0].log_odds + _RESIDUE:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import block_diag, solve_triangular
+from scipy.linalg import block_diag, lapack, solve_triangular
 
 from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.evidence import SCALES, inverse, log_evidence, log_evidence_each, posterior
@@ -162,6 +162,8 @@ def log_odds_beside_residue(
 ) -> float:
     """Return the log odds of a set beside a calibration residue, without members that it makes superfluous.
 
+    They are −∞ where rounding errors leave the normal equations no proper ones.
+
     Parameters
     ----------
     signatures : SignatureSet
@@ -181,7 +183,9 @@ def log_odds_beside_residue(
             spread.append(np.tile(tolerance[signature.family.name] / prior, len(signature.columns) // len(prior)))
     places, scale = np.concatenate(columns), np.concatenate(spread)
     information = signatures.gram[np.ix_(places, places)] * np.outer(scale, scale) + np.eye(len(scale))
-    root = np.linalg.cholesky(0.5 * (information + information.T))
+    root, failed = lapack.dpotrf(0.5 * (information + information.T), lower=1, clean=1)
+    if failed:
+        return -np.inf
     low = solve_triangular(root, scale[:, None] * signatures.gram[places], lower=True)  # (q, P)
     forward = solve_triangular(root, scale * signatures.score[places], lower=True)
     alone = 0.5 * float(forward @ forward) - float(np.log(root.diagonal()).sum())
