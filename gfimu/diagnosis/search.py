@@ -162,7 +162,7 @@ def log_odds_beside_residue(
 ) -> float:
     """Return the log odds of a set beside a calibration residue, without members that it makes superfluous.
 
-    They are −∞ where rounding errors leave the normal equations no proper ones.
+    They are −∞ where nothing of a residue is seen, or rounding errors leave the normal equations no proper ones.
 
     Parameters
     ----------
@@ -181,6 +181,8 @@ def log_odds_beside_residue(
             prior = np.array([size.prior_std for size in signature.family.sizes(array)])
             columns.append(signature.columns)
             spread.append(np.tile(tolerance[signature.family.name] / prior, len(signature.columns) // len(prior)))
+    if not columns:
+        return -np.inf
     places, scale = np.concatenate(columns), np.concatenate(spread)
     information = signatures.gram[np.ix_(places, places)] * np.outer(scale, scale) + np.eye(len(scale))
     root, failed = lapack.dpotrf(0.5 * (information + information.T), lower=1, clean=1)

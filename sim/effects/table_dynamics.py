@@ -55,7 +55,7 @@ class RippledSpin:
         a, b, *_ = cont2discrete((*system, np.eye(2), np.zeros((2, 1))), step)
         self._a, self._b = a, b[:, 0]
         self._angle, self._rate, self._acceleration = _servo_error(
-            torque, order * spin.angle + phase, self._order, a, self._b, SERVO_STIFFNESS, _DRAG
+            torque, order * spin.angle + phase, self._order, a, self._b
         )
 
     def at(self, t: ArrayLike) -> SpinState:
@@ -112,8 +112,8 @@ class RippledSpin:
         starts = np.searchsorted(first, np.arange(size) - angle.shape[1] + 1)
         stops = np.minimum(np.searchsorted(first, np.arange(size), side="right"), last)
         places = np.clip((t - self._grid[0]) / step, 0.0, float(last))
-        values, rows, ends = _follow(starts, stops, first, angle, rate, steep, driven, self._a, self._b, places)
-        return values, rows, ends
+        system = (first, angle, rate, steep, driven, self._a, self._b)
+        return _follow(starts, stops, *system, places)  # type: ignore[no-any-return]
 
 
 @njit(cache=True, nogil=True)
@@ -158,7 +158,7 @@ def _follow(starts, stops, first, angle, rate, steep, driven, a, b, places):  # 
 
 
 @njit(cache=True, nogil=True)
-def _servo_error(torque, turns, order, a, b, stiffness, damping):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _servo_error(torque, turns, order, a, b):  # type: ignore[no-untyped-def]  # pragma: no cover
     """Integrate the error of the servo: the torque of a step is the mean of its ends, the far one predicted."""
     n = len(torque)
     angle, rate, acceleration = np.zeros(n), np.zeros(n), np.zeros(n)
@@ -172,7 +172,7 @@ def _servo_error(torque, turns, order, a, b, stiffness, damping):  # type: ignor
         rate[k + 1] = a[1, 0] * angle[k] + a[1, 1] * rate[k] + b[1] * mean
         # What the mean moves the angle by beside the prediction is of the third order in the step.
         here = there
-        acceleration[k + 1] = here - stiffness * angle[k + 1] - damping * rate[k + 1]
+        acceleration[k + 1] = here - SERVO_STIFFNESS * angle[k + 1] - _DRAG * rate[k + 1]
     return angle, rate, acceleration
 
 
