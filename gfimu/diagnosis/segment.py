@@ -6,10 +6,6 @@ weight W and the roughness prior R, the drive is eliminated by
     H = JᵀWJ + R,  H⁻¹ = VᵀV,  X = V JᵀWA,  x = V(JᵀWr − Rd),  G = AᵀWA − XᵀX,  b = AᵀWr − Xᵀx,
 
 so that everything after it is small algebra on G and b, whatever the length of the run.
-
-The drive is held in units of the reference: where effects change the reference's gain, the motion is the drive over
-that gain. Held in true units, a gain that shrinks the drive would be paid for it by the roughness prior, once per
-coefficient.
 """
 
 from __future__ import annotations
@@ -17,34 +13,30 @@ from __future__ import annotations
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.diagnosis.calibration_residue import CalibrationResidue
 from gfimu.diagnosis.coloured_noise import CosineBasis, NoiseLevels
-from gfimu.diagnosis.drive import AngleSpline, ScaledSpin, ShiftedSpin
-from gfimu.diagnosis.drive_jacobian import DriveJacobian, lagged
+from gfimu.diagnosis.drive import AngleSpline, ShiftedSpin
+from gfimu.diagnosis.drive_derivative import Remembered, differentiate, felt_modes, felt_play, felt_ripple
+from gfimu.diagnosis.drive_jacobian import DriveJacobian
 from gfimu.diagnosis.drive_prior import DrivePrior
 from gfimu.diagnosis.knots import KNOT_SPACING, intervals_to_cut
 from gfimu.diagnosis.linearisation import DriveElimination, DriveEquations, Linearisation
 from gfimu.diagnosis.model import (
     Effect,
     Mode,
-    ModelWithModes,
-    ModelWithPlay,
-    ModelWithRipple,
     Play,
     Ripple,
     Spin,
     WorldModel,
 )
-from gfimu.diagnosis.ringing import Ringing
-from gfimu.diagnosis.rippling import Rippling
 from gfimu.diagnosis.roughness import Roughness
 from gfimu.diagnosis.rounding import COARSE, Steps
 from gfimu.diagnosis.run import Run, difference_noise
+from gfimu.diagnosis.simulation import Simulation
 from gfimu.diagnosis.slow_modes import SlowModes, WeighedModes
 
 __all__ = ["Segment", "known_walk"]
@@ -61,12 +53,7 @@ _MOST_CUTS_BY_REFERENCE = 3
 _BEYOND_CHANCE = 3.0  # times what noise alone, drawn once, bends the drive of the reference by
 _FACTOR_STEPS = 4
 _REST_FACTOR = 1.3
-_LEAST_GAIN = 0.05
-_STATE_STEPS = (1e-5, 1e-4, 1e-3)
-_SAME_PHASE = 0.1  # rad of a mode between the first chip and the last
 _SLOW_ROUNDS, _SLOW_STEP = 10, 0.05  # to the most probable slow noise; of the white noise, below which it is found
-_FELT_PLAY = 2.0  # standard deviations of the noise
-_FELT_STEEPNESS = 0.1
 
 
 class Segment:
@@ -317,27 +304,16 @@ class Segment:
 
     def predict(self, effects: Sequence[Effect], spin: Spin | None = None) -> NDArray[np.float64]:
         """Predict channels and reference, shape (n, c + 1)."""
-        return self._predicted_by(self.model, effects, self.motion(effects, spin))
+        return self.simulation.predict(effects, self.spin if spin is None else spin)
 
-    def _predicted_by(self, model: WorldModel, effects: Sequence[Effect], motion: Spin) -> NDArray[np.float64]:
-        channels, reference = model.predict(
-            motion,
-            self.run.t,
-            effects=effects,
-            temperature=self.run.temperature,
-            mounting=self.run.mounting,
-            start=self.start,
-        )
-        return np.column_stack([channels, reference])
+    def motion(self, effects: Sequence[Effect]) -> Spin:
+        """Return the table's motion for the present drive under effects."""
+        return self.simulation.motion(effects, self.spin)
 
-    def motion(self, effects: Sequence[Effect], spin: Spin | None = None) -> Spin:
-        """Return the table's motion for a drive (the present one) under effects."""
-        drive, gain = self.spin if spin is None else spin, self._gain(effects)
-        return drive if gain == 1.0 else ScaledSpin(drive, gain)
-
-    def _gain(self, effects: Sequence[Effect]) -> float:
-        gain = self.model.reference_gain(effects)
-        return float(np.copysign(max(abs(gain), _LEAST_GAIN), gain))
+    @property
+    def simulation(self) -> Simulation:
+        """The model of this stretch."""
+        return Simulation(self.model, self.run, self.start)
 
     def reference_prediction(self, effects: Sequence[Effect]) -> NDArray[np.float64]:
         """Predict channels and reference, shape (n, c + 1), with the drive that the reference alone gives."""
@@ -457,56 +433,33 @@ class Segment:
 
     def _jacobian(self, effects: Sequence[Effect], base: NDArray[np.float64]) -> DriveJacobian:
         """Differentiate the prediction ``base`` with respect to the drive's state and chain with the spline."""
-        play = self.felt_play(effects) if self.holding else None
-        # The state of the instant moves what a play lets through, that of an earlier one what it holds.
-        model, moving = (self.model, effects) if play is None else (play.model, play.effects)
-        unheld = base if play is None else self._predicted_by(model, moving, self.motion(effects))
-        ripple, rippling = self.felt_ripple(moving, model) if self.rippling else None, None
-        slopes = np.empty((3, *base.shape))
-        if ripple is not None:
-            # The state of the instant is that of the table, which the drive of earlier ones moves too.
-            model, moving = ripple.model, ripple.effects
-            table = ripple.motion(self.motion(effects), self.run.t)
-            rippling, gain = Rippling(self.spline, table), self._gain(effects)
-        for place, step in enumerate(_STATE_STEPS):
-            if ripple is None:
-                motion = self.motion(effects, ShiftedSpin(self.spin, place, step))
-            else:
-                motion = ShiftedSpin(table, place, step / gain)
-            slopes[place] = (self._predicted_by(model, moving, motion) - unheld) / step
-        times = self.model.sample_times(self.run.t, effects)
-        lag = self.model.sensing_lag(effects)
-        delay = partial(lagged, samples=lag / self.run.sample_period) if lag > 0 else None
-        chips = np.append(self.model.array.chip_of_channel, times.shape[1] - 1)
-        weights = self.inverse_variance
-        modes = self.felt_modes(effects) if self.ringing else ()
-        ringing = [Ringing(self.spline, mode, float(self.run.t[0])) for mode in modes]
-        if modes and np.ptp(times[:, :-1], axis=1).max() * max(mode.natural for mode in modes) < _SAME_PHASE:
-            times[:, :-1] = times[:, :-1].mean(axis=1, keepdims=True)  # one ringing for all chips, not one for each
-        if play is not None:
-            held = (play.share, play.sources(unheld[:, :-1]))
-            return DriveJacobian.held(
-                self.spline, slopes, times, chips, weights, self.row_weight, held, delay, ringing, rippling
-            )
-        return DriveJacobian.build(
-            self.spline, slopes * self.row_weight, times, chips, weights, delay, ringing, rippling
+        remembered = Remembered(
+            play=self.felt_play(effects) if self.holding else None,
+            modes=self.felt_modes(effects) if self.ringing else (),
+            ripple=self.rippling,
+        )
+        return differentiate(
+            self.simulation,
+            effects,
+            self.spline,
+            self.spin,
+            base,
+            remembered,
+            self.inverse_variance,
+            self.row_weight,
         )
 
     def felt_modes(self, effects: Sequence[Effect]) -> Sequence[Mode]:
         """Return what rings between the table and the array."""
-        return self.model.modes(effects) if isinstance(self.model, ModelWithModes) else ()
+        return felt_modes(self.model, effects)
 
     def felt_play(self, effects: Sequence[Effect]) -> Play | None:
         """Return what holds a share of the readings, where that is more than their noise."""
-        play = self.model.play(effects) if isinstance(self.model, ModelWithPlay) else None
-        noise = self.levels.of_reading
-        return None if play is None or play.lost < _FELT_PLAY * noise else play
+        return felt_play(self.model, effects, self.levels.of_reading)
 
-    def felt_ripple(self, effects: Sequence[Effect], model: WorldModel | None = None) -> Ripple | None:
-        """Return what the table ripples by, where that holds the table by more than a little of what the servo does."""
-        model = model or self.model
-        ripple = model.ripple(effects) if isinstance(model, ModelWithRipple) else None
-        return None if ripple is None or ripple.steepness < _FELT_STEEPNESS else ripple
+    def felt_ripple(self, effects: Sequence[Effect]) -> Ripple | None:
+        """Return what the table ripples by, where that is strong."""
+        return felt_ripple(self.model, effects)
 
     def whitened_products(
         self, linear: Linearisation, signatures: NDArray[np.float64]

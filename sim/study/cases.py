@@ -154,7 +154,7 @@ def _fresh_faint() -> list[Case]:
     """Return sizes from hardly to plainly seen: seeds on which nothing was developed, for the stated probabilities."""
     rng = np.random.default_rng(96_000)
     names = [name for name in EFFECTS if name not in SIZELESS]
-    sizes = np.exp(rng.uniform(np.log(8.0), np.log(30.0), 280))
+    sizes = np.exp(rng.uniform(np.log(8.0), np.log(30.0), 1120))
     return [
         Case(
             "fresh_faint",
