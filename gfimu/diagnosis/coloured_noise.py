@@ -89,6 +89,17 @@ class CosineBasis:
         """Return the first ``count`` orthonormal cosines, shape (n, count), for reading only."""
         return _cosines(self.n, count)
 
+    def products(self, weights: NDArray[np.float64], count: int) -> NDArray[np.float64]:
+        """Return C_cᵀC_c of the first ``count`` cosines under weights (n, c) of the samples' squares, (c, K, K).
+
+        As 2 cos a cos b = cos(a + b) + cos(a − b), all products are sums of two cosines of the weights.
+        """
+        spectrum = dct(weights, type=2, axis=0)[: 2 * count - 1].T  # (c, 2K − 1)
+        order = np.arange(count)
+        scale = np.where(order > 0, 1.0, np.sqrt(0.5)) / np.sqrt(2.0 * self.n)
+        sums = spectrum[:, order[:, None] + order] + spectrum[:, np.abs(order[:, None] - order)]
+        return np.asarray(sums * np.outer(scale, scale))
+
     def variances(self, levels: NoiseLevels, count: int) -> NDArray[np.float64]:
         """Return the variances of slow noise on the first ``count`` cosines, shape (K, c + 1)."""
         return _variances(levels, self.flicker_spectrum[:count], self.walk_spectrum[:count])

@@ -154,6 +154,10 @@ class DriveJacobian:
         used = np.flatnonzero(self.loading[:, column])
         if len(used) == 0:
             return csr_array(self.parts[0].shape)
+        first = self.parts[used[0]]
+        if all(_alike(self.parts[r], first) for r in used):
+            values = self.loading[used, column] @ np.stack([self.parts[r].data for r in used])
+            return csr_array((values, first.indices, first.indptr), shape=first.shape)
         return csr_array(sum(self.loading[r, column] * self.parts[r] for r in used))
 
     def forward(self, step: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -231,6 +235,11 @@ class DriveJacobian:
     def observations(self) -> int:
         """Number of observations, the reference included."""
         return int(self.loading.shape[1])
+
+
+def _alike(one: csr_array, other: csr_array) -> bool:
+    """Tell whether entries of two matrices are in the same places."""
+    return np.array_equal(one.indptr, other.indptr) and np.array_equal(one.indices, other.indices)
 
 
 def _block(part: csr_array, start: int, stop: int) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float64]]:

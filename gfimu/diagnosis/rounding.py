@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import log_ndtr
+from scipy.special import log_ndtr, ndtr
 
 __all__ = ["COARSE", "Steps", "WorkingResidual", "common_step", "rounded_likelihood", "rounding_noise"]
 
@@ -24,10 +24,11 @@ COARSE = 1.5
 _LEAST_WEIGHT = 0.02
 _LEAST_STEP = 1e-9
 _OFF_GRID = 0.05
+_NEAR = 30.0  # standard deviations, within which probabilities don't underflow
 _FAR = 1e4  # standard deviations
 _LEAST_NOISE = 0.03  # of a reference's step: finer edges would tell more than the steps of real parts keep to
 _NOISE_FACTORS = np.geomspace(0.5, 6.0, 26)
-_LOG_ROOT_TWO_PI = 0.5 * np.log(2 * np.pi)
+_ROOT_TWO_PI = np.sqrt(2 * np.pi)
 
 
 @dataclass(frozen=True)
@@ -155,10 +156,16 @@ def rounded_likelihood(
     # Farther off, the squares of the limits lose all digits of their difference; there only the nearer limit counts.
     lower = np.minimum(true_lower, _FAR)
     upper = lower + quantum / sigma
-    log_outer, log_inner = log_ndtr(-upper), log_ndtr(-lower)
-    log_p = log_inner + np.log1p(-np.exp(log_outer - log_inner))
-    density_upper = np.exp(-0.5 * upper**2 - _LOG_ROOT_TWO_PI - log_p)
-    density_lower = np.exp(-0.5 * lower**2 - _LOG_ROOT_TWO_PI - log_p)
+    if lower.max(initial=0.0) < _NEAR:
+        probability = ndtr(-lower) - ndtr(-upper)
+        log_p = np.log(probability)
+        density_upper = np.exp(-0.5 * upper**2) / (_ROOT_TWO_PI * probability)
+        density_lower = np.exp(-0.5 * lower**2) / (_ROOT_TWO_PI * probability)
+    else:
+        log_outer, log_inner = log_ndtr(-upper), log_ndtr(-lower)
+        log_p = log_inner + np.log1p(-np.exp(log_outer - log_inner))
+        density_upper = np.exp(-0.5 * upper**2 - log_p) / _ROOT_TWO_PI
+        density_lower = np.exp(-0.5 * lower**2 - log_p) / _ROOT_TWO_PI
     beyond = true_lower - lower
     score = density_lower - density_upper + beyond  # σ d log p/dx
     curvature = (score - beyond) ** 2 - (lower * density_lower - upper * density_upper)  # −σ² d² log p/dx²

@@ -109,6 +109,7 @@ class Segment:
         self.row_weight, self._weighed = self.weight_mask.astype(float), False
         # Where the slow noise of coarse readings most probably is: they are expanded about it.
         self._wandered: NDArray[np.float64] | float = 0.0
+        self.modes: SlowModes
         self.rounding, self.levels = self._starting_levels()
         self.round_to(model.expected_noise(1.0 / period).quantum)
         self.calibration_residue: CalibrationResidue | None = None
@@ -336,8 +337,19 @@ class Segment:
         if not self.rounding.coarse:
             return residual, 0.0
         self._weighed = True
-        self._follow_slow_noise(residual)
-        return self._weigh_about(residual)
+        working, lacking = self._weigh_about(residual)
+        if not (self.rounding.channels and self.levels.walk > 0.0):
+            return working, lacking
+        # A walk over steps moves the edges at which they tell much: it is expanded about where it most probably is
+        # (penalised quasi-likelihood, Breslow and Clayton 1993); bias instability keeps well within a step.
+        for _ in range(_SLOW_ROUNDS):
+            modes = WeighedModes(self.basis, self.levels, self.row_weight)
+            self.modes, wandered = modes, modes.slow_noise(working)
+            if np.abs((wandered - self._wandered) / self.levels.white).max() < _SLOW_STEP:
+                break
+            self._wandered = wandered
+            working, lacking = self._weigh_about(residual)
+        return working, lacking
 
     def _weigh_about(self, residual: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
         about = residual - self._wandered * self.weight_mask
@@ -371,22 +383,6 @@ class Segment:
             self.modes = WeighedModes(self.basis, self.levels, self.row_weight)
         self.inverse_variance = 1.0 / self.levels.white**2
 
-    def _follow_slow_noise(self, residual: NDArray[np.float64]) -> None:
-        """Expand coarse readings about the most probable walk of their biases, given measured minus predicted.
-
-        A walk over steps moves the edges at which they tell much (penalised quasi-likelihood, Breslow and Clayton
-        1993); bias instability keeps well within a step.
-        """
-        if not (self.rounding.channels and self.levels.walk > 0.0):
-            return
-        for _ in range(_SLOW_ROUNDS):
-            before = self._wandered
-            working, _ = self._weigh_about(residual)
-            self.modes = WeighedModes(self.basis, self.levels, self.row_weight)
-            self._wandered = self.modes.slow_noise(self.modes.share * self.modes.of_each(working))
-            if np.abs((self._wandered - before) / self.levels.white).max() < _SLOW_STEP:
-                break
-
     def linearise(self, effects: Sequence[Effect]) -> Linearisation:
         """Linearise about effects and the present drive, and eliminate the drive."""
         data = self._equations(effects)
@@ -404,7 +400,8 @@ class Segment:
     def _equations(self, effects: Sequence[Effect]) -> DriveEquations:
         """Return the normal equations of the drive, and of a calibration residue, without the drive's prior."""
         predicted = self.predict(effects)
-        residual, slow_residual, objective = self._misfit(predicted)
+        residual, objective = self._misfit(predicted)
+        slow_residual = self.modes.of_each(residual)
         jacobian = self._jacobian(effects, predicted)
         weights = self.inverse_variance
         rhs = jacobian.backward((residual - self.modes.back(self.modes.share * slow_residual)) * weights)
@@ -416,17 +413,16 @@ class Segment:
             predicted, residual, slow_residual, jacobian, slow, jacobian.information(), rhs, objective, residue
         )
 
-    def _misfit(self, predicted: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
-        """Return the working residual r (n, c + 1), the same in the slow modes (K, c + 1), and rᵀWr."""
+    def _misfit(self, predicted: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
+        """Return the working residual r (n, c + 1) and rᵀWr."""
         measured = np.column_stack([self.run.readings, self.run.reference])
         residual, misfit = self._weigh(np.where(self.weight_mask, measured - predicted, 0.0))
-        slow = self.modes.of_each(residual)
-        power = np.sum(residual**2, axis=0) - np.sum(slow**2 * self.modes.share, axis=0)
-        return residual, slow, misfit + float(self.inverse_variance @ power)
+        power = np.sum(residual**2, axis=0) - self.modes.explained(residual)
+        return residual, misfit + float(self.inverse_variance @ power)
 
     def energy(self, effects: Sequence[Effect]) -> float:
         """Return rᵀWr + dᵀRd at the present drive, which is held; a calibration residue is at its best there."""
-        residual, _, misfit = self._misfit(self.predict(effects))
+        residual, misfit = self._misfit(self.predict(effects))
         if self.calibration_residue is not None:
             misfit -= self.calibration_residue.explained(residual, self.modes, self.inverse_variance)
         return misfit + self.drive_prior.energy(self.coefficients)[0]

@@ -14,9 +14,11 @@ sample: with B = diag(w) C and the variances S of the cosines C,
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
 
 from gfimu.diagnosis.coloured_noise import CosineBasis, NoiseLevels
 from gfimu.diagnosis.drive_jacobian import DriveJacobian
@@ -40,9 +42,21 @@ class SlowModes:
     """
 
     def __init__(self, basis: CosineBasis, levels: NoiseLevels) -> None:
-        self.share = basis.corrections(levels)  # (K, c + 1)
-        self._cosines = basis.matrix(len(self.share))  # (n, K)
-        self.log_determinant = _log_determinant(basis, levels)
+        self._basis, self._levels = basis, levels
+
+    @cached_property
+    def share(self) -> NDArray[np.float64]:
+        """s, shape (K, c + 1)."""
+        return self._basis.corrections(self._levels)
+
+    @cached_property
+    def log_determinant(self) -> float:
+        """Log det of the channels' noise covariance."""
+        return _log_determinant(self._basis, self._levels)
+
+    @cached_property
+    def _cosines(self) -> NDArray[np.float64]:
+        return self._basis.matrix(len(self.share))  # (n, K)
 
     def of(self, values: NDArray[np.float64], column: int) -> NDArray[np.float64]:
         """Return what each mode has of rows (p, n) of one observation, shape (p, K)."""
@@ -55,6 +69,10 @@ class SlowModes:
     def back(self, sizes: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return all observations (n, c + 1) that sizes (K, c + 1) of the modes make."""
         return np.asarray(self._cosines @ sizes)
+
+    def explained(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return what slow noise takes of the squares of all observations (n, c + 1), shape (c + 1,)."""
+        return np.asarray(np.sum(self.of_each(values) ** 2 * self.share, axis=0))
 
     def of_drive(self, jacobian: DriveJacobian, weights: NDArray[np.float64]) -> DriveModes:
         """Return what each mode has of the drive's coefficients.
@@ -82,22 +100,58 @@ class WeighedModes(SlowModes):
     """
 
     def __init__(self, basis: CosineBasis, levels: NoiseLevels, weight: NDArray[np.float64]) -> None:
-        self._weight, cosines = weight, _cosine_count(basis, levels)
-        self._cosines = basis.matrix(cosines)
-        variances = basis.variances(levels, cosines)  # (K, c + 1)
-        found = [
-            _modes(self._cosines, self._weight[:, column], variances[:, column] / levels.white[column] ** 2)
-            for column in range(len(levels.white))
-        ]
-        count = max(1, *(int(np.sum(power > _WEAKEST * (1.0 + power))) for power, _ in found))
-        self.share = np.zeros((count, len(found)))
-        self._mixing = np.zeros((len(found), cosines, count))  # Q_c = diag(w_c) C mixing_c
-        for column, (power, mixing) in enumerate(found):
-            used = int(np.sum(power > _WEAKEST * (1.0 + power)))
-            self.share[:used, column] = power[:used] / (1.0 + power[:used])
-            self._mixing[column, :, :used] = mixing[:, :used]
-        white = len(weight) * float(np.sum(np.log(levels.white[:-1] ** 2)))
-        self.log_determinant = white + float(sum(np.log1p(power).sum() for power, _ in found[:-1]))
+        super().__init__(basis, levels)
+        self._weight, self._count = weight, _cosine_count(basis, levels)
+        # S^½/σ, (K, c + 1)
+        self._root = np.sqrt(basis.variances(levels, self._count)) / levels.white
+
+    @cached_property
+    def _cosines(self) -> NDArray[np.float64]:
+        return self._basis.matrix(self._count)
+
+    @cached_property
+    def _gram(self) -> NDArray[np.float64]:
+        """S^½ BᵀB S^½/σ² of each observation, shape (c + 1, K, K)."""
+        root = self._root.T
+        return self._basis.products(self._weight**2, self._count) * root[:, :, None] * root[:, None, :]
+
+    @cached_property
+    def _factors(self) -> list[NDArray[np.float64]]:
+        """Lower Cholesky factors L of I + S^½ BᵀB S^½/σ², each (K, K)."""
+        return list(np.linalg.cholesky(self._gram + np.eye(self._count)))
+
+    @cached_property
+    def _modes(self) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+        """Λ, largest first, and the mixing S^½ V Λ^−½/σ of the cosines, of each observation."""
+        found = []
+        for gram, root in zip(self._gram, self._root.T, strict=True):
+            power, vectors = np.linalg.eigh(gram)
+            power, vectors = np.maximum(power[::-1], 0.0), vectors[:, ::-1]
+            told = power > _WEAKEST * (1.0 + power)
+            found.append((power[told], root[:, None] * vectors[:, told] / np.sqrt(power[told])))
+        return found
+
+    @cached_property
+    def share(self) -> NDArray[np.float64]:
+        """s, shape (K, c + 1); modes of the least shares are left out."""
+        share = np.zeros((max(1, *(len(power) for power, _ in self._modes)), len(self._modes)))
+        for column, (power, _) in enumerate(self._modes):
+            share[: len(power), column] = power / (1.0 + power)
+        return share
+
+    @cached_property
+    def _mixing(self) -> NDArray[np.float64]:
+        """Q_c = diag(w_c) C mixing_c, shape (c + 1, cosines, K)."""
+        mixing = np.zeros((len(self._modes), self._count, len(self.share)))
+        for column, (_, mine) in enumerate(self._modes):
+            mixing[column, :, : mine.shape[1]] = mine
+        return mixing
+
+    @cached_property
+    def log_determinant(self) -> float:
+        """Log det of the channels' noise covariance."""
+        white = len(self._weight) * float(np.sum(np.log(self._levels.white[:-1] ** 2)))
+        return white + 2.0 * float(sum(np.log(factor.diagonal()).sum() for factor in self._factors[:-1]))
 
     def of(self, values: NDArray[np.float64], column: int) -> NDArray[np.float64]:
         """Return what each mode has of rows (p, n) of one observation, shape (p, K)."""
@@ -111,16 +165,37 @@ class WeighedModes(SlowModes):
         """Return all observations (n, c + 1) that sizes (K, c + 1) of the modes make."""
         return np.asarray(self._cosines @ np.einsum("ckm,mc->kc", self._mixing, sizes) * self._weight)
 
-    def slow_noise(self, sizes: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the slow noise (n, c + 1) that comes through with the weights as sizes (K, c + 1) of the modes."""
-        return np.asarray(self._cosines @ np.einsum("ckm,mc->kc", self._mixing, sizes))
+    def explained(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return what slow noise takes of the squares of all observations (n, c + 1), shape (c + 1,)."""
+        return np.asarray(np.sum(self._solved(values) ** 2, axis=0))
+
+    def slow_noise(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the most probable slow noise (n, c + 1), which comes through in observations with their weights."""
+        sizes = np.column_stack(
+            [
+                solve_triangular(factor, mine, lower=True, trans=1, check_finite=False)
+                for factor, mine in zip(self._factors, self._solved(values).T, strict=True)
+            ]
+        )
+        return np.asarray(self._cosines @ (self._root * sizes))
+
+    def _solved(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return L⁻¹ S^½ Bᵀ/σ of all observations, shape (K, c + 1)."""
+        sizes = self._root * (self._cosines.T @ (values * self._weight))
+        return np.column_stack(
+            [
+                solve_triangular(factor, mine, lower=True, check_finite=False)
+                for factor, mine in zip(self._factors, sizes.T, strict=True)
+            ]
+        )
 
     def of_drive(self, jacobian: DriveJacobian, weights: NDArray[np.float64]) -> DriveModes:
         """Return what each mode has of the drive's coefficients (`SlowModes.of_drive`)."""
         each, rows = [], []
         for column, mixing in enumerate(self._mixing):
             part = jacobian.channel(column)
-            slow = np.asarray(part.T @ (self._cosines * self._weight[:, [column]])) @ mixing  # (m, K)
+            part.data *= np.repeat(self._weight[:, column], np.diff(part.indptr))
+            slow = np.asarray(part.T @ self._cosines) @ mixing  # (m, K)
             each.append(slow)
             rows.append((slow * np.sqrt(weights[column] * self.share[:, column])).T)
         stacked = np.vstack(rows)
@@ -191,14 +266,16 @@ class WeighedPowers:
         flicker, walk = basis.flicker_spectrum[1:count], basis.walk_spectrum[1:count]
         root = np.sqrt(flicker)
         found = cls(*np.zeros((3, count - 1, residual.shape[1])))
-        for column, mine in enumerate(weight.T):
-            columns = basis.matrix(count)[:, 1:] * mine[:, None]
-            columns -= np.outer(mine, mine @ columns) / max(float(mine @ mine), _NO_POWER)
-            gram = columns.T @ columns
+        products = basis.products(weight**2, count)
+        sizes = basis.matrix(count).T @ (weight * residual)  # (K + 1, c)
+        for column, whole in enumerate(products):
+            constant = whole[0, 1:] / max(float(whole[0, 0]), _NO_POWER)
+            gram = whole[1:, 1:] - np.outer(whole[0, 1:], constant)
+            left = sizes[1:, column] - constant * sizes[0, column]
             power, vectors = np.linalg.eigh(gram * np.outer(root, root))
             there = power > _NO_POWER * max(float(power[-1]), _NO_POWER)
             analysis = (root[:, None] * vectors[:, there] / np.sqrt(power[there])).T  # of Bᵀr
-            found.power[there, column] = (analysis @ (columns.T @ residual[:, column])) ** 2
+            found.power[there, column] = (analysis @ left) ** 2
             found.flicker[there, column] = power[there]
             found.walk[there, column] = (analysis @ gram) ** 2 @ walk
         return found
@@ -208,19 +285,6 @@ def _cosine_count(basis: CosineBasis, levels: NoiseLevels) -> int:
     """Return how many cosines matter: more than where all samples count alike, as a few may count for most."""
     louder = NoiseLevels(levels.white, 2.0 * levels.flicker, 2.0 * levels.walk)
     return min(len(basis.corrections(louder)), _MOST_COSINES)
-
-
-def _modes(
-    cosines: NDArray[np.float64], weight: NDArray[np.float64], variance: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return Λ, largest first, and the mixing S^½ V Λ^−½/σ of the cosines, given S/σ²."""
-    columns = cosines * weight[:, None]
-    root = np.sqrt(variance)
-    power, vectors = np.linalg.eigh(columns.T @ columns * np.outer(root, root))
-    power, vectors = np.maximum(power[::-1], 0.0), vectors[:, ::-1]
-    there = power > _NO_POWER * max(float(power[0]), _NO_POWER)
-    power, vectors = power[there], vectors[:, there]
-    return power, root[:, None] * vectors / np.sqrt(power)
 
 
 def _log_determinant(basis: CosineBasis, levels: NoiseLevels) -> float:

@@ -66,3 +66,13 @@ def test_values_in_no_steps_have_none():
     assert common_step(np.random.default_rng(0).standard_normal(500)) is None
     assert common_step(np.full(50, 0.3)) is None
     assert common_step(3.0 * np.arange(40) * 0.7) == pytest.approx(2.1)
+
+
+@pytest.mark.parametrize("quantum", [0.3, 3.0])
+def test_readings_far_off_and_near_are_expanded_alike(quantum):
+    error = np.linspace(-20.0, 20.0, 81)[:, None]
+    near = rounded_likelihood(error, quantum, 1.0)
+    # One reading beyond the range of probabilities has all of them expanded by their logarithms.
+    far = rounded_likelihood(np.append(error, [[40.0]], axis=0), quantum, 1.0)
+    for one, other in ((near.residual, far.residual), (near.weight, far.weight), (near.deviance, far.deviance)):
+        assert_allclose(one, other[:-1], rtol=1e-9, atol=1e-12)

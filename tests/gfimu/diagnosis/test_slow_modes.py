@@ -67,6 +67,36 @@ def test_each_and_all_observations_agree():
     assert np.sum(modes.back(sizes) * values) == pytest.approx(np.sum(sizes * low))
 
 
+def test_products_of_cosines_under_weights():
+    rng = np.random.default_rng(7)
+    basis = CosineBasis(240, PERIOD)
+    count = len(basis.frequency)
+    weights = rng.uniform(0.0, 1.0, (240, 3))
+    cosines = basis.matrix(count)
+    expected = np.einsum("nc,nk,nl->ckl", weights, cosines, cosines)
+    assert_allclose(basis.products(weights, count), expected, atol=1e-14)
+
+
+@pytest.mark.parametrize("walk", [0.0, 0.01])
+def test_slow_noise_and_what_it_takes_are_those_of_the_dense_covariance(walk):
+    rng = np.random.default_rng(8)
+    n = 300
+    basis, noise = CosineBasis(n, PERIOD), levels(1, walk=walk)
+    count = len(basis.frequency)
+    weight = rng.uniform(0.02, 1.0, (n, 2))
+    values = rng.standard_normal((n, 2))
+    modes = WeighedModes(basis, noise, weight)
+    slow = (basis.matrix(count) * basis.variances(noise, count)[:, 0]) @ basis.matrix(count).T
+    covariance = WHITE**2 * np.eye(n) + np.outer(weight[:, 0], weight[:, 0]) * slow
+    known = np.linalg.solve(covariance, values[:, 0])
+    assert_allclose(modes.slow_noise(values)[:, 0], slow @ (weight[:, 0] * known), atol=1e-3 * np.abs(values).max())
+    taken = values[:, 0] @ values[:, 0] - WHITE**2 * values[:, 0] @ known
+    assert modes.explained(values)[0] == pytest.approx(taken, rel=1e-2)
+    left_out = modes.explained(values)[0] - SlowModes.explained(modes, values)[0]
+    assert -1e-9 < left_out < 0.05 * values[:, 0] @ values[:, 0]  # modes that are cut have a share of 0.05 at most
+    assert modes.explained(values)[1] == 0.0
+
+
 @pytest.mark.parametrize("coarse", [False, True])
 def test_the_drive_in_the_modes_is_its_jacobian_in_them(coarse):
     twin = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
