@@ -14,12 +14,12 @@ from gfimu.diagnosis.causes import Cause
 from gfimu.diagnosis.engine import Instead, Report, explain
 from gfimu.diagnosis.explanation import Explanation
 from gfimu.diagnosis.model import Effect
-from gfimu.diagnosis.nuisances import learn_noise, sharpen_drives, widen_drives
+from gfimu.diagnosis.nuisances import learn_noise, settle_noise, sharpen_drives, widen_drives
 from gfimu.diagnosis.pruning import RIVALS, prune
 from gfimu.diagnosis.refinement import refine
 from gfimu.diagnosis.segment import Segment
 
-__all__ = ["MOST_SEARCHED", "explain_any_length", "spread_over_runs"]
+__all__ = ["MOST_SEARCHED", "explain_any_length", "settle_noise_of_any_length", "spread_over_runs"]
 
 MOST_SEARCHED = 8
 """Stretches that are searched for causes, where there are as many runs at most."""
@@ -42,6 +42,34 @@ def spread_over_runs(runs: Sequence[int], most: int) -> list[int]:
         count = min(max(round(most * len(mine) / len(runs)), 1), len(mine))
         chosen += [mine[int(place)] for place in np.linspace(0, len(mine) - 1, count).round()]
     return chosen
+
+
+def settle_noise_of_any_length(
+    segments: Sequence[Segment], causes: Sequence[Cause], fixed: Sequence[Sequence[Effect]]
+) -> None:
+    """Learn the noise that causes leave until it stays the same (`settle_noise`); in long recordings on some stretches.
+
+    The others of a run take theirs.
+    """
+    chosen = spread_over_runs([segment.index for segment in segments], MOST_SEARCHED)
+    some = [segments[place] for place in chosen]
+    settle_noise(some, causes, [fixed[place] for place in chosen])
+    _take_noise(segments, chosen, some)
+
+
+def _take_noise(segments: Sequence[Segment], chosen: Sequence[int], known: Sequence[Segment]) -> list[int]:
+    """Give segments that were not chosen the noise that is known of their runs; returns their places."""
+    rest = [place for place in range(len(segments)) if place not in set(chosen)]
+    for place in rest:
+        like = _of_run(known, segments[place].index)
+        segments[place].set_levels(like.levels)
+        segments[place].rounding = like.rounding
+        segments[place].prepare_weights()
+    return rest
+
+
+def _of_run(segments: Sequence[Segment], index: int) -> Segment:
+    return next(one for one in segments if one.index == index)
 
 
 def explain_any_length(
@@ -67,12 +95,9 @@ def explain_any_length(
         report=lambda share, text: tell(0.6 * share, text),
     )
     tell(0.6, "the whole length")
-    rest = [place for place in range(len(segments)) if place not in set(chosen)]
+    rest = _take_noise(segments, chosen, part.segments)
     for place in rest:
-        like = next(one for one in part.segments if one.index == segments[place].index)
-        segments[place].set_levels(like.levels)
-        segments[place].roughness.factor, segments[place].rounding = like.roughness.factor, like.rounding
-        segments[place].prepare_weights()
+        segments[place].roughness.factor = _of_run(part.segments, segments[place].index).roughness.factor
     if part.left_for:  # nothing of it will be believed
         fit = refine(segments, part.fit.causes, fixed, iterations=_FEW_ITERATIONS)
         for segment, drive in zip(segments, fit.drives, strict=True):

@@ -14,7 +14,7 @@ from gfimu.diagnosis.adequacy import left_over
 from gfimu.diagnosis.coloured_noise import NoiseLevels
 from gfimu.diagnosis.explanation import Explanation
 from gfimu.diagnosis.fit import Fit, segments_at
-from gfimu.diagnosis.long_run import explain_any_length
+from gfimu.diagnosis.long_run import explain_any_length, settle_noise_of_any_length
 from gfimu.diagnosis.model import Effect, WorldModel
 from gfimu.diagnosis.nuisances import settle_noise
 from gfimu.diagnosis.prepared_runs import PreparedRuns
@@ -104,7 +104,7 @@ def with_walk(
         report("wandering biases")
         other = _wandering(before, walk, prepared, model)
         # What was taken for bias instability is the walk now.
-        settle_noise(other, base.causes, fixed)
+        settle_noise_of_any_length(other, base.causes, fixed)
         if number == 0:
             fit = refine(other, base.causes, fixed)
             # Bias instability lets the drive follow the walk.
@@ -112,7 +112,7 @@ def with_walk(
             if abs(freed.strength - walk.strength) > walk.std:
                 walk = freed
                 _let_wander(other, walk)
-                settle_noise(other, base.causes, fixed)
+                settle_noise_of_any_length(other, base.causes, fixed)
                 fit = refine(other, base.causes, fixed)
             if given_up and _leaves_much(other, fit, fixed, prepared):
                 return None

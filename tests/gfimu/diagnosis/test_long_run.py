@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from numpy.testing import assert_array_equal
 
 from gfimu.array import AccelerometerArray
 from gfimu.diagnosis import diagnose, long_run, stretches, surrogate
 from gfimu.diagnosis.long_run import spread_over_runs
+from gfimu.diagnosis.nuisances import settle_noise
+from gfimu.diagnosis.run import prepare_run
 from gfimu.recording import Recording
 from sim.campaign import Measurement, measure, random_profile
 from sim.effects import make_effect
@@ -76,3 +79,26 @@ def test_what_has_no_name_is_described_on_some_stretches_and_fitted_to_all(short
     assert found.verdict == "unknown"
     assert any(effect.name == "unknown" for effect in found.twin.effects)
     assert found.gain.share_of_excess_removed > 0.9
+
+
+def test_the_noise_of_a_long_recording_is_learnt_from_some_stretches_of_each_run(short_stretches, monkeypatch):
+    twin = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
+    rng = np.random.default_rng(14)
+    tachos = (0.02, 0.05)
+    runs = [
+        prepare_run(measure(rng, twin, [], Measurement(duration=50.0, tacho_noise=noise)), twin) for noise in tachos
+    ]
+    segments = stretches.make_segments(twin, runs)
+    for segment in segments:
+        segment.prepare_weights()
+    fixed = [()] * len(segments)
+    monkeypatch.setattr(long_run, "MOST_SEARCHED", 4)
+    learnt = []
+    monkeypatch.setattr(
+        long_run, "settle_noise", lambda some, *rest: (learnt.append(len(some)), settle_noise(some, *rest))
+    )
+    long_run.settle_noise_of_any_length(segments, (), fixed)
+    assert learnt == [4]
+    for segment in segments:
+        assert segment.levels.white[-1] == pytest.approx(tachos[segment.index], rel=0.1)
+        assert_array_equal(segment.inverse_variance, 1.0 / segment.levels.white**2)
