@@ -338,18 +338,21 @@ class Segment:
             return residual, 0.0
         self._weighed = True
         working, lacking = self._weigh_about(residual)
-        if not (self.rounding.channels and self.levels.walk > 0.0):
+        if not self.rounding.channels:
             return working, lacking
+        modes = WeighedModes(self.basis, self.levels, self.row_weight)
         # A walk over steps moves the edges at which they tell much: it is expanded about where it most probably is
         # (penalised quasi-likelihood, Breslow and Clayton 1993); bias instability keeps well within a step.
-        for _ in range(_SLOW_ROUNDS):
-            modes = WeighedModes(self.basis, self.levels, self.row_weight)
-            self.modes, wandered = modes, modes.slow_noise(working)
+        for _ in range(_SLOW_ROUNDS if self.levels.walk > 0.0 else 0):
+            wandered = modes.slow_noise(working)
             if np.abs((wandered - self._wandered) / self.levels.white).max() < _SLOW_STEP:
                 break
             self._wandered = wandered
             working, lacking = self._weigh_about(residual)
-        return working, lacking
+            modes = WeighedModes(self.basis, self.levels, self.row_weight)
+        self.modes = modes
+        # Where edges of steps are met more is known of slow noise, which is less probable to be so by chance.
+        return working, lacking + modes.log_narrowing
 
     def _weigh_about(self, residual: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
         about = residual - self._wandered * self.weight_mask

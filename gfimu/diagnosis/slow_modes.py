@@ -150,8 +150,12 @@ class WeighedModes(SlowModes):
     @cached_property
     def log_determinant(self) -> float:
         """Log det of the channels' noise covariance."""
-        white = len(self._weight) * float(np.sum(np.log(self._levels.white[:-1] ** 2)))
-        return white + 2.0 * float(sum(np.log(factor.diagonal()).sum() for factor in self._factors[:-1]))
+        return len(self._weight) * float(np.sum(np.log(self._levels.white[:-1] ** 2))) + self.log_narrowing
+
+    @cached_property
+    def log_narrowing(self) -> float:
+        """Log det of what is known of slow noise once observed, relative to before, of the channels."""
+        return 2.0 * float(sum(np.log(factor.diagonal()).sum() for factor in self._factors[:-1]))
 
     def of(self, values: NDArray[np.float64], column: int) -> NDArray[np.float64]:
         """Return what each mode has of rows (p, n) of one observation, shape (p, K)."""

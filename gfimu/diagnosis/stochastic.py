@@ -114,10 +114,9 @@ def log_probability(segments: Sequence[Segment], fit: Fit) -> float:
     """
     total = fit.log_posterior
     for segment in segments:
-        total -= 0.5 * segment.modes.log_determinant + segment.drive_prior.log_roughness
-        if segment.rounding.channels:
-            # The deviance of rounded readings is that of probabilities, which have no density of white noise to add.
-            total += len(segment.run.t) * float(np.sum(np.log(segment.levels.white[:-1])))
+        total -= segment.drive_prior.log_roughness
+        if not segment.rounding.channels:  # coarse readings have probabilities, and their misfit all of the noise
+            total -= 0.5 * segment.modes.log_determinant
     return total
 
 
