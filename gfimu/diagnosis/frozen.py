@@ -6,18 +6,34 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtr
 
 from gfimu.diagnosis.run import Run
 
 __all__ = ["frozen_stretches", "told_frozen"]
 
 _LONGEST_EQUAL = 40
+_CHANCE = 1e-3  # that a run without a frozen channel has such a stretch
 
 
 def frozen_stretches(
-    run: Run, prediction: NDArray[np.float64], quantum: float, limit: float | None
+    run: Run, prediction: NDArray[np.float64], quantum: float, limit: float | None, noise: NDArray[np.float64]
 ) -> list[tuple[int, int, int]]:
-    """Return (channel, start, stop) of stretches in which a channel holds one value though it should not."""
+    """Return (channel, start, stop) of stretches in which a channel holds one value though it should not.
+
+    Parameters
+    ----------
+    run : Run
+        The run.
+    prediction : ndarray, shape (n, c)
+        What the simulation predicts for it, m/s².
+    quantum : float
+        Step of the readings, m/s².
+    limit : float, optional
+        Where readings are clipped, m/s².
+    noise : ndarray, shape (c,)
+        White noise before rounding, m/s².
+    """
     found, edges, usual = [], [], []
     for mine, valid in zip(run.readings.T, run.valid.T, strict=True):
         change = np.flatnonzero((np.abs(np.diff(mine)) > 1e-12) | ~valid[1:])
@@ -28,6 +44,10 @@ def frozen_stretches(
         usual.append(float(np.median(np.abs(np.diff(mine[alive])))) if alive.sum() > 10 else np.nan)
     # A channel that was dead all through would have changed like the quietest of the others.
     quietest = 0.0 if np.isnan(usual).all() else float(np.nanmin(usual))
+    # In the middle of a step that is coarse beside the noise a channel at rest may well read the same for long.
+    spread = np.maximum(noise, 1e-3 * quantum)
+    same = np.log(2.0 * ndtr(0.5 * quantum / spread) - 1.0)  # (c,), of one reading more
+    least = np.maximum((np.log(_CHANCE) - np.log(run.readings.size)) / np.minimum(same, -1e-12), _LONGEST_EQUAL)
     for channel in range(run.readings.shape[1]):
         mine = run.readings[:, channel]
         changes = quietest if np.isnan(usual[channel]) else usual[channel]
@@ -35,7 +55,8 @@ def frozen_stretches(
             start, stop = int(edges[channel][place]) + 1, int(edges[channel][place + 1]) + 1
             at_limit = limit is not None and abs(mine[start]) >= limit - 0.6 * quantum
             moving = float(np.ptp(prediction[start:stop, channel])) > 2.5 * quantum
-            if not at_limit and run.valid[start:stop, channel].any() and (moving or changes > 0.3 * quantum):
+            restless = changes > 0.3 * quantum and stop - start > least[channel]
+            if not at_limit and run.valid[start:stop, channel].any() and (moving or restless):
                 found.append((channel, start, stop))
     return found
 

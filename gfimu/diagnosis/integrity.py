@@ -101,7 +101,7 @@ def check_integrity(model: WorldModel, run: Run, prediction: NDArray[np.float64]
     at_limit = np.abs(run.readings) >= (np.inf if limit is None else limit - 0.6 * quantum)
     # Clipped or dead readings look like those of a chip in a wider range.
     alive = run.valid & ~at_limit
-    for channel, start, stop in frozen_stretches(run, prediction, quantum, limit):
+    for channel, start, stop in frozen_stretches(run, prediction, quantum, limit, expected.analogue):
         alive[start:stop, channel] = False
     wiring = _wiring(model, replace(run, valid=alive), prediction, expected.white, known)
     for name, parameters, sentence in wiring:
@@ -120,7 +120,7 @@ def check_integrity(model: WorldModel, run: Run, prediction: NDArray[np.float64]
         clipped = (np.abs(run.readings) >= limit - 0.6 * quantum) | near
         run = replace(run, valid=run.valid & ~clipped)
     valid = run.valid.copy()
-    frozen = frozen_stretches(run, prediction, quantum, limit)
+    frozen = frozen_stretches(run, prediction, quantum, limit, expected.analogue)
     for channel, start, stop in frozen:
         valid[start:stop, channel] = False
     if frozen and "stuck_channel" not in known:

@@ -10,6 +10,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.diagnose import diagnose
+from gfimu.diagnosis.frozen import frozen_stretches
 from gfimu.diagnosis.integrity import check_integrity
 from gfimu.diagnosis.run import prepare_run
 from sim.campaign import Measurement, measure
@@ -149,3 +150,28 @@ def test_a_chip_that_was_never_read_is_told():
     found = diagnose([replace(recording, readings=readings)], twin)
     assert [cause.effect for cause in found.causes] == ["stuck_channel"]
     assert found.causes[0].parameters["channel"] == ["a21", "a22", "a23"]
+
+
+def test_a_channel_in_the_middle_of_a_coarse_step_is_not_frozen():
+    """Readings that repeat by chance are told from a channel that stops."""
+    twin = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
+    rng = np.random.default_rng(12)
+    run = prepare_run(measure(rng, twin, [], Measurement(duration=40.0)), twin)
+    noise = twin.expected_noise(100.0).analogue
+    step = 2.6 * float(noise[0])
+    t = run.t[:, None]
+    # Most readings differ from the one before, but not at rest.
+    moving = 300.0 * step * np.maximum(np.sin(0.5 * t), 0.0) ** 2 + rng.uniform(-step, step, 12)
+    longest, told = 0, 0
+    for _ in range(30):
+        readings = np.round((moving + noise * rng.standard_normal(moving.shape)) / step) * step
+        for column in readings.T:
+            changed = np.flatnonzero(np.diff(column) != 0.0)
+            longest = max(longest, int(np.diff(changed).max()))
+        told += len(frozen_stretches(replace(run, readings=readings), moving, step, None, noise))
+    assert longest > 40
+    assert told == 0
+    readings[800:950, 7] = readings[800, 7]
+    ((channel, start, stop),) = frozen_stretches(replace(run, readings=readings), moving, step, None, noise)
+    assert (channel, start) == (7, pytest.approx(800, abs=5))
+    assert stop == pytest.approx(950, abs=5)
