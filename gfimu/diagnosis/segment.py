@@ -11,7 +11,6 @@ so that everything after it is small algebra on G and b, whatever the length of 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from copy import copy
 from dataclasses import replace
 
 import numpy as np
@@ -19,44 +18,28 @@ from numpy.typing import NDArray
 
 from gfimu.diagnosis.calibration_residue import CalibrationResidue
 from gfimu.diagnosis.coloured_noise import CosineBasis, NoiseLevels
-from gfimu.diagnosis.drive import AngleSpline, ShiftedSpin
+from gfimu.diagnosis.drive import ShiftedSpin
 from gfimu.diagnosis.drive_derivative import Remembered, differentiate, felt_modes, felt_play, felt_ripple
 from gfimu.diagnosis.drive_jacobian import DriveJacobian
-from gfimu.diagnosis.drive_prior import DrivePrior
-from gfimu.diagnosis.knots import KNOT_SPACING, intervals_to_cut
 from gfimu.diagnosis.linearisation import DriveElimination, DriveEquations, Linearisation
-from gfimu.diagnosis.model import (
-    Effect,
-    Mode,
-    Play,
-    Ripple,
-    Spin,
-    WorldModel,
-)
-from gfimu.diagnosis.roughness import Roughness
+from gfimu.diagnosis.model import Effect, Mode, Play, Ripple, Spin, WorldModel
 from gfimu.diagnosis.rounding import COARSE, Steps
 from gfimu.diagnosis.run import Run, difference_noise
 from gfimu.diagnosis.simulation import Simulation
 from gfimu.diagnosis.slow_modes import SlowModes, WeighedModes
+from gfimu.diagnosis.spline_drive import TIME_MARGIN, SplineDrive
 
 __all__ = ["Segment", "known_walk"]
 
-TIME_MARGIN = 0.5
 _WALK = "bias_random_walk"
 _ROUNDING_ERROR = 1e-12
-_START_FACTOR = 2.0  # of the roughness prior, before the data have chosen
 _KNOWN_ANGLE_STD = 5e-3
-_FINEST_ANGLE = 2e-5  # rad
-_FINEST_RATE = 1e-4  # rad/s, and of the spread of the rate
 _LEAST_FACTOR = 0.05
-_MOST_CUTS_BY_REFERENCE = 3
-_BEYOND_CHANCE = 3.0  # times what noise alone, drawn once, bends the drive of the reference by
 _FACTOR_STEPS = 4
-_REST_FACTOR = 1.3
 _SLOW_ROUNDS, _SLOW_STEP = 10, 0.05  # to the most probable slow noise; of the white noise, below which it is found
 
 
-class Segment:
+class Segment(SplineDrive):
     """One stretch of a run with its own drive spline.
 
     Parameters
@@ -86,25 +69,23 @@ class Segment:
         start_angle_std: float = 1e-4,
         stretches: int = 1,
     ) -> None:
-        self.model, self.run, self.index, self.start, self.stretches = model, run, index, start, stretches
-        self.start_angle, self.start_angle_std = start_angle, start_angle_std
-        period = run.sample_period
-        spacing = max(KNOT_SPACING, period)
-        # Late chips and fast clocks ask for the motion beyond the ends of the run.
-        margin = max(TIME_MARGIN, 2 * spacing)
+        self.model, self.index, self.start, self.stretches = model, index, start, stretches
         times = np.append(model.sample_times(run.t), run.t[:, None], axis=1)
-        spline = AngleSpline.uniform(times.min() - margin, times.max() + margin, spacing)
-        self._take(Roughness(spline, _START_FACTOR))
+        super().__init__(
+            run,
+            times,
+            is_angle=model.drive_source == "angle",
+            start_angle=start_angle,
+            start_angle_std=start_angle_std,
+        )
+        period = run.sample_period
         # Whether the derivative knows what a play holds.
         self.holding = True
         # Whether it knows how a torque ripple answers the drive, which takes several times as long.
         self.rippling = False
         # Whether it knows what rings on, which takes more time: from the start where the model has a mode already.
         self.ringing = bool(self.felt_modes(()))
-        # Fits are compared under the same knots, so these are chosen once.
-        self.knots_chosen = False
         self.basis = CosineBasis(len(run.t), period, float(run.t[0] - start), stretches=stretches)
-        self.is_angle = model.drive_source == "angle"
         self.weight_mask = np.column_stack([run.valid, run.reference_valid])  # (n, c + 1)
         self.row_weight, self._weighed = self.weight_mask.astype(float), False
         # Where the slow noise of coarse readings most probably is: they are expanded about it.
@@ -113,22 +94,7 @@ class Segment:
         self.rounding, self.levels = self._starting_levels()
         self.round_to(model.expected_noise(1.0 / period).quantum)
         self.calibration_residue: CalibrationResidue | None = None
-        self._set_prior()
-        self.coefficients = self._reference_drive = self._starting_drive()
-
-    @property
-    def coefficients(self) -> NDArray[np.float64]:
-        """The drive's spline coefficients, shape (m,)."""
-        return self._coefficients
-
-    @coefficients.setter
-    def coefficients(self, values: NDArray[np.float64]) -> None:
-        self._coefficients = values
-        self.spin = self.spline.spin(values)
-
-    def _take(self, roughness: Roughness) -> None:
-        """Use a prior of the drive and its spline."""
-        self.roughness, self.spline = roughness, roughness.spline
+        self._start()
 
     # -- starting values -------------------------------------------------------------------------------------
 
@@ -139,38 +105,6 @@ class Segment:
         white = np.append(expected.white, max(noise, self.finest))
         flicker = np.append(np.full(len(expected.white), 2e-3), 0.0)
         return steps, NoiseLevels(white, flicker, known_walk(self.model))
-
-    @property
-    def finest(self) -> float:
-        """Noise below which a spline can't follow the reference, and which no part keeps to, rad/s or rad."""
-        return _FINEST_ANGLE if self.is_angle else _FINEST_RATE * (1.0 + self._reference_spread)
-
-    @property
-    def _reference_noise(self) -> float:
-        return self.rounding.reference_noise(float(self.levels.white[-1]))
-
-    def _set_prior(self) -> None:
-        self.drive_prior = DrivePrior.of_run(
-            self.roughness,
-            self.run,
-            is_angle=self.is_angle,
-            reference_noise=self._reference_noise,
-            start_angle=(self.start_angle, self.start_angle_std),
-        )
-
-    def _starting_drive(self) -> NDArray[np.float64]:
-        """Fit the spline to the reference alone."""
-        return self._reference_alone(self.run)
-
-    def _reference_alone(self, run: Run) -> NDArray[np.float64]:
-        return self.drive_prior.with_reference(run, is_angle=self.is_angle, reference_noise=self._reference_noise)
-
-    def _follow(self, spin: Spin, roughness: Roughness) -> None:
-        """Take the drive that comes closest to a motion, on other knots."""
-        self._take(roughness)
-        self._set_prior()
-        self.coefficients = self.following(spin)
-        self._reference_drive = self._starting_drive()
 
     def adopt(self, whole: Segment, effects: Sequence[Effect] = ()) -> None:
         """Take noise levels, roughness and drive from a segment of which this is a part.
@@ -189,47 +123,6 @@ class Segment:
         self._follow(whole.spin, whole.roughness.on(spline, corners=True))
         self.prepare_weights()
 
-    def learn_roughness(self) -> None:
-        """Take the roughness from the present drive, which knows the corners of ramps better than the reference."""
-        self.roughness.learn(self.coefficients)
-        self._set_prior()
-
-    def sharpen(self) -> bool:
-        """Cut the knot intervals where the drive bends faster than they follow; tells whether any was cut."""
-        return not self.knots_chosen and self._cut(self.roughness.bend(self.coefficients))
-
-    def sharpen_by_reference(self) -> bool:
-        """Do the same by the drive of the reference alone, which nothing wrong with the channels bends."""
-        if self.knots_chosen:
-            return False
-        rng = np.random.default_rng(0)
-        cuts = 0
-        while cuts < _MOST_CUTS_BY_REFERENCE:
-            noise = self._reference_noise * rng.standard_normal(len(self.run.t))
-            by_chance = self.roughness.bend(self._reference_alone(replace(self.run, reference=noise)))
-            bend = self.roughness.bend(self._reference_drive)
-            self.coefficients = self._reference_drive
-            if not self._cut(np.sqrt(np.maximum(bend**2 - (_BEYOND_CHANCE * by_chance) ** 2, 0.0))):
-                break
-            cuts += 1
-        return cuts > 0
-
-    def _cut(self, bend: NDArray[np.float64]) -> bool:
-        """Cut the knot intervals that miss something of a drive which bends so sharply around each, rad/s⁴."""
-        pushed = self.predict((), ShiftedSpin(self.spin, 2, 1.0)) - self.predict(())
-        levers = np.sqrt(np.mean(pushed[:, :-1] ** 2, axis=0))  # m, from the axis to the chips
-        chosen = intervals_to_cut(
-            self.spline.widths,
-            bend,
-            sample_period=self.run.sample_period,
-            acuity=float(np.linalg.norm(levers / self.levels.white[:-1])),
-            reference_noise=self._reference_noise,
-            is_angle=self.is_angle,
-        )
-        if chosen.any():
-            self._follow(self.spin, self.roughness.on(self.spline.halved(chosen), corners=False))
-        return bool(chosen.any())
-
     def reach_out(self, effects: Sequence[Effect]) -> bool:
         """Widen the spline to the motion that effects ask for (a slow clock, late chips); tells whether it was."""
         times = self.model.sample_times(self.run.t, effects)
@@ -240,25 +133,11 @@ class Segment:
         self._follow(self.spin, self.roughness.on(spline, corners=True))
         return True
 
-    def uncut(self) -> None:
-        """Put the knots of the drive at their usual distance again, at the present drive."""
-        spacing = max(KNOT_SPACING, self.run.sample_period)
-        spline = AngleSpline.uniform(self.spline.start, self.spline.stop, spacing)
-        self._follow(self.spin, self.roughness.on(spline, corners=False))
-
-    def coarser(self, spacing: float) -> Segment:
-        """Return a copy whose knots are all ``spacing`` s apart, at the present drive."""
-        other = copy(self)
-        spline = AngleSpline.uniform(self.spline.start, self.spline.stop, spacing)
-        other._follow(self.spin, self.roughness.on(spline, corners=False))
-        return other
-
-    def following(self, spin: Spin) -> NDArray[np.float64]:
-        """Return the coefficients (m,) of the drive that comes closest to a motion."""
-        step = min(self.run.sample_period, 0.5 * float(self.spline.widths.min()))
-        # Beyond the ends too: late chips ask for the motion there.
-        reach = np.arange(self.spline.start, self.spline.stop, step)
-        return self.spline.through(reach, spin.at(reach))
+    def _acuity(self) -> float:
+        """Return how well one sample of all channels tells the angular acceleration, s²/rad."""
+        pushed = self.predict((), ShiftedSpin(self.spin, 2, 1.0)) - self.predict(())
+        levers = np.sqrt(np.mean(pushed[:, :-1] ** 2, axis=0))  # m, from the axis to the chips
+        return float(np.linalg.norm(levers / self.levels.white[:-1]))
 
     def tune_roughness(self, effects: Sequence[Effect]) -> None:
         """Pick the scale of the roughness prior by marginal likelihood, the drive integrated out."""
@@ -286,16 +165,6 @@ class Segment:
                 break
         self.roughness.factor = best[1]
         self._set_prior()
-
-    @property
-    def at_rest(self) -> bool:
-        """Whether the reference shows no more than its noise."""
-        return self._reference_spread < _REST_FACTOR * self._reference_noise
-
-    @property
-    def _reference_spread(self) -> float:
-        known = self.run.reference_valid
-        return float(np.std(self.run.reference[known])) if known.any() else 0.0
 
     def set_levels(self, levels: NoiseLevels) -> None:
         """Take new noise levels."""
