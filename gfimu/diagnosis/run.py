@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.diagnosis.model import WorldModel
+from gfimu.diagnosis.temperature import between_steps
 from gfimu.errors import InputError
 from gfimu.recording import Recording
 
@@ -165,7 +166,8 @@ def prepare_run(recording: Recording, model: WorldModel, *, name: str = "run") -
     warm = None
     if temperature is not None and np.isfinite(temperature).sum() >= 2:
         known = np.isfinite(temperature)
-        warm = np.interp(t, recording.t_s[known], np.asarray(temperature)[known])
+        measured = recording.t_s[known]
+        warm = np.interp(t, measured, between_steps(measured, np.asarray(temperature, dtype=float)[known]))
     return Run(
         t,
         full,
