@@ -167,6 +167,37 @@ def _fresh_faint() -> list[Case]:
     ]
 
 
+def _coarse_steps() -> list[Case]:
+    """Return readings in coarse steps under the strongest bias instability, which passes for offsets there."""
+    return [
+        Case(
+            "coarse_steps",
+            993_000 + number,
+            ("coarse_resolution",),
+            duration=(40.0, 50.0, 60.0)[number % 3],
+            bias_instability_mg=0.5,
+        )
+        for number in range(36)
+    ]
+
+
+def _other_settings() -> list[Case]:
+    """Return single effects at lengths, rates and noise levels that are drawn: seeds on which nothing was developed."""
+    cases = []
+    for first, count in ((995_000, 60), (996_000, 40)):
+        rng = np.random.default_rng(first)
+        for number in range(count):
+            name = list(EFFECTS)[int(rng.integers(len(EFFECTS)))]
+            size = float(np.exp(rng.uniform(np.log(60.0), np.log(3000.0))))
+            rate = float(rng.choice([25.0, 50.0, 100.0, 200.0, 400.0]))
+            length = float(rng.choice([20.0, 30.0, 60.0, 90.0] if rate <= 100.0 else [15.0, 25.0, 40.0]))
+            bias_instability = float(np.exp(rng.uniform(np.log(0.03), np.log(0.8))))
+            noise = float(np.exp(rng.uniform(np.log(0.003), np.log(0.1))))
+            size = 0.0 if name in SIZELESS else size
+            cases.append(Case("other_settings", first + number, (name,), size, length, rate, bias_instability, noise))
+    return cases
+
+
 def _nulls() -> list[Case]:
     return [
         Case("nulls", 20_000 + 1000 * level + number, **_noise_of(level)) for number in range(200) for level in range(3)
@@ -247,6 +278,8 @@ STUDIES: dict[str, Callable[[], list[Case]]] = {
     "fresh_singles": _fresh_singles,
     "faint": _faint,
     "fresh_faint": _fresh_faint,
+    "coarse_steps": _coarse_steps,
+    "other_settings": _other_settings,
     "nulls": _nulls,
     "long_nulls": _long_nulls,
     "threshold_nulls": _threshold_nulls,
