@@ -270,6 +270,14 @@ def test_study_outside_the_library():
     assert len(cases) - len(missed) >= at_least(0.9, len(cases)), missed
 
 
+def test_coarse_steps_under_strong_bias_instability_draw_in_no_offset():
+    """Where an offset would meet other edges of the steps, slow noise comes through there."""
+    case = next(case for case in study_cases("coarse_steps") if case.seed == 993_012)
+    world = draw_world(case)
+    found = diagnose([world.recording], world.twin)
+    assert [cause.effect for cause in found.causes] == ["coarse_resolution"]
+
+
 def test_study_cases_have_seeds_of_their_own():
     names = ["singles", "nulls", "threshold_nulls", "pairs", "triples", "residue", "left_out", "exotics"]
     names += ["fresh_singles", "fresh_faint", "faint", "coarse_steps", "other_settings"]
