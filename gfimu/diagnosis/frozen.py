@@ -14,6 +14,7 @@ __all__ = ["frozen_stretches", "told_frozen"]
 
 _LONGEST_EQUAL = 40
 _CHANCE = 1e-3  # that a run without a frozen channel has such a stretch
+_LEAST_NOISE = 0.1  # of a step: with less no run is long enough to tell
 
 
 def frozen_stretches(
@@ -45,9 +46,9 @@ def frozen_stretches(
     # A channel that was dead all through would have changed like the quietest of the others.
     quietest = 0.0 if np.isnan(usual).all() else float(np.nanmin(usual))
     # In the middle of a step that is coarse beside the noise a channel at rest may well read the same for long.
-    spread = np.maximum(noise, 1e-3 * quantum)
+    spread = np.maximum(noise, _LEAST_NOISE * quantum)
     same = np.log(2.0 * ndtr(0.5 * quantum / spread) - 1.0)  # (c,), of one reading more
-    least = np.maximum((np.log(_CHANCE) - np.log(run.readings.size)) / np.minimum(same, -1e-12), _LONGEST_EQUAL)
+    least = np.maximum((np.log(_CHANCE) - np.log(run.readings.size)) / same, _LONGEST_EQUAL)
     for channel in range(run.readings.shape[1]):
         mine = run.readings[:, channel]
         changes = quietest if np.isnan(usual[channel]) else usual[channel]
