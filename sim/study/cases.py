@@ -182,7 +182,10 @@ def _coarse_steps() -> list[Case]:
 
 
 def _other_settings() -> list[Case]:
-    """Return single effects at lengths, rates and noise levels that are drawn; 995025 led to reading temperatures between steps."""
+    """Return single effects at lengths, rates and noise levels that are drawn.
+
+    Seeds on which nothing was developed but the reading of temperatures between steps (995025).
+    """
     cases = []
     for first, count in ((995_000, 60), (996_000, 40)):
         rng = np.random.default_rng(first)
