@@ -133,16 +133,16 @@ def dependence_left(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Seque
     single = log_evidence_each(diagonal, score, np.zeros(total, dtype=bool)) - np.log(total)
     single[~usable] = -np.inf
     best = int(np.argmax(single))
-    found = LeftOver(float(single[best]), f"{series[best // count]} depends on {names[best % count]}", {})
+    followed = names[best % count]
+    found = LeftOver(float(single[best]), f"{series[best // count]} depends on {followed}", {}, dependence=followed)
     chosen = [best]
     for function in range(count):
         places = np.arange(observed) * count + function
         value = log_evidence(gram[np.ix_(places, places)], score[places]) - np.log(count)
         if value > found.log_odds + 2.0:
             strong = [channels[c] for c in np.argsort(-np.abs(score[places] / np.sqrt(diagonal[places] + 1e-9)))[:4]]
-            found = LeftOver(
-                float(value), f"several channels (strongest {', '.join(strong)}) depend on {names[function]}", {}
-            )
+            told = f"several channels (strongest {', '.join(strong)}) depend on {names[function]}"
+            found = LeftOver(float(value), told, {}, dependence=names[function])
             chosen = list(places)
     for number, told in enumerate(series):
         places = np.arange(number * count, (number + 1) * count)
@@ -163,7 +163,7 @@ def dependence_left(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Seque
         for place, value in zip(chosen, values, strict=True)
         if abs(value) > 1e-3
     }
-    return LeftOver(found.log_odds, found.signature, surrogate)
+    return replace(found, surrogate=surrogate)
 
 
 def series_products(

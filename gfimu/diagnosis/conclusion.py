@@ -13,6 +13,7 @@ from gfimu.diagnosis.adequacy import LEFT_OVER_ODDS
 from gfimu.diagnosis.causes import Cause, effects_of_run
 from gfimu.diagnosis.explanation import Explanation
 from gfimu.diagnosis.fit import Fit
+from gfimu.diagnosis.generic_basis import ripple_order
 from gfimu.diagnosis.loose_calibration import LooseCalibration
 from gfimu.diagnosis.model import Effect, WorldModel
 from gfimu.diagnosis.named_causes import contested, fault_causes, name_cause
@@ -27,6 +28,7 @@ from gfimu.diagnosis.naming import (
 )
 from gfimu.diagnosis.prepared_runs import PreparedRuns
 from gfimu.diagnosis.residual_tests import LeftOver
+from gfimu.diagnosis.search import MOST_CAUSES
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.signatures import ANGLES
 from gfimu.diagnosis.stochastic import Walk, white_factor
@@ -37,6 +39,7 @@ __all__ = ["conclude", "is_dominant", "is_unknown"]
 
 _DOMINANT = 0.03
 _INEXACTNESS = 2.5e-3
+_OF_RIPPLE = 0.25  # nats that a rough ripple leaves at its own order, by the misfit that it takes off: half of it
 _BESIDE_DRIVE = "motion"  # place of effects that the drive can stand in for
 _TURNS = ANGLES | {"phase_rad"}
 _CLOSE_RESIDUE = 4.0  # log odds against a residue of the calibration in place of a cause, below which it is told
@@ -116,7 +119,8 @@ def is_unknown(explanation: Explanation, left: LeftOver, gain: Gain) -> bool:
     """Tell whether the causes are not to be believed, their gain on held-out data being known."""
     # Several causes that together still miss something, and a share of held-out data, coincide by chance.
     missed = len(explanation.fit.causes) > 1 and gain.share_of_excess_removed < 1.0 - _DOMINANT
-    return _stands_out(explanation, left) and (missed or is_dominant(explanation, left))
+    untold = missed or _is_cut_short(explanation) or is_dominant(explanation, left)
+    return untold and _stands_out(explanation, left)
 
 
 def is_dominant(explanation: Explanation, left: LeftOver) -> bool:
@@ -128,8 +132,32 @@ def is_dominant(explanation: Explanation, left: LeftOver) -> bool:
 
 def _stands_out(explanation: Explanation, left: LeftOver) -> bool:
     """Tell whether what is left is no chance, nor the inexactness that every model has."""
-    inexact = _INEXACTNESS * (explanation.nothing.objective - explanation.fit.objective)
-    return left.log_odds > (LEFT_OVER_ODDS if left.instead else max(LEFT_OVER_ODDS, inexact))
+    removed = explanation.nothing.objective - explanation.fit.objective
+    if left.instead or _is_cut_short(explanation):
+        return left.log_odds > LEFT_OVER_ODDS
+    share = _OF_RIPPLE if _is_of_ripple(explanation.fit, left) else _INEXACTNESS
+    return left.log_odds > max(LEFT_OVER_ODDS, share * removed)
+
+
+def _is_of_ripple(fit: Fit, left: LeftOver) -> bool:
+    """Tell whether what is left turns as often per revolution as a ripple whose model is a rough one.
+
+    The drive follows most of a ripple, and of the table's answer to it what the model has; what the table's own servo
+    does otherwise stays, and may be much of the little that is seen.
+    """
+    order = ripple_order(left.dependence)
+    return order is not None and any(
+        cause.family.inexactness > 0.0 and cause.shape.get("order") == order for cause in fit.causes
+    )
+
+
+def _is_cut_short(explanation: Explanation) -> bool:
+    """Tell whether the causes are as many as a set may have, none of which has a rough model.
+
+    Wide causes enough describe anything: where something is left that asks for one more, it is likely none of them.
+    """
+    causes = explanation.fit.causes
+    return len(causes) >= MOST_CAUSES and all(cause.family.inexactness == 0.0 for cause in causes)
 
 
 def _named(explanation: Explanation, fit: Fit, likely: dict[str, float], array: AccelerometerArray) -> list[NamedCause]:

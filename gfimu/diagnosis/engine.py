@@ -21,7 +21,7 @@ from gfimu.diagnosis.parallel import each_apart, over_segments
 from gfimu.diagnosis.pruning import RIVALS, near_rivals, prune
 from gfimu.diagnosis.refinement import FAIR_FIT, refine, refine_each
 from gfimu.diagnosis.screening import screen
-from gfimu.diagnosis.search import Blocks, Candidate, log_odds_beside_residue, search
+from gfimu.diagnosis.search import MOST_CAUSES, Blocks, Candidate, log_odds_beside_residue, search, swapped
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.signatures import SignatureSet
 
@@ -33,7 +33,6 @@ _Found = tuple[list[Candidate], list[Candidate], Blocks]
 
 _ROUNDS = 6
 _REFINED = 6
-_MOST_CAUSES = 4
 _CLOSE = 12.0
 _GROSS = 150.0
 _WORTH_REFINING = -6.0
@@ -147,7 +146,7 @@ class _Search:
         self._tried: dict[frozenset[tuple[str, str]], Fit] = {}
         # How far each set was behind, under the noise that both were judged by.
         self._behind: dict[frozenset[tuple[str, str]], float] = {}
-        self._settled = self.given_up = False
+        self._settled = self.given_up = self._outweighed = False
         self.left_for = ""
         self._ahead: SignatureSet | None = None
         # What is left is judged once a residue of the calibration is held.
@@ -161,7 +160,7 @@ class _Search:
         """Screen about the best set and search the normal equations; returns what `search` does."""
         self._signatures = self._ahead or self._screen()
         self._screened, self._ahead = self._best.key, None
-        return search(self._signatures, most=max(2, min(len(self._best.causes) + 1, _MOST_CAUSES)))
+        return search(self._signatures, most=max(2, min(len(self._best.causes) + 1, MOST_CAUSES)))
 
     def round(self, found: _Found, *, first: bool, tell: Report) -> bool:
         """Refine what leads, relearn the noise; tells whether nothing changes any more."""
@@ -248,6 +247,7 @@ class _Search:
         # Right sets that still lacked a cause left a third of what they explained at most.
         enough = explained if early else max(_LITTLE * self._gained, share * explained)
         self.given_up = left > max(_MUCH, enough)
+        self._outweighed = left > explained
         return settled or stalled or self.given_up
 
     def hears_mode_ring(self) -> bool:
@@ -263,9 +263,11 @@ class _Search:
 
     @property
     def _may_hear_mode_ring(self) -> bool:
-        # What leaves more than this is not the ringing of a mode.
+        # What leaves more than this, or than all that was found explains, is not the ringing of a mode.
         near = self._best.objective < _MOST_RUNG * self._observations
-        if not near or self._loose or self._segments[0].ringing or "resonance" not in self._best.names:
+        if not near or (self.given_up and self._outweighed):
+            return False
+        if self._loose or self._segments[0].ringing or "resonance" not in self._best.names:
             return False
         # Beside a cause whose model is rough a mode that explains less than that leaves would be dropped at last.
         noise = self._segments[0].levels.of_reading
@@ -329,6 +331,8 @@ class _Search:
             # A large effect is far from linear: the right cause may be well down the linear list. A start that fits
             # has been through this.
             leading = [*candidates[:3], *(one for one in singles[:_REFINED] if one not in candidates[:3])]
+        others = swapped(blocks, self._best.causes) if gross else []
+        leading = [*leading, *others]
         keys: list[frozenset[tuple[str, str]]] = []
         sets: list[Sequence[Cause]] = []
         about: list[Fit] = []
@@ -341,7 +345,8 @@ class _Search:
             key = frozenset(cause.key for cause in causes)
             close = candidate.log_odds > max(candidates[0].log_odds - _CLOSE, _WORTH_REFINING)
             new = key not in self._tried
-            if key in fits or key in keys or not (close or (gross and len(causes) == 1 and new)):
+            distant = gross and new and (len(causes) == 1 or candidate in others)
+            if key in fits or key in keys or not (close or distant):
                 continue
             if new:
                 moves = self._signatures.drive_moves(causes, candidate.members)

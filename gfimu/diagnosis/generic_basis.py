@@ -16,7 +16,17 @@ from numpy.typing import NDArray
 from gfimu.diagnosis.model import BasisUnits, SpinState
 from gfimu.errors import unknown_name
 
-__all__ = ["FUNCTIONS", "OF_READING", "Motion", "basis_function", "is_of_time", "ripples", "step_at", "tone"]
+__all__ = [
+    "FUNCTIONS",
+    "OF_READING",
+    "Motion",
+    "basis_function",
+    "is_of_time",
+    "ripple_order",
+    "ripples",
+    "step_at",
+    "tone",
+]
 
 Function = Callable[["Motion"], NDArray[np.float64]]
 
@@ -124,6 +134,12 @@ def tone(frequency: float, wave: str) -> str:
 def ripples(order: int) -> tuple[str, ...]:
     """Return the names of the functions that turn so many times per revolution."""
     return tuple(_ripples((order,)))
+
+
+def ripple_order(name: str) -> int | None:
+    """Return how many times per revolution a function turns; None where it is of something else."""
+    found = _RIPPLE_NAME.fullmatch(name)
+    return int(found[1]) if found else None
 
 
 def step_at(time: float) -> str:

@@ -31,6 +31,7 @@ __all__ = ["LooseCalibration", "loosen", "relearned"]
 
 _USUAL, _LARGE = 1.0, 3.0  # of the tolerances
 _MUCH = 500.0
+_SUPERFLUOUS = 100.0  # nats: more than dropping causes that a residue makes superfluous brings
 _PLAIN = 25.0  # standard deviations: some 300 nats, and a cause is kept from 4 to 15
 # That everything is a little off is what anybody expects; that all is three times as much, hardly.
 _LEAST_ODDS = {_USUAL: 3.0, _LARGE: 7.0}
@@ -71,6 +72,8 @@ def loosen(
         return None, plain
     runs = len(prepared.runs)
     reference = log_probability(plain.segments, plain.fit)
+    if plain.given_up and not plain.left_for and _is_hopeless(plain, prepared, tolerance, reference):
+        return None, plain
     value, start = _trial(plain, plain.fit.causes, tolerance, _USUAL)
     scale = _USUAL
     larger, other = _trial(plain, start.causes, tolerance, _LARGE)
@@ -145,7 +148,17 @@ def _fits(segment: Segment) -> bool:
     return not segment.rounding.channels and float(np.median(segment.levels.flicker[:-1])) < LARGEST_USUAL_FLICKER
 
 
-def _trial(plain: Explanation, causes: Sequence[Cause], tolerance: dict[str, float], scale: float) -> tuple[float, Fit]:
+def _is_hopeless(plain: Explanation, prepared: PreparedRuns, tolerance: dict[str, float], reference: float) -> bool:
+    """Tell whether a search was given up for what no residue takes off, whichever causes that makes superfluous."""
+    value, start = _trial(plain, plain.fit.causes, tolerance, _USUAL, pruned=False)
+    larger, _ = _trial(plain, start.causes, tolerance, _LARGE, pruned=False)
+    left = left_over(plain.segments, plain.fit, plain.fixed, prepared.spikes, rounded=prepared.rounded)
+    return left.log_odds > max(_MUCH, max(value, larger) + _SUPERFLUOUS - reference)
+
+
+def _trial(
+    plain: Explanation, causes: Sequence[Cause], tolerance: dict[str, float], scale: float, *, pruned: bool = True
+) -> tuple[float, Fit]:
     """Admit a residue beside causes and drop those that it makes superfluous; returns the log probability too.
 
     That is −∞ where what is missing is larger than any residue.
@@ -156,7 +169,7 @@ def _trial(plain: Explanation, causes: Sequence[Cause], tolerance: dict[str, flo
         fit = refine(segments, causes, fixed, drives=plain.fit.drives)
         if fit.objective > FAIR_FIT * sum(int(segment.weight_mask.sum()) for segment in segments):
             return -np.inf, fit
-        if any(cause.power < _PLAIN**2 for cause in fit.causes):  # others need not be tried without
+        if pruned and any(cause.power < _PLAIN**2 for cause in fit.causes):  # others need not be tried without
             fit = prune(segments, fit, fixed)[0]
         return log_probability(segments, fit), fit
     finally:

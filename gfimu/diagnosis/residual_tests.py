@@ -51,6 +51,8 @@ class LeftOver:
         Whether it takes the place of named causes, which then are a compromise, instead of adding to them.
     hints : tuple of str
         Functions (`gfimu.diagnosis.generic_basis`) beyond the usual ones that may describe it.
+    dependence : str
+        The function that it follows, where it follows one.
     """
 
     log_odds: float
@@ -58,6 +60,7 @@ class LeftOver:
     surrogate: dict[str, float]
     instead: bool = False
     hints: tuple[str, ...] = ()
+    dependence: str = ""
 
 
 def judges_reference(segment: Segment) -> bool:

@@ -14,16 +14,20 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag, lapack, solve_triangular
 
 from gfimu.array import AccelerometerArray
+from gfimu.diagnosis.causes import WHOLE_NUMBERS, Cause
 from gfimu.diagnosis.evidence import SCALES, inverse, log_evidence, log_evidence_each, posterior
 from gfimu.diagnosis.signatures import Hypothesis, SignatureSet
 
-__all__ = ["EXTRA_CAUSE", "Blocks", "Candidate", "log_odds_beside_residue", "search"]
+__all__ = ["EXTRA_CAUSE", "MOST_CAUSES", "Blocks", "Candidate", "log_odds_beside_residue", "search", "swapped"]
 
 EXTRA_CAUSE = float(np.log(0.3))
 """Log prior odds for each cause beyond the first."""
+MOST_CAUSES = 4
+"""How many causes a set may have."""
 _TOP_FAMILIES = 8
 _BEAM = 6
 _PARTNERS = 30
+_OF_SHAPE = 0.1  # of what an effect explains: what its nearest listed shape may lack
 
 
 @dataclass(frozen=True)
@@ -155,6 +159,40 @@ def _distinct(candidates: Sequence[Candidate], hypotheses: Sequence[Hypothesis],
             if len(kept) == count:
                 break
     return kept
+
+
+def swapped(blocks: Blocks, causes: Sequence[Cause]) -> list[Candidate]:
+    """Return sets with another effect in place of one where only its shape may keep it from doing as well.
+
+    A large effect in nearly the right shape lacks far more than separates it from another effect, so that the right
+    set may be well down the linear list.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        The normal equations by hypothesis.
+    causes : sequence of Cause
+        The set; of a single cause there are none, as `search` lists single effects anyway.
+    """
+    names = {cause.name for cause in causes}
+    places = {(one.name, one.pattern): number for number, one in reversed(list(enumerate(blocks.hypotheses)))}
+    members = [places[cause.key] for cause in causes if cause.key in places]
+    if not 1 < len(members) == len(causes):
+        return []
+    found = []
+    for member in members:
+        rest = [other for other in members if other != member]
+        odds = blocks.log_odds_each(rest)
+        best: dict[str, int] = {}
+        for number in np.argsort(-odds):
+            hypothesis = blocks.hypotheses[number]
+            if hypothesis.name not in names and hypothesis.signature.shape.keys() - WHOLE_NUMBERS:
+                best.setdefault(hypothesis.name, int(number))
+        for number in best.values():
+            if odds[number] > (1.0 - _OF_SHAPE) * odds[member]:
+                together = tuple(sorted((*rest, number)))
+                found.append(Candidate(blocks.log_odds(together), together))
+    return found
 
 
 def log_odds_beside_residue(

@@ -18,7 +18,7 @@ from gfimu.diagnosis.long_run import explain_any_length, settle_noise_of_any_len
 from gfimu.diagnosis.model import Effect, WorldModel
 from gfimu.diagnosis.nuisances import settle_noise
 from gfimu.diagnosis.prepared_runs import PreparedRuns
-from gfimu.diagnosis.pruning import LEAST_EXTRA_ODDS
+from gfimu.diagnosis.pruning import LEAST_EXTRA_ODDS, prune
 from gfimu.diagnosis.refinement import refine
 from gfimu.diagnosis.segment import Segment, known_walk
 from gfimu.diagnosis.stochastic import UNEQUAL_WALK, WALK_ODDS, Walk, log_probability, walk_strength
@@ -117,7 +117,10 @@ def with_walk(
             if given_up and _leaves_much(other, fit, fixed, prepared):
                 return None
             if beside.log_odds < WALK_ODDS and log_probability(other, fit) - without < -_WORSE:
-                return None
+                # Of the slow causes some may be right, and a walk pass for the others.
+                kept = prune(other, refine(other, judged.fit.causes, fixed, drives=judged.fit.drives), fixed)[0]
+                if log_probability(other, kept) - without < -_WORSE:
+                    return None
         found = explain_any_length(other, fixed, len(prepared.runs), start=base.causes)
         odds = log_probability(other, found.fit) - without
         if found.given_up or number == _ROUNDS - 1:
@@ -126,7 +129,8 @@ def with_walk(
         walk = walk_strength(before, base, fixed)
         if abs(walk.strength - last.strength) < walk.std:
             break
-    if odds < LEAST_EXTRA_ODDS or walk.log_odds < WALK_ODDS or walk.unequal > UNEQUAL_WALK:
+    replaced = len(found.fit.causes) < len(judged.fit.causes)  # not one more cause, but one for another
+    if odds < (0.0 if replaced else LEAST_EXTRA_ODDS) or walk.log_odds < WALK_ODDS or walk.unequal > UNEQUAL_WALK:
         return None  # another cause was taken for a walk at first
     return found, replace(walk, log_odds=float(odds))
 
