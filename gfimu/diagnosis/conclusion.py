@@ -67,8 +67,8 @@ def conclude(
     likely = probabilities(explanation)
     rivals = conflicting(explanation)
     named = _named(explanation, fit, likely, array)
-    significant = _stands_out(explanation, left)
     dominant = described is not None or is_unknown(explanation, left, gain)
+    significant = dominant or _stands_out(explanation, left)
     believed = explanation if described is None else described
     runs = tuple(_view(prepared, number, believed) for number in range(len(prepared.runs)))
     extension = effects_of_run(believed.fit.causes, array, 0) if not dominant or described is not None else []
@@ -120,7 +120,10 @@ def is_unknown(explanation: Explanation, left: LeftOver, gain: Gain) -> bool:
     # Several causes that together still miss something, and a share of held-out data, coincide by chance.
     missed = len(explanation.fit.causes) > 1 and gain.share_of_excess_removed < 1.0 - _DOMINANT
     untold = missed or _is_cut_short(explanation) or is_dominant(explanation, left)
-    return untold and _stands_out(explanation, left)
+    # A ripple that the drive follows so well that its model predicts worse than none is no explanation.
+    plain = left.log_odds > LEFT_OVER_ODDS
+    useless = plain and _is_of_ripple(explanation.fit, left) and gain.log_likelihood_per_sample < 0.0
+    return (untold and _stands_out(explanation, left)) or useless
 
 
 def is_dominant(explanation: Explanation, left: LeftOver) -> bool:
