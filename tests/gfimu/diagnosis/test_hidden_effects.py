@@ -129,6 +129,20 @@ def test_a_strong_torque_ripple_is_told_with_its_phase():
     assert abs((off + np.pi) % (2 * np.pi) - np.pi) < 0.1
 
 
+def test_a_servo_unlike_the_models_leaves_a_ripple_of_the_same_order_and_no_unknown():
+    """The drive follows nearly all of a ripple, and what the two servos do otherwise is much of the little left."""
+    case = next(case for case in study_cases("singles") if case.key == "singles/10048")
+    found = outcome(case, OTHER_GENERATOR)
+    assert (found["verdict"], [cause["effect"] for cause in found["causes"]]) == ("explained", ["cogging"])
+
+
+def test_a_large_effect_is_not_told_as_another_for_want_of_its_shape():
+    """No listed time constant is near enough to compete with a temperature that rises much alike."""
+    settings = {"duration": 40.0, "sample_rate": 200.0, "bias_instability_mg": 0.045, "tacho_noise": 0.0326}
+    found = run_case(Case("reduced", 872_024, ("warm_up", "scale_factor"), 791.6, **settings), OTHER_GENERATOR)
+    assert {cause["effect"] for cause in found["causes"]} == {"warm_up", "scale_factor"}
+
+
 def test_a_mode_that_pushes_its_table_back_is_named_alone():
     """A drive that does not know how the mode rings on is bent to ring itself, and leaves something."""
     outcome = run_case(Case("reduced", 511, ("resonance",), 600.0, duration=20.0), OTHER_GENERATOR)

@@ -12,11 +12,14 @@ from numpy.testing import assert_allclose
 from gfimu.array import AccelerometerArray
 from gfimu.diagnosis import diagnose, engine, loose_calibration
 from gfimu.diagnosis.calibration_residue import CalibrationResidue
+from gfimu.diagnosis.conclusion import is_unknown
 from gfimu.diagnosis.fit import Fit
 from gfimu.diagnosis.nuisances import learn_noise
 from gfimu.diagnosis.prepared_runs import PreparedRuns
 from gfimu.diagnosis.refinement import refine
+from gfimu.diagnosis.residual_tests import LeftOver
 from gfimu.diagnosis.signatures import Signature, hypotheses
+from gfimu.diagnosis.verdict import Gain
 from gfimu.recording import Recording
 from sim.campaign import Measurement, measure, random_profile
 from sim.effects import make_effect
@@ -223,8 +226,46 @@ def test_a_mode_within_what_a_rough_cause_leaves_is_not_listened_to(scores, hear
     """Of 100 standard deviations of torque ripple 2 % of the power may be left, which is 14."""
     segment = SimpleNamespace(ringing=False, levels=SimpleNamespace(of_reading=0.03))
     best = fit_of(cause_of("resonance", MODE, scores), cause_of("cogging", {"order": 10.0}, 100.0))
-    state = SimpleNamespace(_observations=1000, _best=best, _segments=[segment], _loose=False)
+    state = SimpleNamespace(_observations=1000, _best=best, _segments=[segment], _loose=False, given_up=False)
     assert engine._Search._may_hear_mode_ring.fget(state) is heard
+    state.given_up, state._outweighed = True, True  # more is left than all that was found explains
+    assert not engine._Search._may_hear_mode_ring.fget(state)
+
+
+def test_beside_what_no_residue_takes_off_no_cause_is_tried_without(twin, foreign, monkeypatch):
+    def pruned(*_):
+        raise AssertionError("nothing of it will be believed")
+
+    segments, fixed = PreparedRuns.build([foreign], twin, ["run"]).segments(twin)
+    plain = engine.explain(segments, fixed, 1)
+    assert plain.given_up
+    monkeypatch.setattr(loose_calibration, "prune", pruned)
+    monkeypatch.setattr(loose_calibration, "FAIR_FIT", np.inf)
+    loose, same = loose_calibration.loosen(plain, PreparedRuns.build([foreign], twin, ["run"]), twin)
+    assert loose is None
+    assert same is plain
+
+
+@pytest.mark.parametrize(("causes", "verdict"), [(3, False), (4, True)])
+def test_causes_as_many_as_may_be_that_leave_something_are_unknown(causes, verdict):
+    """Wide causes enough describe anything nearly."""
+    names = ("bias", "scale_factor", "quadratic", "mount_tilt")[:causes]
+    explanation = SimpleNamespace(
+        fit=fit_of(*(cause_of(name, {}, 50.0) for name in names)), nothing=fit_of(objective=1e5)
+    )
+    left = LeftOver(100.0, "channel a11 depends on rate³", {})
+    assert is_unknown(explanation, left, Gain()) is verdict
+
+
+def test_a_ripple_that_predicts_worse_than_nothing_is_unknown():
+    explanation = SimpleNamespace(
+        fit=fit_of(cause_of("cogging", {"order": 3.0}, 25.0)), nothing=fit_of(objective=1600.0)
+    )
+    left = LeftOver(50.0, "depends on 3 per revolution (sine)", {}, dependence="3 per revolution (sine)")
+    assert not is_unknown(explanation, left, replace(Gain(), log_likelihood_per_sample=0.01))
+    assert is_unknown(explanation, left, replace(Gain(), log_likelihood_per_sample=-0.01))
+    other = replace(left, dependence="4 per revolution (sine)")
+    assert is_unknown(explanation, other, replace(Gain(), log_likelihood_per_sample=0.01))
 
 
 @pytest.mark.parametrize(("size_m_s2", "tried"), [(1.0, False), (0.01, True)])

@@ -1,6 +1,7 @@
 """Wandering biases: looked for where they are likely, at once where they explain far more than anything else."""
 
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -37,6 +38,16 @@ def test_a_search_that_is_left_for_a_walk_finds_it_and_what_is_beside_it():
     world = draw_world(Case("walks", 91002, ("bias_random_walk", "eccentricity"), 1000.0, duration=40.0))
     found = diagnose([world.recording], world.twin)
     assert {cause.effect for cause in found.causes} == {"bias_random_walk", "eccentricity"}
+
+
+def test_a_walk_is_found_beside_a_slow_cause_that_is_right():
+    """In 15 s one slow cause of two passes for the walk; without both a walk fits worse than with both it would."""
+    settings = {"duration": 15.0, "sample_rate": 200.0, "bias_instability_mg": 0.061, "tacho_noise": 0.0436}
+    case = Case("walks", 872_020, ("bias_random_walk", "scale_factor"), 207.8, **settings)
+    generator = str(Path(__file__).parents[2] / "independent_world.py:hide")
+    world = draw_world(case, generator)
+    found = diagnose([world.recording], world.twin)
+    assert {cause.effect for cause in found.causes} == {"bias_random_walk", "scale_factor"}
 
 
 def test_a_walk_over_coarse_steps_is_told_with_its_strength():
