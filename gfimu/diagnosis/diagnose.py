@@ -22,7 +22,7 @@ from gfimu.diagnosis.prepared_runs import PreparedRuns
 from gfimu.diagnosis.pruning import prune
 from gfimu.diagnosis.refinement import refine
 from gfimu.diagnosis.residual_tests import LeftOver
-from gfimu.diagnosis.stochastic import Walk
+from gfimu.diagnosis.stochastic import UNEQUAL_WALK, WALK_ODDS, Walk, walk_strength
 from gfimu.diagnosis.surrogate import surrogates
 from gfimu.diagnosis.verdict import Diagnosis, Gain
 from gfimu.diagnosis.wandering_biases import wanders, with_walk
@@ -121,7 +121,14 @@ def _diagnose_table(
     described = None
     if is_unknown(explanation, left, gain):
         described, gain = _describe(explanation, left, held_out, model, () if loose is None else loose.effects)
+        walk = None if walk is None or described is None else _left_wandering(described, walk)
     return conclude(prepared, model, explanation, walk, loose, left, gain, withdrawn, described)
+
+
+def _left_wandering(described: Explanation, walk: Walk) -> Walk | None:
+    """Return a walk if one is left where what has no name is described: that passes for a walk too."""
+    left = walk_strength(described.segments, described.fit, described.fixed)
+    return walk if left.log_odds > WALK_ODDS and left.unequal < UNEQUAL_WALK else None
 
 
 def _pruned(explanation: Explanation) -> Explanation:
