@@ -91,10 +91,11 @@ def near_rivals(
     """Refine other sets under the noise and drive prior of the best one; those that come close are pruned too."""
     rivals = []
     sets = [fit.causes for fit in near if len(fit.causes) <= len(best.causes) + 1]
-    for refined in refine_each(segments, sets, fixed, [best.drives] * len(sets), iterations=6):
-        rival = refined
-        if rival.key > best.key and rival.log_posterior < best.log_posterior:
-            continue  # the best set with something superfluous
+    refined = refine_each(segments, sets, fixed, [best.drives] * len(sets), iterations=6)
+    for fit in refined:
+        rival = fit
+        if any(rival.key > other.key and rival.log_posterior < other.log_posterior for other in (best, *refined)):
+            continue  # another set with something superfluous
         if rival.log_posterior > best.log_posterior - _WORTH_PRUNING:
             rival = prune(segments, rival, fixed, done)[0]
         rivals.append(rival)
