@@ -191,14 +191,35 @@ def _other_settings() -> list[Case]:
         rng = np.random.default_rng(first)
         for number in range(count):
             name = list(EFFECTS)[int(rng.integers(len(EFFECTS)))]
-            size = float(np.exp(rng.uniform(np.log(60.0), np.log(3000.0))))
-            rate = float(rng.choice([25.0, 50.0, 100.0, 200.0, 400.0]))
-            length = float(rng.choice([20.0, 30.0, 60.0, 90.0] if rate <= 100.0 else [15.0, 25.0, 40.0]))
-            bias_instability = float(np.exp(rng.uniform(np.log(0.03), np.log(0.8))))
-            noise = float(np.exp(rng.uniform(np.log(0.003), np.log(0.1))))
-            size = 0.0 if name in SIZELESS else size
-            cases.append(Case("other_settings", first + number, (name,), size, length, rate, bias_instability, noise))
+            cases.append(_at_other_settings("other_settings", first + number, (name,), rng))
     return cases
+
+
+def _other_pairs() -> list[Case]:
+    """Return two effects at such settings.
+
+    Nothing was developed on their seeds but what is tried in place of a cause (872024), and a walk beside a slow cause
+    (872020).
+    """
+    rng = np.random.default_rng(872_000)
+    drawn = ((tuple(str(name) for name in rng.choice(list(EFFECTS), 2, replace=False))) for _ in range(50))
+    return [_at_other_settings("other_pairs", 872_000 + number, names, rng) for number, names in enumerate(drawn)]
+
+
+def _other_nulls() -> list[Case]:
+    """Return runs with nothing hidden at such settings."""
+    rng = np.random.default_rng(871_000)
+    return [_at_other_settings("other_nulls", 871_000 + number, (), rng) for number in range(60)]
+
+
+def _at_other_settings(study: str, seed: int, effects: tuple[str, ...], rng: np.random.Generator) -> Case:
+    size = float(np.exp(rng.uniform(np.log(60.0), np.log(3000.0))))
+    rate = float(rng.choice([25.0, 50.0, 100.0, 200.0, 400.0]))
+    length = float(rng.choice([20.0, 30.0, 60.0, 90.0] if rate <= 100.0 else [15.0, 25.0, 40.0]))
+    bias_instability = float(np.exp(rng.uniform(np.log(0.03), np.log(0.8))))
+    noise = float(np.exp(rng.uniform(np.log(0.003), np.log(0.1))))
+    sized = effects and (len(effects) > 1 or effects[0] not in SIZELESS)
+    return Case(study, seed, effects, size if sized else 0.0, length, rate, bias_instability, noise)
 
 
 def _nulls() -> list[Case]:
@@ -283,6 +304,8 @@ STUDIES: dict[str, Callable[[], list[Case]]] = {
     "fresh_faint": _fresh_faint,
     "coarse_steps": _coarse_steps,
     "other_settings": _other_settings,
+    "other_pairs": _other_pairs,
+    "other_nulls": _other_nulls,
     "nulls": _nulls,
     "long_nulls": _long_nulls,
     "threshold_nulls": _threshold_nulls,

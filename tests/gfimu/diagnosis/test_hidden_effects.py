@@ -294,7 +294,7 @@ def test_coarse_steps_under_strong_bias_instability_draw_in_no_offset():
 
 def test_study_cases_have_seeds_of_their_own():
     names = ["singles", "nulls", "threshold_nulls", "pairs", "triples", "residue", "left_out", "exotics"]
-    names += ["fresh_singles", "fresh_faint", "faint", "coarse_steps", "other_settings"]
+    names += ["fresh_singles", "fresh_faint", "faint", "coarse_steps", "other_settings", "other_pairs", "other_nulls"]
     seeds = [case.seed for name in names for case in study_cases(name)]
     assert len(seeds) == len(set(seeds))
     assert all(
