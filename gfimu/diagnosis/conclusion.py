@@ -40,6 +40,7 @@ __all__ = ["conclude", "is_dominant", "is_unknown"]
 _DOMINANT = 0.03
 _INEXACTNESS = 2.5e-3
 _OF_RIPPLE = 0.25  # nats that a rough ripple leaves at its own order, by the misfit that it takes off: half of it
+_OTHER_SERVO = 2.0  # of a ripple's size: off by so much, as the drive follows most of it
 _BESIDE_DRIVE = "motion"  # place of effects that the drive can stand in for
 _TURNS = ANGLES | {"phase_rad"}
 _CLOSE_RESIDUE = 4.0  # log odds against a residue of the calibration in place of a cause, below which it is told
@@ -66,7 +67,7 @@ def conclude(
     ]
     likely = probabilities(explanation)
     rivals = conflicting(explanation)
-    named = _named(explanation, fit, likely, array)
+    named = _named(explanation, fit, likely, array, left)
     dominant = described is not None or is_unknown(explanation, left, gain)
     significant = dominant or _stands_out(explanation, left)
     believed = explanation if described is None else described
@@ -80,7 +81,7 @@ def conclude(
         verdict = "ambiguous"
         others: dict[str, NamedCause] = {}
         for rival in rivals:
-            for cause in _named(explanation, rival, likely, array):
+            for cause in _named(explanation, rival, likely, array, left):
                 others.setdefault(cause.effect, cause)
         every = [*named, *(other for name, other in others.items() if name not in fit.names)]
         causes = (*found, *contested(every, [fit, *rivals], model.families()))
@@ -122,7 +123,7 @@ def is_unknown(explanation: Explanation, left: LeftOver, gain: Gain) -> bool:
     untold = missed or _is_cut_short(explanation) or is_dominant(explanation, left)
     # A ripple that the drive follows so well that its model predicts worse than none is no explanation.
     plain = left.log_odds > LEFT_OVER_ODDS
-    useless = plain and _is_of_ripple(explanation.fit, left) and gain.log_likelihood_per_sample < 0.0
+    useless = plain and _is_of_ripple(explanation.fit.causes, left) and gain.log_likelihood_per_sample < 0.0
     return (untold and _stands_out(explanation, left)) or useless
 
 
@@ -138,11 +139,11 @@ def _stands_out(explanation: Explanation, left: LeftOver) -> bool:
     removed = explanation.nothing.objective - explanation.fit.objective
     if left.instead or _is_cut_short(explanation):
         return left.log_odds > LEFT_OVER_ODDS
-    share = _OF_RIPPLE if _is_of_ripple(explanation.fit, left) else _INEXACTNESS
+    share = _OF_RIPPLE if _is_of_ripple(explanation.fit.causes, left) else _INEXACTNESS
     return left.log_odds > max(LEFT_OVER_ODDS, share * removed)
 
 
-def _is_of_ripple(fit: Fit, left: LeftOver) -> bool:
+def _is_of_ripple(causes: Sequence[Cause], left: LeftOver) -> bool:
     """Tell whether what is left turns as often per revolution as a ripple whose model is a rough one.
 
     The drive follows most of a ripple, and of the table's answer to it what the model has; what the table's own servo
@@ -150,7 +151,7 @@ def _is_of_ripple(fit: Fit, left: LeftOver) -> bool:
     """
     order = ripple_order(left.dependence)
     return order is not None and any(
-        cause.family.inexactness > 0.0 and cause.shape.get("order") == order for cause in fit.causes
+        cause.family.inexactness > 0.0 and cause.shape.get("order") == order for cause in causes
     )
 
 
@@ -163,7 +164,9 @@ def _is_cut_short(explanation: Explanation) -> bool:
     return len(causes) >= MOST_CAUSES and all(cause.family.inexactness == 0.0 for cause in causes)
 
 
-def _named(explanation: Explanation, fit: Fit, likely: dict[str, float], array: AccelerometerArray) -> list[NamedCause]:
+def _named(
+    explanation: Explanation, fit: Fit, likely: dict[str, float], array: AccelerometerArray, left: LeftOver
+) -> list[NamedCause]:
     """Return the causes of a fit as the verdict names them, the largest contribution first."""
     segment = explanation.segments[0]
     known = explanation.fixed[0]
@@ -177,7 +180,7 @@ def _named(explanation: Explanation, fit: Fit, likely: dict[str, float], array: 
         share = channel_share(change[:, :-1] * segment.weight_mask[:, :-1], array.channels)
         entry = name_cause(explanation, fit, cause, likely, array, share)
         why = entry.why + _other_runs(cause, array, runs) + _or_residue(explanation, cause)
-        entry = replace(entry, why=why, std=_widened(entry, cause, misfit))
+        entry = replace(entry, why=why, std=_widened(entry, cause, misfit, left))
         entries.append((float(sum(value**2 for value in share.values())), entry))
     return [entry for _, entry in sorted(entries, key=lambda pair: -pair[0])]
 
@@ -190,17 +193,20 @@ def _misfit(explanation: Explanation, fit: Fit) -> tuple[float, float]:
     return float(left / observations), float(left / (left + removed))
 
 
-def _widened(named: NamedCause, cause: Cause, misfit: tuple[float, float]) -> dict[str, float]:
+def _widened(named: NamedCause, cause: Cause, misfit: tuple[float, float], left: LeftOver) -> dict[str, float]:
     """Widen standard deviations where a cause does not fit to the noise: all by the root of the misfit.
 
     Where the model of the effect is a rough one, the misfit may be its own: a share ε of what a parameter explains is
     what an error of √ε of that parameter leaves. Where such an effect moves the table, the drive takes up what its
-    model gets wrong, and nothing is seen of it.
+    model gets wrong, and nothing is seen of it. Where a ripple leaves what only another servo does, its size is known
+    by order of magnitude.
     """
     over, share = misfit
     inexactness = cause.family.inexactness
     hidden = inexactness if cause.family.place == _BESIDE_DRIVE else 0.0
     rough = np.sqrt(share + hidden) if inexactness > 0.0 else 0.0
+    if left.log_odds > LEFT_OVER_ODDS and _is_of_ripple((cause,), left):
+        rough = _OTHER_SERVO
     values = {key: 1.0 if key in _TURNS else float(named.parameters.get(key, 0.0)) for key in named.std}
     return {key: float(np.hypot(std * np.sqrt(1.0 + over), rough * values[key])) for key, std in named.std.items()}
 
