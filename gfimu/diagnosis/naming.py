@@ -32,11 +32,10 @@ __all__ = [
 TEMPERATURE = 1.2
 """Softening of log posteriors, as the linear-Gaussian model is never quite true.
 
-It makes what was hidden in the runs of `faint` of `sim.study` the most likely; stated probabilities are judged on
-others (`fresh_faint`).
+From 1.1 to 1.2 what was hidden in the runs of `faint` of `sim.study` is the most likely.
 """
 MOST_CERTAIN = 0.997
-"""Largest probability that is stated: of causes surer than this 3 of 1000 were wrong in `sim.study`."""
+"""Largest probability that is stated: of causes surer than 0.99 3 of 1000 were wrong in `sim.study`."""
 AMBIGUOUS_ODDS = 2.0
 """Log odds within which a rival set counts as not told from the best one."""
 _MIMIC_ENERGY = 6.0

@@ -2,6 +2,7 @@
 
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from gfimu.diagnosis import diagnose, engine, wandering_biases
 from gfimu.diagnosis.engine import explain
 from gfimu.diagnosis.long_run import explain_any_length
 from gfimu.diagnosis.prepared_runs import PreparedRuns
+from gfimu.diagnosis.stochastic import Walk
 from sim.study.cases import Case
 from sim.study.outcome import draw_world
 
@@ -115,3 +117,13 @@ def test_slow_causes_that_leave_no_walk_start_no_search_for_one(monkeypatch):
     again = diagnose([world.recording], world.twin)
     assert searches
     assert {cause.effect for cause in again.causes} == {"gain_drift", "warm_up"}
+
+
+@pytest.mark.parametrize(("odds", "unequal", "kept"), [(50.0, 1.0, True), (5.0, 1.0, False), (50.0, 100.0, False)])
+def test_a_walk_is_named_beside_an_unknown_only_where_one_is_left(monkeypatch, odds, unequal, kept):
+    module = sys.modules[diagnose.__module__]
+    left = Walk(0.02, 0.001, odds, unequal)
+    monkeypatch.setattr(module, "walk_strength", lambda *_: left)
+    walk = Walk(0.1, 0.01, 3000.0, 1.0)
+    described = SimpleNamespace(segments=(), fit=None, fixed=())
+    assert module._left_wandering(described, walk) is (walk if kept else None)
