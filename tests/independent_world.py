@@ -64,7 +64,7 @@ class HiddenRun:
         return recording, truth
 
 
-def hide(seed, effects=(), size=300.0, **setting):
+def hide(seed, effects=(), size=300.0, *, draw_command=random_command, drive=drive_table, **setting):
     """Hide effects in a run drawn from a seed.
 
     Parameters
@@ -75,24 +75,28 @@ def hide(seed, effects=(), size=300.0, **setting):
         Names from the contract's table, or exotic ones.
     size : float
         Size of each as d′ = √Σ(Δ/σ)² over channels and tachometer, the drive known; no meaning for discrete ones.
+    draw_command : callable
+        Draws a commanded rate from a generator, a duration and the largest rate.
+    drive : callable
+        Drives the table after it, as `drive_table` does.
     **setting
         Fields of `Setting`.
     """
     rng = np.random.default_rng([seed, 77])
     plan = Setting(**setting)
     top = 25.0 if "saturation" in effects else 15.0  # rad/s: something has to reach the limit
-    command = random_command(rng, plan.duration, top)
-    plain = drive_table(command, Rig(), plan.duration, plan.step_s)
+    command = draw_command(rng, plan.duration, top)
+    plain = drive(command, Rig(), plan.duration, plan.step_s)
     plan = Setting(**{**setting, "top": float(np.abs(plain.readings).max())})
     temperature = _draw_temperature(rng, plan.duration)
     hidden = {}
     for name in effects:
         unit = (DRAWS | EXOTICS)[name](rng, plan)
         if name == "resonance":  # the mode's twist comes from a table that has this mode
-            plain = drive_table(command, rig_with({name: unit}), plan.duration, plan.step_s)
+            plain = drive(command, rig_with({name: unit}), plan.duration, plan.step_s)
         hidden[name] = _sized(plain, plan, temperature, name, unit, size)
     rig = rig_with(hidden)
-    run = drive_table(command, rig, plan.duration, plan.step_s) if _differs(rig) else plain
+    run = drive(command, rig, plan.duration, plan.step_s) if _differs(rig) else plain
     t, readings, tacho = noise_free(run, plan, temperature, hidden, rig, run.readings)
     columns = _measured(rng, plan, t, readings, tacho, temperature, hidden)
     least = min((_reached(plain, plan, temperature, name, hidden[name], size) for name in hidden), default=np.inf)

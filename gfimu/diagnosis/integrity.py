@@ -25,6 +25,7 @@ _RANGE_FACTORS = (1 / 16, 1 / 8, 1 / 4, 1 / 2, 2.0, 4.0, 8.0, 16.0)
 _REMOVED = 0.7
 _FITTING = 0.6  # of the power of the readings
 _SIGNIFICANT_RMS = 12.0
+_VARIED_RMS, _NOISE = 3.0, 1.5  # of a slow table, noise; power of white noise and some bias instability
 _MANY = 3  # inverted channels that are more likely than exchanged ones
 _PILE = 30
 _CAUGHT = 0.8  # of the samples that should be beyond a limit
@@ -262,7 +263,7 @@ def _wiring(
                 )
         options += _exchanged_chips(model, misfit, prediction, max((option[0] for option in options), default=0.0))
         for one in range(len(names)):
-            if _clears(flipped[one], own[one]):
+            if _clears(flipped[one], own[one]) or _reads_negative(run, prediction[:, one], white[one], one):
                 sign = np.ones(len(names))
                 sign[one] = -1
                 options.append(
@@ -331,6 +332,20 @@ def _signed(misfit: NDArray[np.float64], inverted: NDArray[np.float64], *places:
 def _clears(after: float, before: float) -> bool:
     """Tell whether a mean squared misfit is significant, and gone after."""
     return before > _SIGNIFICANT_RMS**2 and after < (1 - _REMOVED) * before
+
+
+def _reads_negative(run: Run, prediction: NDArray[np.float64], white: float, channel: int) -> bool:
+    """Tell whether what varies of a channel is the negative of its prediction (n,), down to the noise.
+
+    Of little, as on a slow table: an offset may look like an inverted constant, but nothing else inverts a variation.
+    """
+    ok = run.valid[:, channel]
+    if not ok.any():
+        return False
+    measured, expected = run.readings[ok, channel] / white, prediction[ok] / white
+    inverted = measured + expected
+    varied = float(np.var(measured - expected)) > _VARIED_RMS**2
+    return varied and float(np.var(inverted)) < _NOISE and float(np.mean(inverted**2)) < 2 * _NOISE
 
 
 def _misfits(run: Run, prediction: NDArray[np.float64], white: NDArray[np.float64]) -> NDArray[np.float64]:

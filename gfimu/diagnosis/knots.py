@@ -32,7 +32,7 @@ def intervals_to_cut(
     widths : ndarray, shape (k,)
         Of the intervals, s.
     bend : ndarray, shape (k,)
-        Rms third derivative of the rate around each, rad/s⁴.
+        Rms of what the third derivative of the rate changes by at the ends of each, rad/s⁴.
     sample_period : float
         Of the channels, s.
     acuity : float

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from gfimu.diagnosis.fit import Fit, without
 from gfimu.diagnosis.model import Effect
+from gfimu.diagnosis.other_orders import is_ripple, power_at_other_orders
 from gfimu.diagnosis.refinement import refine_each
 from gfimu.diagnosis.segment import Segment
 
@@ -23,6 +24,7 @@ _LEAST_ROUNDED_ODDS = 15.0  # where readings are coarse: at rest the same roundi
 RIVALS = 6
 """How many other sets are judged beside the best."""
 _WORTH_PRUNING = 40.0
+_CHANCE_ORDER = 10.0  # misfit that one of four wrong orders of a ripple takes off by chance in one run of forty
 
 
 def prune(
@@ -71,6 +73,9 @@ def prune(
         known |= {one.key: one for one in refined}
         fewer = {cause.name: known[key] for cause, key in zip(fit.causes, keys, strict=True)}
         lost = {name: fit.log_posterior - other.log_posterior for name, other in fewer.items()}
+        for cause in filter(is_ripple, fit.causes):
+            elsewhere = power_at_other_orders(segments, fewer[cause.name], fixed, cause)
+            lost[cause.name] -= max(elsewhere - _CHANCE_ORDER, 0.0)
         weakest = min(lost, key=lost.__getitem__)
         needed = LEAST_ODDS if len(fit.causes) == 1 and not faults else LEAST_EXTRA_ODDS
         needed = _LEAST_ROUNDED_ODDS if rounded else needed

@@ -58,9 +58,14 @@ class Roughness:
         self._corners = np.where(corner, _PEAK_FACTOR * np.sqrt(self.spline.moving_average(third**2, _PEAK)), 0.0)
 
     def bend(self, coefficients: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return how sharply a drive bends around each knot interval, shape (m − 4,), rad/s⁴."""
-        third = self.spline.roughness_rows() @ coefficients
-        return np.asarray(np.sqrt(self.spline.moving_average(third**2, _CORNER)))
+        """Return how sharply a drive bends at the ends of each knot interval, shape (m − 4,), rad/s⁴.
+
+        The third derivative of its rate is constant within an interval: what changes from one to the next tells what
+        the spline misses, little of a swift sine and all of a corner.
+        """
+        change = np.square(np.diff(self.spline.roughness_rows() @ coefficients))  # of a lone peak, twice its square
+        ends = 0.5 * (np.append(change, 0.0) + np.insert(change, 0, 0.0))
+        return np.asarray(np.sqrt(self.spline.moving_average(ends, _CORNER)))
 
     def scaled_rows(self, run: Run, *, is_angle: bool, reference_noise: float) -> tuple[csr_array, float]:
         """Return the third derivative in standard deviations of the prior, shape (m − 4, m), and Σ log of these.

@@ -45,6 +45,31 @@ def test_exchanged_and_inverted_channels_are_told_together(faults):
             assert sorted(np.atleast_1d(told[name][key])) == sorted(np.atleast_1d(value))
 
 
+def slow_table(*hidden, swing):
+    """A recording of a table that turns so slowly that readings hardly leave the noise."""
+    twin = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
+    t = np.arange(-2.0, 22.0, 5e-3)
+    rate = gaussian_filter1d(np.clip(t - 1.0, 0.0, 1.0) * (1.1 + swing * np.sin(0.7 * t)), 40.0)
+    motion = SplineSpin.through(t, rate)
+    rng = np.random.default_rng(4)
+    effects = [make_effect(name, values, twin.array) for name, values in hidden]
+    return twin, measure(rng, twin, effects, Measurement(duration=20.0), motion=motion)
+
+
+def test_an_inverted_channel_shows_on_a_slow_table():
+    twin, recording = slow_table(("sign_flip", {"channel": "a11"}), swing=0.6)
+    diagnosis = diagnose([recording], twin)
+    assert [(cause.effect, cause.parameters["channel"]) for cause in diagnosis.causes] == [("sign_flip", "a11")]
+
+
+def test_an_offset_at_one_slow_speed_is_no_inversion():
+    """It lowers what is read as far as an inversion would, but not what varies."""
+    twin, still = slow_table(swing=0.0)
+    read = float(np.median(still.for_array(twin.array)[-1000:, 0]))
+    _, recording = slow_table(("bias", {"a11_m_s2": -2.0 * read}), swing=0.0)
+    assert "sign_flip" not in {cause.effect for cause in diagnose([recording], twin).causes}
+
+
 @pytest.mark.parametrize("below", [0.3, 1.0, 2.0])
 def test_a_plateau_just_below_the_limit_hides_no_clipping(below):
     """Readings pile up one step below the limit too, where a slower plateau comes so close to it."""

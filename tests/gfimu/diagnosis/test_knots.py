@@ -1,8 +1,13 @@
 """Knots are set closer where a drive bends sharply, as far as samples and arms can tell, the sharpest bends first."""
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
+from scipy.ndimage import gaussian_filter1d
 
+from gfimu.diagnosis.drive import AngleSpline
 from gfimu.diagnosis.knots import KNOT_SPACING, intervals_to_cut
+from gfimu.diagnosis.roughness import Roughness
+from sim.motion import SpinState
 
 PERIOD = 0.01
 INTERVALS = 200
@@ -40,3 +45,21 @@ def test_of_too_many_the_sharpest_are_cut():
     assert 0 < cut.sum() < INTERVALS
     assert np.flatnonzero(cut).min() == INTERVALS - cut.sum()
     assert not chosen(bend, widths=np.full(INTERVALS, 0.3 * KNOT_SPACING)).any()
+
+
+def cut_times(rate, t):
+    """Where the spline that follows a rate would be cut, s."""
+    spline = AngleSpline.uniform(t[0], t[-1], KNOT_SPACING)
+    turned = SpinState(cumulative_trapezoid(rate, t, initial=0.0), rate, np.gradient(rate, t))
+    bend = Roughness(spline, 1.0).bend(spline.through(t, turned))
+    inner = (spline.interval_centres() > t[0] + 0.5) & (spline.interval_centres() < t[-1] - 0.5)
+    return spline.interval_centres()[chosen(bend) & inner]
+
+
+def test_a_swift_sine_is_followed_and_a_corner_is_not():
+    t = np.arange(0.0, 10.0, 1e-3)
+    assert not len(cut_times(6.0 * np.sin(2 * np.pi * 1.1 * t), t))
+    ramp = gaussian_filter1d(np.clip(t - 4.0, 0.0, 2.0) * 40.0, 10.0)
+    corners = cut_times(ramp, t)
+    assert np.abs(corners[:, None] - [4.0, 6.0]).min(axis=1).max() < 0.2
+    assert len(corners) >= 2
