@@ -57,6 +57,11 @@ class Roughness:
         corner = self.spline.widths < 0.75 * self.spline.spacing
         self._corners = np.where(corner, _PEAK_FACTOR * np.sqrt(self.spline.moving_average(third**2, _PEAK)), 0.0)
 
+    def rough(self, coefficients: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return how rough a drive is around each knot interval, shape (m − 4,), rad/s⁴."""
+        third = self.spline.roughness_rows() @ coefficients
+        return np.asarray(np.sqrt(self.spline.moving_average(third**2, _CORNER)))
+
     def bend(self, coefficients: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return how sharply a drive bends at the ends of each knot interval, shape (m − 4,), rad/s⁴.
 

@@ -135,8 +135,9 @@ class SplineDrive(ABC):
         cuts = 0
         while cuts < _MOST_CUTS_BY_REFERENCE:
             noise = self._reference_noise * rng.standard_normal(len(self.run.t))
-            by_chance = self.roughness.bend(self._reference_alone(replace(self.run, reference=noise)))
-            bend = self.roughness.bend(self._reference_drive)
+            # Of noise what changes from interval to interval stands out more than of a motion.
+            by_chance = self.roughness.rough(self._reference_alone(replace(self.run, reference=noise)))
+            bend = self.roughness.rough(self._reference_drive)
             self.coefficients = self._reference_drive
             if not self._cut(np.sqrt(np.maximum(bend**2 - (_BEYOND_CHANCE * by_chance) ** 2, 0.0))):
                 break
