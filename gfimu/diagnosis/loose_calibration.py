@@ -91,10 +91,11 @@ def loosen(
     _admit(segments, start.causes, fixed, start.drives, tolerance, scale)
     found = explain_any_length(segments, fixed, runs, start=start.causes)
     odds = log_probability(segments, found.fit) - reference
-    if odds < _LEAST_ODDS[scale]:
+    if found.fit.key == start.key:
         # Noise learnt anew may leave it less probable than it was under the noise of the plain explanation.
-        rival, odds = max((found.fit, odds), (start, value - reference), key=lambda one: one[1])
-        return None, _with_rival(plain, rival, min(odds - _LEAST_ODDS[scale], 0.0))
+        odds = max(odds, value - reference)
+    if odds < _LEAST_ODDS[scale]:
+        return None, _with_rival(plain, found.fit, odds - _LEAST_ODDS[scale])
     effects = _most_probable(segments, found.fit, fixed, tolerance, scale)
     known = tuple((*before, *effects) for before in fixed)
     for segment in segments:
