@@ -21,7 +21,7 @@ from gfimu.dilution import gdop, gdop_lower_bound
 from gfimu.errors import InputError
 from gfimu.kinematics import MOTION_NAMES, joint_covariance, null_space, omega_leakage, require_all_motions
 
-__all__ = ["DEFAULT_NOISE_STD", "Score", "gdop", "gdop_lower_bound", "score"]
+__all__ = ["DEFAULT_NOISE_STD", "Score", "gdop", "gdop_lower_bound", "ranking_remark", "score"]
 
 DEFAULT_NOISE_STD = 0.0287
 """Channel noise at which rate bounds are quoted, m/s²: ADXL345, x and y axes at 100 Hz (0.75 LSB of 3.9 mg)."""
@@ -150,6 +150,31 @@ def score(
     given = [arrays] if isinstance(arrays, AccelerometerArray | str | Path) else arrays
     loaded = [item if isinstance(item, AccelerometerArray) else AccelerometerArray.load(item) for item in given]
     return [_score(array, length_unit_m or array.length_unit, omega, noise_m_s2) for array in loaded]
+
+
+def ranking_remark(scores: Sequence[Score]) -> str:
+    """Return a sentence where κ and GDOP rank arrays differently, empty where they agree.
+
+    The GF-IMU paper's appendix claims that all its alternatives have larger κ and GDOP than the cube; for κ that is
+    false of P1 and P2, whose κ is 1 (`docs/geometry.md`).
+
+    Parameters
+    ----------
+    scores : sequence of Score
+        Scores of the arrays to rank.
+    """
+    if not scores:
+        return ""
+    best = min(scores, key=lambda entry: entry.gdop)
+    # Equal figures differ in their last digits by rounding.
+    lower = [entry.name for entry in scores if entry.condition_number < best.condition_number * (1.0 - _NEGLIGIBLE)]
+    if not lower:
+        return ""
+    have = "have" if len(lower) > 1 else "has"
+    return (
+        f"κ and GDOP rank these arrays differently: {', '.join(lower)} {have} a lower κ but a larger GDOP than "
+        f"{best.name}. κ compares the best-seen motion with the worst-seen one; rank by GDOP, or by GDOP* without ω."
+    )
 
 
 def _score(array: AccelerometerArray, unit: float, omega: NDArray[np.float64], noise: float) -> Score:

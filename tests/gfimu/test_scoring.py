@@ -13,7 +13,7 @@ from gfimu.array import AccelerometerArray, Chip
 from gfimu.dilution import gdop, gdop_lower_bound
 from gfimu.errors import GeometryError, InputError
 from gfimu.model_files import list_models
-from gfimu.scoring import score
+from gfimu.scoring import ranking_remark, score
 
 # Lengths in units of half the cube's edge. κ and GDOP of the tetrahedral cube: GF-IMU paper (1.414, 1.061); the rest
 # from a numerical study of the geometries, to the digits given there. Last column: GDOP of [J Q] (none: inf).
@@ -232,6 +232,34 @@ def test_bad_arguments_are_refused():
         gdop(np.zeros((4, 2)))
     with pytest.raises(InputError, match="axes of shape"):
         gdop(np.zeros((4, 3)), np.zeros((5, 3)))
+
+
+def test_the_printed_j_has_one_column_twice():
+    """GF-IMU paper, printed J: its second column has the same non-zero entries as the third."""
+    array = AccelerometerArray.load("cube12")
+    derived = array.regression_matrix / np.array([0.05] * 3 + [1.0] * 3)
+    printed = derived.copy()
+    printed[1] = printed[2]
+    for matrix, figures in ((derived, (1.4142, 1.0607)), (printed, (2.0236, 1.1146))):
+        condition = np.linalg.cond(matrix)
+        dilution = math.sqrt(np.trace(np.linalg.inv(matrix.T @ matrix)))
+        assert (condition, dilution) == pytest.approx(figures, abs=5e-5)
+    assert "print has one column twice" in array.description
+
+
+def test_kappa_of_p1_and_p2_is_below_the_cubes():
+    """The paper's appendix claims a larger κ and GDOP for every alternative; for κ that is false of P1 and P2."""
+    cube, p1, p2, p3 = score(["cube12", "p1_face_diagonals", "p2_face_centres", "p3_three_plus_one"])
+    assert p1.condition_number == pytest.approx(1.0)
+    assert p2.condition_number == pytest.approx(1.0)
+    assert p3.condition_number > cube.condition_number > 1.0
+    assert min(p1.gdop, p2.gdop, p3.gdop) > cube.gdop
+    remark = ranking_remark([cube, p1, p2, p3])
+    assert "p1_face_diagonals, p2_face_centres have a lower κ but a larger GDOP than cube12" in remark
+    assert ranking_remark([cube, p3]) == ""
+    assert ranking_remark([]) == ""
+    # P1 is only partly recursive: its angular acceleration needs no rate.
+    assert set(p1.omega_squared_terms) == {"p_x", "p_y", "p_z"}
 
 
 def test_table_in_the_docs_is_what_the_code_computes(project_root):
