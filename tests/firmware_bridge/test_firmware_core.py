@@ -180,9 +180,11 @@ def test_a_full_queue_drops_whole_frames_and_says_so(host: Host) -> None:
 
 COMMANDS = [
     (set_rate(3200), Result.DONE),
-    (set_rate(3201), Result.BAD_VALUE),
-    (set_rate(9), Result.BAD_VALUE),
-    (set_rate(400, 16), Result.BAD_VALUE),
+    (encode_command(Command.SET_RATE, 3201, 0xFF), Result.BAD_VALUE),  # set_rate refuses these before they are sent
+    (encode_command(Command.SET_RATE, 9, 0xFF), Result.BAD_VALUE),
+    (encode_command(Command.SET_RATE, 0, 0xFF), Result.BAD_VALUE),
+    (encode_command(Command.SET_RATE, 65535, 0xFF), Result.BAD_VALUE),
+    (encode_command(Command.SET_RATE, 400, 16), Result.BAD_VALUE),
     (encode_command(Command.SET_RANGE, 4, 1), Result.BAD_VALUE),
     (set_range(2, full_resolution=False), Result.DONE),
     (encode_command(Command.SELF_TEST, 2), Result.BAD_VALUE),

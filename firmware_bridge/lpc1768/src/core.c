@@ -58,7 +58,8 @@ static struct {
     uint32_t last_retry_us;
     volatile uint32_t heartbeat;
     uint32_t dropped;
-    uint32_t present; /* bit mask of answering sensors */
+    uint32_t present; /* bit mask of sensors that answer and hold their configuration */
+    uint32_t faulty;  /* bit mask of sensors that identify themselves but do not hold it */
     uint16_t sticky;  /* status bits to report in the next frame */
     volatile bool announce;
     uint32_t new_baud; /* 0, or the rate to switch to once the reply has left */
@@ -198,7 +199,7 @@ static void send_identity(void)
     payload[6] = core.bw_rate;
     payload[7] = core.data_format;
     put32(&payload[8], core.baud);
-    payload[12] = (uint8_t)core.present;
+    payload[12] = (uint8_t)(core.present | (core.faulty << SENSOR_COUNT));
     payload[13] = core.reset_cause;
     payload[14] = core.streaming ? 1U : 0U;
     payload[15] = SENSOR_COUNT;
@@ -210,11 +211,14 @@ static void send_identity(void)
 
 /* ---- sampling ---- */
 
-static void set_present(uint32_t sensor, bool answers)
+static void set_state(uint32_t sensor, enum adxl345_state state)
 {
-    uint32_t mask = answers ? (core.present | (1U << sensor)) : (core.present & ~(1U << sensor));
-    if (mask != core.present) {
-        core.present = mask;
+    uint32_t bit = 1U << sensor;
+    uint32_t present = (state == ADXL345_READY) ? (core.present | bit) : (core.present & ~bit);
+    uint32_t faulty = (state == ADXL345_FAULTY) ? (core.faulty | bit) : (core.faulty & ~bit);
+    if ((present != core.present) || (faulty != core.faulty)) {
+        core.present = present;
+        core.faulty = faulty;
         core.announce = true;
     }
 }
@@ -222,7 +226,7 @@ static void set_present(uint32_t sensor, bool answers)
 static void configure_sensors(void)
 {
     for (uint32_t sensor = 0U; sensor < SENSOR_COUNT; sensor++) {
-        set_present(sensor, adxl345_configure(sensor, core.data_format, core.bw_rate));
+        set_state(sensor, adxl345_configure(sensor, core.data_format, core.bw_rate));
     }
 }
 
@@ -250,7 +254,9 @@ static uint32_t sample_sensor(uint32_t sensor, uint8_t *at)
     bool good = ((core.present >> sensor) & 1U) != 0U;
     if (good) {
         good = adxl345_read(sensor, core.data_format, &reading);
-        set_present(sensor, good);
+        if (!good) {
+            set_state(sensor, ADXL345_ABSENT); /* until the next try tells more */
+        }
     }
     if (!good) {
         reading.int_source = ADXL345_DATA_READY;
@@ -279,7 +285,7 @@ static void retry_missing(uint32_t now_us)
         core.last_retry_us = now_us;
         for (uint32_t sensor = 0U; sensor < SENSOR_COUNT; sensor++) {
             if (((core.present >> sensor) & 1U) == 0U) {
-                set_present(sensor, adxl345_configure(sensor, core.data_format, core.bw_rate));
+                set_state(sensor, adxl345_configure(sensor, core.data_format, core.bw_rate));
             }
         }
     }
@@ -326,6 +332,9 @@ void core_sample(void)
     }
     if ((core.data_format & ADXL345_SELF_TEST) != 0U) {
         status |= STATUS_SELF_TEST;
+    }
+    if (core.faulty != 0U) {
+        status |= STATUS_CHIP_FAULT;
     }
     core.sticky = 0U;
     frame_close(frame, status);
@@ -570,6 +579,7 @@ void core_init(uint32_t reset_cause, uint32_t baud)
     core.heartbeat = 0U;
     core.dropped = 0U;
     core.present = 0U;
+    core.faulty = 0U;
     core.last_retry_us = hal_time_us();
     core.sticky = ((reset_cause & RESET_WATCHDOG) != 0U) ? STATUS_WATCHDOG_RESET : 0U;
     core.announce = true;
