@@ -159,7 +159,7 @@ class BoardProcess:
         self._call("write_chip", sensor, address, value)
 
     def warnings(self) -> list[str]:
-        """What the firmware did that the processor's documents advise against, once each."""
+        """Return what the firmware did that the processor's documents advise against, once each."""
         result: list[str] = self._call("warnings")
         return result
 

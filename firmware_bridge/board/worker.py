@@ -68,7 +68,7 @@ class Worker:
         self._board.write_chip(sensor, address, value)
 
     def warnings(self) -> list[str]:
-        """What the firmware should not have done."""
+        """Return what the firmware should not have done."""
         return list(self._board.warnings)
 
     def set_line_fault(self, sensor: int, fault: LineFault) -> None:
