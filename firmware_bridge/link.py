@@ -28,7 +28,7 @@ _TAKEN = {errno.EAGAIN, errno.EWOULDBLOCK, errno.EBUSY}
 _NOT_THERE_YET = {errno.ENOENT, errno.ENODEV, errno.ENXIO, errno.EIO, errno.EACCES}  # EACCES: until udev is through
 
 
-class _NotYet(InputError):
+class _NotYetError(InputError):
     """The port can't be opened for a reason that may pass: the board is not plugged in, the server not started."""
 
 
@@ -113,7 +113,7 @@ class Link:
                 ) from None
             reason = str(error).splitlines()[0] if str(error) else type(error).__name__
             may_pass = number in _NOT_THERE_YET or (self._is_socket and not isinstance(error, ValueError))
-            raise (_NotYet if may_pass else InputError)(
+            raise (_NotYetError if may_pass else InputError)(
                 f"{self.port}: can't be opened ({reason}); give a device, a pseudo-terminal or socket://host:port"
             ) from None
 
@@ -124,7 +124,7 @@ class Link:
         while True:
             try:
                 return self._open()
-            except _NotYet:
+            except _NotYetError:
                 if time.monotonic() >= give_up:
                     raise
             time.sleep(max(0.0, min(pause, give_up - time.monotonic())))
