@@ -140,7 +140,8 @@ class Journal:
         self.samples += lines.count(b"\n")
 
     def _failed(self, error: BaseException) -> WriteError:
-        reason = getattr(error, "strerror", None) or str(error).splitlines()[0]
+        number = getattr(error, "errno", None)
+        reason = os.strerror(number) if number else str(error).splitlines()[0]
         left = (
             f"{self.samples} samples are in the file and can be read" if self.samples > 0 else "no sample was written"
         )

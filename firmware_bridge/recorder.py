@@ -304,7 +304,7 @@ def record(
         session.release()
         session.flush(time.monotonic(), force=True)
     except WriteError as error:
-        trouble = error
+        trouble = trouble if isinstance(trouble, WriteError) else error
     session.decoder.finish()
     if session.refused and not session.journal:
         refusal = session.refused[0]
@@ -332,7 +332,7 @@ def record(
     try:
         session.journal.finish(final)
     except WriteError as error:
-        trouble = error
+        trouble = trouble if isinstance(trouble, WriteError) else error
     if isinstance(trouble, WriteError):
         raise trouble
     duration = session.last_s - (session.first_s or 0.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -109,7 +110,8 @@ def _run_to_file(
     try:
         run.recording.write(out)
     except OSError as error:
-        raise GfimuError(f"{out}: {error.strerror or error}; nothing was written: free space and run again") from None
+        reason = os.strerror(error.errno) if error.errno else str(error)
+        raise GfimuError(f"{out}: {reason}; nothing was written: free space and run again") from None
     if json:
         print_json(
             {
