@@ -14,6 +14,8 @@ from firmware_bridge.commands import Command, Identity, encode_command, parse_me
 from firmware_bridge.frames import SampleDecoder, Status
 from firmware_bridge.lpc1768 import build as firmware
 from firmware_bridge.lpc1768.elf import ElfImage
+from firmware_bridge.virtual_run import record_virtual
+from sim.ride import Ride
 
 KINDS = ("python", "fast")
 PLL0CON, PLL0CFG, PLL0FEED = 0x400FC080, 0x400FC084, 0x400FC08C
@@ -96,6 +98,8 @@ def test_firmware_that_selects_the_clocks_too_late_is_four_times_too_slow(make_b
         assert board.uarts[0].baud == pytest.approx(390_625)
         assert len(board.uarts[0].take_sent()[0]) // 40 in {24, 25}
         assert len(board.warnings) == 1
+    run = record_virtual(Ride("rest"), 0.5, image=tmp_path / "image" / "gfimu.elf")
+    assert "PCLKSEL0" in run.warnings[0]
 
 
 @pytest.mark.parametrize("kind", KINDS)
