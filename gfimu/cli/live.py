@@ -61,7 +61,8 @@ def _live(
     from gfimu.rate.stream import filter_stream, read_head
 
     metadata, lines = read_head(_lines(source, follow=follow))
-    rate = metadata.get("sample_rate_hz") if rate is None else rate
+    if rate is None:
+        rate = metadata.get("sample_rate_hz", metadata.get("time_stamp_rate_hz"))
     array = array or str(metadata.get("array", ""))
     if not array:
         raise InputError("--array is missing, and the stream does not state its array; give it")

@@ -98,6 +98,9 @@ def _record(
             ("host clock against board", f"{clock.rate_error * 1e6:+.1f} ± {clock.rate_error_std * 1e6:.1f} ppm")
         )
     if identity is not None:
+        faulty = ", ".join(str(number) for number, is_faulty in enumerate(identity.faulty, start=1) if is_faulty)
+        if faulty:
+            rows.append(("chips that do not hold their settings", faulty))
         rows.append(("firmware", f"{identity.firmware}, {identity.rate_hz} Hz, ±{identity.range_g} g"))
     rows += [(f"status {name}", number) for name, number in report.status_counts.items()]
     print_table(f"recorded from {port}", ("quantity", "value"), rows)

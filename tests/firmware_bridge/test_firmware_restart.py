@@ -9,6 +9,7 @@ import pytest
 
 pytest.importorskip("unicorn", reason="the emulator is in the extra 'firmware'")
 
+from firmware_bridge.board.nvic import FIRST_IRQ
 from firmware_bridge.board_process import BoardProcess
 from firmware_bridge.commands import Command, Identity, encode_command, parse_message
 from firmware_bridge.frames import SampleDecoder, Status
@@ -182,3 +183,13 @@ def test_a_chip_that_does_not_hold_its_registers_is_reported(make_board) -> None
     after, _ = collect(board, 0.2)
     assert after.status[-1] == 0
     assert not (after.counts[-1] == -32768).any()
+
+
+def test_the_watchdog_still_resets_a_board_that_should_sample_and_does_not(make_board) -> None:
+    board = make_board("python")
+    board.run_for(0.5)
+    board.lose_interrupts(FIRST_IRQ + 1, 1)  # TIMER0, every one: the main loop wakes all the same
+    board.run_for(1.9)
+    assert board.resets == 0
+    board.run_for(0.5)
+    assert board.resets == 1
