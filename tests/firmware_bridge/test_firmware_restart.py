@@ -185,6 +185,20 @@ def test_a_chip_that_does_not_hold_its_registers_is_reported(make_board) -> None
     assert not (after.counts[-1] == -32768).any()
 
 
+def test_faulty_chips_do_not_delay_the_samples_of_the_others(make_board) -> None:
+    board = make_board("python", rate=3200)
+    for number, chip in enumerate(board.sensors[1:]):
+        write = chip._write
+        chip._write = lambda address, value, now, write=write: write(address, 1 if address == OFSX else value, now)
+        board.write_chip(number + 1, DATA_FORMAT, 0)  # so that the firmware sets it up again
+    collect(board, 0.1)
+    samples, decoder = collect(board, 0.2)
+    assert Status(int(samples.status[-1])).missing_sensors == (2, 3, 4)
+    assert np.all(samples.status & Status.CHIP_FAULT)
+    assert set(np.diff(samples.ticks).tolist()) <= {312, 313}
+    assert decoder.counts.lost == 0
+
+
 def test_the_watchdog_still_resets_a_board_that_should_sample_and_does_not(make_board) -> None:
     board = make_board("python")
     board.run_for(0.5)

@@ -35,7 +35,7 @@
 #define BITS_PER_FRAME (FRAME_BYTES * 10U)
 #define MICROSECONDS 1000000U
 #define SETTLE_SAMPLES 16U /* longest wait for the first conversions after a change of configuration */
-#define RETRY_US 20000U /* how often a missing sensor is looked for */
+#define RETRY_US 20000U /* how often one of the missing sensors is looked for */
 
 _Static_assert((RECEIVE_RING & (RECEIVE_RING - 1U)) == 0U, "the receive ring is indexed with a mask");
 _Static_assert(HEADER_BYTES + PAYLOAD_BYTES + 6U == FRAME_BYTES, "frame layout");
@@ -56,6 +56,7 @@ static struct {
     uint16_t message_sequence;
     uint32_t last_sample_us;
     uint32_t last_retry_us;
+    uint32_t last_retried; /* sensor */
     volatile uint32_t heartbeat;
     uint32_t dropped;
     uint32_t present; /* bit mask of sensors that answer and hold their configuration */
@@ -277,17 +278,17 @@ static uint32_t sample_sensor(uint32_t sensor, uint8_t *at)
     return status;
 }
 
-/* Looks for one missing sensor now and then, so that one that comes back is used again. */
+/* Looks for one missing sensor now and then, so that one that comes back is used again; the next time for the next one,
+ * since setting up a sensor takes a third of the shortest sample period. */
 static void retry_missing(uint32_t now_us)
 {
     const uint32_t all = (1U << SENSOR_COUNT) - 1U;
     if ((core.present != all) && ((now_us - core.last_retry_us) >= RETRY_US)) {
         core.last_retry_us = now_us;
-        for (uint32_t sensor = 0U; sensor < SENSOR_COUNT; sensor++) {
-            if (((core.present >> sensor) & 1U) == 0U) {
-                set_state(sensor, adxl345_configure(sensor, core.data_format, core.bw_rate));
-            }
-        }
+        do {
+            core.last_retried = (core.last_retried + 1U) % SENSOR_COUNT;
+        } while (((core.present >> core.last_retried) & 1U) != 0U);
+        set_state(core.last_retried, adxl345_configure(core.last_retried, core.data_format, core.bw_rate));
     }
 }
 
@@ -581,6 +582,7 @@ void core_init(uint32_t reset_cause, uint32_t baud)
     core.present = 0U;
     core.faulty = 0U;
     core.last_retry_us = hal_time_us();
+    core.last_retried = 0U;
     core.sticky = ((reset_cause & RESET_WATCHDOG) != 0U) ? STATUS_WATCHDOG_RESET : 0U;
     core.announce = true;
     core.new_baud = 0U;
