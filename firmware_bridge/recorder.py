@@ -370,7 +370,7 @@ def _run(
     if session.decoder.format.name == "lpc1768":
         link.write(encode_command(Command.IDENTIFY))
     restarts = 0
-    started_after: Identity | None = None
+    seen: Identity | None = None
     try:
         while not stop():
             chunk = link.read()
@@ -379,9 +379,9 @@ def _run(
                 if chunk.after_break:
                     session.decoder.break_stream()
                 batch = session.take(chunk.data, chunk.host_s)
-                if session.identity is not started_after:
-                    started_after = session.identity
-                    if started_after is not None and not started_after.streaming:
+                if session.identity is not seen:
+                    seen = session.identity
+                    if seen is not None and not seen.streaming:
                         link.write(encode_command(Command.START))  # someone stopped it
                 if session.decoder.counts.restarts > restarts:
                     restarts = session.decoder.counts.restarts
