@@ -9,6 +9,7 @@ import pytest
 
 pytest.importorskip("unicorn", reason="the emulator is in the extra 'firmware'")
 
+from firmware_bridge.adxl345_device import TICKS_PER_SECOND
 from firmware_bridge.board.nvic import FIRST_IRQ
 from firmware_bridge.board_process import BoardProcess
 from firmware_bridge.commands import Command, Identity, encode_command, parse_message
@@ -197,6 +198,25 @@ def test_faulty_chips_do_not_delay_the_samples_of_the_others(make_board) -> None
     assert np.all(samples.status & Status.CHIP_FAULT)
     assert set(np.diff(samples.ticks).tolist()) <= {312, 313}
     assert decoder.counts.lost == 0
+
+
+def test_a_chip_is_let_go_for_150_ns_between_two_accesses(make_board) -> None:
+    board = make_board("python")
+    pins_changed, since, rests = board.gpio.on_change, {}, []
+
+    def watch(port: int, changed: int, levels: int) -> None:
+        for bit in range(4):
+            if port == 2 and changed >> bit & 1:
+                if levels >> bit & 1:
+                    since[bit] = board.now
+                elif bit in since:
+                    rests.append((board.now - since[bit]) / TICKS_PER_SECOND)
+        pins_changed(port, changed, levels)
+
+    board.gpio.on_change = watch
+    board.run_for(0.05)
+    assert len(rests) > 60
+    assert min(rests) >= 150e-9  # ADXL345 data sheet, table 10
 
 
 def test_the_watchdog_still_resets_a_board_that_should_sample_and_does_not(make_board) -> None:

@@ -17,6 +17,7 @@
 #define BAUD_MIN 9600U
 #define SSP_PRESCALER 2U
 #define SSP_DIVIDER ((CORE_HZ + (SSP_PRESCALER * GFIMU_SPI_HZ) - 1U) / (SSP_PRESCALER * GFIMU_SPI_HZ))
+#define SELECT_REST_LOOPS 5U /* of at least 5 cycles: 250 ns */
 #define SPI_PINS 0x0FU /* P2.0…P2.3: chip-selects of sensors 1…4 */
 
 #define WATCHDOG_TICKS 2000000U /* 2 s of the 4 MHz internal oscillator, divided by 4 */
@@ -99,6 +100,14 @@ static void spi_init(void)
     SSP1CR1 = SSP_CR1_ENABLE;
 }
 
+/* A chip wants its CS high for 150 ns between two accesses (ADXL345 data sheet, table 10, tCS,DIS). Sampling visits each
+ * chip once and needs no rest. */
+static void select_rest(void)
+{
+    for (volatile uint32_t i = 0U; i < SELECT_REST_LOOPS; i++) {
+    }
+}
+
 void hal_spi_exchange(uint32_t sensor, uint16_t *words, uint32_t count)
 {
     FIO2CLR = 1U << sensor;
@@ -111,6 +120,7 @@ void hal_spi_exchange(uint32_t sensor, uint16_t *words, uint32_t count)
         words[i] = (uint16_t)SSP1DR;
     }
     FIO2SET = 1U << sensor;
+    select_rest();
 }
 
 void hal_spi_burst(uint32_t sensor, uint16_t words[HAL_BURST_WORDS])
