@@ -329,6 +329,11 @@ class Adxl345:
                 self._data_ready = self._overrun = False
             self.triggered = False
 
+    def write_register(self, address: int, value: int, now: int) -> None:
+        """Write a register at ``now`` without a bus."""
+        self.catch_up(now)
+        self._write(address, value, now)
+
     # SPI
 
     def select(self, now: int) -> None:

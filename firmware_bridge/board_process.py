@@ -146,6 +146,23 @@ class BoardProcess:
         """Let the supply voltage drop."""
         self._call("brown_out")
 
+    def press_reset(self) -> None:
+        """Reset the processor by its pin; the sensors keep their registers."""
+        self._call("press_reset")
+
+    def read_chip(self, sensor: int, address: int) -> int:
+        """Register of a sensor (from 0) as it stands."""
+        return int(self._call("read_chip", sensor, address))
+
+    def write_chip(self, sensor: int, address: int, value: int) -> None:
+        """Write a register of a sensor (from 0) as a program that ran before would have done."""
+        self._call("write_chip", sensor, address, value)
+
+    def warnings(self) -> list[str]:
+        """Return what the firmware did that the processor's documents advise against, once each."""
+        result: list[str] = self._call("warnings")
+        return result
+
     def set_line_fault(self, sensor: int, fault: LineFault) -> None:
         """Break or mend the line of a sensor (from 0)."""
         self._call("set_line_fault", sensor, fault)

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["ClockFit", "HostClock"]
+from firmware_bridge.frames import Samples, Status
+
+__all__ = ["ClockFit", "HostClock", "SampleRate"]
 
 _WINDOW_S = 1.0
 _HUBER = 1.345  # 95 % efficient for normal errors
@@ -95,3 +97,48 @@ class HostClock:
         return ClockFit(
             float(solution[0]), float(std[0]), float(solution[1]), float(std[1]), mean, spread, len(self._points)
         )
+
+
+class SampleRate:
+    """The sample rate by the board's own time stamps, over everything that was sampled without a new start.
+
+    Lost samples count, as time went on without them; the step to the first sample after a start does not.
+    """
+
+    def __init__(self, tick_hz: float) -> None:
+        self._tick_hz = tick_hz
+        self._segment: int | None = None
+        self._last = 0
+        self._periods = 0
+        self._ticks = 0
+
+    def add(self, samples: Samples) -> None:
+        """Take the next samples of a stream."""
+        if not len(samples):
+            return
+        before = int(samples.segment[0]) - 1 if self._segment is None else self._segment
+        goes_on = (np.diff(samples.segment, prepend=before) == 0) & ((samples.status & Status.FIRST) == 0)
+        self._periods += int((1 + samples.lost_before)[goes_on].sum())
+        self._ticks += int(np.diff(samples.ticks, prepend=self._last)[goes_on].sum())
+        self._segment, self._last = int(samples.segment[-1]), int(samples.ticks[-1])
+
+    def metadata(self, fit: ClockFit | None = None) -> dict[str, str | float]:
+        """Return what a recording states about its time stamps: the clock they come from and the rate they show.
+
+        Parameters
+        ----------
+        fit : ClockFit, optional
+            The board's clock against the host's: gives the rate in the host's seconds, too.
+        """
+        stated: dict[str, str | float] = {"time_stamp_clock": "board", "time_stamp_tick_hz": self._tick_hz}
+        if self._ticks:
+            rate = self._periods * self._tick_hz / self._ticks
+            stated["time_stamp_rate_hz"] = rate
+            stated["time_stamp_rate_from"] = (
+                f"board clock, ticks of {self._tick_hz:.0f} Hz; not corrected by the host's"
+            )
+            if fit is not None:
+                stated["host_clock_rate_hz"] = rate / (1.0 + fit.rate_error)
+                stated["host_clock_rate_std_hz"] = rate * fit.rate_error_std
+                stated["host_clock_rate_from"] = f"line through {fit.windows} arrivals, host clock against board clock"
+        return stated

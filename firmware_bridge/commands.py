@@ -14,6 +14,7 @@ from firmware_bridge.frames import FrameType
 from gfimu.errors import InputError
 
 __all__ = [
+    "RATES_HZ",
     "RATE_CODE_AUTO",
     "Command",
     "Identity",
@@ -29,6 +30,10 @@ COMMAND_SYNC = bytes((0xC3, 0x3C))
 RATE_CODE_AUTO = 0xFF
 """Let the firmware choose the chips' output data rate."""
 
+RATES_HZ = (10, 3200)
+"""Lowest and highest sample rate of the firmware (core.h)."""
+
+_LARGEST_RATE_CODE = 15
 _PAYLOADS = {3: "<HB", 4: "<BB", 5: "<B", 7: "<I"}
 
 
@@ -79,7 +84,7 @@ class Identity:
     baud : int
         Bits per second.
     present : tuple of bool
-        Which sensors answer.
+        Which sensors answer and hold their configuration.
     reset_cause : str
         Why the board started last.
     streaming : bool
@@ -88,6 +93,8 @@ class Identity:
         SPI clock, kHz.
     dropped : int
         Frames that the line could not take.
+    faulty : tuple of bool
+        Which sensors identify themselves but have a register that does not read back as written.
     """
 
     firmware: str
@@ -101,6 +108,7 @@ class Identity:
     streaming: bool
     spi_khz: int
     dropped: int
+    faulty: tuple[bool, ...] = ()
 
     @property
     def range_g(self) -> int:
@@ -129,7 +137,17 @@ def encode_command(command: int, *values: int) -> bytes:
 
 
 def set_rate(rate_hz: int, code: int = RATE_CODE_AUTO) -> bytes:
-    """Encode the command for a sample rate, 10…3200 Hz, and the chips' BW_RATE code (by default the one that fits)."""
+    """Encode the command for a sample rate, 10…3200 Hz, and the chips' BW_RATE code (by default the one that fits).
+
+    Raises
+    ------
+    InputError
+        If the rate or the code is out of its range.
+    """
+    if not RATES_HZ[0] <= rate_hz <= RATES_HZ[1]:
+        raise InputError(f"rate {rate_hz} Hz: the firmware samples at {RATES_HZ[0]} to {RATES_HZ[1]} Hz")
+    if code != RATE_CODE_AUTO and not 0 <= code <= _LARGEST_RATE_CODE:
+        raise InputError(f"BW_RATE code {code}: the ADXL345 has 0 to {_LARGEST_RATE_CODE}")
     return encode_command(Command.SET_RATE, rate_hz, code)
 
 
@@ -164,4 +182,5 @@ def parse_message(packet: Any) -> Reply | Identity | None:
         bool(streaming),
         khz,
         drop,
+        tuple(bool(present >> (sensors + k) & 1) for k in range(sensors)),
     )

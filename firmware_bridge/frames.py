@@ -67,6 +67,7 @@ class Status(enum.IntFlag):
     FIRST = 1 << 12
     WATCHDOG_RESET = 1 << 13
     STALE = 1 << 14
+    CHIP_FAULT = 1 << 15
 
     @property
     def missing_sensors(self) -> tuple[int, ...]:

@@ -6,9 +6,11 @@ process is killed, the file ends behind a whole sample. `finish` puts the proper
 
 from __future__ import annotations
 
+import contextlib
 import io
 import json
 import os
+import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -20,12 +22,39 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from gfimu.atomic_file import atomic_path
-from gfimu.errors import InputError
+from gfimu.errors import GfimuError, InputError
 
-__all__ = ["Journal"]
+__all__ = ["Journal", "WriteError", "check_target"]
 
 _PAGE = 4096
 _BLOCK_BYTES = 1 << 22
+
+
+class WriteError(GfimuError):
+    """The disk is full or failed while a recording was being written; what was written is left readable."""
+
+
+def check_target(path: str | Path) -> None:
+    """Make sure, before anything is done, that a recording can be written to ``path``; leaves no trace.
+
+    Raises
+    ------
+    InputError
+        If the extension is unknown, the folder can't be written to, or ``path`` can't be replaced.
+    """
+    target = Path(path)
+    if target.suffix not in {".csv", ".parquet"}:
+        raise InputError(f"{path}: unknown recording format {target.suffix!r}; use .csv or .parquet")
+    folder = target.absolute().parent
+    while not folder.exists() and folder != folder.parent:
+        folder = folder.parent  # what is missing is made later
+    try:
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+        if target.exists():
+            os.close(os.open(target, os.O_WRONLY | os.O_APPEND))
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror or error}; choose a file that can be written") from None
 
 
 class Journal:
@@ -44,6 +73,8 @@ class Journal:
     ------
     InputError
         If the extension is unknown or the file can't be written.
+    WriteError
+        If the disk is full.
     """
 
     def __init__(self, path: str | Path, channels: tuple[str, ...], metadata: Mapping[str, Any]) -> None:
@@ -62,7 +93,14 @@ class Journal:
         self._metadata = dict(metadata)
         self._header = ",".join(self.columns) + "\n"
         self._header_lines = len(lines) + 1
-        os.write(self._file, ("".join(lines) + self._header).encode())
+        self._size = 0
+        try:
+            self._write(("".join(lines) + self._header).encode())
+        except WriteError:
+            os.close(self._file)
+            self.path.unlink(missing_ok=True)
+            raise
+        self.samples = 0  # the lines so far are the header
 
     def append(self, t_s: NDArray[np.float64], counts: NDArray[np.float64], status: NDArray[np.uint16]) -> None:
         """Append samples: times (n,), s, counts (n, c) with NaN where missing, status bits (n,)."""
@@ -79,24 +117,56 @@ class Journal:
         options = pa_csv.WriteOptions(include_header=False, quoting_style="none")
         pa_csv.write_csv(pa.table(columns, names=self.columns), sink, options)
         self._write(sink.getvalue())
-        self.samples += len(t_s)
 
     def _write(self, text: bytes) -> None:
         start = 0
         while start < len(text):
             end = len(text) if len(text) - start <= _PAGE else text.rfind(b"\n", start, start + _PAGE) + 1
-            os.write(self._file, text[start:end])
+            end = end or text.find(b"\n", start) + 1  # a line longer than a page
+            self._write_lines(text[start:end])
             start = end
 
+    def _write_lines(self, lines: bytes) -> None:
+        """Write whole lines; when the disk is full, the file ends behind the last whole write."""
+        written = 0
+        try:
+            while written < len(lines):
+                written += os.write(self._file, lines[written:])
+        except OSError as error:
+            with contextlib.suppress(OSError):
+                os.ftruncate(self._file, self._size)
+            raise self._failed(error) from None
+        self._size += len(lines)
+        self.samples += lines.count(b"\n")
+
+    def _failed(self, error: BaseException) -> WriteError:
+        number = getattr(error, "errno", None)
+        reason = os.strerror(number) if number else str(error).splitlines()[0]
+        left = (
+            f"{self.samples} samples are in the file and can be read" if self.samples > 0 else "no sample was written"
+        )
+        return WriteError(f"{self.path}: {reason}; {left}; free space and record again")
+
     def finish(self, metadata: Mapping[str, Any]) -> None:
-        """Close the journal and replace it with the recording, with its final metadata; whole or not at all."""
+        """Close the journal and replace it with the recording, with its final metadata; whole or not at all.
+
+        Raises
+        ------
+        WriteError
+            If the disk is full; the journal stays in place.
+        """
         os.close(self._file)
         final = {**self._metadata, **metadata}
-        with atomic_path(self.path) as temporary:
-            if self.path.suffix == ".csv":
-                self._finish_csv(temporary, final)
-            else:
-                self._finish_parquet(temporary, final)
+        try:
+            with atomic_path(self.path) as temporary:
+                if self.path.suffix == ".csv":
+                    self._finish_csv(temporary, final)
+                else:
+                    self._finish_parquet(temporary, final)
+        except InputError as error:  # no temporary file
+            raise self._failed(error.__context__ or error) from None
+        except OSError as error:
+            raise self._failed(error) from None
 
     def _finish_csv(self, target: Path, metadata: Mapping[str, Any]) -> None:
         with self.path.open("rb") as journal, target.open("wb") as file:

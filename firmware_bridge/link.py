@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import queue
 import threading
 import time
@@ -22,6 +23,13 @@ _READ_BYTES = 1 << 16
 _SOCKET_POLL_S = 0.005
 _QUEUE_CHUNKS = 4096
 _FIRST_RETRY_S, _LONGEST_RETRY_S = 0.1, 2.0
+_LOST_FOR_S = 60.0
+_TAKEN = {errno.EAGAIN, errno.EWOULDBLOCK, errno.EBUSY}
+_NOT_THERE_YET = {errno.ENOENT, errno.ENODEV, errno.ENXIO, errno.EIO, errno.EACCES}  # EACCES: until udev is through
+
+
+class _NotYetError(InputError):
+    """The port can't be opened for a reason that may pass: the board is not plugged in, the server not started."""
 
 
 @dataclass(frozen=True)
@@ -55,22 +63,27 @@ class Link:
         Device (``/dev/ttyUSB0``, ``COM3``), pseudo-terminal, or ``socket://host:port``.
     baud : int
         Bits per second; without meaning on pseudo-terminals and sockets.
-    reconnect_s : float
-        How long to try again after the connection was lost, s.
+    reconnect_s : float, optional
+        How long to wait for a port that is not there yet, and for a connection that was lost, s. By default a port has
+        to be there at once, and a lost connection is waited for a minute.
 
     Raises
     ------
     InputError
-        If the port can't be opened.
+        If the port can't be opened, or another program has it.
+
+    Notes
+    -----
+    A serial device or pseudo-terminal is opened for this program alone: two readers would share out its bytes.
     """
 
-    def __init__(self, port: str, *, baud: int = DEFAULT_BAUD, reconnect_s: float = 60.0) -> None:
+    def __init__(self, port: str, *, baud: int = DEFAULT_BAUD, reconnect_s: float | None = None) -> None:
         self.port = port
         self.breaks = 0
         self._baud = baud
-        self._reconnect_s = reconnect_s
+        self._reconnect_s = _LOST_FOR_S if reconnect_s is None else reconnect_s
         self._is_socket = port.startswith("socket://")
-        self._serial = self._open()
+        self._serial = self._open_first(reconnect_s or 0.0)
         self._chunks: queue.Queue[Chunk | GfimuError | None] = queue.Queue(_QUEUE_CHUNKS)
         self._closing = threading.Event()
         self._writing = threading.Lock()
@@ -86,14 +99,36 @@ class Link:
         self.close()
 
     def _open(self) -> Any:
+        timeout = _SOCKET_POLL_S if self._is_socket else _POLL_S
+        exclusive = None if "://" in self.port else True  # a lock on the device (flock); on Windows always
         try:
-            timeout = _SOCKET_POLL_S if self._is_socket else _POLL_S
-            return serial.serial_for_url(self.port, baudrate=self._baud, timeout=timeout, write_timeout=2.0)
+            return serial.serial_for_url(
+                self.port, baudrate=self._baud, timeout=timeout, write_timeout=2.0, exclusive=exclusive
+            )
         except (serial.SerialException, OSError, ValueError) as error:
+            number = getattr(error, "errno", None)
+            if number in _TAKEN:
+                raise InputError(
+                    f"{self.port}: the port is in use by another program; end that one (another gfimu record?) first"
+                ) from None
             reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-            raise InputError(
+            may_pass = number in _NOT_THERE_YET or (self._is_socket and not isinstance(error, ValueError))
+            raise (_NotYetError if may_pass else InputError)(
                 f"{self.port}: can't be opened ({reason}); give a device, a pseudo-terminal or socket://host:port"
             ) from None
+
+    def _open_first(self, wait_s: float) -> Any:
+        """Open the port, or wait for it to appear."""
+        give_up = time.monotonic() + wait_s
+        pause = _FIRST_RETRY_S
+        while True:
+            try:
+                return self._open()
+            except _NotYetError:
+                if time.monotonic() >= give_up:
+                    raise
+            time.sleep(max(0.0, min(pause, give_up - time.monotonic())))
+            pause = min(2 * pause, _LONGEST_RETRY_S)
 
     def close(self) -> None:
         """Stop reading and close the port."""

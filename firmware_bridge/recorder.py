@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 import gfimu
-from firmware_bridge.clock import ClockFit, HostClock
+from firmware_bridge.clock import ClockFit, HostClock, SampleRate
 from firmware_bridge.commands import Command, Identity, Reply, encode_command, parse_message
 from firmware_bridge.frames import FrameFormat, SampleDecoder, Samples, Status, StreamCounts, frame_format
-from firmware_bridge.journal import Journal
+from firmware_bridge.journal import Journal, WriteError, check_target
 from firmware_bridge.link import Link
 from gfimu.array import AccelerometerArray
 from gfimu.errors import GfimuError, InputError
@@ -130,6 +130,7 @@ class _Session:
         self.decoder = SampleDecoder(form.name)
         self.clock = HostClock()
         self.times = SampleClock(form.clock_hz)
+        self.rate = SampleRate(form.clock_hz)
         self.identity: Identity | None = None
         self.refused: list[Reply] = []
         self.asked = False
@@ -191,6 +192,7 @@ class _Session:
             counts[samples.counts == _NO_READING] = np.nan
             counts *= self.identity.count_size if self.identity else 1
         batch = Batch(self.times.place(samples, host_s), counts, samples.status)
+        self.rate.add(samples)
         for flag in Status:
             number = int(np.count_nonzero(samples.status & flag))
             if number:
@@ -231,7 +233,7 @@ def record(
     array: str = "",
     baud: int = 1_562_500,
     setup: tuple[bytes, ...] = (),
-    reconnect_s: float = 60.0,
+    reconnect_s: float | None = None,
     on_batch: Callable[[Batch, StreamCounts], None] | None = None,
     stop: Callable[[], bool] | None = None,
 ) -> RecordReport:
@@ -253,8 +255,9 @@ def record(
         Bits per second.
     setup : tuple of bytes
         Commands to send first (`firmware_bridge.commands`); sent again when the board started anew.
-    reconnect_s : float
-        How long to wait for a lost connection, s.
+    reconnect_s : float, optional
+        How long to wait for a port that is not there yet, and for a lost connection, s; by default the port has to be
+        there at once, and a lost connection is waited for a minute.
     on_batch : callable, optional
         Is given each batch and the totals so far.
     stop : callable, optional
@@ -263,11 +266,13 @@ def record(
     Raises
     ------
     InputError
-        If the port can't be opened, or nothing that is a frame comes.
+        If the file can't be written (found before the port is opened), the port can't be opened or is in use, or
+        nothing that is a frame comes.
+    WriteError
+        If the disk is full; what was written until then can be read.
     """
     target = Path(out)
-    if target.suffix not in {".csv", ".parquet"}:
-        raise InputError(f"{out}: unknown recording format {target.suffix!r}; use .csv or .parquet")
+    check_target(target)
     layout = frame_format(form)
     carried = AccelerometerArray.load(array or layout.array)
     if carried.n_channels != len(layout.channels):
@@ -281,6 +286,8 @@ def record(
         "format": form,
         "started_utc": datetime.now(UTC).isoformat(timespec="milliseconds"),
         "software_version": gfimu.__version__,
+        "time_stamp_clock": "board",
+        "time_stamp_tick_hz": layout.clock_hz,
     }
     session = _Session(layout, carried, target, metadata, has_setup=bool(setup))
     with Link(port, baud=baud, reconnect_s=reconnect_s) as link, _ask_to_stop() as asked:
@@ -293,8 +300,11 @@ def record(
             lambda: asked() or (stop is not None and stop()),
         )
         breaks = link.breaks
-    session.release()
-    session.flush(time.monotonic(), force=True)
+    try:
+        session.release()
+        session.flush(time.monotonic(), force=True)
+    except WriteError as error:
+        trouble = trouble if isinstance(trouble, WriteError) else error
     session.decoder.finish()
     if session.refused and not session.journal:
         refusal = session.refused[0]
@@ -308,18 +318,23 @@ def record(
         )
     counts = session.decoder.counts
     fit = session.clock.fit()
-    session.journal.finish(
-        {
-            "frames_lost": counts.lost,
-            "frames_corrupt": counts.corrupt,
-            "bytes_skipped": counts.skipped_bytes,
-            "board_restarts": counts.restarts,
-            "connection_breaks": breaks,
-            "status_counts": session.status_counts,
-            **({} if fit is None else {"host_clock": fit.__dict__}),
-            **({} if trouble is None else {"ended_by": str(trouble)}),
-        }
-    )
+    final = {
+        "frames_lost": counts.lost,
+        "frames_corrupt": counts.corrupt,
+        "bytes_skipped": counts.skipped_bytes,
+        "board_restarts": counts.restarts,
+        "connection_breaks": breaks,
+        "status_counts": session.status_counts,
+        **session.rate.metadata(fit),
+        **({} if fit is None else {"host_clock": fit.__dict__}),
+        **({} if trouble is None else {"ended_by": str(trouble)}),
+    }
+    try:
+        session.journal.finish(final)
+    except WriteError as error:
+        trouble = trouble if isinstance(trouble, WriteError) else error
+    if isinstance(trouble, WriteError):
+        raise trouble
     duration = session.last_s - (session.first_s or 0.0)
     return RecordReport(target, duration, counts, breaks, fit, session.identity, session.status_counts)
 
@@ -355,6 +370,7 @@ def _run(
     if session.decoder.format.name == "lpc1768":
         link.write(encode_command(Command.IDENTIFY))
     restarts = 0
+    seen: Identity | None = None
     try:
         while not stop():
             chunk = link.read()
@@ -363,6 +379,10 @@ def _run(
                 if chunk.after_break:
                     session.decoder.break_stream()
                 batch = session.take(chunk.data, chunk.host_s)
+                if session.identity is not seen:
+                    seen = session.identity
+                    if seen is not None and not seen.streaming:
+                        link.write(encode_command(Command.START))  # someone stopped it
                 if session.decoder.counts.restarts > restarts:
                     restarts = session.decoder.counts.restarts
                     for command in setup:

@@ -11,6 +11,7 @@ import numpy as np
 import gfimu
 from firmware_bridge.adxl345_device import TICKS_PER_SECOND, Adxl345Options
 from firmware_bridge.board_process import BoardProcess
+from firmware_bridge.clock import SampleRate
 from firmware_bridge.commands import (
     RATE_CODE_AUTO,
     Command,
@@ -46,11 +47,14 @@ class VirtualRun:
         Samples, lost, corrupt.
     identity : Identity or None
         What the board said about itself.
+    warnings : tuple of str
+        What the firmware did that the processor's documents advise against.
     """
 
     recording: Recording
     stream: StreamCounts
     identity: Identity | None
+    warnings: tuple[str, ...] = ()
 
 
 def typical_chips(seed: int) -> tuple[Adxl345Options, ...]:
@@ -97,6 +101,7 @@ def record_virtual(
     progress : callable, optional
         Is told the share done, 0 to 1.
     """
+    setup = set_range(range_g, full_resolution=full_resolution) + set_rate(rate_hz, rate_code)
     options = typical_chips(scene.seed) if chips is None else tuple(chips)
     decoder = SampleDecoder()
     parts: list[Samples] = []
@@ -104,7 +109,7 @@ def record_virtual(
     physics = RidePhysics(scene)
     with BoardProcess(physics, image=image, chips=options, fast=fast, lose_every=lose_every) as board:
         board.run_for(_BOOT_S)
-        board.receive(set_range(range_g, full_resolution=full_resolution) + set_rate(rate_hz, rate_code))
+        board.receive(setup)
         board.receive(encode_command(Command.IDENTIFY))
         now = board.run_for(_SETUP_S)
         decoder.feed(board.take_sent()[0])  # samples from before the board was set up
@@ -114,6 +119,7 @@ def record_virtual(
             parts.append(decoder.feed(board.take_sent()[0]))
             if progress is not None:
                 progress(now / end)
+        warnings = tuple(board.warnings())
     for packet in decoder.messages:
         message = parse_message(packet)
         identity = message if isinstance(message, Identity) else identity
@@ -123,6 +129,8 @@ def record_virtual(
     scale = 1.0 if full_resolution else range_g / 2.0
     readings = np.where(samples.counts == _NO_READING, np.nan, samples.counts * (scale * scene.lsb))
     t = samples.ticks / decoder.format.clock_hz
+    rate = SampleRate(decoder.format.clock_hz)
+    rate.add(samples)
     recording = Recording(
         t,
         readings,
@@ -136,8 +144,9 @@ def record_virtual(
             "source": "emulated LPC1768",
             "software_version": gfimu.__version__,
             "frames_lost": decoder.counts.lost,
+            **rate.metadata(),
             **scene.metadata,
         },
         {"status": samples.status},
     )
-    return VirtualRun(recording, decoder.counts, identity)
+    return VirtualRun(recording, decoder.counts, identity, warnings)

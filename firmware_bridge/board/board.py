@@ -14,7 +14,7 @@ from firmware_bridge.board.i2c import I2c
 from firmware_bridge.board.nvic import Nvic
 from firmware_bridge.board.peripheral import NEVER, Peripheral, StoredRegisters
 from firmware_bridge.board.ssp import Ssp
-from firmware_bridge.board.system_control import BROWN_OUT, POWER_ON, SystemControl
+from firmware_bridge.board.system_control import BROWN_OUT, EXTERNAL, POWER_ON, SystemControl
 from firmware_bridge.board.systick import SysTick
 from firmware_bridge.board.timer import Timer
 from firmware_bridge.board.uart import Uart
@@ -71,6 +71,8 @@ class Board:
         Virtual time, ticks (`TICKS_PER_SECOND`).
     cycle : int
         Ticks per core clock cycle.
+    warnings : list of str
+        What the firmware did that the processor's documents advise against, once each.
     """
 
     _cpu_class = Cpu
@@ -87,6 +89,7 @@ class Board:
         self.stopped = False
         self.sleeping = False
         self.resets = 0
+        self.warnings: list[str] = []
         self.exceptions = 0
         self._events: list[int] = []
         self._peripherals: list[Peripheral] = []
@@ -284,6 +287,15 @@ class Board:
         self.resets += 1
         self._reset_all()
 
+    def warn(self, text: str) -> None:
+        """Record what the firmware should not do."""
+        if text not in self.warnings:
+            self.warnings.append(text)
+
+    def press_reset(self) -> None:
+        """Reset the processor by its pin; the sensors have no reset pin and keep their registers."""
+        self.request_reset(EXTERNAL)
+
     def brown_out(self) -> None:
         """Supply voltage drops: processor, peripherals and sensors start again; unsent bytes are lost."""
         self.request_reset(BROWN_OUT)
@@ -294,6 +306,14 @@ class Board:
     def _power_on_sensors(self) -> None:
         for sensor in self.sensors:
             sensor.power_on()
+
+    def read_chip(self, sensor: int, address: int) -> int:
+        """Register of a sensor (from 0) as it stands, without the bus and without side effects."""
+        return self.sensors[sensor].registers[address]
+
+    def write_chip(self, sensor: int, address: int, value: int) -> None:
+        """Write a register of a sensor (from 0) as a program that ran before would have done."""
+        self.sensors[sensor].write_register(address, value, self.now)
 
     def set_line_fault(self, sensor: int, fault: LineFault) -> None:
         """Break or mend the line between a sensor (from 0) and the processor."""

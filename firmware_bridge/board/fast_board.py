@@ -120,6 +120,8 @@ def _library() -> Any:
         "add_sensor": (None, [pointer, ctypes.c_double, ctypes.c_double, pointer, i32, i32]),
         "power_on_sensor": (None, [pointer, i32]),
         "set_line_fault": (None, [pointer, i32, i32]),
+        "read_chip": (u32, [pointer, i32, u32]),
+        "write_chip": (None, [pointer, i32, u32, u32]),
         "schedule": (None, [pointer, i32, i64]),
         "set_line": (None, [pointer, i32, i32]),
         "pend": (None, [pointer, i32]),
@@ -217,7 +219,8 @@ class _FastCpu(Cpu):
 class FastBoard(Board):
     """A `Board` whose processor loop, NVIC, SysTick, timers, UARTs, SSPs, GPIO and SPI sensors run in C.
 
-    Takes the same image and sensors; a tracer is not supported. Sensors' registers are not visible from Python.
+    Takes the same image and sensors; a tracer is not supported. The registers of the sensors on SPI live in C
+    (`read_chip`, `write_chip`).
     """
 
     _cpu_class = _FastCpu
@@ -410,6 +413,14 @@ class FastBoard(Board):
     def set_line_fault(self, sensor: int, fault: LineFault) -> None:
         """Break or mend the line between a sensor (from 0) and the processor."""
         self.native.board_set_line_fault(self.handle, sensor, int(fault))
+
+    def read_chip(self, sensor: int, address: int) -> int:
+        """Register of a sensor (from 0) as it stands, without the bus and without side effects."""
+        return int(self.native.board_read_chip(self.handle, sensor, address))
+
+    def write_chip(self, sensor: int, address: int, value: int) -> None:
+        """Write a register of a sensor (from 0) as a program that ran before would have done."""
+        self.native.board_write_chip(self.handle, sensor, address, value)
 
     def _power_on_sensors(self) -> None:
         for index in range(len(self.sensors)):

@@ -10,7 +10,7 @@ from firmware_bridge.board.peripheral import Peripheral
 if TYPE_CHECKING:
     from firmware_bridge.board.board import Board
 
-__all__ = ["BROWN_OUT", "POWER_ON", "SYSTEM_RESET", "WATCHDOG", "SystemControl"]
+__all__ = ["BROWN_OUT", "EXTERNAL", "POWER_ON", "SYSTEM_RESET", "WATCHDOG", "SystemControl"]
 
 POWER_ON, EXTERNAL, WATCHDOG, BROWN_OUT = 1, 2, 4, 8
 """Reset causes in RSID."""
@@ -20,10 +20,15 @@ _INTERNAL_OSCILLATOR_HZ = 4_000_000
 _CRYSTAL_HZ = 12_000_000
 _RTC_HZ = 32_768
 _CONNECTED = 3
+_PERIPHERAL_CLOCKS = (0x1A8, 0x1AC)
 
 
 class SystemControl(Peripheral):
-    """Clock tree with a PLL that locks at once, and the reset cause."""
+    """Clock tree with a PLL that locks at once, and the reset cause.
+
+    PCLKSEL0 and PCLKSEL1 keep their value while PLL0 is connected, whatever is written: the worst that NXP's errata
+    sheet ES_LPC176x allows (PCLKSELx.1, "may not take effect"). The board records a warning.
+    """
 
     def __init__(self, board: Board) -> None:
         self.cause = POWER_ON
@@ -89,9 +94,22 @@ class SystemControl(Peripheral):
             self._feed = value
         elif offset == 0x180:
             self.cause &= ~value
+        elif offset in _PERIPHERAL_CLOCKS:
+            self._select_peripheral_clocks(offset, value)
         else:
             self.registers[offset] = value
             if offset in {0x104, 0x10C}:
                 self._update()
-            elif offset in {0x1A8, 0x1AC}:
-                self.board.change_clock(self.board.cycle)
+
+    def _select_peripheral_clocks(self, offset: int, value: int) -> None:
+        if value == self.registers.get(offset, 0):
+            return
+        if self._pll_control & _CONNECTED == _CONNECTED:
+            name = f"PCLKSEL{_PERIPHERAL_CLOCKS.index(offset)}"
+            self.board.warn(
+                f"{name} = {value:#010x} ignored: written while PLL0 is connected (errata sheet ES_LPC176x, "
+                "PCLKSELx.1); write it before"
+            )
+            return
+        self.registers[offset] = value
+        self.board.change_clock(self.board.cycle)

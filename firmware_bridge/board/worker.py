@@ -55,6 +55,22 @@ class Worker:
         """Drop the supply voltage."""
         self._board.brown_out()
 
+    def press_reset(self) -> None:
+        """Reset the processor, not the sensors."""
+        self._board.press_reset()
+
+    def read_chip(self, sensor: int, address: int) -> int:
+        """Register of a sensor."""
+        return self._board.read_chip(sensor, address)
+
+    def write_chip(self, sensor: int, address: int, value: int) -> None:
+        """Write a register of a sensor."""
+        self._board.write_chip(sensor, address, value)
+
+    def warnings(self) -> list[str]:
+        """Return what the firmware should not have done."""
+        return list(self._board.warnings)
+
     def set_line_fault(self, sensor: int, fault: LineFault) -> None:
         """Break or mend a sensor's line."""
         self._board.set_line_fault(sensor, fault)

@@ -47,6 +47,8 @@ _FLAGS = (
     "-Wl,-T,lpc1768.ld", "-Wl,--gc-sections", "-Wl,-e,Reset_Handler",
 )  # fmt: skip
 _VECTORS_SUMMED = 7
+_CODE_READ_PROTECTION = 0x2FC  # UM10360 32.6
+_UNPROTECTED = b"\xff\xff\xff\xff"
 MISSING_COMPILER = "the firmware can't be built: ziglang is not installed; pip install 'gfimu[firmware]'"
 
 
@@ -132,7 +134,7 @@ def build(
     InputError
         If the compiler is not installed or the image is unknown.
     GfimuError
-        If the sources do not compile; the message holds the compiler's.
+        If the sources do not compile (the message holds the compiler's), or code lies in the code-protection word.
     """
     image_path(name)
     compiler = compiler_version()
@@ -145,6 +147,11 @@ def build(
         _zig("cc", *_FLAGS, *options, *IMAGES[name], "-o", str(linked), cwd=SOURCES)
         content = _with_boot_checksum(linked.read_bytes())
     image = ElfImage.parse(content, name)
+    if image.flash_bytes()[_CODE_READ_PROTECTION:][:4] != _UNPROTECTED:
+        raise GfimuError(
+            f"{name}: the code-protection word at {_CODE_READ_PROTECTION:#x} is not 0xFFFFFFFF; "
+            "reserve it in the linker script"
+        )
     elf, binary = folder / f"{name}.elf", folder / f"{name}.bin"
     for path, data in ((elf, content), (binary, image.flash_bytes())):
         with atomic_path(path) as temporary:

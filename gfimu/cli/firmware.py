@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -94,23 +96,28 @@ def _run_to_file(
     scenario: str, out: Path, duration: float | None, rate: int, range_g: int, seed: int, image: str,
     *, pure_python: bool, json: bool,
 ) -> None:  # fmt: skip
+    from firmware_bridge.journal import check_target
     from firmware_bridge.virtual_run import record_virtual
-    from gfimu.errors import InputError
+    from gfimu.errors import GfimuError
 
-    if out.suffix not in {".csv", ".parquet"}:
-        raise InputError(f"{out}: unknown recording format {out.suffix!r}; use .csv or .parquet")
+    check_target(out)
     ride = _ride(scenario, seed)
     with progress(f"running {image}", total=1.0) as done:
         run = record_virtual(
             ride, duration or ride.duration, rate_hz=rate, range_g=range_g, image=image,
             fast=False if pure_python else None, progress=done,
         )  # fmt: skip
-    run.recording.write(out)
+    try:
+        run.recording.write(out)
+    except OSError as error:
+        reason = os.strerror(error.errno) if error.errno else str(error)
+        raise GfimuError(f"{out}: {reason}; nothing was written: free space and run again") from None
     if json:
         print_json(
             {
                 "stream": asdict(run.stream),
                 "identity": None if run.identity is None else asdict(run.identity),
+                "warnings": run.warnings,
                 "files": [out],
             }
         )
@@ -123,7 +130,13 @@ def _run_to_file(
     if run.identity is not None:
         rows.append(("firmware", run.identity.firmware))
     print_table(f"{scenario} on the emulated board", ("quantity", "value"), rows)
+    _print_warnings(run.warnings)
     print_paths([("recording", out)])
+
+
+def _print_warnings(warnings: Sequence[str]) -> None:
+    for warning in warnings:
+        console.print(f"[yellow]warning[/yellow] from the board: {warning}", highlight=False, soft_wrap=True)
 
 
 def _run_behind_port(
@@ -133,20 +146,22 @@ def _run_behind_port(
     from firmware_bridge.commands import set_range, set_rate
     from firmware_bridge.virtual_port import open_port, serve
 
+    setup = set_range(range_g) + set_rate(rate)
     ride = _ride(scenario, seed)
     line = open_port(port)
     try:
         with _board(ride, image, seed, pure_python=pure_python) as board:
             board.run_for(_BOOT_S)
-            board.receive(set_range(range_g) + set_rate(rate))
+            board.receive(setup)
             if not json:
                 console.print(f"board on [bold]{line.name}[/bold]; Ctrl-C ends it", highlight=False)
                 console.print(f"  gfimu record --port {line.name} --out run.parquet", highlight=False)
             report = serve(board, line, duration_s=duration, realtime=realtime)
+            warnings = board.warnings()
     finally:
         line.close()
     if json:
-        print_json(asdict(report) | {"port": line.name})
+        print_json(asdict(report) | {"port": line.name, "warnings": warnings})
         return
     print_table(
         f"{scenario} behind {line.name}",
@@ -159,6 +174,7 @@ def _run_behind_port(
             ("bytes from the host", report.received),
         ],
     )
+    _print_warnings(warnings)
 
 
 def _build(
@@ -239,10 +255,11 @@ def _trace(
     require_emulator()
     if out.suffix not in {".vcd", ".rrd"}:
         raise InputError(f"{out}: unknown trace format {out.suffix!r}; use .vcd or .rrd")
+    setup = set_rate(rate)
     with _board(_ride(scenario, seed), image, seed, pure_python=True, trace=True) as board:
         if skip:
             board.run_for(min(skip, _BOOT_S))
-            board.receive(set_rate(rate))
+            board.receive(setup)
             board.run_for(max(0.0, skip - _BOOT_S))
             board.take_trace()
         board.run_for(duration)

@@ -31,7 +31,14 @@ def _record(
     form: Annotated[str, typer.Option("--format", help="Frame format: lpc1768 or mimu4444.")] = "lpc1768",
     array: Annotated[str, typer.Option("--array", help="Array on the board; else the format's.")] = "",
     baud: Annotated[int, typer.Option("--baud", help="Bits per second; without meaning on a socket.")] = 1_562_500,
-    reconnect: Annotated[float, typer.Option("--reconnect", help="Wait this long for a lost connection, s.")] = 60.0,
+    reconnect: Annotated[
+        float | None,
+        typer.Option(
+            "--reconnect",
+            min=0.0,
+            help="Wait this long, s, for a port that is not there yet and for a lost connection (else: 0 and 60).",
+        ),
+    ] = None,
     rrd: Annotated[Path | None, typer.Option("--rrd", help="Rerun recording to write while recording.")] = None,
     view: Annotated[bool, typer.Option("--view", help="Open the rerun viewer and show what comes in.")] = False,
     json: JsonOption = False,
@@ -44,12 +51,14 @@ def _record(
     """
     from firmware_bridge.commands import set_range, set_rate
     from firmware_bridge.frames import frame_format
+    from firmware_bridge.journal import check_target
     from firmware_bridge.live import LiveView
     from firmware_bridge.recorder import record
     from gfimu.array import AccelerometerArray
     from gfimu.part import Part
 
     carried = AccelerometerArray.load(array or frame_format(form).array)
+    check_target(out)
     setup = [set_range(range_g)] if range_g is not None else []
     setup += [set_rate(rate)] if rate is not None else []
     interactive = console.is_terminal and not json
@@ -58,6 +67,8 @@ def _record(
         lsb = Part.load(carried.chips[0].part).lsb
         show = (lambda text: console.print(text, end="\r", highlight=False)) if interactive else None
         live = LiveView(carried, lsb, on_text=show, rrd=rrd, viewer=view)
+    if interactive and reconnect and "://" not in port and not Path(port).exists():
+        console.print(f"waiting for {port}, up to {reconnect:g} s", highlight=False)
     try:
         report = record(
             port, out, duration_s=duration, form=form, array=array, baud=baud, setup=tuple(setup),
@@ -87,6 +98,9 @@ def _record(
             ("host clock against board", f"{clock.rate_error * 1e6:+.1f} ± {clock.rate_error_std * 1e6:.1f} ppm")
         )
     if identity is not None:
+        faulty = ", ".join(str(number) for number, is_faulty in enumerate(identity.faulty, start=1) if is_faulty)
+        if faulty:
+            rows.append(("chips that do not hold their settings", faulty))
         rows.append(("firmware", f"{identity.firmware}, {identity.rate_hz} Hz, ±{identity.range_g} g"))
     rows += [(f"status {name}", number) for name, number in report.status_counts.items()]
     print_table(f"recorded from {port}", ("quantity", "value"), rows)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import csv
+import itertools
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,13 +13,14 @@ import numpy as np
 
 from gfimu.array import AccelerometerArray
 from gfimu.errors import InputError
+from gfimu.part import Part
 from gfimu.rate.kalman import FilterSettings
 from gfimu.rate.live import LiveRateFilter
 from gfimu.rate.result import RateEstimate
 from gfimu.rate.sensing import SensorErrors
 from gfimu.units import READING_UNITS
 
-__all__ = ["StreamLayout", "filter_stream"]
+__all__ = ["StreamLayout", "filter_stream", "read_head"]
 
 _GYRO = ("gyro_x_rad_s", "gyro_y_rad_s", "gyro_z_rad_s")
 
@@ -48,13 +50,24 @@ class StreamLayout:
     width: int
 
     @classmethod
-    def from_header(cls, names: list[str], array: AccelerometerArray) -> StreamLayout:
+    def from_header(
+        cls, names: list[str], array: AccelerometerArray, metadata: Mapping[str, Any] | None = None
+    ) -> StreamLayout:
         """Find the columns by their names, unit included, as in a recording's CSV file.
+
+        Parameters
+        ----------
+        names : list of str
+            Names of the columns.
+        array : AccelerometerArray
+            The array.
+        metadata : mapping, optional
+            ``lsb_m_s2`` is the size of a raw count; else the parts of the array give it.
 
         Raises
         ------
         InputError
-            If a column is missing or its unit is not one that needs no sensitivity.
+            If a column is missing or its unit is unknown.
         """
         columns = [name.strip() for name in names]
         if "t_s" not in columns:
@@ -66,13 +79,55 @@ class StreamLayout:
             if not found:
                 raise InputError(f"the stream lacks channel {channel} of array {array.name!r}, as {channel}_m_s2")
             unit = found[0][len(channel) + 1 :]
-            factor = READING_UNITS.get(unit)
+            if unit not in READING_UNITS:
+                raise InputError(f"column {found[0]!r}: unknown unit {unit!r}; valid: {', '.join(READING_UNITS)}")
+            factor = READING_UNITS[unit]
             if factor is None:
-                raise InputError(f"column {found[0]!r}: unit must be m_s2, g or mg in a stream")
+                factor = _count_size(metadata or {}, array, channel)
             places.append(columns.index(found[0]))
             factors.append(factor)
         gyro = tuple(columns.index(name) for name in _GYRO) if all(name in columns for name in _GYRO) else ()
         return cls(columns.index("t_s"), tuple(places), tuple(factors), gyro, len(columns))
+
+
+def _count_size(metadata: Mapping[str, Any], array: AccelerometerArray, channel: str) -> float:
+    """Size of a raw count, m/s²: as the stream states it, else by the channel's part."""
+    size = metadata.get("lsb_m_s2")
+    if size is None:
+        return Part.load(next(chip.part for chip in array.chips if channel in chip.channels)).lsb
+    if not isinstance(size, int | float) or not 0 < size < np.inf:
+        raise InputError(f"the stream's lsb_m_s2 is {size!r}; give the size of one count in m/s²")
+    return float(size)
+
+
+def read_head(lines: Iterable[str]) -> tuple[dict[str, Any], Iterator[str]]:
+    """Read the leading ``# key: value`` lines of a stream.
+
+    Returns
+    -------
+    metadata : dict
+        What they state; values are JSON where they can be read as such.
+    lines : iterator of str
+        The whole stream, those lines included.
+    """
+    rest = iter(lines)
+    head: list[str] = []
+    metadata: dict[str, Any] = {}
+    for line in rest:
+        head.append(line)
+        if line.strip() and not line.startswith("#"):
+            break
+        key, colon, text = line.lstrip("# ").partition(":")
+        if colon:
+            metadata[key.strip()] = _value(text.strip())
+    return metadata, itertools.chain(head, rest)
+
+
+def _value(text: str) -> Any:
+    try:
+        return json.loads(text)
+    except json.JSONDecodeError:
+        return text
 
 
 def filter_stream(
@@ -86,7 +141,8 @@ def filter_stream(
 ) -> Iterator[str]:
     """Filter a stream of CSV lines, sample by sample.
 
-    The first line that is no comment names the columns (``t_s``, ``a11_m_s2`` …). Each estimate is one JSON line:
+    The first line that is no comment names the columns (``t_s``, ``a11_m_s2`` … or raw counts, ``a11_lsb`` …, whose
+    size a line ``# lsb_m_s2: …`` before it or the array's part gives). Each estimate is one JSON line:
     ``t_s``, ``omega_rad_s``, ``omega_std_rad_s``, ``nis`` and its degrees of freedom, ``rest`` where a block of rest
     ended, ``sign``, and ``fault`` where something was wrong with the line or its channels. A line that can't be read
     is reported and skipped.
@@ -119,12 +175,13 @@ def filter_stream(
     live = LiveRateFilter(array, errors, period, settings, gyro=fuse_gyro)
     layout: StreamLayout | None = None
     reported: dict[str, Any] = live.report.to_dict()
-    for line in lines:
+    metadata, stream = read_head(lines)
+    for line in stream:
         if not line.strip() or line.startswith("#"):
             continue
         cells = next(csv.reader([line]))
         if layout is None:
-            layout = StreamLayout.from_header(cells, array)
+            layout = StreamLayout.from_header(cells, array, metadata)
             if fuse_gyro and not layout.gyro:
                 raise InputError(f"the stream lacks {', '.join(_GYRO)}; send them, or leave --gyro out")
             continue

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import socket
 import subprocess
@@ -11,6 +12,7 @@ import threading
 import numpy as np
 import pytest
 
+from firmware_bridge.journal import Journal
 from gfimu.array import AccelerometerArray
 from gfimu.rate.filter import filter_rate
 from gfimu.rate.sensing import SensorErrors
@@ -96,8 +98,10 @@ def test_faults_are_told_and_survived(stream):
     [
         ((), "1,2,3\n", "lacks t_s"),
         ((), "t_s,a11_m_s2\n", "lacks channel a12"),
-        ((), "t_s," + ",".join(f"{name}_lsb" for name in CUBE.channels) + "\n", "unit must be m_s2, g or mg"),
-        (("--from", "nowhere"), "", "host:port"),
+        ((), "t_s," + ",".join(f"{name}_V" for name in CUBE.channels) + "\n", "valid: m_s2, g, mg, lsb"),
+        ((), "# lsb_m_s2: 0\nt_s," + ",".join(f"{name}_lsb" for name in CUBE.channels) + "\n", "size of one count"),
+        (("--from", "nowhere"), "", "no such file"),
+        (("--from", "nowhere.csv", "--follow"), "", "no such file"),
         (("--from", "127.0.0.1:1"), "", "start the server first"),
     ],
 )
@@ -106,3 +110,73 @@ def test_bad_input(options, text, message):
     assert result.returncode == 2
     assert message in result.stderr
     assert "Traceback" not in result.stderr
+
+
+@pytest.fixture(scope="module")
+def counts(stream):
+    """Raw counts of the ramp and the readings they stand for."""
+    size = 0.038245935
+    number = np.round(stream[2] / size)
+    return number, number * size
+
+
+def journal(out, t, number, **metadata):
+    described = {"array": "cube12", "part": "adxl345", "lsb_m_s2": 0.038245935, "sample_rate_hz": 100, **metadata}
+    written = Journal(out, CUBE.channels, described)
+    written.append(t[:200], number[:200], np.zeros(200, dtype=np.uint16))
+    return written
+
+
+@pytest.mark.parametrize("name", ["run.csv", "run.parquet"])
+def test_what_record_has_finished(stream, counts, tmp_path, name, gfimu_command):
+    _, t, _ = stream
+    number, readings = counts
+    written = journal(tmp_path / name, t, number)
+    written.append(t[200:], number[200:], np.zeros(len(t) - 200, dtype=np.uint16))
+    written.finish({"frames_lost": 0})
+    result = gfimu_command("live", "--from", tmp_path / name)
+    assert result.code == 0, result.stderr
+    check(result.stdout, t, readings)
+
+
+@pytest.mark.parametrize("name", ["run.csv", "run.parquet"])
+def test_what_record_is_writing(stream, counts, tmp_path, name, gfimu_command):
+    _, t, _ = stream
+    number, readings = counts
+    written = journal(tmp_path / name, t, number)
+    assert len(gfimu_command("live", "--from", tmp_path / name).stdout.splitlines()) == 200
+    process = subprocess.Popen(
+        [sys.executable, "-c", PROGRAM, "live", "--from", str(tmp_path / name), "--follow"],
+        stdout=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    try:
+        first = process.stdout.readline()  # it has read what is there, and waits
+        written.append(t[200:], number[200:], np.zeros(len(t) - 200, dtype=np.uint16))
+        written.finish({})
+        rest, _ = process.communicate(timeout=60)
+    finally:
+        process.kill()
+    assert process.returncode == 0
+    check(first + rest, t, readings)
+
+
+def test_counts_on_a_pipe_are_of_the_arrays_part(stream, counts, gfimu_command, monkeypatch):
+    _, t, _ = stream
+    number, readings = counts
+    lines = ["t_s,status," + ",".join(f"{name}_lsb" for name in CUBE.channels)]
+    lines += [",".join(map(repr, (time, 0.0, *row))) for time, row in zip(t.tolist(), number.tolist(), strict=True)]
+    monkeypatch.setattr(sys, "stdin", io.StringIO("\n".join(lines) + "\n"))
+    result = gfimu_command("live", "--array", "cube12", "--rate", "100")
+    assert result.code == 0, result.stderr
+    check(result.stdout, t, readings)
+
+
+@pytest.mark.parametrize(
+    ("head", "message"), [("", "--array is missing"), ('# array: "cube12"\n', "--rate is missing")]
+)
+def test_a_stream_that_does_not_describe_itself(head, message, gfimu_command, monkeypatch):
+    monkeypatch.setattr(sys, "stdin", io.StringIO(head + "t_s,a11_lsb\n"))
+    result = gfimu_command("live")
+    assert result.code == 2
+    assert message in result.stderr
+    assert result.stderr.count("\n") == 1

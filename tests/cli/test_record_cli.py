@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import os
 import subprocess
 import sys
 import time
@@ -69,6 +71,13 @@ BAD = [
     (("firmware", "run", "--port", "com7"), "pty, tcp:PORT"),
     (("firmware", "run", "--scenario", "nowhere", "--port", "pty"), "paper_run"),
     (("firmware", "run", "--out", "run.txt"), ".csv or .parquet"),
+    (("firmware", "run", "--out", "/dev/null/run.csv"), "can be written"),
+    (("firmware", "run", "--out", "run.csv", "--rate", "9"), "10 to 3200 Hz"),
+    (("firmware", "run", "--port", "tcp:0", "--rate", "3201"), "10 to 3200 Hz"),
+    (("firmware", "trace", "--out", "t.vcd", "--rate", "0"), "10 to 3200 Hz"),
+    (("record", "--port", "/dev/nothing", "--out", "run.csv", "--rate", "5000"), "10 to 3200 Hz"),
+    (("record", "--port", "/dev/nothing", "--out", "/dev/null/run.csv"), "can be written"),
+    (("record", "--port", "/dev/nothing", "--out", "/dev/null/run.csv", "--rrd", "live.rrd"), "can be written"),
     (("firmware", "build", "blink"), "selfcheck"),
     (("firmware", "build", "--define", "X Y"), "NAME=VALUE"),
     (("firmware", "trace", "--out", "t.txt"), ".vcd or .rrd"),
@@ -86,6 +95,19 @@ def test_bad_input_is_one_line_and_code_2(gfimu_command, tmp_path, monkeypatch, 
     assert result.code == 2
     assert remedy in result.stderr
     assert result.stderr.strip().count("\n") == 0
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_full_disk_at_the_end_of_a_virtual_run(gfimu_command, tmp_path, monkeypatch) -> None:
+    def no_room(*_) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr("gfimu.column_file._write_csv", no_room)
+    out = tmp_path / "run.csv"
+    result = gfimu_command("firmware", "run", "--scenario", "rest", "--duration", "0.2", "--out", out)
+    assert result.code == 1
+    assert "No space left on device; nothing was written" in result.stderr
+    assert result.stderr.count("\n") == 1
     assert not list(tmp_path.iterdir())
 
 

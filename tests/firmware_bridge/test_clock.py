@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
-from firmware_bridge.clock import HostClock
+from firmware_bridge.clock import ClockFit, HostClock, SampleRate
+from firmware_bridge.frames import Samples, Status
 
 
 def arrivals(seed: int, *, seconds: int = 120, rate_error: float = 40e-6, offset: float = 1000.0):
@@ -48,3 +50,46 @@ def test_memory_stays_small_and_few_arrivals_give_no_line() -> None:
     assert len(clock._points) <= 102
     clock.restart()
     assert clock.fit() is None
+
+
+def samples_at(ticks, *, status=None, lost=None, segment=None) -> Samples:
+    n = len(ticks)
+    none = np.zeros(n, dtype=np.int64)
+    return Samples(
+        np.asarray(ticks, dtype=np.int64),
+        np.arange(n, dtype=np.uint16),
+        np.zeros((n, 12), dtype=np.int16),
+        np.asarray(none if status is None else status, dtype=np.uint16),
+        none if lost is None else np.asarray(lost),
+        none if segment is None else np.asarray(segment),
+    )
+
+
+def test_the_sample_rate_counts_lost_samples_and_leaves_starts_out() -> None:
+    rate = SampleRate(1e6)
+    rate.add(samples_at([100, 1350, 2600]))
+    rate.add(samples_at([7600, 8850], lost=[3, 0]))
+    rate.add(samples_at([], lost=[]))
+    rate.add(samples_at([9_000_000, 9_001_250], status=[Status.FIRST, 0]))
+    rate.add(samples_at([50, 1300], segment=[1, 1]))
+    stated = rate.metadata()
+    assert stated["time_stamp_rate_hz"] == pytest.approx(800.0, abs=1e-9)
+    assert stated["time_stamp_clock"] == "board"
+    assert stated["time_stamp_tick_hz"] == 1e6
+    assert "not corrected" in stated["time_stamp_rate_from"]
+    assert "host_clock_rate_hz" not in stated
+
+
+def test_the_rate_by_the_hosts_clock_is_stated_with_its_uncertainty() -> None:
+    rate = SampleRate(1e6)
+    rate.add(samples_at(range(0, 100_000, 1250)))
+    stated = rate.metadata(ClockFit(0.0, 1e-4, 50e-6, 2e-6, 0.0, 1e-4, 20))
+    assert stated["host_clock_rate_hz"] == pytest.approx(800.0 / 1.00005)
+    assert stated["host_clock_rate_std_hz"] == pytest.approx(800.0 * 2e-6)
+    assert "20 arrivals" in stated["host_clock_rate_from"]
+
+
+def test_without_two_samples_no_rate_is_stated() -> None:
+    rate = SampleRate(1e6)
+    rate.add(samples_at([100]))
+    assert "time_stamp_rate_hz" not in rate.metadata()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import struct
 import tomllib
 
@@ -40,6 +41,28 @@ def test_boot_checksum_and_flash_image() -> None:
     image = ElfImage.load(image_path())
     assert image.symbol_at(words[1] & ~1) == "Reset_Handler"
     assert image.symbol_at((words[1] & ~1) + 2) == "Reset_Handler+0x2"
+
+
+@pytest.mark.parametrize("name", IMAGES)
+def test_the_code_protection_word_is_reserved(name: str) -> None:
+    flash = image_path(name).with_suffix(".bin").read_bytes()
+    assert flash[0x2FC:0x300] == b"\xff" * 4  # the boot ROM reads it (UM10360 32.6); no instruction may stand there
+    assert all(not 0xCC <= address < 0x300 for address in ElfImage.load(image_path(name)).symbols.values())
+
+
+def test_an_image_with_code_in_the_code_protection_word_is_not_built(tmp_path, monkeypatch) -> None:
+    pytest.importorskip("ziglang", reason="the C compiler is in the extra 'firmware'")
+    sources = tmp_path / "src"
+    shutil.copytree(firmware.SOURCES, sources)
+    script = (sources / "lpc1768.ld").read_text(encoding="utf-8")
+    for line in ("        . = 0x2FC;\n", "        LONG(0xFFFFFFFF)\n"):
+        assert line in script
+        script = script.replace(line, "")
+    (sources / "lpc1768.ld").write_text(script, encoding="utf-8")
+    monkeypatch.setattr(firmware, "SOURCES", sources)
+    with pytest.raises(GfimuError, match=r"code-protection word at 0x2fc"):
+        build("gfimu", tmp_path / "image")
+    assert not (tmp_path / "image").exists()
 
 
 def test_definitions_change_image_and_source_hash(tmp_path) -> None:

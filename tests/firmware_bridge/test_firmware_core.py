@@ -120,6 +120,43 @@ def test_it_announces_itself_and_configures_the_chips(host: Host) -> None:
     assert all(chip.registers[0x31] == 0x0B and chip.registers[0x2D] == 8 for chip in host.chips)
 
 
+DIRTY = {0x1D: 9, 0x1E: 0x7F, 0x2A: 7, 0x2C: 0x17, 0x2D: 0x3F, 0x2E: 0xFF, 0x2F: 0xF0, 0x31: 0xC4, 0x38: 0x9F}
+
+
+def test_chips_that_kept_their_registers_are_set_up_anew(host: Host) -> None:
+    for chip in host.chips:
+        for address, value in DIRTY.items():
+            chip.write_register(address, value, host.now)
+    host.library.host_init(2, 1_562_500)
+    for chip in host.chips:
+        assert {address: chip.registers[address] for address in DIRTY if chip.registers[address]} == {
+            0x2C: 0x0A,
+            0x2D: 0x08,
+            0x31: 0x0B,
+        }
+    host.library.host_start()
+    assert host.sample(8).counts[-1].tolist() == [1, -2, 256, 2, -2, 256, 3, -2, 256, 4, -2, 256]
+
+
+@pytest.mark.parametrize("address", [0x1D, 0x1F, 0x2A, 0x2C, 0x2D, 0x2E, 0x2F, 0x31, 0x38])
+def test_a_register_that_does_not_read_back_is_a_fault_of_its_chip(host: Host, address: int, monkeypatch) -> None:
+    write = host.chips[1]._write
+
+    def stuck(at: int, value: int, now: int) -> None:
+        write(at, value ^ 0x10 if at == address else value, now)
+
+    monkeypatch.setattr(host.chips[1], "_write", stuck)
+    host.library.host_init(2, 1_562_500)
+    host.library.host_start()
+    samples = host.sample(3)
+    host.library.host_poll()
+    identity = host.messages()[-1]
+    assert identity.faulty == (False, True, False, False)
+    assert identity.present == (True, False, True, True)
+    assert np.all(samples.status & Status.CHIP_FAULT)
+    assert np.all(samples.counts[:, 3:6] == -32768)
+
+
 def test_samples_carry_the_chips_counts_time_and_sequence(host: Host) -> None:
     host.library.host_start()
     assert host.library.host_timer_hz() == 100
@@ -180,9 +217,11 @@ def test_a_full_queue_drops_whole_frames_and_says_so(host: Host) -> None:
 
 COMMANDS = [
     (set_rate(3200), Result.DONE),
-    (set_rate(3201), Result.BAD_VALUE),
-    (set_rate(9), Result.BAD_VALUE),
-    (set_rate(400, 16), Result.BAD_VALUE),
+    (encode_command(Command.SET_RATE, 3201, 0xFF), Result.BAD_VALUE),  # set_rate refuses these before they are sent
+    (encode_command(Command.SET_RATE, 9, 0xFF), Result.BAD_VALUE),
+    (encode_command(Command.SET_RATE, 0, 0xFF), Result.BAD_VALUE),
+    (encode_command(Command.SET_RATE, 65535, 0xFF), Result.BAD_VALUE),
+    (encode_command(Command.SET_RATE, 400, 16), Result.BAD_VALUE),
     (encode_command(Command.SET_RANGE, 4, 1), Result.BAD_VALUE),
     (set_range(2, full_resolution=False), Result.DONE),
     (encode_command(Command.SELF_TEST, 2), Result.BAD_VALUE),

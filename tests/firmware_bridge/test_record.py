@@ -14,7 +14,7 @@ from contextlib import contextmanager, suppress
 import numpy as np
 import pytest
 
-from firmware_bridge.commands import set_range, set_rate
+from firmware_bridge.commands import Command, encode_command, set_range, set_rate
 from firmware_bridge.frames import encode_samples
 from firmware_bridge.link import Link
 from firmware_bridge.recorder import SampleClock, record
@@ -104,6 +104,20 @@ def test_virtual_board_to_file(tmp_path, port: str, name: str) -> None:
     assert recording.metadata["sample_rate_hz"] == 800
     assert np.allclose(recording.readings[:, 2::3], 256 * recording.metadata["lsb_m_s2"])
     assert not recording.readings[:, 0].any()
+
+
+@needs_board
+def test_a_board_that_was_stopped_is_started(tmp_path) -> None:
+    with served_board("tcp:0", realtime=False) as device:
+        with Link(device) as link:
+            link.write(set_range(4) + encode_command(Command.STOP))
+            end = time.monotonic() + 10.0
+            while link.read(0.5) is not None and time.monotonic() < end:
+                pass
+        report = record(device, tmp_path / "run.csv", duration_s=1.0)
+    assert report.identity is not None
+    assert report.identity.range_g == 4
+    assert report.stream.samples >= 100
 
 
 def test_unplugging_marks_the_gap_and_recording_goes_on(server: Server, tmp_path) -> None:

@@ -1633,6 +1633,17 @@ PUBLIC void board_add_sensor(struct board *b, double clock_error, double phase, 
 PUBLIC void board_power_on_sensor(struct board *b, int index) { adxl_power_on(&b->sensors[index]); }
 PUBLIC void board_set_line_fault(struct board *b, int index, int fault) { b->sensors[index].line_fault = fault; }
 
+PUBLIC uint32_t board_read_chip(struct board *b, int index, uint32_t address)
+{
+    return b->sensors[index].registers[address & 63];
+}
+
+PUBLIC void board_write_chip(struct board *b, int index, uint32_t address, uint32_t value)
+{
+    adxl_catch_up(b, &b->sensors[index], b->shared.now);
+    adxl_write(&b->sensors[index], (int)(address & 63), (uint8_t)value, b->shared.now);
+}
+
 PUBLIC void board_schedule(struct board *b, int slot, ticks when) { schedule(b, slot, when); }
 PUBLIC void board_set_line(struct board *b, int irq, int level) { set_line(b, irq, level != 0); }
 PUBLIC void board_pend(struct board *b, int exception) { pend(b, exception); }

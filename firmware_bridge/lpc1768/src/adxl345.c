@@ -6,8 +6,12 @@
 #define MULTIPLE 0x4000U
 
 #define REGISTER_DEVID 0x00U
+#define REGISTER_THRESH_TAP 0x1DU
+#define REGISTER_OFSX 0x1EU /* first of 13: offsets, tap, activity, free fall, up to TAP_AXES */
 #define REGISTER_BW_RATE 0x2CU
 #define REGISTER_POWER_CTL 0x2DU
+#define REGISTER_INT_ENABLE 0x2EU
+#define REGISTER_INT_MAP 0x2FU
 #define REGISTER_INT_SOURCE 0x30U
 #define REGISTER_DATA_FORMAT 0x31U
 #define REGISTER_FIFO_CTL 0x38U
@@ -16,7 +20,7 @@
 #define MEASURE 0x08U
 #define FIFO_BYPASS 0x00U
 #define RATE_CODE_100_HZ 0x0AU
-
+#define DETECTION_WORDS 7U /* an address and the 13 registers 0x1E…0x2A */
 
 static void write_register(uint32_t sensor, uint32_t address, uint8_t value)
 {
@@ -31,17 +35,49 @@ static uint8_t read_register(uint32_t sensor, uint32_t address)
     return (uint8_t)word;
 }
 
-bool adxl345_configure(uint32_t sensor, uint8_t data_format, uint8_t bw_rate)
+/* No offsets, no tap, activity or free-fall detection: all zero. */
+static void clear_detection(uint32_t sensor)
 {
+    uint16_t words[DETECTION_WORDS] = {(uint16_t)(MULTIPLE | (REGISTER_OFSX << 8)), 0U, 0U, 0U, 0U, 0U, 0U};
+    write_register(sensor, REGISTER_THRESH_TAP, 0U);
+    hal_spi_exchange(sensor, words, DETECTION_WORDS);
+}
+
+static bool detection_is_clear(uint32_t sensor)
+{
+    uint16_t words[DETECTION_WORDS] = {(uint16_t)(READ | MULTIPLE | (REGISTER_OFSX << 8)), 0U, 0U, 0U, 0U, 0U, 0U};
+    uint32_t found = read_register(sensor, REGISTER_THRESH_TAP);
+    hal_spi_exchange(sensor, words, DETECTION_WORDS);
+    found |= words[0] & 0xFFU; /* the other half came with the address */
+    for (uint32_t i = 1U; i < DETECTION_WORDS; i++) {
+        found |= words[i];
+    }
+    return found == 0U;
+}
+
+enum adxl345_state adxl345_configure(uint32_t sensor, uint8_t data_format, uint8_t bw_rate)
+{
+    /* A reset of the processor leaves the chip as it was. The format comes first, unseen: a chip in 3-wire mode hears
+     * but its answers go to the wrong pin. */
+    write_register(sensor, REGISTER_DATA_FORMAT, data_format);
     if (read_register(sensor, REGISTER_DEVID) != DEVICE_ID) {
-        return false;
+        return ADXL345_ABSENT;
     }
     write_register(sensor, REGISTER_POWER_CTL, 0U);
-    write_register(sensor, REGISTER_DATA_FORMAT, data_format);
+    clear_detection(sensor);
+    write_register(sensor, REGISTER_INT_ENABLE, 0U);
+    write_register(sensor, REGISTER_INT_MAP, 0U);
     write_register(sensor, REGISTER_BW_RATE, bw_rate);
     write_register(sensor, REGISTER_FIFO_CTL, FIFO_BYPASS);
     write_register(sensor, REGISTER_POWER_CTL, MEASURE);
-    return true;
+    bool good = detection_is_clear(sensor);
+    good = (read_register(sensor, REGISTER_DATA_FORMAT) == data_format) && good;
+    good = (read_register(sensor, REGISTER_BW_RATE) == bw_rate) && good;
+    good = (read_register(sensor, REGISTER_POWER_CTL) == MEASURE) && good;
+    good = (read_register(sensor, REGISTER_INT_ENABLE) == 0U) && good;
+    good = (read_register(sensor, REGISTER_INT_MAP) == 0U) && good;
+    good = (read_register(sensor, REGISTER_FIFO_CTL) == FIFO_BYPASS) && good;
+    return good ? ADXL345_READY : ADXL345_FAULTY;
 }
 
 bool adxl345_read(uint32_t sensor, uint8_t data_format, struct adxl345_reading *reading)

@@ -18,8 +18,14 @@ struct adxl345_reading {
     int16_t counts[3];
 };
 
-/* Configure for measuring in bypass mode; true if the chip identifies itself. */
-bool adxl345_configure(uint32_t sensor, uint8_t data_format, uint8_t bw_rate);
+enum adxl345_state {
+    ADXL345_ABSENT, /* does not identify itself */
+    ADXL345_FAULTY, /* identifies itself, but a register does not read back as written */
+    ADXL345_READY
+};
+
+/* Set every register that matters for measuring in bypass mode, whatever was in it before, and read each back. */
+enum adxl345_state adxl345_configure(uint32_t sensor, uint8_t data_format, uint8_t bw_rate);
 
 /* Read flags and data in one burst; false if DATA_FORMAT or FIFO_CTL do not read back as configured. */
 bool adxl345_read(uint32_t sensor, uint8_t data_format, struct adxl345_reading *reading);

@@ -17,18 +17,25 @@
 #define BAUD_MIN 9600U
 #define SSP_PRESCALER 2U
 #define SSP_DIVIDER ((CORE_HZ + (SSP_PRESCALER * GFIMU_SPI_HZ) - 1U) / (SSP_PRESCALER * GFIMU_SPI_HZ))
+#define SELECT_REST_LOOPS 5U /* of at least 5 cycles: 250 ns */
 #define SPI_PINS 0x0FU /* P2.0…P2.3: chip-selects of sensors 1…4 */
 
 #define WATCHDOG_TICKS 2000000U /* 2 s of the 4 MHz internal oscillator, divided by 4 */
 #define WATCHDOG_FEED_US 100000U
 
+#define WAKE_TICKS (CORE_HZ / 10U) /* the main loop wakes ten times a second, whether samples are taken or not */
+
 #define PRIORITY_SAMPLE 1U
 #define PRIORITY_UART 2U
+#define PRIORITY_WAKE 31U
 
 _Static_assert((SSP_DIVIDER >= 1U) && (SSP_DIVIDER <= 256U), "GFIMU_SPI_HZ is out of the SSP's reach");
 
 static volatile bool transmitting;
 
+_Static_assert(WAKE_TICKS <= 0x1000000U, "SysTick counts 24 bits");
+
+void SysTick_Handler(void);
 void TIMER0_Handler(void);
 void UART0_Handler(void);
 
@@ -40,27 +47,44 @@ static void pll_feed(void)
     PLL0FEED = 0x55U;
 }
 
-/* 12 MHz crystal × 2 × 100 / 6 = 400 MHz, / 4 = 100 MHz (UM10360 4.5.13) */
+/* A boot loader may leave PLL0 connected: disconnect, then disable, in two feeds (UM10360 4.5.13). */
+static void pll_off(void)
+{
+    PLL0CON &= ~PLL0_CONNECT;
+    pll_feed();
+    while ((PLL0STAT & PLL0STAT_CONNECTED) != 0U) {
+    }
+    PLL0CON = 0U;
+    pll_feed();
+    while ((PLL0STAT & PLL0STAT_ENABLED) != 0U) {
+    }
+}
+
+/* 12 MHz crystal × 2 × 100 / 6 = 400 MHz, / 4 = 100 MHz (UM10360 4.5.13).
+ * The peripheral clocks are selected first: written once PLL0 is connected, PCLKSEL0 and PCLKSEL1 may not take effect
+ * (NXP's errata sheet ES_LPC176x, PCLKSELx.1). The flash gets its wait states before the clock gets fast. */
 static void clock_init(void)
 {
-    SCS = 1U << 5;
+    pll_off();
+    PCLKSEL0 = (1U << 2) | (1U << 4) | (1U << 6) | (1U << 20); /* TIMER0, TIMER1, UART0, SSP1 at CCLK */
+    PCLKSEL1 = 0U;
+    SCS |= 1U << 5;
     while ((SCS & (1U << 6)) == 0U) {
     }
+    FLASHCFG = (FLASHCFG & 0xFFFU) | 0x4000U;
     CCLKCFG = 3U;
     CLKSRCSEL = 1U;
     PLL0CFG = (5U << 16) | 99U;
     pll_feed();
-    PLL0CON = 1U;
+    PLL0CON = PLL0_ENABLE;
     pll_feed();
-    while ((PLL0STAT & (1U << 26)) == 0U) {
+    while ((PLL0STAT & PLL0STAT_LOCKED) == 0U) {
     }
-    PLL0CON = 3U;
+    PLL0CON = PLL0_ENABLE | PLL0_CONNECT;
     pll_feed();
-    while ((PLL0STAT & (3U << 24)) != (3U << 24)) {
+    while ((PLL0STAT & PLL0STAT_CONNECTED) == 0U) {
     }
-    FLASHCFG = (FLASHCFG & 0xFFFU) | 0x4000U;
     PCONP |= PCONP_TIMER0 | PCONP_TIMER1 | PCONP_UART0 | PCONP_SSP1 | PCONP_GPIO;
-    PCLKSEL0 = (1U << 2) | (1U << 4) | (1U << 6) | (1U << 20); /* TIMER0, TIMER1, UART0, SSP1 at CCLK */
 }
 
 /* ---- SPI ---- */
@@ -76,6 +100,14 @@ static void spi_init(void)
     SSP1CR1 = SSP_CR1_ENABLE;
 }
 
+/* A chip wants its CS high for 150 ns between two accesses (ADXL345 data sheet, table 10, tCS,DIS). Sampling visits each
+ * chip once and needs no rest. */
+static void select_rest(void)
+{
+    for (volatile uint32_t i = 0U; i < SELECT_REST_LOOPS; i++) {
+    }
+}
+
 void hal_spi_exchange(uint32_t sensor, uint16_t *words, uint32_t count)
 {
     FIO2CLR = 1U << sensor;
@@ -88,6 +120,7 @@ void hal_spi_exchange(uint32_t sensor, uint16_t *words, uint32_t count)
         words[i] = (uint16_t)SSP1DR;
     }
     FIO2SET = 1U << sensor;
+    select_rest();
 }
 
 void hal_spi_burst(uint32_t sensor, uint16_t words[HAL_BURST_WORDS])
@@ -279,7 +312,20 @@ static void watchdog_feed(void)
     hal_unlock();
 }
 
-/* Fed only while samples are taken as they should be. */
+/* Wakes the main loop, which has nothing else to wake for while no samples are taken. */
+static void wake_init(void)
+{
+    SYSTEM_PRIORITY(EXCEPTION_SYSTICK) = PRIORITY_WAKE << NVIC_PRIORITY_SHIFT;
+    SYST_RVR = WAKE_TICKS - 1U;
+    SYST_CVR = 0U;
+    SYST_CSR = SYST_CSR_ENABLE_INTERRUPT;
+}
+
+void SysTick_Handler(void)
+{
+}
+
+/* Fed while the main loop runs and, when streaming, samples are taken as they should be. */
 static void watchdog_watch(void)
 {
     static uint32_t fed_us;
@@ -308,6 +354,7 @@ int main(void)
     NVIC_PRIORITY(IRQ_TIMER0) = PRIORITY_SAMPLE << NVIC_PRIORITY_SHIFT;
     NVIC_PRIORITY(IRQ_UART0) = PRIORITY_UART << NVIC_PRIORITY_SHIFT;
     NVIC_ISER0 = (1U << IRQ_TIMER0) | (1U << IRQ_UART0);
+    wake_init();
     WDTC = WATCHDOG_TICKS;
     WDMOD = WDMOD_ENABLE_RESET;
     watchdog_feed();

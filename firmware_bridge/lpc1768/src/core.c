@@ -35,7 +35,7 @@
 #define BITS_PER_FRAME (FRAME_BYTES * 10U)
 #define MICROSECONDS 1000000U
 #define SETTLE_SAMPLES 16U /* longest wait for the first conversions after a change of configuration */
-#define RETRY_US 20000U /* how often a missing sensor is looked for */
+#define RETRY_US 20000U /* how often one of the missing sensors is looked for */
 
 _Static_assert((RECEIVE_RING & (RECEIVE_RING - 1U)) == 0U, "the receive ring is indexed with a mask");
 _Static_assert(HEADER_BYTES + PAYLOAD_BYTES + 6U == FRAME_BYTES, "frame layout");
@@ -56,9 +56,11 @@ static struct {
     uint16_t message_sequence;
     uint32_t last_sample_us;
     uint32_t last_retry_us;
+    uint32_t last_retried; /* sensor */
     volatile uint32_t heartbeat;
     uint32_t dropped;
-    uint32_t present; /* bit mask of answering sensors */
+    uint32_t present; /* bit mask of sensors that answer and hold their configuration */
+    uint32_t faulty;  /* bit mask of sensors that identify themselves but do not hold it */
     uint16_t sticky;  /* status bits to report in the next frame */
     volatile bool announce;
     uint32_t new_baud; /* 0, or the rate to switch to once the reply has left */
@@ -198,7 +200,7 @@ static void send_identity(void)
     payload[6] = core.bw_rate;
     payload[7] = core.data_format;
     put32(&payload[8], core.baud);
-    payload[12] = (uint8_t)core.present;
+    payload[12] = (uint8_t)(core.present | (core.faulty << SENSOR_COUNT));
     payload[13] = core.reset_cause;
     payload[14] = core.streaming ? 1U : 0U;
     payload[15] = SENSOR_COUNT;
@@ -210,11 +212,14 @@ static void send_identity(void)
 
 /* ---- sampling ---- */
 
-static void set_present(uint32_t sensor, bool answers)
+static void set_state(uint32_t sensor, enum adxl345_state state)
 {
-    uint32_t mask = answers ? (core.present | (1U << sensor)) : (core.present & ~(1U << sensor));
-    if (mask != core.present) {
-        core.present = mask;
+    uint32_t bit = 1U << sensor;
+    uint32_t present = (state == ADXL345_READY) ? (core.present | bit) : (core.present & ~bit);
+    uint32_t faulty = (state == ADXL345_FAULTY) ? (core.faulty | bit) : (core.faulty & ~bit);
+    if ((present != core.present) || (faulty != core.faulty)) {
+        core.present = present;
+        core.faulty = faulty;
         core.announce = true;
     }
 }
@@ -222,7 +227,7 @@ static void set_present(uint32_t sensor, bool answers)
 static void configure_sensors(void)
 {
     for (uint32_t sensor = 0U; sensor < SENSOR_COUNT; sensor++) {
-        set_present(sensor, adxl345_configure(sensor, core.data_format, core.bw_rate));
+        set_state(sensor, adxl345_configure(sensor, core.data_format, core.bw_rate));
     }
 }
 
@@ -250,7 +255,9 @@ static uint32_t sample_sensor(uint32_t sensor, uint8_t *at)
     bool good = ((core.present >> sensor) & 1U) != 0U;
     if (good) {
         good = adxl345_read(sensor, core.data_format, &reading);
-        set_present(sensor, good);
+        if (!good) {
+            set_state(sensor, ADXL345_ABSENT); /* until the next try tells more */
+        }
     }
     if (!good) {
         reading.int_source = ADXL345_DATA_READY;
@@ -271,17 +278,17 @@ static uint32_t sample_sensor(uint32_t sensor, uint8_t *at)
     return status;
 }
 
-/* Looks for one missing sensor now and then, so that one that comes back is used again. */
+/* Looks for one missing sensor now and then, so that one that comes back is used again; the next time for the next one,
+ * since setting up a sensor takes a third of the shortest sample period. */
 static void retry_missing(uint32_t now_us)
 {
     const uint32_t all = (1U << SENSOR_COUNT) - 1U;
     if ((core.present != all) && ((now_us - core.last_retry_us) >= RETRY_US)) {
         core.last_retry_us = now_us;
-        for (uint32_t sensor = 0U; sensor < SENSOR_COUNT; sensor++) {
-            if (((core.present >> sensor) & 1U) == 0U) {
-                set_present(sensor, adxl345_configure(sensor, core.data_format, core.bw_rate));
-            }
-        }
+        do {
+            core.last_retried = (core.last_retried + 1U) % SENSOR_COUNT;
+        } while (((core.present >> core.last_retried) & 1U) != 0U);
+        set_state(core.last_retried, adxl345_configure(core.last_retried, core.data_format, core.bw_rate));
     }
 }
 
@@ -326,6 +333,9 @@ void core_sample(void)
     }
     if ((core.data_format & ADXL345_SELF_TEST) != 0U) {
         status |= STATUS_SELF_TEST;
+    }
+    if (core.faulty != 0U) {
+        status |= STATUS_CHIP_FAULT;
     }
     core.sticky = 0U;
     frame_close(frame, status);
@@ -570,7 +580,9 @@ void core_init(uint32_t reset_cause, uint32_t baud)
     core.heartbeat = 0U;
     core.dropped = 0U;
     core.present = 0U;
+    core.faulty = 0U;
     core.last_retry_us = hal_time_us();
+    core.last_retried = 0U;
     core.sticky = ((reset_cause & RESET_WATCHDOG) != 0U) ? STATUS_WATCHDOG_RESET : 0U;
     core.announce = true;
     core.new_baud = 0U;

@@ -14,7 +14,7 @@
 #define FRAME_SLOTS 32U
 
 #define FIRMWARE_MAJOR 1U
-#define FIRMWARE_MINOR 0U
+#define FIRMWARE_MINOR 1U
 #define FIRMWARE_PATCH 0U
 
 #define RATE_MIN_HZ 10U
@@ -51,6 +51,7 @@ enum result {
 #define STATUS_FIRST (1U << 12)
 #define STATUS_WATCHDOG_RESET (1U << 13)
 #define STATUS_STALE (1U << 14)
+#define STATUS_CHIP_FAULT (1U << 15) /* some chip does not hold its configuration; which one: the identity */
 
 /* Reset causes, as the LPC1768 reports them in RSID. */
 #define RESET_POWER_ON 1U

@@ -1,0 +1,83 @@
+"""Lines of a recording for the live filter: from a finished file, or from one that is still being written."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import math
+import os
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from gfimu.errors import InputError
+from gfimu.recording import Recording
+
+__all__ = ["recording_lines"]
+
+_LOOK_AGAIN_S = 0.1
+_PARQUET = b"PAR1"
+
+
+def recording_lines(path: str | Path, *, follow: bool = False) -> Iterator[str]:
+    """Yield the lines of a recording as CSV text, metadata and header first.
+
+    Parameters
+    ----------
+    path : str or Path
+        CSV file, Parquet file, or what `gfimu record` has written so far under either name.
+    follow : bool
+        Wait for more at the end of a file that is being written, until it is finished: replaced by the final recording
+        (whose samples have all been read by then) or removed.
+
+    Raises
+    ------
+    InputError
+        If the file can't be read.
+    """
+    file = Path(path)
+    try:
+        with file.open("rb") as stream:
+            magic = stream.read(len(_PARQUET))
+    except OSError as error:
+        raise InputError(f"{file}: {error.strerror or error}; check the path") from None
+    return _finished(file) if magic == _PARQUET else _text(file, follow=follow)
+
+
+def _finished(file: Path) -> Iterator[str]:
+    """Lines of a Parquet file."""
+    recording = Recording.read(file)
+    for key, value in recording.metadata.items():
+        yield f"# {key}: {json.dumps(value)}\n"
+    gyro = [name for name in recording.reference if name.startswith("gyro_")]
+    yield ",".join(["t_s", *(f"{channel}_m_s2" for channel in recording.channels), *gyro]) + "\n"
+    table = np.column_stack([recording.t_s, recording.readings, *(recording.reference[name] for name in gyro)])
+    for row in table.tolist():
+        yield ",".join("" if math.isnan(value) else repr(value) for value in row) + "\n"
+
+
+def _text(file: Path, *, follow: bool) -> Iterator[str]:
+    """Whole lines of a text file as they are there, or as they arrive."""
+    waiting = ""
+    with file.open(encoding="utf-8", errors="replace", newline="") as stream:
+        while True:
+            replaced = follow and not _is_same(file, stream.fileno())  # asked before the last look for more
+            while text := stream.readline():
+                waiting += text
+                if waiting.endswith("\n"):
+                    yield waiting
+                    waiting = ""
+            if not follow or replaced:
+                break
+            time.sleep(_LOOK_AGAIN_S)
+    if waiting and not follow:
+        yield waiting
+
+
+def _is_same(file: Path, number: int) -> bool:
+    """Whether the path still leads to the open file."""
+    with contextlib.suppress(OSError):
+        return os.path.samestat(file.stat(), os.fstat(number))
+    return False
