@@ -18,6 +18,7 @@ import tomli_w
 from firmware_bridge.lpc1768.elf import ElfImage
 from gfimu.atomic_file import atomic_path, write_text
 from gfimu.errors import GfimuError, InputError
+from gfimu.outputs import check_parent
 
 __all__ = [
     "IMAGES",
@@ -123,7 +124,7 @@ def build(
     name : str
         Image in `IMAGES`.
     out : str or Path, optional
-        Folder for the results; by default the package's own ``image`` folder.
+        Folder for the results, made if it isn't there; by default the package's own ``image`` folder.
     defines : mapping of str to str, optional
         Preprocessor definitions, such as ``{"GFIMU_SPI_HZ": "100000U"}``.
 
@@ -145,6 +146,8 @@ def build(
         _zig("cc", *_FLAGS, *options, *IMAGES[name], "-o", str(linked), cwd=SOURCES)
         content = _with_boot_checksum(linked.read_bytes())
     image = ElfImage.parse(content, name)
+    check_parent(folder)
+    folder.mkdir(exist_ok=True)
     elf, binary = folder / f"{name}.elf", folder / f"{name}.bin"
     for path, data in ((elf, content), (binary, image.flash_bytes())):
         with atomic_path(path) as temporary:

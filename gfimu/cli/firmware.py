@@ -4,15 +4,11 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
-from gfimu.cli.output import JsonOption, console, print_json, print_paths, print_table, progress
-
-if TYPE_CHECKING:
-    from firmware_bridge.board_process import BoardProcess
-    from sim.ride import Ride
+from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, print_text, progress
 
 __all__ = ["register"]
 
@@ -24,8 +20,6 @@ PythonOption = Annotated[
     bool, typer.Option("--pure-python", help="Run all peripherals in Python: slower, the same result.")
 ]
 
-_BOOT_S = 0.02
-
 
 def register(app: typer.Typer) -> None:
     """Add the commands."""
@@ -36,21 +30,6 @@ def register(app: typer.Typer) -> None:
     group.command(name="trace")(_trace)
     group.command(name="faults")(_faults)
     app.add_typer(group, name="firmware")
-
-
-def _ride(scenario: str, seed: int) -> Ride:
-    from sim.ride import Ride
-
-    return Ride(scenario, seed=seed)
-
-
-def _board(ride: Ride, image: str, seed: int, *, pure_python: bool, trace: bool = False) -> BoardProcess:
-    from firmware_bridge.board_process import BoardProcess
-    from firmware_bridge.physics import RidePhysics
-    from firmware_bridge.virtual_run import typical_chips
-
-    fast = False if pure_python else None
-    return BoardProcess(RidePhysics(ride), image=image, chips=typical_chips(seed), fast=fast, trace=trace)
 
 
 def _run(
@@ -78,10 +57,8 @@ def _run(
 
     Example: gfimu firmware run --scenario paper_run --out run.parquet --rate 800
     """
-    from firmware_bridge.board_process import require_emulator
     from gfimu.errors import InputError
 
-    require_emulator()
     if (port is None) == (out is None):
         raise InputError("give either --port (pty or tcp:PORT) or --out (a recording)")
     if port is None and out is not None:
@@ -94,34 +71,29 @@ def _run_to_file(
     scenario: str, out: Path, duration: float | None, rate: int, range_g: int, seed: int, image: str,
     *, pure_python: bool, json: bool,
 ) -> None:  # fmt: skip
-    from firmware_bridge.virtual_run import record_virtual
-    from gfimu.errors import InputError
+    from gfimu.commands.firmware import run
 
-    if out.suffix not in {".csv", ".parquet"}:
-        raise InputError(f"{out}: unknown recording format {out.suffix!r}; use .csv or .parquet")
-    ride = _ride(scenario, seed)
     with progress(f"running {image}", total=1.0) as done:
-        run = record_virtual(
-            ride, duration or ride.duration, rate_hz=rate, range_g=range_g, image=image,
-            fast=False if pure_python else None, progress=done,
+        made = run(
+            scenario=scenario, out=out, duration=duration, rate=rate, range_g=range_g, seed=seed, image=image,
+            pure_python=pure_python, progress=done,
         )  # fmt: skip
-    run.recording.write(out)
     if json:
         print_json(
             {
-                "stream": asdict(run.stream),
-                "identity": None if run.identity is None else asdict(run.identity),
+                "stream": asdict(made.stream),
+                "identity": None if made.identity is None else asdict(made.identity),
                 "files": [out],
             }
         )
         return
     rows: list[tuple[str, Any]] = [
-        ("samples", f"{run.stream.samples} at {rate} Hz"),
-        ("lost", run.stream.lost),
-        ("corrupt", run.stream.corrupt),
+        ("samples", f"{made.stream.samples} at {rate} Hz"),
+        ("lost", made.stream.lost),
+        ("corrupt", made.stream.corrupt),
     ]
-    if run.identity is not None:
-        rows.append(("firmware", run.identity.firmware))
+    if made.identity is not None:
+        rows.append(("firmware", made.identity.firmware))
     print_table(f"{scenario} on the emulated board", ("quantity", "value"), rows)
     print_paths([("recording", out)])
 
@@ -130,26 +102,25 @@ def _run_behind_port(
     scenario: str, port: str, duration: float | None, rate: int, range_g: int, seed: int, image: str,
     realtime: bool, pure_python: bool, json: bool,
 ) -> None:  # fmt: skip
-    from firmware_bridge.commands import set_range, set_rate
-    from firmware_bridge.virtual_port import open_port, serve
+    from gfimu.commands.firmware import run
 
-    ride = _ride(scenario, seed)
-    line = open_port(port)
-    try:
-        with _board(ride, image, seed, pure_python=pure_python) as board:
-            board.run_for(_BOOT_S)
-            board.receive(set_range(range_g) + set_rate(rate))
-            if not json:
-                console.print(f"board on [bold]{line.name}[/bold]; Ctrl-C ends it", highlight=False)
-                console.print(f"  gfimu record --port {line.name} --out run.parquet", highlight=False)
-            report = serve(board, line, duration_s=duration, realtime=realtime)
-    finally:
-        line.close()
+    names: list[str] = []
+
+    def opened(name: str) -> None:
+        names.append(name)
+        if not json:
+            print_text(f"board on {name}; Ctrl-C ends it")
+            print_text(f"  gfimu record --port {name} --out run.parquet")
+
+    report = run(
+        scenario=scenario, port=port, duration=duration, rate=rate, range_g=range_g, realtime=realtime, seed=seed,
+        image=image, pure_python=pure_python, on_open=opened,
+    )  # fmt: skip
     if json:
-        print_json(asdict(report) | {"port": line.name})
+        print_json(asdict(report) | {"port": names[0]})
         return
     print_table(
-        f"{scenario} behind {line.name}",
+        f"{scenario} behind {names[0]}",
         ("quantity", "value"),
         [
             ("virtual time", f"{report.virtual_s:.2f} s"),
@@ -174,7 +145,7 @@ def _build(
 
     Example: gfimu firmware build --out build --define GFIMU_SPI_HZ=1000000U
     """
-    from firmware_bridge.lpc1768.build import build
+    from gfimu.commands.firmware import build
     from gfimu.errors import InputError
 
     defines = {}
@@ -183,7 +154,7 @@ def _build(
         if not equals or not name.isidentifier():
             raise InputError(f"--define {item!r}: write NAME=VALUE")
         defines[name] = value
-    report = build(image, out, defines=defines)
+    report = build(image, out=out, define=defines)
     if json:
         print_json(asdict(report))
         return
@@ -205,9 +176,9 @@ def _selftest(json: JsonOption = False) -> None:
 
     Example: gfimu firmware selftest
     """
-    from firmware_bridge.selftest import run_selftest
+    from gfimu.commands.firmware import selftest
 
-    rows = run_selftest()
+    rows = selftest()
     if json:
         print_json({"passed": all(row.passed for row in rows), "checks": [asdict(row) for row in rows]})
     else:
@@ -231,28 +202,13 @@ def _trace(
 
     Example: gfimu firmware trace --out trace.vcd --duration 0.02
     """
-    from firmware_bridge.board.trace import write_rrd, write_vcd
-    from firmware_bridge.board_process import require_emulator
-    from firmware_bridge.commands import set_rate
-    from gfimu.errors import InputError
+    from gfimu.commands.firmware import trace
 
-    require_emulator()
-    if out.suffix not in {".vcd", ".rrd"}:
-        raise InputError(f"{out}: unknown trace format {out.suffix!r}; use .vcd or .rrd")
-    with _board(_ride(scenario, seed), image, seed, pure_python=True, trace=True) as board:
-        if skip:
-            board.run_for(min(skip, _BOOT_S))
-            board.receive(set_rate(rate))
-            board.run_for(max(0.0, skip - _BOOT_S))
-            board.take_trace()
-        board.run_for(duration)
-        events = board.take_trace()
-    (write_vcd if out.suffix == ".vcd" else write_rrd)(out, events)
-    entered = sum(event.kind == "enter" for event in events)
+    found = trace(out, scenario=scenario, duration=duration, skip=skip, rate=rate, seed=seed, image=image)
     if json:
-        print_json({"events": len(events), "exceptions": entered, "files": [out]})
+        print_json({"events": found.events, "exceptions": found.exceptions, "files": [out]})
         return
-    rows = [("register accesses", sum(event.source != "cpu" for event in events)), ("exceptions", entered)]
+    rows = [("register accesses", found.accesses), ("exceptions", found.exceptions)]
     print_table(f"{duration:g} s of {image}", ("quantity", "value"), rows)
     print_paths([("trace", out)])
 
@@ -262,10 +218,10 @@ def _faults(seed: SeedOption = 0, json: JsonOption = False) -> None:
 
     Example: gfimu firmware faults
     """
-    from firmware_bridge.fault_campaign import run_campaign
+    from gfimu.commands.firmware import faults
 
     with progress("faults", total=1.0) as done:
-        rows = run_campaign(seed=seed, progress=done)
+        rows = faults(seed=seed, progress=done)
     if json:
         print_json(
             {

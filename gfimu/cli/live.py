@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
 from typing import Annotated
 
 import typer
-
-from gfimu.cli.array_option import load_array
 
 __all__ = ["register"]
 
@@ -39,40 +36,10 @@ def _live(
 
     Example: tail -f run.csv | gfimu live --array cube12 --rate 100
     """
-    import numpy as np
+    from gfimu.commands.live import live
 
-    from gfimu.errors import InputError
-    from gfimu.rate.kalman import FilterSettings
-    from gfimu.rate.sensing import SensorErrors
-    from gfimu.rate.stream import filter_stream
-
-    if not rate > 0:
-        raise InputError(f"--rate {rate:g}: must be positive, Hz")
-    geometry = load_array(array)
-    biases = {} if bias_std is None else {"bias_std": bias_std}
-    errors = SensorErrors.from_parts(geometry, rate, scale_std=scale_std, **biases)
-    settings = FilterSettings(start_omega=None) if unknown_start else FilterSettings(start_omega=np.zeros(3))
-    for line in filter_stream(_lines(source), geometry, errors, 1.0 / rate, settings, fuse_gyro=gyro):
+    for line in live(
+        array, rate, source=source, scale_std=scale_std, bias_std=bias_std, unknown_start=unknown_start, gyro=gyro
+    ):
         sys.stdout.write(line + "\n")
         sys.stdout.flush()
-
-
-def _lines(source: str) -> Iterator[str]:
-    """Lines of the source as they arrive."""
-    from gfimu.errors import InputError
-
-    if source == "-":
-        yield from iter(sys.stdin.readline, "")
-        return
-    import socket
-
-    host, colon, port = source.removeprefix("socket://").rpartition(":")
-    if not colon or not port.isdigit():
-        raise InputError(f"--from {source!r}: give - for standard input, or host:port")
-    try:
-        connection = socket.create_connection((host, int(port)), timeout=10)
-    except OSError as error:
-        raise InputError(f"--from {source!r}: {error.strerror or error}; start the server first") from None
-    connection.settimeout(None)
-    with connection, connection.makefile("r", encoding="utf-8", errors="replace") as stream:
-        yield from stream
