@@ -36,10 +36,10 @@ def _simulate(
     from gfimu.commands.simulate import simulate
     from sim.scenarios import Scenario, summarise
 
-    run = Scenario.load(scenario, changes=changes or [])
-    with progress(f"simulating {run.name}", total=1.0) as done:
+    with progress(f"simulating {scenario}", total=1.0) as done:
         recording = simulate(scenario, out=out, seed=seed, changes=changes or [], raw=raw, rrd=rrd, progress=done)
     written = {"recording": out} | ({} if rrd is None else {"rrd": rrd})
+    run = Scenario.load(scenario, changes=changes or [])
     summary = summarise(run, recording)
     if json:
         print_json(summary | {"files": written})

@@ -38,6 +38,10 @@ class EstimatedRun:
     array: AccelerometerArray
 
 
+_READS = ("recording", "array", "calibration")
+
+
+@writes(reads=_READS, out=ESTIMATE, rrd=RERUN)
 def estimate(
     recording: Recording | str | Path,
     array: AccelerometerArray | str | Path | None = None,
@@ -110,7 +114,7 @@ def estimate(
     ).estimate
 
 
-@writes(reads=("recording", "array", "calibration"), out=ESTIMATE, rrd=RERUN)
+@writes(reads=_READS, out=ESTIMATE, rrd=RERUN)
 def estimate_run(
     recording: Recording | str | Path,
     array: AccelerometerArray | str | Path | None = None,

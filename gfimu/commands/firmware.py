@@ -174,7 +174,7 @@ def _behind_port(
         line.close()
 
 
-@writes(out=IMAGES)
+@writes(reads=("image",), out=IMAGES)
 def build(
     image: str = "gfimu", *, out: str | Path | None = None, define: Mapping[str, str] | None = None
 ) -> BuildReport:
