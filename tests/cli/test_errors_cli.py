@@ -92,7 +92,7 @@ def test_no_argument_shows_the_help(gfimu_command):
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full here")
 @pytest.mark.parametrize("form", [(), ("--json",)])
 def test_a_full_disk_behind_standard_output(form):
-    with open("/dev/full", "w") as full:
+    with Path("/dev/full").open("w") as full:
         done = subprocess.run(
             [*PROGRAM, "score", "cube12", *form], stdout=full, stderr=subprocess.PIPE, text=True, check=False
         )
@@ -153,7 +153,7 @@ def _linked(*arguments, cwd):
 
     if "-o" not in arguments:
         return "0.16"
-    os.symlink(image_path("selfcheck"), arguments[arguments.index("-o") + 1])
+    Path(arguments[arguments.index("-o") + 1]).symlink_to(image_path("selfcheck"))
     return ""
 
 

@@ -187,7 +187,7 @@ def test_links_are_seen_through(gfimu_command, here, link):
 
 def test_two_outputs_must_be_two_files(gfimu_command, here):
     (here / "picture.rrd").write_text("kept")
-    os.symlink("picture.rrd", "estimate.csv")
+    (here / "estimate.csv").symlink_to("picture.rrd")
     before = contents(here)
     result = gfimu_command("estimate", "in.csv", "--out", "estimate.csv", "--rrd", "picture.rrd")
     refused(result, before, here, "--out and --rrd name the same file")
@@ -235,7 +235,7 @@ def test_view_makes_no_picture_over_its_input(gfimu_command, here):
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full here")
 def test_a_device_is_no_place_for_a_file(gfimu_command, here):
-    os.symlink("/dev/full", "full.csv")
+    (here / "full.csv").symlink_to("/dev/full")
     refused(gfimu_command("convert", "in.csv", "full.csv"), contents(here), here, "is not an ordinary file")
 
 
