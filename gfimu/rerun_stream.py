@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
+import os
+import signal
 import socket
 import subprocess
 import sys
@@ -93,12 +96,22 @@ def viewer_stream(application: str) -> Any:
         end = time.monotonic() + _START_S
         while not _listens():
             if viewer.poll() is not None or time.monotonic() > end:
-                viewer.kill()
+                _end(viewer)
                 raise GfimuError("the rerun viewer does not start here; write a file with --rrd and look at it later")
             time.sleep(_LOOK_AGAIN_S)
     stream = rr.RecordingStream(application)
     stream.connect_grpc(f"rerun+http://{LOOPBACK}:{_PORT}/proxy")
     return stream
+
+
+def _end(viewer: subprocess.Popen[bytes]) -> None:
+    """End a viewer and what it has started: ``python -m rerun`` runs the program as its child."""
+    if hasattr(os, "killpg"):
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(viewer.pid, signal.SIGTERM)  # a session of its own, so no group of ours
+    else:
+        viewer.kill()
+    viewer.wait()
 
 
 def _listens() -> bool:

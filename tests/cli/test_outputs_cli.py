@@ -96,6 +96,17 @@ def test_every_path_is_declared_as_read_or_written(name):
         assert name in CALLS
 
 
+def test_the_docs_list_every_command_with_its_function(project_root):
+    page = (project_root / "docs" / "commands.md").read_text(encoding="utf-8")
+    rows = dict(re.findall(r"^\| `gfimu ([a-z]+(?: [a-z]+)?)[^|]*\| `gfimu\.([a-z.]+)\(", page, re.MULTILINE))
+    assert rows == {name: name.replace(" ", ".") for name in COMMANDS}
+    for flag, argument in OTHER_WORDS.items():
+        assert f"`{flag}` is `{argument}`" in page
+    written = {suffix for _, function in COMMANDS.values() for output in getattr(function, "__outputs__", {}).values()
+               if isinstance(output, OutputFile) for suffix in output.suffixes}  # fmt: skip
+    assert all(f"`{suffix}`" in page for suffix in written)
+
+
 def call(name, values):
     """Command line of a call."""
     words = name.split()
