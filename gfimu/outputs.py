@@ -39,8 +39,6 @@ _Result = TypeVar("_Result")
 
 _MODELS = {
     "array": "arrays",
-    "arrays": "arrays",
-    "image": "",
     "scenario": "scenarios",
     "twin": "twins",
 }
@@ -221,19 +219,32 @@ def _model_file(kind: str, name: str | Path) -> Path:
     return Path(name)
 
 
-def _named_inside(path: Path) -> Iterator[Path]:
-    """Yield the array file that a twin, scenario or verdict folder names."""
-    if path.suffix == ".toml" and path.is_file():
-        from gfimu.model_files import read_toml
-
-        try:
-            array = read_toml(path).get("array")
-        except InputError:
-            return
-        if isinstance(array, str) and array.endswith(".toml"):
-            yield from (path.parent / array, Path(array))
-    elif path.is_dir():
+def _named_inside(path: Path, seen: frozenset[Path] = frozenset()) -> Iterator[Path]:
+    """Yield the files that a TOML file names (a twin its array, an array its part), and the verdict in a folder."""
+    if path.is_dir():
         yield path / "verdict.json"
+    if path.suffix != ".toml" or not path.is_file() or path in seen:
+        return
+    from gfimu.model_files import read_toml
+
+    try:
+        content = read_toml(path)
+    except InputError:
+        return  # its reader refuses it
+    for text in _texts(content):
+        if text.endswith(".toml"):
+            for named in (path.parent / text, Path(text)):
+                yield named
+                yield from _named_inside(named, seen | {path})
+
+
+def _texts(value: Any) -> Iterator[str]:
+    """Yield all texts inside a TOML value."""
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, dict | list):
+        for item in value.values() if isinstance(value, dict) else value:
+            yield from _texts(item)
 
 
 def _check_kind(path: Path, output: Output) -> None:

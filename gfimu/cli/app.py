@@ -74,6 +74,8 @@ def main() -> None:
     """Run the program: exit code 0 when done, 2 on bad input, 1 on anything else, with one line that says why."""
     arguments, debug = _without_debug(sys.argv[1:])
     sys.argv[1:] = arguments
+    if hasattr(sys.stdout, "reconfigure"):  # Greek letters and odd file names must not end a command
+        sys.stdout.reconfigure(errors="backslashreplace")
     try:
         code = program()(prog_name="gfimu", standalone_mode=False)
         if code == _INTERRUPTED:

@@ -174,6 +174,31 @@ def test_an_atomic_write_that_fails_keeps_what_was_there(tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == [file]
 
 
+def test_a_check_that_fails_is_code_1(gfimu_command, monkeypatch):
+    pytest.importorskip("firmware_bridge.selftest")
+    from firmware_bridge.selftest import SelfTestRow
+
+    monkeypatch.setattr("gfimu.commands.firmware.selftest", lambda: [SelfTestRow("chips", False, "[nothing]")])
+    result = gfimu_command("firmware", "selftest")
+    assert (result.code, result.stderr) == (1, "")
+    assert "[nothing]" in result.stdout
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no such file names")
+def test_a_terminal_without_greek_and_a_name_that_is_no_text(tmp_path):
+    name = os.fsdecode(b"caf\xe9.toml")
+    (tmp_path / name).write_text(gfimu.AccelerometerArray.load("cube12").to_toml())
+    environment = {**os.environ, "PYTHONIOENCODING": "ascii:strict"}
+    done = subprocess.run([*PROGRAM, "score", name], cwd=tmp_path, env=environment, capture_output=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == b""
+    done = subprocess.run(
+        [*PROGRAM, "convert", name, name], cwd=tmp_path, env=environment, capture_output=True, check=False
+    )
+    assert done.returncode == 2
+    assert done.stderr.count(b"\n") == 1
+
+
 def test_an_error_of_the_system_names_its_file(gfimu_command, monkeypatch):
     def unreadable(*_, **__):
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), "some/file")

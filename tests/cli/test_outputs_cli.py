@@ -223,6 +223,16 @@ def test_the_array_file_that_a_twin_names_survives(gfimu_command, here):
     refused(result, before, here, "array.toml", "is read by this command")
 
 
+def test_files_named_by_named_files_survive(gfimu_command, here):
+    """A twin names an array, the array a part; two that name each other are no trap."""
+    (here / "mine.toml").write_text('array = "array.toml"\n')
+    (here / "array.toml").write_text('[[chip]]\npart = "part.toml"\nnext = ["mine.toml"]\n')
+    (here / "part.toml").write_text("kept = 1\n")
+    before = contents(here)
+    result = gfimu_command("design", "bias", "gravity", "--twin", "mine.toml", "--out", "./part.toml")
+    refused(result, before, here, "part.toml", "is read by this command")
+
+
 def test_a_file_is_no_folder_and_a_folder_no_file(gfimu_command, here):
     (here / "folder.csv").mkdir()
     before = contents(here)
