@@ -18,7 +18,6 @@ import tomli_w
 from firmware_bridge.lpc1768.elf import ElfImage
 from gfimu.atomic_file import atomic_path, write_text
 from gfimu.errors import GfimuError, InputError
-from gfimu.outputs import check_parent
 
 __all__ = [
     "IMAGES",
@@ -146,10 +145,9 @@ def build(
         _zig("cc", *_FLAGS, *options, *IMAGES[name], "-o", str(linked), cwd=SOURCES)
         content = _with_boot_checksum(linked.read_bytes())
     image = ElfImage.parse(content, name)
-    check_parent(folder)
-    folder.mkdir(exist_ok=True)
     elf, binary = folder / f"{name}.elf", folder / f"{name}.bin"
     for path, data in ((elf, content), (binary, image.flash_bytes())):
+        folder.mkdir(exist_ok=True)
         with atomic_path(path) as temporary:
             temporary.write_bytes(data)
     text, data_bytes, bss = image.section_sizes()
