@@ -12,8 +12,8 @@ import time
 import allantools
 import numpy as np
 
-from gfimu.noise import allan_deviation, synthesise_noise
-from gfimu.noise.allan import averaging_factors
+from gfimu.sensor_noise import allan_deviation, synthesise_noise
+from gfimu.sensor_noise.allan import averaging_factors
 
 PAIRS = 3
 RATE = 100.0

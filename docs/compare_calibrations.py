@@ -28,9 +28,9 @@ from gfimu.calibration.observations import INPUTS, observations_from
 from gfimu.calibration.recursive import recursive
 from gfimu.calibration.result import Calibration
 from gfimu.calibration.six_position import six_position
-from gfimu.noise import synthesise_noise
 from gfimu.recording import Recording
 from gfimu.rest import Rest
+from gfimu.sensor_noise import synthesise_noise
 
 GRAVITY = 9.81
 RATE, SECONDS = 100.0, 8.0

@@ -19,8 +19,8 @@ import numpy as np
 from gfimu.calibration.error_model import ErrorModel
 from gfimu.calibration.observations import Observations
 from gfimu.calibration.twelve_position import coarse_solution, twelve_position
-from gfimu.noise import identify_noise, synthesise_noise
-from gfimu.noise.identification import TERMS, model_variance
+from gfimu.sensor_noise import identify_noise, synthesise_noise
+from gfimu.sensor_noise.identification import TERMS, model_variance
 
 SEED = 4
 GRAVITY = 9.8

@@ -19,10 +19,10 @@ from matplotlib.figure import Figure
 
 from gfimu import AccelerometerArray, Recording
 from gfimu.attitude import to_rotation
-from gfimu.drift import TILT_LIMIT, ErrorSources, drift_budget, equivalent_rate_drift
 from gfimu.drift_monte_carlo import monte_carlo_drift
 from gfimu.estimation import Estimate
 from gfimu.navigation import navigate
+from gfimu.position_drift import TILT_LIMIT, ErrorSources, drift_budget, equivalent_rate_drift
 from gfimu.rest_bias import estimate_from_rest
 from gfimu.units import STANDARD_GRAVITY
 from sim.effects import make_effect

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from gfimu.array import AccelerometerArray
 from gfimu.bounds import alpha_std, rate_bound_isotropic, steady_rate_bound
-from gfimu.drift import ErrorSources, drift_budget, equivalent_rate_drift
 from gfimu.estimation import Estimate
 from gfimu.part import white_noise_std
+from gfimu.position_drift import ErrorSources, drift_budget, equivalent_rate_drift
 from gfimu.rate.kalman import FilterSettings
 from gfimu.rate.methods import RATE_METHODS, estimate_rate
 from gfimu.rate.sensing import SensorErrors

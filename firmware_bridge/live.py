@@ -6,6 +6,7 @@ import queue
 import threading
 import time
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -18,11 +19,14 @@ from gfimu.array import AccelerometerArray
 from gfimu.errors import GfimuError
 from gfimu.rate.live import LiveRateFilter
 from gfimu.rate.sensing import SensorErrors
+from gfimu.rerun_stream import rrd_stream, viewer_stream
 
 __all__ = ["LiveView"]
 
 _VIEW_HZ = 100.0
 _TEXT_EVERY_S = 0.25
+_APPLICATION = "gfimu_record"
+_FLUSH_S = 5.0
 
 
 class LiveView:
@@ -39,9 +43,9 @@ class LiveView:
     on_text : callable, optional
         Is given a line of text a few times a second.
     rrd : Path, optional
-        Write a rerun recording.
+        Write a rerun recording when the view is closed.
     viewer : bool
-        Open the rerun viewer and send to it.
+        Open the rerun viewer, which listens to this machine only, and send to it.
     """
 
     def __init__(
@@ -62,7 +66,11 @@ class LiveView:
         self._seen = 0
         self._first_s: float | None = None
         self.omega = np.full(3, np.nan)
-        self._stream = _open_stream(rrd, viewer=viewer) if rrd is not None or viewer else None
+        self._open = ExitStack()
+        self._streams: list[Any] = [] if rrd is None else [self._open.enter_context(rrd_stream(rrd, _APPLICATION))]
+        if viewer:
+            self._streams.append(viewer_stream(_APPLICATION))
+            self._open.callback(self._streams[-1].flush, timeout_sec=_FLUSH_S)
         self._batches: queue.SimpleQueue[tuple[Batch, StreamCounts] | None] = queue.SimpleQueue()
         self._thread = threading.Thread(target=self._work, name="live view", daemon=True)
         self._thread.start()
@@ -93,8 +101,8 @@ class LiveView:
         if not len(times):
             return
         omega = self._estimate(times, readings)
-        if self._stream is not None:
-            _log(self._stream, self._array, times, readings, omega)
+        for stream in self._streams:
+            _log(stream, self._array, times, readings, omega)
         now = time.monotonic()
         if self._on_text is not None and now - self._text_at >= _TEXT_EVERY_S:
             self._text_at = now
@@ -130,26 +138,20 @@ class LiveView:
         omega = " ".join(f"{value:+7.3f}" for value in self.omega)
         return f"{elapsed:8.1f} s  {rate:6.1f} Hz  lost {counts.lost}  corrupt {counts.corrupt}  ω {omega} rad/s"
 
-    def close(self) -> None:
-        """Show what still waits and end the rerun recording."""
+    def close(self, *, keep: bool = True) -> None:
+        """Show what still waits, and write the rerun recording if it is to be kept.
+
+        Raises
+        ------
+        WriteError
+            If it can't be written.
+        """
         self._batches.put(None)
         self._thread.join()
-        if self._stream is not None:
-            self._stream.flush()
-            self._stream.disconnect()
-
-
-def _open_stream(rrd: Path | None, *, viewer: bool) -> Any:
-    import rerun as rr
-
-    stream = rr.RecordingStream("gfimu_record")
-    if viewer:
-        stream.spawn()
-    else:
-        assert rrd is not None
-        rrd.parent.mkdir(parents=True, exist_ok=True)
-        stream.save(rrd)
-    return stream
+        if keep:
+            self._open.close()
+        else:
+            self._open.pop_all()
 
 
 def _log(

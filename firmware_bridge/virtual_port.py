@@ -173,6 +173,8 @@ class ServeReport:
         Virtual and real time, s.
     sent, refused, received : int
         Bytes sent, bytes that the host did not take, bytes from the host.
+    warnings : tuple of str
+        What the firmware did that the processor's documents advise against.
     """
 
     virtual_s: float
@@ -180,6 +182,7 @@ class ServeReport:
     sent: int
     refused: int
     received: int
+    warnings: tuple[str, ...] = ()
 
 
 class _Buffer:

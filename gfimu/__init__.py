@@ -27,16 +27,70 @@ Units: SI inside, everywhere; angles in rad, rates in rad/s. Units stand in ever
 from __future__ import annotations
 
 import importlib
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    # What type checkers and editors see; at run time names load on first use (`_PUBLIC`).
+    from gfimu.array import AccelerometerArray as AccelerometerArray
+    from gfimu.array import Chip as Chip
+    from gfimu.attitude import integrate_attitude as integrate_attitude
+    from gfimu.bounds import posterior_rate_bound as posterior_rate_bound
+    from gfimu.bounds import rate_bound as rate_bound
+    from gfimu.calibration.array_calibration import calibrate_array as calibrate_array
+    from gfimu.calibration.array_calibration import update_array_calibration as update_array_calibration
+    from gfimu.calibration.result import Calibration as Calibration
+    from gfimu.calibration.result import load_calibration as load_calibration
+    from gfimu.commands import firmware as firmware
+    from gfimu.commands.calibrate import calibrate as calibrate
+    from gfimu.commands.convert import convert as convert
+    from gfimu.commands.demo import demo as demo
+    from gfimu.commands.design import design as design
+    from gfimu.commands.diagnose import diagnose as diagnose
+    from gfimu.commands.drift import drift as drift
+    from gfimu.commands.estimate import estimate as estimate
+    from gfimu.commands.live import live as live
+    from gfimu.commands.noise import noise as noise
+    from gfimu.commands.optimize import optimize as optimize
+    from gfimu.commands.record import record as record
+    from gfimu.commands.score import score as score
+    from gfimu.commands.simulate import simulate as simulate
+    from gfimu.commands.view import view as view
+    from gfimu.dilution import gdop as gdop
+    from gfimu.drift_forms import ErrorSources as ErrorSources
+    from gfimu.drift_monte_carlo import monte_carlo_drift as monte_carlo_drift
+    from gfimu.errors import GeometryError as GeometryError
+    from gfimu.errors import GfimuError as GfimuError
+    from gfimu.errors import InputError as InputError
+    from gfimu.estimate_summary import centripetal_agreement as centripetal_agreement
+    from gfimu.estimate_summary import summarise as summarise
+    from gfimu.estimation import Estimate as Estimate
+    from gfimu.gravity import local_gravity as local_gravity
+    from gfimu.kinematics import closed_form as closed_form
+    from gfimu.kinematics import joint_form as joint_form
+    from gfimu.kinematics import motion_from_readings as motion_from_readings
+    from gfimu.kinematics import null_space as null_space
+    from gfimu.kinematics import pseudo_inverse as pseudo_inverse
+    from gfimu.kinematics import specific_force as specific_force
+    from gfimu.mimu4444 import read_mimu4444 as read_mimu4444
+    from gfimu.navigation import level as level
+    from gfimu.navigation import navigate as navigate
+    from gfimu.position_drift import drift_budget as drift_budget
+    from gfimu.position_drift import equivalent_rate_drift as equivalent_rate_drift
+    from gfimu.rate.integration import integrate_rate as integrate_rate
+    from gfimu.rate.live import LiveRateFilter as LiveRateFilter
+    from gfimu.rate.methods import estimate_rate as estimate_rate
+    from gfimu.rate.result import RateEstimate as RateEstimate
+    from gfimu.rate.sensing import SensorErrors as SensorErrors
+    from gfimu.recording import Recording as Recording
+    from gfimu.recording_formats import open_recording as open_recording
+    from gfimu.rest_bias import estimate_from_rest as estimate_from_rest
+    from gfimu.sensor_noise import allan_deviation as allan_deviation
+    from gfimu.sensor_noise import identify_noise as identify_noise
+    from gfimu.sensor_noise import recording_noise as recording_noise
 
 __version__ = "0.1.0"
 
 _PUBLIC = {
-    "LiveRateFilter": "gfimu.rate.live",
-    "RateEstimate": "gfimu.rate.result",
-    "SensorErrors": "gfimu.rate.sensing",
-    "estimate_rate": "gfimu.rate.methods",
-    "posterior_rate_bound": "gfimu.bounds",
     "AccelerometerArray": "gfimu.array",
     "Calibration": "gfimu.calibration.result",
     "Chip": "gfimu.array",
@@ -45,47 +99,74 @@ _PUBLIC = {
     "GeometryError": "gfimu.errors",
     "GfimuError": "gfimu.errors",
     "InputError": "gfimu.errors",
+    "LiveRateFilter": "gfimu.rate.live",
+    "RateEstimate": "gfimu.rate.result",
     "Recording": "gfimu.recording",
-    "allan_deviation": "gfimu.noise",
-    "calibrate": "gfimu.calibration.methods",
+    "SensorErrors": "gfimu.rate.sensing",
+    "allan_deviation": "gfimu.sensor_noise",
+    "calibrate": "gfimu.commands.calibrate",
     "calibrate_array": "gfimu.calibration.array_calibration",
     "centripetal_agreement": "gfimu.estimate_summary",
     "closed_form": "gfimu.kinematics",
-    "design": "gfimu.diagnosis.design",
-    "drift_budget": "gfimu.drift",
-    "equivalent_rate_drift": "gfimu.drift",
+    "convert": "gfimu.commands.convert",
+    "demo": "gfimu.commands.demo",
+    "design": "gfimu.commands.design",
+    "diagnose": "gfimu.commands.diagnose",
+    "drift": "gfimu.commands.drift",
+    "drift_budget": "gfimu.position_drift",
+    "equivalent_rate_drift": "gfimu.position_drift",
+    "estimate": "gfimu.commands.estimate",
     "estimate_from_rest": "gfimu.rest_bias",
-    "estimate": "gfimu.estimation",
+    "estimate_rate": "gfimu.rate.methods",
+    "firmware": "gfimu.commands",
     "gdop": "gfimu.dilution",
-    "identify_noise": "gfimu.noise",
+    "identify_noise": "gfimu.sensor_noise",
     "integrate_attitude": "gfimu.attitude",
     "integrate_rate": "gfimu.rate.integration",
     "joint_form": "gfimu.kinematics",
     "level": "gfimu.navigation",
+    "live": "gfimu.commands.live",
     "load_calibration": "gfimu.calibration.result",
     "local_gravity": "gfimu.gravity",
     "monte_carlo_drift": "gfimu.drift_monte_carlo",
     "motion_from_readings": "gfimu.kinematics",
     "navigate": "gfimu.navigation",
+    "noise": "gfimu.commands.noise",
     "null_space": "gfimu.kinematics",
     "open_recording": "gfimu.recording_formats",
-    "optimize": "gfimu.geometry_search",
+    "optimize": "gfimu.commands.optimize",
+    "posterior_rate_bound": "gfimu.bounds",
     "pseudo_inverse": "gfimu.kinematics",
     "rate_bound": "gfimu.bounds",
     "read_mimu4444": "gfimu.mimu4444",
-    "recording_noise": "gfimu.noise",
-    "score": "gfimu.scoring",
+    "record": "gfimu.commands.record",
+    "recording_noise": "gfimu.sensor_noise",
+    "score": "gfimu.commands.score",
+    "simulate": "gfimu.commands.simulate",
     "specific_force": "gfimu.kinematics",
     "summarise": "gfimu.estimate_summary",
     "update_array_calibration": "gfimu.calibration.array_calibration",
+    "view": "gfimu.commands.view",
 }
+"""Public names and the modules that hold them."""
+
+_MODULES = {"firmware"}
+"""Public names that are modules."""
 
 __all__ = ["__version__"]
 __all__ += list(_PUBLIC)
 
+if not TYPE_CHECKING:  # a type checker would take every name for a public one
 
-def __getattr__(name: str) -> Any:
-    # Public names load on first use, so that `gfimu --help` does not wait for numba and scipy.
-    if name in _PUBLIC:
-        return getattr(importlib.import_module(_PUBLIC[name]), name)
-    raise AttributeError(f"module 'gfimu' has no attribute {name!r}")
+    def __getattr__(name: str) -> Any:
+        # Public names load on first use, so that `gfimu --help` does not wait for numba and scipy.
+        if name not in _PUBLIC:
+            raise AttributeError(f"module 'gfimu' has no attribute {name!r}")
+        module = _PUBLIC[name]
+        if name in _MODULES:
+            return importlib.import_module(f"{module}.{name}")
+        return getattr(importlib.import_module(module), name)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

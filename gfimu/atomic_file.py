@@ -8,7 +8,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from gfimu.errors import InputError
+from gfimu.errors import InputError, WriteError
+from gfimu.outputs import check_parent
 
 __all__ = ["atomic_path", "write_text"]
 
@@ -20,11 +21,13 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
     Raises
     ------
     InputError
-        If the folder can't be written to.
+        If the folder does not exist or can't be written to; no folder is made.
+    WriteError
+        If writing fails in the block, on a full disk say; ``path`` is then as it was before.
     """
     target = Path(path)
+    check_parent(target)
     try:
-        target.parent.mkdir(parents=True, exist_ok=True)
         handle, name = tempfile.mkstemp(prefix=f".{target.stem}-", suffix=target.suffix, dir=target.parent)
     except OSError as error:
         raise InputError(f"{target}: {error.strerror or error}; choose a folder that can be written") from None
@@ -36,6 +39,8 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
         os.umask(umask)
         temporary.chmod(0o666 & ~umask)  # mkstemp makes files private; the result is an ordinary file
         temporary.replace(target)
+    except OSError as error:
+        raise WriteError(target, error) from error
     finally:
         temporary.unlink(missing_ok=True)
 

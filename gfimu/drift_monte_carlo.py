@@ -1,7 +1,8 @@
 """Monte Carlo of the position drift: the full nonlinear navigation on simulated sensor errors.
 
-Beside the closed forms of `gfimu.drift`: nothing here is linearised. Errors are drawn per channel, mapped through the
-array's pseudo-inverse, and integrated with the same rate, attitude and navigation functions that real data take.
+Beside the closed forms of `gfimu.position_drift`: nothing here is linearised. Errors are drawn per channel, mapped
+through the array's pseudo-inverse, and integrated with the same rate, attitude and navigation functions that real data
+take.
 """
 
 from __future__ import annotations
@@ -73,12 +74,12 @@ def monte_carlo_drift(
     sample_rate: float = 100.0,
     progress: Callable[[int], object] | None = None,
 ) -> DriftSample:
-    """Simulate the drift that `gfimu.drift.drift_budget` predicts.
+    """Simulate the drift that `gfimu.position_drift.drift_budget` predicts.
 
     Parameters
     ----------
     array, time, sources, rate, offset, gravity
-        As for `gfimu.drift.drift_budget`.
+        As for `gfimu.position_drift.drift_budget`.
     runs : int
         Number of runs, at least 2.
     rng : numpy.random.Generator

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable
 
-__all__ = ["GeometryError", "GfimuError", "InputError", "UnitError", "unknown_name"]
+__all__ = ["GeometryError", "GfimuError", "InputError", "UnitError", "WriteError", "unknown_name"]
 
 
 class GfimuError(Exception):
@@ -13,6 +14,15 @@ class GfimuError(Exception):
 
 class InputError(GfimuError, ValueError):
     """A file or value that can't be used as given; commands end with exit code 2."""
+
+
+class WriteError(GfimuError, OSError):
+    """A file that could not be written, on a full disk say; what stood in its place is as it was."""
+
+    def __init__(self, path: object, error: OSError) -> None:
+        reason = os.strerror(error.errno) if error.errno else str(error).partition("\n")[0]
+        super().__init__(f"{path}: not written: {reason}; free space there, or choose another place")
+        self.errno = error.errno
 
 
 class UnitError(InputError):

@@ -2,7 +2,7 @@
 
 World: z up, gravity (0, 0, −g). In the world v̇ = R(q) p + (0, 0, −g), with p the specific force of the body origin in
 body axes. The runs last minutes at most, so Earth rotation (15 °/h) is left out: it is far below what accelerometers
-of this class resolve, and a budget of drift tells by how much (`gfimu.drift`).
+of this class resolve, and a budget of drift tells by how much (`gfimu.position_drift`).
 """
 
 from __future__ import annotations

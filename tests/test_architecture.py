@@ -64,11 +64,48 @@ def offences(importers, forbidden) -> list[str]:
     ]
 
 
-def test_gfimu_imports_neither_the_world_nor_the_wire_except_its_command_line():
+def test_gfimu_imports_neither_the_world_nor_the_wire_except_its_commands():
     assert not offences(
-        lambda module: inside(module, "gfimu") and not inside(module, "gfimu.cli"),
-        lambda name: inside(name, "sim", "firmware_bridge", "gfimu.cli", "mujoco", "serial", "unicorn"),
+        lambda module: inside(module, "gfimu") and not inside(module, "gfimu.cli", "gfimu.commands"),
+        lambda name: inside(
+            name, "sim", "firmware_bridge", "gfimu.cli", "gfimu.commands", "mujoco", "serial", "unicorn"
+        ),
     )
+
+
+def test_the_functions_under_the_commands_print_nothing():
+    assert not offences(
+        lambda module: inside(module, "gfimu.commands"),
+        lambda name: inside(name, "gfimu.cli", "typer", "rich", "serial", "unicorn"),
+    )
+
+
+def test_neither_the_world_nor_the_wire_imports_the_commands():
+    assert not offences(
+        lambda module: inside(module, "sim", "firmware_bridge"), lambda name: inside(name, "gfimu.commands")
+    )
+
+
+def test_importing_everything_leaves_the_public_names_alone():
+    """A module of the package called like a public function would take its place once it is imported."""
+    modules = {module.removeprefix("gfimu.").partition(".")[0] for module in FILES if module.startswith("gfimu.")}
+    assert not modules & set(gfimu.__all__)
+
+
+def type_checked_names() -> dict[str, str]:
+    """Names that `gfimu/__init__.py` shows to type checkers, and the modules they come from."""
+    tree = ast.parse(FILES["gfimu"].read_text(encoding="utf-8"))
+    (block,) = (node for node in tree.body if is_type_checking(node) and isinstance(node.test, ast.Name))
+    return {alias.asname: node.module for node in block.body for alias in node.names if alias.asname == alias.name}
+
+
+def test_type_checkers_see_the_names_that_programs_see():
+    assert type_checked_names() == gfimu._PUBLIC
+
+
+def test_dir_lists_the_public_names():
+    assert dir(gfimu) == sorted(gfimu.__all__)
+    assert {"simulate", "estimate", "diagnose", "firmware", "Recording", "__version__"} <= set(dir(gfimu))
 
 
 def test_sim_imports_neither_the_wire_nor_the_command_line():

@@ -49,6 +49,11 @@ def test_models_lie_inside_the_wheel(installed: Path) -> None:
     assert not (installed / "tests").exists()
 
 
+def test_type_checkers_find_types_in_the_wheel(installed: Path) -> None:
+    for package in ("gfimu", "sim", "firmware_bridge"):
+        assert (installed / package / "py.typed").is_file()
+
+
 def test_commands_find_the_models_outside_the_checkout(installed: Path, tmp_path: Path) -> None:
     done = _run(installed, "score", "cube12", "--json", cwd=tmp_path)
     assert done.returncode == 0, done.stderr

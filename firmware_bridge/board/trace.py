@@ -8,6 +8,7 @@ from pathlib import Path
 
 from firmware_bridge.adxl345_device import TICKS_PER_SECOND
 from gfimu.atomic_file import atomic_path
+from gfimu.rerun_stream import rrd_stream
 
 __all__ = ["Event", "EventList", "write_rrd", "write_vcd"]
 
@@ -121,9 +122,7 @@ def write_rrd(path: str | Path, events: Sequence[Event]) -> None:
     import numpy as np
     import rerun as rr
 
-    with atomic_path(path) as temporary:
-        stream = rr.RecordingStream("gfimu_firmware_trace")
-        stream.save(temporary)
+    with rrd_stream(path, "gfimu_firmware_trace") as stream:
         for number in sorted({event.place for event in events if event.source == "cpu"}):
             chosen = [event for event in events if event.source == "cpu" and event.place == number]
             times = np.array([event.ticks for event in chosen]) / TICKS_PER_SECOND
@@ -134,8 +133,6 @@ def write_rrd(path: str | Path, events: Sequence[Event]) -> None:
             times = np.array([event.ticks for event in chosen]) / TICKS_PER_SECOND
             lines = [f"{event.kind} +{event.place:#05x} {event.value:#010x}" for event in chosen]
             _send(stream, f"registers/{name}", times, rr.TextLog.columns(text=lines))
-        stream.flush()
-        stream.disconnect()
 
 
 def _send(stream: object, entity: str, times: object, columns: object) -> None:

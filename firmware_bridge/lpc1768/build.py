@@ -125,7 +125,7 @@ def build(
     name : str
         Image in `IMAGES`.
     out : str or Path, optional
-        Folder for the results; by default the package's own ``image`` folder.
+        Folder for the results, made if it isn't there; by default the package's own ``image`` folder.
     defines : mapping of str to str, optional
         Preprocessor definitions, such as ``{"GFIMU_SPI_HZ": "100000U"}``.
 
@@ -154,6 +154,7 @@ def build(
         )
     elf, binary = folder / f"{name}.elf", folder / f"{name}.bin"
     for path, data in ((elf, content), (binary, image.flash_bytes())):
+        folder.mkdir(exist_ok=True)
         with atomic_path(path) as temporary:
             temporary.write_bytes(data)
     text, data_bytes, bss = image.section_sizes()

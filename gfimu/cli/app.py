@@ -1,9 +1,11 @@
-"""The `gfimu` program: collects the commands and turns known errors into one line and an exit code."""
+"""The `gfimu` program: collects the commands and turns every error into one line and an exit code."""
 
 from __future__ import annotations
 
 import importlib
+import os
 import sys
+import traceback
 
 import typer
 
@@ -29,6 +31,11 @@ COMMAND_FILES = (
     "view",
 )
 
+_DEBUG = "--debug"
+_DEBUG_VARIABLE = "GFIMU_DEBUG"
+_LONGEST = 400  # characters of a foreign message
+_INTERRUPTED = 130  # what typer makes of Ctrl-C
+
 
 def _version(show: bool) -> None:
     if show:
@@ -38,6 +45,11 @@ def _version(show: bool) -> None:
 
 def _options(
     version: bool = typer.Option(False, "--version", callback=_version, is_eager=True, help="Print the version."),
+    debug: bool = typer.Option(
+        False,
+        _DEBUG,
+        help=f"Show where an error came from; may stand after the command too, as may {_DEBUG_VARIABLE}=1.",
+    ),
 ) -> None:
     """Collect the options of the program itself."""
 
@@ -59,17 +71,81 @@ def program() -> typer.Typer:
 
 
 def main() -> None:
-    """Run the program: exit code 0 when done, 2 on bad input, 1 on anything else."""
+    """Run the program: exit code 0 when done, 2 on bad input, 1 on anything else, with one line that says why."""
+    arguments, debug = _without_debug(sys.argv[1:])
+    sys.argv[1:] = arguments
+    if hasattr(sys.stdout, "reconfigure"):  # Greek letters and odd file names must not end a command
+        sys.stdout.reconfigure(errors="backslashreplace")
     try:
-        program()()
-    except InputError as error:
-        sys.stderr.write(f"gfimu: {error}\n")
-        raise SystemExit(2) from None
-    except GfimuError as error:
-        sys.stderr.write(f"gfimu: {error}\n")
-        raise SystemExit(1) from None
-    except BrokenPipeError:
-        raise SystemExit(1) from None
-    except KeyboardInterrupt:
-        sys.stderr.write("gfimu: interrupted\n")
-        raise SystemExit(1) from None
+        code = program()(prog_name="gfimu", standalone_mode=False)
+        if code == _INTERRUPTED:
+            code = _say("interrupted", 1)
+        sys.stdout.flush()  # a full disk or a closed pipe shows here at the latest
+    except BaseException as error:  # noqa: BLE001  some libraries' own exceptions are no Exception
+        code = _report(error, debug=debug)
+    raise SystemExit(code or 0)
+
+
+def _without_debug(arguments: list[str]) -> tuple[list[str], bool]:
+    """Take ``--debug`` out of the arguments, wherever it stands before a ``--``."""
+    end = arguments.index("--") if "--" in arguments else len(arguments)
+    kept = [argument for argument in arguments[:end] if argument != _DEBUG]
+    asked = len(kept) < end or os.environ.get(_DEBUG_VARIABLE, "0") not in {"", "0"}
+    return kept + arguments[end:], asked
+
+
+def _report(error: BaseException, *, debug: bool) -> int:
+    """Print an error as one line, and where it came from if asked; return the exit code."""
+    if isinstance(error, SystemExit):
+        return error.code if isinstance(error.code, int) else int(error.code is not None)
+    if debug:
+        traceback.print_exception(error)
+    if isinstance(error, BrokenPipeError):
+        _close_stdout()
+        return 1
+    if isinstance(error, KeyboardInterrupt):
+        return _say("interrupted", 1)
+    if isinstance(error, InputError):
+        return _say(str(error), 2)
+    if isinstance(error, GfimuError):
+        return _say(str(error), 1)
+    if hasattr(error, "format_message"):  # a misspelt option or command
+        return _usage(error)
+    if isinstance(error, OSError):
+        _close_stdout()
+        return _say(_of_system(error), 1)
+    if isinstance(error, MemoryError):
+        return _say("not enough memory; use a shorter recording or a machine with more", 1)
+    text = f"{type(error).__name__}: {error}"[:_LONGEST]
+    return _say(f"unexpected {text}; please report it with what the same command prints with {_DEBUG}", 1)
+
+
+def _say(text: str, code: int) -> int:
+    """Write one line to standard error, whatever line ends the text has."""
+    sys.stderr.write(f"gfimu: {' '.join(text.split())}\n")
+    return code
+
+
+def _of_system(error: OSError) -> str:
+    """Return what the operating system refused, with the file if it is known."""
+    what = error.strerror or str(error)
+    return f"{error.filename}: {what}" if error.filename is not None else f"{what}; free space, or write elsewhere"
+
+
+def _usage(error: BaseException) -> int:
+    """Return the code of a wrong call after naming what was wrong with it."""
+    context = getattr(error, "ctx", None)
+    if type(error).__name__ == "NoArgsIsHelpError" and context is not None:
+        typer.echo(context.get_help())
+        return 2
+    command = context.command_path if context is not None else "gfimu"
+    return _say(f"{error.format_message().rstrip('.')}; see {command} --help", getattr(error, "exit_code", 2))  # type: ignore[attr-defined]
+
+
+def _close_stdout() -> None:
+    """Let the end of the program not stumble over a standard output that can't be written."""
+    try:
+        sys.stdout.flush()
+    except (OSError, ValueError):
+        with open(os.devnull, "w", encoding="utf-8") as nothing:  # noqa: PTH123
+            os.dup2(nothing.fileno(), sys.stdout.fileno())

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gfimu.cli.array_option import load_array
 from gfimu.cli.output import JsonOption, print_json, print_paths, print_table
 
 if TYPE_CHECKING:
@@ -74,76 +73,33 @@ def _calibrate(
 
     Example: gfimu calibrate multi-position poses.csv --latitude 52.3 --height 80 --out calibration.json
     """
-    from gfimu.calibration.array_calibration import calibrate_array, update_array_calibration
-    from gfimu.calibration.methods import METHODS, calibrate, calibrate_gyro
-    from gfimu.calibration.result import load_calibration
-    from gfimu.calibration.run_file import open_uncalibrated
-    from gfimu.errors import InputError, unknown_name
-    from gfimu.recording_formats import open_run
+    from gfimu.commands.calibrate import calibrate
 
-    if method not in {*METHODS, "array", "gyro"}:
-        raise unknown_name("calibration method", method, (*METHODS, "array", "gyro"))
-    if update is not None and method != "array":
-        raise InputError(f"--update carries the calibration of a whole array over; use it with array, not {method}")
-    drawing = None if array is None else load_array(array)
-    local_gravity = _gravity(gravity, latitude, height)
-    recording = open_uncalibrated(run, array=drawing)
-    if update is not None:
-        result = update_array_calibration(
-            load_calibration(update),
-            recording,
-            drawing or open_run(run)[1],
-            turn_on_std_m_s2=turn_on_std,
-            bias_walk_m_s2_rt_s=bias_walk,
-            rest_threshold=rest_threshold,
-            min_rest_s=min_rest or 2.0,
-        )
-    elif method == "array":
-        result = calibrate_array(
-            recording,
-            drawing or open_run(run)[1],
-            gravity=local_gravity,
-            motion=None if motion is None else open_uncalibrated(motion, array=drawing),
-            rest_threshold=rest_threshold,
-            min_rest_s=min_rest or 2.0,
-        )
-    elif method == "gyro":
-        result = calibrate_gyro(recording, rest_threshold=rest_threshold, min_rest_s=min_rest or 1.0)
-    else:
-        result = calibrate(
-            method,
-            recording,
-            gravity=local_gravity,
-            n_parameters=parameters,
-            input_kind=input_kind,
-            rest_threshold=rest_threshold,
-            min_rest_s=min_rest or 1.0,
-            levelling_std_rad=levelling_std,
-        )
-    result.save(out)
-    written = {"calibration": out}
-    if picture is not None:
-        from gfimu.calibration.pictures import calibration_picture
-
-        calibration_picture(picture, result, recording)
-        written["picture"] = picture
+    result = calibrate(
+        method,
+        run,
+        out=out,
+        array=array,
+        gravity=gravity,
+        latitude=latitude,
+        height=height,
+        parameters=parameters,
+        input_kind=input_kind,
+        rest_threshold=rest_threshold,
+        min_rest=min_rest,
+        levelling_std=levelling_std,
+        motion=motion,
+        update=update,
+        turn_on_std=turn_on_std,
+        bias_walk=bias_walk,
+        picture=picture,
+    )
+    written = {"calibration": out} | ({} if picture is None else {"picture": picture})
     if json:
         print_json(result.to_dict() | {"files": written})
     else:
         _print(result)
         print_paths(written.items())
-
-
-def _gravity(gravity: float | None, latitude: float | None, height: float) -> float:
-    from gfimu.errors import InputError
-    from gfimu.gravity import local_gravity
-    from gfimu.units import STANDARD_GRAVITY
-
-    if gravity is not None and latitude is not None:
-        raise InputError("give --gravity or --latitude, not both")
-    if latitude is not None:
-        return local_gravity(latitude, height)
-    return STANDARD_GRAVITY if gravity is None else gravity
 
 
 def _print(result: Calibration) -> None:

@@ -7,7 +7,6 @@ from typing import Annotated
 
 import typer
 
-from gfimu.cli.array_option import load_array
 from gfimu.cli.output import JsonOption, print_json, print_paths, print_table
 
 __all__ = ["register"]
@@ -30,10 +29,9 @@ def _convert(
 
     Example: gfimu convert exp_1.bin.gz run.parquet
     """
-    from gfimu.recording_formats import open_recording
+    from gfimu.commands.convert import convert
 
-    recording = open_recording(source, array=None if array is None else load_array(array))
-    recording.write(target)
+    recording = convert(source, target, array=array)
     figures = {
         "samples": len(recording),
         "channels": len(recording.channels),

@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
-from gfimu.cli.output import JsonOption, console, print_json, print_paths, print_table
+from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, print_text
 
 __all__ = ["register"]
 
@@ -30,30 +29,23 @@ def _demo(
 
     Example: gfimu demo --out demo
     """
-    from gfimu.cli.demo_steps import STEPS, Demo
+    from gfimu.commands.demo import demo
 
-    status = Console(stderr=True)
-    demo = Demo(out, seed)
     began = time.perf_counter()
-    for number, step in enumerate(STEPS, start=1):
-        what = (step.__doc__ or step.__name__).splitlines()[0].rstrip(".")
-        status.print(f"[dim]{number}/{len(STEPS)}[/dim] {what}", highlight=False)
-        step(demo)
-    status.print(f"[dim]done in {time.perf_counter() - began:.0f} s[/dim]", highlight=False)
+    result = demo(
+        out,
+        seed=seed,
+        report=lambda number, total, what: print_text(f"{number}/{total} {what}", style="dim", stderr=True),
+    )
+    print_text(f"done in {time.perf_counter() - began:.0f} s", style="dim", stderr=True)
     if json:
-        print_json(
-            {
-                "seed": seed,
-                "results": [{"what": row.what} | row.figures for row in demo.rows],
-                "files": demo.written,
-            }
-        )
+        print_json(result.to_dict())
         return
     print_table(
         f"The paper's experiment in simulation (seed {seed})",
         ("what", "result", "to compare"),
-        [(row.what, row.result, row.beside) for row in demo.rows],
+        [(row.what, row.result, row.beside) for row in result.rows],
     )
-    print_paths(demo.written.items())
-    console.print(f"look at it with: gfimu view {demo.written['rerun recording']}", highlight=False, soft_wrap=True)
-    console.print(f"and open {demo.written['diagnosis report']} in a browser", highlight=False, soft_wrap=True)
+    print_paths(result.files.items())
+    print_text(f"look at it with: gfimu view {result.files['rerun recording']}")
+    print_text(f"and open {result.files['diagnosis report']} in a browser")

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, cast
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, progress
 
 if TYPE_CHECKING:
-    from gfimu.diagnosis.model import WorldModel
     from gfimu.diagnosis.proposal import Proposal
 
 __all__ = ["register"]
@@ -48,42 +47,27 @@ def _design(
 
     Example: gfimu design tacho_scale sensor_position --twin cube12_turntable --max-rate 12 --out next.toml
     """
-    import numpy as np
+    from gfimu.commands.design import design
 
-    from gfimu.atomic_file import write_text
-    from gfimu.diagnosis.ambiguity import open_effects
-    from gfimu.diagnosis.design import MOUNTINGS, Limits, design
-    from gfimu.diagnosis.run import prepare_run
-    from gfimu.errors import InputError
-    from gfimu.recording import Recording
-    from sim.twin import Twin
-
-    if out is not None and out.suffix != ".toml":
-        raise InputError(f"{out}: a scenario file ends in .toml; name it so")
-    if (verdict is None) == (not effects):
-        raise InputError("name effects to tell apart, or give --verdict: one of the two")
-    loaded = Twin.load(twin)
-    model = cast("WorldModel", loaded)  # its effects are narrower than the protocol's
-    asked = open_effects(verdict, model) if verdict is not None else list(effects or [])
-    recorded = [prepare_run(Recording.read(run, array=model.array), model, name=str(run)) for run in runs or []]
     with progress("designing", total=1.0) as advance:
         proposal = design(
-            model,
-            asked,
-            limits=Limits(max_rate, max_acceleration, duration),
-            rng=np.random.default_rng(seed),
-            mountings={} if upright else MOUNTINGS,
-            recorded=recorded,
-            sample_rate=loaded.sample_rate,
+            twin,
+            effects or [],
+            verdict=verdict,
+            run=runs or [],
+            max_rate=max_rate,
+            max_acceleration=max_acceleration,
+            duration=duration,
+            upright=upright,
             evaluations=evaluations,
+            seed=seed,
+            out=out,
             report=advance,
         )
-    if out is not None:
-        write_text(out, proposal.to_toml())
     if as_json:
         print_json(proposal.to_dict() | {"files": {} if out is None else {"scenario": out}})
         return
-    _print(proposal, at_hand=bool(recorded))
+    _print(proposal, at_hand=bool(runs))
     if out is not None:
         print_paths([("scenario", out)])
 

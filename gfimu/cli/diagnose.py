@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, cast
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gfimu.cli.output import JsonOption, console, print_json, print_paths, print_table, progress
+from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, print_text, progress
 
 if TYPE_CHECKING:
-    from gfimu.diagnosis.model import WorldModel
     from gfimu.diagnosis.verdict import Diagnosis
-    from gfimu.recording import Recording
-    from sim.twin import Twin
 
-__all__ = ["register", "write_result"]
+__all__ = ["register"]
 
 
 def register(app: typer.Typer) -> None:
@@ -49,62 +45,17 @@ def _diagnose(
 
     A unit fresh from the bench: gfimu diagnose run.parquet --twin cube12_turntable --calibration cal.json --out d
     """
-    from gfimu.calibration.result import load_calibration
-    from gfimu.calibration.run_file import open_calibrated_run
-    from gfimu.diagnosis.diagnose import diagnose
-    from gfimu.diagnosis.folder import check_folder
-    from gfimu.recording_formats import open_recording
-    from sim.twin import Twin
+    from gfimu.commands.diagnose import diagnose
+    from gfimu.diagnosis.folder import FILES
 
-    model = Twin.load(twin)
-    check_folder(out)
-    if calibration is None:
-        recordings, kept = (
-            [open_recording(path, array=model.array) for path in paths] for paths in (runs, held_out or [])
-        )
-    else:
-        unit = load_calibration(calibration)
-        recordings, kept = (
-            [open_calibrated_run(path, unit, model.array)[0] for path in paths] for paths in (runs, held_out or [])
-        )
-        if unit.positions:
-            model = replace(model, array=unit.calibrated_array(model.array), array_name="array.toml")
     with progress("diagnosing", total=1.0) as done:
-        found = diagnose(recordings, cast("WorldModel", model), held_out=kept, names=_names(runs), report=done)
-        done(0.99, "write the report")
-        written = write_result(out, found, recordings[0])
+        found = diagnose(runs, twin, out=out, held_out=held_out or [], calibration=calibration, report=done)
+    written = {meaning: out / name for name, meaning in FILES.items()}
     if json:
         print_json(found.to_dict() | {"files": written})
         return
     print_diagnosis(found)
     print_paths(written.items())
-
-
-def write_result(out: Path, found: Diagnosis, recording: Recording) -> dict[str, Path]:
-    """Write the folder of a diagnosis, with the rig of the extended twin drawn by its MuJoCo model."""
-    import tomli_w
-
-    from gfimu.diagnosis.folder import write_diagnosis
-    from gfimu.model_files import list_models
-    from sim.drawing import rig_drawing
-
-    twin = cast("Twin", found.twin)
-    world = twin.world(mounting=recording.mounting_rotvec)
-    content = twin.to_dict()
-    more = {}
-    if content["array"] not in list_models("arrays"):
-        # An array file of the user's is named relative to the twin file: it moves with it.
-        content["array"] = "array.toml"
-        more["array.toml"] = twin.array.to_toml()
-    return write_diagnosis(
-        out,
-        found,
-        twin_toml=tomli_w.dumps(content),
-        more=more,
-        mounting=world.mount_rotvec,
-        cube_centre=world.cube_offset.tolist(),
-        shapes=None if twin.drive_source == "gyro" else rig_drawing(world),
-    )
 
 
 def print_diagnosis(found: Diagnosis) -> None:
@@ -120,8 +71,8 @@ def print_diagnosis(found: Diagnosis) -> None:
         summary,
     )
 
-    console.print(f"[bold]{headline(found)}[/bold]", highlight=False)
-    console.print(story(found), highlight=False)
+    print_text(headline(found), style="bold")
+    print_text(story(found))
     if found.causes:
         rows = []
         for cause in found.causes:
@@ -148,10 +99,4 @@ def print_diagnosis(found: Diagnosis) -> None:
         rivals = [(" + ".join(one.effects) or "nothing", one.why, odds(one.log_odds)) for one in found.rivals[:5]]
         print_table("Other explanations, and why they lost", ("explanation", "why it lost", "odds"), rivals, left=2)
     for step in next_steps(found):
-        console.print(f"next: {step}", highlight=False)
-
-
-def _names(paths: list[Path]) -> list[str]:
-    """Return names for people: file names where they tell the runs apart."""
-    names = [path.name for path in paths]
-    return names if len(set(names)) == len(names) else [str(path) for path in paths]
+        print_text(f"next: {step}")

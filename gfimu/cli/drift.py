@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gfimu.cli.output import JsonOption, console, print_json, print_table, progress
+from gfimu.cli.output import JsonOption, print_json, print_table, print_text, progress
 
 if TYPE_CHECKING:
-    from gfimu.drift import DriftBudget
     from gfimu.drift_monte_carlo import DriftSample
+    from gfimu.position_drift import DriftBudget
 
 __all__ = ["register"]
 
@@ -42,55 +42,28 @@ def _drift(
 
     Example: `gfimu drift --array cube12 --time 0.3 --bias-mg 35 --noise-ug 290 --monte-carlo 400`
     """
-    import numpy as np
+    from gfimu.commands.drift import drift
 
-    from gfimu.array import AccelerometerArray
-    from gfimu.drift import ErrorSources, drift_budget
-    from gfimu.drift_monte_carlo import monte_carlo_drift
-    from gfimu.errors import InputError
-    from gfimu.units import STANDARD_GRAVITY
-
-    if monte_carlo == 1 or monte_carlo < 0:
-        raise InputError(f"--monte-carlo {monte_carlo}: give 0 for none, or 2 or more runs")
-    sources = ErrorSources(
-        bias=bias_mg * 1e-3 * STANDARD_GRAVITY,
-        noise_density=noise_ug * 1e-6 * STANDARD_GRAVITY,
-        bias_random_walk=walk_ug * 1e-6 * STANDARD_GRAVITY,
-        rate_drift=math.radians(rate_drift_deg_h / 3600.0),
-    )
-    if not any(vars(sources).values()):
-        raise InputError(
-            "no error to budget: give at least one of --bias-mg, --noise-ug, --walk-ug, --rate-drift-deg-h"
+    with progress("Monte Carlo", monte_carlo) as advance:
+        result = drift(
+            array,
+            time=time,
+            bias_mg=bias_mg,
+            noise_ug=noise_ug,
+            walk_ug=walk_ug,
+            rate_drift_deg_h=rate_drift_deg_h,
+            rate=rate,
+            offset=offset,
+            gravity=gravity,
+            monte_carlo=monte_carlo,
+            seed=seed,
+            progress=advance,
         )
-    geometry = AccelerometerArray.load(array)
-    budget = drift_budget(geometry, time, sources, rate=rate, offset=offset, gravity=gravity)
-    sample = None
-    if monte_carlo:
-        with progress("Monte Carlo", monte_carlo) as advance:
-            sample = monte_carlo_drift(
-                geometry,
-                time,
-                sources,
-                runs=monte_carlo,
-                rng=np.random.default_rng(seed),
-                rate=rate,
-                offset=offset,
-                gravity=gravity,
-                progress=advance,
-            )
     if as_json:
-        result: dict[str, Any] = budget.to_dict()
-        if sample is not None:
-            result["monte_carlo"] = {
-                "runs": sample.runs,
-                "seed": seed,
-                "std_m": sample.std[-1],
-                "mean_m": sample.mean[-1],
-                "relative_sampling_error": sample.relative_sampling_error,
-            }
-        print_json(result)
+        print_json(result.to_dict())
         return
 
+    budget, sample = result.budget, result.sample
     rows = [
         [f"{term.name}, {term.size:.3g} {term.size_unit}", term.form, *map(_length, term.std), f"{term.share:.1%}"]
         for term in budget.terms
@@ -106,7 +79,7 @@ def _drift(
         rows,
     )
     for line in _remarks(budget, sample):
-        console.print(line, highlight=False, soft_wrap=True)
+        print_text(line, style="" if budget.valid else "yellow")
 
 
 def _length(metres: float) -> str:
@@ -121,7 +94,7 @@ def _length(metres: float) -> str:
 
 def _remarks(budget: DriftBudget, sample: DriftSample | None) -> list[str]:
     """Say in words how far the table holds."""
-    from gfimu.drift import TILT_LIMIT
+    from gfimu.position_drift import TILT_LIMIT
     from gfimu.units import STANDARD_GRAVITY
 
     if budget.valid:
@@ -135,7 +108,7 @@ def _remarks(budget: DriftBudget, sample: DriftSample | None) -> list[str]:
     else:
         lines = [
             (
-                f"[yellow]The closed forms hold for {budget.valid_until:.3g} s only[/yellow], where the attitude error "
+                f"The closed forms hold for {budget.valid_until:.3g} s only, where the attitude error "
                 f"reaches {TILT_LIMIT} rad (1 σ). The figures above extrapolate them; the true error is below "
                 f"g t² = {_length(STANDARD_GRAVITY * budget.time**2)}. Calibrate the biases, or see --monte-carlo."
             )
@@ -146,5 +119,5 @@ def _remarks(budget: DriftBudget, sample: DriftSample | None) -> list[str]:
     if sample is not None:
         lines.append(f"Sampling error of the Monte Carlo: {sample.relative_sampling_error:.1%} per axis.")
     if budget.note:
-        lines.append(f"[yellow]Note:[/yellow] {budget.note}.")
+        lines.append(f"Note: {budget.note}.")
     return lines

@@ -5,13 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
 import typer
 
-from gfimu.cli.array_option import load_array
 from gfimu.cli.output import JsonOption, print_json, print_paths, print_table
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from gfimu.estimate_summary import EstimateSummary
 
 __all__ = ["register"]
@@ -53,36 +53,24 @@ def _estimate(
 
     Example: gfimu estimate run.parquet --method filter --rest-bias --out estimate.parquet
     """
-    from gfimu.calibration.result import load_calibration
-    from gfimu.calibration.run_file import open_calibrated_run
+    from gfimu.commands.estimate import estimate_run
     from gfimu.estimate_summary import summarise
-    from gfimu.estimation import estimate
-    from gfimu.recording_formats import open_run
-    from gfimu.rest_bias import estimate_from_rest
 
-    drawing = None if array is None else load_array(array)
-    if calibration is None:
-        recording, geometry = open_run(run, drawing)
-    else:
-        recording, geometry = open_calibrated_run(run, load_calibration(calibration), drawing)
-    solve = estimate_from_rest if rest_bias else estimate
-    found = solve(
-        recording,
-        geometry,
+    found = estimate_run(
+        run,
+        array,
+        out=out,
         method=method,
         form=form,
+        rest_bias=rest_bias,
+        calibration=calibration,
         omega0=None if unknown_start else (0.0, 0.0, 0.0),
         fuse_gyro=gyro,
         with_position=position,
+        rrd=rrd,
     )
-    found.write(out)
-    written = {"estimate": out}
-    if rrd is not None:
-        from gfimu.visual import write_run
-
-        write_run(rrd, recording, geometry, estimate=found)
-        written["rrd"] = rrd
-    summary = summarise(found, recording, geometry)
+    written = {"estimate": out} | ({} if rrd is None else {"rrd": rrd})
+    summary = summarise(found.estimate, found.recording, found.array)
     if json:
         print_json(summary.to_dict() | {"files": written})
     else:

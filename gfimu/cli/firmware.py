@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
-from gfimu.cli.output import JsonOption, console, print_json, print_paths, print_table, progress
-
-if TYPE_CHECKING:
-    from firmware_bridge.board_process import BoardProcess
-    from sim.ride import Ride
+from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, print_text, progress
 
 __all__ = ["register"]
 
@@ -26,8 +21,6 @@ PythonOption = Annotated[
     bool, typer.Option("--pure-python", help="Run all peripherals in Python: slower, the same result.")
 ]
 
-_BOOT_S = 0.02
-
 
 def register(app: typer.Typer) -> None:
     """Add the commands."""
@@ -38,21 +31,6 @@ def register(app: typer.Typer) -> None:
     group.command(name="trace")(_trace)
     group.command(name="faults")(_faults)
     app.add_typer(group, name="firmware")
-
-
-def _ride(scenario: str, seed: int) -> Ride:
-    from sim.ride import Ride
-
-    return Ride(scenario, seed=seed)
-
-
-def _board(ride: Ride, image: str, seed: int, *, pure_python: bool, trace: bool = False) -> BoardProcess:
-    from firmware_bridge.board_process import BoardProcess
-    from firmware_bridge.physics import RidePhysics
-    from firmware_bridge.virtual_run import typical_chips
-
-    fast = False if pure_python else None
-    return BoardProcess(RidePhysics(ride), image=image, chips=typical_chips(seed), fast=fast, trace=trace)
 
 
 def _run(
@@ -80,10 +58,8 @@ def _run(
 
     Example: gfimu firmware run --scenario paper_run --out run.parquet --rate 800
     """
-    from firmware_bridge.board_process import require_emulator
     from gfimu.errors import InputError
 
-    require_emulator()
     if (port is None) == (out is None):
         raise InputError("give either --port (pty or tcp:PORT) or --out (a recording)")
     if port is None and out is not None:
@@ -96,75 +72,63 @@ def _run_to_file(
     scenario: str, out: Path, duration: float | None, rate: int, range_g: int, seed: int, image: str,
     *, pure_python: bool, json: bool,
 ) -> None:  # fmt: skip
-    from firmware_bridge.journal import check_target
-    from firmware_bridge.virtual_run import record_virtual
-    from gfimu.errors import GfimuError
+    from gfimu.commands.firmware import run
 
-    check_target(out)
-    ride = _ride(scenario, seed)
     with progress(f"running {image}", total=1.0) as done:
-        run = record_virtual(
-            ride, duration or ride.duration, rate_hz=rate, range_g=range_g, image=image,
-            fast=False if pure_python else None, progress=done,
+        made = run(
+            scenario=scenario, out=out, duration=duration, rate=rate, range_g=range_g, seed=seed, image=image,
+            pure_python=pure_python, progress=done,
         )  # fmt: skip
-    try:
-        run.recording.write(out)
-    except OSError as error:
-        reason = os.strerror(error.errno) if error.errno else str(error)
-        raise GfimuError(f"{out}: {reason}; nothing was written: free space and run again") from None
     if json:
         print_json(
             {
-                "stream": asdict(run.stream),
-                "identity": None if run.identity is None else asdict(run.identity),
-                "warnings": run.warnings,
+                "stream": asdict(made.stream),
+                "identity": None if made.identity is None else asdict(made.identity),
+                "warnings": made.warnings,
                 "files": [out],
             }
         )
         return
     rows: list[tuple[str, Any]] = [
-        ("samples", f"{run.stream.samples} at {rate} Hz"),
-        ("lost", run.stream.lost),
-        ("corrupt", run.stream.corrupt),
+        ("samples", f"{made.stream.samples} at {rate} Hz"),
+        ("lost", made.stream.lost),
+        ("corrupt", made.stream.corrupt),
     ]
-    if run.identity is not None:
-        rows.append(("firmware", run.identity.firmware))
+    if made.identity is not None:
+        rows.append(("firmware", made.identity.firmware))
     print_table(f"{scenario} on the emulated board", ("quantity", "value"), rows)
-    _print_warnings(run.warnings)
+    _print_warnings(made.warnings)
     print_paths([("recording", out)])
 
 
 def _print_warnings(warnings: Sequence[str]) -> None:
     for warning in warnings:
-        console.print(f"[yellow]warning[/yellow] from the board: {warning}", highlight=False, soft_wrap=True)
+        print_text(f"warning from the board: {warning}", style="yellow")
 
 
 def _run_behind_port(
     scenario: str, port: str, duration: float | None, rate: int, range_g: int, seed: int, image: str,
     realtime: bool, pure_python: bool, json: bool,
 ) -> None:  # fmt: skip
-    from firmware_bridge.commands import set_range, set_rate
-    from firmware_bridge.virtual_port import open_port, serve
+    from gfimu.commands.firmware import run
 
-    setup = set_range(range_g) + set_rate(rate)
-    ride = _ride(scenario, seed)
-    line = open_port(port)
-    try:
-        with _board(ride, image, seed, pure_python=pure_python) as board:
-            board.run_for(_BOOT_S)
-            board.receive(setup)
-            if not json:
-                console.print(f"board on [bold]{line.name}[/bold]; Ctrl-C ends it", highlight=False)
-                console.print(f"  gfimu record --port {line.name} --out run.parquet", highlight=False)
-            report = serve(board, line, duration_s=duration, realtime=realtime)
-            warnings = board.warnings()
-    finally:
-        line.close()
+    names: list[str] = []
+
+    def opened(name: str) -> None:
+        names.append(name)
+        if not json:
+            print_text(f"board on {name}; Ctrl-C ends it")
+            print_text(f"  gfimu record --port {name} --out run.parquet")
+
+    report = run(
+        scenario=scenario, port=port, duration=duration, rate=rate, range_g=range_g, realtime=realtime, seed=seed,
+        image=image, pure_python=pure_python, on_open=opened,
+    )  # fmt: skip
     if json:
-        print_json(asdict(report) | {"port": line.name, "warnings": warnings})
+        print_json(asdict(report) | {"port": names[0]})
         return
     print_table(
-        f"{scenario} behind {line.name}",
+        f"{scenario} behind {names[0]}",
         ("quantity", "value"),
         [
             ("virtual time", f"{report.virtual_s:.2f} s"),
@@ -174,7 +138,7 @@ def _run_behind_port(
             ("bytes from the host", report.received),
         ],
     )
-    _print_warnings(warnings)
+    _print_warnings(report.warnings)
 
 
 def _build(
@@ -190,7 +154,7 @@ def _build(
 
     Example: gfimu firmware build --out build --define GFIMU_SPI_HZ=1000000U
     """
-    from firmware_bridge.lpc1768.build import build
+    from gfimu.commands.firmware import build
     from gfimu.errors import InputError
 
     defines = {}
@@ -199,7 +163,7 @@ def _build(
         if not equals or not name.isidentifier():
             raise InputError(f"--define {item!r}: write NAME=VALUE")
         defines[name] = value
-    report = build(image, out, defines=defines)
+    report = build(image, out=out, define=defines)
     if json:
         print_json(asdict(report))
         return
@@ -221,9 +185,9 @@ def _selftest(json: JsonOption = False) -> None:
 
     Example: gfimu firmware selftest
     """
-    from firmware_bridge.selftest import run_selftest
+    from gfimu.commands.firmware import selftest
 
-    rows = run_selftest()
+    rows = selftest()
     if json:
         print_json({"passed": all(row.passed for row in rows), "checks": [asdict(row) for row in rows]})
     else:
@@ -247,29 +211,13 @@ def _trace(
 
     Example: gfimu firmware trace --out trace.vcd --duration 0.02
     """
-    from firmware_bridge.board.trace import write_rrd, write_vcd
-    from firmware_bridge.board_process import require_emulator
-    from firmware_bridge.commands import set_rate
-    from gfimu.errors import InputError
+    from gfimu.commands.firmware import trace
 
-    require_emulator()
-    if out.suffix not in {".vcd", ".rrd"}:
-        raise InputError(f"{out}: unknown trace format {out.suffix!r}; use .vcd or .rrd")
-    setup = set_rate(rate)
-    with _board(_ride(scenario, seed), image, seed, pure_python=True, trace=True) as board:
-        if skip:
-            board.run_for(min(skip, _BOOT_S))
-            board.receive(setup)
-            board.run_for(max(0.0, skip - _BOOT_S))
-            board.take_trace()
-        board.run_for(duration)
-        events = board.take_trace()
-    (write_vcd if out.suffix == ".vcd" else write_rrd)(out, events)
-    entered = sum(event.kind == "enter" for event in events)
+    found = trace(out, scenario=scenario, duration=duration, skip=skip, rate=rate, seed=seed, image=image)
     if json:
-        print_json({"events": len(events), "exceptions": entered, "files": [out]})
+        print_json({"events": found.events, "exceptions": found.exceptions, "files": [out]})
         return
-    rows = [("register accesses", sum(event.source != "cpu" for event in events)), ("exceptions", entered)]
+    rows = [("register accesses", found.accesses), ("exceptions", found.exceptions)]
     print_table(f"{duration:g} s of {image}", ("quantity", "value"), rows)
     print_paths([("trace", out)])
 
@@ -279,10 +227,10 @@ def _faults(seed: SeedOption = 0, json: JsonOption = False) -> None:
 
     Example: gfimu firmware faults
     """
-    from firmware_bridge.fault_campaign import run_campaign
+    from gfimu.commands.firmware import faults
 
     with progress("faults", total=1.0) as done:
-        rows = run_campaign(seed=seed, progress=done)
+        rows = faults(seed=seed, progress=done)
     if json:
         print_json(
             {

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
 from typing import Annotated
 
 import typer
-
-from gfimu.cli.array_option import load_array
 
 __all__ = ["register"]
 
@@ -20,8 +17,9 @@ def register(app: typer.Typer) -> None:
 
 def _live(
     array: Annotated[
-        str, typer.Option("--array", help="Array: a name, a .toml file or MJCF sites (.xml); else the stream's own.")
-    ] = "",
+        str | None,
+        typer.Option("--array", help="Array: a name, a .toml file or MJCF sites (.xml); else the stream's own."),
+    ] = None,
     rate: Annotated[
         float | None, typer.Option("--rate", help="Nominal sample rate, Hz; else the stream's own.")
     ] = None,
@@ -53,59 +51,17 @@ def _live(
 
     Example: ssh pi cat /data/run.csv | gfimu live --array cube12 --rate 100
     """
-    import numpy as np
+    from gfimu.commands.live import live
 
-    from gfimu.errors import InputError
-    from gfimu.rate.kalman import FilterSettings
-    from gfimu.rate.sensing import SensorErrors
-    from gfimu.rate.stream import filter_stream, read_head
-
-    metadata, lines = read_head(_lines(source, follow=follow))
-    if rate is None:
-        rate = metadata.get("sample_rate_hz", metadata.get("time_stamp_rate_hz"))
-    array = array or str(metadata.get("array", ""))
-    if not array:
-        raise InputError("--array is missing, and the stream does not state its array; give it")
-    if rate is None:
-        raise InputError("--rate is missing, and the stream does not state its sample rate; give it")
-    if not isinstance(rate, int | float) or not rate > 0:
-        raise InputError(f"--rate {rate}: must be positive, Hz")
-    geometry = load_array(array)
-    biases = {} if bias_std is None else {"bias_std": bias_std}
-    errors = SensorErrors.from_parts(geometry, rate, scale_std=scale_std, **biases)
-    settings = FilterSettings(start_omega=None) if unknown_start else FilterSettings(start_omega=np.zeros(3))
-    for line in filter_stream(lines, geometry, errors, 1.0 / rate, settings, fuse_gyro=gyro):
+    for line in live(
+        array,
+        rate,
+        source=source,
+        follow=follow,
+        scale_std=scale_std,
+        bias_std=bias_std,
+        unknown_start=unknown_start,
+        gyro=gyro,
+    ):
         sys.stdout.write(line + "\n")
         sys.stdout.flush()
-
-
-def _lines(source: str, *, follow: bool) -> Iterator[str]:
-    """Lines of the source as they arrive."""
-    from pathlib import Path
-
-    from gfimu.errors import InputError
-    from gfimu.rate.stream_source import recording_lines
-
-    if source == "-":
-        return iter(sys.stdin.readline, "")
-    if Path(source).is_file():
-        return recording_lines(source, follow=follow)
-    host, colon, port = source.removeprefix("socket://").rpartition(":")
-    if not colon or not port.isdigit():
-        raise InputError(f"--from {source!r}: no such file; give a recording, - for standard input, or host:port")
-    return _socket_lines(source, host, int(port))
-
-
-def _socket_lines(source: str, host: str, port: int) -> Iterator[str]:
-    """Lines that a TCP server sends."""
-    import socket
-
-    from gfimu.errors import InputError
-
-    try:
-        connection = socket.create_connection((host, port), timeout=10)
-    except OSError as error:
-        raise InputError(f"--from {source!r}: {error.strerror or error}; start the server first") from None
-    connection.settimeout(None)
-    with connection, connection.makefile("r", encoding="utf-8", errors="replace") as stream:
-        yield from stream

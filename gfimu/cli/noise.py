@@ -35,23 +35,14 @@ def _noise(
 
     Example: gfimu noise rest.parquet --kalibr imu.yaml --picture allan.png
     """
-    from gfimu.atomic_file import write_text
-    from gfimu.calibration.result import load_calibration
-    from gfimu.calibration.run_file import open_calibrated, open_uncalibrated
-    from gfimu.noise import kalibr_yaml, recording_noise
-    from gfimu.noise.identification import TERMS
+    from gfimu.commands.noise import noise
+    from gfimu.sensor_noise.identification import TERMS
 
-    recording = open_uncalibrated(run) if calibration is None else open_calibrated(run, load_calibration(calibration))
-    result = recording_noise(recording, stretch=stretch, rest_threshold=rest_threshold)
-    written = {}
-    if kalibr is not None:
-        write_text(kalibr, kalibr_yaml(result))
-        written["Kalibr"] = kalibr
-    if picture is not None:
-        from gfimu.noise.pictures import noise_picture
-
-        noise_picture(picture, result)
-        written["picture"] = picture
+    result = noise(
+        run, stretch=stretch, rest_threshold=rest_threshold, calibration=calibration, kalibr=kalibr, picture=picture
+    )
+    written = {} if kalibr is None else {"Kalibr": kalibr}
+    written |= {} if picture is None else {"picture": picture}
     if json:
         print_json(result.to_dict() | {"files": written})
         return

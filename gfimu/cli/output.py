@@ -1,4 +1,8 @@
-"""What every command shares: printing a table or JSON, naming the files it wrote, a progress bar."""
+"""What every command shares: printing a table or JSON, naming the files it wrote, a progress bar.
+
+Text from outside (file names, array names, descriptions, messages) is never read as markup: a file called
+``[red]x[/red].csv`` is printed as it is called.
+"""
 
 from __future__ import annotations
 
@@ -7,31 +11,33 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
 import typer
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-from rich.table import Table
 
-__all__ = ["JsonOption", "console", "plain", "print_json", "print_paths", "print_table", "progress"]
+if TYPE_CHECKING:
+    from rich.console import Console
+
+__all__ = ["JsonOption", "console", "plain", "print_json", "print_paths", "print_table", "print_text", "progress"]
 
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object for machines instead of tables.")]
 
-console = Console()
+
+def console(*, stderr: bool = False) -> Console:
+    """Return a console that takes no text for markup."""
+    from rich.console import Console
+
+    return Console(markup=False, emoji=False, highlight=False, stderr=stderr)
 
 
 def plain(value: Any) -> Any:
     """Turn arrays, paths and NaN into what JSON can hold (NaN and infinity become null)."""
     if isinstance(value, dict):
         return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, np.ndarray):
-        return plain(value.tolist())
     if isinstance(value, list | tuple):
         return [plain(item) for item in value]
-    if isinstance(value, np.generic):
-        return plain(value.item())
+    if hasattr(value, "tolist"):  # NumPy's arrays and numbers
+        return plain(value.tolist())
     if isinstance(value, float) and not math.isfinite(value):
         return None
     if isinstance(value, Path):
@@ -44,35 +50,50 @@ def print_json(value: Any) -> None:
     typer.echo(json.dumps(plain(value), indent=2, allow_nan=False))
 
 
+def print_text(text: str, *, style: str = "", stderr: bool = False) -> None:
+    """Print a line of text as it is, in one style."""
+    from rich.text import Text
+
+    console(stderr=stderr).print(Text(text, style=style), soft_wrap=True)
+
+
 def print_table(
     title: str, header: Sequence[str], rows: Iterable[Sequence[object]], *, note: str = "", left: int = 1
 ) -> None:
     """Print a table for people: the first ``left`` columns hold words, numbers go to the right."""
-    table = Table(title=title, title_justify="left", title_style="bold", caption=note or None)
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(title=Text(title), title_justify="left", title_style="bold", caption=Text(note) if note else None)
     table.caption_justify = "left"
     for place, name in enumerate(header):
-        table.add_column(name, justify="left" if place < left else "right", overflow="fold")
+        table.add_column(Text(name), justify="left" if place < left else "right", overflow="fold")
     for row in rows:
-        table.add_row(*[str(cell) for cell in row])
-    console.print(table)
+        table.add_row(*[Text(str(cell)) for cell in row])
+    console().print(table)
 
 
 def print_paths(paths: Iterable[tuple[str, str | Path]]) -> None:
     """Print what was written and where, one line each."""
+    from rich.text import Text
+
     for meaning, path in paths:
-        console.print(f"[green]wrote[/green] {meaning}: {path}", highlight=False, soft_wrap=True)
+        console().print(Text.assemble(("wrote", "green"), f" {meaning}: {path}"), soft_wrap=True)
 
 
 @contextmanager
 def progress(description: str, total: float | None = None) -> Iterator[Any]:
     """Show a progress bar on a terminal; yields a function called with the work done so far (0 to ``total``)."""
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    screen = console(stderr=True)
     with Progress(
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         BarColumn(),
         TimeRemainingColumn(),
-        console=Console(stderr=True),
+        console=screen,
         transient=True,
-        disable=not Console(stderr=True).is_terminal,
+        disable=not screen.is_terminal,
     ) as bar:
         task = bar.add_task(description, total=total)
         yield lambda done, text=None: bar.update(task, completed=done, description=text or description)

@@ -49,36 +49,28 @@ def _record(
 
     Example: gfimu record --port /dev/ttyUSB0 --out run.parquet --rate 800 --duration 60
     """
-    from firmware_bridge.commands import set_range, set_rate
-    from firmware_bridge.frames import frame_format
-    from firmware_bridge.journal import check_target
-    from firmware_bridge.live import LiveView
-    from firmware_bridge.recorder import record
-    from gfimu.array import AccelerometerArray
-    from gfimu.part import Part
+    from gfimu.commands.record import record
 
-    carried = AccelerometerArray.load(array or frame_format(form).array)
-    check_target(out)
-    setup = [set_range(range_g)] if range_g is not None else []
-    setup += [set_rate(rate)] if rate is not None else []
-    interactive = console.is_terminal and not json
-    live = None
-    if interactive or rrd is not None or view:
-        lsb = Part.load(carried.chips[0].part).lsb
-        show = (lambda text: console.print(text, end="\r", highlight=False)) if interactive else None
-        live = LiveView(carried, lsb, on_text=show, rrd=rrd, viewer=view)
+    screen = console()
+    interactive = screen.is_terminal and not json
     if interactive and reconnect and "://" not in port and not Path(port).exists():
-        console.print(f"waiting for {port}, up to {reconnect:g} s", highlight=False)
-    try:
-        report = record(
-            port, out, duration_s=duration, form=form, array=array, baud=baud, setup=tuple(setup),
-            reconnect_s=reconnect, on_batch=live,
-        )  # fmt: skip
-    finally:
-        if live is not None:
-            live.close()
+        screen.print(f"waiting for {port}, up to {reconnect:g} s")
+    report = record(
+        port,
+        out,
+        duration=duration,
+        rate=rate,
+        range_g=range_g,
+        form=form,
+        array=array,
+        baud=baud,
+        reconnect=reconnect,
+        rrd=rrd,
+        view=view,
+        on_text=(lambda text: screen.print(text, end="\r")) if interactive else None,
+    )
     if interactive:
-        console.print()
+        screen.print()
     written = {"recording": out} | ({"rrd": rrd} if rrd is not None else {})
     if json:
         print_json(asdict(report) | {"files": written})

@@ -9,15 +9,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gfimu.cli.array_option import load_array
 from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, progress
 
 if TYPE_CHECKING:
     from gfimu.scoring import Score
 
 __all__ = ["register"]
-
-_AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
 def register(app: typer.Typer) -> None:
@@ -45,15 +42,9 @@ def _score(
 
     Example: gfimu score cube12 p3_three_plus_one --speed-rad-s 10
     """
-    from gfimu.errors import unknown_name
-    from gfimu.model_files import list_models
-    from gfimu.scoring import score
+    from gfimu.commands.score import score
 
-    if spin_axis not in _AXES:
-        raise unknown_name("axis", spin_axis, _AXES)
-    loaded = [load_array(name) for name in arrays or list_models("arrays")]
-    omega = [speed * component for component in _AXES[spin_axis]]
-    scores = score(loaded, length_unit_m=length_unit, omega_rad_s=omega, noise_m_s2=noise)
+    scores = score(arrays, length_unit_m=length_unit, speed_rad_s=speed, spin_axis=spin_axis, noise_m_s2=noise)
     if as_json:
         print_json({"length_unit_m": scores[0].length_unit_m, "arrays": [entry.to_dict() for entry in scores]})
         return
@@ -79,30 +70,20 @@ def _optimize(
 
     Example: gfimu optimize --chips 5 --non-recursive --out best5.toml
     """
-    import numpy as np
+    from gfimu.commands.optimize import optimize
 
-    from gfimu.atomic_file import write_text
-    from gfimu.errors import InputError
-    from gfimu.geometry_search import optimize
-
-    if out is not None and out.suffix != ".toml":
-        raise InputError(f"{out}: an array file ends in .toml; name it so")
-    if seed < 0:
-        raise InputError(f"seed {seed}: must be zero or positive")
     with progress("searching geometries", total=restarts) as advance:
         result = optimize(
             chips,
-            rng=np.random.default_rng(seed),
             axes_per_chip=axes_per_chip,
             box_m=box,
             min_spacing_m=spacing,
             non_recursive=non_recursive,
             restarts=restarts,
-            name=out.stem if out is not None else "",
+            seed=seed,
+            out=out,
             report=advance,
         )
-    if out is not None:
-        write_text(out, result.array.to_toml())
     if as_json:
         print_json(result.to_dict())
         return

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, progress
-
-if TYPE_CHECKING:
-    from sim.scenarios import Scenario
 
 __all__ = ["register"]
 
@@ -36,15 +33,13 @@ def _simulate(
 
     Example: gfimu simulate paper_run --out run.parquet --seed 1 --set sensor.range_g=8
     """
-    from sim.scenarios import Scenario, simulate, summarise
+    from gfimu.commands.simulate import simulate
+    from sim.scenarios import Scenario, summarise
 
+    with progress(f"simulating {scenario}", total=1.0) as done:
+        recording = simulate(scenario, out=out, seed=seed, changes=changes or [], raw=raw, rrd=rrd, progress=done)
+    written = {"recording": out} | ({} if rrd is None else {"rrd": rrd})
     run = Scenario.load(scenario, changes=changes or [])
-    with progress(f"simulating {run.name}", total=1.0) as done:
-        recording = simulate(run, seed=seed, out=out, raw=raw, progress=done)
-    written = {"recording": out}
-    if rrd is not None:
-        _write_picture(rrd, run, out)
-        written["rrd"] = rrd
     summary = summarise(run, recording)
     if json:
         print_json(summary | {"files": written})
@@ -61,14 +56,3 @@ def _simulate(
     ]
     print_table(run.name, ("quantity", "value"), rows, note=run.description)
     print_paths(written.items())
-
-
-def _write_picture(rrd: Path, run: Scenario, recording: Path) -> None:
-    from gfimu.recording import Recording
-    from gfimu.visual import write_run
-    from sim.drawing import rig_drawing
-    from sim.truth import known_motion
-
-    simulated = Recording.read(recording, array=run.array)
-    shapes = None if run.free else rig_drawing(run.world)
-    write_run(rrd, simulated, run.array, known=known_motion(simulated), shapes=shapes, title=run.name)

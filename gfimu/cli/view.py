@@ -7,7 +7,6 @@ from typing import Annotated
 
 import typer
 
-from gfimu.cli.array_option import load_array
 from gfimu.cli.output import print_paths
 
 __all__ = ["register"]
@@ -32,14 +31,6 @@ def _view(
 
     Example: gfimu view run.parquet
     """
-    from gfimu.visual.picture import picture_of, picture_path
-    from gfimu.visual.viewer import open_viewer
+    from gfimu.commands.view import view
 
-    if file.suffix == ".rrd" and out is None:
-        open_viewer(file)
-        return
-    picture = out or picture_path(file)
-    picture_of(file, picture, array=None if array is None else load_array(array))
-    print_paths([("rerun recording", picture)])
-    if out is None:
-        open_viewer(picture)
+    view(file, array=array, out=out, on_picture=lambda picture: print_paths([("rerun recording", picture)]))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 import tempfile
 from collections.abc import Mapping, Sequence
@@ -14,7 +13,8 @@ from numpy.typing import NDArray
 from gfimu.diagnosis.picture import write_picture
 from gfimu.diagnosis.report import write_report
 from gfimu.diagnosis.verdict import Diagnosis
-from gfimu.errors import InputError
+from gfimu.errors import InputError, WriteError
+from gfimu.outputs import OutputFolder, check_outputs
 from gfimu.visual.scene import Shape
 
 __all__ = ["FILES", "check_folder", "write_diagnosis"]
@@ -34,14 +34,10 @@ def check_folder(directory: str | Path) -> Path:
     Raises
     ------
     InputError
-        If it is a file, or the folder above it can't be written to.
+        If it is a file, or the folder above it does not exist or can't be written to.
     """
     folder = Path(directory)
-    nearest = next(place for place in (folder, *folder.absolute().parents) if place.exists())
-    if not nearest.is_dir():
-        raise InputError(f"{nearest}: is a file; choose a folder for --out")
-    if not os.access(nearest, os.W_OK | os.X_OK):
-        raise InputError(f"{folder}: permission denied; choose a folder that can be written")
+    check_outputs([("out", folder, OutputFolder(tuple(FILES)))])
     return folder
 
 
@@ -60,7 +56,7 @@ def write_diagnosis(
     Parameters
     ----------
     directory : str or Path
-        Folder; made if it isn't there.
+        Folder; made if it isn't there, in one that is.
     diagnosis : Diagnosis
         The diagnosis.
     twin_toml : str, optional
@@ -77,7 +73,7 @@ def write_diagnosis(
     """
     folder = check_folder(directory)
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        folder.mkdir(exist_ok=True)
         made = Path(tempfile.mkdtemp(prefix=".making-", dir=folder))
     except OSError as error:
         raise InputError(f"{folder}: {error.strerror or error}; choose a folder that can be written") from None
@@ -91,6 +87,10 @@ def write_diagnosis(
         write_picture(made / "diagnosis.rrd", diagnosis, mounting=mounting, cube_centre=cube_centre, shapes=shapes)
         for file in made.iterdir():
             file.replace(folder / file.name)
+    except WriteError:
+        raise
+    except OSError as error:
+        raise WriteError(folder, error) from error
     finally:
         shutil.rmtree(made, ignore_errors=True)
     return {meaning: folder / name for name, meaning in FILES.items()}

@@ -8,8 +8,8 @@ from pathlib import Path
 import rerun as rr
 import rerun.blueprint as rrb
 
-from gfimu.atomic_file import atomic_path
-from gfimu.errors import InputError
+from gfimu.outputs import RERUN
+from gfimu.rerun_stream import rrd_stream
 from gfimu.visual.plots import Plot
 from gfimu.visual.scene import TIMELINE, Scene
 
@@ -51,8 +51,7 @@ def write_rrd(
     InputError
         If the file name does not end in ``.rrd`` or its folder can't be written to.
     """
-    if Path(path).suffix != ".rrd":
-        raise InputError(f"{path}: a rerun recording ends in .rrd; rename it")
+    RERUN.check_suffix(Path(path))
     panel = rrb.TimePanel(
         state="collapsed", timeline=TIMELINE, playback_speed=playback_speed, play_state="playing", loop_mode="all"
     )
@@ -64,17 +63,13 @@ def write_rrd(
         auto_views=False,
         auto_layout=False,
     )
-    with atomic_path(path) as temporary:
-        stream = rr.RecordingStream("gfimu")
-        stream.save(temporary, default_blueprint=blueprint)
+    with rrd_stream(path, "gfimu", blueprint=blueprint) as stream:
         stream.send_recording_name(title)
         if notes:
             stream.log(NOTES, rr.TextDocument(notes, media_type=rr.MediaType.MARKDOWN), static=True)
         scene.log(stream)
         for plot in plots:
             plot.log(stream)
-        stream.flush()
-        stream.disconnect()
 
 
 def notes_view() -> rrb.TextDocumentView:

@@ -8,12 +8,13 @@ import sys
 from pathlib import Path
 
 from gfimu.errors import GfimuError, InputError
+from gfimu.rerun_stream import WEB_VIEWER, viewer_command
 
 __all__ = ["open_viewer"]
 
 
 def open_viewer(path: str | Path) -> None:
-    """Open a rerun recording in the viewer and wait until its window is closed.
+    """Open a rerun recording in the viewer, which listens to this machine only, and wait until its window is closed.
 
     Raises
     ------
@@ -31,11 +32,9 @@ def open_viewer(path: str | Path) -> None:
         raise InputError(f"{file}: {error.strerror or error}; check the path") from None
     if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
         raise GfimuError(
-            f"no display here to open {file}; run `rerun --web-viewer {file}` and open the address it prints in a "
+            f"no display here to open {file}; run `{WEB_VIEWER} {file}` and open the address it prints in a "
             "browser, or copy the file to a machine with a display and run `rerun` on it there"
         )
-    done = subprocess.run([sys.executable, "-m", "rerun", str(file)], check=False)
+    done = subprocess.run(viewer_command(file), check=False)
     if done.returncode:
-        raise GfimuError(
-            f"the rerun viewer ended with code {done.returncode}; try `rerun --web-viewer {file}` in a browser"
-        )
+        raise GfimuError(f"the rerun viewer ended with code {done.returncode}; try `{WEB_VIEWER} {file}` in a browser")

@@ -10,7 +10,7 @@ import pytest
 from gfimu import AccelerometerArray, Estimate, Recording, specific_force
 from gfimu.calibration.result import load_calibration
 from gfimu.gravity import local_gravity
-from gfimu.noise import white_noise
+from gfimu.sensor_noise import white_noise
 
 CUBE = AccelerometerArray.load("cube12")
 GRAVITY = local_gravity(52.3, 80.0)

@@ -38,7 +38,7 @@ def eccentric(tmp_path_factory):
 
 
 def test_a_hidden_cause_is_found_told_and_written(gfimu_command, eccentric, tmp_path):
-    out = tmp_path / "made" / "diagnosis"
+    out = tmp_path / "made"
     done = gfimu_command("diagnose", eccentric, "--twin", TWIN, "--out", out)
     assert done.code == 0, done.stderr
     assert "Found what the simulation leaves out: the whole cube is off the table's axis." in " ".join(

@@ -10,10 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gfimu.array import AccelerometerArray
-from gfimu.drift import TILT_LIMIT, drift_budget, equivalent_rate_drift, motion_covariance
 from gfimu.drift_forms import ErrorSources, position_error
 from gfimu.drift_monte_carlo import monte_carlo_drift
 from gfimu.errors import InputError
+from gfimu.position_drift import TILT_LIMIT, drift_budget, equivalent_rate_drift, motion_covariance
 
 G = 9.80665
 MG = G / 1000

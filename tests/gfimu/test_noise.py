@@ -9,7 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gfimu.errors import InputError, UnitError
-from gfimu.noise import (
+from gfimu.recording import Recording
+from gfimu.sensor_noise import (
     allan_deviation,
     flicker_noise,
     identify_noise,
@@ -19,8 +20,7 @@ from gfimu.noise import (
     synthesise_noise,
     white_noise,
 )
-from gfimu.noise.identification import model_variance
-from gfimu.recording import Recording
+from gfimu.sensor_noise.identification import model_variance
 
 RATE = 100.0
 

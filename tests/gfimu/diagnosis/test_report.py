@@ -150,7 +150,9 @@ def test_a_folder_that_cannot_be_is_refused_before_any_work(tmp_path):
         check_folder(tmp_path / "file")
     with pytest.raises(InputError, match="choose a folder"):
         check_folder(tmp_path / "file" / "below")
-    check_folder(tmp_path / "new" / "below")
+    with pytest.raises(InputError, match="choose a folder"):
+        check_folder(tmp_path / "new" / "below")
+    check_folder(tmp_path / "new")
     assert not (tmp_path / "new").exists()
 
 

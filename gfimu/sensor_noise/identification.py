@@ -21,7 +21,7 @@ from scipy.optimize import nnls
 from scipy.stats import chi2
 
 from gfimu.errors import InputError
-from gfimu.noise.allan import AllanDeviation, allan_deviation
+from gfimu.sensor_noise.allan import AllanDeviation, allan_deviation
 
 __all__ = ["TERMS", "NoiseModel", "NoiseTerm", "identify_noise", "model_variance"]
 
@@ -110,8 +110,8 @@ class NoiseModel:
 def model_variance(factors: ArrayLike, rate: float) -> Floats:
     """Allan variance of each term with coefficient one, columns in the order of `TERMS`, shape (k, 5).
 
-    The forms are those of the sampled series: flicker as `gfimu.noise.flicker_noise` makes it, the random walk summed
-    at the sample rate.
+    The forms are those of the sampled series: flicker as `gfimu.sensor_noise.flicker_noise` makes it, the random walk
+    summed at the sample rate.
     """
     m = np.atleast_1d(np.asarray(factors, dtype=float))
     tau = m / rate

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.errors import InputError, unknown_name
-from gfimu.noise.identification import TERMS, NoiseModel, identify_noise
 from gfimu.recording import Recording
 from gfimu.rest import detect_rest
+from gfimu.sensor_noise.identification import TERMS, NoiseModel, identify_noise
 
 __all__ = ["STRETCHES", "RecordingNoise", "recording_noise"]
 

@@ -8,7 +8,7 @@ import matplotlib as mpl
 import numpy as np
 
 from gfimu.atomic_file import atomic_path
-from gfimu.noise.recording_noise import RecordingNoise
+from gfimu.sensor_noise.recording_noise import RecordingNoise
 
 mpl.use("Agg")
 

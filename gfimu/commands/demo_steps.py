@@ -181,9 +181,9 @@ def estimate_motion(demo: Demo) -> None:
 
 def state_drift(demo: Demo) -> None:
     """State the position drift that was to be expected."""
-    from gfimu.drift import ErrorSources, drift_budget
     from gfimu.drift_monte_carlo import monte_carlo_drift
     from gfimu.part import white_noise_std
+    from gfimu.position_drift import ErrorSources, drift_budget
 
     array, recording = demo.scenario.array, demo.recording
     noise = _rms(white_noise_std(array, recording.sample_rate))
@@ -290,7 +290,7 @@ def draw_run(demo: Demo) -> None:
 
 def diagnose_hidden(demo: Demo) -> None:
     """Hide a tilted table and an eccentric cube in the world, and diagnose the recording."""
-    from gfimu.cli.diagnose import write_result
+    from gfimu.commands.diagnose import write_result
     from gfimu.diagnosis.diagnose import diagnose
     from sim.effects import make_effect
     from sim.scenarios import Scenario, simulate

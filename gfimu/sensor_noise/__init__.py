@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from gfimu.noise.allan import AllanDeviation, allan_deviation
-from gfimu.noise.identification import NoiseModel, identify_noise
-from gfimu.noise.kalibr import kalibr_yaml
-from gfimu.noise.recording_noise import RecordingNoise, recording_noise
-from gfimu.noise.synthesis import flicker_noise, random_walk, synthesise_noise, white_noise
+from gfimu.sensor_noise.allan import AllanDeviation, allan_deviation
+from gfimu.sensor_noise.identification import NoiseModel, identify_noise
+from gfimu.sensor_noise.kalibr import kalibr_yaml
+from gfimu.sensor_noise.recording_noise import RecordingNoise, recording_noise
+from gfimu.sensor_noise.synthesis import flicker_noise, random_walk, synthesise_noise, white_noise
 
 __all__ = [
     "AllanDeviation",

@@ -1,0 +1,47 @@
+"""Under `gfimu convert`: a recording in another format."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from gfimu.outputs import RECORDING, writes
+
+if TYPE_CHECKING:
+    from gfimu.array import AccelerometerArray
+    from gfimu.recording import Recording
+
+__all__ = ["convert"]
+
+
+@writes(reads=("source", "array"), target=RECORDING)
+def convert(
+    source: Recording | str | Path,
+    target: str | Path | None = None,
+    *,
+    array: AccelerometerArray | str | Path | None = None,
+) -> Recording:
+    """Read a recording in any format that is known, in m/s², and write it as CSV or Parquet.
+
+    Parameters
+    ----------
+    source : Recording, str or Path
+        The recording, or its file: CSV, Parquet or a MIMU4444 stream.
+    target : str or Path, optional
+        Recording to write, ``.csv`` or ``.parquet``.
+    array : AccelerometerArray, str or Path, optional
+        Array whose channels must be there; every channel found by default.
+
+    Raises
+    ------
+    InputError
+        If the source can't be read, or the target can't be written where it is asked for.
+    """
+    from gfimu.commands.opened import as_array
+    from gfimu.recording_formats import open_recording
+
+    drawing = None if array is None else as_array(array)
+    recording = open_recording(source, array=drawing) if isinstance(source, str | Path) else source
+    if target is not None:
+        recording.write(target)
+    return recording

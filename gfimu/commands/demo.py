@@ -1,0 +1,81 @@
+"""Under `gfimu demo`: the whole job on the paper's run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from gfimu.commands.diagnose import FOLDER as DIAGNOSIS
+from gfimu.outputs import OutputFolder, check_outputs, writes
+
+if TYPE_CHECKING:
+    from gfimu.commands.demo_steps import Row
+
+__all__ = ["DemoResult", "demo"]
+
+FOLDER = OutputFolder(("run.parquet", "estimate.parquet", "calibration.json", "run.rrd", "hidden.parquet"))
+"""What the folder of the demo holds, beside the folder ``diagnosis``."""
+
+
+@dataclass(frozen=True)
+class DemoResult:
+    """What the demo found and wrote.
+
+    Parameters
+    ----------
+    seed : int
+        Seed of everything left to chance.
+    rows : tuple of Row
+        The table: questions, answers, what to compare them with.
+    files : mapping of str to Path
+        What was written, by its meaning.
+    """
+
+    seed: int
+    rows: tuple[Row, ...]
+    files: Mapping[str, Path]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the content of ``gfimu demo --json``."""
+        return {
+            "seed": self.seed,
+            "results": [{"what": row.what} | row.figures for row in self.rows],
+            "files": dict(self.files),
+        }
+
+
+@writes(out=FOLDER)
+def demo(
+    out: str | Path = "gfimu-demo", *, seed: int = 1, report: Callable[[int, int, str], None] | None = None
+) -> DemoResult:
+    """Run the paper's experiment in simulation: geometry, recording, estimate, drift, picture, diagnosis.
+
+    Parameters
+    ----------
+    out : str or Path
+        Folder to write to; made if it isn't there.
+    seed : int
+        Seed of everything left to chance.
+    report : callable, optional
+        Called before each step with its number from 1, how many there are, and what it does.
+
+    Raises
+    ------
+    InputError
+        If the folder can't be written.
+    """
+    from gfimu.commands.demo_steps import STEPS, Demo
+
+    folder = Path(out)
+    check_outputs([("out", folder, FOLDER)])  # the default too
+    if folder.is_dir():
+        check_outputs([("out", folder / "diagnosis", DIAGNOSIS)])
+    folder.mkdir(exist_ok=True)
+    done = Demo(folder, seed)
+    for number, step in enumerate(STEPS, start=1):
+        if report is not None:
+            report(number, len(STEPS), (step.__doc__ or step.__name__).splitlines()[0].rstrip("."))
+        step(done)
+    return DemoResult(seed, tuple(done.rows), done.written)

@@ -1,0 +1,125 @@
+"""Under `gfimu design`: the experiment that best tells effects apart."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, cast
+
+from gfimu.errors import InputError
+from gfimu.outputs import SCENARIO, writes
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from gfimu.diagnosis.model import Effect, WorldModel
+    from gfimu.diagnosis.profile_search import Limits
+    from gfimu.diagnosis.proposal import Proposal
+    from gfimu.diagnosis.run import Run
+    from gfimu.recording import Recording
+    from sim.twin import Twin
+
+__all__ = ["design"]
+
+
+@writes(reads=("twin", "verdict", "run"), out=SCENARIO)
+def design(
+    twin: Twin | WorldModel | str | Path,
+    effects: Sequence[str | Effect] = (),
+    *,
+    verdict: str | Path | None = None,
+    run: Recording | str | Path | Sequence[Recording | str | Path] = (),
+    max_rate: float = 15.0,
+    max_acceleration: float = 20.0,
+    duration: float = 60.0,
+    upright: bool = False,
+    evaluations: int = 150,
+    seed: int = 0,
+    out: str | Path | None = None,
+    limits: Limits | None = None,
+    rng: np.random.Generator | None = None,
+    mountings: Mapping[str, tuple[float, float, float]] | None = None,
+    recorded: Sequence[Run] = (),
+    sample_rate: float | None = None,
+    report: Callable[[float, str], None] | None = None,
+) -> Proposal:
+    """Propose the table profile, or the mounting, that best tells effects apart.
+
+    Parameters
+    ----------
+    twin : Twin, str or Path
+        The simulation: a twin, its name or file.
+    effects : sequence of str or Effect
+        Effects to tell apart; or give ``verdict``.
+    verdict : str or Path, optional
+        Take the effects of an ambiguous verdict (``verdict.json``, or the folder that holds it).
+    run : Recording, path, or sequence of these
+        Recordings at hand, to be diagnosed together with the new one.
+    max_rate, max_acceleration : float
+        Largest rate, rad/s, and angular acceleration, rad/s², of the table.
+    duration : float
+        Length of the recording, s.
+    upright : bool
+        Never propose to mount the cube differently.
+    evaluations : int
+        How many profiles to try.
+    seed : int
+        Seed of the search.
+    out : str or Path, optional
+        Scenario file of the experiment to write, ``.toml``.
+    limits : Limits, optional
+        In place of ``max_rate``, ``max_acceleration`` and ``duration``.
+    rng : numpy.random.Generator, optional
+        In place of ``seed``.
+    mountings : mapping, optional
+        How else the cube may be mounted, in place of ``upright``; see `gfimu.diagnosis.design.MOUNTINGS`.
+    recorded : sequence of Run
+        Prepared recordings at hand, beside ``run``.
+    sample_rate : float, optional
+        Sample rate of the recording, Hz; the twin's by default.
+    report : callable, optional
+        Called with the share done, 0 to 1, and a line of text.
+
+    Raises
+    ------
+    InputError
+        If effects are missing, unknown or have no size, the twin is not driven by a table, the limits leave no
+        motion, or the output can't be written where it is asked for.
+    """
+    import numpy as np
+
+    from gfimu.atomic_file import write_text
+    from gfimu.commands.opened import as_runs, as_twin
+    from gfimu.diagnosis.ambiguity import open_effects
+    from gfimu.diagnosis.design import MOUNTINGS, Limits
+    from gfimu.diagnosis.design import design as propose
+    from gfimu.diagnosis.run import prepare_run
+    from gfimu.recording import Recording
+
+    if (verdict is None) == (not effects):
+        raise InputError("name effects to tell apart, or give --verdict: one of the two")
+    # Its effects are narrower than the protocol's.
+    model = cast("WorldModel", as_twin(cast("Twin | str | Path", twin)))
+    asked = list(effects) if verdict is None else open_effects(verdict, model)
+    at_hand = [
+        prepare_run(
+            Recording.read(item, array=model.array) if isinstance(item, str | Path) else item,
+            model,
+            name=str(item) if isinstance(item, str | Path) else f"run {number}",
+        )
+        for number, item in enumerate(as_runs(run), start=1)
+    ]
+    proposal = propose(
+        model,
+        asked,
+        limits=limits or Limits(max_rate, max_acceleration, duration),
+        rng=np.random.default_rng(seed) if rng is None else rng,
+        mountings={} if upright else MOUNTINGS if mountings is None else mountings,
+        recorded=[*recorded, *at_hand],
+        sample_rate=sample_rate or float(getattr(model, "sample_rate", 100.0)),
+        evaluations=evaluations,
+        report=report,
+    )
+    if out is not None:
+        write_text(out, proposal.to_toml())
+    return proposal

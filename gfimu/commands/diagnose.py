@@ -1,0 +1,128 @@
+"""Under `gfimu diagnose`: what the simulation gets wrong against recordings, and why."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, cast
+
+from gfimu.outputs import OutputFolder, writes
+
+if TYPE_CHECKING:
+    from gfimu.calibration.result import Calibration
+    from gfimu.diagnosis.model import WorldModel
+    from gfimu.diagnosis.verdict import Diagnosis
+    from gfimu.recording import Recording
+    from sim.twin import Twin
+
+__all__ = ["FOLDER", "diagnose", "write_result"]
+
+FOLDER = OutputFolder(("verdict.json", "twin.toml", "report.html", "diagnosis.rrd", "array.toml"))
+"""What the folder of a diagnosis holds."""
+
+
+@writes(reads=("recordings", "twin", "held_out", "calibration"), out=FOLDER)
+def diagnose(
+    recordings: Recording | str | Path | Sequence[Recording | str | Path],
+    twin: Twin | str | Path,
+    *,
+    out: str | Path | None = None,
+    held_out: Recording | str | Path | Sequence[Recording | str | Path] = (),
+    calibration: Calibration | str | Path | None = None,
+    names: Sequence[str] | None = None,
+    report: Callable[[float, str], None] | None = None,
+) -> Diagnosis:
+    """Show what a simulation gets wrong against recordings, name the cause, extend the simulation, measure the gain.
+
+    Parameters
+    ----------
+    recordings : Recording, path, or sequence of these
+        Runs of one rig, fitted together.
+    twin : Twin, str or Path
+        What the simulation believes: a twin, its name or file.
+    out : str or Path, optional
+        Folder for ``verdict.json``, ``twin.toml``, ``report.html`` and ``diagnosis.rrd``; made if it isn't there.
+    held_out : Recording, path, or sequence of these
+        Recordings kept for measuring the gain.
+    calibration : Calibration, str or Path, optional
+        Calibration of the unit, applied first.
+    names : sequence of str, optional
+        Names of the runs, for people; those of their files by default.
+    report : callable, optional
+        Called with the share done, 0 to 1, and a line of text.
+
+    Returns
+    -------
+    Diagnosis
+        The verdict with its numbers.
+
+    Raises
+    ------
+    InputError
+        If a recording is too short or lacks the reference that drives the twin, or the folder can't be written.
+    """
+    from gfimu.commands.opened import as_calibration, as_runs, as_twin
+    from gfimu.diagnosis.diagnose import diagnose as explain
+
+    runs, unseen = as_runs(recordings), as_runs(held_out)
+    model = as_twin(twin)
+    unit = None if calibration is None else as_calibration(calibration)
+    read, kept = ([_opened(run, model, unit) for run in group] for group in (runs, unseen))
+    if unit is not None and unit.positions:
+        model = replace(model, array=unit.calibrated_array(model.array), array_name="array.toml")
+    labels = _names(runs) if names is None else names
+    found = explain(read, cast("WorldModel", model), held_out=kept, names=labels, report=report)
+    if out is not None:
+        if report is not None:
+            report(0.99, "write the report")
+        write_result(out, found, read[0])
+    return found
+
+
+def write_result(out: str | Path, found: Diagnosis, recording: Recording) -> dict[str, Path]:
+    """Write the folder of a diagnosis, with the rig of the extended twin drawn by its MuJoCo model."""
+    import tomli_w
+
+    from gfimu.diagnosis.folder import write_diagnosis
+    from gfimu.model_files import list_models
+    from sim.drawing import rig_drawing
+
+    twin = cast("Twin", found.twin)
+    world = twin.world(mounting=recording.mounting_rotvec)
+    content = twin.to_dict()
+    more = {}
+    if content["array"] not in list_models("arrays"):
+        # An array file of the user's is named relative to the twin file: it moves with it.
+        content["array"] = "array.toml"
+        more["array.toml"] = twin.array.to_toml()
+    return write_diagnosis(
+        out,
+        found,
+        twin_toml=tomli_w.dumps(content),
+        more=more,
+        mounting=world.mount_rotvec,
+        cube_centre=world.cube_offset.tolist(),
+        shapes=None if twin.drive_source == "gyro" else rig_drawing(world),
+    )
+
+
+def _opened(recording: Recording | str | Path, model: Twin, unit: Calibration | None) -> Recording:
+    """Return a recording with the channels of the twin's array, calibrated where there is a calibration."""
+    from gfimu.calibration.run_file import open_calibrated_run
+    from gfimu.recording_formats import open_recording
+
+    if not isinstance(recording, str | Path):
+        return recording if unit is None else unit.apply(recording)
+    if unit is None:
+        return open_recording(recording, array=model.array)
+    return open_calibrated_run(recording, unit, model.array)[0]
+
+
+def _names(runs: Sequence[Recording | str | Path]) -> list[str]:
+    """Return names for people: file names where they tell the runs apart."""
+    paths = [Path(run) if isinstance(run, str | Path) else None for run in runs]
+    short = [path.name if path is not None else f"run {number}" for number, path in enumerate(paths, start=1)]
+    if len(set(short)) == len(short):
+        return short
+    return [str(path) if path is not None else name for path, name in zip(paths, short, strict=True)]

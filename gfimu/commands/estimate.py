@@ -1,0 +1,165 @@
+"""Under `gfimu estimate`: motion from a recording."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from gfimu.outputs import ESTIMATE, RERUN, writes
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from gfimu.array import AccelerometerArray
+    from gfimu.calibration.result import Calibration
+    from gfimu.estimation import Estimate
+    from gfimu.recording import Recording
+
+__all__ = ["EstimatedRun", "estimate", "estimate_run"]
+
+
+@dataclass(frozen=True)
+class EstimatedRun:
+    """An estimate with what it was made from.
+
+    Parameters
+    ----------
+    estimate : Estimate
+        The estimate.
+    recording : Recording
+        The recording, calibrated where that was asked for.
+    array : AccelerometerArray
+        The array, with the calibration's positions where it has some.
+    """
+
+    estimate: Estimate
+    recording: Recording
+    array: AccelerometerArray
+
+
+_READS = ("recording", "array", "calibration")
+
+
+@writes(reads=_READS, out=ESTIMATE, rrd=RERUN)
+def estimate(
+    recording: Recording | str | Path,
+    array: AccelerometerArray | str | Path | None = None,
+    *,
+    out: str | Path | None = None,
+    method: str = "integrate",
+    form: str = "auto",
+    rest_bias: bool = False,
+    calibration: Calibration | str | Path | None = None,
+    unknown_start: bool = False,
+    gyro: bool = False,
+    position: bool = False,
+    rrd: str | Path | None = None,
+    omega0: ArrayLike | None = (0.0, 0.0, 0.0),
+    quaternion0: ArrayLike | None = None,
+    noise_std: ArrayLike | None = None,
+    with_position: bool = False,
+    fuse_gyro: bool = False,
+) -> Estimate:
+    """Estimate p, α, ω, attitude and table angle at every sample of a recording.
+
+    Parameters
+    ----------
+    recording : Recording, str or Path
+        The recording, or its file.
+    array : AccelerometerArray, str or Path, optional
+        The array, its name or file; the recording's own by default.
+    out : str or Path, optional
+        Estimate file to write, ``.parquet`` or ``.csv``.
+    method : str
+        Method for the angular rate: integrate, algebraic, ml, filter or smoother.
+    form : {"auto", "linear", "joint", "recursive"}
+        How readings turn into α and p; see `gfimu.linear_solution`.
+    rest_bias : bool
+        Read the biases off the first rest (table level) and take them off.
+    calibration : Calibration, str or Path, optional
+        Calibration to apply first.
+    unknown_start : bool
+        The run may start spinning (filter, smoother); the same as ``omega0=None``.
+    gyro, fuse_gyro : bool
+        Fuse the recording's gyro (filter, smoother); two names of one argument.
+    position, with_position : bool
+        Integrate to velocity and position as well; two names of one argument.
+    rrd : str or Path, optional
+        Rerun recording to write.
+    omega0, quaternion0, noise_std
+        As for `gfimu.estimation.estimate`.
+
+    Raises
+    ------
+    InputError
+        As `gfimu.estimation.estimate`, or if an output can't be written where it is asked for.
+    GeometryError
+        If the array can't see all six motions; the message names those it can't.
+    """
+    return estimate_run(
+        recording,
+        array,
+        out=out,
+        rrd=rrd,
+        rest_bias=rest_bias,
+        calibration=calibration,
+        method=method,
+        form=form,
+        omega0=None if unknown_start else omega0,
+        quaternion0=quaternion0,
+        noise_std=noise_std,
+        fuse_gyro=gyro or fuse_gyro,
+        with_position=position or with_position,
+    ).estimate
+
+
+@writes(reads=_READS, out=ESTIMATE, rrd=RERUN)
+def estimate_run(
+    recording: Recording | str | Path,
+    array: AccelerometerArray | str | Path | None = None,
+    *,
+    out: str | Path | None = None,
+    rrd: str | Path | None = None,
+    rest_bias: bool = False,
+    calibration: Calibration | str | Path | None = None,
+    **options: Any,
+) -> EstimatedRun:
+    """Estimate and keep the recording and array beside the result, for a summary; ``options`` as `estimate`.
+
+    Raises
+    ------
+    InputError
+        As `estimate`.
+    """
+    from gfimu.estimation import estimate as solve
+    from gfimu.rest_bias import estimate_from_rest
+
+    run, geometry = _opened(recording, array, calibration)
+    found = (estimate_from_rest if rest_bias else solve)(run, geometry, **options)
+    if out is not None:
+        found.write(out)
+    if rrd is not None:
+        from gfimu.visual import write_run
+
+        write_run(rrd, run, geometry, estimate=found)
+    return EstimatedRun(found, run, geometry)
+
+
+def _opened(
+    recording: Recording | str | Path,
+    array: AccelerometerArray | str | Path | None,
+    calibration: Calibration | str | Path | None,
+) -> tuple[Recording, AccelerometerArray]:
+    """Return recording and array, corrected by the calibration where there is one."""
+    from gfimu.commands.opened import as_array, as_calibration, as_run
+
+    if calibration is None:
+        return as_run(recording, array)
+    unit = as_calibration(calibration)
+    if isinstance(recording, str | Path):
+        from gfimu.calibration.run_file import open_calibrated_run
+
+        return open_calibrated_run(recording, unit, None if array is None else as_array(array))
+    run, geometry = as_run(recording, array)
+    return unit.apply(run), unit.calibrated_array(geometry)

@@ -1,0 +1,110 @@
+"""Under `gfimu live`: the rate filter on a stream of samples."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from gfimu.errors import InputError
+
+if TYPE_CHECKING:
+    from gfimu.array import AccelerometerArray
+
+__all__ = ["live"]
+
+
+def live(
+    array: AccelerometerArray | str | Path | None = None,
+    rate: float | None = None,
+    *,
+    source: str | Path | Iterable[str] = "-",
+    follow: bool = False,
+    scale_std: float = 0.0,
+    bias_std: float | None = None,
+    unknown_start: bool = False,
+    gyro: bool = False,
+) -> Iterator[str]:
+    """Estimate the angular rate while samples arrive: CSV lines in, one JSON line per sample out.
+
+    Parameters
+    ----------
+    array : AccelerometerArray, str or Path, optional
+        The array, its name or file; by default the one that the stream's comment lines state.
+    rate : float, optional
+        Nominal sample rate, Hz; by default the one that the stream's comment lines state.
+    source : str, Path or iterable of str
+        Where samples come from (``--from``): ``-`` for standard input, a recording, ``host:port`` of a TCP server, or
+        the lines.
+    follow : bool
+        With a recording: go on reading while `gfimu.record` writes it.
+    scale_std : float
+        Uncertainty of the scale factors, a ratio.
+    bias_std : float, optional
+        Uncertainty of the biases, m/s²; the data sheets' by default.
+    unknown_start : bool
+        Whether the body may be spinning already.
+    gyro : bool
+        Whether to fuse the stream's gyro columns.
+
+    Returns
+    -------
+    iterator of str
+        JSON lines, as `gfimu.rate.stream.filter_stream`; an estimate comes two samples after its own.
+
+    Raises
+    ------
+    InputError
+        If array or rate are stated nowhere, the rate is not positive, the source can't be opened or its first line that
+        is no comment doesn't name the columns.
+    """
+    import numpy as np
+
+    from gfimu.commands.opened import as_array
+    from gfimu.rate.kalman import FilterSettings
+    from gfimu.rate.sensing import SensorErrors
+    from gfimu.rate.stream import filter_stream, read_head
+
+    metadata, lines = read_head(_lines(source, follow=follow) if isinstance(source, str | Path) else source)
+    if rate is None:
+        rate = metadata.get("sample_rate_hz", metadata.get("time_stamp_rate_hz"))
+    array = array or str(metadata.get("array", ""))
+    if not array:
+        raise InputError("--array is missing, and the stream does not state its array; give it")
+    if rate is None:
+        raise InputError("--rate is missing, and the stream does not state its sample rate; give it")
+    if not isinstance(rate, int | float) or not rate > 0:
+        raise InputError(f"--rate {rate}: must be positive, Hz")
+    geometry = as_array(array)
+    biases = {} if bias_std is None else {"bias_std": bias_std}
+    errors = SensorErrors.from_parts(geometry, rate, scale_std=scale_std, **biases)
+    settings = FilterSettings(start_omega=None) if unknown_start else FilterSettings(start_omega=np.zeros(3))
+    return filter_stream(lines, geometry, errors, 1.0 / rate, settings, fuse_gyro=gyro)
+
+
+def _lines(source: str | Path, *, follow: bool) -> Iterator[str]:
+    """Lines of the source as they arrive."""
+    from gfimu.rate.stream_source import recording_lines
+
+    if source == "-":
+        return iter(sys.stdin.readline, "")
+    if Path(source).is_file():
+        return recording_lines(source, follow=follow)
+    host, colon, port = str(source).removeprefix("socket://").rpartition(":")
+    if not colon or not port.isdigit():
+        raise InputError(f"--from {str(source)!r}: no such file; give a recording, - for standard input, or host:port")
+    return _socket_lines(str(source), host, int(port))
+
+
+def _socket_lines(source: str, host: str, port: int) -> Iterator[str]:
+    """Lines that a TCP server sends."""
+    import socket
+
+    try:
+        connection = socket.create_connection((host, port), timeout=10)
+    except OSError as error:
+        raise InputError(f"--from {source!r}: {error.strerror or error}; start the server first") from None
+    connection.settimeout(None)
+    with connection, connection.makefile("r", encoding="utf-8", errors="replace") as stream:
+        yield from stream

@@ -1,0 +1,88 @@
+"""What the functions accept in place of an object: a path, or a name of a shipped model."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from gfimu.errors import InputError
+
+if TYPE_CHECKING:
+    from gfimu.array import AccelerometerArray
+    from gfimu.calibration.result import Calibration
+    from gfimu.recording import Recording
+    from sim.twin import Twin
+
+__all__ = [
+    "array_of",
+    "as_array",
+    "as_calibration",
+    "as_run",
+    "as_runs",
+    "as_twin",
+]
+
+
+def as_array(array: AccelerometerArray | str | Path) -> AccelerometerArray:
+    """Return an array given as such, by name, as an array file (.toml), or as the sites of an MJCF file (.xml)."""
+    if not isinstance(array, str | Path):
+        return array
+    if str(array).endswith(".xml"):
+        from sim.mjcf_array import array_from_mjcf
+
+        return array_from_mjcf(array)
+    from gfimu.array import AccelerometerArray
+
+    return AccelerometerArray.load(array)
+
+
+def array_of(recording: Recording) -> AccelerometerArray:
+    """Return the array that a recording names.
+
+    Raises
+    ------
+    InputError
+        If it names none, or one that is not known here.
+    """
+    name = recording.metadata.get("array")
+    if not isinstance(name, str):
+        raise InputError("the recording does not name its array; give it as array")
+    return as_array(name)
+
+
+def as_run(
+    recording: Recording | str | Path, array: AccelerometerArray | str | Path | None
+) -> tuple[Recording, AccelerometerArray]:
+    """Return a recording with its array; the recording's own array if none is given."""
+    drawing = None if array is None else as_array(array)
+    if isinstance(recording, str | Path):
+        from gfimu.recording_formats import open_run
+
+        return open_run(recording, drawing)
+    return recording, drawing or array_of(recording)
+
+
+def as_calibration(calibration: Calibration | str | Path) -> Calibration:
+    """Return a calibration given as such or as a file."""
+    if not isinstance(calibration, str | Path):
+        return calibration
+    from gfimu.calibration.result import load_calibration
+
+    return load_calibration(calibration)
+
+
+def as_twin(twin: Twin | str | Path) -> Twin:
+    """Return a twin given as such, by name or as a twin file."""
+    if not isinstance(twin, str | Path):
+        return twin
+    from sim.twin import Twin
+
+    return Twin.load(twin)
+
+
+def as_runs(recordings: Recording | str | Path | Iterable[Recording | str | Path]) -> list[Recording | str | Path]:
+    """Return recordings given as one of them or several."""
+    from gfimu.recording import Recording
+
+    return [recordings] if isinstance(recordings, Recording | str | Path) else list(recordings)

@@ -1,0 +1,66 @@
+"""Under `gfimu score`: compare array geometries."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from gfimu.array import AccelerometerArray
+    from gfimu.scoring import Score
+
+__all__ = ["score"]
+
+_AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+
+
+def score(
+    arrays: AccelerometerArray | str | Path | Sequence[AccelerometerArray | str | Path] | None = None,
+    *,
+    length_unit_m: float | None = None,
+    speed_rad_s: float = math.tau,
+    spin_axis: str = "z",
+    noise_m_s2: float = 0.0287,
+    omega_rad_s: ArrayLike | None = None,
+) -> list[Score]:
+    """Score the geometry of one or several arrays.
+
+    Parameters
+    ----------
+    arrays : AccelerometerArray, str, Path, or sequence of these, optional
+        Arrays, names of shipped arrays, array files (.toml) or MJCF files (.xml); all shipped arrays by default.
+    length_unit_m : float, optional
+        Length that counts as 1 for all of them; without it each array's own unit (half the edge of a cube).
+    speed_rad_s : float
+        Angular speed at which the rate bound is taken, rad/s.
+    spin_axis : {"x", "y", "z"}
+        Body axis of that spin.
+    noise_m_s2 : float
+        Standard deviation of every channel at which the rate bound is taken; the default is an ADXL345 at 100 Hz.
+    omega_rad_s : array_like, shape (3,), optional
+        Angular rate in place of ``speed_rad_s`` and ``spin_axis``.
+
+    Raises
+    ------
+    GeometryError
+        If an array can't see all six motions; the message names the motions.
+    InputError
+        If an array is unknown or an argument is out of range.
+    """
+    from gfimu.array import AccelerometerArray
+    from gfimu.commands.opened import as_array
+    from gfimu.errors import unknown_name
+    from gfimu.model_files import list_models
+    from gfimu.scoring import score as score_arrays
+
+    if spin_axis not in _AXES:
+        raise unknown_name("axis", spin_axis, _AXES)
+    given = [arrays] if isinstance(arrays, AccelerometerArray | str | Path) else list(arrays or list_models("arrays"))
+    omega = [speed_rad_s * component for component in _AXES[spin_axis]] if omega_rad_s is None else omega_rad_s
+    return score_arrays(
+        [as_array(item) for item in given], length_unit_m=length_unit_m, omega_rad_s=omega, noise_m_s2=noise_m_s2
+    )

@@ -1,0 +1,65 @@
+"""Under `gfimu view`: a run in the rerun viewer."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from gfimu.outputs import RERUN, check_outputs, writes
+
+if TYPE_CHECKING:
+    from gfimu.array import AccelerometerArray
+
+__all__ = ["view"]
+
+
+@writes(reads=("file", "array"), out=RERUN)
+def view(
+    file: str | Path,
+    *,
+    array: AccelerometerArray | str | Path | None = None,
+    out: str | Path | None = None,
+    on_picture: Callable[[Path], None] | None = None,
+) -> Path:
+    """Open a run in the rerun viewer, or write its picture.
+
+    Parameters
+    ----------
+    file : str or Path
+        A ``.rrd`` file, or a recording to make one from; its picture goes beside it as ``FILE.view.rrd``.
+    array : AccelerometerArray, str or Path, optional
+        The array, its name or file; the recording's own by default.
+    out : str or Path, optional
+        Write the ``.rrd`` here and don't open it.
+    on_picture : callable, optional
+        Called with the rerun recording once it is written, before the viewer opens.
+
+    Returns
+    -------
+    Path
+        The rerun recording.
+
+    Raises
+    ------
+    InputError
+        If the file can't be read, or the output can't be written where it is asked for.
+    GfimuError
+        If this machine has no display, or the viewer fails; the message says what to do instead.
+    """
+    from gfimu.commands.opened import as_array
+    from gfimu.visual.picture import picture_of, picture_path
+    from gfimu.visual.viewer import open_viewer
+
+    source = Path(file)
+    if source.suffix == ".rrd" and out is None:
+        open_viewer(source)
+        return source
+    picture = picture_path(source) if out is None else Path(out)
+    check_outputs([("out", picture, RERUN)], [source])
+    picture_of(source, picture, array=None if array is None else as_array(array))
+    if on_picture is not None:
+        on_picture(picture)
+    if out is None:
+        open_viewer(picture)
+    return picture
