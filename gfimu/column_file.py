@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from gfimu.atomic_file import atomic_path
 from gfimu.errors import InputError
 
-__all__ = ["ColumnFile", "open_columns", "write_columns"]
+__all__ = ["ColumnFile", "head_line", "open_columns", "write_columns"]
 
 _BLOCK_BYTES = 1 << 20
 _BLOCK_ROWS = 1 << 16
@@ -74,6 +74,12 @@ def open_columns(path: str | Path) -> ColumnFile:
     if repeated:
         raise InputError(f"{file}: column {repeated[0]!r} appears twice; keep one")
     return table
+
+
+def head_line(line: str) -> dict[str, Any]:
+    """Return the metadata of one ``# key: value`` line at the head of a CSV file; empty if it holds none."""
+    key, colon, value = line.lstrip("# ").partition(":")
+    return {key.strip(): _from_json(value.strip())} if colon else {}
 
 
 def write_columns(path: str | Path, columns: Mapping[str, NDArray[Any]], metadata: Mapping[str, Any]) -> None:
@@ -191,9 +197,7 @@ class _CsvColumns:
                     if line.strip() and not line.startswith("#"):
                         header = line
                         break
-                    key, colon, value = line.lstrip("# ").partition(":")
-                    if colon:
-                        self.metadata[key.strip()] = _from_json(value.strip())
+                    self.metadata |= head_line(line)
         except UnicodeDecodeError:
             raise self._binary() from None
         if not header:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gfimu.array import AccelerometerArray
+from gfimu.carried_array import array_metadata, carried_array, with_carried_array
 from gfimu.column_file import write_columns
 from gfimu.errors import InputError, UnitError
 from gfimu.recording_file import read_recording_file
@@ -39,7 +41,7 @@ class Recording:
         References by their SI column names: ``tacho_rad_s``, ``command_rad_s``, ``angle_rad``,
         ``temperature_degC``, ``gyro_x_rad_s`` and so on; NaN where one has no value.
     metadata : mapping
-        Array, part, sample rate, scenario, seed, software version, mounting.
+        Array (name and text of its file), part, sample rate, scenario, seed, software version, mounting.
     extra : mapping of str to ndarray
         Columns that the format does not know, kept as they came.
     unit : {"m_s2", "lsb"}
@@ -81,6 +83,14 @@ class Recording:
         """Time from the first to the last sample, s."""
         return float(self.t_s[-1] - self.t_s[0]) if len(self.t_s) else 0.0
 
+    @cached_property
+    def array(self) -> AccelerometerArray | None:
+        """The array that the recording carries in its metadata, or only names there; None if it does neither.
+
+        Raises `InputError` if its text is damaged or its name unknown.
+        """
+        return carried_array(self.metadata)
+
     @property
     def mounting_rotvec(self) -> NDArray[np.float64]:
         """Rotation vector by which the cube was turned from upright before this run, rad, shape (3,)."""
@@ -113,6 +123,12 @@ class Recording:
         """Return the samples with start_s ≤ t < stop_s, as views."""
         first, last = np.searchsorted(self.t_s, [start_s, stop_s])
         return self.slice(int(first), int(last))
+
+    def carrying(self, array: AccelerometerArray) -> Recording:
+        """Return the recording with ``array`` as the one that it carries."""
+        others = {key: value for key, value in self.metadata.items() if key != "parts_toml"}
+        part = {"part": array.chips[0].part} if "part" in others else {}
+        return replace(self, metadata=others | part | array_metadata(array))
 
     def for_array(self, array: AccelerometerArray) -> NDArray[np.float64]:
         """Return the readings in the channel order of ``array``, shape (n, c), m/s².
@@ -161,12 +177,14 @@ class Recording:
     def write(self, path: str | Path) -> None:
         """Write to a CSV or Parquet file (by extension), whole or not at all.
 
+        The file carries the array in its metadata; one of ``models/arrays`` that is only named is added.
+
         Raises
         ------
         InputError
             If the extension is neither ``.csv`` nor ``.parquet``, or the folder can't be written to.
         """
-        write_columns(path, self.to_columns(), self.metadata)
+        write_columns(path, self.to_columns(), with_carried_array(self.metadata, self.channels))
 
     def to_columns(self) -> dict[str, NDArray[Any]]:
         """Return the columns of the file, by name with unit."""
@@ -191,5 +209,5 @@ class Recording:
             np.asarray(readings, dtype=float),
             array.channels,
             {key: np.asarray(value, dtype=float) for key, value in (reference or {}).items()},
-            {"array": array.name, **(metadata or {})},
+            {**array_metadata(array), **(metadata or {})},
         )

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.array import AccelerometerArray
+from gfimu.carried_array import carried_array
 from gfimu.column_file import ColumnFile, open_columns
 from gfimu.errors import InputError, UnitError
 from gfimu.part import Part
@@ -71,7 +72,7 @@ def read_recording_file(path: str | Path, array: AccelerometerArray | None, unit
         _refuse_other_time_unit(table)
         raise InputError(f"{table.file}: column t_s is missing; every recording needs the sample time in seconds")
     references = _reference_columns(table)
-    channels = _channel_columns(table, array, unit)
+    channels = _channel_columns(table, array, _own_array(table), unit)
     known = {"t_s", *(column.source for column in (*channels, *references))}
 
     time = np.empty(table.max_rows)
@@ -102,11 +103,23 @@ def read_recording_file(path: str | Path, array: AccelerometerArray | None, unit
     )
 
 
-def _channel_columns(table: ColumnFile, array: AccelerometerArray | None, unit: str) -> list[_Column]:
+def _own_array(table: ColumnFile) -> AccelerometerArray | None:
+    """Return the array whose text the file carries; None without one, or where it is damaged."""
+    try:
+        return carried_array(table.metadata) if "array_toml" in table.metadata else None
+    except InputError:
+        return None  # reported where the array itself is needed
+
+
+def _channel_columns(
+    table: ColumnFile, array: AccelerometerArray | None, own: AccelerometerArray | None, unit: str
+) -> list[_Column]:
     """Find the columns of the channels; an unknown unit, two units of one channel or a missing one is an error."""
     found: dict[str, tuple[str, str]] = {}
     for name in table.names:
-        channel, suffix = _split_channel(name, array)
+        channel, suffix = _split_channel(name, array or own)
+        if channel is None and array is None:
+            channel, suffix = _split_channel(name, None)
         if channel is None:
             continue
         if suffix not in READING_UNITS:
@@ -128,7 +141,7 @@ def _channel_columns(table: ColumnFile, array: AccelerometerArray | None, unit: 
             "or name the array it was made with"
         )
     return [
-        _Column(found[channel][0], channel, _reading_factor(table, array, channel, found[channel][1], unit))
+        _Column(found[channel][0], channel, _reading_factor(table, array or own, channel, found[channel][1], unit))
         for channel in wanted
     ]
 
@@ -161,12 +174,16 @@ def _lsb_size(table: ColumnFile, array: AccelerometerArray | None, channel: str)
         if not isinstance(size, int | float) or not 0 < size < np.inf:
             raise InputError(f"{table.file}: metadata lsb_m_s2 is {size!r}; give the size of one count in m/s²")
         return float(size)
+    if array is not None and channel in array.channels:
+        chip = next(chip for chip in array.chips if channel in chip.channels)
+        return Part.load(chip.part, array.part_files).lsb
     part = table.metadata.get("part")
-    if array is not None:
-        part = next(chip.part for chip in array.chips if channel in chip.channels)
-    if part is None:
-        return _DEFAULT_LSB
-    return Part.load(str(part)).lsb
+    if part is not None:
+        files = table.metadata.get("parts_toml")
+        return Part.load(str(part), files if isinstance(files, dict) else None).lsb
+    if "array_toml" in table.metadata:
+        carried_array(table.metadata, source=table.file)  # raises: a damaged text is no reason to guess the size
+    return _DEFAULT_LSB
 
 
 def _reference_columns(table: ColumnFile) -> list[_Column]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from gfimu.array import AccelerometerArray
+from gfimu.carried_array import carried_array, check_all_channels
 from gfimu.column_file import open_columns
 from gfimu.errors import InputError
 from gfimu.mimu4444 import is_mimu4444, read_mimu4444
@@ -32,16 +33,22 @@ def open_run(path: str | Path, array: AccelerometerArray | None = None) -> tuple
     path : str or Path
         The recording.
     array : AccelerometerArray, optional
-        The array; by default the one that the recording names.
+        The array; by default the one that the recording carries or, as older ones do, names.
 
     Raises
     ------
     InputError
-        As `open_recording`; also if the array is neither given nor named in the recording, or unknown.
+        As `open_recording`; also if the array is neither given nor in the recording, is damaged there, or does not
+        have the channels of the recording.
     """
-    if array is None:
-        name = "mimu4444" if is_mimu4444(path) else open_columns(path).metadata.get("array")
-        if not isinstance(name, str):
-            raise InputError(f"{path}: the recording does not name its array; give it with --array")
-        array = AccelerometerArray.load(name)
-    return open_recording(path, array=array), array
+    if array is not None:
+        return open_recording(path, array=array), array
+    if is_mimu4444(path):
+        return read_mimu4444(path), AccelerometerArray.load("mimu4444")
+    table = open_columns(path)
+    own = carried_array(table.metadata, source=path, beside=Path(path).parent)
+    if own is None:
+        raise InputError(f"{path}: the recording does not name its array; give it with --array")
+    if "array_toml" in table.metadata:
+        check_all_channels(table.names, own, path)
+    return open_recording(path, array=own), own

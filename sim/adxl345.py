@@ -221,8 +221,8 @@ class Sensor:
             If a part is unknown or does not have these settings.
         """
         if part is not None:
-            array = replace(array, chips=tuple(replace(chip, part=part) for chip in array.chips))
-        sheets = {name: DataSheet.load(name) for name in {chip.part for chip in array.chips}}
+            array = array.with_part(part)
+        sheets = {name: DataSheet.load(name, array.part_files) for name in {chip.part for chip in array.chips}}
         for sheet in sheets.values():
             settings.check(sheet)
         errors = draw_errors(array, sheets, supply=settings.supply, rng=rng)

@@ -30,9 +30,15 @@ def _convert(
 
     Example: gfimu convert exp_1.bin.gz run.parquet
     """
+    from gfimu.carried_array import carried_array
     from gfimu.recording_formats import open_recording
 
-    recording = open_recording(source, array=None if array is None else load_array(array))
+    geometry = None if array is None else load_array(array)
+    recording = open_recording(source, array=geometry)
+    if geometry is not None:
+        recording = recording.carrying(geometry)
+    elif "array_toml" in recording.metadata:
+        carried_array(recording.metadata, source=source)  # a damaged one is not passed on
     recording.write(target)
     figures = {
         "samples": len(recording),

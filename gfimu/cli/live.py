@@ -19,8 +19,11 @@ def register(app: typer.Typer) -> None:
 
 
 def _live(
-    array: Annotated[str, typer.Option("--array", help="Array: a name, a .toml file or MJCF sites (.xml).")],
     rate: Annotated[float, typer.Option("--rate", help="Nominal sample rate, Hz.")],
+    array: Annotated[
+        str | None,
+        typer.Option("--array", help="Array: a name, a .toml file or MJCF sites (.xml); else the stream's own."),
+    ] = None,
     source: Annotated[
         str, typer.Option("--from", help="Where samples come from: - (standard input) or host:port of a TCP server.")
     ] = "-",
@@ -36,23 +39,33 @@ def _live(
     """Estimate the angular rate while samples arrive: CSV lines in, one JSON line per sample out.
 
     The first line names the columns as in a recording (t_s, a11_m_s2, …). An estimate comes two samples after its own.
+    The head of a recording (`# array_toml: …`) may come first; it carries the array.
 
-    Example: tail -f run.csv | gfimu live --array cube12 --rate 100
+    Example: tail -n +1 -f run.csv | gfimu live --rate 100
     """
     import numpy as np
 
+    from gfimu.carried_array import carried_array
     from gfimu.errors import InputError
     from gfimu.rate.kalman import FilterSettings
     from gfimu.rate.sensing import SensorErrors
-    from gfimu.rate.stream import filter_stream
+    from gfimu.rate.stream import filter_stream, split_head
 
     if not rate > 0:
         raise InputError(f"--rate {rate:g}: must be positive, Hz")
-    geometry = load_array(array)
+    lines = _lines(source)
+    if array is not None:
+        geometry = load_array(array)
+    else:
+        metadata, lines = split_head(lines)
+        own = carried_array(metadata, source="the stream")
+        if own is None:
+            raise InputError("the stream does not carry its array (# array_toml: … before the columns); give --array")
+        geometry = own
     biases = {} if bias_std is None else {"bias_std": bias_std}
     errors = SensorErrors.from_parts(geometry, rate, scale_std=scale_std, **biases)
     settings = FilterSettings(start_omega=None) if unknown_start else FilterSettings(start_omega=np.zeros(3))
-    for line in filter_stream(_lines(source), geometry, errors, 1.0 / rate, settings, fuse_gyro=gyro):
+    for line in filter_stream(lines, geometry, errors, 1.0 / rate, settings, fuse_gyro=gyro):
         sys.stdout.write(line + "\n")
         sys.stdout.flush()
 

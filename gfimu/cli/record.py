@@ -55,7 +55,7 @@ def _record(
     interactive = console.is_terminal and not json
     live = None
     if interactive or rrd is not None or view:
-        lsb = Part.load(carried.chips[0].part).lsb
+        lsb = Part.load(carried.chips[0].part, carried.part_files).lsb
         show = (lambda text: console.print(text, end="\r", highlight=False)) if interactive else None
         live = LiveView(carried, lsb, on_text=show, rrd=rrd, viewer=view)
     try:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import itertools
 import json
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -11,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from gfimu.array import AccelerometerArray
+from gfimu.column_file import head_line
 from gfimu.errors import InputError
 from gfimu.rate.kalman import FilterSettings
 from gfimu.rate.live import LiveRateFilter
@@ -18,7 +20,7 @@ from gfimu.rate.result import RateEstimate
 from gfimu.rate.sensing import SensorErrors
 from gfimu.units import READING_UNITS
 
-__all__ = ["StreamLayout", "filter_stream"]
+__all__ = ["StreamLayout", "filter_stream", "split_head"]
 
 _GYRO = ("gyro_x_rad_s", "gyro_y_rad_s", "gyro_z_rad_s")
 
@@ -73,6 +75,16 @@ class StreamLayout:
             factors.append(factor)
         gyro = tuple(columns.index(name) for name in _GYRO) if all(name in columns for name in _GYRO) else ()
         return cls(columns.index("t_s"), tuple(places), tuple(factors), gyro, len(columns))
+
+
+def split_head(lines: Iterator[str]) -> tuple[dict[str, Any], Iterator[str]]:
+    """Read the ``# key: value`` lines at the head of a stream; return them and the lines from the columns' names on."""
+    metadata: dict[str, Any] = {}
+    for line in lines:
+        if line.strip() and not line.startswith("#"):
+            return metadata, itertools.chain([line], lines)
+        metadata |= head_line(line)
+    return metadata, iter(())
 
 
 def filter_stream(
