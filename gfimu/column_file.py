@@ -92,6 +92,8 @@ def write_columns(path: str | Path, columns: Mapping[str, NDArray[Any]], metadat
     InputError
         If the extension is neither ``.csv`` nor ``.parquet``, a metadata key can't stand in a CSV line, or the folder
         can't be written to.
+    GfimuError
+        If writing fails, as on a full disk.
     """
     file = Path(path)
     if file.suffix == ".parquet":

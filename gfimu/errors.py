@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-__all__ = ["GeometryError", "GfimuError", "InputError", "UnitError", "unknown_name"]
+__all__ = ["CorruptValueWarning", "GeometryError", "GfimuError", "InputError", "UnitError", "unknown_name"]
 
 
 class GfimuError(Exception):
@@ -21,6 +21,10 @@ class UnitError(InputError):
 
 class GeometryError(InputError):
     """A sensor geometry that can't see the motions asked for."""
+
+
+class CorruptValueWarning(UserWarning):
+    """Values of a recording that can be no measurement were left out; commands print it as one line."""
 
 
 def unknown_name(kind: str, name: str, valid: Iterable[str]) -> InputError:

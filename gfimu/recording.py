@@ -92,6 +92,13 @@ class Recording:
         return carried_array(self.metadata)
 
     @property
+    def corrupt(self) -> dict[str, int]:
+        """How many values were left out of each channel or reference as they can be no measurement; empty if none."""
+        counts = self.metadata.get("corrupt_values")
+        items = counts.items() if isinstance(counts, Mapping) else ()
+        return {str(name): count for name, count in items if isinstance(count, int)}
+
+    @property
     def mounting_rotvec(self) -> NDArray[np.float64]:
         """Rotation vector by which the cube was turned from upright before this run, rad, shape (3,)."""
         value = self.metadata.get("mounting_rotvec_rad", [0.0, 0.0, 0.0])
@@ -155,6 +162,9 @@ class Recording:
     @classmethod
     def read(cls, path: str | Path, *, array: AccelerometerArray | None = None, unit: str = "m_s2") -> Recording:
         """Read a recording from a CSV or Parquet file.
+
+        Values that can be no measurement (infinite, or far beyond any part's range) become NaN with a
+        `gfimu.errors.CorruptValueWarning`, and are counted in `corrupt`.
 
         Parameters
         ----------

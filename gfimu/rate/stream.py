@@ -14,6 +14,7 @@ import numpy as np
 from gfimu.array import AccelerometerArray
 from gfimu.column_file import head_line
 from gfimu.errors import InputError
+from gfimu.plausible import largest_of_array
 from gfimu.rate.kalman import FilterSettings
 from gfimu.rate.live import LiveRateFilter
 from gfimu.rate.result import RateEstimate
@@ -130,6 +131,7 @@ def filter_stream(
     """
     live = LiveRateFilter(array, errors, period, settings, gyro=fuse_gyro)
     layout: StreamLayout | None = None
+    largest = largest_of_array(array)
     reported: dict[str, Any] = live.report.to_dict()
     for line in lines:
         if not line.strip() or line.startswith("#"):
@@ -143,6 +145,7 @@ def filter_stream(
         try:
             values = _numbers(cells, layout)
             readings = values[list(layout.channels)] * layout.factors
+            readings[np.abs(readings) > largest] = np.nan  # a corrupt value counts as missing
             gyro = values[list(layout.gyro)] if fuse_gyro else None
             found = live.push(values[layout.time], readings, gyro)
         except InputError as error:
