@@ -32,6 +32,7 @@ from gfimu.rate.problem import RateMethod, RateProblem, RateSolution
 from gfimu.rate.sensing import SensorErrors
 from gfimu.recording import Recording
 from gfimu.rest_navigation import navigate_with_rest
+from gfimu.table import ArrowStream, Tabular
 
 __all__ = ["METHODS", "Estimate", "estimate"]
 
@@ -41,7 +42,7 @@ _LEVEL_SECONDS = 1.0
 
 
 @dataclass(frozen=True)
-class Estimate:
+class Estimate(Tabular):
     """Motion of the body at each sample of a recording; NaN where it could not be found.
 
     Parameters
@@ -97,8 +98,8 @@ class Estimate:
         write_columns(path, self.to_columns(), self.metadata)
 
     @classmethod
-    def read(cls, path: str | Path) -> Estimate:
-        """Read an Estimate file.
+    def read(cls, path: str | Path | ArrowStream) -> Estimate:
+        """Read an Estimate file, or a table object with its columns.
 
         Raises
         ------

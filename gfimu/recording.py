@@ -21,12 +21,13 @@ from gfimu.carried_array import array_metadata, carried_array, with_carried_arra
 from gfimu.column_file import write_columns
 from gfimu.errors import InputError, UnitError
 from gfimu.recording_file import read_recording_file
+from gfimu.table import ArrowStream, Tabular
 
 __all__ = ["Recording"]
 
 
 @dataclass(frozen=True)
-class Recording:
+class Recording(Tabular):
     """Samples of an accelerometer array and its references.
 
     Parameters
@@ -160,16 +161,20 @@ class Recording:
         return self.readings[:, [self.channels.index(name) for name in array.channels]]
 
     @classmethod
-    def read(cls, path: str | Path, *, array: AccelerometerArray | None = None, unit: str = "m_s2") -> Recording:
-        """Read a recording from a CSV or Parquet file.
+    def read(
+        cls, path: str | Path | ArrowStream, *, array: AccelerometerArray | None = None, unit: str = "m_s2"
+    ) -> Recording:
+        """Read a recording from a CSV or Parquet file, or from a table of pandas, polars or pyarrow.
 
         Values that can be no measurement (infinite, or far beyond any part's range) become NaN with a
         `gfimu.errors.CorruptValueWarning`, and are counted in `corrupt`.
 
         Parameters
         ----------
-        path : str or Path
-            ``.csv`` or ``.parquet`` file, one row per sample, unit in each column's name.
+        path : str, Path or table
+            ``.csv`` or ``.parquet`` file, one row per sample, unit in each column's name; or a table object with the
+            same columns: a pandas table (``attrs`` are the metadata; an index named ``t_s`` is the time), or anything
+            with ``__arrow_c_stream__``.
         array : AccelerometerArray, optional
             The array whose channels must be there; by default every channel found is read.
         unit : {"m_s2", "lsb"}

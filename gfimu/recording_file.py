@@ -18,6 +18,7 @@ from gfimu.column_file import ColumnFile, open_columns
 from gfimu.errors import CorruptValueWarning, InputError, UnitError
 from gfimu.part import Part
 from gfimu.plausible import MOST_CORRUPT, largest_of_array, largest_of_part, largest_reference
+from gfimu.table import ArrowStream
 from gfimu.units import READING_UNITS, REFERENCE_UNITS, STANDARD_GRAVITY
 
 __all__ = ["RecordingContent", "read_recording_file"]
@@ -52,13 +53,15 @@ class _Column:
     largest: float
 
 
-def read_recording_file(path: str | Path, array: AccelerometerArray | None, unit: str) -> RecordingContent:
-    """Read a CSV or Parquet file block by block into arrays of its final size.
+def read_recording_file(
+    path: str | Path | ArrowStream | ColumnFile, array: AccelerometerArray | None, unit: str
+) -> RecordingContent:
+    """Read a CSV or Parquet file block by block, or a table object, into arrays of its final size.
 
     Parameters
     ----------
-    path : str or Path
-        The file.
+    path : str, Path or table
+        The file, or a table (see `gfimu.table_columns.TableColumns`).
     array : AccelerometerArray or None
         The array whose channels must be there; None takes every channel found.
     unit : {"m_s2", "lsb"}

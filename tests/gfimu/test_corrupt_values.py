@@ -43,10 +43,9 @@ def test_they_are_left_out_and_counted(tmp_path, suffix, unit, place, found):
         file.write_text(file.read_text().replace("a12_m_s2", "a12_mg"))
     with pytest.warns(CorruptValueWarning) as caught:
         read = Recording.read(file)
-    assert [str(one.message) for one in caught] == [
-        f"{file}: left out {found + 1} corrupt values (a12 {found}, tacho_rad_s 1), the first at "
-        f"{place}, column a12_{unit}: 1e+19"
-    ]
+    counts = f"{found + 1} corrupt values (a12 {found}, tacho_rad_s 1)"
+    message = f"{file}: left out {counts}, the first at {place}, column a12_{unit}: 1e+19"
+    assert [str(one.message) for one in caught] == [message]
     assert read.corrupt == {"a12": found, "tacho_rad_s": 1}
     assert np.isnan(read.readings[100 : 100 + found, 1]).all()
     assert np.isnan(read.readings).sum() == found
