@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from gfimu.errors import InputError
 from gfimu.model_files import find_model, read_toml
 from gfimu.part_files import add_part_file, is_part_file
+from gfimu.short_repr import joined, short_repr
 
 __all__ = ["OMEGA_PRODUCTS", "AccelerometerArray", "Chip"]
 
@@ -49,6 +50,8 @@ class Chip:
     axes: NDArray[np.float64]
     part: str = "adxl345"
 
+    __repr__ = short_repr
+
     @property
     def channels(self) -> tuple[str, ...]:
         """Channel names, one per sensing axis."""
@@ -78,6 +81,10 @@ class AccelerometerArray:
     length_unit: float = 0.05
     description: str = ""
     part_files: Mapping[str, str] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        parts = ", ".join(dict.fromkeys(chip.part for chip in self.chips))
+        return joined(self, [repr(self.name), f"{len(self.chips)} chips ({parts})", f"{self.n_channels} channels"])
 
     @cached_property
     def channels(self) -> tuple[str, ...]:

@@ -32,6 +32,7 @@ from gfimu.rate.problem import RateMethod, RateProblem, RateSolution
 from gfimu.rate.sensing import SensorErrors
 from gfimu.recording import Recording
 from gfimu.rest_navigation import navigate_with_rest
+from gfimu.short_repr import joined, timing
 from gfimu.table import ArrowStream, Tabular
 
 __all__ = ["METHODS", "Estimate", "estimate"]
@@ -83,6 +84,10 @@ class Estimate(Tabular):
 
     def __len__(self) -> int:
         return len(self.t_s)
+
+    def __repr__(self) -> str:
+        names = [str(self.metadata[key]) for key in ("array", "method") if key in self.metadata]
+        return joined(self, [*names, timing(self.t_s), "with position" if self.position is not None else ""])
 
     def to_columns(self) -> dict[str, NDArray[np.float64]]:
         """Return the columns of the Estimate file, by name with unit."""

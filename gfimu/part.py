@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from gfimu.array import AccelerometerArray
 from gfimu.errors import InputError
 from gfimu.part_files import part_table
+from gfimu.short_repr import short_repr
 
 __all__ = ["Part", "white_noise_std"]
 
@@ -33,6 +34,8 @@ class Part:
     name: str
     lsb: float
     noise_std_100_hz: NDArray[np.float64]
+
+    __repr__ = short_repr
 
     @classmethod
     def load(cls, name: str, files: Mapping[str, str] | None = None) -> Part:

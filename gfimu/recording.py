@@ -21,6 +21,7 @@ from gfimu.carried_array import array_metadata, carried_array, with_carried_arra
 from gfimu.column_file import write_columns
 from gfimu.errors import InputError, UnitError
 from gfimu.recording_file import read_recording_file
+from gfimu.short_repr import joined, timing
 from gfimu.table import ArrowStream, Tabular
 
 __all__ = ["Recording"]
@@ -66,6 +67,21 @@ class Recording(Tabular):
 
     def __len__(self) -> int:
         return len(self.t_s)
+
+    def __repr__(self) -> str:
+        name = self.metadata.get("array")
+        unit = {"m_s2": "m/s²", "lsb": "counts"}.get(self.unit, self.unit)
+        corrupt = sum(self.corrupt.values())
+        return joined(
+            self,
+            [
+                name if isinstance(name, str) else "no array",
+                f"{len(self.channels)} channels in {unit}",
+                timing(self.t_s),
+                f"{corrupt} corrupt values left out" if corrupt else "",
+                f"references {', '.join(self.reference)}" if self.reference else "",
+            ],
+        )
 
     @property
     def sample_period(self) -> float:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from gfimu.array import AccelerometerArray
 from gfimu.errors import InputError
+from gfimu.short_repr import short_repr
 from sim.data_sheet import DataSheet
 
 __all__ = ["Sensor", "SensorErrors", "SensorSettings", "conversion_offsets", "draw_errors", "flicker", "quantise"]
@@ -108,6 +109,8 @@ class SensorErrors:
     bias_temperature: NDArray[np.float64]
     scale_temperature: NDArray[np.float64]
 
+    __repr__ = short_repr
+
     @classmethod
     def none(cls, n_channels: int) -> SensorErrors:
         """Return the errors of ideal chips."""
@@ -197,6 +200,8 @@ class Sensor:
     lowest: NDArray[np.int64]
     highest: NDArray[np.int64]
     zero_lsb: NDArray[np.bool_]
+
+    __repr__ = short_repr
 
     @classmethod
     def build(

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from gfimu.errors import InputError
 from gfimu.part_files import part_table
+from gfimu.short_repr import short_repr
 from sim.toml_table import TomlTable
 
 __all__ = ["DataSheet"]
@@ -79,6 +80,8 @@ class DataSheet:
     zero_lsb_rate: float
     high_supply_gain: NDArray[np.float64]
     high_supply_offset: NDArray[np.float64]
+
+    __repr__ = short_repr
 
     @classmethod
     def load(cls, name: str, files: Mapping[str, str] | None = None) -> DataSheet:

@@ -16,6 +16,7 @@ from gfimu.carried_array import array_metadata
 from gfimu.errors import InputError
 from gfimu.model_files import find_model, read_toml
 from gfimu.recording import Recording
+from gfimu.short_repr import short_repr
 from gfimu.units import STANDARD_GRAVITY
 from sim import forward
 from sim.adxl345 import Sensor, SensorSettings, conversion_offsets
@@ -91,6 +92,8 @@ class Scenario:
     effects: tuple[Effect, ...] = ()
     temperature: tuple[float, float, float] = (25.0, 25.0, 600.0)
     description: str = field(default="", compare=False)
+
+    __repr__ = short_repr
 
     @property
     def free(self) -> bool:

@@ -18,6 +18,7 @@ from gfimu.diagnosis.model import BasisUnits, EffectFamily, ExpectedNoise, Mode,
 from gfimu.errors import InputError
 from gfimu.model_files import find_model, read_toml
 from gfimu.part_files import part_table
+from gfimu.short_repr import short_repr
 from gfimu.units import STANDARD_GRAVITY
 from sim import forward
 from sim.body import body_channels
@@ -70,6 +71,8 @@ class Twin:
     full_resolution: bool = True
     effects: tuple[Effect, ...] = ()
     array_name: str = ""
+
+    __repr__ = short_repr
 
     @classmethod
     def load(cls, name: str | Path) -> Twin:

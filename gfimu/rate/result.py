@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gfimu.short_repr import joined, timing
 from gfimu.table import Tabular
 
 __all__ = ["ChannelReport", "RateEstimate", "SignDecision", "full_covariance"]
@@ -126,6 +127,9 @@ class RateEstimate(Tabular):
 
     def __len__(self) -> int:
         return len(self.t_s)
+
+    def __repr__(self) -> str:
+        return joined(self, [self.method, timing(self.t_s), f"sign {self.sign.state}"])
 
     @property
     def std(self) -> NDArray[np.float64]:

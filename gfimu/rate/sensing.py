@@ -25,6 +25,7 @@ from gfimu.errors import InputError
 from gfimu.kinematics import require_all_motions
 from gfimu.part import white_noise_std
 from gfimu.part_files import part_table
+from gfimu.short_repr import short_repr
 
 __all__ = ["ChannelTables", "SensorErrors"]
 
@@ -68,6 +69,8 @@ class SensorErrors:
     stuck_after: int = 0
     gyro_noise_std: float = 0.005
     gyro_bias_std: float = 0.35
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         for name in ("noise_std", "bias_std"):
