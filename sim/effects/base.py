@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from gfimu.array import AccelerometerArray
 from gfimu.errors import InputError
+from gfimu.units import split_key
 from sim.world import World
 
 __all__ = ["Effect", "Pattern", "Size", "channel_patterns", "chip_patterns"]
@@ -33,6 +34,8 @@ class Size:
         Finite-difference step as a share of ``prior_std``; large for effects that are not smooth in their size.
     most : float
         Largest size that physics allows, in that unit.
+    unit : str
+        Unit where the key does not end in one: a unit, or `gfimu.units.RATIO` or ``NUMBER``.
     """
 
     key: str
@@ -40,6 +43,7 @@ class Size:
     positive: bool = False
     step: float = 1e-3
     most: float = np.inf
+    unit: str = ""
 
 
 @dataclass(frozen=True)
@@ -79,6 +83,8 @@ class Effect(ABC):
     """True where another mounting or another day has its own value."""
     inexactness: ClassVar[float] = 0.0
     """Share of what it explains that its model may get wrong; beside it a further cause must explain more than that."""
+    other_units: ClassVar[Mapping[str, str]] = {}
+    """Units of the parameters that are no sizes and whose keys don't end in one; or RATIO, NUMBER, NAME."""
     starts: ClassVar[tuple[float, ...]] = ()
     """Values in units of the prior to start from where a large size is far from linear; none by default."""
 
@@ -145,6 +151,12 @@ class Effect(ABC):
         """Return the keys a parameter table may have."""
         grid = cls.shapes(60.0, 100.0)
         return (*(size.key for size in cls.sizes(array)), *(grid[0] if grid else ()))
+
+    @classmethod
+    def parameter_units(cls, array: AccelerometerArray) -> dict[str, str]:
+        """Return the unit of each parameter, by its declaration or the end of its key; empty if it has neither."""
+        declared = {size.key: size.unit for size in cls.sizes(array) if size.unit} | dict(cls.other_units)
+        return {key: declared.get(key) or split_key(key)[1] for key in cls.parameter_keys(array)}
 
     def check(self, array: AccelerometerArray) -> None:
         """Raise `InputError` if a parameter key does not belong to this effect."""

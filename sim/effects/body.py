@@ -6,6 +6,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from gfimu.array import AccelerometerArray
+from gfimu.units import RATIO
 from sim.effects.base import Effect, Pattern, Size, chip_patterns
 from sim.world import World
 
@@ -70,7 +71,7 @@ class GyroScale(Effect):
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
         """One ratio per axis."""
-        return tuple(Size(axis, 0.02) for axis in _AXES)
+        return tuple(Size(axis, 0.02, unit=RATIO) for axis in _AXES)
 
     @classmethod
     def patterns(cls, array: AccelerometerArray) -> tuple[Pattern, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.model import Mode
+from gfimu.units import NUMBER, RATIO
 from sim.effects.base import Effect, Pattern, Size, chip_patterns
 from sim.effects.table_dynamics import SERVO_STIFFNESS, RippledSpin, TwistingSpin
 from sim.motion import SpinMotion
@@ -231,6 +232,7 @@ class CentrifugalFlex(Effect):
     summary = "arms stretch with the rate squared"
     place = "geometry"
     separated_by = "the cube remounted on its side, and several high speeds"
+    other_units: ClassVar = {"moving_arms": NUMBER}
 
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
@@ -259,6 +261,7 @@ class Cogging(Effect):
     summary = "torque ripple locked to the table's angle (n cycles per revolution)"
     place = "motion"
     separated_by = "slow steady rotation at two speeds"
+    other_units: ClassVar = {"order": NUMBER}
     inexactness = 0.02  # motor, friction and speed loop of a table are not as simple as this servo
 
     @classmethod
@@ -310,11 +313,12 @@ class Resonance(Effect):
     summary = "a torsional mode of the mounting, rung by angular acceleration"
     place = "motion"
     separated_by = "fast ramps followed by rest, in which the mode rings down alone"
+    other_units: ClassVar = {"damping_ratio": RATIO}
 
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
         """Participation: 1 is the whole inertia behind one spring."""
-        return (Size("gain", 0.3, positive=True, most=_WHOLE_INERTIA),)
+        return (Size("gain", 0.3, positive=True, most=_WHOLE_INERTIA, unit=RATIO),)
 
     @classmethod
     def shapes(cls, duration: float, sample_rate: float) -> tuple[dict[str, float], ...]:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.array import AccelerometerArray
+from gfimu.units import NUMBER, RATIO
 from sim.effects.base import Effect, Size
 from sim.motion import SpinState
 from sim.world import World
@@ -45,7 +48,7 @@ class ClockError(Effect):
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
         """One ratio; positive: the board's clock is fast."""
-        return (Size("ratio", 1e-3, step=0.02),)
+        return (Size("ratio", 1e-3, step=0.02, unit=RATIO),)
 
     def apply(self, world: World) -> World:
         """Let the board's clock show (1 + ratio) of the true time."""
@@ -82,7 +85,7 @@ class TachoScale(Effect):
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
         """One ratio."""
-        return (Size("ratio", 0.01),)
+        return (Size("ratio", 0.01, unit=RATIO),)
 
     def apply(self, world: World) -> World:
         """Multiply the reference by 1 + ratio."""
@@ -97,11 +100,12 @@ class TachoRipple(Effect):
     summary = "the reference itself is modulated once or n times per revolution"
     place = "reference"
     separated_by = "a second reference, or slow steady rotation in both directions"
+    other_units: ClassVar = {"amplitude": RATIO, "order": NUMBER}
 
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
         """Relative sine and cosine amplitudes."""
-        return (Size("sine", 0.01), Size("cosine", 0.01))
+        return (Size("sine", 0.01, unit=RATIO), Size("cosine", 0.01, unit=RATIO))
 
     @classmethod
     def shapes(cls, duration: float, sample_rate: float) -> tuple[dict[str, float], ...]:
