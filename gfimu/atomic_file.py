@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from gfimu.errors import GfimuError, InputError
+from gfimu.errors import InputError, WriteError
 
 __all__ = ["atomic_path", "write_text"]
 
@@ -20,9 +20,7 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
     Raises
     ------
     InputError
-        If the folder can't be written to, or ``path`` is itself a folder.
-    GfimuError
-        If writing fails, as on a full disk. Nothing is left behind then.
+        If the folder can't be written to.
     """
     target = Path(path)
     try:
@@ -39,9 +37,7 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
         temporary.chmod(0o666 & ~umask)  # mkstemp makes files private; the result is an ordinary file
         temporary.replace(target)
     except OSError as error:
-        reason = os.strerror(error.errno) if error.errno else str(error).splitlines()[0]
-        kind = InputError if target.is_dir() else GfimuError
-        raise kind(f"{target}: not written, {reason}; free some space or choose another file") from None
+        raise WriteError(target, error) from error
     finally:
         temporary.unlink(missing_ok=True)
 

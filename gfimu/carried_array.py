@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 import tomllib
+import warnings
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -18,9 +19,17 @@ import numpy as np
 from gfimu.array import AccelerometerArray
 from gfimu.errors import InputError
 from gfimu.model_files import list_models
+from gfimu.recording_warning import RecordingWarning
 from gfimu.units import READING_UNITS
 
-__all__ = ["array_difference", "array_metadata", "carried_array", "check_all_channels", "with_carried_array"]
+__all__ = [
+    "array_difference",
+    "array_metadata",
+    "carried_array",
+    "check_all_channels",
+    "warn_of_other_array",
+    "with_carried_array",
+]
 
 _SAME_PLACE = 1e-9  # m: far below what can be measured, far above rounding
 _SAME_AXIS = 1e-9  # largest difference of a unit vector's component
@@ -100,7 +109,7 @@ def check_all_channels(columns: Iterable[str], array: AccelerometerArray, source
 
 
 def array_difference(one: AccelerometerArray, other: AccelerometerArray) -> str:
-    """Say in a few words what differs between two arrays as they measure; empty if nothing does."""
+    """Say in a few words what differs between the geometries of two arrays; empty if nothing does."""
     if one.channels != other.channels:
         apart = sorted(set(one.channels) ^ set(other.channels))
         return f"channels {', '.join(apart)} are in one only" if apart else "order of the channels"
@@ -111,10 +120,26 @@ def array_difference(one: AccelerometerArray, other: AccelerometerArray) -> str:
     if float(np.abs(one.axes - other.axes).max()) > _SAME_AXIS:
         chord = float(np.linalg.norm(one.axes - other.axes, axis=1).max())
         found.append(f"axes by up to {np.degrees(2 * np.arcsin(min(chord / 2, 1.0))):.3g}°")
-    parts = {chip.part for chip in one.chips} ^ {chip.part for chip in other.chips}
-    if parts:
-        found.append(f"parts ({', '.join(sorted(parts))})")
     return ", ".join(found)
+
+
+def warn_of_other_array(metadata: Mapping[str, Any], used: AccelerometerArray, name: str) -> None:
+    """Warn in one line where a recording carries another geometry than the one it is compared with."""
+    try:
+        own = carried_array(metadata, source=name)
+    except InputError as error:
+        if "array_toml" in metadata:
+            text = str(error).partition(";")[0]
+            warnings.warn(f"{text}; the twin's array {used.name!r} is used", RecordingWarning, stacklevel=3)
+        return
+    difference = "" if own is None else array_difference(own, used)
+    if own is not None and difference:
+        warnings.warn(
+            f"{name}: recorded with array {own.name!r}, but the twin's {used.name!r} is used; "
+            f"they differ: {difference}",
+            RecordingWarning,
+            stacklevel=3,
+        )
 
 
 def _damaged(source: str | Path, key: str, reason: str) -> InputError:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable
 
-__all__ = ["CorruptValueWarning", "GeometryError", "GfimuError", "InputError", "UnitError", "unknown_name"]
+__all__ = ["GeometryError", "GfimuError", "InputError", "UnitError", "WriteError", "unknown_name"]
 
 
 class GfimuError(Exception):
@@ -15,16 +16,21 @@ class InputError(GfimuError, ValueError):
     """A file or value that can't be used as given; commands end with exit code 2."""
 
 
+class WriteError(GfimuError, OSError):
+    """A file that could not be written, on a full disk say; what stood in its place is as it was."""
+
+    def __init__(self, path: object, error: OSError) -> None:
+        reason = os.strerror(error.errno) if error.errno else str(error).partition("\n")[0]
+        super().__init__(f"{path}: not written: {reason}; free space there, or choose another place")
+        self.errno = error.errno
+
+
 class UnitError(InputError):
     """Data in a unit other than the one the operation needs."""
 
 
 class GeometryError(InputError):
     """A sensor geometry that can't see the motions asked for."""
-
-
-class CorruptValueWarning(UserWarning):
-    """Values of a recording that can be no measurement were left out; commands print it as one line."""
 
 
 def unknown_name(kind: str, name: str, valid: Iterable[str]) -> InputError:

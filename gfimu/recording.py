@@ -183,7 +183,7 @@ class Recording(Tabular):
         """Read a recording from a CSV or Parquet file, or from a table of pandas, polars or pyarrow.
 
         Values that can be no measurement (infinite, or far beyond any part's range) become NaN with a
-        `gfimu.errors.CorruptValueWarning`, and are counted in `corrupt`.
+        `gfimu.recording_warning.CorruptValueWarning`, and are counted in `corrupt`.
 
         Parameters
         ----------

@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 from gfimu.array import AccelerometerArray
 from gfimu.carried_array import carried_array
 from gfimu.column_file import ColumnFile, open_columns
-from gfimu.errors import CorruptValueWarning, InputError, UnitError
+from gfimu.errors import InputError, UnitError
 from gfimu.part import Part
 from gfimu.plausible import MOST_CORRUPT, largest_of_array, largest_of_part, largest_reference
+from gfimu.recording_warning import CorruptValueWarning
 from gfimu.table import ArrowStream
 from gfimu.units import READING_UNITS, REFERENCE_UNITS, STANDARD_GRAVITY
 

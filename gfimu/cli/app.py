@@ -4,15 +4,11 @@ from __future__ import annotations
 
 import importlib
 import sys
-import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager
-from typing import Any
 
 import typer
 
 import gfimu
-from gfimu.errors import CorruptValueWarning, GfimuError, InputError
+from gfimu.errors import GfimuError, InputError
 
 __all__ = ["main", "program"]
 
@@ -44,6 +40,7 @@ def _options(
     version: bool = typer.Option(False, "--version", callback=_version, is_eager=True, help="Print the version."),
 ) -> None:
     """Collect the options of the program itself."""
+    importlib.import_module("gfimu.cli.warning_lines").install()
 
 
 def program() -> typer.Typer:
@@ -62,29 +59,10 @@ def program() -> typer.Typer:
     return app
 
 
-@contextmanager
-def _warnings_as_lines() -> Iterator[None]:
-    """Print each warning about a file as one line, once."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("always", CorruptValueWarning)
-        usual, printed = warnings.showwarning, set()
-
-        def show(message: Warning | str, category: type[Warning], *place: Any, **more: Any) -> None:
-            if not issubclass(category, CorruptValueWarning):
-                usual(message, category, *place, **more)
-            elif str(message) not in printed:
-                printed.add(str(message))
-                sys.stderr.write(f"gfimu: warning: {message}\n")
-
-        warnings.showwarning = show
-        yield
-
-
 def main() -> None:
     """Run the program: exit code 0 when done, 2 on bad input, 1 on anything else."""
     try:
-        with _warnings_as_lines():
-            program()()
+        program()()
     except InputError as error:
         sys.stderr.write(f"gfimu: {error}\n")
         raise SystemExit(2) from None

@@ -1,17 +1,13 @@
-"""The array of a command: given by name, array file or MJCF sites, or the twin's beside the recording's own."""
+"""The array that a command is given: a name, an array file, or the sites of an MJCF file."""
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING
-
-import typer
 
 if TYPE_CHECKING:
     from gfimu.array import AccelerometerArray
-    from gfimu.recording import Recording
 
-__all__ = ["load_array", "note_other_array"]
+__all__ = ["load_array"]
 
 
 def load_array(name: str) -> AccelerometerArray:
@@ -23,23 +19,3 @@ def load_array(name: str) -> AccelerometerArray:
     from gfimu.array import AccelerometerArray
 
     return AccelerometerArray.load(name)
-
-
-def note_other_array(run: Path, recording: Recording, twin_array: AccelerometerArray) -> None:
-    """Print one line to standard error where a recording's own array is not the twin's, which is used."""
-    from gfimu.carried_array import array_difference
-    from gfimu.errors import InputError
-
-    try:
-        own = recording.array
-    except InputError as error:
-        if "array_toml" in recording.metadata:
-            typer.echo(f"note: {run}: {error}".split(";", maxsplit=1)[0] + "; the twin's array is used", err=True)
-        return
-    difference = "" if own is None else array_difference(own, twin_array)
-    if own is not None and difference:
-        typer.echo(
-            f"note: {run} was recorded with array {own.name!r}, the twin has {twin_array.name!r}, which is used; "
-            f"they differ: {difference}",
-            err=True,
-        )

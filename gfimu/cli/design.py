@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
-from gfimu.cli.array_option import note_other_array
 from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, progress
 
 if TYPE_CHECKING:
@@ -66,12 +65,7 @@ def _design(
     loaded = Twin.load(twin)
     model = cast("WorldModel", loaded)  # its effects are narrower than the protocol's
     asked = open_effects(verdict, model) if verdict is not None else list(effects or [])
-    recordings = [Recording.read(run, array=model.array) for run in runs or []]
-    for run, recording in zip(runs or [], recordings, strict=True):
-        note_other_array(run, recording, model.array)
-    recorded = [
-        prepare_run(recording, model, name=str(run)) for run, recording in zip(runs or [], recordings, strict=True)
-    ]
+    recorded = [prepare_run(Recording.read(run, array=model.array), model, name=str(run)) for run in runs or []]
     with progress("designing", total=1.0) as advance:
         proposal = design(
             model,

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
-from gfimu.cli.array_option import note_other_array
 from gfimu.cli.output import JsonOption, console, print_json, print_paths, print_table, progress
 
 if TYPE_CHECKING:
@@ -59,7 +58,6 @@ def _diagnose(
 
     model = Twin.load(twin)
     check_folder(out)
-    given = model.array
     if calibration is None:
         recordings, kept = (
             [open_recording(path, array=model.array) for path in paths] for paths in (runs, held_out or [])
@@ -71,8 +69,6 @@ def _diagnose(
         )
         if unit.positions:
             model = replace(model, array=unit.calibrated_array(model.array), array_name="array.toml")
-    for path, recording in zip((*runs, *(held_out or [])), (*recordings, *kept), strict=True):
-        note_other_array(path, recording, given)
     with progress("diagnosing", total=1.0) as done:
         found = diagnose(recordings, cast("WorldModel", model), held_out=kept, names=_names(runs), report=done)
         done(0.99, "write the report")
@@ -95,7 +91,7 @@ def write_result(out: Path, found: Diagnosis, recording: Recording) -> dict[str,
     twin = cast("Twin", found.twin)
     world = twin.world(mounting=recording.mounting_rotvec)
     content = twin.to_dict()
-    more = dict(twin.array.part_files)  # named by the twin or its array, and looked up beside them
+    more = {}
     if content["array"] not in list_models("arrays"):
         # An array file of the user's is named relative to the twin file: it moves with it.
         content["array"] = "array.toml"

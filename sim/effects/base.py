@@ -34,8 +34,6 @@ class Size:
         Finite-difference step as a share of ``prior_std``; large for effects that are not smooth in their size.
     most : float
         Largest size that physics allows, in that unit.
-    unit : str
-        Unit where the key does not end in one: a unit, or `gfimu.units.RATIO` or ``NUMBER``.
     """
 
     key: str
@@ -43,7 +41,6 @@ class Size:
     positive: bool = False
     step: float = 1e-3
     most: float = np.inf
-    unit: str = ""
 
 
 @dataclass(frozen=True)
@@ -83,8 +80,10 @@ class Effect(ABC):
     """True where another mounting or another day has its own value."""
     inexactness: ClassVar[float] = 0.0
     """Share of what it explains that its model may get wrong; beside it a further cause must explain more than that."""
+    size_unit: ClassVar[str] = ""
+    """Unit of the sizes where their keys don't end in one; ``"ratio"`` for a pure number, read in percent."""
     other_units: ClassVar[Mapping[str, str]] = {}
-    """Units of the parameters that are no sizes and whose keys don't end in one; or RATIO, NUMBER, NAME."""
+    """Units of other parameters whose keys don't end in one; ``"ratio"``, ``"number"`` (count, factor), ``"name"``."""
     starts: ClassVar[tuple[float, ...]] = ()
     """Values in units of the prior to start from where a large size is far from linear; none by default."""
 
@@ -154,8 +153,8 @@ class Effect(ABC):
 
     @classmethod
     def parameter_units(cls, array: AccelerometerArray) -> dict[str, str]:
-        """Return the unit of each parameter, by its declaration or the end of its key; empty if it has neither."""
-        declared = {size.key: size.unit for size in cls.sizes(array) if size.unit} | dict(cls.other_units)
+        """Return the unit of each parameter, as declared or by the end of its key; empty if it has neither."""
+        declared = dict.fromkeys((size.key for size in cls.sizes(array)), cls.size_unit) | dict(cls.other_units)
         return {key: declared.get(key) or split_key(key)[1] for key in cls.parameter_keys(array)}
 
     def check(self, array: AccelerometerArray) -> None:

@@ -6,7 +6,6 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from gfimu.array import AccelerometerArray
-from gfimu.units import RATIO
 from sim.effects.base import Effect, Pattern, Size, chip_patterns
 from sim.world import World
 
@@ -65,13 +64,14 @@ class GyroScale(Effect):
 
     name = "gyro_scale"
     summary = "the reference gyro has wrong gains"
+    size_unit = "ratio"
     place = "reference"
     separated_by = "rotation about each axis in turn, at several rates"
 
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
         """One ratio per axis."""
-        return tuple(Size(axis, 0.02, unit=RATIO) for axis in _AXES)
+        return tuple(Size(axis, 0.02) for axis in _AXES)
 
     @classmethod
     def patterns(cls, array: AccelerometerArray) -> tuple[Pattern, ...]:

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from gfimu.array import AccelerometerArray
 from gfimu.errors import InputError
-from gfimu.units import NAME, NUMBER, RATIO
 from sim.effects.base import Effect, Size
 from sim.world import World
 
@@ -53,7 +52,7 @@ class Noise(_Discrete):
     summary = "more white noise than the part should have"
     place = "noise"
     keys = ("factor",)
-    other_units: ClassVar = {"factor": NUMBER}
+    other_units: ClassVar = {"factor": "number"}
     separated_by = "a longer rest"
 
     def apply(self, world: World) -> World:
@@ -108,7 +107,7 @@ class WrongRange(_Discrete):
     name = "wrong_range"
     summary = "a chip is configured for another range: its readings are off by a power of two"
     keys = ("chip", "factor")
-    other_units: ClassVar = {"chip": NAME, "factor": NUMBER}
+    other_units: ClassVar = {"chip": "name", "factor": "number"}
 
     def apply(self, world: World) -> World:
         """Multiply the chip's readings by the factor."""
@@ -126,7 +125,7 @@ class AxisSwap(_Discrete):
     name = "axis_swap"
     summary = "channels are exchanged by wiring"
     keys = ("channels",)
-    other_units: ClassVar = {"channels": NAME}
+    other_units: ClassVar = {"channels": "name"}
 
     def apply(self, world: World) -> World:
         """Exchange the two channels, or the two of each pair where several follow each other."""
@@ -145,7 +144,7 @@ class SignFlip(_Discrete):
     name = "sign_flip"
     summary = "a channel is inverted"
     keys = ("channel",)
-    other_units: ClassVar = {"channel": NAME}
+    other_units: ClassVar = {"channel": "name"}
 
     def apply(self, world: World) -> World:
         """Invert the channel or channels."""
@@ -161,7 +160,7 @@ class StuckChannel(_Discrete):
     name = "stuck_channel"
     summary = "one or several channels are frozen for a while"
     keys = ("channel", "start_s", "stop_s")
-    other_units: ClassVar = {"channel": NAME}
+    other_units: ClassVar = {"channel": "name"}
 
     def apply(self, world: World) -> World:
         """Hold the channel at its last value before the start until the stop."""
@@ -188,7 +187,7 @@ class DroppedFrames(_Discrete):
     name = "dropped_frames"
     summary = "samples are lost"
     keys = ("share", "count", "longest_s")
-    other_units: ClassVar = {"share": RATIO, "count": NUMBER}
+    other_units: ClassVar = {"share": "ratio", "count": "number"}
 
     def apply(self, world: World) -> World:
         """Lose a share of the frames at random (rows become NaN; the writer leaves them out)."""

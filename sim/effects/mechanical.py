@@ -11,7 +11,6 @@ from scipy.spatial.transform import Rotation
 
 from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.model import Mode
-from gfimu.units import NUMBER, RATIO
 from sim.effects.base import Effect, Pattern, Size, chip_patterns
 from sim.effects.table_dynamics import SERVO_STIFFNESS, RippledSpin, TwistingSpin
 from sim.motion import SpinMotion
@@ -232,7 +231,7 @@ class CentrifugalFlex(Effect):
     summary = "arms stretch with the rate squared"
     place = "geometry"
     separated_by = "the cube remounted on its side, and several high speeds"
-    other_units: ClassVar = {"moving_arms": NUMBER}
+    other_units: ClassVar = {"moving_arms": "number"}
 
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
@@ -261,7 +260,7 @@ class Cogging(Effect):
     summary = "torque ripple locked to the table's angle (n cycles per revolution)"
     place = "motion"
     separated_by = "slow steady rotation at two speeds"
-    other_units: ClassVar = {"order": NUMBER}
+    other_units: ClassVar = {"order": "number"}
     inexactness = 0.02  # motor, friction and speed loop of a table are not as simple as this servo
 
     @classmethod
@@ -313,12 +312,13 @@ class Resonance(Effect):
     summary = "a torsional mode of the mounting, rung by angular acceleration"
     place = "motion"
     separated_by = "fast ramps followed by rest, in which the mode rings down alone"
-    other_units: ClassVar = {"damping_ratio": RATIO}
+    size_unit = "ratio"
+    other_units: ClassVar = {"damping_ratio": "ratio"}
 
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
         """Participation: 1 is the whole inertia behind one spring."""
-        return (Size("gain", 0.3, positive=True, most=_WHOLE_INERTIA, unit=RATIO),)
+        return (Size("gain", 0.3, positive=True, most=_WHOLE_INERTIA),)
 
     @classmethod
     def shapes(cls, duration: float, sample_rate: float) -> tuple[dict[str, float], ...]:

@@ -9,7 +9,7 @@ from scipy.interpolate import CubicSpline
 from scipy.signal import lfilter
 
 from gfimu.array import AccelerometerArray
-from gfimu.units import RATIO, STANDARD_GRAVITY
+from gfimu.units import STANDARD_GRAVITY
 from sim.effects.base import Effect, Pattern, Size, channel_patterns
 from sim.world import SensingStep, World
 
@@ -40,12 +40,11 @@ class _PerChannel(Effect):
 
     place = "sensing"
     suffix = ""
-    unit = ""
     prior_std = 1.0
 
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
-        return tuple(Size(f"{channel}{cls.suffix}", cls.prior_std, unit=cls.unit) for channel in array.channels)
+        return tuple(Size(f"{channel}{cls.suffix}", cls.prior_std) for channel in array.channels)
 
     @classmethod
     def patterns(cls, array: AccelerometerArray) -> tuple[Pattern, ...]:
@@ -79,9 +78,9 @@ class ScaleFactor(_PerChannel):
 
     name = "scale_factor"
     summary = "a gain error per channel (another supply voltage, say)"
-    unit = RATIO
     prior_std = 0.02
     separated_by = "static poses on several sides, or the cube remounted on its side and several speeds"
+    size_unit = "ratio"
 
     @classmethod
     def patterns(cls, array: AccelerometerArray) -> tuple[Pattern, ...]:
@@ -157,6 +156,7 @@ class VibrationRectification(_PerChannel):
     name = "vibration_rectification"
     summary = "mean readings shift with vibration, about as ω⁴"
     suffix = "_m_s2_per_rad4_s4"
+    size_unit = "m/s²/(rad/s)⁴"
     prior_std = 30 * _MG / 15.0**4
     separated_by = "several speeds with and without vibration isolation"
 
@@ -184,6 +184,7 @@ class CrossAxis(Effect):
     summary = "a channel picks up its neighbour on the same chip"
     place = "sensing"
     separated_by = "static poses on several sides and several speeds"
+    size_unit = "ratio"
 
     @classmethod
     def _pairs(cls, array: AccelerometerArray) -> list[tuple[int, int]]:
@@ -195,7 +196,7 @@ class CrossAxis(Effect):
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
         """One ratio per ordered pair of channels of a chip: ``a11_from_a12``."""
         names = array.channels
-        return tuple(Size(f"{names[i]}_from_{names[j]}", 0.01, unit=RATIO) for i, j in cls._pairs(array))
+        return tuple(Size(f"{names[i]}_from_{names[j]}", 0.01) for i, j in cls._pairs(array))
 
     @classmethod
     def reach(cls, array: AccelerometerArray) -> NDArray[np.bool_]:

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.array import AccelerometerArray
-from gfimu.units import NUMBER, RATIO
 from sim.effects.base import Effect, Size
 from sim.motion import SpinState
 from sim.world import World
@@ -41,6 +40,7 @@ class ClockError(Effect):
 
     name = "clock_error"
     summary = "the board's clock runs fast or slow against the reference's"
+    size_unit = "ratio"
     place = "timing"
     separated_by = "a longer run with fast changes of the rate at its end"
     starts = (-20.0, -8.0, -3.0, 3.0, 8.0, 20.0)
@@ -48,7 +48,7 @@ class ClockError(Effect):
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
         """One ratio; positive: the board's clock is fast."""
-        return (Size("ratio", 1e-3, step=0.02, unit=RATIO),)
+        return (Size("ratio", 1e-3, step=0.02),)
 
     def apply(self, world: World) -> World:
         """Let the board's clock show (1 + ratio) of the true time."""
@@ -79,13 +79,14 @@ class TachoScale(Effect):
 
     name = "tacho_scale"
     summary = "the reference has a wrong gain"
+    size_unit = "ratio"
     place = "reference"
     separated_by = "fast ramps: a wrong gain of the reference scales the centripetal and tangential parts unlike"
 
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
         """One ratio."""
-        return (Size("ratio", 0.01, unit=RATIO),)
+        return (Size("ratio", 0.01),)
 
     def apply(self, world: World) -> World:
         """Multiply the reference by 1 + ratio."""
@@ -98,14 +99,15 @@ class TachoRipple(Effect):
 
     name = "tacho_ripple"
     summary = "the reference itself is modulated once or n times per revolution"
+    size_unit = "ratio"
+    other_units: ClassVar = {"amplitude": "ratio", "order": "number"}
     place = "reference"
     separated_by = "a second reference, or slow steady rotation in both directions"
-    other_units: ClassVar = {"amplitude": RATIO, "order": NUMBER}
 
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
         """Relative sine and cosine amplitudes."""
-        return (Size("sine", 0.01, unit=RATIO), Size("cosine", 0.01, unit=RATIO))
+        return (Size("sine", 0.01), Size("cosine", 0.01))
 
     @classmethod
     def shapes(cls, duration: float, sample_rate: float) -> tuple[dict[str, float], ...]:

@@ -14,7 +14,7 @@ from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.generic_basis import OF_READING, Motion, basis_function, is_of_time
 from gfimu.diagnosis.model import BasisUnits
 from gfimu.errors import InputError
-from gfimu.units import NAME, STANDARD_GRAVITY
+from gfimu.units import STANDARD_GRAVITY
 from sim.effects.base import Effect, Pattern, Size
 from sim.motion import SpinState
 from sim.world import SampleContext, World
@@ -33,7 +33,7 @@ class Unknown(Effect):
     summary = "a dependence that the data show and nothing in the library explains"
     place = "sensing"
     separated_by = "another run with another motion: what stays is in the rig or the sensors"
-    other_units: ClassVar = {"dependence": NAME}
+    other_units: ClassVar = {"dependence": "name"}
 
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:

@@ -128,19 +128,22 @@ def no_search(monkeypatch):
     def stop(*_, **__):
         raise GfimuError("stopped")
 
-    monkeypatch.setattr(importlib.import_module("gfimu.diagnosis.diagnose"), "diagnose", stop)
+    monkeypatch.setattr(importlib.import_module("gfimu.diagnosis.diagnose"), "_diagnose_table", stop)
 
 
 @pytest.mark.usefixtures("no_search")
 def test_diagnose_uses_the_twins_array_and_says_so(run, tmp_path, gfimu_command):
     arguments = ("--twin", "cube12_turntable", "--out", tmp_path / "d")
     result = gfimu_command("diagnose", run, *arguments)
-    (line,) = [line for line in result.stderr.splitlines() if line.startswith("note:")]
-    assert "run.csv was recorded with array 'garage cube', the twin has 'cube12', which is used" in line
-    assert "positions by up to 17.3 mm, parts (adxl345, chip.toml)" in line
+    note, error = result.stderr.splitlines()
+    assert note == (
+        "gfimu: warning: run.csv: recorded with array 'garage cube', but the twin's 'cube12' is used; "
+        "they differ: positions by up to 17.3 mm"
+    )
+    assert error == "gfimu: stopped"
     own = Recording.from_arrays(np.arange(20) / 100, np.zeros((20, 12)), AccelerometerArray.load("cube12"))
     own.write(tmp_path / "own.csv")
-    assert "note:" not in gfimu_command("diagnose", tmp_path / "own.csv", *arguments).stderr
+    assert gfimu_command("diagnose", tmp_path / "own.csv", *arguments).stderr == "gfimu: stopped\n"
 
 
 def test_a_twin_finds_its_part_file_beside_it_and_passes_it_on(tmp_path, monkeypatch):

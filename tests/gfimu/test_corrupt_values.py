@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from gfimu import AccelerometerArray, InputError, Recording, estimate
-from gfimu.errors import CorruptValueWarning
 from gfimu.plausible import largest_of_array, largest_of_part
 from gfimu.recording_formats import open_run
+from gfimu.recording_warning import CorruptValueWarning
 
 CUBE = AccelerometerArray.load("cube12")
 RAIL = 156.9064  # 16 g

@@ -5,7 +5,7 @@ import sys
 import numpy as np
 import pytest
 
-from gfimu import AccelerometerArray, InputError, Recording, estimate
+from gfimu import AccelerometerArray, Recording, estimate
 from gfimu.errors import GfimuError
 
 resource = pytest.importorskip("resource", reason="no file size limit on this system")
@@ -38,7 +38,8 @@ def test_whole_or_not_at_all(tmp_path, results, what, suffix):
     file.write_bytes(b"of yesterday")
     with pytest.raises(GfimuError) as error:
         results[what].write(file)
-    assert str(error.value) == f"{file}: not written, File too large; free some space or choose another file"
+    assert str(error.value).startswith(f"{file}: not written: File too large; free space")
+    assert "\n" not in str(error.value)
     assert file.read_bytes() == b"of yesterday"
     assert [path.name for path in tmp_path.iterdir()] == [file.name]
 
@@ -47,6 +48,6 @@ def test_whole_or_not_at_all(tmp_path, results, what, suffix):
 def test_a_folder_in_the_place_of_the_file(tmp_path, results, suffix):
     file = tmp_path / f"out.{suffix}"
     file.mkdir()
-    with pytest.raises(InputError, match=rf"out\.{suffix}: not written, Is a directory"):
+    with pytest.raises(GfimuError, match=rf"out\.{suffix}: .*[Dd]irectory"):
         results["recording"].write(file)
     assert [path.name for path in tmp_path.iterdir()] == [file.name]

@@ -8,9 +8,10 @@ import pyarrow as pa
 import pytest
 
 from gfimu import AccelerometerArray, InputError, Recording, SensorErrors, estimate, estimate_rate, open_recording
-from gfimu.errors import CorruptValueWarning, GfimuError, UnitError
+from gfimu.errors import GfimuError, UnitError
 from gfimu.estimation import Estimate
 from gfimu.recording_formats import open_run
+from gfimu.recording_warning import CorruptValueWarning
 from gfimu.units import STANDARD_GRAVITY
 
 CUBE = AccelerometerArray.load("cube12")
