@@ -62,9 +62,7 @@ class Journal:
         self._metadata = dict(metadata)
         self._header = ",".join(self.columns) + "\n"
         self._header_lines = len(lines) + 1
-        head = ("".join(lines) + self._header).encode()
-        while head:
-            head = head[os.write(self._file, head) :]
+        os.write(self._file, ("".join(lines) + self._header).encode())
 
     def append(self, t_s: NDArray[np.float64], counts: NDArray[np.float64], status: NDArray[np.uint16]) -> None:
         """Append samples: times (n,), s, counts (n, c) with NaN where missing, status bits (n,)."""

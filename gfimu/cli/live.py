@@ -49,7 +49,7 @@ def _live(
     from gfimu.errors import InputError
     from gfimu.rate.kalman import FilterSettings
     from gfimu.rate.sensing import SensorErrors
-    from gfimu.rate.stream import filter_stream, split_head
+    from gfimu.rate.stream import filter_stream, read_head
 
     if not rate > 0:
         raise InputError(f"--rate {rate:g}: must be positive, Hz")
@@ -57,7 +57,7 @@ def _live(
     if array is not None:
         geometry = load_array(array)
     else:
-        metadata, lines = split_head(lines)
+        metadata, lines = read_head(lines)
         own = carried_array(metadata, source="the stream")
         if own is None:
             raise InputError("the stream does not carry its array (# array_toml: … before the columns); give --array")

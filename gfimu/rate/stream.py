@@ -21,7 +21,7 @@ from gfimu.rate.result import RateEstimate
 from gfimu.rate.sensing import SensorErrors
 from gfimu.units import READING_UNITS
 
-__all__ = ["StreamLayout", "filter_stream", "split_head"]
+__all__ = ["StreamLayout", "filter_stream", "read_head"]
 
 _GYRO = ("gyro_x_rad_s", "gyro_y_rad_s", "gyro_z_rad_s")
 
@@ -78,14 +78,17 @@ class StreamLayout:
         return cls(columns.index("t_s"), tuple(places), tuple(factors), gyro, len(columns))
 
 
-def split_head(lines: Iterator[str]) -> tuple[dict[str, Any], Iterator[str]]:
-    """Read the ``# key: value`` lines at the head of a stream; return them and the lines from the columns' names on."""
+def read_head(lines: Iterable[str]) -> tuple[dict[str, Any], Iterator[str]]:
+    """Read the leading ``# key: value`` lines of a stream; return what they state, and the whole stream again."""
+    rest = iter(lines)
+    head: list[str] = []
     metadata: dict[str, Any] = {}
-    for line in lines:
+    for line in rest:
+        head.append(line)
         if line.strip() and not line.startswith("#"):
-            return metadata, itertools.chain([line], lines)
+            break
         metadata |= head_line(line)
-    return metadata, iter(())
+    return metadata, itertools.chain(head, rest)
 
 
 def filter_stream(

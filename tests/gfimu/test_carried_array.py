@@ -13,6 +13,7 @@ from gfimu.carried_array import array_difference
 from gfimu.part import Part, white_noise_std
 from gfimu.rate.sensing import SensorErrors
 from gfimu.recording_formats import open_run
+from sim.data_sheet import DataSheet
 
 CUBE = AccelerometerArray.load("cube12")
 FORMATS = ("csv", "parquet")
@@ -193,3 +194,16 @@ def test_what_differs_between_two_arrays():
     assert array_difference(CUBE, CUBE.relative_to([0, 0, 0.003])) == "positions by up to 3 mm"
     assert "axes by up to" in array_difference(CUBE, AccelerometerArray.load("cube12_as_built"))
     assert "m11" in array_difference(CUBE, AccelerometerArray.load("mimu4444"))
+
+
+def test_the_documented_part_file_is_enough(project_root, tmp_path):
+    text = (project_root / "docs" / "recording-format.md").read_text(encoding="utf-8")
+    block = text.split("## Part\n")[1].split("```toml\n")[1].split("```")[0]
+    (tmp_path / "my_chip.toml").write_text(block, encoding="utf-8")
+    array = AccelerometerArray.load(own_array(tmp_path / "own", part="../my_chip.toml"))
+    assert DataSheet.load(array.chips[0].part, array.part_files).ranges_g == (2, 4, 8, 16)
+    assert np.isfinite(SensorErrors.from_parts(array, 100.0).noise_std).all()
+    for key in tomllib.loads(block).keys() - {"name", "range_g"}:
+        left = "\n".join(line for line in block.splitlines() if not line.startswith(key))
+        with pytest.raises(InputError, match=rf"part 'my_chip\.toml': key '{key}' is missing; add it"):
+            SensorErrors.from_parts(replace(array, part_files={"my_chip.toml": left}), 100.0)
