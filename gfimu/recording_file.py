@@ -126,7 +126,7 @@ class _Corrupt:
         self, column: _Column, values: NDArray[np.float64], found: NDArray[np.float64], first_row: int
     ) -> None:
         """Turn impossible ``values``, in the unit in memory, into NaN; ``found`` are the same as the file has them."""
-        bad = np.abs(values) > column.largest  # false for NaN, a missing value
+        bad = np.abs(found) > column.largest / column.factor  # false for NaN, a missing value
         if not bad.any():
             return
         if not self._counts:
