@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from firmware_bridge.checksum import crc16, crc16_rows, sum16_rows
 from firmware_bridge.packets import PacketLayout, PacketScanner
 from gfimu.errors import unknown_name
+from gfimu.short_repr import short_repr
 
 __all__ = [
     "FORMATS",
@@ -238,6 +239,8 @@ class Samples:
     status: NDArray[np.uint16]
     lost_before: NDArray[np.int64]
     segment: NDArray[np.int64]
+
+    __repr__ = short_repr
 
     def __len__(self) -> int:
         return len(self.ticks)

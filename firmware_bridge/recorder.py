@@ -22,8 +22,9 @@ from firmware_bridge.frames import FrameFormat, SampleDecoder, Samples, Status, 
 from firmware_bridge.journal import Journal, WriteError, check_target
 from firmware_bridge.link import Link
 from gfimu.array import AccelerometerArray
+from gfimu.carried_array import array_metadata
 from gfimu.errors import GfimuError, InputError
-from gfimu.model_files import find_model, read_toml
+from gfimu.part import Part
 
 __all__ = ["Batch", "RecordReport", "SampleClock", "record"]
 
@@ -279,9 +280,9 @@ def record(
         raise InputError(f"array {carried.name!r} has {carried.n_channels} channels, {form} {len(layout.channels)}")
     part = carried.chips[0].part
     metadata: dict[str, Any] = {
-        "array": carried.name,
+        **array_metadata(carried),
         "part": part,
-        "lsb_m_s2": float(read_toml(find_model("parts", part))["lsb_m_s2"]),
+        "lsb_m_s2": Part.load(part, carried.part_files).lsb,
         "port": port,
         "format": form,
         "started_utc": datetime.now(UTC).isoformat(timespec="milliseconds"),

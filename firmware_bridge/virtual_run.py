@@ -23,6 +23,7 @@ from firmware_bridge.commands import (
 )
 from firmware_bridge.frames import SampleDecoder, Samples, StreamCounts
 from firmware_bridge.physics import RidePhysics, Scene
+from gfimu.carried_array import array_metadata
 from gfimu.errors import InputError
 from gfimu.recording import Recording
 
@@ -137,7 +138,7 @@ def record_virtual(
         scene.array.channels,
         scene.references(t),
         {
-            "array": scene.array.name,
+            **array_metadata(scene.array),
             "part": scene.array.chips[0].part,
             "sample_rate_hz": rate_hz,
             "range_g": range_g,

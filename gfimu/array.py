@@ -7,7 +7,7 @@ centripetal terms follow from it; both are in body axes about the body's origin.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from gfimu.errors import InputError
 from gfimu.model_files import find_model, read_toml
+from gfimu.part_files import add_part_file, is_part_file
+from gfimu.short_repr import joined, short_repr
 
 __all__ = ["OMEGA_PRODUCTS", "AccelerometerArray", "Chip"]
 
@@ -40,13 +42,15 @@ class Chip:
     axes : ndarray, shape (k, 3)
         Unit vectors of the sensing axes in the body frame.
     part : str
-        Name of the part in ``models/parts``.
+        Name of the part in ``models/parts``, or of a part file of the user's.
     """
 
     name: str
     position: NDArray[np.float64]
     axes: NDArray[np.float64]
     part: str = "adxl345"
+
+    __repr__ = short_repr
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -68,12 +72,19 @@ class AccelerometerArray:
         Length that scoring calls 1, m (half the cube's edge for a cube).
     description : str
         One line for people.
+    part_files : mapping of str to str
+        Text of the part files that are not in ``models/parts``, by the name that the chips use.
     """
 
     name: str
     chips: tuple[Chip, ...]
     length_unit: float = 0.05
     description: str = ""
+    part_files: Mapping[str, str] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        parts = ", ".join(dict.fromkeys(chip.part for chip in self.chips))
+        return joined(self, [repr(self.name), f"{len(self.chips)} chips ({parts})", f"{self.n_channels} channels"])
 
     @cached_property
     def channels(self) -> tuple[str, ...]:
@@ -147,6 +158,20 @@ class AccelerometerArray:
         )
         return replace(self, chips=chips)
 
+    def with_part(self, part: str) -> AccelerometerArray:
+        """Return the same array with every chip of one part."""
+        return replace(self, chips=tuple(replace(chip, part=part) for chip in self.chips))
+
+    def with_part_file(self, part: str, *, beside: Path | None = None) -> tuple[AccelerometerArray, str]:
+        """Return the array with the text of a part file kept in it, and the name by which it is kept.
+
+        A part of ``models/parts`` stays as it is. Raises `InputError` if there is no such file.
+        """
+        if not is_part_file(part):
+            return self, part
+        files, kept = add_part_file(self.part_files, part, beside)
+        return replace(self, part_files=files), kept
+
     def relative_to(self, origin: ArrayLike) -> AccelerometerArray:
         """Return the same array with its body origin moved to ``origin``, shape (3,), m."""
         return self.with_geometry(self.chip_positions - np.asarray(origin, dtype=float), [c.axes for c in self.chips])
@@ -161,7 +186,13 @@ class AccelerometerArray:
             If the array is unknown (the message lists the names) or the file is malformed.
         """
         path = find_model("arrays", name, beside=beside)
-        return cls.from_dict(read_toml(path), source=str(path))
+        array = cls.from_dict(read_toml(path), source=str(path))
+        for part in dict.fromkeys(chip.part for chip in array.chips if is_part_file(chip.part)):
+            if any((folder / part).is_file() for folder in (path.parent, Path())):  # others fail where they are needed
+                array, kept = array.with_part_file(part, beside=path.parent)
+                chips = tuple(replace(chip, part=kept) if chip.part == part else chip for chip in array.chips)
+                array = replace(array, chips=chips)
+        return array
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any], *, source: str = "array") -> AccelerometerArray:

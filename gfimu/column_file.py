@@ -7,7 +7,6 @@ values are JSON. A block is small against the table, so reading needs no second 
 from __future__ import annotations
 
 import csv
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol
@@ -20,23 +19,28 @@ from numpy.typing import NDArray
 
 from gfimu.atomic_file import atomic_path
 from gfimu.errors import InputError
+from gfimu.table import ArrowStream, column_type, from_json, metadata_of_schema, numbers, schema_metadata, to_json
+from gfimu.table_columns import TableColumns
 
-__all__ = ["ColumnFile", "open_columns", "write_columns"]
+__all__ = ["ColumnFile", "head_line", "open_columns", "write_columns"]
 
 _BLOCK_BYTES = 1 << 20
 _BLOCK_ROWS = 1 << 16
 _ROW_GROUP_ROWS = 1 << 18
-_FOREIGN_METADATA = {"ARROW:schema", "pandas"}
 _MISSING = ["", "nan", "NaN", "NAN", "NA", "N/A", "null", "NULL"]
 
 
 class ColumnFile(Protocol):
     """An open table: its column names, metadata, an upper bound of its rows, and its blocks."""
 
-    file: Path
     names: list[str]
     metadata: dict[str, Any]
     max_rows: int
+
+    @property
+    def file(self) -> Path | str:
+        """The file, or what messages call the table."""
+        ...
 
     def blocks(self, columns: Sequence[str]) -> Iterator[list[NDArray[np.float64]]]:
         """Yield the named columns as numbers, block by block; missing values are NaN."""
@@ -51,15 +55,18 @@ class ColumnFile(Protocol):
         ...
 
 
-def open_columns(path: str | Path) -> ColumnFile:
-    """Open a CSV or Parquet file (told apart by content).
+def open_columns(source: str | Path | ArrowStream | ColumnFile) -> ColumnFile:
+    """Open a CSV or Parquet file (told apart by content), or a table object.
 
     Raises
     ------
     InputError
-        If the file is missing, empty, binary but not Parquet, damaged, or repeats a column name.
+        If the file is missing, empty, binary but not Parquet, damaged, or repeats a column name; or if ``source`` is
+        neither a path nor a table.
     """
-    file = Path(path)
+    if not isinstance(source, str | Path):
+        return source if isinstance(source, TableColumns) else TableColumns(source)
+    file = Path(source)
     try:
         with file.open("rb") as stream:
             magic = stream.read(4)
@@ -76,6 +83,12 @@ def open_columns(path: str | Path) -> ColumnFile:
     return table
 
 
+def head_line(line: str) -> dict[str, Any]:
+    """Return the metadata of one ``# key: value`` line at the head of a CSV file; empty if it holds none."""
+    key, colon, value = line.lstrip("# ").partition(":")
+    return {key.strip(): from_json(value.strip())} if colon else {}
+
+
 def write_columns(path: str | Path, columns: Mapping[str, NDArray[Any]], metadata: Mapping[str, Any]) -> None:
     """Write columns of equal length to a ``.csv`` or ``.parquet`` file, whole or not at all.
 
@@ -86,6 +99,8 @@ def write_columns(path: str | Path, columns: Mapping[str, NDArray[Any]], metadat
     InputError
         If the extension is neither ``.csv`` nor ``.parquet``, a metadata key can't stand in a CSV line, or the folder
         can't be written to.
+    GfimuError
+        If writing fails, as on a full disk.
     """
     file = Path(path)
     if file.suffix == ".parquet":
@@ -102,22 +117,18 @@ def write_columns(path: str | Path, columns: Mapping[str, NDArray[Any]], metadat
 
 
 def _write_parquet(file: Path, columns: Mapping[str, NDArray[Any]], metadata: Mapping[str, Any]) -> None:
-    described = {key.encode(): _to_json(value).encode() for key, value in metadata.items()}
-    schema = pa.schema([(name, _arrow_type(values)) for name, values in columns.items()], metadata=described)
+    fields = [(name, column_type(values)) for name, values in columns.items()]
+    schema = pa.schema(fields, metadata=schema_metadata(metadata))
     # Readings are nearly random in their low bits: a dictionary would only cost time and memory.
     with pq.ParquetWriter(file, schema, compression="zstd", use_dictionary=False, write_page_checksum=True) as writer:
         for rows in _row_blocks(columns, _ROW_GROUP_ROWS):
             writer.write_table(pa.table([pa.array(values[rows]) for values in columns.values()], schema=schema))
 
 
-def _arrow_type(values: NDArray[Any]) -> pa.DataType:
-    return pa.array(values).type if values.dtype == object else pa.from_numpy_dtype(values.dtype)
-
-
 def _write_csv(file: Path, columns: Mapping[str, NDArray[Any]], metadata: Mapping[str, Any]) -> None:
     with file.open("w", encoding="utf-8", newline="") as text:
         for key, value in metadata.items():
-            text.write(f"# {key}: {_to_json(value)}\n")
+            text.write(f"# {key}: {to_json(value)}\n")
         csv.writer(text, lineterminator="\n").writerow(columns)
     options = pa_csv.WriteOptions(include_header=False, quoting_style="needed")
     with file.open("ab") as stream:
@@ -146,9 +157,7 @@ class _ParquetColumns:
         self._types = dict(zip(schema.names, schema.types, strict=True))
         self.names: list[str] = list(schema.names)
         self.max_rows: int = self._parquet.metadata.num_rows
-        pairs = self._parquet.metadata.metadata or {}
-        texts = {key.decode(errors="replace"): value.decode(errors="replace") for key, value in pairs.items()}
-        self.metadata = {key: _from_json(text) for key, text in texts.items() if key not in _FOREIGN_METADATA}
+        self.metadata = metadata_of_schema(self._parquet.metadata.metadata)
 
     def blocks(self, columns: Sequence[str]) -> Iterator[list[NDArray[np.float64]]]:
         for name in columns:
@@ -157,7 +166,7 @@ class _ParquetColumns:
                 raise InputError(f"{self.file}: column {name} holds {kind}, not numbers; write it as numbers")
         try:
             for batch in self._parquet.iter_batches(batch_size=_BLOCK_ROWS, columns=list(columns), use_threads=False):
-                yield [_numbers(batch.column(name)) for name in columns]
+                yield [numbers(batch.column(name)) for name in columns]
         except (pa.ArrowException, OSError) as error:
             raise self._damaged(error) from None
 
@@ -191,9 +200,7 @@ class _CsvColumns:
                     if line.strip() and not line.startswith("#"):
                         header = line
                         break
-                    key, colon, value = line.lstrip("# ").partition(":")
-                    if colon:
-                        self.metadata[key.strip()] = _from_json(value.strip())
+                    self.metadata |= head_line(line)
         except UnicodeDecodeError:
             raise self._binary() from None
         if not header:
@@ -214,7 +221,7 @@ class _CsvColumns:
         try:
             with pa_csv.open_csv(self.file, read_options=self._read_options(), convert_options=convert) as reader:
                 for batch in reader:
-                    yield [_numbers(column) for column in batch.columns]
+                    yield [numbers(column) for column in batch.columns]
         except (pa.ArrowException, OSError) as error:
             if "Empty CSV" not in str(error):
                 raise self._locate(columns, error) from None
@@ -274,11 +281,6 @@ class _CsvColumns:
         return InputError(f"{self.file}: not a readable CSV file ({_first_line(error)}); write it again")
 
 
-def _numbers(column: pa.Array) -> NDArray[np.float64]:
-    """Numbers of an Arrow column; nulls become NaN."""
-    return np.asarray(column.to_numpy(zero_copy_only=False), dtype=np.float64)
-
-
 def _is_number(cell: str) -> bool:
     try:
         float(cell)
@@ -299,15 +301,3 @@ def _count_lines(file: Path) -> int:
 
 def _first_line(error: Exception) -> str:
     return str(error).splitlines()[0][:120] if str(error) else type(error).__name__
-
-
-def _to_json(value: Any) -> str:
-    """JSON of a metadata value; NumPy arrays and numbers as lists and numbers."""
-    return json.dumps(value, default=lambda item: item.tolist() if hasattr(item, "tolist") else str(item))
-
-
-def _from_json(text: str) -> Any:
-    try:
-        return json.loads(text)
-    except json.JSONDecodeError:
-        return text

@@ -29,6 +29,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gfimu.errors import InputError
 from gfimu.rate.integration import integrate_samples
+from gfimu.short_repr import short_repr
 from gfimu.units import STANDARD_GRAVITY
 
 __all__ = [
@@ -94,6 +95,8 @@ class AttitudeGrowth:
     tilt: NDArray[np.float64]
     heading: NDArray[np.float64]
     deciding: NDArray[np.float64]
+
+    __repr__ = short_repr
 
 
 def position_error(

@@ -21,6 +21,7 @@ from gfimu.errors import InputError
 from gfimu.kinematics import pseudo_inverse
 from gfimu.navigation import navigate
 from gfimu.rate.integration import integrate_rate
+from gfimu.short_repr import short_repr
 from gfimu.units import STANDARD_GRAVITY
 
 __all__ = ["DriftSample", "monte_carlo_drift"]
@@ -49,6 +50,8 @@ class DriftSample:
     mean: NDArray[np.float64]
     std: NDArray[np.float64]
     final: NDArray[np.float64]
+
+    __repr__ = short_repr
 
     @property
     def runs(self) -> int:

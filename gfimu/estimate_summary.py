@@ -14,6 +14,7 @@ from gfimu.array import AccelerometerArray
 from gfimu.estimation import Estimate
 from gfimu.kinematics import null_space, omega_products
 from gfimu.recording import Recording
+from gfimu.short_repr import short_repr
 
 __all__ = ["Agreement", "EstimateSummary", "centripetal_agreement", "summarise"]
 
@@ -80,6 +81,8 @@ class EstimateSummary:
     tacho_rmse_rad_s: float | None
     gyro_rmse_rad_s: float | None
     centripetal: Agreement | None
+
+    __repr__ = short_repr
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures by name, for JSON."""

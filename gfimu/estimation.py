@@ -32,6 +32,8 @@ from gfimu.rate.problem import RateMethod, RateProblem, RateSolution
 from gfimu.rate.sensing import SensorErrors
 from gfimu.recording import Recording
 from gfimu.rest_navigation import navigate_with_rest
+from gfimu.short_repr import joined, timing
+from gfimu.table import ArrowStream, Tabular
 
 __all__ = ["METHODS", "Estimate", "estimate"]
 
@@ -41,7 +43,7 @@ _LEVEL_SECONDS = 1.0
 
 
 @dataclass(frozen=True)
-class Estimate:
+class Estimate(Tabular):
     """Motion of the body at each sample of a recording; NaN where it could not be found.
 
     Parameters
@@ -83,6 +85,10 @@ class Estimate:
     def __len__(self) -> int:
         return len(self.t_s)
 
+    def __repr__(self) -> str:
+        names = [str(self.metadata[key]) for key in ("array", "method") if key in self.metadata]
+        return joined(self, [*names, timing(self.t_s), "with position" if self.position is not None else ""])
+
     def to_columns(self) -> dict[str, NDArray[np.float64]]:
         """Return the columns of the Estimate file, by name with unit."""
         columns = {"t_s": self.t_s}
@@ -97,8 +103,8 @@ class Estimate:
         write_columns(path, self.to_columns(), self.metadata)
 
     @classmethod
-    def read(cls, path: str | Path) -> Estimate:
-        """Read an Estimate file.
+    def read(cls, path: str | Path | ArrowStream) -> Estimate:
+        """Read an Estimate file, or a table object with its columns.
 
         Raises
         ------

@@ -22,6 +22,7 @@ from gfimu.errors import GeometryError, InputError
 from gfimu.geometry_objective import GeometryObjective
 from gfimu.kinematics import require_all_motions
 from gfimu.scoring import Score, score
+from gfimu.short_repr import short_repr
 
 __all__ = ["SearchResult", "optimize"]
 
@@ -57,6 +58,8 @@ class SearchResult:
     gdop_lower_bound: float
     starts: int
     agreeing: int
+
+    __repr__ = short_repr
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of ``gfimu optimize --json``."""

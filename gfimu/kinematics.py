@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 from gfimu.array import AccelerometerArray
 from gfimu.errors import GeometryError, InputError
 from gfimu.observability import MOTION_NAMES, RANK_TOLERANCE, require_all_motions, unseen_motions
+from gfimu.short_repr import short_repr
 
 __all__ = [
     "ALTERNATE_CORNERS",
@@ -68,6 +69,8 @@ class MotionEstimate:
     p: NDArray[np.float64]
     covariance: NDArray[np.float64]
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True)
 class JointEstimate:
@@ -92,6 +95,8 @@ class JointEstimate:
     omega_products: NDArray[np.float64]
     covariance: NDArray[np.float64]
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True)
 class NullSpace:
@@ -113,6 +118,8 @@ class NullSpace:
     basis: NDArray[np.float64]
     sensitivity: NDArray[np.float64]
     rank: int
+
+    __repr__ = short_repr
 
 
 def omega_products(omega: ArrayLike) -> NDArray[np.float64]:

@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from gfimu.array import AccelerometerArray
 from gfimu.errors import GeometryError, unknown_name
 from gfimu.kinematics import joint_form, null_space, omega_leakage, omega_products, pseudo_inverse
+from gfimu.short_repr import short_repr
 
 __all__ = ["FORMS", "LinearSolution", "linear_solution"]
 
@@ -63,6 +64,8 @@ class LinearSolution:
     leakage: NDArray[np.float64]
     covariance: NDArray[np.float64]
     omega_products_covariance: NDArray[np.float64]
+
+    __repr__ = short_repr
 
     @property
     def needs_omega(self) -> bool:

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.array import AccelerometerArray
+from gfimu.carried_array import array_metadata
 from gfimu.errors import InputError
 from gfimu.part import Part
 from gfimu.recording import Recording
@@ -92,7 +93,7 @@ def read_mimu4444(path: str | Path) -> Recording:
     missing = int(np.sum(np.diff(_unwrapped(packets.number, 16)[first]) - 1))
 
     array = AccelerometerArray.load("mimu4444")
-    part = Part.load(array.chips[0].part)
+    part = Part.load(array.chips[0].part, array.part_files)
     counts = packets.counts[first]  # (n, 8, 6)
     readings = counts[:, :, :3].reshape(len(counts), -1) * np.float64(part.lsb)  # (n, 24)
     gyros = _gyros_in_board_axes(counts[:, :, 3:], array)  # (n, 8, 3)
@@ -103,7 +104,7 @@ def read_mimu4444(path: str | Path) -> Recording:
         array.channels,
         {f"gyro_{axis}_rad_s": mean[:, place] for place, axis in enumerate(_GYRO_AXES)},
         {
-            "array": array.name,
+            **array_metadata(array),
             "part": part.name,
             "source": file.name,
             "packets": len(packets.ticks),

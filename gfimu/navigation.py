@@ -16,6 +16,7 @@ from scipy.spatial.transform import Rotation
 from gfimu.attitude import from_rotation, to_rotation
 from gfimu.errors import InputError
 from gfimu.rate.integration import integrate_samples
+from gfimu.short_repr import short_repr
 from gfimu.units import STANDARD_GRAVITY
 
 __all__ = ["NavigationResult", "level", "navigate"]
@@ -43,6 +44,8 @@ class NavigationResult:
     quaternion: NDArray[np.float64]
     velocity: NDArray[np.float64]
     position: NDArray[np.float64]
+
+    __repr__ = short_repr
 
 
 def level(p_at_rest: ArrayLike, *, heading: float = 0.0) -> NDArray[np.float64]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +11,8 @@ from numpy.typing import NDArray
 
 from gfimu.array import AccelerometerArray
 from gfimu.errors import InputError
-from gfimu.model_files import find_model, read_toml
+from gfimu.part_files import part_table
+from gfimu.short_repr import short_repr
 
 __all__ = ["Part", "white_noise_std"]
 
@@ -33,27 +35,35 @@ class Part:
     lsb: float
     noise_std_100_hz: NDArray[np.float64]
 
+    __repr__ = short_repr
+
     @classmethod
-    def load(cls, name: str) -> Part:
+    def load(cls, name: str, files: Mapping[str, str] | None = None) -> Part:
         """Load a part by name (in ``models/parts``) or from a TOML file.
+
+        Parameters
+        ----------
+        name : str
+            Name in ``models/parts``, name of one of ``files``, or path of a part file.
+        files : mapping of str to str, optional
+            Part files that an array carries (`gfimu.AccelerometerArray.part_files`).
 
         Raises
         ------
         InputError
             If the part is unknown (the message lists the names), or its file lacks a figure.
         """
-        path = find_model("parts", name)
-        data = read_toml(path)
+        data, source = part_table(name, files or {})
         try:
             lsb = float(data["lsb_m_s2"])
             noise_lsb = np.asarray(data["noise_lsb_rms_100_hz"], dtype=float)
         except KeyError as error:
-            raise InputError(f"{path}: key {error.args[0]!r} is missing; add it") from None
+            raise InputError(f"{source}: key {error.args[0]!r} is missing; add it") from None
         except (TypeError, ValueError):
-            raise InputError(f"{path}: lsb_m_s2 must be a number and noise_lsb_rms_100_hz three numbers") from None
+            raise InputError(f"{source}: lsb_m_s2 must be a number and noise_lsb_rms_100_hz three numbers") from None
         if noise_lsb.shape != (3,) or not lsb > 0:
-            raise InputError(f"{path}: lsb_m_s2 must be positive and noise_lsb_rms_100_hz three numbers")
-        return cls(str(data.get("name", path.stem)), lsb, noise_lsb * lsb)
+            raise InputError(f"{source}: lsb_m_s2 must be positive and noise_lsb_rms_100_hz three numbers")
+        return cls(str(data.get("name", name)), lsb, noise_lsb * lsb)
 
 
 def white_noise_std(array: AccelerometerArray, sample_rate: float) -> NDArray[np.float64]:
@@ -62,6 +72,6 @@ def white_noise_std(array: AccelerometerArray, sample_rate: float) -> NDArray[np
     The noise is white up to half the output data rate, so it grows with the square root of ``sample_rate``, Hz, from
     100 Hz on; below that the data sheets give the figure for 100 Hz.
     """
-    parts = {chip.part: Part.load(chip.part) for chip in array.chips}
+    parts = {chip.part: Part.load(chip.part, array.part_files) for chip in array.chips}
     at_100_hz = [parts[chip.part].noise_std_100_hz[: len(chip.axes)] for chip in array.chips]
     return np.concatenate(at_100_hz) * math.sqrt(max(sample_rate, 100.0) / 100.0)

@@ -27,6 +27,7 @@ from gfimu.drift_forms import (
 )
 from gfimu.errors import InputError
 from gfimu.kinematics import omega_leakage, pseudo_inverse
+from gfimu.short_repr import short_repr
 from gfimu.units import STANDARD_GRAVITY
 
 __all__ = [
@@ -73,6 +74,8 @@ class DriftTerm:
     size_unit: str
     std: NDArray[np.float64]
     share: float
+
+    __repr__ = short_repr
 
 
 @dataclass(frozen=True)
@@ -125,6 +128,8 @@ class DriftBudget:
     alpha_overtakes: float
     note: str = ""
     format_version: int = _FORMAT_VERSION
+
+    __repr__ = short_repr
 
     @property
     def total_std(self) -> NDArray[np.float64]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -16,15 +17,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gfimu.array import AccelerometerArray
+from gfimu.carried_array import array_metadata, carried_array, with_carried_array
 from gfimu.column_file import write_columns
 from gfimu.errors import InputError, UnitError
 from gfimu.recording_file import read_recording_file
+from gfimu.short_repr import joined, timing
+from gfimu.table import ArrowStream, Tabular
 
 __all__ = ["Recording"]
 
 
 @dataclass(frozen=True)
-class Recording:
+class Recording(Tabular):
     """Samples of an accelerometer array and its references.
 
     Parameters
@@ -39,7 +43,7 @@ class Recording:
         References by their SI column names: ``tacho_rad_s``, ``command_rad_s``, ``angle_rad``,
         ``temperature_degC``, ``gyro_x_rad_s`` and so on; NaN where one has no value.
     metadata : mapping
-        Array, part, sample rate, scenario, seed, software version, mounting.
+        Array (name and text of its file), part, sample rate, scenario, seed, software version, mounting.
     extra : mapping of str to ndarray
         Columns that the format does not know, kept as they came.
     unit : {"m_s2", "lsb"}
@@ -64,6 +68,21 @@ class Recording:
     def __len__(self) -> int:
         return len(self.t_s)
 
+    def __repr__(self) -> str:
+        name = self.metadata.get("array")
+        unit = {"m_s2": "m/s²", "lsb": "counts"}.get(self.unit, self.unit)
+        corrupt = sum(self.corrupt.values())
+        return joined(
+            self,
+            [
+                name if isinstance(name, str) else "no array",
+                f"{len(self.channels)} channels in {unit}",
+                timing(self.t_s),
+                f"{corrupt} corrupt values left out" if corrupt else "",
+                f"references {', '.join(self.reference)}" if self.reference else "",
+            ],
+        )
+
     @property
     def sample_period(self) -> float:
         """Nominal sample period: the median step of the times, s."""
@@ -80,6 +99,21 @@ class Recording:
     def duration(self) -> float:
         """Time from the first to the last sample, s."""
         return float(self.t_s[-1] - self.t_s[0]) if len(self.t_s) else 0.0
+
+    @cached_property
+    def array(self) -> AccelerometerArray | None:
+        """The array that the recording carries in its metadata, or only names there; None if it does neither.
+
+        Raises `InputError` if its text is damaged or its name unknown.
+        """
+        return carried_array(self.metadata)
+
+    @property
+    def corrupt(self) -> dict[str, int]:
+        """How many values were left out of each channel or reference as they can be no measurement; empty if none."""
+        counts = self.metadata.get("corrupt_values")
+        items = counts.items() if isinstance(counts, Mapping) else ()
+        return {str(name): count for name, count in items if isinstance(count, int)}
 
     @property
     def mounting_rotvec(self) -> NDArray[np.float64]:
@@ -114,6 +148,12 @@ class Recording:
         first, last = np.searchsorted(self.t_s, [start_s, stop_s])
         return self.slice(int(first), int(last))
 
+    def carrying(self, array: AccelerometerArray) -> Recording:
+        """Return the recording with ``array`` as the one that it carries."""
+        others = {key: value for key, value in self.metadata.items() if key != "parts_toml"}
+        part = {"part": array.chips[0].part} if "part" in others else {}
+        return replace(self, metadata=others | part | array_metadata(array))
+
     def for_array(self, array: AccelerometerArray) -> NDArray[np.float64]:
         """Return the readings in the channel order of ``array``, shape (n, c), m/s².
 
@@ -137,13 +177,20 @@ class Recording:
         return self.readings[:, [self.channels.index(name) for name in array.channels]]
 
     @classmethod
-    def read(cls, path: str | Path, *, array: AccelerometerArray | None = None, unit: str = "m_s2") -> Recording:
-        """Read a recording from a CSV or Parquet file.
+    def read(
+        cls, path: str | Path | ArrowStream, *, array: AccelerometerArray | None = None, unit: str = "m_s2"
+    ) -> Recording:
+        """Read a recording from a CSV or Parquet file, or from a table of pandas, polars or pyarrow.
+
+        Values that can be no measurement (infinite, or far beyond any part's range) become NaN with a
+        `gfimu.recording_warning.CorruptValueWarning`, and are counted in `corrupt`.
 
         Parameters
         ----------
-        path : str or Path
-            ``.csv`` or ``.parquet`` file, one row per sample, unit in each column's name.
+        path : str, Path or table
+            ``.csv`` or ``.parquet`` file, one row per sample, unit in each column's name; or a table object with the
+            same columns: a pandas table (``attrs`` are the metadata; an index named ``t_s`` is the time), or anything
+            with ``__arrow_c_stream__``.
         array : AccelerometerArray, optional
             The array whose channels must be there; by default every channel found is read.
         unit : {"m_s2", "lsb"}
@@ -161,12 +208,14 @@ class Recording:
     def write(self, path: str | Path) -> None:
         """Write to a CSV or Parquet file (by extension), whole or not at all.
 
+        The file carries the array in its metadata; one of ``models/arrays`` that is only named is added.
+
         Raises
         ------
         InputError
             If the extension is neither ``.csv`` nor ``.parquet``, or the folder can't be written to.
         """
-        write_columns(path, self.to_columns(), self.metadata)
+        write_columns(path, self.to_columns(), with_carried_array(self.metadata, self.channels))
 
     def to_columns(self) -> dict[str, NDArray[Any]]:
         """Return the columns of the file, by name with unit."""
@@ -191,5 +240,5 @@ class Recording:
             np.asarray(readings, dtype=float),
             array.channels,
             {key: np.asarray(value, dtype=float) for key, value in (reference or {}).items()},
-            {"array": array.name, **(metadata or {})},
+            {**array_metadata(array), **(metadata or {})},
         )

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+import warnings
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,9 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.array import AccelerometerArray
+from gfimu.carried_array import carried_array
 from gfimu.column_file import ColumnFile, open_columns
 from gfimu.errors import InputError, UnitError
 from gfimu.part import Part
+from gfimu.plausible import MOST_CORRUPT, largest_of_array, largest_of_part, largest_reference
+from gfimu.recording_warning import CorruptValueWarning
+from gfimu.table import ArrowStream
 from gfimu.units import READING_UNITS, REFERENCE_UNITS, STANDARD_GRAVITY
 
 __all__ = ["RecordingContent", "read_recording_file"]
@@ -22,7 +27,8 @@ __all__ = ["RecordingContent", "read_recording_file"]
 _CHANNEL = re.compile(r"([A-Za-z]+[0-9]+)_(.+)")
 _TIME_UNIT_LIKE = re.compile(r"(m|u|µ|n)?s|sec|seconds?|min|h|ticks?")
 _DEFAULT_LSB = 0.0039 * STANDARD_GRAVITY
-_LARGEST = {"m_s2": 1e7, "lsb": 2.0**31}
+_UNITS = ("m_s2", "lsb")
+_LARGEST_COUNT = 2.0**31
 _LONGEST_TIME = 1e12
 
 
@@ -40,20 +46,23 @@ class RecordingContent:
 
 @dataclass(frozen=True)
 class _Column:
-    """A column of the file, the name of what it holds, and its factor to the unit in memory."""
+    """A column of the file, the name of what it holds, its factor to the unit in memory, its largest value there."""
 
     source: str
     name: str
     factor: float
+    largest: float
 
 
-def read_recording_file(path: str | Path, array: AccelerometerArray | None, unit: str) -> RecordingContent:
-    """Read a CSV or Parquet file block by block into arrays of its final size.
+def read_recording_file(
+    path: str | Path | ArrowStream | ColumnFile, array: AccelerometerArray | None, unit: str
+) -> RecordingContent:
+    """Read a CSV or Parquet file block by block, or a table object, into arrays of its final size.
 
     Parameters
     ----------
-    path : str or Path
-        The file.
+    path : str, Path or table
+        The file, or a table (see `gfimu.table_columns.TableColumns`).
     array : AccelerometerArray or None
         The array whose channels must be there; None takes every channel found.
     unit : {"m_s2", "lsb"}
@@ -64,49 +73,110 @@ def read_recording_file(path: str | Path, array: AccelerometerArray | None, unit
     InputError
         As `gfimu.Recording.read`.
     """
-    if unit not in _LARGEST:
-        raise UnitError(f"unknown unit {unit!r} for readings; valid: {', '.join(_LARGEST)}")
+    if unit not in _UNITS:
+        raise UnitError(f"unknown unit {unit!r} for readings; valid: {', '.join(_UNITS)}")
     table = open_columns(path)
     if "t_s" not in table.names:
         _refuse_other_time_unit(table)
         raise InputError(f"{table.file}: column t_s is missing; every recording needs the sample time in seconds")
     references = _reference_columns(table)
-    channels = _channel_columns(table, array, unit)
+    channels = _channel_columns(table, array, _own_array(table), unit)
     known = {"t_s", *(column.source for column in (*channels, *references))}
 
     time = np.empty(table.max_rows)
     readings = np.empty((table.max_rows, len(channels)))
     reference = {column.name: np.empty(table.max_rows) for column in references}
+    corrupt = _Corrupt(table)
     filled = 0
     sources = ["t_s", *(column.source for column in (*channels, *references))]
     for times, *values in table.blocks(sources):
         rows = slice(filled, filled + len(times))
         _check_times(table, times, filled, time[filled - 1] if filled else -np.inf)
         time[rows] = times
-        for place, column in enumerate(channels):
-            _check_readings(table, column, values[place], filled, unit)
-            np.multiply(values[place], column.factor, out=readings[rows, place])
-        for column, numbers in zip(references, values[len(channels) :], strict=True):
-            np.multiply(numbers, column.factor, out=reference[column.name][rows])
+        targets = [readings[rows, place] for place in range(len(channels))]
+        targets += [reference[column.name][rows] for column in references]
+        for column, numbers, target in zip((*channels, *references), values, targets, strict=True):
+            with np.errstate(over="ignore"):  # what becomes infinite is left out
+                np.multiply(numbers, column.factor, out=target)
+            corrupt.leave_out(column, target, numbers, filled)
         filled += len(times)
     if filled == 0:
         raise InputError(f"{table.file}: no samples below the header; record again or give another file")
     extra = table.read_as_found([name for name in table.names if name not in known])
+    metadata = corrupt.report([column.name for column in channels], int(np.isfinite(readings[:filled]).sum()))
     return RecordingContent(
         time[:filled],
         readings[:filled],
         tuple(column.name for column in channels),
         {name: values[:filled] for name, values in reference.items()},
-        table.metadata,
+        metadata,
         extra,
     )
 
 
-def _channel_columns(table: ColumnFile, array: AccelerometerArray | None, unit: str) -> list[_Column]:
+class _Corrupt:
+    """Values of a file that can be no measurement: left out, counted by column, the first one remembered."""
+
+    def __init__(self, table: ColumnFile) -> None:
+        self._table = table
+        self._counts: dict[str, int] = {}
+        self._first = ""
+
+    def leave_out(
+        self, column: _Column, values: NDArray[np.float64], found: NDArray[np.float64], first_row: int
+    ) -> None:
+        """Turn impossible ``values``, in the unit in memory, into NaN; ``found`` are the same as the file has them."""
+        bad = np.abs(found) > column.largest / column.factor  # false for NaN, a missing value
+        if not bad.any():
+            return
+        if not self._counts:
+            row = int(np.argmax(bad))
+            self._first = f"{self._table.place(first_row + row)}, column {column.source}: {found[row]:g}"
+        values[bad] = np.nan
+        self._counts[column.name] = self._counts.get(column.name, 0) + int(bad.sum())
+
+    def report(self, channels: Sequence[str], intact: int) -> dict[str, Any]:
+        """Warn of what was left out, and return the metadata with the counts; ``intact`` readings are left.
+
+        Raises `InputError` if most readings were impossible: then it is their unit that is wrong.
+        """
+        file, metadata = self._table.file, self._table.metadata
+        if not self._counts:
+            return metadata
+        lost = sum(count for name, count in self._counts.items() if name in channels)
+        if lost > MOST_CORRUPT * (lost + intact):
+            raise InputError(
+                f"{file}: {self._first} can't be a reading, as most in this file; check the unit in the column's name, "
+                "or leave the cell empty where a value is missing"
+            )
+        names = ", ".join(f"{name} {count}" for name, count in self._counts.items())
+        warnings.warn(
+            f"{file}: left out {sum(self._counts.values())} corrupt values ({names}), the first at {self._first}",
+            CorruptValueWarning,
+            stacklevel=4,
+        )
+        before = metadata.get("corrupt_values")
+        known = {} if not isinstance(before, dict) else {n: c for n, c in before.items() if isinstance(c, int)}
+        return metadata | {"corrupt_values": known | {n: c + known.get(n, 0) for n, c in self._counts.items()}}
+
+
+def _own_array(table: ColumnFile) -> AccelerometerArray | None:
+    """Return the array whose text the file carries; None without one, or where it is damaged."""
+    try:
+        return carried_array(table.metadata) if "array_toml" in table.metadata else None
+    except InputError:
+        return None  # reported where the array itself is needed
+
+
+def _channel_columns(
+    table: ColumnFile, array: AccelerometerArray | None, own: AccelerometerArray | None, unit: str
+) -> list[_Column]:
     """Find the columns of the channels; an unknown unit, two units of one channel or a missing one is an error."""
     found: dict[str, tuple[str, str]] = {}
     for name in table.names:
-        channel, suffix = _split_channel(name, array)
+        channel, suffix = _split_channel(name, array or own)
+        if channel is None and array is None:
+            channel, suffix = _split_channel(name, None)
         if channel is None:
             continue
         if suffix not in READING_UNITS:
@@ -127,10 +197,22 @@ def _channel_columns(table: ColumnFile, array: AccelerometerArray | None, unit: 
             f"{table.file}: column {', '.join(missing)}{place} is missing; add it (or _g, _mg, _lsb) "
             "or name the array it was made with"
         )
+    largest = _largest_readings(table, array or own, wanted) if unit == "m_s2" else [_LARGEST_COUNT] * len(wanted)
     return [
-        _Column(found[channel][0], channel, _reading_factor(table, array, channel, found[channel][1], unit))
-        for channel in wanted
+        _Column(
+            found[channel][0], channel, _reading_factor(table, array or own, channel, found[channel][1], unit), most
+        )
+        for channel, most in zip(wanted, largest, strict=True)
     ]
+
+
+def _largest_readings(table: ColumnFile, array: AccelerometerArray | None, channels: Sequence[str]) -> list[float]:
+    """Return the largest reading that each channel can have, m/s²: by the array's parts, else by the recording's."""
+    files = table.metadata.get("parts_toml")
+    part = table.metadata.get("part")
+    usual = largest_of_part(part if isinstance(part, str) else None, files if isinstance(files, dict) else None)
+    by_array = {} if array is None else dict(zip(array.channels, largest_of_array(array).tolist(), strict=True))
+    return [by_array.get(channel, usual) for channel in channels]
 
 
 def _split_channel(name: str, array: AccelerometerArray | None) -> tuple[str | None, str]:
@@ -161,12 +243,16 @@ def _lsb_size(table: ColumnFile, array: AccelerometerArray | None, channel: str)
         if not isinstance(size, int | float) or not 0 < size < np.inf:
             raise InputError(f"{table.file}: metadata lsb_m_s2 is {size!r}; give the size of one count in m/s²")
         return float(size)
+    if array is not None and channel in array.channels:
+        chip = next(chip for chip in array.chips if channel in chip.channels)
+        return Part.load(chip.part, array.part_files).lsb
     part = table.metadata.get("part")
-    if array is not None:
-        part = next(chip.part for chip in array.chips if channel in chip.channels)
-    if part is None:
-        return _DEFAULT_LSB
-    return Part.load(str(part)).lsb
+    if part is not None:
+        files = table.metadata.get("parts_toml")
+        return Part.load(str(part), files if isinstance(files, dict) else None).lsb
+    if "array_toml" in table.metadata:
+        carried_array(table.metadata, source=table.file)  # raises: a damaged text is no reason to guess the size
+    return _DEFAULT_LSB
 
 
 def _reference_columns(table: ColumnFile) -> list[_Column]:
@@ -183,7 +269,8 @@ def _reference_columns(table: ColumnFile) -> list[_Column]:
             raise UnitError(f"{table.file}: column {name!r}: unknown unit {suffix!r}; valid: {valid}")
         if quantity in found:
             raise InputError(f"{table.file}: {quantity} appears as {found[quantity].source} and {name}; keep one")
-        found[quantity] = _Column(name, f"{quantity}_{next(iter(units))}", units[suffix])
+        column = f"{quantity}_{next(iter(units))}"
+        found[quantity] = _Column(name, column, units[suffix], largest_reference(column))
     return list(found.values())
 
 
@@ -209,15 +296,4 @@ def _check_times(table: ColumnFile, times: NDArray[np.float64], first_row: int, 
         raise InputError(
             f"{table.file}: {table.place(first_row + row)}: t_s does not increase "
             f"({previous:.9g} s, then {times[row]:.9g} s); sort by time or drop the repeated samples"
-        )
-
-
-def _check_readings(table: ColumnFile, column: _Column, values: NDArray[np.float64], first_row: int, unit: str) -> None:
-    """Refuse infinite and impossible readings; NaN (a missing reading) passes."""
-    bad = np.abs(values) > _LARGEST[unit] / column.factor
-    if bad.any():
-        row = int(np.argmax(bad))
-        raise InputError(
-            f"{table.file}: {table.place(first_row + row)}, column {column.source}: {values[row]:g} can't be a "
-            "reading; check the unit, or leave the cell empty where a value is missing"
         )

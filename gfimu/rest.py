@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from gfimu.errors import InputError
 from gfimu.recording import Recording
+from gfimu.short_repr import short_repr
 
 __all__ = ["Rest", "detect_rest", "motion_statistic", "rest_threshold"]
 
@@ -49,6 +50,8 @@ class Rest:
     chosen_by_data: bool
     window: int
     unit: str
+
+    __repr__ = short_repr
 
     def __len__(self) -> int:
         return len(self.start)

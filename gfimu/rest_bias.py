@@ -20,6 +20,7 @@ from gfimu.estimation import Estimate, estimate
 from gfimu.kinematics import specific_force
 from gfimu.recording import Recording
 from gfimu.rest import detect_rest
+from gfimu.short_repr import short_repr
 from gfimu.units import STANDARD_GRAVITY
 
 __all__ = ["RestBias", "estimate_from_rest", "rest_bias"]
@@ -46,6 +47,8 @@ class RestBias:
     std: NDArray[np.float64]
     start_s: float
     stop_s: float
+
+    __repr__ = short_repr
 
     def remove(self, recording: Recording) -> Recording:
         """Return the recording without these biases, in the channel order of the array."""

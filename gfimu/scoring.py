@@ -20,6 +20,7 @@ from gfimu.bounds import rate_bound
 from gfimu.dilution import gdop, gdop_lower_bound
 from gfimu.errors import InputError
 from gfimu.kinematics import MOTION_NAMES, joint_covariance, null_space, omega_leakage, require_all_motions
+from gfimu.short_repr import short_repr
 
 __all__ = ["DEFAULT_NOISE_STD", "Score", "gdop", "gdop_lower_bound", "ranking_remark", "score"]
 
@@ -80,6 +81,8 @@ class Score:
     omega_rad_s: NDArray[np.float64]
     noise_m_s2: float
     rate_bound_rad_s: NDArray[np.float64]
+
+    __repr__ = short_repr
 
     @property
     def omega_squared_terms(self) -> dict[str, str]:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from gfimu.array import AccelerometerArray
 from gfimu.errors import InputError
+from gfimu.short_repr import short_repr
 from sim.data_sheet import DataSheet
 
 __all__ = ["Sensor", "SensorErrors", "SensorSettings", "conversion_offsets", "draw_errors", "flicker", "quantise"]
@@ -107,6 +108,8 @@ class SensorErrors:
     quadratic: NDArray[np.float64]
     bias_temperature: NDArray[np.float64]
     scale_temperature: NDArray[np.float64]
+
+    __repr__ = short_repr
 
     @classmethod
     def none(cls, n_channels: int) -> SensorErrors:
@@ -198,6 +201,8 @@ class Sensor:
     highest: NDArray[np.int64]
     zero_lsb: NDArray[np.bool_]
 
+    __repr__ = short_repr
+
     @classmethod
     def build(
         cls, array: AccelerometerArray, settings: SensorSettings, rng: np.random.Generator, *, part: str | None = None
@@ -221,8 +226,8 @@ class Sensor:
             If a part is unknown or does not have these settings.
         """
         if part is not None:
-            array = replace(array, chips=tuple(replace(chip, part=part) for chip in array.chips))
-        sheets = {name: DataSheet.load(name) for name in {chip.part for chip in array.chips}}
+            array = array.with_part(part)
+        sheets = {name: DataSheet.load(name, array.part_files) for name in {chip.part for chip in array.chips}}
         for sheet in sheets.values():
             settings.check(sheet)
         errors = draw_errors(array, sheets, supply=settings.supply, rng=rng)

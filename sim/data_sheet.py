@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.errors import InputError
-from gfimu.model_files import find_model, read_toml
+from gfimu.part_files import part_table
+from gfimu.short_repr import short_repr
 from sim.toml_table import TomlTable
 
 __all__ = ["DataSheet"]
@@ -80,25 +81,34 @@ class DataSheet:
     high_supply_gain: NDArray[np.float64]
     high_supply_offset: NDArray[np.float64]
 
+    __repr__ = short_repr
+
     @classmethod
-    def load(cls, name: str | Path) -> DataSheet:
+    def load(cls, name: str, files: Mapping[str, str] | None = None) -> DataSheet:
         """Load the data sheet of a part by name (in ``models/parts``) or from a TOML file.
+
+        Parameters
+        ----------
+        name : str
+            Name in ``models/parts``, name of one of ``files``, or path of a part file.
+        files : mapping of str to str, optional
+            Part files that an array carries (`gfimu.AccelerometerArray.part_files`).
 
         Raises
         ------
         InputError
             If the part is unknown (the message lists the names) or the file is malformed.
         """
-        path = find_model("parts", name)
-        table = TomlTable(read_toml(path), str(path))
+        content, source = part_table(name, files or {})
+        table = TomlTable(content, source)
         supply = table.table("supply_3_3_V")
         sensitivity = supply.numbers("sensitivity_lsb_g", 3, [_NOMINAL_SENSITIVITY_LSB_G] * 3)
         ranges = table.raw("range_g")
         if not isinstance(ranges, list) or not ranges or not all(isinstance(value, int) for value in ranges):
-            raise InputError(f"{path}: range_g must be a list of whole numbers of g")
+            raise InputError(f"{source}: range_g must be a list of whole numbers of g")
         offset_std = np.array(table.numbers("offset_std_m_s2", 3))
         return cls(
-            name=table.text("name", path.stem),
+            name=table.text("name", name),
             lsb=table.number("lsb_m_s2", above=0.0),
             ranges_g=tuple(ranges),
             bits=int(table.number("bits", 16, above=1)),

@@ -64,7 +64,7 @@ class Ride:
             t = np.arange(0.0, run.duration, 1.0 / GRID_HZ)
             for step in (*self.world.motion_steps, *self.world.mount_steps):
                 self._motion = step(_spin(self._motion), t)
-        self._sheet = DataSheet.load(run.part or run.array.chips[0].part)
+        self._sheet = DataSheet.load(run.part or run.array.chips[0].part, run.array.part_files)
         self._sensors: dict[float, Sensor] = {}
         self._segments: dict[int, CubicSpline] = {}
 

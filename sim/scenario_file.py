@@ -75,6 +75,8 @@ def scenario_fields(data: Mapping[str, Any], source: str, beside: Path | None) -
     motion, length = _motion(table.table("motion"))
     sensor, drive = table.table("sensor"), table.table("drive")
     part = sensor.text("part", "") or None
+    if part is not None:
+        array, part = array.with_part_file(part, beside=beside)
     drive.raw("source", None)  # of a twin file; a simulation drives itself
     fields: dict[str, Any] = {
         "name": table.text("name", Path(source).stem),
@@ -83,7 +85,7 @@ def scenario_fields(data: Mapping[str, Any], source: str, beside: Path | None) -
         "motion": motion,
         "duration": table.number("duration_s", length, above=0.0) if length else table.number("duration_s", above=0.0),
         "sample_rate": sample_rate,
-        "sensor": _sensor(sensor, sample_rate, DataSheet.load(part or array.chips[0].part)),
+        "sensor": _sensor(sensor, sample_rate, DataSheet.load(part or array.chips[0].part, array.part_files)),
         "part": part,
         "chips_seed": sensor.whole("chips_seed", None, least=0),
         "gravity": table.number("gravity_m_s2", STANDARD_GRAVITY, above=0.0),

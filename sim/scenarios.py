@@ -12,9 +12,11 @@ from numpy.typing import NDArray
 
 import gfimu
 from gfimu.array import AccelerometerArray
+from gfimu.carried_array import array_metadata
 from gfimu.errors import InputError
 from gfimu.model_files import find_model, read_toml
 from gfimu.recording import Recording
+from gfimu.short_repr import short_repr
 from gfimu.units import STANDARD_GRAVITY
 from sim import forward
 from sim.adxl345 import Sensor, SensorSettings, conversion_offsets
@@ -90,6 +92,8 @@ class Scenario:
     effects: tuple[Effect, ...] = ()
     temperature: tuple[float, float, float] = (25.0, 25.0, 600.0)
     description: str = field(default="", compare=False)
+
+    __repr__ = short_repr
 
     @property
     def free(self) -> bool:
@@ -240,7 +244,7 @@ def _rigid_body(
     if not run.free:
         for step in (*world.motion_steps, *world.mount_steps):
             motion = step(_spin(motion), t)
-    offsets = conversion_offsets(run.sensor, DataSheet.load(run.part or run.array.chips[0].part))
+    offsets = conversion_offsets(run.sensor, DataSheet.load(run.part or run.array.chips[0].part, run.array.part_files))
     force = np.empty((len(t), run.array.n_channels))
     for first in range(0, len(t), _BLOCK):
         block = slice(first, first + _BLOCK)
@@ -292,7 +296,7 @@ def _metadata(run: Scenario, sensor: Sensor, seed: int) -> dict[str, Any]:
     errors = dict(zip(run.array.channels, sensor.errors.bias.tolist(), strict=True))
     gains = dict(zip(run.array.channels, sensor.errors.scale.tolist(), strict=True))
     return {
-        "array": run.array.name,
+        **array_metadata(run.array if run.part is None else run.array.with_part(run.part)),
         "part": run.part or run.array.chips[0].part,
         "sample_rate_hz": run.sample_rate,
         "scenario": run.name,

@@ -21,6 +21,7 @@ from scipy.spatial.transform import Rotation
 from gfimu.array import AccelerometerArray
 from gfimu.errors import InputError
 from gfimu.model_files import find_model
+from gfimu.short_repr import short_repr
 from sim.forward import arm_growth
 from sim.motion import BodyMotion, BodyState, SpinMotion, SpinState, SplineSpin
 from sim.world import Nod, World
@@ -55,6 +56,8 @@ class DrivenRun:
     readings: NDArray[np.float64]
     tacho: NDArray[np.float64]
     torque: NDArray[np.float64]
+
+    __repr__ = short_repr
 
     @property
     def motion(self) -> SplineSpin:

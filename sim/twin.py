@@ -17,6 +17,8 @@ from gfimu.diagnosis.free_body.motion import BodyDrive
 from gfimu.diagnosis.model import BasisUnits, EffectFamily, ExpectedNoise, Mode, Play, Ripple
 from gfimu.errors import InputError
 from gfimu.model_files import find_model, read_toml
+from gfimu.part_files import part_table
+from gfimu.short_repr import short_repr
 from gfimu.units import STANDARD_GRAVITY
 from sim import forward
 from sim.body import body_channels
@@ -70,6 +72,8 @@ class Twin:
     effects: tuple[Effect, ...] = ()
     array_name: str = ""
 
+    __repr__ = short_repr
+
     @classmethod
     def load(cls, name: str | Path) -> Twin:
         """Load a twin by name (in ``models/twins``) or from a TOML file.
@@ -113,7 +117,8 @@ class Twin:
         if offset.shape != (3,) or not np.isfinite(offset).all():
             raise InputError(f"{source}: cube_offset_m needs three finite numbers")
         part = str(sensor.get("part", array.chips[0].part))
-        find_model("parts", part)
+        array, part = array.with_part_file(part, beside=beside)
+        part_table(part, array.part_files)
         return cls(
             array=array,
             gravity=_positive(data.get("gravity_m_s2", STANDARD_GRAVITY), f"{source}: gravity_m_s2"),
@@ -279,7 +284,7 @@ class Twin:
 
     def expected_noise(self, sample_rate: float) -> ExpectedNoise:
         """Return white noise and quantisation of the part at a sample rate, as the data sheet has them."""
-        part = read_toml(find_model("parts", self.part))
+        part, _ = part_table(self.part, self.array.part_files)
         quantum = float(part["lsb_m_s2"])
         if not self.full_resolution:
             quantum *= max(self.range_g / float(part["range_g"][0]), 1.0)

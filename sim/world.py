@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.array import AccelerometerArray
+from gfimu.short_repr import short_repr
 from gfimu.units import STANDARD_GRAVITY
 from sim.motion import SpinMotion, SpinState
 
@@ -191,6 +192,8 @@ class World:
     bias_walk: float = 0.0
     temperature: float = 25.0
     start: float | None = None
+
+    __repr__ = short_repr
 
     def chip_times(self, t: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the true (reference) times at which each chip is sampled, shape (n, k), for board times ``t``, s."""

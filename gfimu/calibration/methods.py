@@ -150,5 +150,6 @@ def _nominal_scales(recording: Recording, chips: tuple[str, ...]) -> dict[str, f
     if "lsb_m_s2" in recording.metadata:
         return dict.fromkeys(chips, 1.0 / float(recording.metadata["lsb_m_s2"]))
     if "part" in recording.metadata:
-        return dict.fromkeys(chips, 1.0 / Part.load(str(recording.metadata["part"])).lsb)
+        part = Part.load(str(recording.metadata["part"]), recording.metadata.get("parts_toml"))
+        return dict.fromkeys(chips, 1.0 / part.lsb)
     return {}

@@ -22,6 +22,7 @@ from gfimu.atomic_file import write_text
 from gfimu.calibration.error_model import GAUGES, ErrorModel, free_elements
 from gfimu.errors import InputError, UnitError
 from gfimu.recording import Recording
+from gfimu.short_repr import joined
 
 __all__ = ["FORMAT_VERSION", "Calibration", "combine", "load_calibration", "parameter_names"]
 
@@ -96,6 +97,20 @@ class Calibration:
             raise InputError("a calibration needs three channels per chip")
         if self.null_space.size == 0:
             object.__setattr__(self, "null_space", np.empty((count, 0)))
+
+    def __repr__(self) -> str:
+        unit = {"m_s2": "m/s²", "rad_s": "rad/s", "lsb": "counts"}.get(self.unit, self.unit)
+        undetermined = self.null_space.shape[1]
+        return joined(
+            self,
+            [
+                self.method,
+                f"{len(self.channels)} channels in {unit}",
+                f"{len(self.names)} parameters",
+                f"{undetermined} directions undetermined" if undetermined else "",
+                f"{len(self.warnings)} warnings" if self.warnings else "",
+            ],
+        )
 
     @property
     def std(self) -> NDArray[np.float64]:

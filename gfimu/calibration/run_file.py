@@ -7,7 +7,9 @@ from pathlib import Path
 from gfimu.array import AccelerometerArray
 from gfimu.calibration.imu_tk import read_text_triad
 from gfimu.calibration.result import Calibration
+from gfimu.carried_array import array_difference
 from gfimu.column_file import open_columns
+from gfimu.errors import InputError
 from gfimu.mimu4444 import is_mimu4444, read_mimu4444
 from gfimu.recording import Recording
 from gfimu.recording_formats import open_run
@@ -57,7 +59,19 @@ def open_calibrated_run(
     recording, geometry = open_run(path, array)
     if calibration.unit == "lsb" and not is_mimu4444(path):
         recording = Recording.read(path, array=geometry, unit="lsb")
-    return calibration.apply(recording), calibration.calibrated_array(geometry)
+    corrected, calibrated = calibration.apply(recording), calibration.calibrated_array(geometry)
+    if _carries(recording, geometry):  # another array of its own stays in it, so that the difference is reported
+        corrected = corrected.carrying(calibrated)
+    return corrected, calibrated
+
+
+def _carries(recording: Recording, array: AccelerometerArray) -> bool:
+    """Tell whether a recording carries the geometry of ``array``."""
+    try:
+        own = recording.array
+    except InputError:
+        return False
+    return own is not None and not array_difference(own, array)
 
 
 def _open(path: str | Path, array: AccelerometerArray | None, unit: str | None) -> Recording:

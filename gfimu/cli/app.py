@@ -52,6 +52,7 @@ def _options(
     ),
 ) -> None:
     """Collect the options of the program itself."""
+    importlib.import_module("gfimu.cli.warning_lines").install()
 
 
 def program() -> typer.Typer:

@@ -66,6 +66,7 @@ def print_diagnosis(found: Diagnosis) -> None:
         next_steps,
         odds,
         parameter_texts,
+        parameter_units,
         percent,
         story,
         summary,
@@ -76,7 +77,8 @@ def print_diagnosis(found: Diagnosis) -> None:
     if found.causes:
         rows = []
         for cause in found.causes:
-            texts = [one for one in parameter_texts(cause) if one.significant] or parameter_texts(cause)
+            texts = parameter_texts(cause, parameter_units(found, cause))
+            texts = [one for one in texts if one.significant] or texts
             rows += [(cause.effect, summary(found, cause), percent(cause.probability))]
             rows += [
                 (f"  {one.name}", f"{one.value}{f' = {one.familiar}' if one.familiar else ''}", "") for one in texts

@@ -37,11 +37,17 @@ def convert(
     InputError
         If the source can't be read, or the target can't be written where it is asked for.
     """
+    from gfimu.carried_array import carried_array
     from gfimu.commands.opened import as_array
     from gfimu.recording_formats import open_recording
 
     drawing = None if array is None else as_array(array)
     recording = open_recording(source, array=drawing) if isinstance(source, str | Path) else source
+    if drawing is not None:
+        recording = recording.carrying(drawing)
+    elif "array_toml" in recording.metadata:
+        named = source if isinstance(source, str | Path) else "the recording"
+        carried_array(recording.metadata, source=named)  # a damaged one is not passed on
     if target is not None:
         recording.write(target)
     return recording

@@ -38,17 +38,17 @@ def as_array(array: AccelerometerArray | str | Path) -> AccelerometerArray:
 
 
 def array_of(recording: Recording) -> AccelerometerArray:
-    """Return the array that a recording names.
+    """Return the array that a recording carries.
 
     Raises
     ------
     InputError
-        If it names none, or one that is not known here.
+        If it carries none, or names one that is not known here.
     """
-    name = recording.metadata.get("array")
-    if not isinstance(name, str):
-        raise InputError("the recording does not name its array; give it as array")
-    return as_array(name)
+    array = recording.array
+    if array is None:
+        raise InputError("the recording does not carry its array; give it as array")
+    return array
 
 
 def as_run(

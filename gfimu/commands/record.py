@@ -100,5 +100,5 @@ def _live_view(
     from gfimu.part import Part
 
     carried = AccelerometerArray.load(array or frame_format(form).array)
-    lsb = Part.load(carried.chips[0].part).lsb
+    lsb = Part.load(carried.chips[0].part, carried.part_files).lsb
     return LiveView(carried, lsb, on_text=on_text, rrd=None if rrd is None else Path(rrd), viewer=view)

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from gfimu.carried_array import warn_of_other_array
 from gfimu.diagnosis.adequacy import LEFT_OVER_ODDS, left_over
 from gfimu.diagnosis.causes import effects_of_run
 from gfimu.diagnosis.conclusion import conclude, is_dominant, is_unknown
@@ -74,6 +75,9 @@ def diagnose(
         raise InputError("no recording to diagnose; give at least one")
     tell = report or (lambda share, text: None)
     labels = list(names) if names is not None else [f"run {number + 1}" for number in range(len(recordings))]
+    held_labels = [f"held-out run {number + 1}" for number in range(len(held_out))]
+    for recording, label in zip((*recordings, *held_out), (*labels, *held_labels), strict=True):
+        warn_of_other_array(recording.metadata, model.array, label)
     with one_blas_thread():
         if model.drive_source == "gyro":
             return diagnose_body(recordings, model, held_out=held_out, names=labels, report=tell)

@@ -28,6 +28,7 @@ from gfimu.diagnosis.run import Run
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.signatures import signature_columns
 from gfimu.errors import InputError, unknown_name
+from gfimu.short_repr import short_repr
 from gfimu.units import STANDARD_GRAVITY
 
 __all__ = [
@@ -156,6 +157,8 @@ class Distinguishability:
     effects: tuple[str, ...]
     detectability: NDArray[np.float64]
     energy: NDArray[np.float64]
+
+    __repr__ = short_repr
 
     @property
     def nats(self) -> NDArray[np.float64]:

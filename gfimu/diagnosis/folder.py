@@ -81,7 +81,8 @@ def write_diagnosis(
         diagnosis.write(made)
         if twin_toml is not None:
             (made / "twin.toml").write_text(twin_toml, encoding="utf-8")
-        for name, text in (more or {}).items():
+        # Part files of the user's are named by the twin or its array, and looked up beside them.
+        for name, text in {**diagnosis.twin.array.part_files, **(more or {})}.items():
             (made / name).write_text(text, encoding="utf-8")
         write_report(made / "report.html", diagnosis)
         write_picture(made / "diagnosis.rrd", diagnosis, mounting=mounting, cube_centre=cube_centre, shapes=shapes)

@@ -120,6 +120,10 @@ class EffectFamily(Protocol):
         """Return the linear coordinates."""
         ...
 
+    def parameter_units(self, array: AccelerometerArray) -> Mapping[str, str]:
+        """Return the unit of each parameter by key: a unit, or `gfimu.units.RATIO`, ``NUMBER`` or ``NAME``."""
+        ...
+
     def patterns(self, array: AccelerometerArray) -> tuple[Pattern, ...]:
         """Return the places and structures it can take."""
         ...

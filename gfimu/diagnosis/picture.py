@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from gfimu.diagnosis.plain_words import headline, next_steps, parameter_texts, percent, story
+from gfimu.diagnosis.plain_words import headline, next_steps, parameter_texts, parameter_units, percent, story
 from gfimu.diagnosis.verdict import Diagnosis, RunView
 from gfimu.recording import Recording
 from gfimu.visual import KnownMotion, Line, Plot, write_comparison
@@ -124,7 +124,8 @@ def _plots(view: RunView) -> list[Plot]:
 def _notes(diagnosis: Diagnosis) -> str:
     lines = [f"# {headline(diagnosis)}", "", story(diagnosis), ""]
     for cause in diagnosis.causes:
-        sizes = "; ".join(f"{one.name} {one.value}" for one in parameter_texts(cause) if one.significant)
+        texts = parameter_texts(cause, parameter_units(diagnosis, cause))
+        sizes = "; ".join(f"{one.name} {one.value}" for one in texts if one.significant)
         lines.append(f"- **{cause.effect}** {sizes} (probability {percent(cause.probability)})")
     lines += ["", "**Next.**", *[f"- {step}" for step in next_steps(diagnosis)]]
     return "\n".join(lines)

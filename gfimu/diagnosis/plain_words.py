@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from gfimu.diagnosis.verdict import Diagnosis, NamedCause, RunView
-from gfimu.units import STANDARD_GRAVITY
+from gfimu.units import NAME, NUMBER, RATIO, STANDARD_GRAVITY, split_key
 
 __all__ = [
     "ParameterText",
@@ -17,26 +18,12 @@ __all__ = [
     "next_steps",
     "odds",
     "parameter_texts",
+    "parameter_units",
     "percent",
     "story",
     "summary",
 ]
 
-_UNITS = {
-    "_m_s2_rts": "m/s²/√s",
-    "_s2_rad2": "s²/rad²",
-    "_m_s2_K": "m/s²/K",
-    "_rad_s2": "rad/s²",
-    "_rad_s": "rad/s",
-    "_m_s2": "m/s²",
-    "_s2_m": "s²/m",
-    "_1_s": "1/s",
-    "_rad": "rad",
-    "_hz": "Hz",
-    "_s": "s",
-    "_m": "m",
-}
-_ALONE = {key.lstrip("_"): unit for key, unit in _UNITS.items()}
 _OF_A_CALIBRATION = frozenset({"bias", "scale_factor", "misalignment", "cross_axis"})
 _SIGNIFICANT = 2.0
 _THOUSANDTHS = ("rad", "m", "s")
@@ -153,11 +140,20 @@ def _silent(diagnosis: Diagnosis, run: RunView) -> list[str]:
     return [name for name, good in zip(diagnosis.twin.array.channels, alive, strict=True) if not good]
 
 
-def parameter_texts(cause: NamedCause) -> list[ParameterText]:
-    """Return the parameters of a cause as people read them; those that are zero and unknown are left out."""
+def parameter_units(diagnosis: Diagnosis, cause: NamedCause) -> Mapping[str, str]:
+    """Return the units that the effect of a cause declares for its parameters, by key."""
+    family = diagnosis.twin.families().get(cause.effect)
+    return {} if family is None else family.parameter_units(diagnosis.twin.array)
+
+
+def parameter_texts(cause: NamedCause, units: Mapping[str, str] | None = None) -> list[ParameterText]:
+    """Return the parameters of a cause as people read them; those that are zero and unknown are left out.
+
+    ``units`` are those that the effect declares (`parameter_units`); else the end of each key counts.
+    """
     texts = []
     for key, value in cause.parameters.items():
-        name, unit = _split(key)
+        name, unit = _name_and_unit(key, units or {})
         if isinstance(value, bool) or not isinstance(value, int | float):
             plain = ", ".join(map(str, value)) if isinstance(value, list | tuple) else str(value)
             texts.append(ParameterText(name, plain, "", significant=True))
@@ -250,17 +246,19 @@ def odds(log_odds: float) -> str:
     return f"1 : {ratio}" if log_odds <= 0 else f"{ratio} : 1"
 
 
-def _split(key: str) -> tuple[str, str]:
-    if key in _ALONE:
-        return "value", _ALONE[key]
-    for suffix, unit in _UNITS.items():
-        if key.endswith(suffix):
-            return key.removesuffix(suffix).replace("_", " "), unit
-    return key.replace("_", " "), ""
+def _name_and_unit(key: str, declared: Mapping[str, str]) -> tuple[str, str]:
+    """Return the name of a parameter for people and its unit: as its effect declares it, else by the end of the key."""
+    name, unit = split_key(key)
+    if declared.get(key, unit) != unit:
+        name, unit = key, declared[key]
+    if not unit and "_" not in key:
+        unit = RATIO  # a channel's bare name
+    return name.replace("_", " "), unit
 
 
 def _with_std(value: float, std: float | None, unit: str) -> str:
     """Return value ± standard deviation, in thousandths of its unit where it is small."""
+    unit = "" if unit in {RATIO, NUMBER, NAME} else unit
     scale = max(abs(value), std or 0.0)
     if unit in _THOUSANDTHS and scale < _SMALL:
         value, std, unit = 1e3 * value, None if std is None else 1e3 * std, f"m{unit}"
@@ -281,8 +279,8 @@ def _superscript(power: int) -> str:
 
 def _familiar(value: float, std: float | None, unit: str) -> str:
     factors = {"rad": (180 / math.pi, "°"), "m/s²": (1e3 / STANDARD_GRAVITY, "mg"), "rad/s": (30 / math.pi, "rpm")}
-    if not unit and abs(value) < _SMALL:
-        factors[""] = (100.0, "%")
+    if unit == RATIO and abs(value) < _SMALL:
+        factors[RATIO] = (100.0, "%")
     if unit not in factors:
         return ""
     factor, name = factors[unit]

@@ -13,6 +13,7 @@ from gfimu.diagnosis.distinguishability import Distinguishability, PlannedRun
 from gfimu.diagnosis.model import WorldModel
 from gfimu.diagnosis.profile_search import Limits
 from gfimu.diagnosis.table_profile import TableProfile
+from gfimu.short_repr import short_repr
 
 __all__ = ["SEPARATED", "Proposal", "in_words", "scenario_of"]
 
@@ -55,6 +56,8 @@ class Proposal:
     limits: Limits
     text: str
     scenario: Mapping[str, Any]
+
+    __repr__ = short_repr
 
     @property
     def separates(self) -> bool:

@@ -12,7 +12,17 @@ from jinja2 import Environment, FileSystemLoader, select_autoescape
 import gfimu
 from gfimu.atomic_file import write_text
 from gfimu.diagnosis import figures
-from gfimu.diagnosis.plain_words import gain_rows, headline, next_steps, odds, parameter_texts, percent, story, summary
+from gfimu.diagnosis.plain_words import (
+    gain_rows,
+    headline,
+    next_steps,
+    odds,
+    parameter_texts,
+    parameter_units,
+    percent,
+    story,
+    summary,
+)
 from gfimu.diagnosis.residuals import ResidualViews, residual_views
 from gfimu.diagnosis.verdict import Diagnosis, NamedCause
 
@@ -126,7 +136,7 @@ def _figures_of_merit(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:
 
 
 def _cause(diagnosis: Diagnosis, cause: NamedCause) -> Mapping[str, Any]:
-    parameters = parameter_texts(cause)
+    every = parameters = parameter_texts(cause, parameter_units(diagnosis, cause))
     # Of many parameters, those that stand out from their uncertainty are worth a line on the first screen.
     if len(parameters) > _MOST_PARAMETERS:
         parameters = [one for one in parameters if one.significant] or parameters
@@ -134,7 +144,7 @@ def _cause(diagnosis: Diagnosis, cause: NamedCause) -> Mapping[str, Any]:
         "name": cause.effect,
         "summary": summary(diagnosis, cause),
         "parameters": parameters[:_MOST_PARAMETERS],
-        "more": max(len(parameter_texts(cause)) - min(len(parameters), _MOST_PARAMETERS), 0),
+        "more": max(len(every) - min(len(parameters), _MOST_PARAMETERS), 0),
         "probability": percent(cause.probability),
         "why": cause.why.removeprefix(summary(diagnosis, cause)).lstrip("; "),
         "alike": cause.not_distinguishable_from,

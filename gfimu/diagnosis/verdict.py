@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from gfimu.atomic_file import write_text
 from gfimu.diagnosis.model import WorldModel
+from gfimu.short_repr import joined, short_repr
 
 __all__ = ["FORMAT_VERSION", "Diagnosis", "Gain", "NamedCause", "Residual", "Rival", "RunView", "Unexplained"]
 
@@ -206,6 +207,8 @@ class RunView:
     white: NDArray[np.float64]
     attitude: NDArray[np.float64] | None = None
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True)
 class Diagnosis:
@@ -243,6 +246,11 @@ class Diagnosis:
     runs: tuple[RunView, ...]
     sentences: tuple[str, ...]
     noise: Mapping[str, float]
+
+    def __repr__(self) -> str:
+        causes = ", ".join(f"{cause.effect} {100 * cause.probability:.3g} %" for cause in self.causes)
+        size = f"residual {self.residual.rms_before:.3g} -> {self.residual.rms_after:.3g} m/s²"
+        return joined(self, [self.verdict, causes, size, f"{len(self.runs)} runs"])
 
     @property
     def calibration_residue(self) -> float:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from gfimu.array import AccelerometerArray
 from gfimu.linear_solution import LinearSolution
+from gfimu.short_repr import short_repr
 
 __all__ = ["RateMethod", "RateProblem", "RateSolution"]
 
@@ -45,6 +46,8 @@ class RateProblem:
     omega0: NDArray[np.float64] | None
     gyro: NDArray[np.float64] | None = None
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True)
 class RateSolution:
@@ -58,6 +61,8 @@ class RateSolution:
     omega_std: NDArray[np.float64]
     rest: NDArray[np.bool_] | None = None
     remarks: Mapping[str, Any] = field(default_factory=dict)
+
+    __repr__ = short_repr
 
 
 class RateMethod(Protocol):

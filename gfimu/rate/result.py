@@ -9,6 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gfimu.short_repr import joined, timing
+from gfimu.table import Tabular
+
 __all__ = ["ChannelReport", "RateEstimate", "SignDecision", "full_covariance"]
 
 
@@ -77,7 +80,7 @@ class ChannelReport:
 
 
 @dataclass(frozen=True)
-class RateEstimate:
+class RateEstimate(Tabular):
     """Angular rate and how well it is known.
 
     Parameters
@@ -125,10 +128,28 @@ class RateEstimate:
     def __len__(self) -> int:
         return len(self.t_s)
 
+    def __repr__(self) -> str:
+        return joined(self, [self.method, timing(self.t_s), f"sign {self.sign.state}"])
+
     @property
     def std(self) -> NDArray[np.float64]:
         """Standard deviation of each component of ω, shape (n, 3), rad/s."""
         return np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2))
+
+    def to_columns(self) -> dict[str, NDArray[Any]]:
+        """Return the columns of a table, by name with unit: time, ω and its standard deviation, statistics, rest."""
+        columns: dict[str, NDArray[Any]] = {"t_s": self.t_s}
+        columns |= {f"omega_{axis}_rad_s": self.omega[:, place] for place, axis in enumerate("xyz")}
+        columns |= {f"omega_{axis}_std_rad_s": self.std[:, place] for place, axis in enumerate("xyz")}
+        return columns | {"nis": self.nis, "nis_dof": self.nis_dof, "rest": self.rest}
+
+    def _table_metadata(self) -> dict[str, Any]:
+        return {
+            "method": self.method,
+            "sign": self.sign.state,
+            "channels": self.channels.to_dict(),
+            "format_version": self.format_version,
+        }
 
     @property
     def mean_nis(self) -> float:

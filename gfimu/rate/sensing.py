@@ -23,8 +23,9 @@ from numpy.typing import ArrayLike, NDArray
 from gfimu.array import AccelerometerArray
 from gfimu.errors import InputError
 from gfimu.kinematics import require_all_motions
-from gfimu.model_files import find_model, read_toml
 from gfimu.part import white_noise_std
+from gfimu.part_files import part_table
+from gfimu.short_repr import short_repr
 
 __all__ = ["ChannelTables", "SensorErrors"]
 
@@ -69,6 +70,8 @@ class SensorErrors:
     gyro_noise_std: float = 0.005
     gyro_bias_std: float = 0.35
 
+    __repr__ = short_repr
+
     def __post_init__(self) -> None:
         for name in ("noise_std", "bias_std"):
             value = getattr(self, name)
@@ -103,12 +106,15 @@ class SensorErrors:
         Raises
         ------
         InputError
-            If a part is unknown.
+            If a part is unknown or its file lacks a figure.
         """
         bias, limit, steps = [], [], []
         rms = white_noise_std(array, sample_rate)
         for chip in array.chips:
-            part = read_toml(find_model("parts", chip.part))
+            part, source = part_table(chip.part, array.part_files)
+            missing = [key for key in ("offset_std_m_s2", "full_range_m_s2") if key not in part]
+            if missing:
+                raise InputError(f"{source}: key {missing[0]!r} is missing; add it")
             lsb, axes = float(part["lsb_m_s2"]), len(chip.axes)
             bias.append(np.array(part["offset_std_m_s2"])[:axes])
             limit.append(np.full(axes, float(part["full_range_m_s2"]) - lsb))

@@ -12,8 +12,10 @@ from typing import Any
 import numpy as np
 
 from gfimu.array import AccelerometerArray
+from gfimu.column_file import head_line
 from gfimu.errors import InputError
 from gfimu.part import Part
+from gfimu.plausible import largest_of_array
 from gfimu.rate.kalman import FilterSettings
 from gfimu.rate.live import LiveRateFilter
 from gfimu.rate.result import RateEstimate
@@ -94,7 +96,7 @@ def _count_size(metadata: Mapping[str, Any], array: AccelerometerArray, channel:
     """Size of a raw count, m/s²: as the stream states it, else by the channel's part."""
     size = metadata.get("lsb_m_s2")
     if size is None:
-        return Part.load(next(chip.part for chip in array.chips if channel in chip.channels)).lsb
+        return Part.load(next(chip.part for chip in array.chips if channel in chip.channels), array.part_files).lsb
     if not isinstance(size, int | float) or not 0 < size < np.inf:
         raise InputError(f"the stream's lsb_m_s2 is {size!r}; give the size of one count in m/s²")
     return float(size)
@@ -117,17 +119,8 @@ def read_head(lines: Iterable[str]) -> tuple[dict[str, Any], Iterator[str]]:
         head.append(line)
         if line.strip() and not line.startswith("#"):
             break
-        key, colon, text = line.lstrip("# ").partition(":")
-        if colon:
-            metadata[key.strip()] = _value(text.strip())
+        metadata |= head_line(line)
     return metadata, itertools.chain(head, rest)
-
-
-def _value(text: str) -> Any:
-    try:
-        return json.loads(text)
-    except json.JSONDecodeError:
-        return text
 
 
 def filter_stream(
@@ -174,6 +167,7 @@ def filter_stream(
     """
     live = LiveRateFilter(array, errors, period, settings, gyro=fuse_gyro)
     layout: StreamLayout | None = None
+    largest = largest_of_array(array)
     reported: dict[str, Any] = live.report.to_dict()
     metadata, stream = read_head(lines)
     for line in stream:
@@ -188,6 +182,7 @@ def filter_stream(
         try:
             values = _numbers(cells, layout)
             readings = values[list(layout.channels)] * layout.factors
+            readings[np.abs(readings) > largest] = np.nan  # a corrupt value counts as missing
             gyro = values[list(layout.gyro)] if fuse_gyro else None
             found = live.push(values[layout.time], readings, gyro)
         except InputError as error:

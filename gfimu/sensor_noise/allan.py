@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gfimu.errors import InputError
+from gfimu.short_repr import short_repr
 
 __all__ = ["FLICKER_FLOOR", "AllanDeviation", "allan_deviation", "averaging_factors"]
 
@@ -51,6 +52,8 @@ class AllanDeviation:
     n: int
     rate: float
     overlapping: bool = True
+
+    __repr__ = short_repr
 
     @property
     def variance(self) -> Floats:

@@ -22,6 +22,7 @@ from scipy.stats import chi2
 
 from gfimu.errors import InputError
 from gfimu.sensor_noise.allan import AllanDeviation, allan_deviation
+from gfimu.short_repr import short_repr
 
 __all__ = ["TERMS", "NoiseModel", "NoiseTerm", "identify_noise", "model_variance"]
 
@@ -91,6 +92,8 @@ class NoiseModel:
     terms: dict[str, NoiseTerm]
     allan: AllanDeviation
     misfit: float
+
+    __repr__ = short_repr
 
     def __getitem__(self, symbol: str) -> NoiseTerm:
         return self.terms[symbol]

@@ -14,6 +14,7 @@ from gfimu.errors import InputError, unknown_name
 from gfimu.recording import Recording
 from gfimu.rest import detect_rest
 from gfimu.sensor_noise.identification import TERMS, NoiseModel, identify_noise
+from gfimu.short_repr import short_repr
 
 __all__ = ["STRETCHES", "RecordingNoise", "recording_noise"]
 
@@ -42,6 +43,8 @@ class RecordingNoise:
     rate: float
     start_s: float
     duration_s: float
+
+    __repr__ = short_repr
 
     @property
     def accelerometers(self) -> dict[str, NoiseModel]:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from gfimu.array import AccelerometerArray
 from gfimu.errors import InputError
+from gfimu.units import split_key
 from sim.world import World
 
 __all__ = ["Effect", "Pattern", "Size", "channel_patterns", "chip_patterns"]
@@ -79,6 +80,10 @@ class Effect(ABC):
     """True where another mounting or another day has its own value."""
     inexactness: ClassVar[float] = 0.0
     """Share of what it explains that its model may get wrong; beside it a further cause must explain more than that."""
+    size_unit: ClassVar[str] = ""
+    """Unit of the sizes where their keys don't end in one; ``"ratio"`` for a pure number, read in percent."""
+    other_units: ClassVar[Mapping[str, str]] = {}
+    """Units of other parameters whose keys don't end in one; ``"ratio"``, ``"number"`` (count, factor), ``"name"``."""
     starts: ClassVar[tuple[float, ...]] = ()
     """Values in units of the prior to start from where a large size is far from linear; none by default."""
 
@@ -145,6 +150,12 @@ class Effect(ABC):
         """Return the keys a parameter table may have."""
         grid = cls.shapes(60.0, 100.0)
         return (*(size.key for size in cls.sizes(array)), *(grid[0] if grid else ()))
+
+    @classmethod
+    def parameter_units(cls, array: AccelerometerArray) -> dict[str, str]:
+        """Return the unit of each parameter, as declared or by the end of its key; empty if it has neither."""
+        declared = dict.fromkeys((size.key for size in cls.sizes(array)), cls.size_unit) | dict(cls.other_units)
+        return {key: declared.get(key) or split_key(key)[1] for key in cls.parameter_keys(array)}
 
     def check(self, array: AccelerometerArray) -> None:
         """Raise `InputError` if a parameter key does not belong to this effect."""

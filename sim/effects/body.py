@@ -64,6 +64,7 @@ class GyroScale(Effect):
 
     name = "gyro_scale"
     summary = "the reference gyro has wrong gains"
+    size_unit = "ratio"
     place = "reference"
     separated_by = "rotation about each axis in turn, at several rates"
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,6 +52,7 @@ class Noise(_Discrete):
     summary = "more white noise than the part should have"
     place = "noise"
     keys = ("factor",)
+    other_units: ClassVar = {"factor": "number"}
     separated_by = "a longer rest"
 
     def apply(self, world: World) -> World:
@@ -106,6 +107,7 @@ class WrongRange(_Discrete):
     name = "wrong_range"
     summary = "a chip is configured for another range: its readings are off by a power of two"
     keys = ("chip", "factor")
+    other_units: ClassVar = {"chip": "name", "factor": "number"}
 
     def apply(self, world: World) -> World:
         """Multiply the chip's readings by the factor."""
@@ -123,6 +125,7 @@ class AxisSwap(_Discrete):
     name = "axis_swap"
     summary = "channels are exchanged by wiring"
     keys = ("channels",)
+    other_units: ClassVar = {"channels": "name"}
 
     def apply(self, world: World) -> World:
         """Exchange the two channels, or the two of each pair where several follow each other."""
@@ -141,6 +144,7 @@ class SignFlip(_Discrete):
     name = "sign_flip"
     summary = "a channel is inverted"
     keys = ("channel",)
+    other_units: ClassVar = {"channel": "name"}
 
     def apply(self, world: World) -> World:
         """Invert the channel or channels."""
@@ -156,6 +160,7 @@ class StuckChannel(_Discrete):
     name = "stuck_channel"
     summary = "one or several channels are frozen for a while"
     keys = ("channel", "start_s", "stop_s")
+    other_units: ClassVar = {"channel": "name"}
 
     def apply(self, world: World) -> World:
         """Hold the channel at its last value before the start until the stop."""
@@ -182,6 +187,7 @@ class DroppedFrames(_Discrete):
     name = "dropped_frames"
     summary = "samples are lost"
     keys = ("share", "count", "longest_s")
+    other_units: ClassVar = {"share": "ratio", "count": "number"}
 
     def apply(self, world: World) -> World:
         """Lose a share of the frames at random (rows become NaN; the writer leaves them out)."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -231,6 +231,7 @@ class CentrifugalFlex(Effect):
     summary = "arms stretch with the rate squared"
     place = "geometry"
     separated_by = "the cube remounted on its side, and several high speeds"
+    other_units: ClassVar = {"moving_arms": "number"}
 
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
@@ -259,6 +260,7 @@ class Cogging(Effect):
     summary = "torque ripple locked to the table's angle (n cycles per revolution)"
     place = "motion"
     separated_by = "slow steady rotation at two speeds"
+    other_units: ClassVar = {"order": "number"}
     inexactness = 0.02  # motor, friction and speed loop of a table are not as simple as this servo
 
     @classmethod
@@ -310,6 +312,8 @@ class Resonance(Effect):
     summary = "a torsional mode of the mounting, rung by angular acceleration"
     place = "motion"
     separated_by = "fast ramps followed by rest, in which the mode rings down alone"
+    size_unit = "ratio"
+    other_units: ClassVar = {"damping_ratio": "ratio"}
 
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:

@@ -80,6 +80,7 @@ class ScaleFactor(_PerChannel):
     summary = "a gain error per channel (another supply voltage, say)"
     prior_std = 0.02
     separated_by = "static poses on several sides, or the cube remounted on its side and several speeds"
+    size_unit = "ratio"
 
     @classmethod
     def patterns(cls, array: AccelerometerArray) -> tuple[Pattern, ...]:
@@ -155,6 +156,7 @@ class VibrationRectification(_PerChannel):
     name = "vibration_rectification"
     summary = "mean readings shift with vibration, about as ω⁴"
     suffix = "_m_s2_per_rad4_s4"
+    size_unit = "m/s²/(rad/s)⁴"
     prior_std = 30 * _MG / 15.0**4
     separated_by = "several speeds with and without vibration isolation"
 
@@ -182,6 +184,7 @@ class CrossAxis(Effect):
     summary = "a channel picks up its neighbour on the same chip"
     place = "sensing"
     separated_by = "static poses on several sides and several speeds"
+    size_unit = "ratio"
 
     @classmethod
     def _pairs(cls, array: AccelerometerArray) -> list[tuple[int, int]]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -38,6 +40,7 @@ class ClockError(Effect):
 
     name = "clock_error"
     summary = "the board's clock runs fast or slow against the reference's"
+    size_unit = "ratio"
     place = "timing"
     separated_by = "a longer run with fast changes of the rate at its end"
     starts = (-20.0, -8.0, -3.0, 3.0, 8.0, 20.0)
@@ -76,6 +79,7 @@ class TachoScale(Effect):
 
     name = "tacho_scale"
     summary = "the reference has a wrong gain"
+    size_unit = "ratio"
     place = "reference"
     separated_by = "fast ramps: a wrong gain of the reference scales the centripetal and tangential parts unlike"
 
@@ -95,6 +99,8 @@ class TachoRipple(Effect):
 
     name = "tacho_ripple"
     summary = "the reference itself is modulated once or n times per revolution"
+    size_unit = "ratio"
+    other_units: ClassVar = {"amplitude": "ratio", "order": "number"}
     place = "reference"
     separated_by = "a second reference, or slow steady rotation in both directions"
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +33,7 @@ class Unknown(Effect):
     summary = "a dependence that the data show and nothing in the library explains"
     place = "sensing"
     separated_by = "another run with another motion: what stays is in the rig or the sensors"
+    other_units: ClassVar = {"dependence": "name"}
 
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
@@ -116,6 +117,10 @@ class UnknownTerm:
     def sizes(self, array: AccelerometerArray) -> tuple[Size, ...]:
         """Return the sizes of the channels, or the one of the reference."""
         return (_REFERENCE,) if self.of_reference else Unknown.sizes(array)[:-1]
+
+    def parameter_units(self, array: AccelerometerArray) -> dict[str, str]:
+        """Return the unit of each parameter."""
+        return Unknown.parameter_units(array)
 
     def patterns(self, array: AccelerometerArray) -> tuple[Pattern, ...]:
         """Return one pattern: every size free."""

@@ -18,6 +18,7 @@ from gfimu.diagnosis.distinguishability import PlannedRun, energy_left, normal_e
 from gfimu.diagnosis.verdict import Diagnosis, NamedCause
 from gfimu.errors import InputError
 from gfimu.recording import Recording
+from gfimu.short_repr import short_repr
 from gfimu.units import STANDARD_GRAVITY
 from sim.campaign import Measurement, detectability, hidden_effect, measure, random_profile
 from sim.effects import Effect, make_effect
@@ -55,6 +56,8 @@ class HiddenWorld:
     drive_unknown: float | None = None
     left_by: Mapping[str, float] = field(default_factory=dict)
     left_by_two: float | None = None
+
+    __repr__ = short_repr
 
 
 @dataclass(frozen=True)

@@ -30,8 +30,8 @@ BAD_RUNS = {
     "time backwards": (table(row(0), row(0.02), row(0.01)), ["line 4", "does not increase"]),
     "time missing": (table(row(0), row("nan"), row(0.02)), ["line 3", "t_s is missing"]),
     "text in a number": (table(row(0), row(0.01, "off")), ["line 3", "a11_m_s2", "'off'"]),
-    "huge value": (table(row(0), row(0.01, 1e30)), ["line 3", "a11_m_s2", "1e+30"]),
-    "infinite value": (table(row(0), row(0.01, "inf")), ["line 3", "a11_m_s2", "inf"]),
+    "huge values": (table(row(0), *(row(k, *[1e30] * 12) for k in (1, 2))), ["line 3", "a11_m_s2", "1e+30", "unit"]),
+    "infinite values": (table(row(0), *(row(k, *["inf"] * 12) for k in (1, 2))), ["line 3", "a11_m_s2", "inf"]),
     "cut off": (GOOD + "0.06,1,2\n", ["line 7", "3 columns"]),
     "column twice": (table(row(0) + ",1", header=f"{HEADER},a11_m_s2"), ["a11_m_s2", "twice"]),
     "channel twice": (table(row(0) + ",1", header=f"{HEADER},a11_g"), ["a11_m_s2", "a11_g", "keep one"]),
@@ -200,3 +200,14 @@ def test_the_installed_program_ends_with_code_two(tmp_path):
     assert finished.stdout == ""
     assert finished.stderr.startswith("gfimu: unknown array 'cube13'; valid: ")
     assert finished.stderr.count("\n") == 1
+
+
+def test_corrupt_values_are_one_line_and_no_end(gfimu_command, tmp_path):
+    rows = [row(k / 100, "1e19" if k == 3 else "inf" if k == 4 else 1.0) for k in range(20)]
+    (tmp_path / "run.csv").write_text(table(*rows))
+    result = gfimu_command("estimate", tmp_path / "run.csv", "--array", "cube12", "--out", tmp_path / "e.csv", "--json")
+    assert result.code == 0
+    assert result.stderr == (
+        f"gfimu: warning: {tmp_path / 'run.csv'}: left out 2 corrupt values (a11 2), the first at line 5, "
+        "column a11_m_s2: 1e+19\n"
+    )

@@ -19,6 +19,7 @@ from firmware_bridge.frames import encode_samples
 from firmware_bridge.link import Link
 from firmware_bridge.recorder import SampleClock, record
 from firmware_bridge.virtual_port import open_port, serve
+from gfimu.array import AccelerometerArray
 from gfimu.errors import GfimuError, InputError
 from gfimu.recording import Recording
 
@@ -102,6 +103,7 @@ def test_virtual_board_to_file(tmp_path, port: str, name: str) -> None:
     assert not len(recording.gaps)
     assert recording.sample_rate == pytest.approx(800)
     assert recording.metadata["sample_rate_hz"] == 800
+    assert recording.metadata["array_toml"] == AccelerometerArray.load("cube12").to_toml()
     assert np.allclose(recording.readings[:, 2::3], 256 * recording.metadata["lsb_m_s2"])
     assert not recording.readings[:, 0].any()
 

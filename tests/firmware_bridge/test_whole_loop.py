@@ -131,6 +131,7 @@ def test_record_virtual_has_references_and_metadata() -> None:
     assert recording.sample_rate == pytest.approx(400)
     assert {"tacho_rad_s", "command_rad_s", "angle_rad", "temperature_degC"} <= set(recording.reference)
     assert recording.metadata["scenario"] == "paper_run"
+    assert recording.metadata["array_toml"] == AccelerometerArray.load("cube12").to_toml()
     steps = recording.readings[:, 2] / (2 * LSB)  # ±4 g in 10 bits: 7.8 mg per count
     assert np.allclose(steps, np.round(steps), atol=1e-6)
     assert np.median(recording.readings[:, 2]) == pytest.approx(9.8, abs=1.0)

@@ -55,6 +55,7 @@ def test_fields(tmp_path, name, acknowledge):
         "packets_corrupt": 0,
         "bytes_skipped": 0,
     }
+    assert run.metadata["array_toml"] == run.array.to_toml() == AccelerometerArray.load("mimu4444").to_toml()
 
 
 def test_gyros_in_board_axes(tmp_path):

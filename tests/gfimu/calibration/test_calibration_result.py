@@ -7,6 +7,8 @@ import pytest
 
 from gfimu.array import AccelerometerArray
 from gfimu.calibration.result import Calibration, combine, load_calibration, parameter_names
+from gfimu.calibration.run_file import open_calibrated_run
+from gfimu.carried_array import array_difference
 from gfimu.errors import InputError, UnitError
 from gfimu.recording import Recording
 
@@ -105,14 +107,29 @@ def other_fields(calibration):
     )
 
 
-def test_fitted_positions_reach_the_array():
-    array = AccelerometerArray.load("cube12")
+def moved_calibration(array):
+    """A calibration that moves every chip by 1 mm along each axis and changes nothing else."""
     names = [name for chip in array.chips for name in parameter_names(chip.name, "array")]
     names += [f"{chip.name}_r_{axis}" for chip in array.chips for axis in "xyz"]
     moved = array.chip_positions + 0.001
     values = np.concatenate([np.tile(np.r_[np.eye(3).ravel(), np.zeros(3)], 4), moved.ravel()])
-    calibration = Calibration("array", "m_s2", array.channels, "array", 9.81, tuple(names), values, np.zeros((60, 60)))
-    np.testing.assert_allclose(calibration.calibrated_array(array).chip_positions, moved)
+    return Calibration("array", "m_s2", array.channels, "array", 9.81, tuple(names), values, np.zeros((60, 60)))
+
+
+def test_fitted_positions_reach_the_array():
+    array = AccelerometerArray.load("cube12")
+    found = moved_calibration(array).calibrated_array(array)
+    np.testing.assert_allclose(found.chip_positions, array.chip_positions + 0.001)
+
+
+@pytest.mark.parametrize("name", ["cube12", "cube12_as_built"])
+def test_a_corrected_recording_carries_the_calibrated_array(tmp_path, name):
+    array = AccelerometerArray.load("cube12")
+    own = AccelerometerArray.load(name)
+    Recording.from_arrays(np.arange(5) / 100, np.ones((5, 12)), own).write(tmp_path / "run.csv")
+    corrected, calibrated = open_calibrated_run(tmp_path / "run.csv", moved_calibration(array), array)
+    expected = calibrated if name == "cube12" else own  # the board's own array stays where it is another one
+    assert array_difference(corrected.array, expected) == ""
 
 
 @pytest.mark.parametrize(

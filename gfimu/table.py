@@ -1,0 +1,115 @@
+"""Columns as table objects: a pandas table, or an Arrow stream that polars, pyarrow, DuckDB and others take.
+
+The metadata go with the columns: as ``attrs`` of a pandas table, and as JSON in the schema of an Arrow stream.
+"""
+
+from __future__ import annotations
+
+import json
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from gfimu.errors import GfimuError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = [
+    "ArrowStream",
+    "Tabular",
+    "column_type",
+    "from_json",
+    "metadata_of_schema",
+    "numbers",
+    "schema_metadata",
+    "to_json",
+]
+
+_FOREIGN_METADATA = {"ARROW:schema", "pandas"}
+_PANDAS_ATTRS = "PANDAS_ATTRS"
+
+
+@runtime_checkable
+class ArrowStream(Protocol):
+    """Anything that hands out its columns by the Arrow interface: a table of pandas, polars, pyarrow, DuckDB."""
+
+    def __arrow_c_stream__(self, requested_schema: Any = None) -> Any:
+        """Return the columns as a stream."""
+        ...
+
+
+class Tabular(ABC):
+    """A result with one row per sample, for other libraries."""
+
+    @abstractmethod
+    def to_columns(self) -> Mapping[str, NDArray[Any]]:
+        """Return the columns by name with unit."""
+
+    def _table_metadata(self) -> Mapping[str, Any]:
+        return getattr(self, "metadata", {})
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Return the columns as a pandas table, with the metadata in ``attrs``.
+
+        Raises
+        ------
+        GfimuError
+            If pandas is not installed.
+        """
+        try:
+            import pandas as pd
+        except ImportError:
+            raise GfimuError("to_pandas needs pandas, which is not installed: pip install 'gfimu[tables]'") from None
+        table = pd.DataFrame(dict(self.to_columns()))
+        table.attrs = json.loads(to_json(dict(self._table_metadata())))
+        return table
+
+    def __arrow_c_stream__(self, requested_schema: Any = None) -> Any:
+        """Return the columns as an Arrow stream: ``polars.DataFrame(result)``, ``pyarrow.table(result)``."""
+        columns = self.to_columns()
+        fields = [(name, column_type(values)) for name, values in columns.items()]
+        schema = pa.schema(fields, metadata=schema_metadata(self._table_metadata()))
+        table = pa.table([pa.array(values) for values in columns.values()], schema=schema)
+        return table.__arrow_c_stream__(requested_schema)
+
+
+def column_type(values: NDArray[Any]) -> pa.DataType:
+    """Return the Arrow type of a column."""
+    return pa.array(values).type if values.dtype == object else pa.from_numpy_dtype(values.dtype)
+
+
+def schema_metadata(metadata: Mapping[str, Any]) -> dict[bytes, bytes]:
+    """Return metadata as the schema of an Arrow table or a Parquet file holds them."""
+    return {key.encode(): to_json(value).encode() for key, value in metadata.items()}
+
+
+def to_json(value: Any) -> str:
+    """JSON of a metadata value; NumPy arrays and numbers as lists and numbers."""
+    return json.dumps(value, default=lambda item: item.tolist() if hasattr(item, "tolist") else str(item))
+
+
+def from_json(text: str) -> Any:
+    """Return the value that a metadata text holds; the text itself where it is no JSON."""
+    try:
+        return json.loads(text)
+    except json.JSONDecodeError:
+        return text
+
+
+def metadata_of_schema(pairs: Mapping[bytes, bytes] | None) -> dict[str, Any]:
+    """Return the metadata that the schema of an Arrow table or a Parquet file holds, also as pandas writes them."""
+    texts = {key.decode(errors="replace"): value.decode(errors="replace") for key, value in (pairs or {}).items()}
+    found = {key: from_json(text) for key, text in texts.items() if key not in _FOREIGN_METADATA}
+    attrs = found.pop(_PANDAS_ATTRS, None)
+    return {**attrs, **found} if isinstance(attrs, dict) else found
+
+
+def numbers(column: pa.Array | pa.ChunkedArray) -> NDArray[np.float64]:
+    """Numbers of an Arrow column; nulls become NaN."""
+    values = column.to_numpy() if isinstance(column, pa.ChunkedArray) else column.to_numpy(zero_copy_only=False)
+    return np.asarray(values, dtype=np.float64)
