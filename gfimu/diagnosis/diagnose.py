@@ -22,6 +22,7 @@ from gfimu.diagnosis.prepared_runs import PreparedRuns
 from gfimu.diagnosis.pruning import prune
 from gfimu.diagnosis.refinement import refine
 from gfimu.diagnosis.residual_tests import LeftOver
+from gfimu.diagnosis.sample_notes import with_sample_notes
 from gfimu.diagnosis.stochastic import UNEQUAL_WALK, WALK_ODDS, Walk, walk_strength
 from gfimu.diagnosis.surrogate import surrogates
 from gfimu.diagnosis.verdict import Diagnosis, Gain
@@ -122,7 +123,8 @@ def _diagnose_table(
     if is_unknown(explanation, left, gain):
         described, gain = _describe(explanation, left, held_out, model, () if loose is None else loose.effects)
         walk = None if walk is None or described is None else _left_wandering(described, walk)
-    return conclude(prepared, model, explanation, walk, loose, left, gain, withdrawn, described)
+    found = conclude(prepared, model, explanation, walk, loose, left, gain, withdrawn, described)
+    return with_sample_notes(found, prepared.runs)
 
 
 def _left_wandering(described: Explanation, walk: Walk) -> Walk | None:

@@ -32,6 +32,7 @@ from gfimu.diagnosis.model import Effect, WorldModel
 from gfimu.diagnosis.named_causes import contested, fault_causes, name_cause
 from gfimu.diagnosis.naming import channel_share, conflicting, probabilities, rival_list
 from gfimu.diagnosis.residual_tests import LeftOver
+from gfimu.diagnosis.sample_notes import with_sample_notes
 from gfimu.diagnosis.verdict import Diagnosis, Gain, NamedCause, Residual, RunView, Unexplained
 from gfimu.diagnosis.wording import verdict_sentences
 from gfimu.recording import Recording
@@ -90,7 +91,8 @@ def diagnose_body(
         constant = [effect for effects in fixed for effect in effects]
         label = "another recording" if kept else "stretches of the recording, each from the others"
         gain = held_out_gain(explanation.fit.causes, pairs, constant, label)
-    return _verdict(prepared, explanation, (structure, tone, noise), gain, withdrawn)
+    found = _verdict(prepared, explanation, (structure, tone, noise), gain, withdrawn)
+    return with_sample_notes(found, [segment.run for segment in segments])
 
 
 @dataclass(frozen=True)

@@ -95,7 +95,7 @@ class BodySegment:
         array = model.array
         stacked = np.hstack([array.axes, array.regression_matrix[:, :3] / array.length_unit]) * self.alive[:, None]
         self._projector = (np.eye(len(white)) - stacked @ np.linalg.pinv(stacked)) * self.alive
-        self.change = change_of_readings(self.run.readings, self.run.sample_period, white)
+        self.change = change_of_readings(self.run.bridged, self.run.sample_period, white)
         self.drive = BodyDrive(self.run.t, body.rate, self._first_force())
         self.starts = self._groups()
         self.count = np.add.reduceat(self.use.astype(float), self.starts)
@@ -105,7 +105,7 @@ class BodySegment:
         self.set_noise(BodyNoise(white, flicker=_FLICKER_PRIOR / 4))
 
     def _first_force(self) -> NDArray[np.float64]:
-        return np.asarray(self.run.readings @ np.linalg.pinv(self.model.array.axes * self.alive[:, None]).T)
+        return np.asarray(self.run.bridged @ np.linalg.pinv(self.model.array.axes * self.alive[:, None]).T)
 
     def _groups(self) -> NDArray[np.intp]:
         """Return where each group of samples begins: many at rest, one in motion."""
