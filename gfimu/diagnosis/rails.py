@@ -113,9 +113,10 @@ def _pile(
         return None
     level = float(mine[below_top == place].mean())
     on = below_top <= place
-    predicted = (expected[on] > level + _CLEAR * sigma + step).mean() > 0.5
-    # Noise of half a count and more would spread any signal that just gets there.
-    again = sigma > 0.5 * step and _visits(on) >= _VISITS
+    # Noise of half a count and more would spread any signal that just gets there; coarser steps hide small errors.
+    fine = sigma > 0.5 * step
+    predicted = (expected[on] > level + _CLEAR * sigma + (step if fine else _CLEAR * step)).mean() > 0.5
+    again = fine and _visits(on) >= _VISITS
     return (level, 0.0) if predicted or again else None
 
 
