@@ -18,6 +18,7 @@ from gfimu.diagnosis.explanation import Explanation
 from gfimu.diagnosis.fit import Fit
 from gfimu.diagnosis.free_body.segment import BodySegment
 from gfimu.diagnosis.free_body.signatures import plan_signatures, signature_columns
+from gfimu.diagnosis.free_body.undetermined import LEAST_INFORMATION, determined
 from gfimu.diagnosis.model import Effect
 from gfimu.diagnosis.pruning import LEAST_EXTRA_ODDS, LEAST_ODDS
 from gfimu.diagnosis.search import EXTRA_CAUSE, Blocks, search
@@ -40,7 +41,6 @@ _NESTED = (frozenset({"channel_skew", "chip_delay"}), frozenset({"misalignment",
 _SETTLED = 0.5
 _UPHILL = 2.0
 _SMALLEST_POSITIVE = 1e-6
-_UNSEEN = 0.5
 _CONSTANT = frozenset({"bias", "scale_factor", "cross_axis", "quadratic"})
 
 
@@ -93,14 +93,13 @@ class Screening:
 
 
 def _seen(gram: NDArray[np.float64], score: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the sizes and their covariance in the directions that the data see; zero in the others.
+    """Return the sizes and their covariance: zero along what the data don't determine, with the spread of the prior.
 
     What all chips share of a displacement or a turn, a free body takes for its own.
     """
-    strength, turn = np.linalg.eigh(gram)
-    seen = strength > _UNSEEN
-    gain = np.where(seen, 1.0 / (np.maximum(strength, _UNSEEN) + 1.0 / SCALES[-1] ** 2), 0.0)
-    return (turn * gain) @ (turn.T @ score), (turn * gain) @ turn.T
+    strength, turn, seen = determined(gram)
+    gain = np.where(seen, 1.0 / (np.maximum(strength, LEAST_INFORMATION) + 1.0 / SCALES[-1] ** 2), 0.0)
+    return (turn * gain) @ (turn.T @ score), (turn * np.where(seen, gain, 1.0)) @ turn.T
 
 
 def screen(
