@@ -238,6 +238,9 @@ class Diagnosis:
         Noise levels estimated: ``white_over_data_sheet``, ``bias_instability_m_s2``, ``reference_white``; and
         ``calibration_residue``, small errors of all the twin's numbers at once, in units of what a good calibration
         leaves (0 where there are none).
+    undetermined : tuple of mapping
+        Combinations of sizes that these data can't see, which stay at zero: ``effect``, ``combination`` (weights by
+        key) and ``text``.
     """
 
     verdict: str
@@ -250,6 +253,7 @@ class Diagnosis:
     runs: tuple[RunView, ...]
     sentences: tuple[str, ...]
     noise: Mapping[str, float]
+    undetermined: tuple[Mapping[str, Any], ...] = ()
 
     @property
     def calibration_residue(self) -> float:
@@ -296,6 +300,7 @@ class Diagnosis:
             },
             "rivals": [{"effects": list(r.effects), "log_odds": r.log_odds, "why": r.why} for r in self.rivals],
             "noise": dict(self.noise),
+            "undetermined": [dict(one) for one in self.undetermined],
         }
 
     def to_json(self) -> str:

@@ -27,6 +27,8 @@ from gfimu.diagnosis.free_body.left_over import motion_noise, structure_left
 from gfimu.diagnosis.free_body.model import BodyModel
 from gfimu.diagnosis.free_body.run import BodyRun, prepare_body_run
 from gfimu.diagnosis.free_body.segment import BodySegment
+from gfimu.diagnosis.free_body.undetermined import undetermined, undetermined_sentence
+from gfimu.diagnosis.gate import impossible_sizes, judge
 from gfimu.diagnosis.integrity import check_integrity
 from gfimu.diagnosis.model import Effect, WorldModel
 from gfimu.diagnosis.named_causes import contested, fault_causes, name_cause
@@ -86,12 +88,12 @@ def diagnose_body(
     noise = motion_noise(segments)
     structure, tone = structure_left(segments, explanation.fit.causes, fixed)
     report(0.96, "measure the gain")
-    gain = Gain()
+    gain, over_noise = Gain(), float("nan")
     if explanation.fit.causes or any(fixed):
         constant = [effect for effects in fixed for effect in effects]
         label = "another recording" if kept else "stretches of the recording, each from the others"
-        gain = held_out_gain(explanation.fit.causes, pairs, constant, label)
-    found = _verdict(prepared, explanation, (structure, tone, noise), gain, withdrawn)
+        gain, over_noise = held_out_gain(explanation.fit.causes, pairs, constant, label)
+    found = _verdict(prepared, explanation, (structure, tone, noise), gain, withdrawn, over_noise)
     return with_sample_notes(found, [segment.run for segment in segments])
 
 
@@ -167,8 +169,9 @@ def _verdict(
     left: tuple[LeftOver, LeftOver, LeftOver],
     gain: Gain,
     withdrawn: Sequence[str],
+    over_noise: float,
 ) -> Diagnosis:
-    """Put everything together."""
+    """Put everything together; ``over_noise`` is the share of the held-out misfit over all noise that is removed."""
     model, segments = prepared.model, prepared.segments
     fit = explanation.fit
     removed = max(explanation.nothing.objective - fit.objective, 0.0)
@@ -181,6 +184,13 @@ def _verdict(
     named = [_named(explanation, fit, cause, likely, segments[0]) for cause in fit.causes]
     rivals = conflicting(explanation)
     families = model.families()
+    views = _views(prepared, fit.causes)
+    residual = Residual.of_views(views, model.array.channels, segments[0].noise_floor)
+    refuted = _refuted(named, residual, replace(gain, share_of_excess_removed=over_noise), model)
+    if refuted or dominant:
+        views = _views(prepared, ())
+        residual = Residual.of_views(views, model.array.channels, segments[0].noise_floor)
+    dominant = dominant or bool(refuted)
     extension = [] if dominant else [cause.effect(model.array) for cause in fit.causes]
     faults = [families[cause.effect](cause.parameters) for cause in found if cause.effect in families]
     causes: tuple[NamedCause, ...] = (*found, *named)
@@ -197,14 +207,14 @@ def _verdict(
     else:
         verdict = "explained" if causes else "nothing_found"
     unexplained = Unexplained(
-        bool(told),
-        "; ".join(one.signature for one in told),
+        bool(told) or bool(refuted),
+        "; ".join([*([refuted] if refuted else []), *(one.signature for one in told)]),
         max(one.log_odds for one in left),
         {key: value for one in told for key, value in one.surrogate.items()},
     )
-    views = tuple(_view(segment, known, fit.causes) for segment, known in zip(segments, prepared.fixed, strict=True))
-    residual = Residual.of_views(views, model.array.channels, segments[0].noise_floor)
+    unseen = undetermined(explanation.signatures, model.array)
     words = verdict_sentences(verdict, causes, residual, gain, unexplained, withdrawn)
+    words = (*words, undetermined_sentence(unseen)) if unseen else words
     first = segments[0]
     expected = model.expected_noise(1.0 / first.run.sample_period)
     alive = first.alive
@@ -215,7 +225,22 @@ def _verdict(
         "gyro_bias_rad_s": float(np.linalg.norm(first.body.gyro_bias)),
     }
     twin = model.extended([*faults, *extension])
-    return Diagnosis(verdict, causes, residual, gain, unexplained, rival_list(explanation), twin, views, words, levels)
+    combinations = tuple(one.to_dict() for one in unseen)
+    rivals_told = rival_list(explanation)
+    return Diagnosis(
+        verdict, causes, residual, gain, unexplained, rivals_told, twin, views, words, levels, undetermined=combinations
+    )
+
+
+def _refuted(named: Sequence[NamedCause], residual: Residual, gain: Gain, model: BodyModel) -> str:
+    """Return why causes must not stand, or nothing: the gate's word, or sizes that no part can have."""
+    beyond = impossible_sizes(named, model.families(), model.array)
+    return beyond or judge(gain, residual, named).why
+
+
+def _views(prepared: _Prepared, causes: Sequence[Cause]) -> tuple[RunView, ...]:
+    pairs = zip(prepared.segments, prepared.fixed, strict=True)
+    return tuple(_view(segment, known, causes) for segment, known in pairs)
 
 
 def _named(

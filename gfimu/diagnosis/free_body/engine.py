@@ -177,7 +177,7 @@ def explain(segments: Sequence[BodySegment], fixed: Known, *, report: Report | N
     for number in range(_ROUNDS):
         tell(0.05 + 0.8 * number / _ROUNDS, f"search {number + 1}")
         screening = screen(segments, causes, fixed)
-        if base is not None and screening.objective > base[0].objective + _UPHILL * screening.misfit:
+        if base is not None and not screening.objective <= base[0].objective + _UPHILL * screening.misfit:
             # The linear form promised what the simulation does not keep.
             refused.add(frozenset(cause.key for cause in causes))
             screening, causes = base
