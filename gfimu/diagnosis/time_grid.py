@@ -72,18 +72,27 @@ def time_grid(t_s: NDArray[np.float64]) -> TimeGrid:
     return TimeGrid(place, float(t_s[0]) + start + step * np.arange(n), jitter)
 
 
-@dataclass
+@dataclass(frozen=True)
+class _Loss:
+    """A number of samples lost after a sample, and the loss before it."""
+
+    after: int
+    count: int
+    before: _Loss | None
+
+
+@dataclass(frozen=True)
 class _Path:
     """One number of samples lost so far, with the grid that goes with it.
 
     ``phase`` and ``rate`` are where the grid is behind the stamps, and by how much more per sample, in sample periods;
-    ``cost`` in nats; ``losses`` the last loss before, as (sample, number, the one before that).
+    ``cost`` in nats; ``losses`` the last loss before.
     """
 
     phase: float
     rate: float
     cost: float
-    losses: tuple[int, int, object] | None
+    losses: _Loss | None
 
 
 def _period(t_s: NDArray[np.float64], period: float) -> float:
@@ -120,7 +129,7 @@ def _apart(steps: NDArray[np.float64]) -> NDArray[np.intp]:
                 # An outlier moves the grid no further than the spread would.
                 heard = min(max(error, -3.0 * spread), 3.0 * spread)
                 rate = min(max(path.rate + drift * heard, -_MOST_RATE), _MOST_RATE)
-                losses = (number, more, path.losses) if more else path.losses
+                losses = _Loss(number, more, path.losses) if more else path.losses
                 wanted[total] = _Path(error - gain * heard, rate, cost, losses)
         best = min(path.cost for path in wanted.values())
         near = sorted((one for one in wanted.items() if one[1].cost < best + _FAR), key=lambda one: one[1].cost)
@@ -128,13 +137,13 @@ def _apart(steps: NDArray[np.float64]) -> NDArray[np.intp]:
     apart = np.ones(len(steps), dtype=np.intp)
     likeliest = min(paths.values(), key=lambda path: path.cost)
     # Where stamps scatter by half a period the search may lose its way; a whole line through all of them does not.
-    number = np.arange(len(steps) + 1)
+    count = np.arange(len(steps) + 1)
     stamps = np.concatenate([[0.0], np.cumsum(steps)])
-    errors = stamps - np.polyval(np.polyfit(number, stamps, 1), number)
+    errors = stamps - np.polyval(np.polyfit(count, stamps, 1), count)
     if np.minimum(0.5 * (errors / spread) ** 2, _OUTLIER).sum() <= likeliest.cost:
         return apart
-    losses: object = likeliest.losses
-    while isinstance(losses, tuple):
-        number, more, losses = losses
-        apart[number] += more
+    last = likeliest.losses
+    while last is not None:
+        apart[last.after] += last.count
+        last = last.before
     return apart

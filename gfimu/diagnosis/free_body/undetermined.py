@@ -87,8 +87,7 @@ def _of_effect(signature: Signature, gram: NDArray[np.float64], array: Accelerom
     plain = np.linalg.solve(basis[:, order[: len(basis)]], basis)
     plain *= [size.prior_std for size in sizes]
     out = []
-    for row in plain:
-        row = row / row[np.argmax(np.abs(row))]
+    for row in plain / plain[np.arange(len(plain)), np.argmax(np.abs(plain), axis=1)][:, None]:
         keep = np.abs(row) > _LEAST_WEIGHT
         combination = {size.key: round(float(w), 3) for size, w, on in zip(sizes, row, keep, strict=True) if on}
         out.append(Undetermined(str(signature.family.name), combination))

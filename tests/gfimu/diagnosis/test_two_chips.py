@@ -27,7 +27,9 @@ GYRO = [f"gyro_{axis}_rad_s" for axis in "xyz"]
 
 def pair(one, other, names="ab"):
     """Twin of two triads, their axes those of the body, at places in m."""
-    chips = tuple(Chip(name, np.array(place, float), np.eye(3)) for name, place in zip(names, (one, other), strict=True))
+    chips = tuple(
+        Chip(name, np.array(place, float), np.eye(3)) for name, place in zip(names, (one, other), strict=True)
+    )
     return Twin(array=AccelerometerArray("pair", chips), drive_source="gyro", array_name="pair")
 
 
@@ -47,7 +49,7 @@ def moved(*hidden, twin=RIG, seed=1, duration=20.0, rate=4.0, force=4.0, vibrati
         return size * values / values.std()
 
     omega = smooth(25.0, rate, 3)
-    p = smooth(30.0, force, 3) + [0.0, 0.0, STANDARD_GRAVITY]
+    p = smooth(30.0, force, 3) + np.array([0.0, 0.0, STANDARD_GRAVITY])
     effects = [make_effect(name, parameters, twin.array) for name, parameters in hidden]
     readings = twin.predict_body(BodyDrive(t, omega, p), t, effects=effects)
     readings = readings + rng.standard_normal(readings.shape) * twin.expected_noise(100.0).white
@@ -143,7 +145,11 @@ GAIN = Gain("stretches", 0.1, 0.05, 0.95, 1.0, 0.1)
     [
         ({}, {"b1": 0.02}, ""),
         ({"residual": replace(RESIDUAL, rms_after=0.135)}, {"b1": 0.02}, "rises from 0.104 to 0.135"),
-        ({"gain": replace(GAIN, rms_after=0.328, share_of_excess_removed=-9.4)}, {"b1": 0.02}, "rises from 0.1 to 0.328"),
+        (
+            {"gain": replace(GAIN, rms_after=0.328, share_of_excess_removed=-9.4)},
+            {"b1": 0.02},
+            "rises from 0.1 to 0.328",
+        ),
         ({"gain": replace(GAIN, share_of_excess_removed=0.3)}, {"b1": 0.02}, "30 % of the excess removed"),
         ({}, {"b1": -0.97}, "the array file, axes or units do not fit these data"),
     ],
