@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d
 
-from gfimu.array import AccelerometerArray
+from gfimu.array import AccelerometerArray, Chip
 from gfimu.diagnosis.diagnose import diagnose
 from gfimu.diagnosis.integrity import check_integrity
 from gfimu.diagnosis.run import prepare_run
@@ -152,3 +152,23 @@ def test_saturation_of_single_sides_clips_only_those():
     readings = np.array([[9.0, 9.0] + [0.0] * 10, [-9.0, -9.0] + [0.0] * 10])
     clipped_now = step(np.arange(2.0), readings, np.random.default_rng(0))
     assert clipped_now[:, :2].tolist() == [[3.0, 9.0], [-9.0, -9.0]]
+
+
+@pytest.mark.parametrize("scatter", [none, rare, noisy])
+def test_a_rig_of_one_chip_that_clips_in_every_turn_on_one_side(scatter):
+    """No other channel reaches a limit; and the chip is 7 % further out than its twin has it."""
+    one, true = (
+        Twin(array=AccelerometerArray("one", (Chip("a", np.array([arm, 0.0, 0.0]), np.eye(3)),)), array_name="one")
+        for arm in (0.05, 0.0535)
+    )
+    motion = swinging()[1]
+    recording = measure(np.random.default_rng(2), true, [], Measurement(duration=20.0), motion=motion)
+    readings, rail = recording.readings.copy(), round(-5.0 / STEP) * STEP
+    over = readings[:, 0] < rail
+    readings[over, 0] = rail - np.round(scatter(np.random.default_rng(3), int(over.sum()))) * STEP
+    run = prepare_run(replace(recording, readings=readings), one)
+    report = check_integrity(one, run, one.predict(motion, run.t)[0])
+    (effect,) = report.effects
+    assert effect.name == "saturation"
+    assert effect.parameters["a1_lower_m_s2"] == pytest.approx(-5.0, abs=2 * STEP)
+    assert report.run.valid[over, 0].mean() < 0.01  # but for the tail of its noise

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 from dataclasses import replace
 
 import numpy as np
@@ -72,6 +73,25 @@ def test_a_stalled_host_loses_nothing():
         t[start : start + 7] = t[start + 7] - 1e-4 * np.arange(7, 0, -1)
     grid = time_grid(t)
     assert grid.lost == 0
+
+
+@pytest.mark.parametrize("tick", [1e-6, 1e-3])
+def test_a_slightly_irregular_sampling_loses_nothing(tick):
+    """A clock that wanders by half a percent, at 120 Hz, in whole ticks of the stamps."""
+    periods = (1.0 + 5e-3 * np.sin(np.arange(4000) / 300.0)) / 120.0
+    t = np.round(np.cumsum(periods) / tick) * tick
+    assert time_grid(t).lost == 0
+
+
+def test_a_real_pair_has_its_samples_on_the_grid(shared_data):
+    if not (shared_data / "wid").is_dir():
+        pytest.skip("no ../shared/data/wid")
+    with gzip.open(shared_data / "wid" / "trial08_IMU2.csv.gz", "rt") as file:
+        t = np.array([float(line.split(",")[1]) for line in file.readlines()[3:]]) * 1e-6
+    grid = time_grid(t)
+    assert grid.lost == np.rint((t[-1] - t[0]) / np.median(np.diff(t))) + 1 - len(t)
+    assert grid.lost < 1e-3 * len(t)
+    assert grid.jitter == 0.0
 
 
 def recorded(share=0.0):
