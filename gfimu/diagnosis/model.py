@@ -31,6 +31,7 @@ __all__ = [
     "Spin",
     "SpinState",
     "WorldModel",
+    "bound_of",
 ]
 
 
@@ -54,7 +55,10 @@ class Spin(Protocol):
 
 
 class Size(Protocol):
-    """One linear coordinate of an effect: key, physical prior, sign, finite-difference step; ``most``, if it has it."""
+    """One linear coordinate of an effect: key, physical prior, sign, finite-difference step.
+
+    It may have ``most``, the largest size that a fit may take, and ``bound`` (see `bound_of`); others need not.
+    """
 
     @property
     def key(self) -> str: ...  # noqa: D102
@@ -64,6 +68,11 @@ class Size(Protocol):
     def positive(self) -> bool: ...  # noqa: D102
     @property
     def step(self) -> float: ...  # noqa: D102
+
+
+def bound_of(size: Size) -> float:
+    """Return the size beyond which the twin must be of another unit, in the size's unit; infinite where it has none."""
+    return float(getattr(size, "bound", np.inf))
 
 
 class Pattern(Protocol):

@@ -142,6 +142,11 @@ class Gain:
         Rate of the array against the reference, rad/s.
     drift_before, drift_after : float
         Position drift of the held-out stretch, m.
+    share_std : float
+        Standard error of ``share_of_excess_removed`` by the noise; NaN where it was not estimated.
+    share_in_any_recording : float
+        The same share without terms of absolute time, which another recording has otherwise; NaN where nothing can
+        be said.
     """
 
     held_out: str = ""
@@ -154,6 +159,8 @@ class Gain:
     rate_rmse_after: float = float("nan")
     drift_before: float = float("nan")
     drift_after: float = float("nan")
+    share_std: float = float("nan")
+    share_in_any_recording: float = float("nan")
 
 
 @dataclass(frozen=True)
@@ -271,6 +278,8 @@ class Diagnosis:
                 "held_out_rms_before": gain.rms_before,
                 "held_out_rms_after": gain.rms_after,
                 "share_of_excess_removed": gain.share_of_excess_removed,
+                "share_of_excess_removed_std": gain.share_std,
+                "share_in_any_recording": gain.share_in_any_recording,
                 "log_likelihood_per_sample": gain.log_likelihood_per_sample,
                 "log_likelihood_std": gain.log_likelihood_std,
                 "rate_rmse_before_rad_s": gain.rate_rmse_before,

@@ -14,7 +14,10 @@ from gfimu.array import AccelerometerArray
 from gfimu.errors import InputError
 from sim.world import World
 
-__all__ = ["Effect", "Pattern", "Size", "channel_patterns", "chip_patterns"]
+__all__ = ["LARGEST_TURN", "Effect", "Pattern", "Size", "channel_patterns", "chip_patterns"]
+
+LARGEST_TURN = np.pi / 9
+"""Bound of a turn, rad: 20°. Soldering and mounting leave a degree or two; what is turned further is another unit."""
 
 
 @dataclass(frozen=True)
@@ -33,6 +36,9 @@ class Size:
         Finite-difference step as a share of ``prior_std``; large for effects that are not smooth in their size.
     most : float
         Largest size that physics allows, in that unit.
+    bound : float
+        Size beyond which a unit is not the one that was assumed (another array file, other axes, other units), in
+        that unit: several times what the data sheet or the rig allows.
     """
 
     key: str
@@ -40,6 +46,7 @@ class Size:
     positive: bool = False
     step: float = 1e-3
     most: float = np.inf
+    bound: float = np.inf
 
 
 @dataclass(frozen=True)
