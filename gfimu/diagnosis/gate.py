@@ -14,12 +14,10 @@ from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.model import EffectFamily, bound_of
 from gfimu.diagnosis.verdict import Gain, NamedCause, Residual
 
-__all__ = ["IN_PART", "LEAST_SHARE", "Judgement", "impossible_sizes", "judge"]
+__all__ = ["LEAST_SHARE", "Judgement", "impossible_sizes", "judge"]
 
 LEAST_SHARE = 0.5
 """Share of the held-out excess below which causes are withdrawn: they miss more than they explain."""
-IN_PART = 0.9
-"""Share of the held-out excess below which causes explain in part."""
 _STDS = 2.0  # standard errors beyond which a figure counts
 _WORSE = 1.01  # of the rms before: an in-sample error that is larger by less is the noise of the drive
 _NEAR_NOISE = 1.1  # of the noise floor: an error within it is no evidence against a cause
@@ -35,13 +33,10 @@ class Judgement:
         Whether the causes must not stand.
     why : str
         The figure that withdraws them, in words; empty where they stand.
-    in_part : bool
-        Whether they stand but leave more than a tenth of the held-out excess.
     """
 
     withdrawn: bool = False
     why: str = ""
-    in_part: bool = False
 
 
 def judge(gain: Gain, residual: Residual, causes: Sequence[NamedCause]) -> Judgement:
@@ -68,7 +63,7 @@ def judge(gain: Gain, residual: Residual, causes: Sequence[NamedCause]) -> Judge
     if after > max(_WORSE * before, _NEAR_NOISE * residual.noise_floor):
         worse = f"the prediction error rises from {before:.3g} to {after:.3g} m/s²"
         return Judgement(True, f"{_found(causes)} make the simulation worse: {worse}")
-    return Judgement(in_part=bool(gain.share_of_excess_removed < IN_PART))
+    return Judgement()
 
 
 def _held_out_figure(gain: Gain) -> str:

@@ -21,7 +21,7 @@ from gfimu.diagnosis.coloured_noise import NoiseLevels
 from gfimu.diagnosis.drive import smooth_rate
 from gfimu.diagnosis.evidence import SCALES, inverse, likeliest_scale
 from gfimu.diagnosis.fit import SMALLEST_POSITIVE, Fit
-from gfimu.diagnosis.model import Effect
+from gfimu.diagnosis.model import Effect, is_of_one_recording
 from gfimu.diagnosis.refinement import refine, refine_each
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.verdict import Gain
@@ -164,15 +164,19 @@ def held_out_gain(causes: Sequence[Cause], pairs: Sequence[Holdout], constant: S
     share, std = _share(before - floor, after - floor, error, floor)
     blocks = np.concatenate([one.blocks for one in measured])
     rms = np.sqrt(np.sum([one.squares for one in measured], axis=0) / samples)
+    rates = np.sqrt(np.mean(np.square([one.rates for one in measured]), axis=0))
+    drifts = np.mean([one.drifts for one in measured], axis=0)
     return Gain(
-        label,
-        float(rms[0]),
-        float(rms[1]),
-        share,
-        0.5 * (before - after) / sum(len(one.blocks) * one.block for one in measured),
-        float(blocks.std(ddof=1) / np.sqrt(len(blocks))) if len(blocks) > 1 else float("nan"),
-        *(float(np.sqrt(np.mean(np.square(column)))) for column in zip(*(one.rates for one in measured), strict=True)),
-        *(float(np.mean(column)) for column in zip(*(one.drifts for one in measured), strict=True)),
+        held_out=label,
+        rms_before=float(rms[0]),
+        rms_after=float(rms[1]),
+        share_of_excess_removed=share,
+        log_likelihood_per_sample=0.5 * (before - after) / sum(one.rows for one in measured),
+        log_likelihood_std=float(blocks.std(ddof=1) / np.sqrt(len(blocks))) if len(blocks) > 1 else float("nan"),
+        rate_rmse_before=float(rates[0]),
+        rate_rmse_after=float(rates[1]),
+        drift_before=float(drifts[0]),
+        drift_after=float(drifts[1]),
         share_std=std,
         share_in_any_recording=_share(before - floor, carried - floor, error, floor)[0],
     )
@@ -193,12 +197,10 @@ class _Measured:
         What as many observations of the fitted part leave.
     squares : tuple of float
         Sums of squares of the channels before and after, (m/s²)².
-    samples : int
-        Readings in them.
+    samples, rows : int
+        Readings in them, and samples.
     blocks : ndarray, shape (b,)
         Gain of log-likelihood per sample in blocks of a second.
-    block : float
-        Samples of a block.
     rates, drifts : tuple of float
         Errors of rate, rad/s, and drift, m, before and after.
     """
@@ -211,8 +213,8 @@ class _Measured:
     fitted: float
     squares: tuple[float, float]
     samples: int
+    rows: int
     blocks: NDArray[np.float64]
-    block: float
     rates: tuple[float, float]
     drifts: tuple[float, float]
 
@@ -253,7 +255,7 @@ def _measured(
     """
     array, kept = segment.model.array, segment.coefficients
     effects = [*known, *effects_of_run(causes, array, segment.index)]
-    carried = [cause for cause in causes if not getattr(cause.family, "of_one_recording", False)]
+    carried = [cause for cause in causes if not is_of_one_recording(cause.family)]
     squares, misfits, whites = [], [], []
     use = segment.weight_mask[:, :-1]
     for chosen in (nominal, effects):
@@ -271,19 +273,19 @@ def _measured(
     fitted = left * float(segment.weight_mask.sum())
     if segment.rounding.coarse:
         floor = fitted
-    blocks = _blocks(0.5 * np.sum(whites[0] ** 2 - whites[1] ** 2, axis=1), segment)
     return _Measured(
-        *misfits,
-        other,
-        floor,
-        variance,
-        fitted,
-        (squares[0], squares[1]),
-        int(use.sum()),
-        blocks,
-        len(segment.run.t) / len(blocks),
-        rates,
-        drifts,
+        before=misfits[0],
+        after=misfits[1],
+        carried=other,
+        floor=floor,
+        floor_variance=variance,
+        fitted=fitted,
+        squares=(squares[0], squares[1]),
+        samples=int(use.sum()),
+        rows=len(segment.run.t),
+        blocks=_blocks(0.5 * np.sum(whites[0] ** 2 - whites[1] ** 2, axis=1), segment),
+        rates=rates,
+        drifts=drifts,
     )
 
 

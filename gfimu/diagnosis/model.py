@@ -32,6 +32,7 @@ __all__ = [
     "SpinState",
     "WorldModel",
     "bound_of",
+    "is_of_one_recording",
 ]
 
 
@@ -101,6 +102,11 @@ class Effect(Protocol):
     def shape_values(self) -> dict[str, float]:
         """Return the shape parameters."""
         ...
+
+
+def is_of_one_recording(family: EffectFamily) -> bool:
+    """Tell whether a kind of effect has the phase of a clock that no other recording shares; others need not say so."""
+    return bool(getattr(family, "of_one_recording", False))
 
 
 class EffectFamily(Protocol):

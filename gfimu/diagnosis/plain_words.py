@@ -86,6 +86,9 @@ def headline(diagnosis: Diagnosis) -> str:
             text = f"Something is missing in the simulation, but this recording can't tell which: {candidates}."
             certain = [_short(diagnosis, cause) for cause in diagnosis.causes if cause not in contested]
             return f"Found: {_joined(certain)}. {text.replace('Something', 'Something else', 1)}" if certain else text
+        case _ if diagnosis.in_part:
+            share = percent(diagnosis.gain.share_of_excess_removed)
+            return f"Found in part what the simulation leaves out: {_joined(found)} ({share} of the error is gone)."
         case _ if len(found) == 1:
             return f"Found what the simulation leaves out: {found[0]}."
         case _:
@@ -142,8 +145,17 @@ def story(diagnosis: Diagnosis) -> str:
             f"On data that the fit never saw ({gain.held_out}), {percent(gain.share_of_excess_removed)} of the error "
             "beyond noise is gone. "
         )
+    if diagnosis.unexplained.left_out:
+        text += (
+            f"{diagnosis.unexplained.left_out} of the terms that describe it are of absolute time and left out of "
+            "twin.toml: another recording has other phases, and none confirms them. "
+        )
     if diagnosis.unexplained.significant:
         text += f"Left unexplained: {diagnosis.unexplained.signature}. "
+    level = float(diagnosis.noise.get("bias_instability_largest_m_s2", 0.0))
+    if level > 0.0:
+        name = diagnosis.noise["bias_instability_largest_channel"]
+        text += f"The largest slow noise is that of {name}, {level / STANDARD_GRAVITY * 1e3:.2g} mg. "
     return text.strip()
 
 

@@ -14,9 +14,21 @@ from numpy.typing import NDArray
 from gfimu.atomic_file import write_text
 from gfimu.diagnosis.model import WorldModel
 
-__all__ = ["FORMAT_VERSION", "Diagnosis", "Gain", "NamedCause", "Residual", "Rival", "RunView", "Unexplained"]
+__all__ = [
+    "FORMAT_VERSION",
+    "IN_PART",
+    "Diagnosis",
+    "Gain",
+    "NamedCause",
+    "Residual",
+    "Rival",
+    "RunView",
+    "Unexplained",
+]
 
 FORMAT_VERSION = 1
+IN_PART = 0.9
+"""Share of the held-out excess below which causes explain in part."""
 
 
 @dataclass(frozen=True)
@@ -178,7 +190,9 @@ class Unexplained:
     surrogate : mapping of str to float
         Data-driven terms: coefficients by what they are of, with its unit, and function: ``"a11_m_s2: rate²"``.
     extends_twin : bool
-        Whether these terms are in the extended twin, as they predict data that their fit never saw.
+        Whether such terms are in the extended twin, as they predict data that their fit never saw.
+    left_out : int
+        How many of the terms are not in it, as they are of absolute time, which another recording has otherwise.
     """
 
     significant: bool = False
@@ -186,6 +200,7 @@ class Unexplained:
     log_odds: float = 0.0
     surrogate: Mapping[str, float] = field(default_factory=dict)
     extends_twin: bool = False
+    left_out: int = 0
 
 
 @dataclass(frozen=True)
@@ -234,8 +249,9 @@ class Diagnosis:
         The data for pictures.
     sentences : tuple of str
         The verdict in words, most important first.
-    noise : mapping of str to float
-        Noise levels estimated: ``white_over_data_sheet``, ``bias_instability_m_s2``, ``reference_white``; and
+    noise : mapping
+        Noise levels estimated: ``white_over_data_sheet``, ``bias_instability_m_s2`` (median of the channels),
+        ``bias_instability_largest_m_s2`` and ``bias_instability_largest_channel``, ``reference_white``; and
         ``calibration_residue``, small errors of all the twin's numbers at once, in units of what a good calibration
         leaves (0 where there are none).
     undetermined : tuple of mapping
@@ -252,8 +268,13 @@ class Diagnosis:
     twin: WorldModel
     runs: tuple[RunView, ...]
     sentences: tuple[str, ...]
-    noise: Mapping[str, float]
+    noise: Mapping[str, Any]
     undetermined: tuple[Mapping[str, Any], ...] = ()
+
+    @property
+    def in_part(self) -> bool:
+        """Whether the causes stand but leave more than a tenth of the excess on held-out data."""
+        return self.verdict == "explained" and self.gain.share_of_excess_removed < IN_PART
 
     @property
     def calibration_residue(self) -> float:
@@ -267,6 +288,7 @@ class Diagnosis:
         return {
             "format_version": FORMAT_VERSION,
             "verdict": self.verdict,
+            "in_part": self.in_part,
             "sentences": list(self.sentences),
             "causes": [cause.to_dict() for cause in self.causes],
             "residual": {
@@ -297,6 +319,7 @@ class Diagnosis:
                 "log_odds": self.unexplained.log_odds,
                 "surrogate": dict(self.unexplained.surrogate),
                 "extends_twin": self.unexplained.extends_twin,
+                "left_out": self.unexplained.left_out,
             },
             "rivals": [{"effects": list(r.effects), "log_odds": r.log_odds, "why": r.why} for r in self.rivals],
             "noise": dict(self.noise),

@@ -88,6 +88,8 @@ class Effect(ABC):
     """Share of what it explains that its model may get wrong; beside it a further cause must explain more than that."""
     starts: ClassVar[tuple[float, ...]] = ()
     """Values in units of the prior to start from where a large size is far from linear; none by default."""
+    of_one_recording: ClassVar[bool] = False
+    """True where its phase is that of a clock no other recording shares: it does not predict another one."""
 
     def __init__(self, parameters: Mapping[str, Any]) -> None:
         self.parameters: dict[str, Any] = dict(parameters)

@@ -372,6 +372,7 @@ class InterferenceTone(Effect):
     name = "interference_tone"
     summary = "a tone at a fixed frequency (mains, aliased or not) on all channels"
     place = "sensing"
+    of_one_recording = True
     separated_by = "a run at rest, where only the tone is left"
 
     @classmethod
