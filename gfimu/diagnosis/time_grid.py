@@ -65,7 +65,7 @@ def time_grid(t_s: NDArray[np.float64]) -> TimeGrid:
     n = int(place[-1]) + 1
     # The median step carries the rounding of the time stamps; the ends do not.
     ends = float(t_s[0]) + float(t_s[-1] - t_s[0]) / (n - 1) * np.arange(n)
-    step, start = np.polyfit(place, t_s - t_s[0], 1)
+    step, start = (float(one) for one in np.polyfit(place, t_s - t_s[0], 1))
     jitter = float(np.std(t_s - t_s[0] - start - step * place))
     if steps.min() >= _EARLY * period:
         return TimeGrid(place, ends, jitter if jitter > _SMOOTH * period else 0.0)

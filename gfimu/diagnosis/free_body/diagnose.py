@@ -34,9 +34,11 @@ from gfimu.diagnosis.model import Effect, WorldModel
 from gfimu.diagnosis.named_causes import contested, fault_causes, name_cause
 from gfimu.diagnosis.naming import channel_share, conflicting, probabilities, rival_list
 from gfimu.diagnosis.residual_tests import LeftOver
+from gfimu.diagnosis.run import Run
 from gfimu.diagnosis.sample_notes import with_sample_notes
 from gfimu.diagnosis.verdict import Diagnosis, Gain, NamedCause, Residual, RunView, Unexplained
 from gfimu.diagnosis.wording import verdict_sentences
+from gfimu.errors import InputError
 from gfimu.recording import Recording
 
 __all__ = ["diagnose_body"]
@@ -49,6 +51,8 @@ _INEXACTNESS = 2.5e-3
 _WIRING = ("axis_swap", "sign_flip", "wrong_range")
 _SWEEPS = 12
 _MOST_SPIKES = 2e-3
+_ALIVE = 0.5  # of the samples, with a value
+_FEWEST = 80  # samples
 
 
 def diagnose_body(
@@ -111,11 +115,13 @@ class _Prepared:
         segments, faults, why = [], [], {}
         for number, (recording, name) in enumerate(zip(recordings, names, strict=True)):
             body = prepare_body_run(recording, model, name=name)
+            _refuse_too_few(body.run, model, name)
             checked = check_integrity(model, body.run, robust_prediction(BodySegment(model, body, number)))
             run = checked.run
             if checked.spikes > _MOST_SPIKES * run.valid.size:
                 # So many are no faults: the hand moves faster than the samples follow.
                 run = replace(run, valid=run.valid | body.run.valid & ~_lost_for_good(body, run.valid))
+            _refuse_too_few(run, model, name)
             segments.append(BodySegment(model, replace(body, run=run), number))
             faults.append(list(checked.effects))
             why.update(checked.why)
@@ -125,6 +131,22 @@ class _Prepared:
     def fixed(self) -> list[list[Effect]]:
         """Faults of the wiring, which change a noise-free prediction."""
         return [[effect for effect in effects if effect.name in _WIRING] for effects in self.faults]
+
+
+def _refuse_too_few(run: Run, model: BodyModel, name: str) -> None:
+    """Refuse channels that the unknown specific force follows exactly: those of one chip, or too few with values."""
+    alive = run.valid.mean(axis=0) > _ALIVE
+    if alive.sum() - np.linalg.matrix_rank(model.array.axes[alive]) < 1:
+        raise InputError(
+            f"{name}: {int(alive.sum())} channels with values leave nothing to compare, as the specific force of a "
+            "free body is unknown; record the channels of two chips at least"
+        )
+    whole = int(run.valid[:, alive].all(axis=1).sum())
+    if whole < _FEWEST:
+        raise InputError(
+            f"{name}: {whole} samples have a value of every channel; a free body needs {_FEWEST}: record again "
+            "within the range of the sensors"
+        )
 
 
 def _lost_for_good(body: BodyRun, valid: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -190,6 +212,7 @@ def _verdict(
     if refuted or dominant:
         views = _views(prepared, ())
         residual = Residual.of_views(views, model.array.channels, segments[0].noise_floor)
+        gain = Gain()  # nothing stands that could be worth something
     dominant = dominant or bool(refuted)
     extension = [] if dominant else [cause.effect(model.array) for cause in fit.causes]
     faults = [families[cause.effect](cause.parameters) for cause in found if cause.effect in families]

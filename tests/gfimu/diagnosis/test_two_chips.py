@@ -16,7 +16,10 @@ from gfimu.diagnosis.diagnose import diagnose
 from gfimu.diagnosis.free_body.diagnose import _refuted
 from gfimu.diagnosis.free_body.motion import BodyDrive
 from gfimu.diagnosis.free_body.noise import Projection
+from gfimu.diagnosis.free_body.run import prepare_body_run
+from gfimu.diagnosis.free_body.segment import BodySegment
 from gfimu.diagnosis.verdict import Gain, NamedCause, Residual
+from gfimu.errors import InputError
 from gfimu.recording import Recording
 from gfimu.units import STANDARD_GRAVITY
 from sim.effects import make_effect
@@ -134,6 +137,47 @@ def test_corrupt_values_are_left_out_on_a_free_body():
     found = diagnose([spoiled], RIG)
     assert (found.verdict, found.causes) == ("nothing_found", ())
     assert any("5 values are left out as corrupt" in sentence for sentence in found.sentences)
+
+
+def test_late_stamps_lose_nothing_on_a_free_body():
+    recording = moved(seed=4)
+    late = recording.t_s + np.abs(np.random.default_rng(1).normal(0.0, 2e-3, len(recording)))
+    found = diagnose([replace(recording, t_s=np.maximum.accumulate(late) + 1e-7 * np.arange(len(late)))], RIG)
+    assert (found.verdict, found.causes) == ("nothing_found", ())
+    assert found.noise["time_jitter_s"] == pytest.approx(1.2e-3, rel=0.15)
+
+
+@pytest.mark.parametrize(("vibration", "least", "most"), [(0.0, 1.0, 1.6), (0.3, 2.0, 1e3)])
+def test_what_the_noise_model_lacks_is_measured_along_the_columns_of_a_cause(vibration, least, most):
+    hidden = ("scale_factor", {"b1": 0.05, "b2": -0.05})
+    segment = BodySegment(RIG, prepare_body_run(moved(hidden, seed=8, vibration=vibration), RIG), 0)
+    cause = RIG.families()["scale_factor"](dict(hidden[1]))
+    line = segment.linearise([cause])
+    columns = []
+    for axis in (3, 4):
+        change = np.zeros_like(line.residual)
+        change[:, axis] = line.drive.force[:, axis - 3]
+        columns.append(segment.signature(segment.grouped(change)))
+    misfit = segment.misfit(np.stack(columns, axis=1), line, segment.nuisances([cause], line))
+    assert least <= misfit < most
+
+
+def test_one_chip_on_a_free_body_is_refused():
+    one = Twin(
+        array=AccelerometerArray("one", (Chip("a", np.array([0.03, 0.0, 0.0]), np.eye(3)),)),
+        drive_source="gyro",
+        array_name="one",
+    )
+    with pytest.raises(InputError, match="3 channels with values leave nothing to compare"):
+        diagnose([moved(twin=one)], one)
+
+
+def test_a_dead_chip_of_two_is_refused():
+    recording = moved(seed=4)
+    readings = recording.readings.copy()
+    readings[:, 3:] = np.nan
+    with pytest.raises(InputError, match="record the channels of two chips at least"):
+        diagnose([replace(recording, readings=readings)], RIG)
 
 
 RESIDUAL = Residual(0.104, 0.05, 0.03, {}, {})
