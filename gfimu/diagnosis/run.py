@@ -157,9 +157,10 @@ def prepare_run(recording: Recording, model: WorldModel, *, name: str = "run") -
             f"Record at {1 / _LONGEST_PERIOD:g} Hz at least"
         )
     grid = time_grid(recording.t_s)
-    place, t, n = grid.place, grid.t, len(grid.t)
+    place, n = grid.place, grid.size
     if n > 4 * len(recording):
         raise InputError(f"{name}: more samples are missing than present; record again without the long gaps")
+    t = grid.t
     full = np.zeros((n, readings.shape[1]))
     full[place] = readings
     valid = np.zeros(full.shape, dtype=bool)

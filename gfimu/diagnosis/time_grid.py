@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
 
 __all__ = ["TimeGrid", "time_grid"]
 
@@ -33,25 +34,38 @@ class TimeGrid:
     ----------
     place : ndarray of int, shape (m,)
         Place of each sample on the grid; the first is 0.
-    t : ndarray, shape (n,)
-        Times of the grid, s, lost samples included.
+    start : float
+        Time of the first place, s.
+    period : float
+        Sample period, s.
     jitter : float
         Rms of the time stamps about the grid, s; 0 where they show none.
     """
 
     place: NDArray[np.intp]
-    t: NDArray[np.float64]
+    start: float
+    period: float
     jitter: float = 0.0
+
+    @property
+    def size(self) -> int:
+        """Number of places, n: samples there and lost."""
+        return int(self.place[-1]) + 1
+
+    @property
+    def t(self) -> NDArray[np.float64]:
+        """Times of the grid, shape (n,), s, lost samples included."""
+        return np.asarray(self.start + self.period * np.arange(self.size))
 
     @property
     def lost(self) -> int:
         """Number of samples missing."""
-        return len(self.t) - len(self.place)
+        return self.size - len(self.place)
 
     @property
     def longest_gap(self) -> float:
         """Longest step between two samples on the grid, s."""
-        return float(np.diff(self.place).max(initial=1) * (self.t[1] - self.t[0]))
+        return float(np.diff(self.place).max(initial=1) * self.period)
 
 
 def time_grid(t_s: NDArray[np.float64]) -> TimeGrid:
@@ -62,14 +76,14 @@ def time_grid(t_s: NDArray[np.float64]) -> TimeGrid:
     if (apart > 1).any() and steps.min() < _EARLY * period:
         apart = _apart(steps / _period(t_s, period))
     place = np.concatenate([[0], np.cumsum(apart)])
-    n = int(place[-1]) + 1
-    # The median step carries the rounding of the time stamps; the ends do not.
-    ends = float(t_s[0]) + float(t_s[-1] - t_s[0]) / (n - 1) * np.arange(n)
     step, start = (float(one) for one in np.polyfit(place, t_s - t_s[0], 1))
-    jitter = float(np.std(t_s - t_s[0] - start - step * place))
+    late = t_s - t_s[0] - start - step * place
+    jitter = float(np.std(late - uniform_filter1d(late, _MEMORY)))  # a clock that wanders slowly makes no jitter
     if steps.min() >= _EARLY * period:
-        return TimeGrid(place, ends, jitter if jitter > _SMOOTH * period else 0.0)
-    return TimeGrid(place, float(t_s[0]) + start + step * np.arange(n), jitter)
+        # The median step carries the rounding of the time stamps; the ends do not.
+        ends = float(t_s[-1] - t_s[0]) / float(place[-1])
+        return TimeGrid(place, float(t_s[0]), ends, jitter if jitter > _SMOOTH * period else 0.0)
+    return TimeGrid(place, float(t_s[0]) + start, step, jitter)
 
 
 @dataclass(frozen=True)
