@@ -110,7 +110,6 @@ def screen(
     signatures = plan_signatures(segments, causes, only)
     count = sum(len(one.columns) for one in signatures)
     gram, score, objective = np.zeros((count, count)), np.zeros(count), 0.0
-    mixing = _mixing(signatures, causes)
     misfits = []
     for segment, known in zip(segments, fixed, strict=True):
         effects = [*known, *effects_of_run(causes, array, segment.index)]
@@ -118,7 +117,7 @@ def screen(
         columns = signature_columns(segment, signatures, causes, known, line)
         nuisances = segment.nuisances(effects, line)
         part, right, squares = segment.products(columns, line, nuisances)
-        misfits.append(segment.misfit(columns @ mixing, line, nuisances))
+        misfits.append(segment.misfit(_of_causes(columns, signatures, causes), line, nuisances))
         gram += part
         score += right
         objective += squares
@@ -132,15 +131,15 @@ def screen(
     return Screening(places, objective, at, misfit)
 
 
-def _mixing(signatures: Sequence[Signature], causes: Sequence[Cause]) -> NDArray[np.float64]:
-    """Return the coordinates of causes in the columns of signatures, shape (P, k)."""
-    count = sum(len(one.columns) for one in signatures)
-    parts = [np.zeros((count, 0))]
+def _of_causes(
+    columns: NDArray[np.float64], signatures: Sequence[Signature], causes: Sequence[Cause]
+) -> NDArray[np.float64]:
+    """Return the columns of the coordinates of causes, from those of all signatures (rows, P)."""
+    parts = [np.zeros((len(columns), 0))]
     for cause in causes:
         signature = next(one for one in signatures if one.family.name == cause.name)
-        part = np.zeros((count, cause.mixing.shape[1]))
-        part[signature.columns] = cause.mixing
-        parts.append(part)
+        first, last = signature.columns[[0, -1]]
+        parts.append(columns[:, first : last + 1] @ cause.mixing)
     return np.hstack(parts)
 
 

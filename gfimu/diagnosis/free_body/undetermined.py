@@ -101,4 +101,7 @@ def undetermined_sentence(combinations: tuple[Undetermined, ...]) -> str:
     # One of each effect first: they say most.
     first = list({one.effect: one for one in reversed(combinations)}.values())[::-1][:_TOLD]
     named = "; ".join(one.text for one in first)
-    return f"These data can't determine {len(combinations)} combinations, which stay at zero, such as {named}."
+    return (
+        f"These data can't determine {len(combinations)} combinations, which stay at zero with the ± of what is usual, "
+        f"such as {named}."
+    )
