@@ -145,6 +145,8 @@ def story(diagnosis: Diagnosis) -> str:
             f"On data that the fit never saw ({gain.held_out}), {percent(gain.share_of_excess_removed)} of the error "
             "beyond noise is gone. "
         )
+        if diagnosis.unexplained.left_out and math.isfinite(gain.share_in_any_recording):
+            text += f"In any other recording it would be {percent(max(gain.share_in_any_recording, 0.0))}. "
     if diagnosis.unexplained.left_out:
         text += (
             f"{diagnosis.unexplained.left_out} of the terms that describe it are of absolute time and left out of "

@@ -157,7 +157,7 @@ def test_a_verdict_that_does_not_predict_unseen_data_is_unknown():
 
 
 def test_gains_that_no_part_has_are_told_as_a_wrong_file(twin):
-    gains = make_effect("scale_factor", dict.fromkeys(twin.array.channels[:3], -0.47))
+    gains = make_effect("scale_factor", dict.fromkeys(twin.array.channels[:3], 0.4))
     run = measure(np.random.default_rng(7), twin, [gains], SETTING)
     found = diagnose([run], twin)
     assert (found.verdict, found.causes) == ("unknown", ())
