@@ -59,6 +59,8 @@ def verdict_sentences(
             f"{_anywhere(gain)}."
         )
         words += _far_below(residual, gain)
+    if gain.held_out and np.isnan(gain.rms_after):
+        words.append(f"On data the fit never saw ({gain.held_out}) the gain is within the noise and can't be measured.")
     if unexplained.significant and verdict != "unknown":
         words.append(f"Something is left that nothing in the library explains: {unexplained.signature}.")
     over = residual.rms_after / max(residual.noise_floor, 1e-12)
