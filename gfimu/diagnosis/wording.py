@@ -136,9 +136,10 @@ def _surrogate_sentence(terms: int, left_out: int) -> str:
         )
     clock = ""
     if left_out:
+        are, them = ("is", "it") if left_out == 1 else ("are", "them")
         clock = (
-            f" {_many(left_out)} of absolute time {'is' if left_out == 1 else 'are'} left out of the extended twin: "
-            "another recording has other phases, and none was given that confirms them."
+            f" {_many(left_out)} of absolute time {are} left out of the extended twin: another recording has other "
+            f"phases, and no second one confirms {them}."
         )
     if not terms:
         return clock.strip()
