@@ -373,8 +373,9 @@ def _view(prepared: PreparedRuns, number: int, explanation: Explanation) -> RunV
 
 
 def _noise_floor(runs: Sequence[RunView], segment: Segment) -> float:
-    """Return the rms of the noise of all channels: white, slow and rounding."""
+    """Return the rms of the noise of all channels: white, slow, a random walk from the start on, and rounding."""
     levels = segment.levels
     floor = levels.white[:-1] ** 2 + 0.6 * levels.flicker[:-1] ** 2 + segment.rounding.channels**2 / 12.0
+    floor = floor + 0.5 * levels.walk**2 * np.mean([run.t[-1] - run.t[0] for run in runs])
     count = np.maximum(np.sum([run.valid.sum(axis=0) for run in runs], axis=0), 1)
     return float(np.sqrt(np.sum(floor * count) / count.sum()))

@@ -12,7 +12,7 @@ from gfimu.diagnosis.causes import effects_of_run
 from gfimu.diagnosis.conclusion import Described, conclude, is_dominant, is_unknown
 from gfimu.diagnosis.explanation import Explanation
 from gfimu.diagnosis.free_body.diagnose import diagnose_body
-from gfimu.diagnosis.gate import impossible_sizes, judge
+from gfimu.diagnosis.gate import impossible_sizes, judge, measurable
 from gfimu.diagnosis.holdout import Holdout, gate_gains, held_out_gain, split_segments
 from gfimu.diagnosis.long_run import explain_any_length
 from gfimu.diagnosis.loose_calibration import LooseCalibration, loosen, relearned
@@ -136,7 +136,10 @@ def _diagnose_prepared(
             return conclude(prepared, model, explanation, walk, loose, left, Gain(), withdrawn, refuted=refuted)
         refuted = judge(gain, found.residual, causes).why
         if not refuted:
-            return found
+            told = measurable(gain)
+            if told is gain:
+                return found
+            return conclude(prepared, model, explanation, walk, loose, left, told, withdrawn)
     described, gain = _describe(explanation, left, held_out, model, () if loose is None else loose.effects)
     walk = None if walk is None or described is None else _left_wandering(described.whole, walk)
     return conclude(prepared, model, explanation, walk, loose, left, gain, withdrawn, described, refuted)

@@ -14,7 +14,7 @@ from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.model import EffectFamily, bound_of
 from gfimu.diagnosis.verdict import Gain, NamedCause, Residual
 
-__all__ = ["LEAST_SHARE", "Judgement", "impossible_sizes", "judge"]
+__all__ = ["LEAST_SHARE", "Judgement", "impossible_sizes", "judge", "measurable"]
 
 LEAST_SHARE = 0.5
 """Share of the held-out excess below which causes are withdrawn: they miss more than they explain."""
@@ -64,6 +64,15 @@ def judge(gain: Gain, residual: Residual, causes: Sequence[NamedCause]) -> Judge
         worse = f"the prediction error rises from {before:.3g} to {after:.3g} m/s²"
         return Judgement(True, f"{_found(causes)} make the simulation worse: {worse}")
     return Judgement()
+
+
+def measurable(gain: Gain) -> Gain:
+    """Return a gain, or one without figures where causes stand but what they are worth is within the noise.
+
+    There the error may rise as well as fall by chance, and says nothing.
+    """
+    rises = gain.log_likelihood_per_sample < 0.0 or gain.rms_after > gain.rms_before
+    return Gain(gain.held_out) if rises and np.isnan(gain.share_of_excess_removed) else gain
 
 
 def _held_out_figure(gain: Gain) -> str:

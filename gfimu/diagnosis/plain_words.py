@@ -145,10 +145,14 @@ def story(diagnosis: Diagnosis) -> str:
             f"On data that the fit never saw ({gain.held_out}), {percent(gain.share_of_excess_removed)} of the error "
             "beyond noise is gone. "
         )
-    if diagnosis.unexplained.left_out:
+        if diagnosis.unexplained.left_out and math.isfinite(gain.share_in_any_recording):
+            text += f"In any other recording it would be {percent(max(gain.share_in_any_recording, 0.0))}. "
+    left_out = diagnosis.unexplained.left_out
+    if left_out:
+        what = f"{_count(left_out)} terms" if left_out > 1 else "one term"
         text += (
-            f"{diagnosis.unexplained.left_out} of the terms that describe it are of absolute time and left out of "
-            "twin.toml: another recording has other phases, and none confirms them. "
+            f"Of what describes it {what} of absolute time {'are' if left_out > 1 else 'is'} not in twin.toml: another "
+            "recording has other phases, and no second one confirms them. "
         )
     if diagnosis.unexplained.significant:
         text += f"Left unexplained: {diagnosis.unexplained.signature}. "

@@ -13,6 +13,7 @@ from gfimu.units import STANDARD_GRAVITY
 __all__ = ["verdict_sentences"]
 
 _FAR_BELOW = 0.25  # of the excess: less on unseen data than on the fitted ones by more is told
+_SAME_SHARE = 5e-3
 _INEXACT = 1.1  # of the noise, from which what is left is told
 
 
@@ -54,9 +55,12 @@ def verdict_sentences(
         )
     if gain.held_out and np.isfinite(gain.share_of_excess_removed):
         words.append(
-            f"On data the fit never saw ({gain.held_out}), {gain.share_of_excess_removed:.1%} of the excess is gone."
+            f"On data the fit never saw ({gain.held_out}), {gain.share_of_excess_removed:.1%} of the excess is gone"
+            f"{_anywhere(gain)}."
         )
         words += _far_below(residual, gain)
+    if gain.held_out and np.isnan(gain.rms_after):
+        words.append(f"On data the fit never saw ({gain.held_out}) the gain is within the noise and can't be measured.")
     if unexplained.significant and verdict != "unknown":
         words.append(f"Something is left that nothing in the library explains: {unexplained.signature}.")
     over = residual.rms_after / max(residual.noise_floor, 1e-12)
@@ -77,6 +81,14 @@ def verdict_sentences(
         words.append(f"{unreferenced:.1f} s are left out, as the reference is missing there.")
     words += [f"{name} was withdrawn: it did not predict held-out data." for name in withdrawn]
     return tuple(words)
+
+
+def _anywhere(gain: Gain) -> str:
+    """Return the share without what belongs to the clock of one recording, where that is another one."""
+    share = gain.share_in_any_recording
+    if not np.isfinite(share) or abs(share - gain.share_of_excess_removed) < _SAME_SHARE:
+        return ""
+    return f"; without terms of absolute time, as in any other recording, {max(share, 0.0):.1%}"
 
 
 def _far_below(residual: Residual, gain: Gain) -> list[str]:
@@ -124,9 +136,10 @@ def _surrogate_sentence(terms: int, left_out: int) -> str:
         )
     clock = ""
     if left_out:
+        are, them = ("is", "it") if left_out == 1 else ("are", "them")
         clock = (
-            f" {_many(left_out)} of absolute time {'is' if left_out == 1 else 'are'} left out of the extended twin: "
-            "another recording has other phases, and none was given that confirms them."
+            f" {_many(left_out)} of absolute time {are} left out of the extended twin: another recording has other "
+            f"phases, and no second one confirms {them}."
         )
     if not terms:
         return clock.strip()

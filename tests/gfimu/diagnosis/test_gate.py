@@ -9,11 +9,11 @@ from made_diagnoses import made_diagnosis
 
 from gfimu.array import AccelerometerArray
 from gfimu.diagnosis import diagnose
-from gfimu.diagnosis.gate import impossible_sizes, judge
+from gfimu.diagnosis.gate import impossible_sizes, judge, measurable
 from gfimu.diagnosis.named_causes import capped
 from gfimu.diagnosis.plain_words import headline
 from gfimu.diagnosis.report import report_html
-from gfimu.diagnosis.verdict import Gain, NamedCause, Residual
+from gfimu.diagnosis.verdict import Gain, NamedCause, Residual, Unexplained
 from gfimu.diagnosis.wording import verdict_sentences
 from gfimu.recording import Recording
 from sim.campaign import Measurement, measure, random_profile
@@ -74,6 +74,16 @@ def test_causes_are_withdrawn_by_the_figure_that_speaks_against_them(gain, resid
 )
 def test_causes_stand_where_no_figure_speaks_against_them(gain, residual):
     assert not judge(gain, residual, CAUSES).withdrawn
+
+
+def test_a_gain_within_the_noise_is_no_figure():
+    faint = Gain("blocks", 0.0342, 0.0342, log_likelihood_per_sample=-6e-4, log_likelihood_std=3e-3)
+    assert not judge(faint, FITS, CAUSES).withdrawn
+    assert np.isnan(measurable(faint).log_likelihood_per_sample)
+    assert measurable(faint).held_out == "blocks"
+    assert measurable(GOOD) is GOOD
+    told = verdict_sentences("explained", CAUSES, FITS, measurable(faint), Unexplained(), ())
+    assert any("the gain is within the noise" in sentence for sentence in told)
 
 
 def test_nothing_is_withdrawn_where_nothing_was_found():
@@ -157,7 +167,7 @@ def test_a_verdict_that_does_not_predict_unseen_data_is_unknown():
 
 
 def test_gains_that_no_part_has_are_told_as_a_wrong_file(twin):
-    gains = make_effect("scale_factor", dict.fromkeys(twin.array.channels[:3], -0.47))
+    gains = make_effect("scale_factor", dict.fromkeys(twin.array.channels[:3], 0.4))
     run = measure(np.random.default_rng(7), twin, [gains], SETTING)
     found = diagnose([run], twin)
     assert (found.verdict, found.causes) == ("unknown", ())
