@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.special import expit
@@ -12,11 +13,11 @@ from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.adequacy import LEFT_OVER_ODDS
 from gfimu.diagnosis.causes import Cause, effects_of_run
 from gfimu.diagnosis.explanation import Explanation
-from gfimu.diagnosis.fit import Fit
+from gfimu.diagnosis.fit import Fit, segments_at
 from gfimu.diagnosis.generic_basis import ripple_order
 from gfimu.diagnosis.loose_calibration import LooseCalibration
 from gfimu.diagnosis.model import Effect, WorldModel
-from gfimu.diagnosis.named_causes import contested, fault_causes, name_cause
+from gfimu.diagnosis.named_causes import capped, contested, fault_causes, name_cause
 from gfimu.diagnosis.naming import (
     MOST_CERTAIN,
     TEMPERATURE,
@@ -31,11 +32,11 @@ from gfimu.diagnosis.residual_tests import LeftOver
 from gfimu.diagnosis.search import MOST_CAUSES
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.signatures import ANGLES
-from gfimu.diagnosis.stochastic import Walk, white_factor
+from gfimu.diagnosis.stochastic import LoudestChannel, Walk, loudest_channel, white_factor
 from gfimu.diagnosis.verdict import Diagnosis, Gain, NamedCause, Residual, RunView, Unexplained
 from gfimu.diagnosis.wording import verdict_sentences
 
-__all__ = ["conclude", "is_dominant", "is_unknown"]
+__all__ = ["Described", "conclude", "is_dominant", "is_unknown", "without_causes"]
 
 _DOMINANT = 0.03
 _INEXACTNESS = 2.5e-3
@@ -56,9 +57,14 @@ def conclude(
     left: LeftOver,
     gain: Gain,
     withdrawn: Sequence[str],
-    described: Explanation | None = None,
+    described: Described | None = None,
+    refuted: str = "",
 ) -> Diagnosis:
-    """Put everything together; ``described`` holds the surrogate of an unknown."""
+    """Put everything together.
+
+    ``described`` holds the surrogate of an unknown; ``refuted`` says why the causes found must not stand, where the
+    gate withdrew them.
+    """
     array = model.array
     fit = explanation.fit
     found = [
@@ -68,11 +74,17 @@ def conclude(
     likely = probabilities(explanation)
     rivals = conflicting(explanation)
     named = _named(explanation, fit, likely, array, left)
-    dominant = described is not None or is_unknown(explanation, left, gain)
-    significant = dominant or _stands_out(explanation, left)
-    believed = explanation if described is None else described
+    dominant = described is not None or bool(refuted) or is_unknown(explanation, left, gain)
+    believed = explanation
+    if described is not None and described.carried is not None:
+        believed = described.carried
+    elif described is not None or refuted:
+        believed = without_causes(explanation)
+    loudest = loudest_channel(believed.segments, believed.fit, believed.fixed)
+    significant = dominant or _stands_out(explanation, left) or loudest.stands_out
     runs = tuple(_view(prepared, number, believed) for number in range(len(prepared.runs)))
-    extension = effects_of_run(believed.fit.causes, array, 0) if not dominant or described is not None else []
+    extends = not dominant or (described is not None and described.carried is not None)
+    extension = effects_of_run(believed.fit.causes, array, 0) if extends else []
     residue = () if loose is None else loose.effects
     twin = model.extended([*_library_effects(model, found), *residue, *extension])
     if dominant:
@@ -88,16 +100,25 @@ def conclude(
     elif named or found:
         verdict, causes = "explained", (*found, *named)
     else:
-        verdict, causes = "nothing_found", ()
-    surrogate = left.surrogate if described is None else _coefficients(described.fit.causes, array)
-    signature = left.signature if significant else ""
-    unexplained = Unexplained(significant, signature, left.log_odds, surrogate, described is not None)
+        verdict, causes = "unknown" if loudest.stands_out else "nothing_found", ()
+    surrogate = left.surrogate if described is None else _coefficients(described.whole.fit.causes, array)
+    shown = left.signature if (dominant and not refuted) or _stands_out(explanation, left) else ""
+    unexplained = Unexplained(
+        significant,
+        "; ".join(part for part in (refuted, shown, _slow_noise_signature(loudest)) if part),
+        left.log_odds,
+        surrogate,
+        described is not None and described.carried is not None,
+        0 if described is None else described.left_out,
+    )
     residual = Residual.of_views(runs, array.channels, _noise_floor(runs, believed.segments[0]))
     levels = believed.segments[0].levels
     expected = model.expected_noise(1.0 / prepared.runs[0].sample_period)
-    noise = {
+    noise: dict[str, Any] = {
         "white_over_data_sheet": float(np.median(levels.white[:-1] / expected.white)),
         "bias_instability_m_s2": float(np.median(levels.flicker[:-1])),
+        "bias_instability_largest_m_s2": loudest.level,
+        "bias_instability_largest_channel": loudest.name,
         "reference_white": float(levels.white[-1]),
         "calibration_residue": 0.0 if loose is None else loose.scale,
     }
@@ -108,12 +129,51 @@ def conclude(
         gain,
         unexplained,
         withdrawn,
-        residue=noise["calibration_residue"],
+        residue=0.0 if loose is None else loose.scale,
         unreferenced=sum(run.unreferenced for run in prepared.runs),
-        terms=0 if described is None else len(described.fit.causes),
+        terms=len(believed.fit.causes) if dominant and extends else 0,
+        loudest=(loudest.name, loudest.level, loudest.ratio),
         rest=left.signature if left.log_odds > LEFT_OVER_ODDS else "",
     )
     return Diagnosis(verdict, causes, residual, gain, unexplained, rival_list(explanation), twin, runs, words, noise)
+
+
+@dataclass(frozen=True)
+class Described:
+    """A surrogate of what has no name.
+
+    Parameters
+    ----------
+    whole : Explanation
+        All its terms.
+    carried : Explanation, optional
+        Those that go into the extended twin: functions of the motion and the angle, and of absolute time where
+        another recording confirms them; None where none is left.
+    """
+
+    whole: Explanation
+    carried: Explanation | None
+
+    @property
+    def left_out(self) -> int:
+        """How many terms do not go into the extended twin."""
+        return len(self.whole.fit.causes) - (0 if self.carried is None else len(self.carried.fit.causes))
+
+
+def without_causes(explanation: Explanation) -> Explanation:
+    """Return an explanation that names nothing, its drives at their best without."""
+    nothing = explanation.nothing
+    return replace(explanation, fit=nothing, segments=tuple(segments_at(explanation.segments, nothing)))
+
+
+def _slow_noise_signature(loudest: LoudestChannel) -> str:
+    """Return what a channel with far more slow noise than the others looks like; empty where none has."""
+    if not loudest.stands_out:
+        return ""
+    return (
+        f"the slow noise of channel {loudest.name} is {loudest.ratio:.1f} times the median of the other channels: "
+        "something else is in it"
+    )
 
 
 def is_unknown(explanation: Explanation, left: LeftOver, gain: Gain) -> bool:
@@ -180,7 +240,7 @@ def _named(
         share = channel_share(change[:, :-1] * segment.weight_mask[:, :-1], array.channels)
         entry = name_cause(explanation, fit, cause, likely, array, share)
         why = entry.why + _other_runs(cause, array, runs) + _or_residue(explanation, cause)
-        entry = replace(entry, why=why, std=_widened(entry, cause, misfit, left))
+        entry = capped(replace(entry, why=why, std=_widened(entry, cause, misfit, left)))
         entries.append((float(sum(value**2 for value in share.values())), entry))
     return [entry for _, entry in sorted(entries, key=lambda pair: -pair[0])]
 
@@ -313,8 +373,9 @@ def _view(prepared: PreparedRuns, number: int, explanation: Explanation) -> RunV
 
 
 def _noise_floor(runs: Sequence[RunView], segment: Segment) -> float:
-    """Return the rms of the noise of all channels: white, slow and rounding."""
+    """Return the rms of the noise of all channels: white, slow, a random walk from the start on, and rounding."""
     levels = segment.levels
     floor = levels.white[:-1] ** 2 + 0.6 * levels.flicker[:-1] ** 2 + segment.rounding.channels**2 / 12.0
+    floor = floor + 0.5 * levels.walk**2 * np.mean([run.t[-1] - run.t[0] for run in runs])
     count = np.maximum(np.sum([run.valid.sum(axis=0) for run in runs], axis=0), 1)
     return float(np.sqrt(np.sum(floor * count) / count.sum()))

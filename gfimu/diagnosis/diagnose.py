@@ -10,19 +10,21 @@ import numpy as np
 from gfimu.carried_array import warn_of_other_array
 from gfimu.diagnosis.adequacy import LEFT_OVER_ODDS, left_over
 from gfimu.diagnosis.causes import effects_of_run
-from gfimu.diagnosis.conclusion import conclude, is_dominant, is_unknown
+from gfimu.diagnosis.conclusion import Described, conclude, is_dominant, is_unknown
 from gfimu.diagnosis.explanation import Explanation
 from gfimu.diagnosis.free_body.diagnose import diagnose_body
+from gfimu.diagnosis.gate import impossible_sizes, judge, measurable
 from gfimu.diagnosis.holdout import Holdout, gate_gains, held_out_gain, split_segments
 from gfimu.diagnosis.long_run import explain_any_length
 from gfimu.diagnosis.loose_calibration import LooseCalibration, loosen, relearned
-from gfimu.diagnosis.model import Effect, WorldModel
+from gfimu.diagnosis.model import Effect, WorldModel, is_of_one_recording
 from gfimu.diagnosis.nuisances import sharpen_drives, tune_drives
 from gfimu.diagnosis.parallel import one_blas_thread
 from gfimu.diagnosis.prepared_runs import PreparedRuns
 from gfimu.diagnosis.pruning import prune
 from gfimu.diagnosis.refinement import refine
 from gfimu.diagnosis.residual_tests import LeftOver
+from gfimu.diagnosis.sample_notes import with_sample_notes
 from gfimu.diagnosis.stochastic import UNEQUAL_WALK, WALK_ODDS, Walk, walk_strength
 from gfimu.diagnosis.surrogate import surrogates
 from gfimu.diagnosis.verdict import Diagnosis, Gain
@@ -94,6 +96,13 @@ def _diagnose_table(
     """Diagnose a unit on a table, whose drive is one smooth unknown."""
     tell(0.02, "read")
     prepared = PreparedRuns.build(recordings, model, labels)
+    return with_sample_notes(_diagnose_prepared(prepared, model, held_out, tell), prepared.runs)
+
+
+def _diagnose_prepared(
+    prepared: PreparedRuns, model: WorldModel, held_out: Sequence[Recording], tell: Report
+) -> Diagnosis:
+    """Diagnose runs that have been read and checked."""
     explanation, walk, loose = _explain(prepared, model, tell)
     tell(0.92, "hold out")
     pairs, label = _holdouts(explanation, held_out, model, () if loose is None else loose.effects)
@@ -122,11 +131,27 @@ def _diagnose_table(
         if loose is not None:
             pairs = relearned(loose, explanation.fit.causes, pairs)
         gain = _gain(explanation, pairs, label)
-    described = None
-    if is_unknown(explanation, left, gain):
-        described, gain = _describe(explanation, left, held_out, model, () if loose is None else loose.effects)
-        walk = None if walk is None or described is None else _left_wandering(described, walk)
-    return conclude(prepared, model, explanation, walk, loose, left, gain, withdrawn, described)
+    refuted = ""
+    if not is_unknown(explanation, left, gain):
+        found = conclude(prepared, model, explanation, walk, loose, left, gain, withdrawn)
+        causes = [cause for cause in found.causes if cause.effect in _fitted(explanation)]
+        refuted = impossible_sizes(causes, model.families(), model.array)
+        if refuted:  # nothing that such a twin leaves is worth a description
+            return conclude(prepared, model, explanation, walk, loose, left, Gain(), withdrawn, refuted=refuted)
+        refuted = judge(gain, found.residual, causes).why
+        if not refuted:
+            told = measurable(gain)
+            if told is gain:
+                return found
+            return conclude(prepared, model, explanation, walk, loose, left, told, withdrawn)
+    described, gain = _describe(explanation, left, held_out, model, () if loose is None else loose.effects)
+    walk = None if walk is None or described is None else _left_wandering(described.whole, walk)
+    return conclude(prepared, model, explanation, walk, loose, left, gain, withdrawn, described, refuted)
+
+
+def _fitted(explanation: Explanation) -> frozenset[str]:
+    """Return the names of the causes that were fitted, and of those in their place that the data can't tell apart."""
+    return frozenset().union(explanation.fit.names, *(rival.names for rival in explanation.rivals))
 
 
 def _left_wandering(described: Explanation, walk: Walk) -> Walk | None:
@@ -149,16 +174,31 @@ def _describe(
     held_out: Sequence[Recording],
     model: WorldModel,
     residue: Sequence[Effect],
-) -> tuple[Explanation | None, Gain]:
-    """Describe what has no name by a surrogate, and keep it where it predicts data that its fit never saw."""
+) -> tuple[Described | None, Gain]:
+    """Describe what has no name by a surrogate, and keep it where it predicts data that its fit never saw.
+
+    Terms of absolute time have the phase of one recording: only another one can confirm them.
+    """
     found = surrogates(explanation.segments, explanation.nothing, explanation.fixed, left.hints)
     # The richest that predicts; if that was too rich, the poorest.
     for surrogate in [*found[-1:], *found[:-1][:1]]:
-        described = replace(explanation, fit=surrogate.fit, segments=surrogate.segments)
-        pairs, label = _holdouts(described, held_out, model, residue)
-        gain = _gain(described, pairs, label)
+        whole = replace(explanation, fit=surrogate.fit, segments=surrogate.segments)
+        pairs, label = _holdouts(whole, held_out, model, residue)
+        gain = _gain(whole, pairs, label)
+        kept = tuple(cause for cause in whole.fit.causes if not is_of_one_recording(cause.family))
+        carried = replace(whole, fit=replace(whole.fit, causes=kept)) if kept else None
+        if len(kept) < len(whole.fit.causes) and held_out:
+            alone = _gain(carried, pairs, label) if carried is not None else Gain()
+            samples = sum(len(segment.run.t) for pair in pairs for segment in pair.test)
+            better = gain.log_likelihood_per_sample - float(np.nan_to_num(alone.log_likelihood_per_sample))
+            if better * samples > LEAST_GAIN:
+                carried = whole
+            else:
+                gain = alone
+        elif carried is not None and gain.share_in_any_recording <= 0.0:
+            carried = None
         if gain.log_likelihood_per_sample > 0.0:
-            return described, gain
+            return Described(whole, carried), gain
     return None, Gain()
 
 

@@ -18,7 +18,7 @@ from gfimu.diagnosis.drive_root import banded
 from gfimu.diagnosis.model import Spin, SpinState
 from gfimu.diagnosis.run import Run
 
-__all__ = ["DEGREE", "AngleSpline", "ScaledSpin", "ShiftedSpin", "SplineState", "smooth_rate"]
+__all__ = ["DEGREE", "AngleSpline", "JoinedSpin", "ScaledSpin", "ShiftedSpin", "SplineState", "smooth_rate"]
 
 DEGREE = 4
 """Of the spline of the angle."""
@@ -242,6 +242,23 @@ class ScaledSpin:
         """Return the state at times (n,), s."""
         state = self._spin.at(t)
         return SplineState(state.angle / self._gain, state.rate / self._gain, state.acceleration / self._gain)
+
+
+class JoinedSpin:
+    """One spin before an instant, s, and another from it on."""
+
+    def __init__(self, before: Spin, after: Spin, instant: float) -> None:
+        self._before, self._after, self._instant = before, after, instant
+
+    def at(self, t: ArrayLike) -> SpinState:
+        """Return the state at times (n,), s."""
+        first, second = self._before.at(t), self._after.at(t)
+        early = np.asarray(t) < self._instant
+        return SplineState(
+            np.where(early, first.angle, second.angle),
+            np.where(early, first.rate, second.rate),
+            np.where(early, first.acceleration, second.acceleration),
+        )
 
 
 class ShiftedSpin:

@@ -107,7 +107,8 @@ def differentiate(
     run, play = simulation.run, remembered.play
     # The state of the instant moves what a play lets through, that of an earlier one what it holds.
     model, moving = (simulation.model, effects) if play is None else (play.model, play.effects)
-    unheld = base if play is None else simulation.of_motion(moving, simulation.motion(effects, drive), model)
+    same = play is None and (simulation.run_up is None or not simulation.remembers(effects))
+    unheld = base if same else simulation.of_motion(moving, simulation.motion(effects, drive), model)
     ripple = felt_ripple(model, moving) if remembered.ripple else None
     slopes, rippling = np.empty((3, *base.shape)), None
     if ripple is None:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.linalg import lapack
 from scipy.special import log_ndtr
 
-__all__ = ["SCALES", "inverse", "log_evidence", "log_evidence_each", "posterior"]
+__all__ = ["SCALES", "inverse", "likeliest_scale", "log_evidence", "log_evidence_each", "posterior"]
 
 SCALES = (0.01, 0.03, 0.08, 0.2, 0.45, 1.0, 2.2, 5.0, 12.0, 30.0)
 """Scales k of the prior: a fraction of the usual size up to a gross error.
@@ -72,6 +72,11 @@ def log_evidence(
     """
     values = _unsigned(gram, score) if positive is None or not positive.any() else _signed(gram, score, positive)
     return float(np.logaddexp.reduce(values + _SCALE_WEIGHTS))
+
+
+def likeliest_scale(gram: NDArray[np.float64], score: NDArray[np.float64]) -> float:
+    """Return the scale k of the prior under which coordinates with G (k, k) and b (k,) are the most probable."""
+    return SCALES[int(np.argmax(_unsigned(gram, score) + _SCALE_WEIGHTS))]
 
 
 def _unsigned(gram: NDArray[np.float64], score: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -57,7 +57,10 @@ def frozen_stretches(
             at_limit = limit is not None and abs(mine[start]) >= limit - 0.6 * quantum
             moving = float(np.ptp(prediction[start:stop, channel])) > 2.5 * quantum
             restless = changes > 0.3 * quantum and stop - start > least[channel]
-            if not at_limit and run.valid[start:stop, channel].any() and (moving or restless):
+            # Where all channels repeat themselves no single one has stopped.
+            others = np.diff(np.delete(run.readings[start:stop], channel, axis=1), axis=0)
+            alone = bool((others != 0.0).any(axis=1).mean() > 0.5)
+            if not at_limit and alone and run.valid[start:stop, channel].any() and (moving or restless):
                 found.append((channel, start, stop))
     return found
 

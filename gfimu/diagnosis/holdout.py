@@ -15,10 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
+from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.causes import Cause, effects_of_run
+from gfimu.diagnosis.coloured_noise import NoiseLevels
 from gfimu.diagnosis.drive import smooth_rate
-from gfimu.diagnosis.fit import Fit
-from gfimu.diagnosis.model import Effect
+from gfimu.diagnosis.evidence import SCALES, inverse, likeliest_scale
+from gfimu.diagnosis.fit import SMALLEST_POSITIVE, Fit
+from gfimu.diagnosis.model import Effect, is_of_one_recording
 from gfimu.diagnosis.refinement import refine, refine_each
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.verdict import Gain
@@ -28,6 +31,12 @@ __all__ = ["BLOCK_DURATION", "Holdout", "gate_gains", "held_out_gain", "split_se
 BLOCK_DURATION = 8.0
 """About how long a held-out block is, s."""
 _ITERATIONS = 8
+_FOLLOWED = 0.6  # over the spacing of the knots, Hz: what is faster the drive does not follow
+_CLIP = 9.0  # squares in variances, 3 σ
+_CLIPPED = 0.995007  # expectation of a squared standard normal that is clipped there
+_SIGNIFICANT = 4.0  # standard errors of the floor from which an excess counts
+_SLACK = 3.0  # standard errors that the floor may be raised by
+_LEAST_EXCESS = 0.01  # of the floor: what the spectrum of slow noise may be wrong by
 
 
 @dataclass(frozen=True)
@@ -118,6 +127,11 @@ def _evidence_of(segments: Sequence[Segment], fits: Sequence[Fit], fixed: Sequen
 def held_out_gain(causes: Sequence[Cause], pairs: Sequence[Holdout], constant: Sequence[Effect], *, label: str) -> Gain:
     """Measure what the causes, fitted on one part, are worth on the other.
 
+    Errors are compared in the metric of the fit: squares whitened by the learnt noise, white, slow and a random walk
+    where one was found, the drive marginalised. Their expectation is the number of observations times the white noise
+    that the held-out data themselves show at frequencies which the drive can't follow, so that slow noise and an error
+    of its learnt level are no excess.
+
     Parameters
     ----------
     causes : sequence of Cause
@@ -129,65 +143,199 @@ def held_out_gain(causes: Sequence[Cause], pairs: Sequence[Holdout], constant: S
     label : str
         What was held out.
     """
-    before, after, count = 0.0, 0.0, 0
-    scaled_before, scaled_after, floor = 0.0, 0.0, 0.0
-    likelihoods: list[NDArray[np.float64]] = []
-    rates: list[tuple[float, float]] = []
-    drifts: list[tuple[float, float]] = []
+    measured: list[_Measured] = []
     for pair in pairs:
         trained = refine(pair.train, causes, pair.train_fixed, iterations=4, shapes=False)
+        expected = _expected(trained, pair.train[0].model.array)
+        left = trained.objective / max(sum(int(segment.weight_mask.sum()) for segment in pair.train), 1)
         for segment, known in zip(pair.test, pair.test_fixed, strict=True):
-            array = segment.model.array
-            effects = [*known, *effects_of_run(trained.causes, array, segment.index)]
             nominal = [effect for effect in known if not any(_same(effect, other) for other in constant)]
-            plain = segment.residual(nominal)[:, :-1]
-            kept = segment.coefficients
-            plain_likelihood = _scaled(segment, nominal)
-            segment.coefficients = kept
-            extended_likelihood = _scaled(segment, effects)
-            left = segment.residual(effects)[:, :-1]
-            use = segment.weight_mask[:, :-1]
-            before += float(np.sum(plain[use] ** 2))
-            after += float(np.sum(left[use] ** 2))
-            scaled_before += float(plain_likelihood.sum())
-            scaled_after += float(extended_likelihood.sum())
-            ratio = 1.0 + 0.6 * (segment.levels.flicker / segment.levels.white) ** 2
-            floor += float(np.sum(segment.weight_mask * ratio))
-            count += int(use.sum())
-            likelihoods.append(0.5 * _blocks(plain_likelihood - extended_likelihood, segment))
-            rate, drift = _motion_errors(segment, nominal, effects)
-            rates.append(rate)
-            drifts.append(drift)
-            segment.coefficients = kept
-    if count == 0:
+            measured.append(_measured(segment, nominal, known, expected, left))
+    samples = sum(one.samples for one in measured)
+    if samples == 0:
         return Gain()
-    # In units of the noise, channels and reference together: a wrong reference shows in the channels only through
-    # the drive, which each model fits as well as it can.
-    excess = scaled_before - floor
-    share = 1.0 - max(scaled_after - floor, 0.0) / excess if excess > 0.02 * floor else float("nan")
-    blocks = np.concatenate(likelihoods)
-    return Gain(
-        label,
-        float(np.sqrt(before / count)),
-        float(np.sqrt(after / count)),
-        float(min(share, 1.0)),
-        float(blocks.mean()),
-        float(blocks.std(ddof=1) / np.sqrt(len(blocks))) if len(blocks) > 1 else float("nan"),
-        *(float(np.sqrt(np.mean(np.square(column)))) for column in zip(*rates, strict=True)),
-        *(float(np.mean(column)) for column in zip(*drifts, strict=True)),
+    before, after, carried = (
+        float(sum(getattr(one, name) for one in measured)) for name in ("before", "after", "carried")
     )
+    floor, fitted = (float(sum(getattr(one, name) for one in measured)) for name in ("floor", "fitted"))
+    error = float(np.sqrt(sum(one.floor_variance for one in measured)))
+    # What the fitted part leaves within the error of the floor is noise that was learnt too low.
+    floor += float(np.clip(fitted - floor, 0.0, _SLACK * error))
+    share, std = _share(before - floor, after - floor, error, floor)
+    blocks = np.concatenate([one.blocks for one in measured])
+    rms = np.sqrt(np.sum([one.squares for one in measured], axis=0) / samples)
+    rates = np.sqrt(np.mean(np.square([one.rates for one in measured]), axis=0))
+    drifts = np.mean([one.drifts for one in measured], axis=0)
+    return Gain(
+        held_out=label,
+        rms_before=float(rms[0]),
+        rms_after=float(rms[1]),
+        share_of_excess_removed=share,
+        log_likelihood_per_sample=0.5 * (before - after) / sum(one.rows for one in measured),
+        log_likelihood_std=float(blocks.std(ddof=1) / np.sqrt(len(blocks))) if len(blocks) > 1 else float("nan"),
+        rate_rmse_before=float(rates[0]),
+        rate_rmse_after=float(rates[1]),
+        drift_before=float(drifts[0]),
+        drift_after=float(drifts[1]),
+        share_std=std,
+        share_in_any_recording=_share(before - floor, carried - floor, error, floor)[0],
+    )
+
+
+@dataclass(frozen=True)
+class _Measured:
+    """A held-out stretch: misfits of the given and the extended simulation, and what noise alone would leave.
+
+    Parameters
+    ----------
+    before, after, carried : float
+        Whitened squares, the drive marginalised: as given, extended, and extended without what belongs to one
+        recording.
+    floor, floor_variance : float
+        What noise leaves of them, and its variance.
+    fitted : float
+        What as many observations of the fitted part leave.
+    squares : tuple of float
+        Sums of squares of the channels before and after, (m/s²)².
+    samples, rows : int
+        Readings in them, and samples.
+    blocks : ndarray, shape (b,)
+        Gain of log-likelihood per sample in blocks of a second.
+    rates, drifts : tuple of float
+        Errors of rate, rad/s, and drift, m, before and after.
+    """
+
+    before: float
+    after: float
+    carried: float
+    floor: float
+    floor_variance: float
+    fitted: float
+    squares: tuple[float, float]
+    samples: int
+    rows: int
+    blocks: NDArray[np.float64]
+    rates: tuple[float, float]
+    drifts: tuple[float, float]
+
+
+def _expected(fit: Fit, array: AccelerometerArray) -> tuple[Cause, ...]:
+    """Return causes with the sizes to expect after a fit: the posterior mean under a prior of the likeliest scale.
+
+    A size that one part of a recording leaves open comes out of its fit as anything, and would be extrapolated to the
+    other part. The prior of the fit is wide enough for a gross error; how large a cause's sizes are, those of them
+    that are seen tell.
+    """
+    if not fit.causes:
+        return fit.causes
+    ends = np.cumsum([len(cause.coordinates) for cause in fit.causes])
+    places = np.split(np.arange(ends[-1]), ends[:-1])
+    precision = np.empty(ends[-1])
+    for mine in places:
+        others = np.setdiff1d(np.arange(ends[-1]), mine)
+        free = fit.gram[np.ix_(others, others)] + np.eye(len(others)) / SCALES[-1] ** 2
+        taken = np.linalg.solve(free, fit.gram[np.ix_(others, mine)]).T  # of the others', as they follow
+        gram = fit.gram[np.ix_(mine, mine)] - taken @ fit.gram[np.ix_(others, mine)]
+        precision[mine] = likeliest_scale(gram, fit.score[mine] - taken @ fit.score[others]) ** -2
+    mean = inverse(fit.gram + np.diag(precision)) @ fit.score
+    causes = []
+    for cause, mine in zip(fit.causes, places, strict=True):
+        sizes = np.where(cause.positive(array), np.maximum(mean[mine], SMALLEST_POSITIVE), mean[mine])
+        causes.append(cause.at(np.minimum(sizes, cause.most(array))))
+    return tuple(causes)
+
+
+def _measured(
+    segment: Segment, nominal: Sequence[Effect], known: Sequence[Effect], causes: Sequence[Cause], left: float
+) -> _Measured:
+    """Measure causes on a stretch that they were not fitted to.
+
+    ``left`` is what they leave per observation on the fitted part: the floor where readings are coarse, whose
+    likelihood is no sum of squares.
+    """
+    array, kept = segment.model.array, segment.coefficients
+    effects = [*known, *effects_of_run(causes, array, segment.index)]
+    carried = [cause for cause in causes if not is_of_one_recording(cause.family)]
+    squares, misfits, whites = [], [], []
+    use = segment.weight_mask[:, :-1]
+    for chosen in (nominal, effects):
+        segment.coefficients = kept
+        misfits.append(_misfit(segment, chosen))
+        whites.append(segment.basis.whitened(segment.working_residual(chosen), segment.levels) / segment.levels.white)
+        squares.append(float(np.sum(_without_walk(segment, chosen)[use] ** 2)))
+    rates, drifts = _motion_errors(segment, nominal, effects)
+    other = misfits[1]
+    if len(carried) < len(causes):
+        segment.coefficients = kept
+        other = _misfit(segment, [*known, *effects_of_run(carried, array, segment.index)])
+    segment.coefficients = kept
+    floor, variance = min(_floor(segment, white) for white in whites)
+    fitted = left * float(segment.weight_mask.sum())
+    if segment.rounding.coarse:
+        floor = fitted
+    return _Measured(
+        before=misfits[0],
+        after=misfits[1],
+        carried=other,
+        floor=floor,
+        floor_variance=variance,
+        fitted=fitted,
+        squares=(squares[0], squares[1]),
+        samples=int(use.sum()),
+        rows=len(segment.run.t),
+        blocks=_blocks(0.5 * np.sum(whites[0] ** 2 - whites[1] ** 2, axis=1), segment),
+        rates=rates,
+        drifts=drifts,
+    )
+
+
+def _misfit(segment: Segment, effects: Sequence[Effect]) -> float:
+    """Move the drive to its posterior under these effects; return the whitened squares with it marginalised."""
+    fit = refine([segment], (), [effects], iterations=_ITERATIONS)
+    segment.coefficients = fit.drives[0]
+    return fit.objective
+
+
+def _without_walk(segment: Segment, effects: Sequence[Effect]) -> NDArray[np.float64]:
+    """Return the residual of the channels (n, c), m/s², without the excess of a random walk that was found."""
+    levels = segment.levels
+    residual = segment.residual(effects)
+    if levels.walk > 0.0:
+        residual = segment.basis.whitened(residual, NoiseLevels(levels.white, np.zeros(len(levels.white)), levels.walk))
+    return residual[:, :-1]
+
+
+def _floor(segment: Segment, white: NDArray[np.float64]) -> tuple[float, float]:
+    """Return what noise leaves of whitened residuals (n, c + 1), and its variance.
+
+    The white noise is that of the fast half, which the drive does not follow; squares are clipped, so that a line does
+    not count as noise.
+    """
+    count = len(white)
+    first = min(int(2 * count * segment.run.sample_period * _FOLLOWED / segment.spline.spacing), count // 2)
+    fast = np.minimum(segment.basis.transform(white)[first:] ** 2 / segment.weight_mask.mean(axis=0).clip(1e-3), _CLIP)
+    level = fast.mean(axis=0) / _CLIPPED
+    valid = segment.weight_mask.sum(axis=0)
+    slow = valid * first / count
+    return float(valid @ level), float(np.sum(2.0 * slow * (1.0 + slow / (valid - slow).clip(1.0))))
+
+
+def _share(before: float, after: float, error: float, floor: float) -> tuple[float, float]:
+    """Return the share of an excess that is removed and its standard error; NaN where there is no excess.
+
+    ``error`` is the standard error of the floor, which both excesses share.
+    """
+    if before < max(_SIGNIFICANT * error, _LEAST_EXCESS * floor):
+        return float("nan"), float("nan")
+    share = 1.0 - max(after, 0.0) / before
+    # Beside the floor, the noise correlates with what is there to be removed and with what is left.
+    variance = (share * error) ** 2 + 4.0 * max(after, 0.0) + 4.0 * before * (1.0 - share) ** 2
+    return share, float(np.sqrt(variance)) / before
 
 
 def _same(one: Effect, other: Effect) -> bool:
     """Tell whether an effect is another, or the same fault found in another recording."""
     return one is other or (one.place == "data" and one.name == other.name)
-
-
-def _scaled(segment: Segment, effects: Sequence[Effect]) -> NDArray[np.float64]:
-    """Move the drive to its posterior under these effects; return the summed squares per sample in white noise."""
-    segment.coefficients = refine([segment], (), [effects], iterations=_ITERATIONS).drives[0]
-    scaled = segment.working_residual(effects) / segment.levels.white
-    return np.asarray(np.sum(scaled**2, axis=1))
 
 
 def _blocks(values: NDArray[np.float64], segment: Segment) -> NDArray[np.float64]:

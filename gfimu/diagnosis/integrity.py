@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from gfimu.diagnosis.frozen import frozen_stretches, told_frozen
 from gfimu.diagnosis.model import Effect, WorldModel
+from gfimu.diagnosis.rails import Rail, find_rails, on_rails, rail_parameters, rail_sentence
 from gfimu.diagnosis.rounding import common_step
 from gfimu.diagnosis.run import Run, difference_noise
 from gfimu.diagnosis.spikes import channel_spikes
@@ -31,6 +32,7 @@ _PILE = 30
 _CAUGHT = 0.8  # of the samples that should be beyond a limit
 _SURELY_MISSING = 15.0  # samples above the largest value of several channels, of which none is there
 _ONE_CHIP, _GARBAGE = 3, 5  # channels, and samples of each, that may read more than a limit
+_OF_RANGE = 0.97  # of the configured range: clipping there is no fault
 _DIFFERENT = 0.6  # share of values above which steps are finer than what is seen
 
 _Option = tuple[float, str, dict[str, object], str, NDArray[np.float64]]
@@ -99,7 +101,9 @@ def check_integrity(model: WorldModel, run: Run, prediction: NDArray[np.float64]
     clipped_at = [float(effect.parameters["limit_m_s2"]) for effect in model.effects if effect.name == "saturation"]
     coarser = _range_factors(model.effects, model)
     limit = min(clipped_at) if clipped_at else _clipping(run, prediction, quantum * coarser, expected.white * coarser)
-    at_limit = np.abs(run.readings) >= (np.inf if limit is None else limit - 0.6 * quantum)
+    rails = [] if clipped_at else _own_rails(run, prediction, limit, quantum * coarser, expected.white * coarser)
+    at_limit = np.abs(run.readings) >= (np.inf if limit is None or rails else limit - 0.6 * quantum)
+    at_limit |= on_rails(run, np.zeros_like(prediction), rails, quantum * coarser, np.zeros_like(coarser))
     # Clipped or dead readings look like those of a chip in a wider range.
     alive = run.valid & ~at_limit
     for channel, start, stop in frozen_stretches(run, prediction, quantum, limit, expected.analogue):
@@ -113,8 +117,18 @@ def check_integrity(model: WorldModel, run: Run, prediction: NDArray[np.float64]
     coarser = _range_factors([*model.effects, *rewired], model)
     if not clipped_at:
         limit = _clipping(run, prediction, quantum * coarser, expected.white * coarser)
+        rails = _own_rails(run, prediction, limit, quantum * coarser, expected.white * coarser)
+    if rails:
+        limit = None
+        clipped = on_rails(run, prediction, rails, quantum * coarser, _noise_seen(run, expected.white))
+        names = model.array.channels
+        if "saturation" not in known and min(abs(rail.level) for rail in rails) < _OF_RANGE * expected.full_scale:
+            left_out = int((clipped & run.valid).sum())
+            parameters = rail_parameters(run, rails, names, quantum * coarser)
+            add("saturation", parameters, rail_sentence(rails, names, left_out))
+        run = replace(run, valid=run.valid & ~clipped)
     if limit is not None:
-        if "saturation" not in known and limit < 0.97 * expected.full_scale:
+        if "saturation" not in known and limit < _OF_RANGE * expected.full_scale:
             add("saturation", {"limit_m_s2": limit}, f"readings pile up at ±{limit:.2f} m/s² and never exceed it")
         # Just below the limit only those samples are whole whose noise points down.
         near = np.abs(prediction) > limit - 4.0 * _noise_seen(run, expected.white)
@@ -183,6 +197,22 @@ def _clipping(
     # One chip in another range may read more, and single samples may be garbage.
     contradicted = np.sum(beyond_it.sum(axis=0) > _GARBAGE) > _ONE_CHIP
     return limit if close.sum() >= max(1, len(levels) // 2) and not contradicted else None
+
+
+def _own_rails(
+    run: Run,
+    prediction: NDArray[np.float64],
+    limit: float | None,
+    steps: NDArray[np.float64],
+    white: NDArray[np.float64],
+) -> list[Rail]:
+    """Return the rails of channels that clip otherwise than at one limit for all of them, above and below alike."""
+    rails = find_rails(run, prediction, steps, white)
+    if limit is None or not rails:
+        return rails
+    other = any(abs(abs(rail.level) - limit) > 1.5 * steps[rail.channel] for rail in rails)
+    beyond = np.abs(np.where(run.valid, run.readings, 0.0)) > limit + np.maximum(0.6 * steps, 4.0 * white)
+    return rails if other or (beyond.sum(axis=0) > _GARBAGE).any() else []
 
 
 def _cut_off(lacking: Sequence[tuple[float, float]], step: float) -> list[float]:

@@ -31,6 +31,8 @@ __all__ = [
     "Spin",
     "SpinState",
     "WorldModel",
+    "bound_of",
+    "is_of_one_recording",
 ]
 
 
@@ -54,7 +56,10 @@ class Spin(Protocol):
 
 
 class Size(Protocol):
-    """One linear coordinate of an effect: key, physical prior, sign, finite-difference step; ``most``, if it has it."""
+    """One linear coordinate of an effect: key, physical prior, sign, finite-difference step.
+
+    It may have ``most``, the largest size that a fit may take, and ``bound`` (see `bound_of`); others need not.
+    """
 
     @property
     def key(self) -> str: ...  # noqa: D102
@@ -64,6 +69,11 @@ class Size(Protocol):
     def positive(self) -> bool: ...  # noqa: D102
     @property
     def step(self) -> float: ...  # noqa: D102
+
+
+def bound_of(size: Size) -> float:
+    """Return the size beyond which the twin must be of another unit, in the size's unit; infinite where it has none."""
+    return float(getattr(size, "bound", np.inf))
 
 
 class Pattern(Protocol):
@@ -92,6 +102,11 @@ class Effect(Protocol):
     def shape_values(self) -> dict[str, float]:
         """Return the shape parameters."""
         ...
+
+
+def is_of_one_recording(family: EffectFamily) -> bool:
+    """Tell whether a kind of effect has the phase of a clock that no other recording shares; others need not say so."""
+    return bool(getattr(family, "of_one_recording", False))
 
 
 class EffectFamily(Protocol):

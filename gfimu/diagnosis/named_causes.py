@@ -11,9 +11,13 @@ from gfimu.diagnosis.explanation import Explanation
 from gfimu.diagnosis.fit import Fit
 from gfimu.diagnosis.model import Effect, EffectFamily
 from gfimu.diagnosis.naming import MOST_CERTAIN, cause_parameters, describe, mimics
+from gfimu.diagnosis.signatures import ANGLES
 from gfimu.diagnosis.verdict import NamedCause
 
-__all__ = ["contested", "fault_causes", "name_cause"]
+__all__ = ["capped", "contested", "fault_causes", "name_cause"]
+
+_SEEN = 2.0  # standard deviations from which a parameter stands out
+_UNSEEN_AT_MOST = 0.9
 
 
 def fault_causes(effects: Iterable[Effect], why: Mapping[str, str]) -> list[NamedCause]:
@@ -55,7 +59,7 @@ def name_cause(
     parameters, std = cause_parameters(cause, array)
     same = mimics(explanation, cause) if fit is explanation.fit else []
     without = explanation.without.get(cause.name)
-    return NamedCause(
+    named = NamedCause(
         cause.name,
         parameters,
         std,
@@ -66,6 +70,19 @@ def name_cause(
         describe(cause, array, share),
         0.0 if without is None else float(fit.log_posterior - without.log_posterior),
     )
+    return capped(named)
+
+
+def capped(cause: NamedCause) -> NamedCause:
+    """Return a cause no surer than 0.9 if none of its parameters stands out from its uncertainty.
+
+    Phases and directions are compared with nothing; a cause without standard deviations, as a fault of the samples,
+    stays as it is.
+    """
+    judged = [key for key, std in cause.std.items() if std > 0.0 and key not in ANGLES and not key.startswith("phase")]
+    if not judged or any(abs(float(cause.parameters[key])) > _SEEN * cause.std[key] for key in judged):
+        return cause
+    return replace(cause, probability=min(cause.probability, _UNSEEN_AT_MOST))
 
 
 def contested(

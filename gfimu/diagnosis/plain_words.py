@@ -73,6 +73,9 @@ def headline(diagnosis: Diagnosis) -> str:
             text = f"Something is missing in the simulation, but this recording can't tell which: {candidates}."
             certain = [_short(diagnosis, cause) for cause in diagnosis.causes if cause not in contested]
             return f"Found: {_joined(certain)}. {text.replace('Something', 'Something else', 1)}" if certain else text
+        case _ if diagnosis.in_part:
+            share = percent(diagnosis.gain.share_of_excess_removed)
+            return f"Found in part what the simulation leaves out: {_joined(found)} ({share} of the error is gone)."
         case _ if len(found) == 1:
             return f"Found what the simulation leaves out: {found[0]}."
         case _:
@@ -129,8 +132,21 @@ def story(diagnosis: Diagnosis) -> str:
             f"On data that the fit never saw ({gain.held_out}), {percent(gain.share_of_excess_removed)} of the error "
             "beyond noise is gone. "
         )
+        if diagnosis.unexplained.left_out and math.isfinite(gain.share_in_any_recording):
+            text += f"In any other recording it would be {percent(max(gain.share_in_any_recording, 0.0))}. "
+    left_out = diagnosis.unexplained.left_out
+    if left_out:
+        what = f"{_count(left_out)} terms" if left_out > 1 else "one term"
+        text += (
+            f"Of what describes it {what} of absolute time {'are' if left_out > 1 else 'is'} not in twin.toml: another "
+            "recording has other phases, and no second one confirms them. "
+        )
     if diagnosis.unexplained.significant:
         text += f"Left unexplained: {diagnosis.unexplained.signature}. "
+    level = float(diagnosis.noise.get("bias_instability_largest_m_s2", 0.0))
+    if level > 0.0:
+        name = diagnosis.noise["bias_instability_largest_channel"]
+        text += f"The largest slow noise is that of {name}, {level / STANDARD_GRAVITY * 1e3:.2g} mg. "
     return text.strip()
 
 

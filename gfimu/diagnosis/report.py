@@ -45,6 +45,7 @@ _VIEWS = (
 )
 _MOST_PARAMETERS = 14
 _MOST_RIVALS = 8
+_SAME_SHARE = 5e-3
 
 
 def write_report(path: str | Path, diagnosis: Diagnosis) -> None:
@@ -70,6 +71,7 @@ def _content(diagnosis: Diagnosis) -> Mapping[str, Any]:
     seen = [run for run in diagnosis.runs if run.valid.any()]
     views = [residual_views(run, channels, bias_instability=bias_instability) for run in seen]
     label, tone = _VERDICTS[diagnosis.verdict]
+    label += " in part" if diagnosis.in_part else ""
     return {
         "version": gfimu.__version__,
         "label": label,
@@ -86,6 +88,7 @@ def _content(diagnosis: Diagnosis) -> Mapping[str, Any]:
         "gain": diagnosis.gain,
         "gain_rows": gain_rows(diagnosis),
         "share": percent(diagnosis.gain.share_of_excess_removed),
+        "any_share": _share_in_any_recording(diagnosis),
         "steps": next_steps(diagnosis),
         "noise": diagnosis.noise,
         "runs": [
@@ -119,6 +122,12 @@ def _surrogate(diagnosis: Diagnosis) -> dict[str, Any]:
     for (series, function), value in zip(places, diagnosis.unexplained.surrogate.values(), strict=True):
         rows.setdefault(function, [""] * len(of))[of.index(series)] = f"{value:.3g}"
     return {"columns": of, "rows": rows}
+
+
+def _share_in_any_recording(diagnosis: Diagnosis) -> str:
+    """Return the share without terms of absolute time where that is another one."""
+    here, anywhere = diagnosis.gain.share_of_excess_removed, diagnosis.gain.share_in_any_recording
+    return percent(anywhere) if np.isfinite(anywhere) and abs(here - anywhere) > _SAME_SHARE else ""
 
 
 def _figures_of_merit(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from gfimu.diagnosis.model import WorldModel
 from gfimu.diagnosis.temperature import between_steps
+from gfimu.diagnosis.time_grid import time_grid
 from gfimu.errors import InputError
 from gfimu.recording import Recording
 
-__all__ = ["GYRO_COLUMNS", "REFERENCE_COLUMNS", "Run", "difference_noise", "prepare_run"]
+__all__ = ["GYRO_COLUMNS", "REFERENCE_COLUMNS", "Run", "difference_noise", "possible_values", "prepare_run"]
 
 GYRO_COLUMNS = ("gyro_x_rad_s", "gyro_y_rad_s", "gyro_z_rad_s")
 """Columns of the gyro that drives the twin of a free body."""
@@ -35,6 +36,8 @@ _BRIDGED_SPACINGS = 3.0
 _SHORTEST = 2.0  # s between two gaps of the reference
 _ONE_STEP = 1.5
 _MOVING = 8.0
+_WIDEST = 16.0  # times the configured range: the largest factor between two ranges of a part
+_FASTEST = 1e3  # rad/s: beyond the range of any gyro on the market, 20 000 °/s, and of any table
 
 
 @dataclass(frozen=True)
@@ -67,6 +70,10 @@ class Run:
         Time that is left out because the reference is missing for long, s.
     resumed : tuple of int
         Samples of a whole run at which the reference is back after that.
+    jitter : float
+        Rms of the time stamps about the uniform grid, s; 0 where they show none.
+    impossible : int
+        Number of values left out because no sensor reads them.
     """
 
     t: NDArray[np.float64]
@@ -81,6 +88,8 @@ class Run:
     name: str = "run"
     unreferenced: float = 0.0
     resumed: tuple[int, ...] = ()
+    jitter: float = 0.0
+    impossible: int = 0
 
     @property
     def sample_period(self) -> float:
@@ -91,6 +100,14 @@ class Run:
     def duration(self) -> float:
         """Length, s."""
         return float(self.t[-1] - self.t[0])
+
+    @property
+    def bridged(self) -> NDArray[np.float64]:
+        """Readings with a straight line across invalid ones, shape (n, c), m/s²; zero in a channel without any."""
+        readings = self.readings.copy()
+        for column, valid in zip(readings.T, self.valid.T, strict=True):
+            column[~valid] = np.interp(self.t[~valid], self.t[valid], column[valid]) if valid.any() else 0.0
+        return readings
 
     def rows(self, start: int, stop: int) -> Run:
         """Return the samples from ``start`` up to ``stop``."""
@@ -107,6 +124,8 @@ class Run:
             self.longest_gap,
             self.name,
             self.unreferenced,
+            jitter=self.jitter,
+            impossible=self.impossible,
         )
 
 
@@ -118,6 +137,7 @@ def prepare_run(recording: Recording, model: WorldModel, *, name: str = "run") -
     InputError
         If the recording is too short, lacks the reference that the twin names, or that reference never has a value.
     """
+    recording, impossible = possible_values(recording, model)
     readings = recording.for_array(model.array)
     if len(recording) < _MINIMUM_SAMPLES or recording.duration < MINIMUM_DURATION:
         raise InputError(
@@ -136,13 +156,11 @@ def prepare_run(recording: Recording, model: WorldModel, *, name: str = "run") -
             f"{name}: one sample every {period:g} s is too slow to diagnose; is column t_s in seconds? "
             f"Record at {1 / _LONGEST_PERIOD:g} Hz at least"
         )
-    steps = np.diff(recording.t_s)
-    place = np.concatenate([[0], np.cumsum(np.maximum(1, np.rint(steps / period).astype(int)))])
-    n = int(place[-1]) + 1
+    grid = time_grid(recording.t_s)
+    place, n = grid.place, grid.size
     if n > 4 * len(recording):
         raise InputError(f"{name}: more samples are missing than present; record again without the long gaps")
-    # The median step carries the rounding of the time stamps; the ends do not.
-    t = recording.t_s[0] + (recording.t_s[-1] - recording.t_s[0]) / (n - 1) * np.arange(n)
+    t = grid.t
     full = np.zeros((n, readings.shape[1]))
     full[place] = readings
     valid = np.zeros(full.shape, dtype=bool)
@@ -176,12 +194,40 @@ def prepare_run(recording: Recording, model: WorldModel, *, name: str = "run") -
         reference_valid,
         warm,
         recording.mounting_rotvec,
-        lost=n - len(recording),
-        longest_gap=float(steps.max()) if len(steps) else 0.0,
+        lost=grid.lost,
+        longest_gap=grid.longest_gap,
         name=name,
         unreferenced=left_out,
         resumed=tuple((np.flatnonzero(np.diff(unreferenced.astype(int)) == -1) + 1).tolist()),
+        jitter=grid.jitter,
+        impossible=impossible,
     )
+
+
+def possible_values(recording: Recording, model: WorldModel) -> tuple[Recording, int]:
+    """Leave out values that no sensor reads: corrupt ones, such as 1e19 m/s², and infinite ones.
+
+    Returns
+    -------
+    recording : Recording
+        With NaN in their place.
+    count : int
+        How many there were.
+    """
+    most = _WIDEST * model.expected_noise(recording.sample_rate).full_scale if len(recording) > 1 else np.inf
+    wrong = ~np.isnan(recording.readings) & ~(np.abs(recording.readings) <= most)
+    count = int(wrong.sum())
+    reference = dict(recording.reference)
+    for name, values in recording.reference.items():
+        limit = _FASTEST if name.endswith("_rad_s") else np.finfo(float).max
+        beyond = ~np.isnan(values) & ~(np.abs(values) <= limit)
+        if beyond.any():
+            reference[name] = np.where(beyond, np.nan, values)
+            count += int(beyond.sum())
+    if not count:
+        return recording, 0
+    readings = np.where(wrong, np.nan, recording.readings) if recording.unit == "m_s2" else recording.readings
+    return replace(recording, readings=readings, reference=reference), count
 
 
 def _unreferenced(valid: NDArray[np.bool_], period: float) -> NDArray[np.bool_]:

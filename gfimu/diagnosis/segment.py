@@ -25,7 +25,7 @@ from gfimu.diagnosis.linearisation import DriveElimination, DriveEquations, Line
 from gfimu.diagnosis.model import Effect, Mode, Play, Ripple, Spin, WorldModel
 from gfimu.diagnosis.rounding import COARSE, Steps
 from gfimu.diagnosis.run import Run, difference_noise
-from gfimu.diagnosis.simulation import Simulation
+from gfimu.diagnosis.simulation import RunUp, Simulation
 from gfimu.diagnosis.slow_modes import SlowModes, WeighedModes
 from gfimu.diagnosis.spline_drive import TIME_MARGIN, SplineDrive
 
@@ -70,6 +70,8 @@ class Segment(SplineDrive):
         stretches: int = 1,
     ) -> None:
         self.model, self.index, self.start, self.stretches = model, index, start, stretches
+        # What came before it in the run, where it is a block of one.
+        self.run_up: RunUp | None = None
         times = np.append(model.sample_times(run.t), run.t[:, None], axis=1)
         super().__init__(
             run,
@@ -120,6 +122,10 @@ class Segment(SplineDrive):
             stop = min(max(self.spline.stop, float(times.max()) + TIME_MARGIN), stop)
         spline = whole.spline.within(start, stop)
         self.start_angle, self.start_angle_std = float(whole.spin.at(self.run.t[:1]).angle[0]), _KNOWN_ANGLE_STD
+        earlier = whole.run.t < self.run.t[0]
+        if earlier.any():
+            temperature = whole.run.temperature
+            self.run_up = RunUp(whole.run.t[earlier], None if temperature is None else temperature[earlier], whole.spin)
         self._follow(whole.spin, whole.roughness.on(spline, corners=True))
         self.prepare_weights()
 
@@ -183,7 +189,7 @@ class Segment(SplineDrive):
     @property
     def simulation(self) -> Simulation:
         """The model of this stretch."""
-        return Simulation(self.model, self.run, self.start)
+        return Simulation(self.model, self.run, self.start, self.run_up)
 
     def reference_prediction(self, effects: Sequence[Effect]) -> NDArray[np.float64]:
         """Predict channels and reference, shape (n, c + 1), with the drive that the reference alone gives."""

@@ -21,8 +21,10 @@ __all__ = [
     "LARGEST_USUAL_FLICKER",
     "UNEQUAL_WALK",
     "WALK_ODDS",
+    "LoudestChannel",
     "Walk",
     "log_probability",
+    "loudest_channel",
     "walk_strength",
     "white_factor",
 ]
@@ -33,6 +35,8 @@ UNEQUAL_WALK = 14.0
 """`Walk.unequal` from which the channels do not wander alike: something else is taken for a walk."""
 LARGEST_USUAL_FLICKER = 1.5e-3 * STANDARD_GRAVITY
 """Bias instability beyond which something else is left in the channels, m/s²."""
+_LOUD = 4.0  # times the median of the others: right verdicts reach 3.0 (130 of them)
+_BEYOND_DOUBT = 2.0  # log likelihood by which a level must beat that bound: two standard deviations
 _WEAKEST_WALK = 3e-3
 _WALK_GRID = np.geomspace(2e-3, 0.5, 28)
 _DRIVE_TAKES = 0.08  # of the strength, as the unknown drive follows what wanders in the channels together
@@ -58,6 +62,63 @@ class Walk:
     std: float
     log_odds: float
     unequal: float
+
+
+@dataclass(frozen=True)
+class LoudestChannel:
+    """The channel with the largest slow noise.
+
+    Parameters
+    ----------
+    name : str
+        The channel.
+    level : float
+        Its bias instability as learnt, m/s².
+    ratio : float
+        That over the median of the other channels.
+    log_odds : float
+        Log likelihood of its level against the largest that the others allow, where its is larger; 0 otherwise.
+    """
+
+    name: str
+    level: float
+    ratio: float
+    log_odds: float
+
+    @property
+    def stands_out(self) -> bool:
+        """Whether it is beyond doubt more than the other channels have."""
+        return self.ratio > _LOUD and self.log_odds > _BEYOND_DOUBT
+
+
+def loudest_channel(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]]) -> LoudestChannel:
+    """Return the channel with the largest slow noise beside what a fit explains.
+
+    In a short run a level is known to a factor of two or so: the likelihood of what is left tells whether it can be as
+    small as the others allow.
+    """
+    array = segments[0].model.array
+    alive = np.any([segment.weight_mask[:, :-1].any(axis=0) for segment in segments], axis=0)
+    levels = np.where(alive, segments[0].levels.flicker[:-1], 0.0)
+    channel = int(np.argmax(levels))
+    others = np.delete(levels, channel)[np.delete(alive, channel)]
+    usual = float(np.median(others)) if len(others) else 0.0
+    level = float(levels[channel])
+    ratio = level / usual if usual > 0.0 else 1.0
+    odds = 0.0
+    for segment, known, drive in zip(segments, fixed, fit.drives, strict=True) if ratio > _LOUD else ():
+        kept, segment.coefficients = segment.coefficients, drive
+        left = segment.working_residual([*known, *effects_of_run(fit.causes, array, segment.index)])[:, :-1]
+        segment.coefficients = kept
+        slow = _slow_powers(segment, left)
+        flicker, walk = (np.broadcast_to(one, slow.power.shape)[:, channel] for one in (slow.flicker, slow.walk))
+        besides = segment.levels.white[channel] ** 2 + walk * segment.levels.walk**2
+        own, allowed = (
+            _whittle(slow.power[:, [channel]], (besides + flicker * size**2)[:, None])
+            for size in (level, _LOUD * usual)
+        )
+        odds += float(own[0] - allowed[0])
+    return LoudestChannel(array.channels[channel], level, ratio, odds)
 
 
 def walk_strength(segments: Sequence[Segment], fit: Fit, fixed: Sequence[Sequence[Effect]]) -> Walk:

@@ -15,9 +15,21 @@ from gfimu.atomic_file import write_text
 from gfimu.diagnosis.model import WorldModel
 from gfimu.short_repr import joined, short_repr
 
-__all__ = ["FORMAT_VERSION", "Diagnosis", "Gain", "NamedCause", "Residual", "Rival", "RunView", "Unexplained"]
+__all__ = [
+    "FORMAT_VERSION",
+    "IN_PART",
+    "Diagnosis",
+    "Gain",
+    "NamedCause",
+    "Residual",
+    "Rival",
+    "RunView",
+    "Unexplained",
+]
 
 FORMAT_VERSION = 1
+IN_PART = 0.9
+"""Share of the held-out excess below which causes explain in part."""
 
 
 @dataclass(frozen=True)
@@ -143,6 +155,11 @@ class Gain:
         Rate of the array against the reference, rad/s.
     drift_before, drift_after : float
         Position drift of the held-out stretch, m.
+    share_std : float
+        Standard error of ``share_of_excess_removed`` by the noise; NaN where it was not estimated.
+    share_in_any_recording : float
+        The same share without terms of absolute time, which another recording has otherwise; NaN where nothing can
+        be said.
     """
 
     held_out: str = ""
@@ -155,6 +172,8 @@ class Gain:
     rate_rmse_after: float = float("nan")
     drift_before: float = float("nan")
     drift_after: float = float("nan")
+    share_std: float = float("nan")
+    share_in_any_recording: float = float("nan")
 
 
 @dataclass(frozen=True)
@@ -172,7 +191,9 @@ class Unexplained:
     surrogate : mapping of str to float
         Data-driven terms: coefficients by what they are of, with its unit, and function: ``"a11_m_s2: rate²"``.
     extends_twin : bool
-        Whether these terms are in the extended twin, as they predict data that their fit never saw.
+        Whether such terms are in the extended twin, as they predict data that their fit never saw.
+    left_out : int
+        How many of the terms are not in it, as they are of absolute time, which another recording has otherwise.
     """
 
     significant: bool = False
@@ -180,6 +201,7 @@ class Unexplained:
     log_odds: float = 0.0
     surrogate: Mapping[str, float] = field(default_factory=dict)
     extends_twin: bool = False
+    left_out: int = 0
 
 
 @dataclass(frozen=True)
@@ -230,10 +252,14 @@ class Diagnosis:
         The data for pictures.
     sentences : tuple of str
         The verdict in words, most important first.
-    noise : mapping of str to float
-        Noise levels estimated: ``white_over_data_sheet``, ``bias_instability_m_s2``, ``reference_white``; and
+    noise : mapping
+        Noise levels estimated: ``white_over_data_sheet``, ``bias_instability_m_s2`` (median of the channels),
+        ``bias_instability_largest_m_s2`` and ``bias_instability_largest_channel``, ``reference_white``; and
         ``calibration_residue``, small errors of all the twin's numbers at once, in units of what a good calibration
         leaves (0 where there are none).
+    undetermined : tuple of mapping
+        Combinations of sizes that these data can't see, which stay at zero: ``effect``, ``combination`` (weights by
+        key) and ``text``.
     """
 
     verdict: str
@@ -245,7 +271,13 @@ class Diagnosis:
     twin: WorldModel
     runs: tuple[RunView, ...]
     sentences: tuple[str, ...]
-    noise: Mapping[str, float]
+    noise: Mapping[str, Any]
+    undetermined: tuple[Mapping[str, Any], ...] = ()
+
+    @property
+    def in_part(self) -> bool:
+        """Whether the causes stand but leave more than a tenth of the excess on held-out data."""
+        return self.verdict == "explained" and self.gain.share_of_excess_removed < IN_PART
 
     def __repr__(self) -> str:
         causes = ", ".join(f"{cause.effect} {100 * cause.probability:.3g} %" for cause in self.causes)
@@ -264,6 +296,7 @@ class Diagnosis:
         return {
             "format_version": FORMAT_VERSION,
             "verdict": self.verdict,
+            "in_part": self.in_part,
             "sentences": list(self.sentences),
             "causes": [cause.to_dict() for cause in self.causes],
             "residual": {
@@ -279,6 +312,8 @@ class Diagnosis:
                 "held_out_rms_before": gain.rms_before,
                 "held_out_rms_after": gain.rms_after,
                 "share_of_excess_removed": gain.share_of_excess_removed,
+                "share_of_excess_removed_std": gain.share_std,
+                "share_in_any_recording": gain.share_in_any_recording,
                 "log_likelihood_per_sample": gain.log_likelihood_per_sample,
                 "log_likelihood_std": gain.log_likelihood_std,
                 "rate_rmse_before_rad_s": gain.rate_rmse_before,
@@ -292,9 +327,11 @@ class Diagnosis:
                 "log_odds": self.unexplained.log_odds,
                 "surrogate": dict(self.unexplained.surrogate),
                 "extends_twin": self.unexplained.extends_twin,
+                "left_out": self.unexplained.left_out,
             },
             "rivals": [{"effects": list(r.effects), "log_odds": r.log_odds, "why": r.why} for r in self.rivals],
             "noise": dict(self.noise),
+            "undetermined": [dict(one) for one in self.undetermined],
         }
 
     def to_json(self) -> str:

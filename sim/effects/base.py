@@ -15,7 +15,10 @@ from gfimu.errors import InputError
 from gfimu.units import split_key
 from sim.world import World
 
-__all__ = ["Effect", "Pattern", "Size", "channel_patterns", "chip_patterns"]
+__all__ = ["LARGEST_TURN", "Effect", "Pattern", "Size", "channel_patterns", "chip_patterns"]
+
+LARGEST_TURN = np.pi / 9
+"""Bound of a turn, rad: 20°. Soldering and mounting leave a degree or two; what is turned further is another unit."""
 
 
 @dataclass(frozen=True)
@@ -34,6 +37,9 @@ class Size:
         Finite-difference step as a share of ``prior_std``; large for effects that are not smooth in their size.
     most : float
         Largest size that physics allows, in that unit.
+    bound : float
+        Size beyond which a unit is not the one that was assumed (another array file, other axes, other units), in
+        that unit: several times what the data sheet or the rig allows.
     """
 
     key: str
@@ -41,6 +47,7 @@ class Size:
     positive: bool = False
     step: float = 1e-3
     most: float = np.inf
+    bound: float = np.inf
 
 
 @dataclass(frozen=True)
@@ -86,6 +93,8 @@ class Effect(ABC):
     """Units of other parameters whose keys don't end in one; ``"ratio"``, ``"number"`` (count, factor), ``"name"``."""
     starts: ClassVar[tuple[float, ...]] = ()
     """Values in units of the prior to start from where a large size is far from linear; none by default."""
+    of_one_recording: ClassVar[bool] = False
+    """True where its phase is that of a clock no other recording shares: it does not predict another one."""
 
     def __init__(self, parameters: Mapping[str, Any]) -> None:
         self.parameters: dict[str, Any] = dict(parameters)

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from gfimu.array import AccelerometerArray
-from sim.effects.base import Effect, Pattern, Size, chip_patterns
+from sim.effects.base import LARGEST_TURN, Effect, Pattern, Size, chip_patterns
 from sim.world import World
 
 __all__ = ["ChipDelay", "GyroLatency", "GyroMisalignment", "GyroScale"]
@@ -71,7 +71,8 @@ class GyroScale(Effect):
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
         """One ratio per axis."""
-        return tuple(Size(axis, 0.02) for axis in _AXES)
+        # Ten times the ±3 % that the MPU-9150's data sheet allows.
+        return tuple(Size(axis, 0.02, bound=0.3) for axis in _AXES)
 
     @classmethod
     def patterns(cls, array: AccelerometerArray) -> tuple[Pattern, ...]:
@@ -96,7 +97,7 @@ class GyroMisalignment(Effect):
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
         """Rotation vector of the gyro in the body frame."""
-        return tuple(Size(f"{axis}_rad", 0.5 * _DEGREE) for axis in _AXES)
+        return tuple(Size(f"{axis}_rad", 0.5 * _DEGREE, bound=LARGEST_TURN) for axis in _AXES)
 
     def apply(self, world: World) -> World:
         """Turn the gyro's axes by the rotation vector: it reads Rᵀω."""

@@ -75,17 +75,35 @@ class BiasRandomWalk(_Discrete):
 
 
 class Saturation(_Discrete):
-    """Clipping below the assumed range."""
+    """Clipping below the assumed range: of all channels alike, or of single sides of single channels.
+
+    ``limit_m_s2`` holds for all channels, above and below, unless levels of channels are given, such as
+    ``a11_upper_m_s2`` or ``a11_lower_m_s2``: then only those clip, each at its own level.
+    """
 
     name = "saturation"
     summary = "readings clip below the assumed range"
     keys = ("limit_m_s2",)
     separated_by = "a run at lower rates, which must agree"
 
+    @classmethod
+    def parameter_keys(cls, array: AccelerometerArray) -> tuple[str, ...]:
+        """Return the common limit and two levels per channel."""
+        return (*cls.keys, *cls._side_keys(array, "upper"), *cls._side_keys(array, "lower"))
+
+    @staticmethod
+    def _side_keys(array: AccelerometerArray, side: str) -> tuple[str, ...]:
+        return tuple(f"{channel}_{side}_m_s2" for channel in array.channels)
+
     def apply(self, world: World) -> World:
         """Clip the readings."""
+        sides = [self._side_keys(world.array, side) for side in ("upper", "lower")]
         limit = self.value("limit_m_s2", np.inf)
-        return _with_data_step(world, lambda t, readings, rng: np.clip(readings, -limit, limit))
+        if any(key in self.parameters for keys in sides for key in keys):
+            limit = np.inf
+        upper = np.array([self.value(key, limit) for key in sides[0]])
+        lower = np.array([self.value(key, -limit) for key in sides[1]])
+        return _with_data_step(world, lambda t, readings, rng: np.clip(readings, lower, upper))
 
 
 class CoarseResolution(_Discrete):

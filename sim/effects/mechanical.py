@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.model import Mode
-from sim.effects.base import Effect, Pattern, Size, chip_patterns
+from sim.effects.base import LARGEST_TURN, Effect, Pattern, Size, chip_patterns
 from sim.effects.table_dynamics import SERVO_STIFFNESS, RippledSpin, TwistingSpin
 from sim.motion import SpinMotion
 from sim.world import Nod, World
@@ -46,7 +46,9 @@ class Misalignment(Effect):
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
         """Rotation vector of each chip in the body frame."""
-        return tuple(Size(f"{chip.name}_{axis}_rad", 0.5 * _DEGREE) for chip in array.chips for axis in "xyz")
+        return tuple(
+            Size(f"{chip.name}_{axis}_rad", 0.5 * _DEGREE, bound=LARGEST_TURN) for chip in array.chips for axis in "xyz"
+        )
 
     @classmethod
     def reach(cls, array: AccelerometerArray) -> NDArray[np.bool_]:
@@ -77,8 +79,11 @@ class SensorPosition(Effect):
 
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
-        """Displacement of each chip in the body frame."""
-        return tuple(Size(f"{chip.name}_{axis}_m", 1e-3) for chip in array.chips for axis in "xyz")
+        """Displacement of each chip in the body frame, at most as far as the chips are apart."""
+        places = np.array([chip.position for chip in array.chips])
+        extent = float(np.linalg.norm(places[:, None] - places, axis=2).max())
+        bound = extent if extent > 0.0 else np.inf
+        return tuple(Size(f"{chip.name}_{axis}_m", 1e-3, bound=bound) for chip in array.chips for axis in "xyz")
 
     @classmethod
     def reach(cls, array: AccelerometerArray) -> NDArray[np.bool_]:
@@ -104,10 +109,11 @@ class _TwoAxes(Effect):
 
     suffix = "_rad"
     prior_std = 0.5 * _DEGREE
+    bound = LARGEST_TURN
 
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
-        return tuple(Size(f"{axis}{cls.suffix}", cls.prior_std) for axis in "xy")
+        return tuple(Size(f"{axis}{cls.suffix}", cls.prior_std, bound=cls.bound) for axis in "xy")
 
     def across(self) -> NDArray[np.float64]:
         return np.array([self.value(f"x{self.suffix}"), self.value(f"y{self.suffix}"), 0.0])
@@ -121,6 +127,7 @@ class Eccentricity(_TwoAxes):
     place = "geometry"
     suffix = "_m"
     prior_std = 1e-3
+    bound = np.inf  # an arm may be mounted anywhere
     per_run = True
     separated_by = "the cube remounted on its side: an eccentric mounting changes with it, a chip's place does not"
 
@@ -171,7 +178,7 @@ class AxisWobble(Effect):
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
         """Cosine and sine amplitudes of the nod."""
-        return (Size("cosine_rad", 0.1 * _DEGREE), Size("sine_rad", 0.1 * _DEGREE))
+        return tuple(Size(f"{wave}_rad", 0.1 * _DEGREE, bound=LARGEST_TURN) for wave in ("cosine", "sine"))
 
     @classmethod
     def shapes(cls, duration: float, sample_rate: float) -> tuple[dict[str, float], ...]:

@@ -10,7 +10,7 @@ from scipy.signal import lfilter
 
 from gfimu.array import AccelerometerArray
 from gfimu.units import STANDARD_GRAVITY
-from sim.effects.base import Effect, Pattern, Size, channel_patterns
+from sim.effects.base import LARGEST_TURN, Effect, Pattern, Size, channel_patterns
 from sim.world import SensingStep, World
 
 __all__ = [
@@ -41,10 +41,11 @@ class _PerChannel(Effect):
     place = "sensing"
     suffix = ""
     prior_std = 1.0
+    bound = np.inf
 
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
-        return tuple(Size(f"{channel}{cls.suffix}", cls.prior_std) for channel in array.channels)
+        return tuple(Size(f"{channel}{cls.suffix}", cls.prior_std, bound=cls.bound) for channel in array.channels)
 
     @classmethod
     def patterns(cls, array: AccelerometerArray) -> tuple[Pattern, ...]:
@@ -65,6 +66,7 @@ class Bias(_PerChannel):
     summary = "a constant offset per channel"
     suffix = "_m_s2"
     prior_std = 20 * _MG
+    bound = STANDARD_GRAVITY  # four times the 0.25 g that the ADXL345's data sheet allows along z
     separated_by = "static poses on several sides (six-position), or the cube remounted on its side"
 
     def apply(self, world: World) -> World:
@@ -79,6 +81,7 @@ class ScaleFactor(_PerChannel):
     name = "scale_factor"
     summary = "a gain error per channel (another supply voltage, say)"
     prior_std = 0.02
+    bound = 0.3  # three times the ±10 % that the ADXL345's data sheet allows; the MPU-9150's ±3 % is narrower
     separated_by = "static poses on several sides, or the cube remounted on its side and several speeds"
     size_unit = "ratio"
 
@@ -196,7 +199,8 @@ class CrossAxis(Effect):
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
         """One ratio per ordered pair of channels of a chip: ``a11_from_a12``."""
         names = array.channels
-        return tuple(Size(f"{names[i]}_from_{names[j]}", 0.01) for i, j in cls._pairs(array))
+        bound = float(np.sin(LARGEST_TURN))  # an axis that is turned picks up the sine
+        return tuple(Size(f"{names[i]}_from_{names[j]}", 0.01, bound=bound) for i, j in cls._pairs(array))
 
     @classmethod
     def reach(cls, array: AccelerometerArray) -> NDArray[np.bool_]:
@@ -371,6 +375,7 @@ class InterferenceTone(Effect):
     name = "interference_tone"
     summary = "a tone at a fixed frequency (mains, aliased or not) on all channels"
     place = "sensing"
+    of_one_recording = True
     separated_by = "a run at rest, where only the tone is left"
 
     @classmethod

@@ -48,7 +48,7 @@ class ClockError(Effect):
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
         """One ratio; positive: the board's clock is fast."""
-        return (Size("ratio", 1e-3, step=0.02),)
+        return (Size("ratio", 1e-3, step=0.02, bound=0.1),)  # a free-running oscillator is within some percent
 
     def apply(self, world: World) -> World:
         """Let the board's clock show (1 + ratio) of the true time."""

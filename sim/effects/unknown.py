@@ -109,6 +109,11 @@ class UnknownTerm:
     inexactness = 0.0
     starts: tuple[float, ...] = ()
 
+    @property
+    def of_one_recording(self) -> bool:
+        """Whether the function is of absolute time, which another recording has otherwise."""
+        return is_of_time(self.dependence)
+
     def __call__(self, parameters: Mapping[str, Any]) -> Effect:
         """Build the effect from its coefficients."""
         units = dict(zip(_UNITS, (self.units.rate, self.units.acceleration, self.units.duration), strict=True))

@@ -27,13 +27,18 @@ from gfimu.diagnosis.free_body.left_over import motion_noise, structure_left
 from gfimu.diagnosis.free_body.model import BodyModel
 from gfimu.diagnosis.free_body.run import BodyRun, prepare_body_run
 from gfimu.diagnosis.free_body.segment import BodySegment
+from gfimu.diagnosis.free_body.undetermined import undetermined, undetermined_sentence
+from gfimu.diagnosis.gate import impossible_sizes, judge
 from gfimu.diagnosis.integrity import check_integrity
 from gfimu.diagnosis.model import Effect, WorldModel
 from gfimu.diagnosis.named_causes import contested, fault_causes, name_cause
 from gfimu.diagnosis.naming import channel_share, conflicting, probabilities, rival_list
 from gfimu.diagnosis.residual_tests import LeftOver
+from gfimu.diagnosis.run import Run
+from gfimu.diagnosis.sample_notes import with_sample_notes
 from gfimu.diagnosis.verdict import Diagnosis, Gain, NamedCause, Residual, RunView, Unexplained
 from gfimu.diagnosis.wording import verdict_sentences
+from gfimu.errors import InputError
 from gfimu.recording import Recording
 
 __all__ = ["diagnose_body"]
@@ -46,6 +51,8 @@ _INEXACTNESS = 2.5e-3
 _WIRING = ("axis_swap", "sign_flip", "wrong_range")
 _SWEEPS = 12
 _MOST_SPIKES = 2e-3
+_ALIVE = 0.5  # of the samples, with a value
+_FEWEST = 80  # samples
 
 
 def diagnose_body(
@@ -85,12 +92,13 @@ def diagnose_body(
     noise = motion_noise(segments)
     structure, tone = structure_left(segments, explanation.fit.causes, fixed)
     report(0.96, "measure the gain")
-    gain = Gain()
+    gain, over_noise = Gain(), float("nan")
     if explanation.fit.causes or any(fixed):
         constant = [effect for effects in fixed for effect in effects]
         label = "another recording" if kept else "stretches of the recording, each from the others"
-        gain = held_out_gain(explanation.fit.causes, pairs, constant, label)
-    return _verdict(prepared, explanation, (structure, tone, noise), gain, withdrawn)
+        gain, over_noise = held_out_gain(explanation.fit.causes, pairs, constant, label)
+    found = _verdict(prepared, explanation, (structure, tone, noise), gain, withdrawn, over_noise)
+    return with_sample_notes(found, [segment.run for segment in segments])
 
 
 @dataclass(frozen=True)
@@ -107,11 +115,13 @@ class _Prepared:
         segments, faults, why = [], [], {}
         for number, (recording, name) in enumerate(zip(recordings, names, strict=True)):
             body = prepare_body_run(recording, model, name=name)
+            _refuse_too_few(body.run, model, name)
             checked = check_integrity(model, body.run, robust_prediction(BodySegment(model, body, number)))
             run = checked.run
             if checked.spikes > _MOST_SPIKES * run.valid.size:
                 # So many are no faults: the hand moves faster than the samples follow.
                 run = replace(run, valid=run.valid | body.run.valid & ~_lost_for_good(body, run.valid))
+            _refuse_too_few(run, model, name)
             segments.append(BodySegment(model, replace(body, run=run), number))
             faults.append(list(checked.effects))
             why.update(checked.why)
@@ -121,6 +131,22 @@ class _Prepared:
     def fixed(self) -> list[list[Effect]]:
         """Faults of the wiring, which change a noise-free prediction."""
         return [[effect for effect in effects if effect.name in _WIRING] for effects in self.faults]
+
+
+def _refuse_too_few(run: Run, model: BodyModel, name: str) -> None:
+    """Refuse channels that the unknown specific force follows exactly: those of one chip, or too few with values."""
+    alive = run.valid.mean(axis=0) > _ALIVE
+    if alive.sum() - np.linalg.matrix_rank(model.array.axes[alive]) < 1:
+        raise InputError(
+            f"{name}: {int(alive.sum())} channels with values leave nothing to compare, as the specific force of a "
+            "free body is unknown; record the channels of two chips at least"
+        )
+    whole = int(run.valid[:, alive].all(axis=1).sum())
+    if whole < _FEWEST:
+        raise InputError(
+            f"{name}: {whole} samples have a value of every channel; a free body needs {_FEWEST}: record again "
+            "within the range of the sensors"
+        )
 
 
 def _lost_for_good(body: BodyRun, valid: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -165,8 +191,9 @@ def _verdict(
     left: tuple[LeftOver, LeftOver, LeftOver],
     gain: Gain,
     withdrawn: Sequence[str],
+    over_noise: float,
 ) -> Diagnosis:
-    """Put everything together."""
+    """Put everything together; ``over_noise`` is the share of the held-out misfit over all noise that is removed."""
     model, segments = prepared.model, prepared.segments
     fit = explanation.fit
     removed = max(explanation.nothing.objective - fit.objective, 0.0)
@@ -179,6 +206,14 @@ def _verdict(
     named = [_named(explanation, fit, cause, likely, segments[0]) for cause in fit.causes]
     rivals = conflicting(explanation)
     families = model.families()
+    views = _views(prepared, fit.causes)
+    residual = Residual.of_views(views, model.array.channels, segments[0].noise_floor)
+    refuted = _refuted(named, residual, replace(gain, share_of_excess_removed=over_noise), model)
+    if refuted or dominant:
+        views = _views(prepared, ())
+        residual = Residual.of_views(views, model.array.channels, segments[0].noise_floor)
+        gain = Gain()  # nothing stands that could be worth something
+    dominant = dominant or bool(refuted)
     extension = [] if dominant else [cause.effect(model.array) for cause in fit.causes]
     faults = [families[cause.effect](cause.parameters) for cause in found if cause.effect in families]
     causes: tuple[NamedCause, ...] = (*found, *named)
@@ -195,14 +230,14 @@ def _verdict(
     else:
         verdict = "explained" if causes else "nothing_found"
     unexplained = Unexplained(
-        bool(told),
-        "; ".join(one.signature for one in told),
+        bool(told) or bool(refuted),
+        "; ".join([*([refuted] if refuted else []), *(one.signature for one in told)]),
         max(one.log_odds for one in left),
         {key: value for one in told for key, value in one.surrogate.items()},
     )
-    views = tuple(_view(segment, known, fit.causes) for segment, known in zip(segments, prepared.fixed, strict=True))
-    residual = Residual.of_views(views, model.array.channels, segments[0].noise_floor)
+    unseen = undetermined(explanation.signatures, model.array)
     words = verdict_sentences(verdict, causes, residual, gain, unexplained, withdrawn)
+    words = (*words, undetermined_sentence(unseen)) if unseen else words
     first = segments[0]
     expected = model.expected_noise(1.0 / first.run.sample_period)
     alive = first.alive
@@ -213,7 +248,22 @@ def _verdict(
         "gyro_bias_rad_s": float(np.linalg.norm(first.body.gyro_bias)),
     }
     twin = model.extended([*faults, *extension])
-    return Diagnosis(verdict, causes, residual, gain, unexplained, rival_list(explanation), twin, views, words, levels)
+    combinations = tuple(one.to_dict() for one in unseen)
+    rivals_told = rival_list(explanation)
+    return Diagnosis(
+        verdict, causes, residual, gain, unexplained, rivals_told, twin, views, words, levels, undetermined=combinations
+    )
+
+
+def _refuted(named: Sequence[NamedCause], residual: Residual, gain: Gain, model: BodyModel) -> str:
+    """Return why causes must not stand, or nothing: the gate's word, or sizes that no part can have."""
+    beyond = impossible_sizes(named, model.families(), model.array)
+    return beyond or judge(gain, residual, named).why
+
+
+def _views(prepared: _Prepared, causes: Sequence[Cause]) -> tuple[RunView, ...]:
+    pairs = zip(prepared.segments, prepared.fixed, strict=True)
+    return tuple(_view(segment, known, causes) for segment, known in pairs)
 
 
 def _named(

@@ -12,12 +12,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.diagnosis.causes import Cause, effects_of_run
+from gfimu.diagnosis.causes import Cause, Signature, effects_of_run
 from gfimu.diagnosis.evidence import SCALES, log_evidence
 from gfimu.diagnosis.explanation import Explanation
 from gfimu.diagnosis.fit import Fit
 from gfimu.diagnosis.free_body.segment import BodySegment
 from gfimu.diagnosis.free_body.signatures import plan_signatures, signature_columns
+from gfimu.diagnosis.free_body.undetermined import LEAST_INFORMATION, determined
 from gfimu.diagnosis.model import Effect
 from gfimu.diagnosis.pruning import LEAST_EXTRA_ODDS, LEAST_ODDS
 from gfimu.diagnosis.search import EXTRA_CAUSE, Blocks, search
@@ -40,7 +41,6 @@ _NESTED = (frozenset({"channel_skew", "chip_delay"}), frozenset({"misalignment",
 _SETTLED = 0.5
 _UPHILL = 2.0
 _SMALLEST_POSITIVE = 1e-6
-_UNSEEN = 0.02
 _CONSTANT = frozenset({"bias", "scale_factor", "cross_axis", "quadratic"})
 
 
@@ -56,22 +56,27 @@ class Screening:
         Sum of squares about the causes, nuisances eliminated.
     at : ndarray, shape (P,)
         Where the causes are in the columns.
+    misfit : float
+        What the normal equations have been divided by (`BodySegment.misfit`); sums of squares have not.
     """
 
     signatures: SignatureSet
     objective: float
     at: NDArray[np.float64]
+    misfit: float = 1.0
 
     @property
     def nothing(self) -> float:
         """Sum of squares without any cause, as the linear form has it."""
         pull = self.signatures.gram @ self.at
-        return self.objective + 2 * float((self.signatures.score - pull) @ self.at) + float(self.at @ pull)
+        taken = 2 * float((self.signatures.score - pull) @ self.at) + float(self.at @ pull)
+        return self.objective + self.misfit * taken
 
     def fit(self, blocks: Blocks, members: Members) -> Fit:
         """Return a set of hypotheses at its best sizes."""
+        nothing = -0.5 * self.nothing / self.misfit
         if not members:
-            return Fit((), -0.5 * self.nothing, -0.5 * self.nothing, self.nothing, (), np.zeros((0, 0)), np.zeros(0))
+            return Fit((), nothing, nothing, self.nothing, (), np.zeros((0, 0)), np.zeros(0))
         gram, score, positive = blocks.system(members)
         values, covariance = _seen(gram, score)
         values = np.where(positive, np.maximum(values, _SMALLEST_POSITIVE), values)
@@ -81,21 +86,20 @@ class Screening:
             replace(h.cause(values[mine]), covariance=covariance[np.ix_(mine, mine)])
             for h, mine in zip(chosen, places, strict=True)
         )
-        objective = self.nothing - 2 * float(score @ values) + float(values @ gram @ values)
-        evidence = -0.5 * self.nothing + log_evidence(gram, score, positive)
+        objective = self.nothing - self.misfit * float(2.0 * score @ values - values @ gram @ values)
+        evidence = nothing + log_evidence(gram, score, positive)
         prior = sum(h.log_prior for h in chosen) + EXTRA_CAUSE * (len(chosen) - 1)
         return Fit(causes, evidence, evidence + prior, objective, (), gram, score)
 
 
 def _seen(gram: NDArray[np.float64], score: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the sizes and their covariance in the directions that the data see; zero in the others.
+    """Return the sizes and their covariance: zero along what the data don't determine, with the spread of the prior.
 
     What all chips share of a displacement or a turn, a free body takes for its own.
     """
-    strength, turn = np.linalg.eigh(gram)
-    seen = strength > _UNSEEN
-    gain = np.where(seen, 1.0 / (np.maximum(strength, _UNSEEN) + 1.0 / SCALES[-1] ** 2), 0.0)
-    return (turn * gain) @ (turn.T @ score), (turn * gain) @ turn.T
+    strength, turn, seen = determined(gram)
+    gain = np.where(seen, 1.0 / (np.maximum(strength, LEAST_INFORMATION) + 1.0 / SCALES[-1] ** 2), 0.0)
+    return (turn * gain) @ (turn.T @ score), (turn * np.where(seen, gain, 1.0)) @ turn.T
 
 
 def screen(
@@ -106,11 +110,14 @@ def screen(
     signatures = plan_signatures(segments, causes, only)
     count = sum(len(one.columns) for one in signatures)
     gram, score, objective = np.zeros((count, count)), np.zeros(count), 0.0
+    misfits = []
     for segment, known in zip(segments, fixed, strict=True):
         effects = [*known, *effects_of_run(causes, array, segment.index)]
         line = segment.linearise(effects)
         columns = signature_columns(segment, signatures, causes, known, line)
-        part, right, squares = segment.products(columns, line, segment.nuisances(effects, line))
+        nuisances = segment.nuisances(effects, line)
+        part, right, squares = segment.products(columns, line, nuisances)
+        misfits.append(segment.misfit(_of_causes(columns, signatures, causes), line, nuisances))
         gram += part
         score += right
         objective += squares
@@ -118,8 +125,22 @@ def screen(
     for cause in causes:
         signature = next(one for one in signatures if one.family.name == cause.name)
         at[signature.columns] = cause.mixing @ cause.coordinates
+    misfit = float(np.mean(misfits))
+    gram, score = gram / misfit, score / misfit
     places = SignatureSet(tuple(signatures), gram, score + gram @ at, tuple(hypotheses(signatures, array, 1)), at)
-    return Screening(places, objective, at)
+    return Screening(places, objective, at, misfit)
+
+
+def _of_causes(
+    columns: NDArray[np.float64], signatures: Sequence[Signature], causes: Sequence[Cause]
+) -> NDArray[np.float64]:
+    """Return the columns of the coordinates of causes, from those of all signatures (rows, P)."""
+    parts = [np.zeros((len(columns), 0))]
+    for cause in causes:
+        signature = next(one for one in signatures if one.family.name == cause.name)
+        first, last = signature.columns[[0, -1]]
+        parts.append(columns[:, first : last + 1] @ cause.mixing)
+    return np.hstack(parts)
 
 
 def learn_noise(segments: Sequence[BodySegment], causes: Sequence[Cause], fixed: Known) -> None:
@@ -155,7 +176,7 @@ def explain(segments: Sequence[BodySegment], fixed: Known, *, report: Report | N
     for number in range(_ROUNDS):
         tell(0.05 + 0.8 * number / _ROUNDS, f"search {number + 1}")
         screening = screen(segments, causes, fixed)
-        if base is not None and screening.objective > base[0].objective + _UPHILL:
+        if base is not None and not screening.objective <= base[0].objective + _UPHILL * screening.misfit:
             # The linear form promised what the simulation does not keep.
             refused.add(frozenset(cause.key for cause in causes))
             screening, causes = base
@@ -163,7 +184,7 @@ def explain(segments: Sequence[BodySegment], fixed: Known, *, report: Report | N
         members = _members(blocks, causes)
         chosen = _best(blocks, members, refused)
         fit = screening.fit(blocks, chosen)
-        moved = screening.objective - fit.objective
+        moved = (screening.objective - fit.objective) / screening.misfit
         base = (screening, causes)
         same = set(chosen) == set(members)
         if same and stable and moved < _SETTLED * max(len(causes), 1):

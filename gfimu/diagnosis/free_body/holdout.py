@@ -90,13 +90,22 @@ def _squares(screening: Screening, at: NDArray[np.float64]) -> float:
 
 def held_out_gain(
     causes: Sequence[Cause], pairs: Sequence[BodyHoldout], constant: Sequence[Effect], label: str
-) -> Gain:
+) -> tuple[Gain, float]:
     """Measure what causes, fitted on one part, are worth on the other.
 
     The motion is marginalised before and after alike. The share of the excess is that over the sensors' own noise at
     rest: what the motion adds and no cause explains counts as error.
+
+    Returns
+    -------
+    gain : Gain
+        What the causes are worth.
+    over_noise : float
+        The share of the misfit removed in units of all noise that was learned, that of the motion too; NaN where
+        there was none.
     """
     before = after = floor = 0.0
+    misfits, rows_counted = np.zeros(2), 0
     samples, gains = 0, []
     for pair in pairs:
         fitted = tuple(causes)
@@ -117,6 +126,8 @@ def held_out_gain(
             before, after = before + squares[0], after + squares[1]
             floor += float(segment.noise_floor**2 * use.sum())
             samples += int(use.sum())
+            misfits += [float(part.sum()) for part in rows]
+            rows_counted += segment.observations
             counted = segment.stretch & (segment.count > 0)
             change = 0.5 * (rows[0] - rows[1])[counted] / np.maximum(segment.count[counted], 1)
             whole = len(change) // _BLOCK * _BLOCK
@@ -124,7 +135,9 @@ def held_out_gain(
     excess = before - floor
     share = 1.0 - max(after - floor, 0.0) / excess if excess > _EXCESS * floor else float("nan")
     likelihood = np.concatenate(gains)
-    return Gain(
+    over = misfits - rows_counted
+    over_noise = 1.0 - max(over[1], 0.0) / over[0] if over[0] > _EXCESS * rows_counted else float("nan")
+    gain = Gain(
         label,
         float(np.sqrt(before / samples)),
         float(np.sqrt(after / samples)),
@@ -132,3 +145,4 @@ def held_out_gain(
         float(likelihood.mean()),
         float(likelihood.std(ddof=1) / np.sqrt(len(likelihood))) if len(likelihood) > 1 else float("nan"),
     )
+    return gain, float(over_noise)

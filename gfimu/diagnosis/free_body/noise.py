@@ -80,7 +80,8 @@ class Projection:
         self.strength = strength  # (3,)
         self.turn = turn  # (3, 3): rows i feels strength_i · turn_i · α
         self.to_force = np.linalg.pinv(axes) * self.inverse  # (3, c)
-        self.force_covariance = np.linalg.inv(axes.T @ axes)
+        # Gains near −1 leave no specific force to be sensed.
+        self.force_covariance = np.linalg.pinv(axes.T @ axes, hermitian=True)
         self.alive = np.flatnonzero(np.linalg.norm(self.rows, axis=1) > 0)
 
     def variance(self, noise: BodyNoise, change: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -10,7 +10,8 @@ from scipy.ndimage import binary_dilation, binary_erosion, uniform_filter1d
 
 from gfimu.diagnosis.free_body.gyro import smooth_gyro
 from gfimu.diagnosis.model import WorldModel
-from gfimu.diagnosis.run import GYRO_COLUMNS, Run, prepare_run
+from gfimu.diagnosis.run import GYRO_COLUMNS, Run, possible_values, prepare_run
+from gfimu.diagnosis.time_grid import time_grid
 from gfimu.recording import Recording
 
 __all__ = ["BodyRun", "prepare_body_run"]
@@ -62,7 +63,8 @@ def prepare_body_run(recording: Recording, model: WorldModel, *, name: str = "ru
         If the recording is too short or lacks the gyro.
     """
     run = prepare_run(recording, model, name=name)
-    place = np.rint((recording.t_s - run.t[0]) / run.sample_period).astype(int)
+    recording, _ = possible_values(recording, model)
+    place = time_grid(recording.t_s).place
     gyro = np.full((len(run.t), 3), np.nan)
     gyro[place] = np.column_stack([recording.reference[column] for column in GYRO_COLUMNS])
     missing = ~np.isfinite(gyro).all(axis=1)
@@ -83,7 +85,7 @@ def _rest(run: Run, gyro: NDArray[np.float64], white: NDArray[np.float64]) -> ND
     still = (_rolling_std(gyro, window) < _LOUDER * noise + 0.005).all(axis=1)
     still &= np.linalg.norm(uniform_filter1d(gyro, window, axis=0), axis=1) < _TURNING
     alive = run.valid.mean(axis=0) > 0.5
-    loud = _rolling_std(run.readings[:, alive], window) / white[alive]
+    loud = _rolling_std(run.bridged[:, alive], window) / white[alive]
     still &= np.median(loud, axis=1) < _LOUDER
     length = max(int(_SHORTEST_REST_S / run.sample_period), window)
     core = binary_erosion(still, structure=np.ones(length), border_value=1)

@@ -37,6 +37,8 @@ _REST_FLOOR = 5e-3  # m/s²: what "at rest" may leave in the magnitude of the sp
 _GYRO_BIAS = (0.005, 0.1)  # rad/s: uncertain after a rest, without one
 _SLOW_SHARE = 0.6  # of bias instability that a run shows about its mean
 _UNTRUE = 0.1
+_BLOCK_S, _MOST_BLOCKS = 0.5, 128
+_SEEN = 1e-9
 _AVERAGING = 1.5  # sample periods: how long chips or gyro may average
 _FORCE_STEPS = 6
 _FORCE_DONE = 0.02
@@ -95,7 +97,7 @@ class BodySegment:
         array = model.array
         stacked = np.hstack([array.axes, array.regression_matrix[:, :3] / array.length_unit]) * self.alive[:, None]
         self._projector = (np.eye(len(white)) - stacked @ np.linalg.pinv(stacked)) * self.alive
-        self.change = change_of_readings(self.run.readings, self.run.sample_period, white)
+        self.change = change_of_readings(self.run.bridged, self.run.sample_period, white)
         self.drive = BodyDrive(self.run.t, body.rate, self._first_force())
         self.starts = self._groups()
         self.count = np.add.reduceat(self.use.astype(float), self.starts)
@@ -105,7 +107,7 @@ class BodySegment:
         self.set_noise(BodyNoise(white, flicker=_FLICKER_PRIOR / 4))
 
     def _first_force(self) -> NDArray[np.float64]:
-        return np.asarray(self.run.readings @ np.linalg.pinv(self.model.array.axes * self.alive[:, None]).T)
+        return np.asarray(self.run.bridged @ np.linalg.pinv(self.model.array.axes * self.alive[:, None]).T)
 
     def _groups(self) -> NDArray[np.intp]:
         """Return where each group of samples begins: many at rest, one in motion."""
@@ -373,6 +375,39 @@ class BodySegment:
             columns.T @ right - eliminated.T @ forward,
             float(right @ right - forward @ forward),
         )
+
+    def misfit(self, columns: NDArray[np.float64], line: BodyLine, nuisances: Nuisances) -> float:
+        """Return how much more than white noise the residual scatters along columns (m · (c − 2), k); at least 1.
+
+        Block by block of time the products of columns and residual have the variance that white noise gives them, were
+        the noise all that is left. Vibration that the chips do not share, or filters unlike, leave more: every block
+        then weighs for one observation, whatever the number of its samples (the information-matrix test of White,
+        Econometrica 50, 1982, in the directions of the columns).
+        """
+        if not columns.shape[1]:
+            return 1.0
+        right = self._left(line, nuisances)
+        width = len(self.projection.rows) + 1
+        length = max(int(_BLOCK_S / self.run.sample_period), len(self.starts) // _MOST_BLOCKS, 1)
+        starts = np.arange(0, len(self.starts), length) * width
+        scores = np.add.reduceat(columns * right[:, None], starts, axis=0)  # (blocks, k)
+        strength, turn = np.linalg.eigh(columns.T @ columns)
+        seen = strength > _SEEN * strength[-1]
+        if not seen.any():
+            return 1.0
+        scatter = np.sum((scores @ turn[:, seen]) ** 2 / strength[seen])
+        return max(float(scatter) / int(seen.sum()), 1.0)
+
+    def _left(self, line: BodyLine, nuisances: Nuisances) -> NDArray[np.float64]:
+        """Return the residual rows (m · (c − 2),) less the most probable nuisances."""
+        right = line.rows.ravel()
+        slow = nuisances.flicker * self.slow_cross(right[:, None])[:, 0]
+        sizes = cho_solve((nuisances.factor, True), np.concatenate([slow, nuisances.bias.T @ right]))
+        drift = nuisances.flicker * self._cosines @ sizes[: len(slow)].reshape(-1, _MODES).T  # (m, c)
+        rows = np.empty_like(line.rows)
+        rows[:, :-1] = (drift @ self.projection.rows.T) * self.weight
+        rows[:, -1] = np.sum(drift * self._rest_mix, axis=1)
+        return np.asarray(right - rows.ravel() - nuisances.bias @ sizes[len(slow) :])
 
     def eliminated(self, columns: NDArray[np.float64], nuisances: Nuisances) -> NDArray[np.float64]:
         """Return what the nuisances take of columns: E, so that XᵀY − E(X)ᵀE(Y) is their product without them."""

@@ -8,6 +8,7 @@ import pytest
 from gfimu.array import AccelerometerArray
 from gfimu.diagnosis import diagnose
 from gfimu.diagnosis.folder import write_diagnosis
+from gfimu.diagnosis.plain_words import story
 from gfimu.errors import InputError
 from gfimu.recording import Recording
 from sim.campaign import Measurement, measure, random_profile
@@ -58,7 +59,6 @@ def stretched(t, spin, readings, reference):
     ("change", "seed", "function", "key", "size"),
     [
         (pickup, 3, "2 per revolution × rate (cosine)", f"{CHANNEL}_m_s2", 0.02),
-        (whistle, 4, "tone at 17.3", "a13_m_s2", 0.03),
         (stretched, 5, "rate²", "reference_rad_s", 0.002),
     ],
 )
@@ -71,15 +71,43 @@ def test_a_dependence_without_a_name_extends_the_twin(twin, tmp_path, change, se
     assert told, described
     unit = told[0].units.rate if "rate" in function else 1.0
     power = 2 if function == "rate²" else 1
-    amplitude = np.hypot(*(np.pad([term.parameters[key] for term in told], (0, 2 - len(told)))))
+    [amplitude] = [term.parameters[key] for term in told]
     assert amplitude / unit**power == pytest.approx(size, rel=0.1)
     assert found.unexplained.extends_twin
+    assert not found.unexplained.left_out
+    assert found.gain.share_in_any_recording == pytest.approx(found.gain.share_of_excess_removed)
     assert found.gain.held_out
     assert found.gain.share_of_excess_removed > 0.9
     assert found.residual.rms_after < 1.05 * found.residual.noise_floor
     write_diagnosis(tmp_path, found)
     again = diagnose([run], Twin.load(tmp_path / "twin.toml"))
     assert again.verdict == "nothing_found", again.sentences
+
+
+def test_a_tone_of_one_recording_is_described_and_left_out_of_the_twin(twin):
+    found = diagnose([recorded(twin, 4, whistle)], twin)
+    assert found.verdict == "unknown"
+    tones = [key for key in found.unexplained.surrogate if key.startswith("a13_m_s2: tone at 17.3")]
+    assert np.linalg.norm([found.unexplained.surrogate[key] for key in tones]) == pytest.approx(0.03, rel=0.1)
+    assert not terms(found)
+    assert not found.unexplained.extends_twin
+    assert found.unexplained.left_out >= len(tones) > 0
+    assert found.gain.share_of_excess_removed > 0.9
+    assert found.gain.share_in_any_recording == pytest.approx(0.0, abs=0.05)
+    assert any("of absolute time is left out of the extended twin" in sentence for sentence in found.sentences)
+    assert "of absolute time is not in twin.toml" in story(found)
+    # The error after is that of the twin that is written, not of what was left out of it.
+    assert found.residual.rms_after > 1.2 * found.residual.noise_floor
+
+
+@pytest.mark.parametrize("late", [0.0, 0.0145], ids=["in phase", "in another phase"])
+def test_only_a_second_recording_confirms_a_tone(twin, late):
+    def again(t, spin, readings, reference):
+        whistle(t - late, spin, readings, reference)
+
+    found = diagnose([recorded(twin, 4, whistle)], twin, held_out=[recorded(twin, 40, again)])
+    assert found.verdict == "unknown"
+    assert any(name.startswith("tone at 17.3") for name in terms(found)) == (late == 0.0)
 
 
 def test_runs_share_their_terms_with_a_run_that_was_not_there(twin):
