@@ -22,6 +22,7 @@ from gfimu.units import STANDARD_GRAVITY
 from sim.campaign import Measurement, detectability, hidden_effect, measure, random_profile
 from sim.effects import Effect, make_effect
 from sim.motion import SpinMotion
+from sim.study.bodies import draw_body, body_twin
 from sim.study.cases import Case
 from sim.twin import Twin
 
@@ -89,6 +90,9 @@ def draw_world(case: Case, source: str = "") -> HiddenWorld:
         ``FILE.py:FUNCTION`` of a generator of its own, called as ``function(seed, effects, size, **measurement)``;
         by default the project's own campaign.
     """
+    if case.body:
+        recording, thrown, least = draw_body(case)
+        return HiddenWorld(recording, body_twin(case), tuple((one.name, one.parameters) for one in thrown), least)
     twin: Twin = _SmallerLibrary(
         array=AccelerometerArray.load(case.array),
         array_name=case.array,
