@@ -1,4 +1,4 @@
-"""Run ``python -m sim.study run STUDY --out FILE.jsonl``, then ``report FILE.jsonl --out DIR`` or ``compare FILE.jsonl``.
+"""Run ``python -m sim.study run STUDY --out FILE.jsonl``, then ``report FILE.jsonl --out DIR`` or ``compare FILE``.
 
 ``run gate --out FILE.jsonl`` and ``compare FILE.jsonl`` compare an engine with the one of the study page, list by list.
 """
@@ -105,7 +105,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     comparison = commands.add_parser(
         "compare", help="two files of outcomes, list by list; exit code 1 where a list leaves its interval"
     )
-    comparison.add_argument("files", nargs="+", metavar="[OLD] NEW", help=f"files of outcomes; OLD is {STORED} by default")
+    comparison.add_argument(
+        "files", nargs="+", metavar="[OLD] NEW", help=f"files of outcomes; OLD is {STORED} by default"
+    )
     comparison.set_defaults(work=_compare)
     choice = commands.add_parser("choose-gate", help="print the list of the gate, chosen by the time that cases took")
     choice.add_argument("outcomes", nargs="?", default=STORED, help=f"file of outcomes; {STORED} by default")

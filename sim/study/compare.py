@@ -140,7 +140,9 @@ def load_outcomes(path: str | Path) -> dict[tuple[str, str], Outcome]:
     for number, outcome in enumerate(read_outcomes(path), start=1):
         missing = [key for key in _NEEDED if not isinstance(outcome, dict) or key not in outcome]
         if missing:
-            raise InputError(f"{path}: outcome {number} has no {missing[0]!r}; give a file of `python -m sim.study run`")
+            raise InputError(
+                f"{path}: outcome {number} has no {missing[0]!r}; give a file of `python -m sim.study run`"
+            )
         if not outcome.get("method"):
             found[outcome["key"], generator_name(outcome["source"])] = outcome
     if not found:

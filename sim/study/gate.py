@@ -1,4 +1,4 @@
-"""The gate: about 300 cases of all studies that one core runs in half an hour, to compare an engine with the one before.
+"""The gate: cases of all studies that one core runs in half an hour, to compare an engine with the one before.
 
 The list stands in ``gate.txt``. It was chosen once by `choose_gate` from the times in ``docs/diagnosis-study.jsonl.xz``
 and stays as it is, so that comparisons of different days are of the same cases.

@@ -19,10 +19,12 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from sim.effects import EFFECTS
 from sim.study.cases import EXOTICS, Case, study_cases
 from sim.study.outcome import run_case
-from sim.study.report import visible
+from sim.study.report import score, visible
 from sim.study.runner import open_executor
 
 PINS = Path(__file__).with_suffix(".toml")
@@ -32,13 +34,14 @@ SOURCES = {
     "independent": f"{_TESTS / 'independent_world.py'}:hide",
     "programmed": f"{_TESTS / 'independent_profiles.py'}:hide",
 }
-"""Generators of worlds: the project's own; one that shares no code with it; the same under commands as people program."""
+"""Generators of worlds: the project's own; one that shares no code with it; the same under programmed commands."""
 
 WITHIN = 3.0
 """Standard deviations within which the parameters of a rightly named cause must lie."""
-LEAST_REMOVED = 0.9
+LEAST_REMOVED = 0.95
 """Share of the excess error on held-out data that a right extension removes, of effects of d′ 300 and more."""
 _GROSS = 300.0
+_SHARE_KEPT = 0.05  # by which a documented share may change with the machine
 
 
 @dataclass(frozen=True)
@@ -66,16 +69,17 @@ class HiddenCase:
         size = f"-{self.case.size:.0f}" if self.case.size else ""
         return f"{self.group}-{hidden}{size}-{self.generator}-{self.case.seed}"
 
-    @property
-    def right(self) -> str:
-        """What is to be reported: the hidden names alone, nothing where nothing is hidden, ``unknown`` outside."""
-        if not self.case.effects:
-            return "nothing_found"
-        return "unknown" if self.outside else f"explained: {' + '.join(sorted(self.case.effects))}"
+    def is_right(self, outcome: Mapping[str, Any]) -> bool:
+        """Tell whether an outcome is right: the hidden names, alone or in a set that the data can't tell apart.
+
+        Nothing where nothing is hidden, ``unknown`` outside the library.
+        """
+        judged = score(outcome)
+        return judged["unknown"] if self.outside else judged["fair"]
 
 
 def reported(outcome: Mapping[str, Any]) -> str:
-    """Return verdict and names of an outcome as text; names beside what is unknown belong to it."""
+    """Return verdict and names of an outcome as text."""
     names = sorted({cause["effect"] for cause in outcome["causes"]})
     link = " or " if outcome["verdict"] == "ambiguous" else " + "
     return f"{outcome['verdict']}: {link.join(names)}" if names else str(outcome["verdict"])
@@ -92,19 +96,33 @@ def far_off(outcome: Mapping[str, Any]) -> list[str]:
     )
 
 
+def little_removed(outcome: Mapping[str, Any]) -> float | None:
+    """Return the share of the excess removed, to two digits, where it is less than a right extension removes."""
+    removed = removed_share(outcome)
+    named = score(outcome)["exact"] and outcome["effects"] and outcome["size"] >= _GROSS
+    return round(removed, 2) if named and removed is not None and removed < LEAST_REMOVED else None
+
+
+def removed_share(outcome: Mapping[str, Any]) -> float | None:
+    """Return the share of the excess error that was removed on held-out data; None where there was no excess."""
+    removed = outcome.get("share_of_excess_removed")
+    return None if removed is None or not np.isfinite(removed) else float(removed)
+
+
 @dataclass(frozen=True)
 class Pins:
-    """What is pinned: reports by case, the misses among them with a reason each, documented estimates far off."""
+    """What is pinned by case: reports, misses with a reason each, estimates far off, and shares of little gain."""
 
     reports: Mapping[str, str]
     misses: Mapping[str, Mapping[str, str]]
     far_off: Mapping[str, Sequence[str]]
+    little_removed: Mapping[str, float]
 
     @classmethod
     def load(cls) -> Pins:
         """Read the pins."""
         table = tomllib.loads(PINS.read_text(encoding="utf-8")) if PINS.exists() else {}
-        return cls(table.get("right", {}), table.get("known_misses", {}), table.get("beyond_three_sigma", {}))
+        return cls(*(table.get(name, {}) for name in ("right", "known_misses", "beyond_three_sigma", "little_removed")))
 
     def of(self, name: str) -> str:
         """Return what is reported of a case."""
@@ -117,26 +135,33 @@ def problems(hidden: HiddenCase, outcome: Mapping[str, Any], pins: Pins) -> list
     found = []
     if told != pinned:
         found.append(f"reported {told!r}, pinned {pinned!r} {outcome.get('error', '')}".rstrip())
+    if hidden.is_right(outcome) == (hidden.name in pins.misses):
+        found.append("right, but pinned as a known miss" if hidden.name in pins.misses else "not right")
     beyond, documented = far_off(outcome), list(pins.far_off.get(hidden.name, []))
-    if told == hidden.right and beyond != documented:
+    if score(outcome)["exact"] and beyond != documented:
         found.append(f"beyond {WITHIN:g} standard deviations: {beyond}, documented {documented}")
-    removed = outcome.get("share_of_excess_removed")
+    removed, little = removed_share(outcome), little_removed(outcome)
     if removed is not None and removed > 1.0:
         found.append(f"share of the excess removed {removed} > 1")
-    if not hidden.case.effects and removed is not None:
+    # A residue of the calibration is no cause, but learnt and removed.
+    if not hidden.case.effects and not hidden.case.residue and removed is not None:
         found.append(f"share of the excess removed {removed} where nothing is hidden")
-    if hidden.case.size >= _GROSS and told == hidden.right and not hidden.outside:
-        if removed is not None and removed < LEAST_REMOVED:
-            found.append(f"share of the excess removed {removed} < {LEAST_REMOVED} under the right name")
-        if outcome["unexplained"]:
-            found.append(f"something unexplained beside the right name: {outcome['signature']}")
+    pinned_little = pins.little_removed.get(hidden.name)
+    if little is not None and (pinned_little is None or abs(little - pinned_little) > _SHARE_KEPT):
+        found.append(f"share of the excess removed {little} under the right name, documented {pinned_little}")
+    if little is None and pinned_little is not None:
+        found.append(f"share of the excess removed {removed}, documented {pinned_little}")
+    if score(outcome)["exact"] and outcome["effects"] and outcome["unexplained"]:
+        found.append(f"something unexplained beside the right name: {outcome['signature']}")
+    named = [cause["effect"] for cause in outcome["causes"]]
+    if len(named) > len(set(named)):
+        found.append(f"a cause is listed twice: {named}")
     return found
 
 
 _SHORT = {"duration": 12.0}
 _TAKEN_OUT = (
-    *("table_tilt", "axis_wobble", "channel_skew", "clock_error", "hysteresis", "interference_tone", "cogging"),
-    *("tacho_ripple", "tacho_scale"),
+    *("table_tilt", "axis_wobble", "channel_skew", "clock_error", "tacho_ripple", "interference_tone", "cogging"),
 )
 _PAIRS = (
     ("table_tilt", "clock_error"),
@@ -224,8 +249,6 @@ def _hard() -> list[HiddenCase]:
         ("independent", by_key["singles/10046"]),
         # Two servos that differ leave a ripple of the same order, which was unknown.
         ("independent", by_key["singles/10048"]),
-        # A strong ripple drives the table: steps of a drive without that ended 0.8 rad off in phase.
-        ("campaign", Case("pinned", 709, ("cogging",), 1500.0, duration=20.0)),
         # No listed time constant is near enough to compete with a temperature that rises much alike.
         ("independent", Case("pinned", 872_024, ("warm_up", "scale_factor"), 791.6, **pair)),
         # A mode that pushes its table back bends the drive to ring itself.
@@ -265,6 +288,18 @@ def group(name: str) -> list[HiddenCase]:
     return [hidden for hidden in hidden_cases() if hidden.group == name]
 
 
+_HEAD = """\
+# What the diagnosis reports of every hidden case of hidden_cases.py: written by that file, reviewed by eye as a diff.
+# A name has the group, what is hidden, its size d', the generator of the world and the seed.
+"""
+_REMARKS = {
+    "right": "The hidden names, alone or in a set that the data can't part; nothing; unknown outside the library.",
+    "known_misses": "Answered otherwise than it should be. An improvement fails the test too: write the pins again.",
+    "beyond_three_sigma": "Parameters of a right cause that lie more than three standard deviations off.",
+    "little_removed": "Share of the excess on held-out data that is removed under the right name, where it is small.",
+}
+
+
 def _line(key: str, value: str) -> str:
     return f'"{key}" = {value}\n'
 
@@ -275,35 +310,36 @@ def _quoted(text: str) -> str:
 
 def write_pins(outcomes: Mapping[str, Mapping[str, Any]], old: Pins) -> str:
     """Return the text of the pins from outcomes by name; reasons are kept, and pins of cases that were not run."""
-    reports, misses, far = dict(old.reports), dict(old.misses), dict(old.far_off)
+    right, misses = dict(old.reports), dict(old.misses)
+    far, little = dict(old.far_off), dict(old.little_removed)
     for hidden in hidden_cases():
         if hidden.name not in outcomes:
             continue
-        for table in (reports, misses, far):
-            table.pop(hidden.name, None)  # type: ignore[attr-defined]
+        for table in (right, misses, far, little):
+            table.pop(hidden.name, None)
         outcome = outcomes[hidden.name]
-        told = reported(outcome)
-        if told == hidden.right or (hidden.outside and outcome["verdict"] == "unknown"):
-            reports[hidden.name] = told
+        if hidden.is_right(outcome):
+            right[hidden.name] = reported(outcome)
         else:
             why = old.misses.get(hidden.name, {}).get("why", "")
-            misses[hidden.name] = {"reported": told, "why": why}
-        if told == hidden.right and far_off(outcome):
+            misses[hidden.name] = {"reported": reported(outcome), "why": why}
+        if score(outcome)["exact"] and far_off(outcome):
             far[hidden.name] = far_off(outcome)
-    names = [hidden.name for hidden in hidden_cases()]
-    text = (
-        "# What the diagnosis reports of every hidden case of hidden_cases.py, written by that file and reviewed by eye.\n"
-        "# A name has the group, what is hidden, its size d', the generator of the world and the seed.\n\n[right]\n"
-    )
-    text += "".join(_line(name, _quoted(reports[name])) for name in names if name in reports)
-    text += "\n# Answered otherwise than it should be today. An improvement fails here too: move its line.\n[known_misses]\n"
-    text += "".join(
-        _line(name, f"{{ reported = {_quoted(misses[name]['reported'])}, why = {_quoted(misses[name]['why'])} }}")
-        for name in names
-        if name in misses
-    )
-    text += "\n# Parameters of a right cause that lie more than three standard deviations off.\n[beyond_three_sigma]\n"
-    text += "".join(_line(name, f"[{', '.join(map(_quoted, far[name]))}]") for name in names if name in far)
+        if little_removed(outcome) is not None:
+            little[hidden.name] = little_removed(outcome)
+    tables = {
+        "right": {name: _quoted(told) for name, told in right.items()},
+        "known_misses": {
+            name: f"{{ reported = {_quoted(miss['reported'])}, why = {_quoted(miss['why'])} }}"
+            for name, miss in misses.items()
+        },
+        "beyond_three_sigma": {name: f"[{', '.join(map(_quoted, keys))}]" for name, keys in far.items()},
+        "little_removed": {name: f"{share:g}" for name, share in little.items()},
+    }
+    text = _HEAD
+    for title, table in tables.items():
+        text += f"\n# {_REMARKS[title]}\n[{title}]\n"
+        text += "".join(_line(hidden.name, table[hidden.name]) for hidden in hidden_cases() if hidden.name in table)
     return text
 
 
@@ -312,6 +348,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description="Run the hidden cases and write what is reported into their pins.")
     parser.add_argument("parts", nargs="*", metavar="PART", help="only cases whose name contains one of these")
     parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--check", action="store_true", help="only tell what is otherwise than pinned, write nothing")
     options = parser.parse_args(arguments)
     wanted = [
         hidden for hidden in hidden_cases() if not options.parts or any(part in hidden.name for part in options.parts)
@@ -319,20 +356,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if not wanted:
         sys.stderr.write(f"no case has {' or '.join(options.parts)} in its name; see {PINS}\n")
         return 2
-    old, outcomes = Pins.load(), {}
+    old, outcomes, otherwise = Pins.load(), {}, 0
     with open_executor(options.workers) as executor:
         futures = {hidden.name: executor.submit(run_case, hidden.case, hidden.source) for hidden in wanted}
         for hidden in wanted:
             outcome = outcomes[hidden.name] = futures[hidden.name].result()
-            pinned = {**old.reports, **{name: miss["reported"] for name, miss in old.misses.items()}}
-            told = reported(outcome)
-            mark = " " if told == pinned.get(hidden.name) else "*"
+            known = hidden.name in old.reports or hidden.name in old.misses
+            differs = problems(hidden, outcome, old) if known else ["new"]
+            otherwise += bool(differs)
             seen = "" if visible(outcome) else f" (d' {outcome['reached']:.1f}: not to be seen)"
             sys.stdout.write(
-                f"{mark} {hidden.name:60s} {told}{seen} {' '.join(far_off(outcome))} "
-                f"removed {outcome.get('share_of_excess_removed')} ({outcome['processor_s']:.1f} s)\n"
+                f"{'*' if differs else ' '} {hidden.name:60s} {reported(outcome)}{seen} "
+                f"removed {removed_share(outcome)} ({outcome['processor_s']:.1f} s) {'; '.join(differs)}\n"
             )
             sys.stdout.flush()
+    if options.check:
+        return 1 if otherwise else 0
     PINS.write_text(write_pins(outcomes, old), encoding="utf-8")
     return 0
 
