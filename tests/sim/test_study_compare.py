@@ -56,7 +56,9 @@ def test_a_case_that_differs_is_printed_with_what_was_reported_before_and_after(
 
 def test_seven_that_only_got_worse_leave_the_paired_interval_where_no_rate_is_promised(tmp_path, capsys):
     def some(missed):
-        return [outcome(n, ("bias", "noise", "gravity"), () if n < missed else None, study="triples") for n in range(40)]
+        return [
+            outcome(n, ("bias", "noise", "gravity"), () if n < missed else None, study="triples") for n in range(40)
+        ]
 
     old = write(tmp_path / "old.jsonl", some(2))
     for missed, code in ((8, 0), (9, 1)):  # 6 and 7 of as many: p = 1/64 and 1/128

@@ -252,7 +252,7 @@ def _hard() -> list[HiddenCase]:
         # No listed time constant is near enough to compete with a temperature that rises much alike.
         ("independent", Case("pinned", 872_024, ("warm_up", "scale_factor"), 791.6, **pair)),
         # A mode that pushes its table back bends the drive to ring itself.
-        ("campaign", Case("pinned", 511, ("resonance",), 600.0, duration=20.0)),
+        ("independent", Case("pinned", 511, ("resonance",), 600.0, duration=20.0)),
         # A candidate that several rivals have is listed once.
         ("campaign", by_key["singles/10180"]),
         # Where an offset would meet other edges of coarse steps, slow noise comes through.

@@ -141,7 +141,16 @@ def test_study_outside_the_library():
 
 def test_study_cases_have_seeds_of_their_own():
     names = ["singles", "nulls", "threshold_nulls", "pairs", "triples", "residue", "left_out", "exotics"]
-    names += ["free_body", "fresh_singles", "fresh_faint", "faint", "coarse_steps", "other_settings", "other_pairs", "other_nulls"]
+    names += [
+        "free_body",
+        "fresh_singles",
+        "fresh_faint",
+        "faint",
+        "coarse_steps",
+        "other_settings",
+        "other_pairs",
+        "other_nulls",
+    ]
     seeds = [case.seed for name in names for case in study_cases(name)]
     assert len(seeds) == len(set(seeds))
     assert all(

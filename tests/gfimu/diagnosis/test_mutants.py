@@ -6,9 +6,8 @@ A mutant acts on the diagnosis only; the world is drawn before.
 import sys
 from dataclasses import replace
 
-import numpy as np
 import pytest
-from hidden_cases import LEAST_REMOVED, Pins, group, hidden_cases, problems, removed_share
+from hidden_cases import Pins, group, hidden_cases, problems
 
 from gfimu.diagnosis import diagnose, segment
 from sim.effects import EFFECTS
@@ -126,7 +125,13 @@ def test_a_mutant_of_the_engine_turns_its_case_red(monkeypatch, mutate, name):
     assert problems(hidden, outcome, PINNED)
 
 
-@pytest.mark.parametrize("name", EFFECTS)
+_BY_SAMPLES = tuple(name for name, family in EFFECTS.items() if family.place in {"data", "noise"})
+"""Found by checks of samples and noise, which look into the library one by one; the rest go through one screening."""
+
+
+@pytest.mark.parametrize(
+    "name", [name if name in _BY_SAMPLES else pytest.param(name, marks=pytest.mark.study) for name in EFFECTS]
+)
 def test_an_effect_taken_out_of_the_search_turns_its_case_red(name):
     hidden = SINGLES[name]
     world = draw_world(hidden.case, hidden.source)

@@ -15,7 +15,7 @@ from sim.effects import make_effect
 from sim.motion import SpinState
 from sim.twin import Twin
 
-DURATION = 20.0
+DURATION = 14.0
 
 
 class ServoSteps:
