@@ -97,10 +97,14 @@ def far_off(outcome: Mapping[str, Any]) -> list[str]:
 
 
 def little_removed(outcome: Mapping[str, Any]) -> float | None:
-    """Return the share of the excess removed, to two digits, where it is less than a right extension removes."""
+    """Return the share of the excess removed, to two digits, where it is less than a right extension removes.
+
+    That of large effects under their right name, and of the description of what is not in the library.
+    """
     removed = removed_share(outcome)
-    named = score(outcome)["exact"] and outcome["effects"] and outcome["size"] >= _GROSS
-    return round(removed, 2) if named and removed is not None and removed < LEAST_REMOVED else None
+    named = score(outcome)["exact"] and outcome["size"] >= _GROSS
+    judged = bool(outcome["effects"]) and (named or outcome["verdict"] == "unknown")
+    return round(removed, 2) if judged and removed is not None and removed < LEAST_REMOVED else None
 
 
 def removed_share(outcome: Mapping[str, Any]) -> float | None:
@@ -148,7 +152,7 @@ def problems(hidden: HiddenCase, outcome: Mapping[str, Any], pins: Pins) -> list
         found.append(f"share of the excess removed {removed} where nothing is hidden")
     pinned_little = pins.little_removed.get(hidden.name)
     if little is not None and (pinned_little is None or abs(little - pinned_little) > _SHARE_KEPT):
-        found.append(f"share of the excess removed {little} under the right name, documented {pinned_little}")
+        found.append(f"share of the excess removed {little}, documented {pinned_little}")
     if little is None and pinned_little is not None:
         found.append(f"share of the excess removed {removed}, documented {pinned_little}")
     if score(outcome)["exact"] and outcome["effects"] and outcome["unexplained"]:
@@ -296,7 +300,7 @@ _REMARKS = {
     "right": "The hidden names, alone or in a set that the data can't part; nothing; unknown outside the library.",
     "known_misses": "Answered otherwise than it should be. An improvement fails the test too: write the pins again.",
     "beyond_three_sigma": "Parameters of a right cause that lie more than three standard deviations off.",
-    "little_removed": "Share of the excess on held-out data that is removed under the right name, where it is small.",
+    "little_removed": "Share of the held-out excess that a right name, or the description of an unknown, removes: small.",
 }
 
 

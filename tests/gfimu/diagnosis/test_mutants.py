@@ -5,9 +5,10 @@ A mutant acts on the diagnosis only; the world is drawn before.
 
 import sys
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
-from hidden_cases import Pins, group, hidden_cases, problems
+from hidden_cases import LEAST_REMOVED, Pins, group, hidden_cases, problems, removed_share
 
 from gfimu.diagnosis import diagnose, segment
 from sim.effects import EFFECTS
@@ -81,8 +82,12 @@ def reference_ignored(patch):
 
 
 def everything_is_explained(patch):
-    patch.setattr(ENGINE, "is_unknown", lambda *_: False)
-    patch.setattr("gfimu.diagnosis.conclusion.is_unknown", lambda *_: False)
+    """Whatever is left, the best set of names is believed and measured."""
+    for module in (ENGINE, sys.modules["gfimu.diagnosis.conclusion"]):
+        patch.setattr(module, "is_unknown", lambda *_: False)
+        patch.setattr(module, "is_dominant", lambda *_: False)
+    believed = SimpleNamespace(withdrawn=False, why="", in_part=False)
+    patch.setattr(ENGINE, "judge", lambda *_: believed, raising=False)  # the gate's judgement of what was found
 
 
 def samples_unchecked(patch):
@@ -110,7 +115,7 @@ MUTANTS = [
     (reference_ignored, "single-tacho_scale-300-campaign-116"),
     (everything_is_explained, "outside-tone_on_one_channel-600-independent-402"),
     (samples_unchecked, "single-sign_flip-1500-campaign-132"),
-    (trained_on_what_is_held_out, "pair-warm_up+axis_swap-300-campaign-313"),
+    (trained_on_what_is_held_out, "outside-cogging-600-campaign-426"),
 ]
 
 
@@ -123,6 +128,20 @@ def test_a_mutant_of_the_engine_turns_its_case_red(monkeypatch, mutate, name):
     outcome = diagnosed(hidden, world)
     assert outcome["verdict"] != "error", outcome["error"]  # a crash would be noticed anyway
     assert problems(hidden, outcome, PINNED)
+
+
+@pytest.mark.parametrize("name", ["table_tilt", "clock_error", "tacho_ripple"])
+def test_held_out_data_are_predicted_by_the_right_effect_and_not_by_what_is_nearest_without_it(monkeypatch, name):
+    hidden = next(hidden for hidden in group("outside") if hidden.case.without == name)
+    world = draw_world(hidden.case, hidden.source)
+    right = diagnosed(hidden, world, smaller(world.twin, ""))
+    assert [cause["effect"] for cause in right["causes"]] == [name]
+    assert LEAST_REMOVED <= removed_share(right) <= 1.0
+    everything_is_explained(monkeypatch)
+    nearest = diagnosed(hidden, world)
+    assert name not in {cause["effect"] for cause in nearest["causes"]}
+    removed = removed_share(nearest)
+    assert removed is None or removed < 0.5
 
 
 _BY_SAMPLES = tuple(name for name, family in EFFECTS.items() if family.place in {"data", "noise"})
