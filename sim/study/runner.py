@@ -163,7 +163,7 @@ def _outcomes(executor: Executor, work: _Work, cases: Sequence[Case], source: st
 def _died(case: Case, source: str) -> dict[str, Any]:
     """Return the row of a case whose worker was killed twice."""
     what = {"verdict": "error", "error": "the worker process was killed (out of memory?)", "causes": []}
-    nothing = {"share_of_excess_removed": None, "unexplained": False, "signature": "", "noise": {}}
+    nothing: dict[str, Any] = {"share_of_excess_removed": None, "unexplained": False, "signature": "", "noise": {}}
     times = {"wall_s": 0.0, "processor_s": 0.0}
     return {"key": case.key, "source": source or "sim.campaign", **case.to_dict(), **what, **nothing, **times}
 

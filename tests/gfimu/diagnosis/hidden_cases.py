@@ -300,7 +300,7 @@ _REMARKS = {
     "right": "The hidden names, alone or in a set that the data can't part; nothing; unknown outside the library.",
     "known_misses": "Answered otherwise than it should be. An improvement fails the test too: write the pins again.",
     "beyond_three_sigma": "Parameters of a right cause that lie more than three standard deviations off.",
-    "little_removed": "Share of the held-out excess that a right name, or the description of an unknown, removes: small.",
+    "little_removed": "Share of the held-out excess that a right name or the description of an unknown removes, if small.",
 }
 
 
