@@ -9,7 +9,8 @@ import itertools
 
 import numpy as np
 import pytest
-from hidden_cases import SOURCES, HiddenCase, Pins, group, hidden_cases, problems
+from hidden_cases import SOURCES, HiddenCase, group, hidden_cases
+from hidden_pins import Pins, problems
 from scipy.stats import binom
 
 from gfimu.diagnosis import diagnose
@@ -34,7 +35,7 @@ def test_a_hidden_case_is_reported_as_pinned(hidden: HiddenCase):
 def test_the_pins_are_of_these_cases_and_every_miss_has_its_reason():
     names = [hidden.name for hidden in hidden_cases()]
     assert len(names) == len(set(names))
-    assert sorted([*PINNED.reports, *PINNED.misses]) == sorted(names), "python tests/gfimu/diagnosis/hidden_cases.py"
+    assert sorted([*PINNED.reports, *PINNED.misses]) == sorted(names), "python tests/gfimu/diagnosis/hidden_pins.py"
     assert set(PINNED.far_off) | set(PINNED.little_removed) <= set(names)
     assert all(miss["why"] for miss in PINNED.misses.values()), "say why in hidden_cases.toml"
     assert len(PINNED.misses) <= 0.07 * len(names)

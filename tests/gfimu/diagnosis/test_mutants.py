@@ -8,7 +8,8 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
-from hidden_cases import LEAST_REMOVED, Pins, group, hidden_cases, problems, removed_share
+from hidden_cases import group, hidden_cases
+from hidden_pins import LEAST_REMOVED, Pins, problems, removed_share
 
 from gfimu.diagnosis import diagnose, segment
 from sim.effects import EFFECTS
