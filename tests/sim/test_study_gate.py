@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from concurrent.futures import BrokenExecutor, Executor, Future
+from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor
 from contextlib import nullcontext
 from dataclasses import replace
 
@@ -136,3 +136,24 @@ def test_a_killed_worker_is_a_row_that_says_so_and_the_others_go_on(tmp_path, mo
     rows = {row["seed"]: row for row in read_outcomes(tmp_path / "out.jsonl")}
     assert {seed: row["verdict"] for seed, row in rows.items()} == {1: "nothing_found", 2: "error", 3: "nothing_found"}
     assert "killed" in rows[2]["error"]
+
+
+@pytest.mark.parametrize(("verdict", "asked"), [("nothing_found", ["nulls/1"]), ("explained", [])])
+def test_only_a_miss_is_fitted_from_the_truth(tmp_path, monkeypatch, verdict, asked):
+    told = [] if verdict == "nothing_found" else [{"effect": "bias", "rivals": []}]
+    monkeypatch.setattr(
+        runner,
+        "run_case",
+        lambda case, source: {**_row(case), "effects": ["bias"], "verdict": verdict, "causes": told, "reached": 60.0},
+    )
+    seen = []
+    monkeypatch.setattr(runner, "blame_of", lambda case, *_: seen.append(case.key) or {"blame": "search"})
+    with ThreadPoolExecutor(1) as executor:
+        run_study([Case("nulls", 1)], tmp_path / "out.jsonl", executor, blame=True)
+    (row,) = read_outcomes(tmp_path / "out.jsonl")
+    assert seen == asked
+    assert row.get("blame") == ("search" if asked else None)
+
+
+def _row(case):
+    return {"key": case.key, "source": "sim.campaign", **case.to_dict()}
