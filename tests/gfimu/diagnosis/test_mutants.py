@@ -82,11 +82,16 @@ def reference_ignored(patch):
     patch.setattr(segment.Segment, "residual", blind)
 
 
-def everything_is_explained(patch):
-    """Whatever is left, the best set of names is believed and measured."""
+def residuals_unjudged(patch):
+    """Whatever is left, the best set of names is believed; only the gate may withdraw it."""
     for module in (ENGINE, sys.modules["gfimu.diagnosis.conclusion"]):
         patch.setattr(module, "is_unknown", lambda *_: False)
         patch.setattr(module, "is_dominant", lambda *_: False)
+
+
+def everything_is_explained(patch):
+    """Neither what is left nor the gate withdraws the best set of names."""
+    residuals_unjudged(patch)
     believed = SimpleNamespace(withdrawn=False, why="", in_part=False)
     patch.setattr(ENGINE, "judge", lambda *_: believed, raising=False)  # the gate's judgement of what was found
 
@@ -142,7 +147,17 @@ def test_held_out_data_are_predicted_by_the_right_effect_and_not_by_what_is_near
     nearest = diagnosed(hidden, world)
     assert name not in {cause["effect"] for cause in nearest["causes"]}
     removed = removed_share(nearest)
+    assert nearest["causes"], nearest["verdict"]
     assert removed is None or removed < 0.5
+
+
+@pytest.mark.skipif(not hasattr(ENGINE, "judge"), reason="causes are not judged by their share of held-out data")
+def test_names_that_predict_no_held_out_data_are_withdrawn_whatever_the_residuals_say(monkeypatch):
+    """The other half of it, that they are reported without the gate, is the test above."""
+    hidden = CASES["outside-tacho_ripple-600-campaign-424"]
+    world = draw_world(hidden.case, hidden.source)
+    residuals_unjudged(monkeypatch)
+    assert diagnosed(hidden, world)["verdict"] == "unknown"
 
 
 _BY_SAMPLES = tuple(name for name, family in EFFECTS.items() if family.place in {"data", "noise"})
