@@ -21,7 +21,15 @@ from sim.effects import EFFECTS, Effect, make_effect
 from sim.motion import SpinMotion, SplineSpin
 from sim.twin import Twin
 
-__all__ = ["Measurement", "bias_instability", "detectability", "hidden_effect", "measure", "random_profile"]
+__all__ = [
+    "Measurement",
+    "bias_instability",
+    "detectability",
+    "discrete_parameters",
+    "hidden_effect",
+    "measure",
+    "random_profile",
+]
 
 _MG = STANDARD_GRAVITY / 1000.0
 _POWERS = (0.25, 0.5, 2.0, 4.0)
@@ -212,6 +220,13 @@ def hidden_effect(
         # A participation beyond 1 is no mounting any more.
         scale = min(scale, 1.0 / max(direction[0], 1e-12))
     return family.from_sizes(twin.array, scale * direction, shape)
+
+
+def discrete_parameters(
+    rng: np.random.Generator, twin: Twin, name: str, magnitude: NDArray[np.float64], duration: float, sample_rate: float
+) -> dict[str, Any]:
+    """Draw parameters of an effect without a continuous size, given the magnitude of the readings (n, c), m/s²."""
+    return _DISCRETE[name](rng, twin, magnitude, Measurement(duration, sample_rate))
 
 
 def _shape(rng: np.random.Generator, name: str, setting: Measurement) -> dict[str, float]:

@@ -1,4 +1,7 @@
-"""Run ``python -m sim.study run STUDY --out FILE.jsonl``, then ``python -m sim.study report FILE.jsonl --out DIR``."""
+"""Run ``python -m sim.study run STUDY --out FILE.jsonl``, then ``report FILE.jsonl --out DIR`` or ``compare FILE``.
+
+``run gate --out FILE.jsonl`` and ``compare FILE.jsonl`` compare an engine with the one of the study page, list by list.
+"""
 
 from __future__ import annotations
 
@@ -9,9 +12,15 @@ from typing import Any
 
 from gfimu.errors import GfimuError, InputError
 from sim.study.baselines import METHODS
-from sim.study.cases import STUDIES, study_cases
+from sim.study.cases import STUDIES, Case, study_cases
+from sim.study.compare import compare, load_outcomes
+from sim.study.gate import GATE, choose_gate, gate_cases
+from sim.study.outcome_file import read_outcomes
 from sim.study.report import summarise, write_report
-from sim.study.runner import open_executor, read_outcomes, run_study
+from sim.study.runner import open_executor, run_study
+
+STORED = "docs/diagnosis-study.jsonl.xz"
+"""Outcomes of the study page, seen from the project's root."""
 
 
 def _print_outcome(outcome: dict[str, Any]) -> None:
@@ -24,14 +33,45 @@ def _print_outcome(outcome: dict[str, Any]) -> None:
     sys.stdout.flush()
 
 
-def _run(options: argparse.Namespace) -> None:
+def _run(options: argparse.Namespace) -> int:
+    if GATE in options.studies and options.world:
+        raise InputError(f"{GATE} has generators of its own; leave out --world")
+    lists: list[tuple[list[Case], str]] = []
+    for study in options.studies:
+        if study == GATE:
+            by_source: dict[str, list[Case]] = {}
+            for case, source in gate_cases(options.first):
+                by_source.setdefault(source, []).append(case)
+            lists += [(cases, source) for source, cases in by_source.items()]
+        else:
+            lists.append((study_cases(study, options.first), options.world))
     with open_executor(options.workers, options.cluster) as executor:
-        for study in options.studies:
-            cases = study_cases(study, options.first)
-            run_study(cases, options.out, executor, source=options.world, method=options.method, tell=_print_outcome)
+        for cases, source in lists:
+            run_study(
+                cases,
+                options.out,
+                executor,
+                source=source,
+                method=options.method,
+                blame=options.blame,
+                tell=_print_outcome,
+            )
+    return 0
 
 
-def _report(options: argparse.Namespace) -> None:
+def _compare(options: argparse.Namespace) -> int:
+    old, new = options.files if len(options.files) == 2 else (STORED, options.files[0])
+    found = compare(load_outcomes(old), load_outcomes(new))
+    sys.stdout.write(f"{old} -> {new}\n\n{found.text}")
+    return 1 if found.left else 0
+
+
+def _choose_gate(options: argparse.Namespace) -> int:
+    sys.stdout.write("".join(f"{line}\n" for line in choose_gate(read_outcomes(options.outcomes))))
+    return 0
+
+
+def _report(options: argparse.Namespace) -> int:
     latest: dict[tuple[str, str, str], dict[str, Any]] = {}
     for file in options.outcomes:
         found = read_outcomes(file)
@@ -45,6 +85,7 @@ def _report(options: argparse.Namespace) -> None:
             sys.stdout.write(f"{path}\n")
     else:
         sys.stdout.write(summarise(outcomes))
+    return 0
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -52,14 +93,25 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m sim.study", description=__doc__)
     commands = parser.add_subparsers(required=True)
     run = commands.add_parser("run", help="diagnose the hidden worlds of studies")
-    run.add_argument("studies", nargs="+", metavar="STUDY", choices=STUDIES, help=", ".join(STUDIES))
+    run.add_argument("studies", nargs="+", metavar="STUDY", choices=[*STUDIES, GATE], help=", ".join([*STUDIES, GATE]))
     run.add_argument("--out", required=True, help="file of outcomes (JSON lines); a run that was cut off is resumed")
     run.add_argument("--first", type=int, help="only so many cases of each study")
     run.add_argument("--workers", type=int, default=2)
     run.add_argument("--cluster", default="", help="address of a Dask scheduler")
     run.add_argument("--world", default="", help="FILE.py:FUNCTION of another generator of worlds")
     run.add_argument("--method", default="", choices=["", *METHODS], help="a simpler method instead of the diagnosis")
+    run.add_argument("--blame", action="store_true", help="fit each miss from the truth: search or evidence")
     run.set_defaults(work=_run)
+    comparison = commands.add_parser(
+        "compare", help="two files of outcomes, list by list; exit code 1 where a list leaves its interval"
+    )
+    comparison.add_argument(
+        "files", nargs="+", metavar="[OLD] NEW", help=f"files of outcomes; OLD is {STORED} by default"
+    )
+    comparison.set_defaults(work=_compare)
+    choice = commands.add_parser("choose-gate", help="print the list of the gate, chosen by the time that cases took")
+    choice.add_argument("outcomes", nargs="?", default=STORED, help=f"file of outcomes; {STORED} by default")
+    choice.set_defaults(work=_choose_gate)
     report = commands.add_parser("report", help="tables and figures from outcomes")
     report.add_argument("outcomes", nargs="+", help="files of outcomes; what a later one has again replaces an earlier")
     report.add_argument(
@@ -69,12 +121,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     report.set_defaults(work=_report)
     options = parser.parse_args(arguments)
+    if options.work is _compare and len(options.files) > 2:
+        parser.error("compare takes one file or two: [OLD] NEW")
     try:
-        options.work(options)
+        return int(options.work(options))
     except GfimuError as error:
         sys.stderr.write(f"{error}\n")
         return 2
-    return 0
 
 
 if __name__ == "__main__":

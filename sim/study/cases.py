@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from gfimu.errors import unknown_name
-from sim.effects import EFFECTS, ENCODER_EFFECTS
+from sim.effects import BODY_EFFECTS, EFFECTS, ENCODER_EFFECTS
 
-__all__ = ["EXOTICS", "STUDIES", "Case", "study_cases"]
+__all__ = ["BODY_PARTS", "EXOTICS", "STUDIES", "Case", "study_cases"]
 
 SIZES = (15.0, 60.0, 300.0, 1500.0, 6000.0)
 """Sizes as d′: from just detectable to gross."""
@@ -32,6 +32,9 @@ EXOTICS = (
     "backlash",
 )
 """Effects outside the library, known to the independent generator only."""
+
+BODY_PARTS = {"mimu4444": "mpu9150", "cube12": "adxl345"}
+"""Arrays that are thrown about as free bodies, and the part of their chips."""
 
 _TAKEN_OUT = (
     "table_tilt",
@@ -87,6 +90,8 @@ class Case:
         Effect taken out of the library, if any.
     encoder_counts : int
         Counts per revolution of an encoder that drives the twin instead of the tachometer; 0: none.
+    body : bool
+        Whether the array is a free body with a gyro instead of a rig on a table.
     """
 
     study: str
@@ -101,6 +106,7 @@ class Case:
     residue: bool = False
     without: str = ""
     encoder_counts: int = 0
+    body: bool = False
 
     @property
     def key(self) -> str:
@@ -297,6 +303,30 @@ def _exotics() -> list[Case]:
     ]
 
 
+_BODY_HIDDEN = tuple(
+    name
+    for name in BODY_EFFECTS
+    # Temperature is constant in a tumble; noise, rounding, clipping and lost frames are the same as on a table.
+    if name not in {"bias_temperature", "noise", "coarse_resolution", "saturation", "stuck_channel", "dropped_frames"}
+)
+
+
+def _free_body() -> list[Case]:
+    """Return free bodies with a gyro: in turn nothing hidden, and every effect once at each of two sizes."""
+    cases = []
+    hidden = [(name, size) for size in (300.0, 1500.0) for name in _BODY_HIDDEN]
+    for number in range(len(hidden) * 3 // 2):
+        pair, step = divmod(number, 3)
+        setting = {"array": list(BODY_PARTS)[number % 2], "body": True, "duration": 20.0, **_noise_of(number)}
+        if step == 0:
+            cases.append(Case("free_body", 85_000 + number, **setting))
+            continue
+        name, size = hidden[2 * pair + step - 1]
+        sized = name not in SIZELESS
+        cases.append(Case("free_body", 85_000 + number, (name,), size if sized else 0.0, **setting))
+    return cases
+
+
 STUDIES: dict[str, Callable[[], list[Case]]] = {
     "singles": _singles,
     "fresh_singles": _fresh_singles,
@@ -323,6 +353,7 @@ STUDIES: dict[str, Callable[[], list[Case]]] = {
     "coarse_encoders": lambda: _elsewhere("coarse_encoders", 68_000, {"encoder_counts": 360}),
     "left_out": _left_out,
     "exotics": _exotics,
+    "free_body": _free_body,
 }
 """Every study by name; each call returns the same cases."""
 

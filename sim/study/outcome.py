@@ -23,10 +23,11 @@ from gfimu.units import STANDARD_GRAVITY
 from sim.campaign import Measurement, detectability, hidden_effect, measure, random_profile
 from sim.effects import Effect, make_effect
 from sim.motion import SpinMotion
+from sim.study.bodies import body_twin, draw_body
 from sim.study.cases import Case
 from sim.twin import Twin
 
-__all__ = ["HiddenWorld", "draw_world", "outcome_of", "run_case"]
+__all__ = ["HiddenWorld", "SmallerLibrary", "draw_world", "outcome_of", "run_case"]
 
 _MG = STANDARD_GRAVITY / 1000.0
 _TURN = 2 * np.pi
@@ -61,7 +62,7 @@ class HiddenWorld:
 
 
 @dataclass(frozen=True)
-class _SmallerLibrary(Twin):
+class SmallerLibrary(Twin):
     """A twin whose library of effects lacks one."""
 
     without: str = ""
@@ -92,7 +93,10 @@ def draw_world(case: Case, source: str = "") -> HiddenWorld:
         ``FILE.py:FUNCTION`` of a generator of its own, called as ``function(seed, effects, size, **measurement)``;
         by default the project's own campaign.
     """
-    twin: Twin = _SmallerLibrary(
+    if case.body:
+        recording, thrown, least = draw_body(case)
+        return HiddenWorld(recording, body_twin(case), tuple((one.name, one.parameters) for one in thrown), least)
+    twin: Twin = SmallerLibrary(
         array=AccelerometerArray.load(case.array),
         array_name=case.array,
         sample_rate=case.sample_rate,

@@ -15,7 +15,7 @@ from scipy.stats import beta
 from gfimu.atomic_file import write_text
 from gfimu.errors import InputError
 from sim.study.figures import draw_confusion, draw_detection, draw_reliability
-from sim.study.runner import keep_outcomes
+from sim.study.outcome_file import keep_outcomes
 
 __all__ = ["Tally", "rate_with_interval", "score", "summarise", "visible", "write_report"]
 

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import json
-import lzma
 import multiprocessing
 import os
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import BrokenExecutor, Executor, ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
 from functools import partial
 from multiprocessing.queues import SimpleQueue
@@ -18,16 +17,18 @@ from typing import Any
 
 import numpy as np
 
-from gfimu.atomic_file import atomic_path
 from gfimu.errors import InputError
 from sim.study.baselines import run_baseline
+from sim.study.blame import blame_of, is_miss
 from sim.study.cases import Case
 from sim.study.outcome import run_case
+from sim.study.outcome_file import read_outcomes
 
-__all__ = ["keep_outcomes", "open_executor", "read_outcomes", "run_study"]
+__all__ = ["open_executor", "run_study"]
 
 _WATCH_PERIOD = 2.0
-_PACKED = ".xz"
+_SUSPECTS = 8  # cases a broken pool may have been at: more than it has workers, and few to run one by one
+_Work = Callable[[Case, str], dict[str, Any]]
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
@@ -81,43 +82,6 @@ def _end_with_parent(parent: int) -> None:
     threading.Thread(target=watch, daemon=True).start()
 
 
-def read_outcomes(path: str | Path) -> list[dict[str, Any]]:
-    """Read the outcomes of a study, packed (``.xz``) or not; a last line cut off by an interruption is left out."""
-    file = Path(path)
-    if not file.exists():
-        return []
-    try:
-        packed = file.suffix == _PACKED
-        text = lzma.decompress(file.read_bytes()).decode() if packed else file.read_text(encoding="utf-8")
-    except (lzma.LZMAError, UnicodeDecodeError):
-        raise InputError(f"{file}: not a file of outcomes; give one that `python -m sim.study run` wrote") from None
-    outcomes = []
-    for line in text.splitlines():
-        try:
-            outcomes.append(json.loads(line))
-        except json.JSONDecodeError:
-            continue
-    return outcomes
-
-
-def keep_outcomes(outcomes: Sequence[Mapping[str, Any]], path: str | Path) -> Path:
-    """Write outcomes packed (``.xz``), numbers to six digits, to make the tables again from; return the path."""
-    lines = [json.dumps(_rounded(outcome)) + "\n" for outcome in outcomes]
-    file = Path(path)
-    file.parent.mkdir(parents=True, exist_ok=True)
-    with atomic_path(file) as temporary:
-        temporary.write_bytes(lzma.compress("".join(lines).encode(), preset=9))
-    return file
-
-
-def _rounded(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _rounded(item) for key, item in value.items()}
-    if isinstance(value, list):
-        return [_rounded(item) for item in value]
-    return float(f"{value:.6g}") if isinstance(value, float) else value
-
-
 def run_study(
     cases: Sequence[Case],
     out: str | Path,
@@ -125,6 +89,7 @@ def run_study(
     *,
     source: str = "",
     method: str = "",
+    blame: bool = False,
     tell: Callable[[dict[str, Any]], None] | None = None,
 ) -> int:
     """Run the cases whose outcome is not yet in the file; return how many were run.
@@ -141,25 +106,66 @@ def run_study(
         Generator of the worlds, as in `draw_world`.
     method : str
         A simpler method instead of the diagnosis (`sim.study.baselines.METHODS`).
+    blame : bool
+        Whether each miss is fitted again from the truth (`sim.study.blame`), which takes as long as the case did.
     tell : callable, optional
         Called with each outcome as it comes.
     """
     file = Path(out)
     file.parent.mkdir(parents=True, exist_ok=True)
-    work = partial(run_baseline, method) if method else run_case
+    work: _Work = partial(run_baseline, method) if method else partial(_run_and_blame, blame=blame)
     done = {(outcome["key"], outcome["source"], outcome.get("method", "")) for outcome in read_outcomes(file)}
     open_cases = [case for case in cases if (case.key, source or "sim.campaign", method) not in done]
     torn = file.exists() and file.stat().st_size > 0 and not file.read_bytes().endswith(b"\n")
     with file.open("a", encoding="utf-8") as lines:
         if torn:
             lines.write("\n")
-        for future in as_completed([executor.submit(work, case, source) for case in open_cases]):
-            outcome = future.result()
+        for outcome in _outcomes(executor, work, open_cases, source):
             lines.write(json.dumps(_finite(outcome), allow_nan=False) + "\n")
             lines.flush()
             if tell is not None:
                 tell(outcome)
     return len(open_cases)
+
+
+def _run_and_blame(case: Case, source: str, *, blame: bool) -> dict[str, Any]:
+    outcome = run_case(case, source)
+    if blame and is_miss(outcome):
+        outcome |= blame_of(case, source, outcome)
+    return outcome
+
+
+def _outcomes(executor: Executor, work: _Work, cases: Sequence[Case], source: str) -> Iterator[dict[str, Any]]:
+    """Yield outcomes as they come; where a worker was killed, which breaks its pool, go on in pools of our own.
+
+    The cases that it may have been at are run again one by one: the one that kills its worker again says so.
+    """
+    futures = {executor.submit(work, case, source): case for case in cases}
+    broken = []
+    for future in as_completed(futures):
+        try:
+            yield future.result()
+        except BrokenExecutor:
+            broken.append(futures[future])
+    lost = [case for case in cases if case in broken]
+    for case in lost[:_SUSPECTS]:
+        with open_executor(1) as alone:
+            try:
+                outcome = alone.submit(work, case, source).result()
+            except BrokenExecutor:
+                outcome = _died(case, source)
+        yield outcome
+    if lost[_SUSPECTS:]:
+        with open_executor(getattr(executor, "_max_workers", 1)) as again:
+            yield from _outcomes(again, work, lost[_SUSPECTS:], source)
+
+
+def _died(case: Case, source: str) -> dict[str, Any]:
+    """Return the row of a case whose worker was killed twice."""
+    what = {"verdict": "error", "error": "the worker process was killed (out of memory?)", "causes": []}
+    nothing: dict[str, Any] = {"share_of_excess_removed": None, "unexplained": False, "signature": "", "noise": {}}
+    times = {"wall_s": 0.0, "processor_s": 0.0}
+    return {"key": case.key, "source": source or "sim.campaign", **case.to_dict(), **what, **nothing, **times}
 
 
 def _finite(value: Any) -> Any:

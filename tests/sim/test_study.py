@@ -10,8 +10,8 @@ from gfimu.errors import InputError
 from sim.study.__main__ import main
 from sim.study.cases import Case
 from sim.study.outcome import draw_world
+from sim.study.outcome_file import read_outcomes
 from sim.study.report import rate_with_interval, reliability, score, summarise, write_report
-from sim.study.runner import read_outcomes
 
 
 def outcome(effects=(), causes=(), verdict="nothing_found", **more):

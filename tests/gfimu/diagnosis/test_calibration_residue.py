@@ -176,7 +176,7 @@ def test_a_search_left_for_a_residue_that_is_none_is_taken_up_again(monkeypatch)
 
 
 def test_a_mode_beside_a_residue_is_named_alone():
-    world = draw_world(Case("reduced", 701, ("resonance",), 1500.0, residue=True, duration=20.0))
+    world = draw_world(Case("reduced", 701, ("resonance",), 1500.0, residue=True, duration=14.0))
     found = diagnose([world.recording], world.twin)
     assert [cause.effect for cause in found.causes] == ["resonance"]
     ((_, truth),) = world.truth

@@ -32,13 +32,13 @@ def test_stretches_are_spread_and_every_run_gives_one(runs, most, chosen):
 
 @pytest.fixture
 def short_stretches(monkeypatch):
-    monkeypatch.setattr(stretches, "SEGMENT_DURATION", 10.0)
+    monkeypatch.setattr(stretches, "SEGMENT_DURATION", 6.0)
 
 
 def test_a_cause_found_in_part_is_measured_on_all(short_stretches, monkeypatch):
     twin = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
     hidden = make_effect("table_tilt", {"x_rad": 2e-3, "y_rad": -1e-3})
-    recording = measure(np.random.default_rng(11), twin, [hidden], Measurement(duration=50.0))
+    recording = measure(np.random.default_rng(11), twin, [hidden], Measurement(duration=30.0))
     whole = diagnose([recording], twin)
     searched = []
     explain = long_run.explain
@@ -62,15 +62,15 @@ def test_a_cause_found_in_part_is_measured_on_all(short_stretches, monkeypatch):
 def test_nothing_is_found_in_a_long_quiet_recording(short_stretches, monkeypatch):
     twin = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
     monkeypatch.setattr(long_run, "MOST_SEARCHED", 2)
-    recording = measure(np.random.default_rng(12), twin, [], Measurement(duration=50.0))
+    recording = measure(np.random.default_rng(12), twin, [], Measurement(duration=30.0))
     assert diagnose([recording], twin).verdict == "nothing_found"
 
 
 def test_what_has_no_name_is_described_on_some_stretches_and_fitted_to_all(short_stretches, monkeypatch):
     twin = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
     rng = np.random.default_rng(13)
-    motion = random_profile(rng, 50.0)
-    run = measure(rng, twin, [], Measurement(duration=50.0), motion=motion)
+    motion = random_profile(rng, 30.0)
+    run = measure(rng, twin, [], Measurement(duration=30.0), motion=motion)
     readings = run.readings.copy()
     readings[:, 4] += 0.004 * motion.at(run.t_s).rate ** 3
     monkeypatch.setattr(long_run, "MOST_SEARCHED", 2)
@@ -86,7 +86,7 @@ def test_the_noise_of_a_long_recording_is_learnt_from_some_stretches_of_each_run
     rng = np.random.default_rng(14)
     tachos = (0.02, 0.05)
     runs = [
-        prepare_run(measure(rng, twin, [], Measurement(duration=50.0, tacho_noise=noise)), twin) for noise in tachos
+        prepare_run(measure(rng, twin, [], Measurement(duration=30.0, tacho_noise=noise)), twin) for noise in tachos
     ]
     segments = stretches.make_segments(twin, runs)
     for segment in segments:

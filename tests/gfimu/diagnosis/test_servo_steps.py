@@ -15,15 +15,15 @@ from sim.effects import make_effect
 from sim.motion import SpinState
 from sim.twin import Twin
 
-DURATION = 20.0
+DURATION = 14.0
 
 
 class ServoSteps:
     """Sum of the responses of a critically damped servo to steps of the commanded rate, in closed form."""
 
-    def __init__(self, rng, *, bandwidth=3.0, top_rate=8.0, every=2.5):
+    def __init__(self, rng, *, duration=DURATION, bandwidth=3.0, top_rate=8.0, every=2.5):
         self.natural = 2 * np.pi * bandwidth
-        self.times = np.arange(4.0, DURATION + 1.0, every)
+        self.times = np.arange(4.0, duration + 1.0, every)
         self.steps = np.diff(rng.uniform(-top_rate, top_rate, len(self.times)), prepend=0.0)
 
     def at(self, t):
@@ -79,8 +79,9 @@ def test_a_recording_held_out_may_have_corners_too():
     rng = np.random.default_rng(8)
     twin = mounted(0.12)
     hidden = [make_effect("eccentricity", {"x_m": 0.004, "y_m": -0.003})]
-    smooth = measure(rng, twin, hidden, Measurement(duration=DURATION))
-    cornered = measure(rng, twin, hidden, Measurement(duration=DURATION), motion=ServoSteps(rng))
+    setting = Measurement(duration=20.0)
+    smooth = measure(rng, twin, hidden, setting)
+    cornered = measure(rng, twin, hidden, setting, motion=ServoSteps(rng, duration=setting.duration))
     found = diagnose([smooth], twin, held_out=[cornered])
     assert [cause.effect for cause in found.causes] == ["eccentricity"]
     assert found.gain.held_out == "another recording"

@@ -37,7 +37,7 @@ def test_a_search_is_left_for_a_walk_and_for_nothing_else(effects, left):
 
 
 def test_a_search_that_is_left_for_a_walk_finds_it_and_what_is_beside_it():
-    world = draw_world(Case("walks", 91002, ("bias_random_walk", "eccentricity"), 1000.0, duration=40.0))
+    world = draw_world(Case("walks", 91002, ("bias_random_walk", "eccentricity"), 1000.0, duration=20.0))
     found = diagnose([world.recording], world.twin)
     assert {cause.effect for cause in found.causes} == {"bias_random_walk", "eccentricity"}
 
@@ -84,7 +84,7 @@ def test_what_no_walk_explains_starts_no_search_for_one(monkeypatch):
     """An axis that nods, in a library without it, looks like wandering biases at first sight."""
     world = draw_world(
         Case(
-            "left_out", 80045, ("axis_wobble",), 1000.0, duration=40.0, bias_instability_mg=0.05, without="axis_wobble"
+            "left_out", 80045, ("axis_wobble",), 1000.0, duration=20.0, bias_instability_mg=0.05, without="axis_wobble"
         )
     )
     searches = []
@@ -101,7 +101,7 @@ def test_what_no_walk_explains_starts_no_search_for_one(monkeypatch):
 
 
 def test_slow_causes_that_leave_no_walk_start_no_search_for_one(monkeypatch):
-    world = draw_world(Case("pairs", 30112, ("gain_drift", "warm_up"), 300.0, duration=40.0))
+    world = draw_world(Case("pairs", 30112, ("gain_drift", "warm_up"), 300.0, duration=20.0))
     searches = []
 
     def counted(*args, **kwargs):
