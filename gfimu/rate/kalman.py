@@ -164,7 +164,7 @@ class KalmanRateFilter:
         self.lag = points - 2 - position
         self._gyro = gyro
         c, d = array.n_channels, self.tables.n_null
-        self._axes = ((0,) * (9 + d + 3 * gyro), (0,) * d, (0,) * (3 * gyro))
+        self._sizes = (9 + d + 3 * gyro, d, 3 * gyro)  # of the state, the null space and the gyro
         rest = self.settings.rest
         self._tuning = Tuning(
             period,
@@ -196,14 +196,14 @@ class KalmanRateFilter:
         self._tally = np.zeros((3, c), dtype=np.int64)
         self._blind = 0
         self._gaps = 0
-        self._record = empty_record(0, *self._axes)
+        self._record = empty_record(0, *self._sizes)
         self._kept: list[RecursionState] = []
         self._taken_back: list[tuple[int, int]] = []  # rows of the buffer, from behind the last rest to its end's block
         self._last_time = -np.inf
 
     def _start(self) -> RecursionState:
         """State before the first sample."""
-        c, d, n = self.array.n_channels, self.tables.n_null, len(self._axes[0])
+        c, d, n = self.array.n_channels, self.tables.n_null, self._sizes[0]
         if self.settings.start_omega is None:
             raise InputError("a single filter needs a start; use LiveRateFilter or filter_rate for an unknown one")
         x = np.zeros(n)
@@ -320,19 +320,19 @@ class KalmanRateFilter:
         """Smooth the recording of `record_run`: rates (n, 3) and covariances (n, 3, 3)."""
         n = self._done
         omega, covariance = np.empty((n, 3)), np.empty((n, 6))
-        size = len(self._axes[0])
+        size = self._sizes[0]
         adjoint, curvature = np.zeros(size), np.zeros((size, size))
-        record = empty_record(_SMOOTHER_BLOCK, *self._axes)
+        record = empty_record(_SMOOTHER_BLOCK, *self._sizes)
         ignored = empty_output(_SMOOTHER_BLOCK)
         for number in range(len(self._kept) - 1, -1, -1):
             first = number * _SMOOTHER_BLOCK
             last = min(first + _SMOOTHER_BLOCK, n)
             forward(
                 self._buffer, first, last, n, self._compiled_tables, self._tuning, self._kept[number].copy(), ignored,
-                -first, record, *self._axes,
+                -first, record,
             )  # fmt: skip
             backward(
-                record, last - first, self._tuning.ringing, adjoint, curvature, omega, covariance, first, self._axes[0]
+                record, last - first, self._tuning.ringing, adjoint, curvature, omega, covariance, first
             )
         return omega, full_covariance(covariance)
 
@@ -398,7 +398,7 @@ class KalmanRateFilter:
         while reached < until:
             reached = forward(
                 self._buffer, reached, until, self._received, self._compiled_tables, self._tuning, self.state, out,
-                filled - first, self._record, *self._axes,
+                filled - first, self._record,
             )  # fmt: skip
             if self.state.counts[RETURN]:
                 self._take_back(reached, out, filled + reached - first - 1)
@@ -419,7 +419,7 @@ class KalmanRateFilter:
         again = empty_output(reached - first)
         forward(
             self._buffer, first, reached, self._received, self._compiled_tables,
-            self._tuning._replace(rest_window=0, likelihood=False), state, again, -first, self._record, *self._axes,
+            self._tuning._replace(rest_window=0, likelihood=False), state, again, -first, self._record,
         )  # fmt: skip
         state.counts[BLOCK] = 0
         state.block_x[:] = state.x
@@ -465,11 +465,9 @@ def empty_output(n: int) -> RecursionOutput:
     )  # fmt: skip
 
 
-def empty_record(
-    length: int, states: tuple[int, ...], null_axes: tuple[int, ...], gyro_axes: tuple[int, ...]
-) -> Record:
-    """Record for the backward pass over ``length`` samples."""
-    n, updates = len(states), 2 * len(null_axes) + len(gyro_axes) + 3
+def empty_record(length: int, n: int, null_axes: int, gyro_axes: int) -> Record:
+    """Record for the backward pass over ``length`` samples of a state of size ``n``."""
+    updates = 2 * null_axes + gyro_axes + 3
     return Record(
         np.empty((length, 3)), np.empty((length, 3, n)), np.empty((length, 3, n)), np.empty(length, dtype=np.int64),
         np.empty((length, updates, n)), np.empty((length, updates, n)), np.empty((length, updates)),

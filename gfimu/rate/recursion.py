@@ -22,7 +22,7 @@ to second order while ω is not much larger than its uncertainty: with P the cov
 of row i, z_i has mean ωᵀB_iω + tr(B_i P) and the variance 2 tr(B_i P B_i P) more than the linear one.
 
 Everything that a sample needs is in arrays, so a run can stop after any sample and go on with the same answer. Sizes
-are lengths of tuples: constants for the compiler, which unrolls the loops over the state.
+are those of the arrays: one compiled form serves every array of accelerometers, with and without a gyro.
 """
 
 from __future__ import annotations
@@ -45,19 +45,19 @@ _SLOW = 1e-3  # tr P above this share of |ω|² switches the second-order terms 
 
 @njit(**COMPILE)
 def forward(  # type: ignore[no-untyped-def]
-    data, first, last, closing, tables, tuning, state, out, offset, record, states, null_axes, gyro_axes
+    data, first, last, closing, tables, tuning, state, out, offset, record
 ):
     """Run the filter over the samples ``first`` to ``last − 1``; returns where it stopped.
 
     It stops behind a sample at which a rest ended whose last blocks are in doubt (``state.counts[RETURN]``).
 
     ``closing`` is the number of samples that the stencils may use; ``offset`` is added to a sample's place to find
-    its place in ``out``; the record is filled when its arrays are not empty. ``states``, ``null_axes`` and
-    ``gyro_axes`` are tuples as long as the state, the null space and the gyro.
+    its place in ``out``; the record is filled when its arrays are not empty.
     """
-    n = len(states)
-    d = len(null_axes)
     x = state.x
+    n = x.shape[0]
+    d = data.z.shape[1]
+    gyro_axes = n - 9 - d  # 0 or 3
     covariance = state.covariance
     keep = record.updates.shape[0] > 0
     points = tuning.weights.shape[1]
@@ -332,11 +332,11 @@ def forward(  # type: ignore[no-untyped-def]
                 if keep:
                     _remember(record, row, used_rows, h, ph, inverse, innovation)
                     used_rows += 1
-                _apply(x, covariance, ph, inverse, innovation, states)
+                _apply(x, covariance, ph, inverse, innovation)
                 nis += innovation * innovation * inverse
                 determinant *= variance
             dof = measured_rows
-        if len(gyro_axes) > 0:
+        if gyro_axes > 0:
             for a in range(3):
                 if np.isfinite(data.gyro[k, a]):
                     for r in range(n):
@@ -350,7 +350,7 @@ def forward(  # type: ignore[no-untyped-def]
                         h[6 + d + a] = 1.0
                         _remember(record, row, used_rows, h, ph, inverse, innovation)
                         used_rows += 1
-                    _apply(x, covariance, ph, inverse, innovation, states)
+                    _apply(x, covariance, ph, inverse, innovation)
                     nis += innovation * innovation * inverse
                     determinant *= variance
                     dof += 1
@@ -369,7 +369,7 @@ def forward(  # type: ignore[no-untyped-def]
                     h[a] = 1.0
                     _remember(record, row, used_rows, h, ph, inverse, innovation)
                     used_rows += 1
-                _apply(x, covariance, ph, inverse, innovation, states)
+                _apply(x, covariance, ph, inverse, innovation)
             if settling:
                 for i in range(d):
                     for r in range(n):
@@ -383,7 +383,7 @@ def forward(  # type: ignore[no-untyped-def]
                         h[6 + i] = 1.0
                         _remember(record, row, used_rows, h, ph, inverse, innovation)
                         used_rows += 1
-                    _apply(x, covariance, ph, inverse, innovation, states)
+                    _apply(x, covariance, ph, inverse, innovation)
         state.counts[SAMPLES] += 1
         if keep:
             record.updates[row] = used_rows
@@ -459,9 +459,9 @@ def _renew_noise(x, covariance, noise, factor, ringing, half):  # type: ignore[n
 
 
 @njit(**COMPILE)
-def _apply(x, covariance, ph, inverse, innovation, states):  # type: ignore[no-untyped-def]
+def _apply(x, covariance, ph, inverse, innovation):  # type: ignore[no-untyped-def]
     """Update by one scalar measurement: x += P h e/S, P −= P h hᵀP/S."""
-    n = len(states)
+    n = len(x)
     root = np.sqrt(inverse)
     pull = innovation * inverse
     for r in range(n):
