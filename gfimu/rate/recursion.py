@@ -35,7 +35,6 @@ from gfimu.rate.model_errors import follow_differences, inflation_of, undersampl
 from gfimu.rate.recursion_data import BLOCK, COMPILE, LAST_GOOD, RETURN, SAMPLES, STARTED, TIME, WALK
 from gfimu.rate.rest_recursion import keep_rest, rest_block
 from gfimu.rate.second_order import second_order
-from gfimu.rate.unrolled import step as _step_twelve
 
 __all__ = ["forward"]
 
@@ -68,7 +67,6 @@ def forward(  # type: ignore[no-untyped-def]
     moved = np.zeros(3)
     rows = np.zeros((3, n))
     product = np.zeros((3, n))
-    turned = np.zeros(3)
     settles = state.settles[0]
     noise_row = n - 3
     ringing = tuning.ringing
@@ -76,13 +74,10 @@ def forward(  # type: ignore[no-untyped-def]
     slopes = np.zeros((max(d, 1), 3))
     innovations = np.zeros(d)
     variances = np.zeros(d)
-    unrolled = n == 15 and d == 6
     alpha = data.alpha
-    z = data.z
     even_weights = tuning.weights
     plain_set = tables.plain[0]
     noise_of_all = tables.alpha_noise[0]
-    sensitivity_of_all = tables.null_sensitivity[0]
     noise_power = noise_of_all[0, 0] + noise_of_all[1, 1] + noise_of_all[2, 2]
     inflated = tuning.scale_variance + tuning.placement_variance + tuning.timing_variance > 0.0
     forget = min(1.0, tuning.period / _WALK_MEMORY)
@@ -96,7 +91,6 @@ def forward(  # type: ignore[no-untyped-def]
         nis = 0.0
         dof = 0
         determinant = 1.0
-        stepped = False
         noise_set = place if sensed else 0
         if inflated and sensed:
             inflation = inflation_of(data, k, state, tuning, x[0] * x[0] + x[1] * x[1] + x[2] * x[2])
@@ -126,7 +120,6 @@ def forward(  # type: ignore[no-untyped-def]
                     s0 += weight * alpha[start + j, 0]
                     s1 += weight * alpha[start + j, 1]
                     s2 += weight * alpha[start + j, 2]
-                stepped = unrolled and not keep and not (settles and state.counts[SAMPLES] < tuning.rest_window)
             else:
                 start, used = interval_weights(data, tuning, k, closing, weights)
                 for j in range(used):
@@ -138,15 +131,7 @@ def forward(  # type: ignore[no-untyped-def]
                     s0 += weights[j] * alpha[node, 0]
                     s1 += weights[j] * alpha[node, 1]
                     s2 += weights[j] * alpha[node, 2]
-            if stepped:
-                turned[0] = s0
-                turned[1] = s1
-                turned[2] = s2
-                nis, determinant = _step_twelve(
-                    x, covariance, turned, step, ringing, noise_of_all, inflation, sensitivity_of_all, z, k, _SLOW
-                )
-                dof = d
-            elif clean:
+            if clean:
                 for r in range(n):
                     covariance[0, r] += carried * covariance[noise_row, r] - step * covariance[3, r]
                     covariance[1, r] += carried * covariance[noise_row + 1, r] - step * covariance[4, r]
@@ -217,11 +202,10 @@ def forward(  # type: ignore[no-untyped-def]
                         mean = 0.5 * (covariance[a, b] + covariance[b, a])
                         covariance[a, b] = mean
                         covariance[b, a] = mean
-            if not stepped:
-                x[0] += s0 - step * x[3] + carried * x[noise_row]
-                x[1] += s1 - step * x[4] + carried * x[noise_row + 1]
-                x[2] += s2 - step * x[5] + carried * x[noise_row + 2]
-                _renew_noise(x, covariance, tables.alpha_noise[noise_set], (1.0 + inflation) * renewed, ringing, half)
+            x[0] += s0 - step * x[3] + carried * x[noise_row]
+            x[1] += s1 - step * x[4] + carried * x[noise_row + 1]
+            x[2] += s2 - step * x[5] + carried * x[noise_row + 2]
+            _renew_noise(x, covariance, tables.alpha_noise[noise_set], (1.0 + inflation) * renewed, ringing, half)
             extra = 0.0
             if not sensed:  # α is held: its wandering adds up
                 age = data.t[k] - state.scalars[LAST_GOOD]
@@ -270,7 +254,7 @@ def forward(  # type: ignore[no-untyped-def]
         # In the first block after a start at rest ω is known from the start alone and drifts with the unknown bias of
         # α: far too uncertain for a linearised z. If the block turns out as rest, the mean of z is used at its end.
         settling = tuning.rest_window > state.counts[SAMPLES] and settles
-        if sensed and d > 0 and not settling and not stepped:
+        if sensed and d > 0 and not settling:
             plain = place == 0
             measured_rows = d if plain else tables.null_count[place]
             sensitivity = tables.null_sensitivity[place]
