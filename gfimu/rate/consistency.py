@@ -1,0 +1,247 @@
+"""Whether a rate filter's innovations are as large as it states: χ² tests of the whole run and of each second.
+
+With a right model the normalised innovations squared (NIS) of a sample are χ² with one degree of freedom per
+combination that was compared, independent of those of other samples (Bar-Shalom, Li & Kirubarajan, Estimation with
+Applications to Tracking and Navigation, 2001, ch. 5.4). Their sum over N degrees of freedom is χ² with N.
+
+A real chip has errors that the filter's white noise and constant bias don't cover: its gain and its axes are known to
+its data sheet's typical deviation only, and its bias changes with temperature. They move the innovations in
+proportion to how far the readings have moved since the start. With g_i such an error of channel i in its standard
+deviations, the sum grows by Σ g_i² λ_i, where λ_i is the energy that one standard deviation puts into the null space.
+That is a weighted sum of χ² variables with one degree of freedom each, here taken as the gamma distribution of its
+mean Σ λ_i and variance 2 Σ λ_i² (Satterthwaite). The bound is the χ² quantile plus the quantile of that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2, gamma
+
+from gfimu.array import AccelerometerArray
+from gfimu.errors import InputError
+from gfimu.part_limits import PartLimits
+from gfimu.rate.result import RateEstimate
+from gfimu.rate.sensing import ChannelTables, SensorErrors
+
+__all__ = ["FALSE_ALARM", "Consistency", "judge_consistency", "slow_error_energy"]
+
+FALSE_ALARM = 1e-4
+"""Probability that a run whose sensors are as stated is called inconsistent, at most, by each of the two tests."""
+
+_WINDOW_S = 1.0
+_SEARCHED = 200_000  # samples in which the channel is looked for
+_SETTLED = 0.5  # of the excess has to go with a channel that is named alone
+
+
+@dataclass(frozen=True)
+class Consistency:
+    """How the innovations of a filter compare with what it states.
+
+    Parameters
+    ----------
+    nis : float
+        Mean normalised innovation squared per degree of freedom, over the run.
+    expected : float
+        What a right model gives: 1.
+    bound : float
+        Largest mean that noise and channels within their data sheets' typical deviations give, with a probability of
+        1 − ``false_alarm``.
+    noise_bound : float
+        The same of noise alone. A mean between the two says that the stated standard deviation is too small by about
+        √nis, and that a calibration would mend it.
+    worst_second, worst_second_bound : float
+        The mean over the second that exceeds its own bound most, and that bound; NaN without a whole second.
+    worst_second_at_s : float
+        Time at which it begins, s.
+    consistent : bool
+        Whether both means are within their bounds.
+    worst_channel : str or None
+        The channel without which the innovations shrink most, if they are inconsistent and that removes most of it.
+    nis_without_worst : float
+        The mean without it; NaN if none was looked for.
+    degrees_of_freedom : int
+        Combinations that were compared, over all samples.
+    false_alarm : float
+        Probability of calling a right model inconsistent, by each of the two tests.
+    """
+
+    nis: float
+    expected: float
+    bound: float
+    noise_bound: float
+    worst_second: float
+    worst_second_bound: float
+    worst_second_at_s: float
+    consistent: bool
+    worst_channel: str | None
+    nis_without_worst: float
+    degrees_of_freedom: int
+    false_alarm: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the figures by name, for JSON; None for those that are not known."""
+        return {
+            name: None if isinstance(value, float) and not np.isfinite(value) else value
+            for name, value in asdict(self).items()
+        }
+
+
+def judge_consistency(
+    array: AccelerometerArray,
+    readings: NDArray[np.float64],
+    errors: SensorErrors,
+    found: RateEstimate,
+    *,
+    temperature: NDArray[np.float64] | None = None,
+    filter_again: Callable[[slice, NDArray[np.float64]], RateEstimate] | None = None,
+) -> Consistency | None:
+    """Judge the innovations of a filter, and look for the channel that disagrees.
+
+    Parameters
+    ----------
+    array : AccelerometerArray
+        The array, with c channels.
+    readings : ndarray, shape (n, c)
+        What was filtered, m/s²; NaN where missing.
+    errors : SensorErrors
+        Noise that the filter was given.
+    found : RateEstimate
+        What it found.
+    temperature : ndarray, shape (n,), optional
+        Temperature of the chips, °C.
+    filter_again : callable, optional
+        Filters some rows of the run again with these readings; needed to name a channel.
+
+    Returns
+    -------
+    Consistency or None
+        None where nothing was compared, as with an array without redundant directions.
+    """
+    used = (found.nis_dof > 0) & np.isfinite(found.nis)
+    dof = np.where(used, found.nis_dof, 0)
+    nis = np.where(used, found.nis, 0.0)
+    total = int(dof.sum())
+    if total == 0:
+        return None
+    energy = slow_error_energy(array, readings, errors, temperature)  # (n, c)
+    # A bias learned while the readings had moved far is as wrong when they come back.
+    energy = np.where(used[:, None], np.maximum.accumulate(energy, axis=0), 0.0)
+    noise_bound = float(chi2.isf(FALSE_ALARM, total)) / total
+    bound = noise_bound + float(_slow_quantile(energy.sum(axis=0)[None], FALSE_ALARM)[0]) / total
+    mean = float(nis.sum()) / total
+    # The same for each second, at a smaller probability as there are many.
+    period = float(np.median(np.diff(found.t_s)))
+    length = max(1, round(_WINDOW_S / period))
+    worst = worst_bound = at = np.nan
+    count = len(nis) // length
+    late = False
+    if count:
+        sums, freedom, slow = (
+            np.add.reduceat(values[: count * length], np.arange(0, count * length, length), axis=0)
+            for values in (nis, dof, energy)
+        )
+        whole = freedom > 0
+        limit = np.full(count, np.inf)
+        limit[whole] = chi2.isf(FALSE_ALARM / count, freedom[whole]) + _slow_quantile(
+            slow[whole], FALSE_ALARM / count
+        )
+        place = int(np.argmax(sums / limit))
+        if whole[place]:
+            worst, worst_bound = float(sums[place] / freedom[place]), float(limit[place] / freedom[place])
+            at = float(found.t_s[place * length])
+            late = worst > worst_bound
+    consistent = mean <= bound and not late
+    channel, without = None, np.nan
+    if not consistent and filter_again is not None:
+        focus = int(np.searchsorted(found.t_s, at)) if late else 0
+        channel, without = _worst_channel(array, readings, found, focus, filter_again)
+    return Consistency(
+        mean, 1.0, bound, noise_bound, worst, worst_bound, at, consistent, channel, without, total, FALSE_ALARM
+    )
+
+
+def slow_error_energy(
+    array: AccelerometerArray,
+    readings: NDArray[np.float64],
+    errors: SensorErrors,
+    temperature: NDArray[np.float64] | None = None,
+) -> NDArray[np.float64]:
+    """Energy that typical errors of gain, axes and bias put into the whitened null space, by sample and channel.
+
+    Shape (n, c): ‖Z e_i‖² (ε² Δy_i² + κ² Δf_i² + τ² ΔT²) with Δ against the start, where the filter learns its
+    biases; ε and κ are the data sheet's deviations of gain and axis, τ the bias's temperature coefficient, and f_i the
+    specific force across the axis, taken from the chip's other channels. Zero where no data sheet is known.
+    """
+    try:
+        sheet = PartLimits.of(array, 100.0)
+    except InputError:
+        return np.zeros(readings.shape)
+    share = np.sum(ChannelTables(array, errors).null_rows[0] ** 2, axis=0)  # (c,)
+    known = np.where(np.isfinite(readings), readings, np.nan)
+    start = _start_mean(known)
+    moved = np.nan_to_num(known - start) ** 2  # (n, c)
+    across = np.zeros_like(moved)
+    for number, chip in enumerate(array.chips):
+        mine = np.flatnonzero(array.chip_of_channel == number)
+        sides = moved[:, mine].sum(axis=1, keepdims=True) - moved[:, mine]
+        if len(chip.axes) < 3:  # the directions that the chip doesn't read move as much as all channels do on average
+            sides = sides + (3 - len(chip.axes)) * moved.mean(axis=1, keepdims=True)
+        across[:, mine] = sides
+    energy = sheet.gain_std**2 * moved + sheet.axis_std**2 * across
+    if temperature is not None and np.isfinite(temperature).any():
+        warmed = temperature - temperature[np.isfinite(temperature)][0]
+        energy = energy + sheet.bias_tempco**2 * np.nan_to_num(warmed)[:, None] ** 2
+    return np.asarray(share * energy)
+
+
+def _start_mean(readings: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the mean of each channel's first readings (c,)."""
+    first = readings[: max(20, len(readings) // 100)]
+    seen = np.isfinite(first).any(axis=0)
+    mean = np.zeros(readings.shape[1])
+    mean[seen] = np.nanmean(first[:, seen], axis=0)
+    return mean
+
+
+def _slow_quantile(energy: NDArray[np.float64], probability: float) -> NDArray[np.float64]:
+    """Return the upper quantile of Σ g_i² λ_i for each row of λ (k, c), with g_i of unit variance."""
+    mean = energy.sum(axis=1)
+    square = np.sum(energy**2, axis=1)
+    quantile = np.zeros(len(energy))
+    some = mean > 0.0
+    shape = mean[some] ** 2 / (2.0 * square[some])
+    quantile[some] = gamma.isf(probability, shape, scale=2.0 * square[some] / mean[some])
+    return quantile
+
+
+def _worst_channel(
+    array: AccelerometerArray,
+    readings: NDArray[np.float64],
+    found: RateEstimate,
+    focus: int,
+    filter_again: Callable[[slice, NDArray[np.float64]], RateEstimate],
+) -> tuple[str | None, float]:
+    """Filter again without each channel in turn: the one whose absence shrinks the innovations most, and their mean."""
+    first = max(0, min(focus - _SEARCHED // 2, len(readings) - _SEARCHED))
+    rows = slice(first, first + _SEARCHED)
+    part = readings[rows]
+    means = np.full(array.n_channels, np.inf)
+    for channel in range(array.n_channels):
+        if not np.isfinite(part[:, channel]).any():
+            continue
+        fewer = part.copy()
+        fewer[:, channel] = np.nan
+        again = filter_again(rows, fewer)
+        if again.nis_dof.sum() > 0:
+            means[channel] = again.mean_nis
+    best = int(np.argmin(means))
+    used = found.nis_dof[rows] > 0
+    before = float(found.nis[rows][used].sum() / max(1, found.nis_dof[rows][used].sum()))
+    if not np.isfinite(means[best]) or means[best] - 1.0 > _SETTLED * (before - 1.0):
+        return None, np.nan
+    return array.channels[best], float(means[best])
