@@ -1,4 +1,4 @@
-"""What the data sheets say of the errors of an array's channels: limits and typical figures (``models/parts/*.toml``)."""
+"""Errors of an array's channels by the data sheets (``models/parts``): limits and typical figures."""
 
 from __future__ import annotations
 

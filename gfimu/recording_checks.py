@@ -34,6 +34,7 @@ _SIGNIFICANT = 3.0  # times what white noise gives, for a warning
 _REMOVED_FOR_WARNING = 0.9
 _ALIKE = 1.5  # ratio of the costs of two ways that can't be told apart
 _RATE_RATIO = 1.5  # between the rate by the times and the metadata's, for a refusal
+_FASTEST = 2.0  # times the part's fastest output data rate
 _SLOWEST = 2.0  # Hz, a rate that is plausible for a moving body
 
 _CLEAR = 0.02  # of the contradiction is left: no need to look further
@@ -87,7 +88,7 @@ def dead_channels(recording: Recording, array: AccelerometerArray) -> tuple[Find
     present = np.isfinite(readings)
     constant = _constant(readings)
     noisy = np.zeros(array.n_channels, dtype=bool) if limits is None else _noise(readings) > _LEAST_NOISE * limits.noise
-    others = np.count_nonzero(noisy) >= max(1, np.count_nonzero(~constant & present.any(axis=0)) // 2)
+    others = int(np.count_nonzero(noisy)) >= max(1, int(np.count_nonzero(~constant & present.any(axis=0))) // 2)
     for name, seen, held, column in zip(array.channels, present.T, constant, readings.T, strict=True):
         if not seen.any():
             text = f"channel {name} has no readings; the estimate goes on without it: check its wiring"
@@ -99,9 +100,7 @@ def dead_channels(recording: Recording, array: AccelerometerArray) -> tuple[Find
     return tuple(found)
 
 
-def without_dead_channels(
-    recording: Recording, array: AccelerometerArray, findings: Iterable[Finding]
-) -> Recording:
+def without_dead_channels(recording: Recording, array: AccelerometerArray, findings: Iterable[Finding]) -> Recording:
     """Return the recording with the readings of dead channels marked as missing."""
     dead = [name for finding in findings if finding.kind == "dead" for name in finding.channels]
     if not dead:
@@ -183,7 +182,9 @@ def _time_against_metadata(recording: Recording) -> list[Finding]:
         return []
     for factor, name in _TIME_UNITS.items():
         if abs(ratio * factor - 1.0) < _RATE_RATIO - 1.0:
-            text = _time_text(name, factor, f"the metadata state {stated:g} Hz, the column gives {recording.sample_rate:.4g} Hz")
+            text = _time_text(
+                name, factor, f"the metadata state {stated:g} Hz, the column gives {recording.sample_rate:.4g} Hz"
+            )
             return [Finding("time", text, True)]
     text = (
         f"column t_s gives {recording.sample_rate:.4g} Hz and the metadata state {stated:g} Hz; "
@@ -253,9 +254,7 @@ def _decide(evidence: Evidence, recording: Recording) -> list[Finding]:
     return [_finding(best[1], alike, refused=best[2])]
 
 
-def _explaining(
-    ways: Sequence[Otherwise], before: Costs, evidence: Evidence
-) -> list[tuple[float, Otherwise, bool]]:
+def _explaining(ways: Sequence[Otherwise], before: Costs, evidence: Evidence) -> list[tuple[float, Otherwise, bool]]:
     """Return the ways that explain a contradiction: what is left of its cost, the way, and whether to refuse."""
     # Wiring shows in the combinations that no motion changes, where there are any; else in the whole motion.
     hopeless = before.total(motion=True)
@@ -267,7 +266,7 @@ def _explaining(
     found = []
     for way, after in zip(ways, costs, strict=True):
         compared = usable and bool(np.isfinite(after.motion))
-        if not _possible(way, evidence) or after.worst_rest > _FITS:
+        if not _possible(way, before, evidence) or after.worst_rest > _FITS:
             continue
         ratio = after.total(motion=compared) / max(before.total(motion=compared), 1e-12)
         fits = max(after.parity, after.motion if compared else 0.0, after.level) < _FITS
@@ -289,9 +288,7 @@ def _contradicts(costs: Costs, evidence: Evidence) -> bool:
     moving = costs.motion > _SIGNIFICANT * costs.motion_noise  # false for NaN
     if evidence.has_parity:
         moving = moving and costs.motion > _FITS
-    return (
-        max(costs.worst_rest, costs.level) > 0.5 or costs.parity > _SIGNIFICANT * costs.parity_noise or bool(moving)
-    )
+    return max(costs.worst_rest, costs.level) > 0.5 or costs.parity > _SIGNIFICANT * costs.parity_noise or bool(moving)
 
 
 def _explains_noise(before: Costs, after: Costs, *, motion: bool) -> bool:
@@ -301,13 +298,25 @@ def _explains_noise(before: Costs, after: Costs, *, motion: bool) -> bool:
         pairs.append((before.motion - before.motion_noise, after.motion - before.motion_noise, before.motion_noise))
     if before.worst_rest > 0.5:
         pairs.append((before.rest, after.rest, 0.1))
-    left = [rest_after - (1.0 - _REMOVED_FOR_WARNING) * excess for excess, rest_after, noise in pairs if excess > _SIGNIFICANT * noise]
+    left = [
+        rest_after - (1.0 - _REMOVED_FOR_WARNING) * excess
+        for excess, rest_after, noise in pairs
+        if excess > _SIGNIFICANT * noise
+    ]
     worse = after.rest > before.rest + 0.1 or after.level > before.level + 0.1
     return bool(left) and max(left) < 0.0 and not worse
 
 
-def _possible(way: Otherwise, evidence: Evidence) -> bool:
-    """Tell whether the noise fits another unit of readings: it shrinks and grows with them."""
+def _possible(way: Otherwise, before: Costs, evidence: Evidence) -> bool:
+    """Tell whether a way is possible at all.
+
+    Another unit of time has to give a rate that the part has; another unit of all readings has to be asked for by
+    gravity at rest; and the noise has to fit another unit, as it shrinks and grows with the readings.
+    """
+    if way.kind == "time":
+        return evidence.sample_rate / way.time < _FASTEST * evidence.limits.output_rate[1]
+    if way.kind == "unit" and not (len(evidence.rests) and before.level > _FITS):
+        return False
     if way.kind not in {"unit", "chip_unit"}:
         return True
     scale = np.abs(np.diag(way.columns))
@@ -350,17 +359,13 @@ def _ways(evidence: Evidence, recording: Recording) -> list[Otherwise]:
         remedy = f"name the columns {names[0]}{suffix} …" if suffix else f"multiply them by {scale[0]:g}"
         rest = evidence.gravity_at_rest(evidence.as_given())
         seen = f"gravity reads {np.median(rest):.4g} at rest" if len(rest) else "the motion fits no other unit"
-        ways.append(
-            Otherwise("unit", f"all readings are in {unit}, not in m/s²: {seen}; {remedy}", np.diag(scale))
-        )
+        ways.append(Otherwise("unit", f"all readings are in {unit}, not in m/s²: {seen}; {remedy}", np.diag(scale)))
         for number, chip in enumerate(array.chips):
             mine = chip_of == number
             columns = ", ".join(f"{name}{suffix}" for name in chip.channels)
             cure = f"name its columns {columns}" if suffix else f"multiply its columns by {scale[0]:g}"
             text = f"chip {chip.name} reads in {unit}, the others in m/s²; {cure}"
-            ways.append(
-                Otherwise("chip_unit", text, np.diag(np.where(mine, scale, 1.0)), channels=chip.channels)
-            )
+            ways.append(Otherwise("chip_unit", text, np.diag(np.where(mine, scale, 1.0)), channels=chip.channels))
     for channel, name in enumerate(names):
         sign = np.ones(count)
         sign[channel] = -1.0
@@ -368,8 +373,13 @@ def _ways(evidence: Evidence, recording: Recording) -> list[Otherwise]:
         ways.append(Otherwise("sign", text, np.diag(sign), channels=(name,)))
     for number, chip in enumerate(array.chips):
         if len(chip.axes) > 1:
-            text = f"all channels of chip {chip.name} are inverted; change the sign of its columns, or of its axes in the array file"
-            ways.append(Otherwise("sign", text, np.diag(np.where(chip_of == number, -1.0, 1.0)), channels=chip.channels))
+            text = (
+                f"all channels of chip {chip.name} are inverted; "
+                "change the sign of its columns, or of its axes in the array file"
+            )
+            ways.append(
+                Otherwise("sign", text, np.diag(np.where(chip_of == number, -1.0, 1.0)), channels=chip.channels)
+            )
     ways.append(Otherwise("sign", "all channels are inverted; change the sign of all columns", -identity, channels=()))
     for one, two in combinations(range(count), 2):
         order = np.arange(count)

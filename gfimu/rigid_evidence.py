@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import scipy.linalg
@@ -38,6 +39,8 @@ _RATE = 100.0  # Hz, to which faster recordings are averaged
 _NOMINAL_RATES = (4.0, 20_000.0)  # Hz; outside of them rest is looked for as if at 100 Hz
 _LEAST_PARITY = 3  # combinations free of all motion that make the integration of α needless
 _ITERATIONS = 15
+_NO_LEAK = 1e-6  # rad/s² per rad²/s²
+_WEAK = 0.1  # products seen more weakly than this share of the best are not used to clean α
 _FEWEST = 30  # samples
 
 
@@ -113,10 +116,13 @@ class Window:
 
 @dataclass(frozen=True)
 class _Matrices:
-    """What an array makes of its readings: α = A y − L s(ω), N y = M s(ω), and P y = 0 for any motion."""
+    """What an array makes of its readings: α = A y, N y = M s(ω), and P y = 0 for any motion.
+
+    ``clean`` tells whether no products of ω are left in A y; without that the motion is not judged.
+    """
 
     alpha: NDArray[np.float64]  # (3, c)
-    leak: NDArray[np.float64]  # (3, 6)
+    clean: bool
     null: NDArray[np.float64]  # (d, c), orthonormal rows
     sensitivity: NDArray[np.float64]  # (d, 6)
     parity: NDArray[np.float64]  # (k, c), orthonormal rows
@@ -129,7 +135,11 @@ class _Matrices:
         null = scipy.linalg.null_space(j.T, rcond=1e-9).T
         parity = scipy.linalg.null_space(np.hstack([j, q]).T, rcond=1e-9).T
         centripetal = array.centripetal_matrix[alive]
-        return cls(alpha, alpha @ centripetal, null, null @ centripetal, parity)
+        leak = alpha @ centripetal
+        if np.abs(leak).max() > _NO_LEAK and len(null):  # the null space takes off what it sees well
+            alpha = alpha - leak @ np.linalg.pinv(null @ centripetal, rcond=_WEAK) @ null
+            leak = alpha @ centripetal
+        return cls(alpha, bool(np.abs(leak).max() < _NO_LEAK), null, null @ centripetal, parity)
 
 
 @dataclass(frozen=True)
@@ -154,6 +164,8 @@ class Evidence:
         Upward direction at rest in body axes, if the recording says how the body was mounted.
     quiet : ndarray, shape (c,)
         Noise seen between neighbouring samples where they are quietest, m/s².
+    sample_rate : float
+        By the times as given, Hz.
     """
 
     array: AccelerometerArray
@@ -164,6 +176,7 @@ class Evidence:
     windows: tuple[Window, ...]
     up: NDArray[np.float64] | None
     quiet: NDArray[np.float64]
+    sample_rate: float
     _cache: dict[str, _Matrices] = field(default_factory=dict)
 
     @property
@@ -193,7 +206,7 @@ class Evidence:
             parity_noise = float(np.sum((matrices.parity * sigma) ** 2)) / allowed
         motion = motion_noise = np.nan
         with_motion = with_motion and rest + level + parity <= hopeless
-        if with_motion and len(matrices.null) and self.windows:
+        if with_motion and matrices.clean and len(matrices.null) and self.windows:
             found = [self._motion(window, columns, way.time, matrices) for window in self.windows]
             energy, noise, allowed = np.sum(found, axis=0)
             motion, motion_noise = energy / allowed, noise / allowed
@@ -307,7 +320,7 @@ def _unexplained(
     normal, pull = np.zeros((6, 6)), np.zeros(6)
     with np.errstate(over="ignore", invalid="ignore"):
         for _ in range(_ITERATIONS):
-            omega = _rates(turned, t, point, matrices)
+            omega = _rates(turned, t, point)
             seen = omega_products(omega) @ matrices.sensitivity.T
             residual = centred - (seen - seen.mean(axis=0))
             energy = float(np.sum(residual**2) + weight @ point**2) / count
@@ -332,18 +345,9 @@ def _unexplained(
     return best
 
 
-def _rates(
-    turned: NDArray[np.float64], t: NDArray[np.float64], point: NDArray[np.float64], matrices: _Matrices
-) -> NDArray[np.float64]:
-    """Return ω (m, 3) from the integral of A y, the rate at the start and the bias of α."""
-    omega = turned + point[:3] - t[:, None] * point[3:]
-    if not matrices.leak.any():
-        return omega
-    for _ in range(3):  # what the products of ω leave in A y, by the rate found so far
-        left = omega_products(omega) @ matrices.leak.T
-        steps = np.diff(t)[:, None] * 0.5 * (left[1:] + left[:-1])
-        omega = turned + point[:3] - t[:, None] * point[3:] - np.vstack([np.zeros(3), np.cumsum(steps, axis=0)])
-    return omega
+def _rates(turned: NDArray[np.float64], t: NDArray[np.float64], point: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return ω (m, 3) from the integral of α, the rate at the start and the bias of α."""
+    return np.asarray(turned + point[:3] - t[:, None] * point[3:])
 
 
 def _slopes(omega: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -354,7 +358,7 @@ def _slopes(omega: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
-def _rates_of(products: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+def _rates_of(products: NDArray[np.floating[Any]]) -> list[NDArray[np.float64]]:
     """Return the two rates whose products (6,) are nearest to these."""
     xx, yy, zz, xy, xz, yz = products
     values, vectors = np.linalg.eigh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
@@ -384,7 +388,7 @@ def gather(recording: Recording, array: AccelerometerArray, limits: PartLimits, 
         As `gfimu.Recording.for_array`.
     """
     readings = np.where(alive, recording.for_array(array), 0.0)  # (n, c)
-    whole = np.isfinite(readings).all(axis=1)
+    whole: NDArray[np.bool_] = np.asarray(np.isfinite(readings).all(axis=1))
     rests = _rests(recording, array, readings, whole, alive)
     step = max(1, int(np.count_nonzero(whole)) // 20_000)
     covariance = np.cov(readings[whole][::step].T) if np.count_nonzero(whole) > 2 else np.zeros((0, 0))
@@ -393,7 +397,7 @@ def gather(recording: Recording, array: AccelerometerArray, limits: PartLimits, 
         up = Rotation.from_rotvec(recording.mounting_rotvec).inv().apply([0.0, 0.0, 1.0])
     means = np.array([readings[rest][whole[rest]].mean(axis=0) for rest in rests]).reshape(-1, array.n_channels)
     windows = _windows(recording, readings[:, alive], whole, rests)
-    return Evidence(array, alive, limits, means, covariance, windows, up, _quiet(readings))
+    return Evidence(array, alive, limits, means, covariance, windows, up, _quiet(readings), recording.sample_rate)
 
 
 def _rests(
@@ -410,7 +414,8 @@ def _rests(
         t = np.arange(len(t)) / _RATE
     names = tuple(name for name, lives in zip(array.channels, alive, strict=True) if lives)
     try:
-        rest = detect_rest(Recording(t, readings[:, alive], names))
+        tacho = {name: recording.reference[name] for name in ("tacho_rad_s",) if name in recording.reference}
+        rest = detect_rest(Recording(t, readings[:, alive], names, tacho))
     except InputError:
         return []
     longest = np.sort(np.argsort(-rest.lengths, kind="stable")[:_RESTS])

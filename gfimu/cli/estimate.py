@@ -9,7 +9,7 @@ import numpy as np
 import typer
 
 from gfimu.cli.array_option import load_array
-from gfimu.cli.output import JsonOption, print_json, print_paths, print_table
+from gfimu.cli.output import JsonOption, console, print_json, print_paths, print_table, progress
 
 if TYPE_CHECKING:
     from gfimu.estimate_summary import EstimateSummary
@@ -46,6 +46,9 @@ def _estimate(
     ] = False,
     gyro: Annotated[bool, typer.Option("--gyro", help="Fuse the recording's gyro (filter, smoother).")] = False,
     position: Annotated[bool, typer.Option("--position", help="Integrate to velocity and position too.")] = False,
+    force: Annotated[
+        bool, typer.Option("--force", help="Go on where the checks of units, time, array and channels refuse the file.")
+    ] = False,
     rrd: Annotated[Path | None, typer.Option("--rrd", help="Rerun recording to write.")] = None,
     json: JsonOption = False,
 ) -> None:
@@ -66,15 +69,18 @@ def _estimate(
     else:
         recording, geometry = open_calibrated_run(run, load_calibration(calibration), drawing)
     solve = estimate_from_rest if rest_bias else estimate
-    found = solve(
-        recording,
-        geometry,
-        method=method,
-        form=form,
-        omega0=None if unknown_start else (0.0, 0.0, 0.0),
-        fuse_gyro=gyro,
-        with_position=position,
-    )
+    with progress(_describe(method), total=1.0) as done:
+        found = solve(
+            recording,
+            geometry,
+            method=method,
+            form=form,
+            omega0=None if unknown_start else (0.0, 0.0, 0.0),
+            fuse_gyro=gyro,
+            with_position=position,
+            force=force,
+            progress=lambda share: done(share, f"estimating by {method}"),
+        )
     found.write(out)
     written = {"estimate": out}
     if rrd is not None:
@@ -87,7 +93,19 @@ def _estimate(
         print_json(summary.to_dict() | {"files": written})
     else:
         _print_summary(summary)
+        for warning in summary.warnings:
+            console.print(f"[yellow]WARNING[/yellow] {warning}", highlight=False, soft_wrap=True)
         print_paths(written.items())
+
+
+def _describe(method: str) -> str:
+    """Return what is being done, for the progress bar; says so when the filter is compiled first."""
+    if method in {"filter", "smoother"}:
+        from gfimu.rate.first_call import must_compile
+
+        if must_compile():
+            return "compiling the filter, the first time only: half a minute or so"
+    return f"estimating by {method}"
 
 
 def _print_summary(summary: EstimateSummary) -> None:
@@ -113,4 +131,13 @@ def _print_summary(summary: EstimateSummary) -> None:
     if summary.centripetal is not None:
         rows.append(("centripetal terms against gyro, slope", f"{summary.centripetal.slope:.4f}", ""))
         rows.append(("centripetal terms against gyro, correlation", f"{summary.centripetal.correlation:.4f}", ""))
+    if summary.consistency is not None:
+        found = summary.consistency
+        verdict = "consistent" if found["consistent"] else "INCONSISTENT"
+        rows.append(("innovations squared over stated (NIS)", f"{found['nis']:.3f}", f"≤ {found['bound']:.3f}"))
+        rows.append(("innovations", verdict, ""))
+        if found["worst_channel"] is not None:
+            rows.append(("channel that disagrees most", found["worst_channel"], ""))
+    if summary.channels_left_out:
+        rows.append(("channels left out", ", ".join(summary.channels_left_out), ""))
     print_table(f"{summary.array}, method {summary.method}, {summary.form} form", ("quantity", "value", "unit"), rows)

@@ -5,11 +5,11 @@ combination that was compared, independent of those of other samples (Bar-Shalom
 Applications to Tracking and Navigation, 2001, ch. 5.4). Their sum over N degrees of freedom is χ² with N.
 
 A real chip has errors that the filter's white noise and constant bias don't cover: its gain and its axes are known to
-its data sheet's typical deviation only, and its bias changes with temperature. They move the innovations in
-proportion to how far the readings have moved since the start. With g_i such an error of channel i in its standard
-deviations, the sum grows by Σ g_i² λ_i, where λ_i is the energy that one standard deviation puts into the null space.
-That is a weighted sum of χ² variables with one degree of freedom each, here taken as the gamma distribution of its
-mean Σ λ_i and variance 2 Σ λ_i² (Satterthwaite). The bound is the χ² quantile plus the quantile of that.
+its data sheet's typical deviation only, and its bias changes with temperature. The filter takes the mean of such an
+error so far for a bias; the innovations get the rest, in proportion to how far the readings are from their mean so
+far. With g the vector of such errors in their standard deviations, the sum grows by gᵀΛg, where Λ holds the energies
+and correlations that one standard deviation of each puts into the null space. That quadratic form is taken as a gamma
+distribution of its mean tr Λ and variance 2 tr Λ² (Satterthwaite). The bound is the χ² quantile plus its quantile.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from gfimu.part_limits import PartLimits
 from gfimu.rate.result import RateEstimate
 from gfimu.rate.sensing import ChannelTables, SensorErrors
 
-__all__ = ["FALSE_ALARM", "Consistency", "judge_consistency", "slow_error_energy"]
+__all__ = ["FALSE_ALARM", "Consistency", "judge_consistency", "slow_error_signatures"]
 
 FALSE_ALARM = 1e-4
 """Probability that a run whose sensors are as stated is called inconsistent, at most, by each of the two tests."""
@@ -128,11 +128,12 @@ def judge_consistency(
     total = int(dof.sum())
     if total == 0:
         return None
-    energy = slow_error_energy(array, readings, errors, temperature)  # (n, c)
-    # A bias learned while the readings had moved far is as wrong when they come back.
-    energy = np.where(used[:, None], np.maximum.accumulate(energy, axis=0), 0.0)
+    signatures = slow_error_signatures(array, readings, temperature)  # (n, k)
+    signatures[~used] = 0.0
+    null = ChannelTables(array, errors).null_rows[0]
+    seen = np.tile(null.T @ null, (signatures.shape[1] // array.n_channels,) * 2)  # (k, k)
     noise_bound = float(chi2.isf(FALSE_ALARM, total)) / total
-    bound = noise_bound + float(_slow_quantile(energy.sum(axis=0)[None], FALSE_ALARM)[0]) / total
+    bound = noise_bound + _slow_quantile(signatures, seen, FALSE_ALARM) / total
     mean = float(nis.sum()) / total
     # The same for each second, at a smaller probability as there are many.
     period = float(np.median(np.diff(found.t_s)))
@@ -141,15 +142,13 @@ def judge_consistency(
     count = len(nis) // length
     late = False
     if count:
-        sums, freedom, slow = (
-            np.add.reduceat(values[: count * length], np.arange(0, count * length, length), axis=0)
-            for values in (nis, dof, energy)
-        )
+        sums, freedom = (values[: count * length].reshape(count, length).sum(axis=1) for values in (nis, dof))
         whole = freedom > 0
         limit = np.full(count, np.inf)
-        limit[whole] = chi2.isf(FALSE_ALARM / count, freedom[whole]) + _slow_quantile(
-            slow[whole], FALSE_ALARM / count
-        )
+        limit[whole] = chi2.isf(FALSE_ALARM / count, freedom[whole])
+        for place in np.flatnonzero(sums > limit):  # the others need no allowance
+            rows = signatures[place * length : (place + 1) * length]
+            limit[place] += _slow_quantile(rows, seen, FALSE_ALARM / count)
         place = int(np.argmax(sums / limit))
         if whole[place]:
             worst, worst_bound = float(sums[place] / freedom[place]), float(limit[place] / freedom[place])
@@ -165,58 +164,49 @@ def judge_consistency(
     )
 
 
-def slow_error_energy(
-    array: AccelerometerArray,
-    readings: NDArray[np.float64],
-    errors: SensorErrors,
-    temperature: NDArray[np.float64] | None = None,
+def slow_error_signatures(
+    array: AccelerometerArray, readings: NDArray[np.float64], temperature: NDArray[np.float64] | None = None
 ) -> NDArray[np.float64]:
-    """Energy that typical errors of gain, axes and bias put into the whitened null space, by sample and channel.
+    """Readings' errors by one standard deviation of each slow error, as far as a filter of constant biases keeps them.
 
-    Shape (n, c): ‖Z e_i‖² (ε² Δy_i² + κ² Δf_i² + τ² ΔT²) with Δ against the start, where the filter learns its
-    biases; ε and κ are the data sheet's deviations of gain and axis, τ the bias's temperature coefficient, and f_i the
-    specific force across the axis, taken from the chip's other channels. Zero where no data sheet is known.
+    Shape (n, k) with the c channels' errors of the gain first, then of the axis to its two sides, then, if the
+    ``temperature`` (n,), °C, is known, of the bias with temperature; m/s². Each is the data sheet's typical deviation
+    times how far the reading, the specific force across the axis, or the temperature is from its mean so far. Zero
+    where no data sheet is known.
     """
+    moved = _from_mean_so_far(readings)  # (n, c)
     try:
         sheet = PartLimits.of(array, 100.0)
     except InputError:
-        return np.zeros(readings.shape)
-    share = np.sum(ChannelTables(array, errors).null_rows[0] ** 2, axis=0)  # (c,)
-    known = np.where(np.isfinite(readings), readings, np.nan)
-    start = _start_mean(known)
-    moved = np.nan_to_num(known - start) ** 2  # (n, c)
-    across = np.zeros_like(moved)
-    for number, chip in enumerate(array.chips):
+        return np.zeros_like(moved)
+    sides = np.zeros((2, *moved.shape))
+    for number in range(len(array.chips)):
         mine = np.flatnonzero(array.chip_of_channel == number)
-        sides = moved[:, mine].sum(axis=1, keepdims=True) - moved[:, mine]
-        if len(chip.axes) < 3:  # the directions that the chip doesn't read move as much as all channels do on average
-            sides = sides + (3 - len(chip.axes)) * moved.mean(axis=1, keepdims=True)
-        across[:, mine] = sides
-    energy = sheet.gain_std**2 * moved + sheet.axis_std**2 * across
+        for side in range(min(2, len(mine) - 1)):
+            sides[side][:, mine] = moved[:, np.roll(mine, -1 - side)]
+        if len(mine) < 3:  # the chip does not read this side; it moves as much as all channels do on average
+            sides[len(mine) - 1 :, :, mine] = np.sqrt(np.mean(moved**2, axis=1, keepdims=True))
+    columns = [sheet.gain_std * moved, sheet.axis_std * sides[0], sheet.axis_std * sides[1]]
     if temperature is not None and np.isfinite(temperature).any():
-        warmed = temperature - temperature[np.isfinite(temperature)][0]
-        energy = energy + sheet.bias_tempco**2 * np.nan_to_num(warmed)[:, None] ** 2
-    return np.asarray(share * energy)
+        columns.append(_from_mean_so_far(temperature[:, None]) * sheet.bias_tempco)
+    return np.hstack(columns)
 
 
-def _start_mean(readings: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the mean of each channel's first readings (c,)."""
-    first = readings[: max(20, len(readings) // 100)]
-    seen = np.isfinite(first).any(axis=0)
-    mean = np.zeros(readings.shape[1])
-    mean[seen] = np.nanmean(first[:, seen], axis=0)
-    return mean
+def _from_mean_so_far(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return what each column (n, k) differs from the mean of its values up to there; zero where missing."""
+    seen = np.isfinite(values)
+    count = np.maximum(np.cumsum(seen, axis=0), 1)
+    mean = np.cumsum(np.where(seen, values, 0.0), axis=0) / count
+    return np.where(seen, values - mean, 0.0)
 
 
-def _slow_quantile(energy: NDArray[np.float64], probability: float) -> NDArray[np.float64]:
-    """Return the upper quantile of Σ g_i² λ_i for each row of λ (k, c), with g_i of unit variance."""
-    mean = energy.sum(axis=1)
-    square = np.sum(energy**2, axis=1)
-    quantile = np.zeros(len(energy))
-    some = mean > 0.0
-    shape = mean[some] ** 2 / (2.0 * square[some])
-    quantile[some] = gamma.isf(probability, shape, scale=2.0 * square[some] / mean[some])
-    return quantile
+def _slow_quantile(signatures: NDArray[np.float64], seen: NDArray[np.float64], probability: float) -> float:
+    """Return the upper quantile of gᵀΛg for signatures (m, k) and what the null space sees of each pair (k, k)."""
+    energies = seen * (signatures.T @ signatures)
+    mean, square = float(np.trace(energies)), float(np.sum(energies**2))
+    if not (mean > 0.0 and square > 0.0):
+        return 0.0
+    return float(gamma.isf(probability, mean**2 / (2.0 * square), scale=2.0 * square / mean))
 
 
 def _worst_channel(

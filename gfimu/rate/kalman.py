@@ -11,7 +11,7 @@ takes three on each side: the estimate for a sample appears when two more have c
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -54,6 +54,7 @@ QUADRATURES = {"centred6": (6, 2), "centred4": (4, 1), "adams_moulton4": (4, 2),
 _CHUNK = 4096
 _SMOOTHER_BLOCK = 512
 _MOST_CHANNELS = 62
+_FORWARD_SHARE = 0.3  # of the smoother's time, for its progress
 
 
 @dataclass(frozen=True)
@@ -200,6 +201,7 @@ class KalmanRateFilter:
         self._kept: list[RecursionState] = []
         self._taken_back: list[tuple[int, int]] = []  # rows of the buffer, from behind the last rest to its end's block
         self._last_time = -np.inf
+        self.progress: Callable[[float], object] | None = None  # called with the share of a block done so far
 
     def _start(self) -> RecursionState:
         """State before the first sample."""
@@ -284,6 +286,8 @@ class KalmanRateFilter:
             part = slice(start, start + _CHUNK)
             self._take(times[part], rows[part], None if turning is None else turning[part])
             filled = self._advance(self._received - self.lag, out, stamps, filled)
+            if self.progress is not None:
+                self.progress(min(1.0, (start + _CHUNK) / len(times)))
         return FilterOutput(stamps, out).rows(slice(0, filled))
 
     def finish(self) -> FilterOutput:
@@ -310,6 +314,8 @@ class KalmanRateFilter:
             for start in range(0, len(times), _SMOOTHER_BLOCK):
                 self._kept.append(self.state.copy())
                 self._advance(min(start + _SMOOTHER_BLOCK, len(times)), out, stamps, start, closing=True)
+                if self.progress is not None:
+                    self.progress(_FORWARD_SHARE * min(1.0, (start + _SMOOTHER_BLOCK) / len(times)))
             if not self._taken_back:
                 return FilterOutput(stamps, out)
             for first, last in self._taken_back:  # again, without the blocks that turned out not to be rest
