@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -63,6 +64,12 @@ class EstimateSummary:
         Root mean square difference of the rate from the tachometer and, over all three axes, from the gyro.
     centripetal : Agreement or None
         Centripetal terms against the gyro.
+    consistency : mapping or None
+        Of the filter's or smoother's innovations: the figures of `gfimu.rate.consistency.Consistency`.
+    channels_left_out : tuple of str
+        Dead channels that the estimate goes without.
+    warnings : tuple of str
+        What the checks of the recording found, and an inconsistent filter.
     """
 
     array: str
@@ -81,6 +88,9 @@ class EstimateSummary:
     tacho_rmse_rad_s: float | None
     gyro_rmse_rad_s: float | None
     centripetal: Agreement | None
+    consistency: Mapping[str, Any] | None = None
+    channels_left_out: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
 
     __repr__ = short_repr
 
@@ -106,6 +116,7 @@ def summarise(estimate: Estimate, recording: Recording, array: AccelerometerArra
     axis = Rotation.from_rotvec(recording.mounting_rotvec).inv().apply([0.0, 0.0, 1.0])
     tacho = recording.reference.get("tacho_rad_s")
     gyro = _gyro(recording)
+    consistency = estimate.metadata.get("consistency")
     return EstimateSummary(
         array=array.name,
         method=str(estimate.metadata.get("method", "")),
@@ -123,7 +134,31 @@ def summarise(estimate: Estimate, recording: Recording, array: AccelerometerArra
         tacho_rmse_rad_s=None if tacho is None else _rms_difference(estimate.omega @ axis, tacho),
         gyro_rmse_rad_s=None if gyro is None else _rms_difference(estimate.omega, gyro),
         centripetal=centripetal_agreement(recording, array),
+        consistency=consistency,
+        channels_left_out=tuple(estimate.metadata.get("channels_left_out", ())),
+        warnings=(*estimate.metadata.get("warnings", ()), *_inconsistency(consistency)),
     )
+
+
+def _inconsistency(consistency: Mapping[str, Any] | None) -> list[str]:
+    """Return the warning of a filter whose innovations are larger than it states, if they are."""
+    if consistency is None or consistency["consistent"]:
+        return []
+    mean, bound = consistency["nis"], consistency["bound"]
+    if mean > bound:
+        what = f"the innovations are {mean:.2f} times as large as stated (NIS; {bound:.2f} at most for a right model)"
+    else:
+        mean, bound, start = (consistency[name] for name in ("worst_second", "worst_second_bound", "worst_second_at_s"))
+        what = (
+            f"the innovations are {mean:.2f} times as large as stated (NIS; {bound:.2f} at most for a right model) "
+            f"in the second from {start:.4g} s on"
+        )
+    channel = consistency["worst_channel"]
+    if channel is None:
+        whose = "no single channel explains it: check gains (calibrate), array and sample times"
+    else:
+        whose = f"channel {channel} disagrees most: without it they are {consistency['nis_without_worst']:.2f}"
+    return [f"the estimate is worse than its standard deviation says: {what}; {whose}"]
 
 
 def centripetal_agreement(

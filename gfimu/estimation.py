@@ -7,7 +7,7 @@ integration: the six products of its components.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -24,13 +24,16 @@ from gfimu.errors import InputError, unknown_name
 from gfimu.linear_solution import linear_solution
 from gfimu.navigation import level, navigate
 from gfimu.part import white_noise_std
+from gfimu.rate.consistency import judge_consistency
 from gfimu.rate.feedback import integrate_rate_recursively
 from gfimu.rate.integration import integrate_rate
 from gfimu.rate.kalman import FilterSettings
 from gfimu.rate.methods import RATE_METHODS, estimate_rate
 from gfimu.rate.problem import RateMethod, RateProblem, RateSolution
+from gfimu.rate.result import RateEstimate
 from gfimu.rate.sensing import SensorErrors
 from gfimu.recording import Recording
+from gfimu.recording_checks import Finding, check_recording, refuse_or_warn, without_dead_channels
 from gfimu.rest_navigation import navigate_with_rest
 from gfimu.short_repr import joined, timing
 from gfimu.table import ArrowStream, Tabular
@@ -161,6 +164,9 @@ def estimate(
     noise_std: ArrayLike | None = None,
     with_position: bool = False,
     fuse_gyro: bool = False,
+    force: bool = False,
+    findings: Sequence[Finding] | None = None,
+    progress: Callable[[float], object] | None = None,
 ) -> Estimate:
     """Estimate p, α, ω, attitude and table angle at every sample of a recording.
 
@@ -185,16 +191,31 @@ def estimate(
         Whether to integrate p to velocity and position as well, from rest at the origin.
     fuse_gyro : bool
         Whether ``filter`` and ``smoother`` use the recording's gyro as well.
+    force : bool
+        Whether to go on with a recording that its checks refuse; what they found is kept as a warning.
+    findings : sequence of Finding, optional
+        What `gfimu.recording_checks.check_recording` found, if it was run already.
+    progress : callable, optional
+        Called with the share of the work that ``filter`` and ``smoother`` have done so far, 0 to 1.
+
+    Returns
+    -------
+    Estimate
+        Its metadata hold ``warnings`` and, with ``filter`` and ``smoother``, ``consistency``
+        (`gfimu.rate.consistency.Consistency`).
 
     Raises
     ------
     InputError
-        If the recording lacks channels, the method or form is unknown, or no sample suffices for p and α.
+        If the recording lacks channels, the method or form is unknown, no sample suffices for p and α, or the
+        recording contradicts itself and another unit, order or array explains it (see ``force``).
     GeometryError
         If the array can't see all six motions; the message names those it can't.
     """
     if method not in METHODS:
         raise unknown_name("method", method, METHODS)
+    found = refuse_or_warn(check_recording(recording, array) if findings is None else findings, force=force)
+    recording = without_dead_channels(recording, array, found)
     readings = recording.for_array(array)
     rate0 = None if omega0 is None else np.asarray(omega0, dtype=float)
     if rate0 is None and method not in {"filter", "smoother"}:
@@ -211,7 +232,9 @@ def estimate(
         raise InputError("no sample has enough channels for p and alpha; check the recording for missing readings")
 
     gyro = _gyro(recording) if fuse_gyro else None
-    rate = METHODS[method](RateProblem(array, recording.t_s, readings, noise, linear, rate0, gyro))
+    temperature = recording.reference.get("temperature_degC")
+    problem = RateProblem(array, recording.t_s, readings, noise, linear, rate0, gyro, temperature, progress)
+    rate = METHODS[method](problem)
     motion = linear.with_omega(rate.omega)
     alpha, p = motion[:, :3], motion[:, 3:]
     start = (
@@ -246,6 +269,8 @@ def estimate(
             "method": method,
             "form": linear.form,
             **rate.remarks,
+            "warnings": [finding.text for finding in found],
+            "channels_left_out": [name for finding in found if finding.kind == "dead" for name in finding.channels],
             "mounting_rotvec_rad": recording.mounting_rotvec.tolist(),
             "format_version": FORMAT_VERSION,
             "software_version": __version__,
@@ -276,8 +301,9 @@ def _by_rate_method(method: str) -> RateMethod:
         errors = SensorErrors.from_parts(problem.array, rate, noise_std=problem.noise_std)
         settings = FilterSettings(start_omega=problem.omega0)
         found = estimate_rate(
-            problem.array, problem.t_s, problem.readings, errors, method=method, settings=settings, gyro=problem.gyro
-        )
+            problem.array, problem.t_s, problem.readings, errors, method=method, settings=settings, gyro=problem.gyro,
+            progress=problem.progress,
+        )  # fmt: skip
         remarks = {
             "sign": found.sign.state,
             "sign_decided_at_s": found.sign.decided_at_s if np.isfinite(found.sign.decided_at_s) else None,
@@ -285,9 +311,34 @@ def _by_rate_method(method: str) -> RateMethod:
             "share_at_rest": float(found.rest.mean()),
             "channels": found.channels.to_dict(),
         }
+        if method in {"filter", "smoother"}:
+            consistency = judge_consistency(
+                problem.array, problem.readings, errors, found, temperature=problem.temperature,
+                filter_again=_filter_again(problem, errors, found),
+            )  # fmt: skip
+            remarks["consistency"] = None if consistency is None else consistency.to_dict()
         return RateSolution(found.omega, np.where(np.isfinite(found.std), found.std, np.nan), found.rest, remarks)
 
     return solve
+
+
+def _filter_again(
+    problem: RateProblem, errors: SensorErrors, found: RateEstimate
+) -> Callable[[slice, NDArray[np.float64]], RateEstimate]:
+    """Return a filter of some rows with other readings that starts as the one before did, or from what it found."""
+
+    def run(rows: slice, readings: NDArray[np.float64]) -> RateEstimate:
+        if rows.start == 0 and problem.omega0 is not None:
+            settings = FilterSettings(start_omega=problem.omega0)
+        else:
+            std = float(np.nan_to_num(found.std[rows.start]).max())
+            settings = FilterSettings(start_omega=found.omega[rows.start], start_std=max(std, 1e-3))
+        gyro = None if problem.gyro is None else problem.gyro[rows]
+        return estimate_rate(
+            problem.array, problem.t_s[rows], readings, errors, method="filter", settings=settings, gyro=gyro
+        )
+
+    return run
 
 
 METHODS: dict[str, RateMethod] = {

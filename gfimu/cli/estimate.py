@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gfimu.cli.output import JsonOption, print_json, print_paths, print_table
+from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, print_text, progress
 
 if TYPE_CHECKING:
     import numpy as np
@@ -46,6 +46,9 @@ def _estimate(
     ] = False,
     gyro: Annotated[bool, typer.Option("--gyro", help="Fuse the recording's gyro (filter, smoother).")] = False,
     position: Annotated[bool, typer.Option("--position", help="Integrate to velocity and position too.")] = False,
+    force: Annotated[
+        bool, typer.Option("--force", help="Go on where the checks of units, time, array and channels refuse the file.")
+    ] = False,
     rrd: Annotated[Path | None, typer.Option("--rrd", help="Rerun recording to write.")] = None,
     json: JsonOption = False,
 ) -> None:
@@ -56,26 +59,41 @@ def _estimate(
     from gfimu.commands.estimate import estimate_run
     from gfimu.estimate_summary import summarise
 
-    found = estimate_run(
-        run,
-        array,
-        out=out,
-        method=method,
-        form=form,
-        rest_bias=rest_bias,
-        calibration=calibration,
-        omega0=None if unknown_start else (0.0, 0.0, 0.0),
-        fuse_gyro=gyro,
-        with_position=position,
-        rrd=rrd,
-    )
+    with progress(_describe(method), total=1.0) as done:
+        found = estimate_run(
+            run,
+            array,
+            out=out,
+            method=method,
+            form=form,
+            rest_bias=rest_bias,
+            calibration=calibration,
+            omega0=None if unknown_start else (0.0, 0.0, 0.0),
+            fuse_gyro=gyro,
+            with_position=position,
+            force=force,
+            progress=lambda share: done(share, f"estimating by {method}"),
+            rrd=rrd,
+        )
     written = {"estimate": out} | ({} if rrd is None else {"rrd": rrd})
     summary = summarise(found.estimate, found.recording, found.array)
     if json:
         print_json(summary.to_dict() | {"files": written})
     else:
         _print_summary(summary)
+        for warning in summary.warnings:
+            print_text(f"WARNING {warning}", style="yellow")
         print_paths(written.items())
+
+
+def _describe(method: str) -> str:
+    """Return what is being done, for the progress bar; says so when the filter is compiled first."""
+    if method in {"filter", "smoother"}:
+        from gfimu.rate.first_call import must_compile
+
+        if must_compile():
+            return "compiling the filter, the first time only: half a minute or so"
+    return f"estimating by {method}"
 
 
 def _print_summary(summary: EstimateSummary) -> None:
@@ -101,4 +119,13 @@ def _print_summary(summary: EstimateSummary) -> None:
     if summary.centripetal is not None:
         rows.append(("centripetal terms against gyro, slope", f"{summary.centripetal.slope:.4f}", ""))
         rows.append(("centripetal terms against gyro, correlation", f"{summary.centripetal.correlation:.4f}", ""))
+    if summary.consistency is not None:
+        found = summary.consistency
+        verdict = "consistent" if found["consistent"] else "INCONSISTENT"
+        rows.append(("innovations squared over stated (NIS)", f"{found['nis']:.3f}", f"≤ {found['bound']:.3f}"))
+        rows.append(("innovations", verdict, ""))
+        if found["worst_channel"] is not None:
+            rows.append(("channel that disagrees most", found["worst_channel"], ""))
+    if summary.channels_left_out:
+        rows.append(("channels left out", ", ".join(summary.channels_left_out), ""))
     print_table(f"{summary.array}, method {summary.method}, {summary.form} form", ("quantity", "value", "unit"), rows)

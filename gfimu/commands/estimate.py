@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -55,6 +56,8 @@ def estimate(
     gyro: bool = False,
     position: bool = False,
     rrd: str | Path | None = None,
+    force: bool = False,
+    progress: Callable[[float], None] | None = None,
     omega0: ArrayLike | None = (0.0, 0.0, 0.0),
     quaternion0: ArrayLike | None = None,
     noise_std: ArrayLike | None = None,
@@ -87,6 +90,10 @@ def estimate(
         Integrate to velocity and position as well; two names of one argument.
     rrd : str or Path, optional
         Rerun recording to write.
+    force : bool
+        Go on, with a warning in the estimate, where the checks of the recording would refuse it.
+    progress : callable, optional
+        Called with the share done, 0 to 1.
     omega0, quaternion0, noise_std
         As for `gfimu.estimation.estimate`.
 
@@ -111,6 +118,8 @@ def estimate(
         noise_std=noise_std,
         fuse_gyro=gyro or fuse_gyro,
         with_position=position or with_position,
+        force=force,
+        progress=progress,
     ).estimate
 
 

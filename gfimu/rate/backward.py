@@ -11,7 +11,7 @@ __all__ = ["backward"]
 
 
 @njit(**COMPILE)
-def backward(record, count, ringing, adjoint, curvature, omega, covariance, first, states):  # type: ignore[no-untyped-def]
+def backward(record, count, ringing, adjoint, curvature, omega, covariance, first):  # type: ignore[no-untyped-def]
     """Run the smoother back over a recorded block of ``count`` samples (Bryson–Frazier form of Rauch–Tung–Striebel).
 
     For each scalar measurement, from the last to the first, with gain k = P h/S:
@@ -20,7 +20,7 @@ def backward(record, count, ringing, adjoint, curvature, omega, covariance, firs
 
     then x_s = x − P λ and P_s = P − P Λ P with the predicted x and P, and λ ← Fᵀλ, Λ ← FᵀΛF. No inverse is needed.
     """
-    n = len(states)
+    n = len(adjoint)
     work = np.zeros(n)
     three = np.zeros((3, n))
     for row in range(count - 1, -1, -1):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -25,6 +26,7 @@ def filter_rate(
     settings: FilterSettings | None = None,
     *,
     gyro: ArrayLike | None = None,
+    progress: Callable[[float], object] | None = None,
 ) -> RateEstimate:
     """Filter a recording: the causal estimate of the angular rate.
 
@@ -42,6 +44,8 @@ def filter_rate(
         Start, quadrature, rest.
     gyro : array_like, shape (n, 3), optional
         Gyro to fuse, rad/s; NaN where saturated.
+    progress : callable, optional
+        Called with the share of the work done so far, 0 to 1.
 
     Returns
     -------
@@ -56,7 +60,7 @@ def filter_rate(
     GeometryError
         If the array can't see all six motions, or can't find an unknown start.
     """
-    return run_filter(array, t, readings, errors, settings, gyro=gyro)[0]
+    return run_filter(array, t, readings, errors, settings, gyro=gyro, progress=progress)[0]
 
 
 def require_finite(array: AccelerometerArray, result: RateEstimate) -> None:
@@ -83,6 +87,7 @@ def run_filter(
     settings: FilterSettings | None = None,
     *,
     gyro: ArrayLike | None = None,
+    progress: Callable[[float], object] | None = None,
 ) -> tuple[RateEstimate, LiveRateFilter]:
     """Like `filter_rate`; also returns the filter as it is at the end."""
     times = np.asarray(t, dtype=float)
@@ -90,7 +95,8 @@ def run_filter(
         raise InputError("the filter needs at least two samples; record longer")
     if not np.isfinite(times).all() or np.any(np.diff(times) <= 0):
         raise InputError("sample times must be finite and increase; drop repeated or reordered samples")
-    live = LiveRateFilter(array, errors, float(np.median(np.diff(times))), settings, gyro=gyro is not None)
+    period = float(np.median(np.diff(times)))
+    live = LiveRateFilter(array, errors, period, settings, gyro=gyro is not None, progress=progress)
     pushed, _ = live.push_raw(times, readings, gyro)
     if not live.hypotheses:  # never clear of the biases
         return live.describe(pushed[0]), live

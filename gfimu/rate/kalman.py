@@ -11,7 +11,7 @@ takes three on each side: the estimate for a sample appears when two more have c
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -54,6 +54,7 @@ QUADRATURES = {"centred6": (6, 2), "centred4": (4, 1), "adams_moulton4": (4, 2),
 _CHUNK = 4096
 _SMOOTHER_BLOCK = 512
 _MOST_CHANNELS = 62
+_FORWARD_SHARE = 0.3  # of the smoother's time, for its progress
 
 
 @dataclass(frozen=True)
@@ -164,7 +165,7 @@ class KalmanRateFilter:
         self.lag = points - 2 - position
         self._gyro = gyro
         c, d = array.n_channels, self.tables.n_null
-        self._axes = ((0,) * (9 + d + 3 * gyro), (0,) * d, (0,) * (3 * gyro))
+        self._sizes = (9 + d + 3 * gyro, d, 3 * gyro)  # of the state, the null space and the gyro
         rest = self.settings.rest
         self._tuning = Tuning(
             period,
@@ -196,14 +197,15 @@ class KalmanRateFilter:
         self._tally = np.zeros((3, c), dtype=np.int64)
         self._blind = 0
         self._gaps = 0
-        self._record = empty_record(0, *self._axes)
+        self._record = empty_record(0, *self._sizes)
         self._kept: list[RecursionState] = []
         self._taken_back: list[tuple[int, int]] = []  # rows of the buffer, from behind the last rest to its end's block
         self._last_time = -np.inf
+        self.progress: Callable[[float], object] | None = None  # called with the share of a block done so far
 
     def _start(self) -> RecursionState:
         """State before the first sample."""
-        c, d, n = self.array.n_channels, self.tables.n_null, len(self._axes[0])
+        c, d, n = self.array.n_channels, self.tables.n_null, self._sizes[0]
         if self.settings.start_omega is None:
             raise InputError("a single filter needs a start; use LiveRateFilter or filter_rate for an unknown one")
         x = np.zeros(n)
@@ -284,6 +286,8 @@ class KalmanRateFilter:
             part = slice(start, start + _CHUNK)
             self._take(times[part], rows[part], None if turning is None else turning[part])
             filled = self._advance(self._received - self.lag, out, stamps, filled)
+            if self.progress is not None:
+                self.progress(min(1.0, (start + _CHUNK) / len(times)))
         return FilterOutput(stamps, out).rows(slice(0, filled))
 
     def finish(self) -> FilterOutput:
@@ -310,6 +314,8 @@ class KalmanRateFilter:
             for start in range(0, len(times), _SMOOTHER_BLOCK):
                 self._kept.append(self.state.copy())
                 self._advance(min(start + _SMOOTHER_BLOCK, len(times)), out, stamps, start, closing=True)
+                if self.progress is not None:
+                    self.progress(_FORWARD_SHARE * min(1.0, (start + _SMOOTHER_BLOCK) / len(times)))
             if not self._taken_back:
                 return FilterOutput(stamps, out)
             for first, last in self._taken_back:  # again, without the blocks that turned out not to be rest
@@ -320,20 +326,18 @@ class KalmanRateFilter:
         """Smooth the recording of `record_run`: rates (n, 3) and covariances (n, 3, 3)."""
         n = self._done
         omega, covariance = np.empty((n, 3)), np.empty((n, 6))
-        size = len(self._axes[0])
+        size = self._sizes[0]
         adjoint, curvature = np.zeros(size), np.zeros((size, size))
-        record = empty_record(_SMOOTHER_BLOCK, *self._axes)
+        record = empty_record(_SMOOTHER_BLOCK, *self._sizes)
         ignored = empty_output(_SMOOTHER_BLOCK)
         for number in range(len(self._kept) - 1, -1, -1):
             first = number * _SMOOTHER_BLOCK
             last = min(first + _SMOOTHER_BLOCK, n)
             forward(
                 self._buffer, first, last, n, self._compiled_tables, self._tuning, self._kept[number].copy(), ignored,
-                -first, record, *self._axes,
+                -first, record,
             )  # fmt: skip
-            backward(
-                record, last - first, self._tuning.ringing, adjoint, curvature, omega, covariance, first, self._axes[0]
-            )
+            backward(record, last - first, self._tuning.ringing, adjoint, curvature, omega, covariance, first)
         return omega, full_covariance(covariance)
 
     def _check_times(self, times: NDArray[np.float64]) -> None:
@@ -398,7 +402,7 @@ class KalmanRateFilter:
         while reached < until:
             reached = forward(
                 self._buffer, reached, until, self._received, self._compiled_tables, self._tuning, self.state, out,
-                filled - first, self._record, *self._axes,
+                filled - first, self._record,
             )  # fmt: skip
             if self.state.counts[RETURN]:
                 self._take_back(reached, out, filled + reached - first - 1)
@@ -419,7 +423,7 @@ class KalmanRateFilter:
         again = empty_output(reached - first)
         forward(
             self._buffer, first, reached, self._received, self._compiled_tables,
-            self._tuning._replace(rest_window=0, likelihood=False), state, again, -first, self._record, *self._axes,
+            self._tuning._replace(rest_window=0, likelihood=False), state, again, -first, self._record,
         )  # fmt: skip
         state.counts[BLOCK] = 0
         state.block_x[:] = state.x
@@ -465,11 +469,9 @@ def empty_output(n: int) -> RecursionOutput:
     )  # fmt: skip
 
 
-def empty_record(
-    length: int, states: tuple[int, ...], null_axes: tuple[int, ...], gyro_axes: tuple[int, ...]
-) -> Record:
-    """Record for the backward pass over ``length`` samples."""
-    n, updates = len(states), 2 * len(null_axes) + len(gyro_axes) + 3
+def empty_record(length: int, n: int, null_axes: int, gyro_axes: int) -> Record:
+    """Record for the backward pass over ``length`` samples of a state of size ``n``."""
+    updates = 2 * null_axes + gyro_axes + 3
     return Record(
         np.empty((length, 3)), np.empty((length, 3, n)), np.empty((length, 3, n)), np.empty(length, dtype=np.int64),
         np.empty((length, updates, n)), np.empty((length, updates, n)), np.empty((length, updates)),

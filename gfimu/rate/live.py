@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -35,6 +36,8 @@ class LiveRateFilter:
         Start, quadrature, rest. With ``start_omega=None`` two filters follow ω and −ω until the sign is decided.
     gyro : bool
         Whether gyro readings come along.
+    progress : callable, optional
+        Called with the share of each block of samples that is filtered, 0 to 1.
 
     Raises
     ------
@@ -56,12 +59,14 @@ class LiveRateFilter:
         settings: FilterSettings | None = None,
         *,
         gyro: bool = False,
+        progress: Callable[[float], object] | None = None,
     ) -> None:
         self.array = array
         self.errors = errors
         self.period = period
         self.settings = settings or FilterSettings()
         self._gyro = gyro
+        self._progress = progress
         self._sign = SignDecision()
         self._test = SignTest()
         self.hypotheses: list[KalmanRateFilter] = []
@@ -74,6 +79,7 @@ class LiveRateFilter:
             if rest is not None and not np.any(self.settings.start_omega):
                 self._unproven = rest.window(period)
             self.hypotheses = [KalmanRateFilter(array, errors, period, self.settings, gyro=gyro)]
+            self.hypotheses[0].progress = progress
         else:
             self._sign = SignDecision("undecided", 0.0)
             self._initial = InitialRate(array, errors)
@@ -176,6 +182,7 @@ class LiveRateFilter:
             self.hypotheses.append(
                 KalmanRateFilter(self.array, self.errors, self.period, start, gyro=self._gyro, likelihood=True)
             )
+            self.hypotheses[-1].progress = self._progress
 
     def _judge(self, outputs: list[FilterOutput]) -> tuple[list[FilterOutput], int | None]:
         """Compare the hypotheses; once decided, drop the loser."""

@@ -44,6 +44,7 @@ def estimate_rate(
     method: str = "filter",
     settings: FilterSettings | None = None,
     gyro: ArrayLike | None = None,
+    progress: Callable[[float], object] | None = None,
 ) -> RateEstimate:
     """Estimate the angular rate of a recording.
 
@@ -64,6 +65,8 @@ def estimate_rate(
         biases from a leading rest if the start is at rest.
     gyro : array_like, shape (n, 3), optional
         Gyro that ``filter`` and ``smoother`` fuse, rad/s; NaN where saturated.
+    progress : callable, optional
+        Called by ``filter`` and ``smoother`` with the share of the work done so far, 0 to 1.
 
     Raises
     ------
@@ -77,7 +80,7 @@ def estimate_rate(
     chosen = settings or FilterSettings()
     if method in {"filter", "smoother"}:
         solve = filter_rate if method == "filter" else smooth_rate
-        return solve(array, t, readings, errors, chosen, gyro=gyro)
+        return solve(array, t, readings, errors, chosen, gyro=gyro, progress=progress)
     if gyro is not None:
         raise InputError(f"method {method!r} can't use a gyro; use filter or smoother")
     return _SIMPLE[method](array, t, readings, errors, chosen)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -36,6 +36,10 @@ class RateProblem:
         Angular rate at the first sample, body axes, rad/s; None if unknown.
     gyro : ndarray, shape (n, 3), optional
         Gyro to fuse, rad/s; NaN where it is saturated or missing.
+    temperature : ndarray, shape (n,), optional
+        Temperature of the chips, °C.
+    progress : callable, optional
+        Called with the share of the work done so far.
     """
 
     array: AccelerometerArray
@@ -45,6 +49,8 @@ class RateProblem:
     linear: LinearSolution
     omega0: NDArray[np.float64] | None
     gyro: NDArray[np.float64] | None = None
+    temperature: NDArray[np.float64] | None = None
+    progress: Callable[[float], object] | None = None
 
     __repr__ = short_repr
 

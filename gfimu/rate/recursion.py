@@ -22,7 +22,7 @@ to second order while ω is not much larger than its uncertainty: with P the cov
 of row i, z_i has mean ωᵀB_iω + tr(B_i P) and the variance 2 tr(B_i P B_i P) more than the linear one.
 
 Everything that a sample needs is in arrays, so a run can stop after any sample and go on with the same answer. Sizes
-are lengths of tuples: constants for the compiler, which unrolls the loops over the state.
+are those of the arrays: one compiled form serves every array of accelerometers, with and without a gyro.
 """
 
 from __future__ import annotations
@@ -35,7 +35,6 @@ from gfimu.rate.model_errors import follow_differences, inflation_of, undersampl
 from gfimu.rate.recursion_data import BLOCK, COMPILE, LAST_GOOD, RETURN, SAMPLES, STARTED, TIME, WALK
 from gfimu.rate.rest_recursion import keep_rest, rest_block
 from gfimu.rate.second_order import second_order
-from gfimu.rate.unrolled import step as _step_twelve
 
 __all__ = ["forward"]
 
@@ -45,19 +44,19 @@ _SLOW = 1e-3  # tr P above this share of |ω|² switches the second-order terms 
 
 @njit(**COMPILE)
 def forward(  # type: ignore[no-untyped-def]
-    data, first, last, closing, tables, tuning, state, out, offset, record, states, null_axes, gyro_axes
+    data, first, last, closing, tables, tuning, state, out, offset, record
 ):
     """Run the filter over the samples ``first`` to ``last − 1``; returns where it stopped.
 
     It stops behind a sample at which a rest ended whose last blocks are in doubt (``state.counts[RETURN]``).
 
     ``closing`` is the number of samples that the stencils may use; ``offset`` is added to a sample's place to find
-    its place in ``out``; the record is filled when its arrays are not empty. ``states``, ``null_axes`` and
-    ``gyro_axes`` are tuples as long as the state, the null space and the gyro.
+    its place in ``out``; the record is filled when its arrays are not empty.
     """
-    n = len(states)
-    d = len(null_axes)
     x = state.x
+    n = x.shape[0]
+    d = data.z.shape[1]
+    gyro_axes = n - 9 - d  # 0 or 3
     covariance = state.covariance
     keep = record.updates.shape[0] > 0
     points = tuning.weights.shape[1]
@@ -68,7 +67,6 @@ def forward(  # type: ignore[no-untyped-def]
     moved = np.zeros(3)
     rows = np.zeros((3, n))
     product = np.zeros((3, n))
-    turned = np.zeros(3)
     settles = state.settles[0]
     noise_row = n - 3
     ringing = tuning.ringing
@@ -76,13 +74,10 @@ def forward(  # type: ignore[no-untyped-def]
     slopes = np.zeros((max(d, 1), 3))
     innovations = np.zeros(d)
     variances = np.zeros(d)
-    unrolled = n == 15 and d == 6
     alpha = data.alpha
-    z = data.z
     even_weights = tuning.weights
     plain_set = tables.plain[0]
     noise_of_all = tables.alpha_noise[0]
-    sensitivity_of_all = tables.null_sensitivity[0]
     noise_power = noise_of_all[0, 0] + noise_of_all[1, 1] + noise_of_all[2, 2]
     inflated = tuning.scale_variance + tuning.placement_variance + tuning.timing_variance > 0.0
     forget = min(1.0, tuning.period / _WALK_MEMORY)
@@ -96,7 +91,6 @@ def forward(  # type: ignore[no-untyped-def]
         nis = 0.0
         dof = 0
         determinant = 1.0
-        stepped = False
         noise_set = place if sensed else 0
         if inflated and sensed:
             inflation = inflation_of(data, k, state, tuning, x[0] * x[0] + x[1] * x[1] + x[2] * x[2])
@@ -126,7 +120,6 @@ def forward(  # type: ignore[no-untyped-def]
                     s0 += weight * alpha[start + j, 0]
                     s1 += weight * alpha[start + j, 1]
                     s2 += weight * alpha[start + j, 2]
-                stepped = unrolled and not keep and not (settles and state.counts[SAMPLES] < tuning.rest_window)
             else:
                 start, used = interval_weights(data, tuning, k, closing, weights)
                 for j in range(used):
@@ -138,15 +131,7 @@ def forward(  # type: ignore[no-untyped-def]
                     s0 += weights[j] * alpha[node, 0]
                     s1 += weights[j] * alpha[node, 1]
                     s2 += weights[j] * alpha[node, 2]
-            if stepped:
-                turned[0] = s0
-                turned[1] = s1
-                turned[2] = s2
-                nis, determinant = _step_twelve(
-                    x, covariance, turned, step, ringing, noise_of_all, inflation, sensitivity_of_all, z, k, _SLOW
-                )
-                dof = d
-            elif clean:
+            if clean:
                 for r in range(n):
                     covariance[0, r] += carried * covariance[noise_row, r] - step * covariance[3, r]
                     covariance[1, r] += carried * covariance[noise_row + 1, r] - step * covariance[4, r]
@@ -217,11 +202,10 @@ def forward(  # type: ignore[no-untyped-def]
                         mean = 0.5 * (covariance[a, b] + covariance[b, a])
                         covariance[a, b] = mean
                         covariance[b, a] = mean
-            if not stepped:
-                x[0] += s0 - step * x[3] + carried * x[noise_row]
-                x[1] += s1 - step * x[4] + carried * x[noise_row + 1]
-                x[2] += s2 - step * x[5] + carried * x[noise_row + 2]
-                _renew_noise(x, covariance, tables.alpha_noise[noise_set], (1.0 + inflation) * renewed, ringing, half)
+            x[0] += s0 - step * x[3] + carried * x[noise_row]
+            x[1] += s1 - step * x[4] + carried * x[noise_row + 1]
+            x[2] += s2 - step * x[5] + carried * x[noise_row + 2]
+            _renew_noise(x, covariance, tables.alpha_noise[noise_set], (1.0 + inflation) * renewed, ringing, half)
             extra = 0.0
             if not sensed:  # α is held: its wandering adds up
                 age = data.t[k] - state.scalars[LAST_GOOD]
@@ -270,7 +254,7 @@ def forward(  # type: ignore[no-untyped-def]
         # In the first block after a start at rest ω is known from the start alone and drifts with the unknown bias of
         # α: far too uncertain for a linearised z. If the block turns out as rest, the mean of z is used at its end.
         settling = tuning.rest_window > state.counts[SAMPLES] and settles
-        if sensed and d > 0 and not settling and not stepped:
+        if sensed and d > 0 and not settling:
             plain = place == 0
             measured_rows = d if plain else tables.null_count[place]
             sensitivity = tables.null_sensitivity[place]
@@ -332,11 +316,11 @@ def forward(  # type: ignore[no-untyped-def]
                 if keep:
                     _remember(record, row, used_rows, h, ph, inverse, innovation)
                     used_rows += 1
-                _apply(x, covariance, ph, inverse, innovation, states)
+                _apply(x, covariance, ph, inverse, innovation)
                 nis += innovation * innovation * inverse
                 determinant *= variance
             dof = measured_rows
-        if len(gyro_axes) > 0:
+        if gyro_axes > 0:
             for a in range(3):
                 if np.isfinite(data.gyro[k, a]):
                     for r in range(n):
@@ -350,7 +334,7 @@ def forward(  # type: ignore[no-untyped-def]
                         h[6 + d + a] = 1.0
                         _remember(record, row, used_rows, h, ph, inverse, innovation)
                         used_rows += 1
-                    _apply(x, covariance, ph, inverse, innovation, states)
+                    _apply(x, covariance, ph, inverse, innovation)
                     nis += innovation * innovation * inverse
                     determinant *= variance
                     dof += 1
@@ -369,7 +353,7 @@ def forward(  # type: ignore[no-untyped-def]
                     h[a] = 1.0
                     _remember(record, row, used_rows, h, ph, inverse, innovation)
                     used_rows += 1
-                _apply(x, covariance, ph, inverse, innovation, states)
+                _apply(x, covariance, ph, inverse, innovation)
             if settling:
                 for i in range(d):
                     for r in range(n):
@@ -383,7 +367,7 @@ def forward(  # type: ignore[no-untyped-def]
                         h[6 + i] = 1.0
                         _remember(record, row, used_rows, h, ph, inverse, innovation)
                         used_rows += 1
-                    _apply(x, covariance, ph, inverse, innovation, states)
+                    _apply(x, covariance, ph, inverse, innovation)
         state.counts[SAMPLES] += 1
         if keep:
             record.updates[row] = used_rows
@@ -459,9 +443,9 @@ def _renew_noise(x, covariance, noise, factor, ringing, half):  # type: ignore[n
 
 
 @njit(**COMPILE)
-def _apply(x, covariance, ph, inverse, innovation, states):  # type: ignore[no-untyped-def]
+def _apply(x, covariance, ph, inverse, innovation):  # type: ignore[no-untyped-def]
     """Update by one scalar measurement: x += P h e/S, P −= P h hᵀP/S."""
-    n = len(states)
+    n = len(x)
     root = np.sqrt(inverse)
     pull = innovation * inverse
     for r in range(n):

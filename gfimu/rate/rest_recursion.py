@@ -83,9 +83,12 @@ def _return_before(back, window, state):  # type: ignore[no-untyped-def]
 def keep_rest(state):  # type: ignore[no-untyped-def]
     """Keep the state after a block of rest, so that later blocks can be taken back."""
     place = state.counts[PAST] % len(state.past_x)
-    state.past_x[place] = state.x
-    state.past_covariance[place] = state.covariance
-    state.past_scalars[place] = state.scalars
+    for r in range(len(state.x)):
+        state.past_x[place, r] = state.x[r]
+        for q in range(len(state.x)):
+            state.past_covariance[place, r, q] = state.covariance[r, q]
+    for number in range(len(state.scalars)):
+        state.past_scalars[place, number] = state.scalars[number]
     state.past_samples[place] = state.counts[SAMPLES]
     state.counts[PAST] += 1
 
@@ -137,18 +140,38 @@ def _moving_blocks(y, tables, tuning, state):  # type: ignore[no-untyped-def]
     halves /= 1.0 / first + 1.0 / second
     if scatter > ends[0] or halves > ends[1]:
         return 1
-    consistent = np.linalg.solve(known[:3, :3] + tuning.rest_variance * np.eye(3), state.block_x[:3])
-    if (consistent * state.block_x[:3]).sum() > ends[4]:
+    size = max(d, 3)
+    spread = np.empty((size, size))
+    value = np.empty(size)
+    for a in range(3):
+        value[a] = state.block_x[a]
+        for b in range(3):
+            spread[a, b] = known[a, b]
+        spread[a, a] += tuning.rest_variance
+    if _normalised_square(spread, value, 3) > ends[4]:
         return 1
     # Means against the biases known when the block began.
-    alpha = tables.alpha_rows[0] @ mean - state.block_x[3:6]
-    spread = known[3:6, 3:6] + tables.alpha_noise[0] / window
-    alpha_statistic = (np.linalg.solve(spread, alpha) * alpha).sum()
+    alpha = np.empty(3)
+    for a in range(3):
+        total = -state.block_x[3 + a]
+        for i in range(c):
+            total += tables.alpha_rows[0, a, i] * mean[i]
+        alpha[a] = total
+        value[a] = total
+        for b in range(3):
+            spread[a, b] = known[3 + a, 3 + b] + tables.alpha_noise[0, a, b] / window
+    alpha_statistic = _normalised_square(spread, value, 3)
     null_statistic = 0.0
     if d > 0:
-        null = tables.null_rows[0] @ mean - state.block_x[6 : 6 + d]
-        spread_null = known[6 : 6 + d, 6 : 6 + d] + np.eye(d) / window
-        null_statistic = (np.linalg.solve(spread_null, null) * null).sum()
+        for j in range(d):
+            total = -state.block_x[6 + j]
+            for i in range(c):
+                total += tables.null_rows[0, j, i] * mean[i]
+            value[j] = total
+            for r in range(d):
+                spread[j, r] = known[6 + j, 6 + r]
+            spread[j, j] += 1.0 / window
+        null_statistic = _normalised_square(spread, value, d)
     if alpha_statistic > ends[2] or null_statistic > ends[3]:
         return 1
     doubtful = scatter > limits[0] or halves > limits[1] or alpha_statistic > limits[2] or null_statistic > limits[3]
@@ -183,10 +206,11 @@ def _moving_run(alpha, tables, tuning, state):  # type: ignore[no-untyped-def]
     counts = state.counts
     length = len(state.run_alpha)
     place = counts[RUN] % length
-    state.run_alpha[place] = alpha
-    state.run_alpha[place] += state.block_x[3:6]
-    state.run_bias[place] = state.block_x[3:6]
-    state.run_covariance[place] = state.block_covariance[3:6, 3:6]
+    for a in range(3):
+        state.run_alpha[place, a] = alpha[a] + state.block_x[3 + a]
+        state.run_bias[place, a] = state.block_x[3 + a]
+        for b in range(3):
+            state.run_covariance[place, a, b] = state.block_covariance[3 + a, 3 + b]
     counts[RUN] += 1
     run = counts[RUN]
     limit = tuning.rest_limits[2 if counts[RESTING] > 0 else 0, 2]
@@ -202,8 +226,14 @@ def _moving_run(alpha, tables, tuning, state):  # type: ignore[no-untyped-def]
             or _run_statistic(min(run, length), tables, tuning, state) > tuning.rest_limits[0, 7 if resumes else 6]
         ):
             return 0
-        known = state.covariance[:3, :3] + tuning.rest_variance * np.eye(3)
-        if (np.linalg.solve(known, state.x[:3]) * state.x[:3]).sum() > tuning.rest_limits[0, 7]:
+        spread = np.empty((3, 3))
+        value = np.empty(3)
+        for a in range(3):
+            value[a] = state.x[a]
+            for b in range(3):
+                spread[a, b] = state.covariance[a, b]
+            spread[a, a] += tuning.rest_variance
+        if _normalised_square(spread, value, 3) > tuning.rest_limits[0, 7]:
             return 0
         counts[RESTING] = 1
     return 0
@@ -215,8 +245,37 @@ def _run_statistic(span, tables, tuning, state):  # type: ignore[no-untyped-def]
     length = len(state.run_alpha)
     run = state.counts[RUN]
     begin = (run - span) % length
-    difference = -state.run_bias[begin]
-    for number in range(run - span, run):
-        difference += state.run_alpha[number % length] / span
-    spread = state.run_covariance[begin] + tables.alpha_noise[0] / (span * tuning.rest_window)
-    return (np.linalg.solve(spread, difference) * difference).sum()
+    difference = np.empty(3)
+    spread = np.empty((3, 3))
+    for a in range(3):
+        total = 0.0
+        for number in range(run - span, run):
+            total += state.run_alpha[number % length, a]
+        difference[a] = total / span - state.run_bias[begin, a]
+        for b in range(3):
+            noise = tables.alpha_noise[0, a, b] / (span * tuning.rest_window)
+            spread[a, b] = state.run_covariance[begin, a, b] + noise
+    return _normalised_square(spread, difference, 3)
+
+
+@njit(**COMPILE)
+def _normalised_square(spread, value, size):  # type: ignore[no-untyped-def]
+    """Return vᵀ S⁻¹ v of the first ``size`` components by Cholesky's factors; both arguments are overwritten.
+
+    Loops, as the compiler takes far longer over calls of a linear algebra library.
+    """
+    total = 0.0
+    for i in range(size):
+        for j in range(i):
+            entry = spread[i, j]
+            for k in range(j):
+                entry -= spread[i, k] * spread[j, k]
+            spread[i, j] = entry / spread[j, j]
+            value[i] -= spread[i, j] * value[j]
+        pivot = spread[i, i]
+        for k in range(i):
+            pivot -= spread[i, k] * spread[i, k]
+        spread[i, i] = np.sqrt(pivot)
+        value[i] /= spread[i, i]
+        total += value[i] * value[i]
+    return total

@@ -8,6 +8,7 @@ per sample.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -32,6 +33,7 @@ def smooth_rate(
     settings: FilterSettings | None = None,
     *,
     gyro: ArrayLike | None = None,
+    progress: Callable[[float], object] | None = None,
 ) -> RateEstimate:
     """Smooth a recording: the estimate of the angular rate from all its samples.
 
@@ -49,6 +51,8 @@ def smooth_rate(
         Start, quadrature, rest.
     gyro : array_like, shape (n, 3), optional
         Gyro to fuse, rad/s; NaN where saturated.
+    progress : callable, optional
+        Called with the share of the work done so far, 0 to 1.
 
     Returns
     -------
@@ -70,7 +74,7 @@ def smooth_rate(
     turning = None if gyro is None else np.asarray(gyro, dtype=float)
     chosen = settings or FilterSettings()
     if chosen.start_omega is not None:
-        smoothed_run = _smooth(array, times, rows, errors, chosen, turning, period)
+        smoothed_run = _smooth(array, times, rows, errors, chosen, turning, period, progress)
         window = chosen.rest.window(period) if chosen.rest else 0
         doubtful = 0 < window <= len(times) and not np.any(chosen.start_omega) and not smoothed_run.rest[:window].any()
         return replace(smoothed_run, sign=SignDecision("undecided", 0.0)) if doubtful else smoothed_run
@@ -81,7 +85,7 @@ def smooth_rate(
     first = int(np.argmax(filtered.t_s >= live.started_at_s))
     tail = None if turning is None else turning[first:]
     smoothed = [
-        _smooth(array, times[first:], rows[first:], errors, hypothesis.settings, tail, period)
+        _smooth(array, times[first:], rows[first:], errors, hypothesis.settings, tail, period, progress)
         for hypothesis in live.hypotheses
     ]
     smoothed = [replace(_prepend(filtered, first, result), sign=live.sign) for result in smoothed]
@@ -105,9 +109,11 @@ def _smooth(
     settings: FilterSettings,
     gyro: NDArray[np.float64] | None,
     period: float,
+    progress: Callable[[float], object] | None = None,
 ) -> RateEstimate:
     """Smooth with a known start."""
     process = KalmanRateFilter(array, errors, period, settings, gyro=gyro is not None, capacity=len(t))
+    process.progress = progress
     forward = process.record_run(t, readings, gyro)
     require_finite(array, process.estimate(forward))
     omega, covariance = process.run_back()

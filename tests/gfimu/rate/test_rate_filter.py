@@ -11,11 +11,13 @@ from reference_filter import reference_filter, reference_smoother
 
 from gfimu.array import AccelerometerArray
 from gfimu.errors import GeometryError, InputError
-from gfimu.rate import unroll
+from gfimu.rate.backward import backward
 from gfimu.rate.filter import filter_rate
 from gfimu.rate.kalman import FilterSettings, quadrature_weights
 from gfimu.rate.live import LiveRateFilter
 from gfimu.rate.methods import RATE_METHODS, estimate_rate
+from gfimu.rate.preparation import prepare
+from gfimu.rate.recursion import forward
 from gfimu.rate.sensing import ChannelTables, SensorErrors
 from gfimu.rate.smoother import smooth_rate
 
@@ -49,8 +51,14 @@ def test_smoother_agrees_with_rauch_tung_striebel_by_the_book(run):
     np.testing.assert_allclose(found.covariance, covariance, rtol=1e-4, atol=1e-9)
 
 
-def test_generated_step_is_up_to_date(project_root):
-    assert (project_root / "gfimu/rate/unrolled.py").read_text(encoding="utf-8") == unroll.source()
+def test_one_compiled_form_serves_all_arrays():
+    for name, gyro in (("cube12", False), ("cube12", True), ("corners8", False), ("mimu4444", False)):
+        array = AccelerometerArray.load(name)
+        t = np.arange(80) / RATE
+        turning = np.zeros((80, 3)) if gyro else None
+        for solve in (filter_rate, smooth_rate):
+            solve(array, t, np.zeros((80, array.n_channels)), SensorErrors.from_parts(array, RATE), gyro=turning)
+    assert len(forward.signatures) == len(backward.signatures) == len(prepare.signatures) == 1
 
 
 def test_quadrature_weights():

@@ -1,0 +1,237 @@
+"""Whether a rate filter's innovations are as large as it states: χ² tests of the whole run and of each second.
+
+With a right model the normalised innovations squared (NIS) of a sample are χ² with one degree of freedom per
+combination that was compared, independent of those of other samples (Bar-Shalom, Li & Kirubarajan, Estimation with
+Applications to Tracking and Navigation, 2001, ch. 5.4). Their sum over N degrees of freedom is χ² with N.
+
+A real chip has errors that the filter's white noise and constant bias don't cover: its gain and its axes are known to
+its data sheet's typical deviation only, and its bias changes with temperature. The filter takes the mean of such an
+error so far for a bias; the innovations get the rest, in proportion to how far the readings are from their mean so
+far. With g the vector of such errors in their standard deviations, the sum grows by gᵀΛg, where Λ holds the energies
+and correlations that one standard deviation of each puts into the null space. That quadratic form is taken as a gamma
+distribution of its mean tr Λ and variance 2 tr Λ² (Satterthwaite). The bound is the χ² quantile plus its quantile.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2, gamma
+
+from gfimu.array import AccelerometerArray
+from gfimu.errors import InputError
+from gfimu.part_limits import PartLimits
+from gfimu.rate.result import RateEstimate
+from gfimu.rate.sensing import ChannelTables, SensorErrors
+
+__all__ = ["FALSE_ALARM", "Consistency", "judge_consistency", "slow_error_signatures"]
+
+FALSE_ALARM = 1e-4
+"""Probability that a run whose sensors are as stated is called inconsistent, at most, by each of the two tests."""
+
+_WINDOW_S = 1.0
+_SEARCHED = 200_000  # samples in which the channel is looked for
+_SETTLED = 0.5  # of the excess has to go with a channel that is named alone
+
+
+@dataclass(frozen=True)
+class Consistency:
+    """How the innovations of a filter compare with what it states.
+
+    Parameters
+    ----------
+    nis : float
+        Mean normalised innovation squared per degree of freedom, over the run.
+    expected : float
+        What a right model gives: 1.
+    bound : float
+        Largest mean that noise and channels within their data sheets' typical deviations give, with a probability of
+        1 − ``false_alarm``.
+    noise_bound : float
+        The same of noise alone. A mean between the two says that the stated standard deviation is too small by about
+        √nis, and that a calibration would mend it.
+    worst_second, worst_second_bound : float
+        The mean over the second that exceeds its own bound most, and that bound; NaN without a whole second.
+    worst_second_at_s : float
+        Time at which it begins, s.
+    consistent : bool
+        Whether both means are within their bounds.
+    worst_channel : str or None
+        The channel without which the innovations shrink most, if they are inconsistent and that removes most of it.
+    nis_without_worst : float
+        The mean without it; NaN if none was looked for.
+    degrees_of_freedom : int
+        Combinations that were compared, over all samples.
+    false_alarm : float
+        Probability of calling a right model inconsistent, by each of the two tests.
+    """
+
+    nis: float
+    expected: float
+    bound: float
+    noise_bound: float
+    worst_second: float
+    worst_second_bound: float
+    worst_second_at_s: float
+    consistent: bool
+    worst_channel: str | None
+    nis_without_worst: float
+    degrees_of_freedom: int
+    false_alarm: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the figures by name, for JSON; None for those that are not known."""
+        return {
+            name: None if isinstance(value, float) and not np.isfinite(value) else value
+            for name, value in asdict(self).items()
+        }
+
+
+def judge_consistency(
+    array: AccelerometerArray,
+    readings: NDArray[np.float64],
+    errors: SensorErrors,
+    found: RateEstimate,
+    *,
+    temperature: NDArray[np.float64] | None = None,
+    filter_again: Callable[[slice, NDArray[np.float64]], RateEstimate] | None = None,
+) -> Consistency | None:
+    """Judge the innovations of a filter, and look for the channel that disagrees.
+
+    Parameters
+    ----------
+    array : AccelerometerArray
+        The array, with c channels.
+    readings : ndarray, shape (n, c)
+        What was filtered, m/s²; NaN where missing.
+    errors : SensorErrors
+        Noise that the filter was given.
+    found : RateEstimate
+        What it found.
+    temperature : ndarray, shape (n,), optional
+        Temperature of the chips, °C.
+    filter_again : callable, optional
+        Filters some rows of the run again with these readings; needed to name a channel.
+
+    Returns
+    -------
+    Consistency or None
+        None where nothing was compared, as with an array without redundant directions.
+    """
+    used = (found.nis_dof > 0) & np.isfinite(found.nis)
+    dof = np.where(used, found.nis_dof, 0)
+    nis = np.where(used, found.nis, 0.0)
+    total = int(dof.sum())
+    if total == 0:
+        return None
+    signatures = slow_error_signatures(array, readings, temperature)  # (n, k)
+    signatures[~used] = 0.0
+    null = ChannelTables(array, errors).null_rows[0]
+    seen = np.tile(null.T @ null, (signatures.shape[1] // array.n_channels,) * 2)  # (k, k)
+    noise_bound = float(chi2.isf(FALSE_ALARM, total)) / total
+    bound = noise_bound + _slow_quantile(signatures, seen, FALSE_ALARM) / total
+    mean = float(nis.sum()) / total
+    # The same for each second, at a smaller probability as there are many.
+    period = float(np.median(np.diff(found.t_s)))
+    length = max(1, round(_WINDOW_S / period))
+    worst = worst_bound = at = np.nan
+    count = len(nis) // length
+    late = False
+    if count:
+        sums, freedom = (values[: count * length].reshape(count, length).sum(axis=1) for values in (nis, dof))
+        whole = freedom > 0
+        limit = np.full(count, np.inf)
+        limit[whole] = chi2.isf(FALSE_ALARM / count, freedom[whole])
+        for place in np.flatnonzero(sums > limit):  # the others need no allowance
+            rows = signatures[place * length : (place + 1) * length]
+            limit[place] += _slow_quantile(rows, seen, FALSE_ALARM / count)
+        place = int(np.argmax(sums / limit))
+        if whole[place]:
+            worst, worst_bound = float(sums[place] / freedom[place]), float(limit[place] / freedom[place])
+            at = float(found.t_s[place * length])
+            late = worst > worst_bound
+    consistent = mean <= bound and not late
+    channel, without = None, np.nan
+    if not consistent and filter_again is not None:
+        focus = int(np.searchsorted(found.t_s, at)) if late else 0
+        channel, without = _worst_channel(array, readings, found, focus, filter_again)
+    return Consistency(
+        mean, 1.0, bound, noise_bound, worst, worst_bound, at, consistent, channel, without, total, FALSE_ALARM
+    )
+
+
+def slow_error_signatures(
+    array: AccelerometerArray, readings: NDArray[np.float64], temperature: NDArray[np.float64] | None = None
+) -> NDArray[np.float64]:
+    """Readings' errors by one standard deviation of each slow error, as far as a filter of constant biases keeps them.
+
+    Shape (n, k) with the c channels' errors of the gain first, then of the axis to its two sides, then, if the
+    ``temperature`` (n,), °C, is known, of the bias with temperature; m/s². Each is the data sheet's typical deviation
+    times how far the reading, the specific force across the axis, or the temperature is from its mean so far. Zero
+    where no data sheet is known.
+    """
+    moved = _from_mean_so_far(readings)  # (n, c)
+    try:
+        sheet = PartLimits.of(array, 100.0)
+    except InputError:
+        return np.zeros_like(moved)
+    sides = np.zeros((2, *moved.shape))
+    for number in range(len(array.chips)):
+        mine = np.flatnonzero(array.chip_of_channel == number)
+        for side in range(min(2, len(mine) - 1)):
+            sides[side][:, mine] = moved[:, np.roll(mine, -1 - side)]
+        if len(mine) < 3:  # the chip does not read this side; it moves as much as all channels do on average
+            sides[len(mine) - 1 :, :, mine] = np.sqrt(np.mean(moved**2, axis=1, keepdims=True))
+    columns = [sheet.gain_std * moved, sheet.axis_std * sides[0], sheet.axis_std * sides[1]]
+    if temperature is not None and np.isfinite(temperature).any():
+        columns.append(_from_mean_so_far(temperature[:, None]) * sheet.bias_tempco)
+    return np.hstack(columns)
+
+
+def _from_mean_so_far(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return what each column (n, k) differs from the mean of its values up to there; zero where missing."""
+    seen = np.isfinite(values)
+    count = np.maximum(np.cumsum(seen, axis=0), 1)
+    mean = np.cumsum(np.where(seen, values, 0.0), axis=0) / count
+    return np.where(seen, values - mean, 0.0)
+
+
+def _slow_quantile(signatures: NDArray[np.float64], seen: NDArray[np.float64], probability: float) -> float:
+    """Return the upper quantile of gᵀΛg for signatures (m, k) and what the null space sees of each pair (k, k)."""
+    energies = seen * (signatures.T @ signatures)
+    mean, square = float(np.trace(energies)), float(np.sum(energies**2))
+    if not (mean > 0.0 and square > 0.0):
+        return 0.0
+    return float(gamma.isf(probability, mean**2 / (2.0 * square), scale=2.0 * square / mean))
+
+
+def _worst_channel(
+    array: AccelerometerArray,
+    readings: NDArray[np.float64],
+    found: RateEstimate,
+    focus: int,
+    filter_again: Callable[[slice, NDArray[np.float64]], RateEstimate],
+) -> tuple[str | None, float]:
+    """Filter again without each channel in turn: the one whose absence shrinks the innovations most, and their mean."""
+    first = max(0, min(focus - _SEARCHED // 2, len(readings) - _SEARCHED))
+    rows = slice(first, first + _SEARCHED)
+    part = readings[rows]
+    means = np.full(array.n_channels, np.inf)
+    for channel in range(array.n_channels):
+        if not np.isfinite(part[:, channel]).any():
+            continue
+        fewer = part.copy()
+        fewer[:, channel] = np.nan
+        again = filter_again(rows, fewer)
+        if again.nis_dof.sum() > 0:
+            means[channel] = again.mean_nis
+    best = int(np.argmin(means))
+    used = found.nis_dof[rows] > 0
+    before = float(found.nis[rows][used].sum() / max(1, found.nis_dof[rows][used].sum()))
+    if not np.isfinite(means[best]) or means[best] - 1.0 > _SETTLED * (before - 1.0):
+        return None, np.nan
+    return array.channels[best], float(means[best])
