@@ -10,7 +10,6 @@ import contextlib
 import io
 import json
 import os
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -24,37 +23,14 @@ from numpy.typing import NDArray
 from gfimu.atomic_file import atomic_path
 from gfimu.errors import GfimuError, InputError
 
-__all__ = ["Journal", "WriteError", "check_target"]
+__all__ = ["Journal", "JournalError"]
 
 _PAGE = 4096
 _BLOCK_BYTES = 1 << 22
 
 
-class WriteError(GfimuError):
+class JournalError(GfimuError):
     """The disk is full or failed while a recording was being written; what was written is left readable."""
-
-
-def check_target(path: str | Path) -> None:
-    """Make sure, before anything is done, that a recording can be written to ``path``; leaves no trace.
-
-    Raises
-    ------
-    InputError
-        If the extension is unknown, the folder can't be written to, or ``path`` can't be replaced.
-    """
-    target = Path(path)
-    if target.suffix not in {".csv", ".parquet"}:
-        raise InputError(f"{path}: unknown recording format {target.suffix!r}; use .csv or .parquet")
-    folder = target.absolute().parent
-    while not folder.exists() and folder != folder.parent:
-        folder = folder.parent  # what is missing is made later
-    try:
-        with tempfile.TemporaryFile(dir=folder):
-            pass
-        if target.exists():
-            os.close(os.open(target, os.O_WRONLY | os.O_APPEND))
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror or error}; choose a file that can be written") from None
 
 
 class Journal:
@@ -73,7 +49,7 @@ class Journal:
     ------
     InputError
         If the extension is unknown or the file can't be written.
-    WriteError
+    JournalError
         If the disk is full.
     """
 
@@ -85,7 +61,6 @@ class Journal:
         self.columns = ["t_s", *(f"{channel}_lsb" for channel in channels), "status"]
         lines = [f"# {key}: {json.dumps(value)}\n" for key, value in metadata.items()]
         try:
-            self.path.parent.mkdir(parents=True, exist_ok=True)
             flags = os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_APPEND | getattr(os, "O_BINARY", 0)
             self._file = os.open(self.path, flags, 0o666)
         except OSError as error:
@@ -96,7 +71,7 @@ class Journal:
         self._size = 0
         try:
             self._write(("".join(lines) + self._header).encode())
-        except WriteError:
+        except JournalError:
             os.close(self._file)
             self.path.unlink(missing_ok=True)
             raise
@@ -139,20 +114,20 @@ class Journal:
         self._size += len(lines)
         self.samples += lines.count(b"\n")
 
-    def _failed(self, error: BaseException) -> WriteError:
+    def _failed(self, error: BaseException) -> JournalError:
         number = getattr(error, "errno", None)
         reason = os.strerror(number) if number else str(error).splitlines()[0]
         left = (
             f"{self.samples} samples are in the file and can be read" if self.samples > 0 else "no sample was written"
         )
-        return WriteError(f"{self.path}: {reason}; {left}; free space and record again")
+        return JournalError(f"{self.path}: {reason}; {left}; free space and record again")
 
     def finish(self, metadata: Mapping[str, Any]) -> None:
         """Close the journal and replace it with the recording, with its final metadata; whole or not at all.
 
         Raises
         ------
-        WriteError
+        JournalError
             If the disk is full; the journal stays in place.
         """
         os.close(self._file)

@@ -19,11 +19,12 @@ import gfimu
 from firmware_bridge.clock import ClockFit, HostClock, SampleRate
 from firmware_bridge.commands import Command, Identity, Reply, encode_command, parse_message
 from firmware_bridge.frames import FrameFormat, SampleDecoder, Samples, Status, StreamCounts, frame_format
-from firmware_bridge.journal import Journal, WriteError, check_target
+from firmware_bridge.journal import Journal, JournalError
 from firmware_bridge.link import Link
 from gfimu.array import AccelerometerArray
 from gfimu.carried_array import array_metadata
 from gfimu.errors import GfimuError, InputError
+from gfimu.outputs import RECORDING, check_outputs
 from gfimu.part import Part
 
 __all__ = ["Batch", "RecordReport", "SampleClock", "record"]
@@ -269,11 +270,11 @@ def record(
     InputError
         If the file can't be written (found before the port is opened), the port can't be opened or is in use, or
         nothing that is a frame comes.
-    WriteError
+    JournalError
         If the disk is full; what was written until then can be read.
     """
     target = Path(out)
-    check_target(target)
+    check_outputs([("out", target, RECORDING)])
     layout = frame_format(form)
     carried = AccelerometerArray.load(array or layout.array)
     if carried.n_channels != len(layout.channels):
@@ -304,8 +305,8 @@ def record(
     try:
         session.release()
         session.flush(time.monotonic(), force=True)
-    except WriteError as error:
-        trouble = trouble if isinstance(trouble, WriteError) else error
+    except JournalError as error:
+        trouble = trouble if isinstance(trouble, JournalError) else error
     session.decoder.finish()
     if session.refused and not session.journal:
         refusal = session.refused[0]
@@ -332,9 +333,9 @@ def record(
     }
     try:
         session.journal.finish(final)
-    except WriteError as error:
-        trouble = trouble if isinstance(trouble, WriteError) else error
-    if isinstance(trouble, WriteError):
+    except JournalError as error:
+        trouble = trouble if isinstance(trouble, JournalError) else error
+    if isinstance(trouble, JournalError):
         raise trouble
     duration = session.last_s - (session.first_s or 0.0)
     return RecordReport(target, duration, counts, breaks, fit, session.identity, session.status_counts)

@@ -68,15 +68,15 @@ def live(
     from gfimu.rate.stream import filter_stream, read_head
 
     metadata, lines = read_head(_lines(source, follow=follow) if isinstance(source, str | Path) else source)
+    geometry = carried_array(metadata, source="the stream") if array is None else as_array(array)
+    if geometry is None:
+        raise InputError("--array is missing, and the stream does not state its array; give it")
     if rate is None:
         rate = metadata.get("sample_rate_hz", metadata.get("time_stamp_rate_hz"))
     if rate is None:
         raise InputError("--rate is missing, and the stream does not state its sample rate; give it")
     if not isinstance(rate, int | float) or not rate > 0:
         raise InputError(f"--rate {rate}: must be positive, Hz")
-    geometry = carried_array(metadata, source="the stream") if array is None else as_array(array)
-    if geometry is None:
-        raise InputError("--array is missing, and the stream does not state its array; give it")
     biases = {} if bias_std is None else {"bias_std": bias_std}
     errors = SensorErrors.from_parts(geometry, rate, scale_std=scale_std, **biases)
     settings = FilterSettings(start_omega=None) if unknown_start else FilterSettings(start_omega=np.zeros(3))

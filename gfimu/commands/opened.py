@@ -56,7 +56,9 @@ def as_run(
 ) -> tuple[Recording, AccelerometerArray]:
     """Return a recording with its array; the recording's own array if none is given."""
     drawing = None if array is None else as_array(array)
-    if isinstance(recording, str | Path):
+    from gfimu.recording import Recording
+
+    if not isinstance(recording, Recording):
         from gfimu.recording_formats import open_run
 
         return open_run(recording, drawing)

@@ -71,13 +71,16 @@ BAD = [
     (("firmware", "run", "--port", "com7"), "pty, tcp:PORT"),
     (("firmware", "run", "--scenario", "nowhere", "--port", "pty"), "paper_run"),
     (("firmware", "run", "--out", "run.txt"), ".csv or .parquet"),
-    (("firmware", "run", "--out", "/dev/null/run.csv"), "can be written"),
+    (("firmware", "run", "--out", "/dev/null/run.csv"), "choose a folder that exists"),
     (("firmware", "run", "--out", "run.csv", "--rate", "9"), "10 to 3200 Hz"),
     (("firmware", "run", "--port", "tcp:0", "--rate", "3201"), "10 to 3200 Hz"),
     (("firmware", "trace", "--out", "t.vcd", "--rate", "0"), "10 to 3200 Hz"),
     (("record", "--port", "/dev/nothing", "--out", "run.csv", "--rate", "5000"), "10 to 3200 Hz"),
-    (("record", "--port", "/dev/nothing", "--out", "/dev/null/run.csv"), "can be written"),
-    (("record", "--port", "/dev/nothing", "--out", "/dev/null/run.csv", "--rrd", "live.rrd"), "can be written"),
+    (("record", "--port", "/dev/nothing", "--out", "/dev/null/run.csv"), "choose a folder that exists"),
+    (
+        ("record", "--port", "/dev/nothing", "--out", "/dev/null/run.csv", "--rrd", "live.rrd"),
+        "choose a folder that exists",
+    ),
     (("firmware", "build", "blink"), "selfcheck"),
     (("firmware", "build", "--define", "X Y"), "NAME=VALUE"),
     (("firmware", "trace", "--out", "t.txt"), ".vcd or .rrd"),
@@ -106,7 +109,7 @@ def test_a_full_disk_at_the_end_of_a_virtual_run(gfimu_command, tmp_path, monkey
     out = tmp_path / "run.csv"
     result = gfimu_command("firmware", "run", "--scenario", "rest", "--duration", "0.2", "--out", out)
     assert result.code == 1
-    assert "No space left on device; nothing was written" in result.stderr
+    assert "not written: No space left on device" in result.stderr
     assert result.stderr.count("\n") == 1
     assert not list(tmp_path.iterdir())
 

@@ -99,7 +99,7 @@ def test_wrong_arguments_are_named():
         gfimu.simulate("rest", seed=-1)
     with pytest.raises(InputError, match="give chips"):
         gfimu.optimize()
-    with pytest.raises(InputError, match="does not name its array"):
+    with pytest.raises(InputError, match="does not carry its array"):
         gfimu.estimate(gfimu.Recording(np.arange(3.0), np.zeros((3, 1)), ("a11",)))
     with pytest.raises(TypeError, match="nonsense"):
         gfimu.convert("run.csv", nonsense=1)
