@@ -28,7 +28,7 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
     target = Path(path)
     check_parent(target)
     if target.is_dir():
-        raise InputError(f"{target}: is a folder; name a file in it")
+        raise InputError(f"{target}: is a directory; name a file in it")
     try:
         handle, name = tempfile.mkstemp(prefix=f".{target.stem}-", suffix=target.suffix, dir=target.parent)
     except OSError as error:
