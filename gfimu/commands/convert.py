@@ -38,10 +38,11 @@ def convert(
         If the source can't be read, or the target can't be written where it is asked for.
     """
     from gfimu.commands.opened import as_array
+    from gfimu.recording import Recording
     from gfimu.recording_formats import open_recording
 
     drawing = None if array is None else as_array(array)
-    recording = open_recording(source, array=drawing) if isinstance(source, str | Path) else source
+    recording = source if isinstance(source, Recording) else open_recording(source, array=drawing)
     if target is not None:
         recording.write(target)
     return recording
