@@ -6,7 +6,7 @@ import queue
 import threading
 import time
 from collections.abc import Callable
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any
 
@@ -70,7 +70,7 @@ class LiveView:
         self._streams: list[Any] = [] if rrd is None else [self._open.enter_context(rrd_stream(rrd, _APPLICATION))]
         if viewer:
             self._streams.append(viewer_stream(_APPLICATION))
-            self._open.callback(self._streams[-1].flush, timeout_sec=_FLUSH_S)
+            self._open.callback(_flush, self._streams[-1])
         self._batches: queue.SimpleQueue[tuple[Batch, StreamCounts] | None] = queue.SimpleQueue()
         self._thread = threading.Thread(target=self._work, name="live view", daemon=True)
         self._thread.start()
@@ -152,6 +152,12 @@ class LiveView:
             self._open.close()
         else:
             self._open.pop_all()
+
+
+def _flush(stream: Any) -> None:
+    """Send what still waits; a viewer that was closed meanwhile is no fault of the recording."""
+    with suppress(RuntimeError):
+        stream.flush(timeout_sec=_FLUSH_S)
 
 
 def _log(

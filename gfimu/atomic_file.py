@@ -21,12 +21,14 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
     Raises
     ------
     InputError
-        If the folder does not exist or can't be written to; no folder is made.
+        If the folder does not exist or can't be written to, or ``path`` is a folder; no folder is made.
     WriteError
         If writing fails in the block, on a full disk say; ``path`` is then as it was before.
     """
     target = Path(path)
     check_parent(target)
+    if target.is_dir():
+        raise InputError(f"{target}: is a directory; name a file in it")
     try:
         handle, name = tempfile.mkstemp(prefix=f".{target.stem}-", suffix=target.suffix, dir=target.parent)
     except OSError as error:

@@ -114,7 +114,7 @@ def check_parent(path: Path) -> None:
     if not parent.exists():
         raise InputError(f"{path}: there is no folder {parent}; make it first, or choose a folder that exists")
     if not parent.is_dir():
-        raise InputError(f"{path}: {parent} is a file; choose a folder that exists")
+        raise InputError(f"{path}: {parent} is a file; choose a folder that can be written")
     if not os.access(parent, os.W_OK | os.X_OK):
         raise InputError(f"{path}: permission denied; choose a folder that can be written")
 

@@ -64,9 +64,11 @@ def rrd_stream(
     content = stream.binary_stream()
     if blueprint is not None:
         stream.send_blueprint(blueprint, make_active=False, make_default=True)
-    yield stream
-    data = content.read(flush=True) or b""
-    stream.disconnect()
+    try:
+        yield stream
+    finally:
+        data = content.read(flush=True) or b""  # also where the block failed: the SDK complains of what nobody read
+        stream.disconnect()
     with atomic_path(path) as temporary:
         temporary.write_bytes(data)
 

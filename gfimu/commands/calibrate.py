@@ -161,8 +161,9 @@ def _calibrate_array(
 
 def _uncalibrated(recording: Recording | str | Path, array: AccelerometerArray | None) -> Recording:
     from gfimu.calibration.run_file import open_uncalibrated
+    from gfimu.recording import Recording
 
-    return open_uncalibrated(recording, array=array) if isinstance(recording, str | Path) else recording
+    return recording if isinstance(recording, Recording) else open_uncalibrated(recording, array=array)
 
 
 def _own_array(recording: Recording | str | Path) -> AccelerometerArray:

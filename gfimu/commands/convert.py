@@ -39,10 +39,11 @@ def convert(
     """
     from gfimu.carried_array import carried_array
     from gfimu.commands.opened import as_array
+    from gfimu.recording import Recording
     from gfimu.recording_formats import open_recording
 
     drawing = None if array is None else as_array(array)
-    recording = open_recording(source, array=drawing) if isinstance(source, str | Path) else source
+    recording = source if isinstance(source, Recording) else open_recording(source, array=drawing)
     if drawing is not None:
         recording = recording.carrying(drawing)
     elif "array_toml" in recording.metadata:

@@ -103,7 +103,7 @@ def design(
     asked = list(effects) if verdict is None else open_effects(verdict, model)
     at_hand = [
         prepare_run(
-            Recording.read(item, array=model.array) if isinstance(item, str | Path) else item,
+            item if isinstance(item, Recording) else Recording.read(item, array=model.array),
             model,
             name=str(item) if isinstance(item, str | Path) else f"run {number}",
         )

@@ -110,9 +110,10 @@ def write_result(out: str | Path, found: Diagnosis, recording: Recording) -> dic
 def _opened(recording: Recording | str | Path, model: Twin, unit: Calibration | None) -> Recording:
     """Return a recording with the channels of the twin's array, calibrated where there is a calibration."""
     from gfimu.calibration.run_file import open_calibrated_run
+    from gfimu.recording import Recording
     from gfimu.recording_formats import open_recording
 
-    if not isinstance(recording, str | Path):
+    if isinstance(recording, Recording):
         return recording if unit is None else unit.apply(recording)
     if unit is None:
         return open_recording(recording, array=model.array)

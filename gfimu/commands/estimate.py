@@ -161,14 +161,14 @@ def _opened(
     calibration: Calibration | str | Path | None,
 ) -> tuple[Recording, AccelerometerArray]:
     """Return recording and array, corrected by the calibration where there is one."""
+    from gfimu.calibration.run_file import open_calibrated_run
     from gfimu.commands.opened import as_array, as_calibration, as_run
+    from gfimu.recording import Recording
 
     if calibration is None:
         return as_run(recording, array)
     unit = as_calibration(calibration)
-    if isinstance(recording, str | Path):
-        from gfimu.calibration.run_file import open_calibrated_run
-
-        return open_calibrated_run(recording, unit, None if array is None else as_array(array))
-    run, geometry = as_run(recording, array)
-    return unit.apply(run), unit.calibrated_array(geometry)
+    if isinstance(recording, Recording):
+        run, geometry = as_run(recording, array)
+        return unit.apply(run), unit.calibrated_array(geometry)
+    return open_calibrated_run(recording, unit, None if array is None else as_array(array))

@@ -50,10 +50,11 @@ def noise(
     from gfimu.atomic_file import write_text
     from gfimu.calibration.run_file import open_calibrated, open_uncalibrated
     from gfimu.commands.opened import as_calibration
+    from gfimu.recording import Recording
     from gfimu.sensor_noise import kalibr_yaml, recording_noise
 
     unit = None if calibration is None else as_calibration(calibration)
-    if not isinstance(recording, str | Path):
+    if isinstance(recording, Recording):
         run = recording if unit is None else unit.apply(recording)
     else:
         run = open_uncalibrated(recording) if unit is None else open_calibrated(recording, unit)

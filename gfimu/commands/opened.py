@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -55,14 +55,13 @@ def as_run(
     recording: Recording | str | Path, array: AccelerometerArray | str | Path | None
 ) -> tuple[Recording, AccelerometerArray]:
     """Return a recording with its array; the recording's own array if none is given."""
-    drawing = None if array is None else as_array(array)
     from gfimu.recording import Recording
+    from gfimu.recording_formats import open_run
 
-    if not isinstance(recording, Recording):
-        from gfimu.recording_formats import open_run
-
-        return open_run(recording, drawing)
-    return recording, drawing or array_of(recording)
+    drawing = None if array is None else as_array(array)
+    if isinstance(recording, Recording):
+        return recording, drawing or array_of(recording)
+    return open_run(recording, drawing)
 
 
 def as_calibration(calibration: Calibration | str | Path) -> Calibration:
@@ -83,8 +82,6 @@ def as_twin(twin: Twin | str | Path) -> Twin:
     return Twin.load(twin)
 
 
-def as_runs(recordings: Recording | str | Path | Iterable[Recording | str | Path]) -> list[Recording | str | Path]:
-    """Return recordings given as one of them or several."""
-    from gfimu.recording import Recording
-
-    return [recordings] if isinstance(recordings, Recording | str | Path) else list(recordings)
+def as_runs(recordings: Recording | str | Path | Sequence[Recording | str | Path]) -> list[Recording | str | Path]:
+    """Return recordings given as one of them, or as a list or tuple of several."""
+    return list(recordings) if isinstance(recordings, list | tuple) else [recordings]  # type: ignore[list-item]

@@ -211,6 +211,8 @@ def test_an_error_of_the_system_names_its_file(gfimu_command, monkeypatch):
 def test_no_folder_is_made_for_a_file(tmp_path):
     with pytest.raises(gfimu.InputError, match="there is no folder"), atomic_path(tmp_path / "typo" / "file.txt"):
         pass
+    with pytest.raises(gfimu.InputError, match="is a directory"):
+        write_text(tmp_path, "text")
     assert list(tmp_path.iterdir()) == []
 
 

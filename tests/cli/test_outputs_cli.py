@@ -85,10 +85,10 @@ def test_every_path_is_declared_as_read_or_written(name):
     hints = get_type_hints(inspect.unwrap(command.callback))
     written, read = getattr(function, "__outputs__", {}), getattr(function, "__reads__", ())
     for parameter in parameters_of(name):
-        argument, told = argument_of(parameter), getattr(parameter, "help", "") or ""
+        argument, text = argument_of(parameter), getattr(parameter, "help", "") or ""
         if "Path" in str(hints[parameter.name]):
             assert argument in written or argument in read, f"{name}: {argument} is neither read nor written"
-        if re.search(r"\b(to write|[Ww]rite|Folder for|Folder to)\b", told):
+        if re.search(r"\b(to write|[Ww]rite|Folder for|Folder to)\b", text):
             assert argument in written, f"{name}: {argument} is not checked"
         if written and argument in NAMES_A_FILE:
             assert argument in read, f"{name}: {argument} may name a file that is read"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import subprocess
 import sys
@@ -152,3 +153,35 @@ def test_type_checkers_see_real_types(tmp_path, project_root):
 @pytest.mark.parametrize("package", ["gfimu", "sim", "firmware_bridge"])
 def test_packages_say_that_they_are_typed(project_root, package):
     assert Path(project_root / package / "py.typed").is_file()
+
+
+def test_design_takes_a_twin_or_its_name(tmp_path):
+    from sim.twin import Twin
+
+    quick = {"max_rate": 8.0, "duration": 20.0, "evaluations": 1, "upright": True}
+    effects = ["gravity", "tacho_scale"]
+    by_name = gfimu.design("cube12_turntable", effects, out=tmp_path / "next.toml", **quick)
+    by_twin = gfimu.design(Twin.load("cube12_turntable"), effects, **quick)
+    assert by_twin.to_toml() == by_name.to_toml() == (tmp_path / "next.toml").read_text()
+    with pytest.raises(InputError, match="name effects"):
+        gfimu.design("cube12_turntable")
+
+
+def test_diagnose_takes_paths_and_objects(made, monkeypatch):
+    from sim.twin import Twin
+
+    recording, file = made
+    calls = []
+
+    def explain(recordings, model, *, held_out, names, report):
+        calls.append((len(recordings), model.array.name, len(held_out), names))
+
+    monkeypatch.setattr(importlib.import_module("gfimu.diagnosis.diagnose"), "diagnose", explain)
+    gfimu.diagnose(file, "cube12_turntable")
+    gfimu.diagnose([recording, str(file)], Twin.load("cube12_turntable"), held_out=recording)
+    gfimu.diagnose((file, file), "cube12_turntable", names=["one", "other"])
+    assert calls == [
+        (1, "cube12", 0, ["run.parquet"]),
+        (2, "cube12", 1, ["run 1", "run.parquet"]),
+        (2, "cube12", 0, ["one", "other"]),
+    ]

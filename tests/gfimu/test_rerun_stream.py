@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import socket
 import subprocess
 import sys
@@ -9,7 +10,9 @@ import time
 
 import pytest
 
+from firmware_bridge import live
 from gfimu import rerun_stream
+from gfimu.array import AccelerometerArray
 from gfimu.errors import GfimuError
 from gfimu.rerun_stream import rrd_stream, viewer_command, viewer_stream
 from gfimu.visual import viewer
@@ -33,10 +36,33 @@ def test_the_file_is_complete(picture):
     assert verified.returncode == 0, verified.stderr
 
 
-def test_a_block_that_fails_leaves_no_file(tmp_path):
-    with pytest.raises(RuntimeError), rrd_stream(tmp_path / "look.rrd", "test"):
-        raise RuntimeError
+def test_a_block_that_fails_leaves_no_file_and_says_nothing(tmp_path, capfd):
+    import rerun as rr
+
+    def fail():
+        with rrd_stream(tmp_path / "look.rrd", "test") as stream:
+            stream.log("text", rr.TextLog("said"))
+            raise RuntimeError
+
+    with pytest.raises(RuntimeError):
+        fail()
+    gc.collect()
     assert list(tmp_path.iterdir()) == []
+    assert capfd.readouterr().err == ""
+
+
+def test_a_live_view_keeps_or_drops_its_picture(tmp_path, monkeypatch, capfd):
+    class Closed:
+        def flush(self, timeout_sec):
+            raise RuntimeError
+
+    monkeypatch.setattr(live, "viewer_stream", lambda _: Closed())
+    cube = AccelerometerArray.load("cube12")
+    live.LiveView(cube, 0.04, rrd=tmp_path / "kept.rrd", viewer=True).close()
+    live.LiveView(cube, 0.04, rrd=tmp_path / "dropped.rrd").close(keep=False)
+    gc.collect()
+    assert [file.name for file in tmp_path.iterdir()] == ["kept.rrd"]
+    assert capfd.readouterr().err == ""
 
 
 def bound_to_loopback(command):
