@@ -234,7 +234,14 @@ def estimate(
     gyro = _gyro(recording) if fuse_gyro else None
     temperature = recording.reference.get("temperature_degC")
     problem = RateProblem(array, recording.t_s, readings, noise, linear, rate0, gyro, temperature, progress)
-    rate = METHODS[method](problem)
+    dead = [name for finding in found if finding.kind == "dead" for name in finding.channels]
+    try:
+        rate = METHODS[method](problem)
+    except InputError as error:
+        if not dead or method in {"filter", "smoother"}:
+            raise
+        names = ", ".join(dead)
+        raise InputError(f"without the dead {names}: {error}; --method filter may do without it") from None
     motion = linear.with_omega(rate.omega)
     alpha, p = motion[:, :3], motion[:, 3:]
     start = (
@@ -270,7 +277,7 @@ def estimate(
             "form": linear.form,
             **rate.remarks,
             "warnings": [finding.text for finding in found],
-            "channels_left_out": [name for finding in found if finding.kind == "dead" for name in finding.channels],
+            "channels_left_out": dead,
             "mounting_rotvec_rad": recording.mounting_rotvec.tolist(),
             "format_version": FORMAT_VERSION,
             "software_version": __version__,

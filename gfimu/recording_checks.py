@@ -32,6 +32,7 @@ _REMOVED = 0.8  # of the contradiction, by the other way to read the file
 _FITS = 1.0  # of what the limits allow
 _SIGNIFICANT = 3.0  # times what white noise gives, for a warning
 _REMOVED_FOR_WARNING = 0.9
+_WORSE = 0.1  # by which a cost may grow that was possible before
 _ALIKE = 1.5  # ratio of the costs of two ways that can't be told apart
 _RATE_RATIO = 1.5  # between the rate by the times and the metadata's, for a refusal
 _FASTEST = 2.0  # times the part's fastest output data rate
@@ -268,19 +269,36 @@ def _explaining(ways: Sequence[Otherwise], before: Costs, evidence: Evidence) ->
         compared = usable and bool(np.isfinite(after.motion))
         if not _possible(way, before, evidence) or after.worst_rest > _FITS:
             continue
-        ratio = after.total(motion=compared) / max(before.total(motion=compared), 1e-12)
         fits = max(after.parity, after.motion if compared else 0.0, after.level) < _FITS
         impossible = _impossible(before, motion=compared)
+        ratio = _left(before, after, impossible, scaled=way.kind in {"unit", "chip_unit"})
         if impossible and fits and ratio < 1.0 - _REMOVED:
             found.append((ratio, way, True))
         elif not impossible and fits and _explains_noise(before, after, motion=compared):
-            found.append((ratio, way, False))
+            found.append((after.total(motion=compared) / before.total(motion=compared), way, False))
     return found
 
 
-def _impossible(costs: Costs, *, motion: bool) -> bool:
-    """Tell whether errors within the limits can't be the reason for a contradiction."""
-    return max(costs.worst_rest, costs.level, costs.parity, costs.motion if motion else 0.0) > _FITS
+def _impossible(costs: Costs, *, motion: bool) -> tuple[str, ...]:
+    """Return the costs that errors within the limits can't be the reason for."""
+    beyond = {
+        "rest": costs.worst_rest > _FITS,
+        "level": costs.level > _FITS,
+        "parity": costs.parity > _FITS,
+        "motion": motion and costs.motion > _FITS,
+    }
+    return tuple(name for name, is_beyond in beyond.items() if is_beyond)
+
+
+def _left(before: Costs, after: Costs, impossible: Sequence[str], *, scaled: bool) -> float:
+    """Return what is left of the impossible costs, or 1 if another one grows (larger readings have larger errors)."""
+    others = {"rest", "level", "parity", "motion"} - set(impossible)
+    grown = [name for name in others if getattr(after, name) > getattr(before, name) + _WORSE]  # false for NaN
+    if any(not scaled or getattr(after, name) > _FITS for name in grown):
+        return 1.0
+    return float(
+        sum(getattr(after, name) for name in impossible) / max(sum(getattr(before, name) for name in impossible), 1e-12)
+    )
 
 
 def _contradicts(costs: Costs, evidence: Evidence) -> bool:
@@ -303,7 +321,7 @@ def _explains_noise(before: Costs, after: Costs, *, motion: bool) -> bool:
         for excess, rest_after, noise in pairs
         if excess > _SIGNIFICANT * noise
     ]
-    worse = after.rest > before.rest + 0.1 or after.level > before.level + 0.1
+    worse = after.rest > before.rest + _WORSE or after.level > before.level + _WORSE
     return bool(left) and max(left) < 0.0 and not worse
 
 

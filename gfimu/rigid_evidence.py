@@ -33,6 +33,7 @@ __all__ = ["Costs", "Evidence", "Otherwise", "Window", "gather"]
 
 ALIGNMENT = 0.05  # rad, by which a sensing axis may be off on a real board: "turned by degrees"
 _RESTS = 8  # stretches of rest that are used, the longest
+_STILL = 0.02  # of the size of the mean readings, by which readings at rest may scatter, in whatever unit they are
 _WINDOW = 2000  # samples of a window of motion, after decimation
 _ROWS = 200  # of them that are compared
 _RATE = 100.0  # Hz, to which faster recordings are averaged
@@ -389,7 +390,7 @@ def gather(recording: Recording, array: AccelerometerArray, limits: PartLimits, 
     """
     readings = np.where(alive, recording.for_array(array), 0.0)  # (n, c)
     whole: NDArray[np.bool_] = np.asarray(np.isfinite(readings).all(axis=1))
-    rests = _rests(recording, array, readings, whole, alive)
+    rests = _rests(recording, array, readings, whole, alive, limits.noise)
     step = max(1, int(np.count_nonzero(whole)) // 20_000)
     covariance = np.cov(readings[whole][::step].T) if np.count_nonzero(whole) > 2 else np.zeros((0, 0))
     up = None
@@ -406,6 +407,7 @@ def _rests(
     readings: NDArray[np.float64],
     whole: NDArray[np.bool_],
     alive: NDArray[np.bool_],
+    noise: NDArray[np.float64],
 ) -> list[slice]:
     """Return the longest stretches of rest."""
     t = recording.t_s
@@ -420,7 +422,14 @@ def _rests(
         return []
     longest = np.sort(np.argsort(-rest.lengths, kind="stable")[:_RESTS])
     found = [slice(int(rest.start[place]), int(rest.stop[place])) for place in longest]
-    return [rows for rows in found if np.count_nonzero(whole[rows]) >= _FEWEST]
+    kept = []
+    for rows in found:
+        inside = readings[rows][whole[rows]]
+        if len(inside) >= _FEWEST and np.all(
+            inside.std(axis=0) < 3.0 * noise + _STILL * np.linalg.norm(inside.mean(axis=0))
+        ):
+            kept.append(rows)  # a perfect sensor's slowest motion is a rest for `detect_rest` too
+    return kept
 
 
 def _windows(

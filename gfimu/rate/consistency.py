@@ -10,6 +10,7 @@ error so far for a bias; the innovations get the rest, in proportion to how far 
 far. With g the vector of such errors in their standard deviations, the sum grows by gᵀΛg, where Λ holds the energies
 and correlations that one standard deviation of each puts into the null space. That quadratic form is taken as a gamma
 distribution of its mean tr Λ and variance 2 tr Λ² (Satterthwaite). The bound is the χ² quantile plus its quantile.
+Where that bound is exceeded, the mean is found again by filtering with such errors added, and the larger one counts.
 """
 
 from __future__ import annotations
@@ -35,6 +36,7 @@ FALSE_ALARM = 1e-4
 
 _WINDOW_S = 1.0
 _SEARCHED = 200_000  # samples in which the channel is looked for
+_DRAWS = 6  # of the slow errors, each with both signs, where the closed form calls a run inconsistent
 _SETTLED = 0.5  # of the excess has to go with a channel that is named alone
 
 
@@ -132,49 +134,91 @@ def judge_consistency(
     signatures[~used] = 0.0
     null = ChannelTables(array, errors).null_rows[0]
     seen = np.tile(null.T @ null, (signatures.shape[1] // array.n_channels,) * 2)  # (k, k)
-    noise_bound = float(chi2.isf(FALSE_ALARM, total)) / total
-    bound = noise_bound + _slow_quantile(signatures, seen, FALSE_ALARM) / total
-    mean = float(nis.sum()) / total
-    # The same for each second, at a smaller probability as there are many.
     period = float(np.median(np.diff(found.t_s)))
     length = max(1, round(_WINDOW_S / period))
-    worst = worst_bound = at = np.nan
     count = len(nis) // length
-    late = False
-    if count:
-        sums, freedom = (values[: count * length].reshape(count, length).sum(axis=1) for values in (nis, dof))
-        whole = freedom > 0
-        limit = np.full(count, np.inf)
-        limit[whole] = chi2.isf(FALSE_ALARM / count, freedom[whole])
-        for place in np.flatnonzero(sums > limit):  # the others need no allowance
-            rows = signatures[place * length : (place + 1) * length]
-            limit[place] += _slow_quantile(rows, seen, FALSE_ALARM / count)
-        place = int(np.argmax(sums / limit))
-        if whole[place]:
-            worst, worst_bound = float(sums[place] / freedom[place]), float(limit[place] / freedom[place])
-            at = float(found.t_s[place * length])
-            late = worst > worst_bound
-    consistent = mean <= bound and not late
+    whole = slice(0, len(nis))
+    parts = [whole] + [slice(number * length, (number + 1) * length) for number in range(count)]
+    sums = np.array([nis[part].sum() for part in parts])
+    freedom = np.array([dof[part].sum() for part in parts])
+    # One test for the run and one for the worst of its seconds, so those share the probability.
+    probability = np.array([FALSE_ALARM] + [FALSE_ALARM / max(count, 1)] * count)
+    noise = np.where(freedom > 0, chi2.isf(probability, np.maximum(freedom, 1)), np.inf)
+    slow = np.zeros(len(parts))
+    for number in np.flatnonzero((sums > noise) | (np.arange(len(parts)) == 0)):  # the others need no allowance
+        slow[number] = _slow_quantile(signatures[parts[number]], seen, float(probability[number]))
+    if np.any(sums > noise + slow) and filter_again is not None:
+        excess = _excess(array, readings, temperature, parts, nis, filter_again)
+        for number in np.flatnonzero(sums > noise + slow):
+            predicted = float(np.sum(signatures[parts[number]] ** 2 @ np.diag(seen)))
+            slow[number] *= max(1.0, excess[number] / max(predicted, 1e-12))
+    limit = noise + slow
+    place = 1 + int(np.argmax(sums[1:] / limit[1:])) if count else 0
+    late = place > 0 and bool(sums[place] > limit[place])
+    consistent = bool(sums[0] <= limit[0]) and not late
     channel, without = None, np.nan
     if not consistent and filter_again is not None:
-        focus = int(np.searchsorted(found.t_s, at)) if late else 0
-        channel, without = _worst_channel(array, readings, found, focus, filter_again)
+        channel, without = _worst_channel(array, readings, found, parts[place].start, filter_again)
+    known = count > 0 and freedom[place] > 0
     return Consistency(
-        mean, 1.0, bound, noise_bound, worst, worst_bound, at, consistent, channel, without, total, FALSE_ALARM
+        nis=float(sums[0]) / total,
+        expected=1.0,
+        bound=float(limit[0]) / total,
+        noise_bound=float(noise[0]) / total,
+        worst_second=float(sums[place] / freedom[place]) if known else np.nan,
+        worst_second_bound=float(limit[place] / freedom[place]) if known else np.nan,
+        worst_second_at_s=float(found.t_s[parts[place].start]) if known else np.nan,
+        consistent=consistent,
+        worst_channel=channel,
+        nis_without_worst=without,
+        degrees_of_freedom=total,
+        false_alarm=FALSE_ALARM,
     )
 
 
-def slow_error_signatures(
-    array: AccelerometerArray, readings: NDArray[np.float64], temperature: NDArray[np.float64] | None = None
+def _excess(
+    array: AccelerometerArray,
+    readings: NDArray[np.float64],
+    temperature: NDArray[np.float64] | None,
+    parts: list[slice],
+    nis: NDArray[np.float64],
+    filter_again: Callable[[slice, NDArray[np.float64]], RateEstimate],
 ) -> NDArray[np.float64]:
-    """Readings' errors by one standard deviation of each slow error, as far as a filter of constant biases keeps them.
+    """Return by how much typical slow errors raise the sum of the innovations in parts of the run, found by trial.
+
+    The closed form counts what they put into the null space alone. They also give a false α, and so a wrong rate,
+    which matters where the body is turned over. Each draw is tried with both signs, which cancels its product with the
+    errors that are there already.
+    """
+    rng = np.random.default_rng(0)
+    columns = slow_error_signatures(array, readings, temperature, from_mean=False)
+    size = array.n_channels
+    raised = np.zeros(len(readings))
+    for _ in range(_DRAWS):
+        drawn = columns * rng.standard_normal(columns.shape[1])
+        added = drawn.reshape(len(readings), -1, size).sum(axis=1)
+        for sign in (1.0, -1.0):
+            again = filter_again(slice(0, len(readings)), readings + sign * added)
+            raised += np.where(np.isfinite(again.nis), again.nis, 0.0) / (2 * _DRAWS)
+    return np.array([raised[part].sum() - nis[part].sum() for part in parts])
+
+
+def slow_error_signatures(
+    array: AccelerometerArray,
+    readings: NDArray[np.float64],
+    temperature: NDArray[np.float64] | None = None,
+    *,
+    from_mean: bool = True,
+) -> NDArray[np.float64]:
+    """Return what one standard deviation of each slow error adds to the readings, less what a constant bias takes off.
 
     Shape (n, k) with the c channels' errors of the gain first, then of the axis to its two sides, then, if the
     ``temperature`` (n,), °C, is known, of the bias with temperature; m/s². Each is the data sheet's typical deviation
-    times how far the reading, the specific force across the axis, or the temperature is from its mean so far. Zero
-    where no data sheet is known.
+    times how far the reading, the specific force across the axis, or the temperature is from its mean so far, or with
+    ``from_mean`` false from its first value. Zero where no data sheet is known.
     """
-    moved = _from_mean_so_far(readings)  # (n, c)
+    change = _from_mean_so_far if from_mean else _from_first
+    moved = change(readings)  # (n, c)
     try:
         sheet = PartLimits.of(array, 100.0)
     except InputError:
@@ -188,7 +232,7 @@ def slow_error_signatures(
             sides[len(mine) - 1 :, :, mine] = np.sqrt(np.mean(moved**2, axis=1, keepdims=True))
     columns = [sheet.gain_std * moved, sheet.axis_std * sides[0], sheet.axis_std * sides[1]]
     if temperature is not None and np.isfinite(temperature).any():
-        columns.append(_from_mean_so_far(temperature[:, None]) * sheet.bias_tempco)
+        columns.append(change(temperature[:, None]) * sheet.bias_tempco)
     return np.hstack(columns)
 
 
@@ -198,6 +242,13 @@ def _from_mean_so_far(values: NDArray[np.float64]) -> NDArray[np.float64]:
     count = np.maximum(np.cumsum(seen, axis=0), 1)
     mean = np.cumsum(np.where(seen, values, 0.0), axis=0) / count
     return np.where(seen, values - mean, 0.0)
+
+
+def _from_first(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return what each column (n, k) differs from its first value; zero where missing."""
+    seen = np.isfinite(values)
+    first = values[np.argmax(seen, axis=0), np.arange(values.shape[1])]
+    return np.where(seen, values - first, 0.0)
 
 
 def _slow_quantile(signatures: NDArray[np.float64], seen: NDArray[np.float64], probability: float) -> float:
