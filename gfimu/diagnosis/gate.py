@@ -79,17 +79,16 @@ def _held_out_figure(gain: Gain) -> str:
     """Return the held-out figure that withdraws causes, in words, or nothing."""
     share = gain.share_of_excess_removed
     upper = share + _STDS * float(np.nan_to_num(gain.share_std))
-    if upper < LEAST_SHARE and share >= 0.0:
-        return f"{100 * share:.0f} % of the excess removed"
+    rises = f"the error there rises from {gain.rms_before:.3g} to {gain.rms_after:.3g} m/s²"
+    if upper < LEAST_SHARE and share < 0.0 and gain.rms_after > _WORSE * gain.rms_before:
+        return rises
     if upper < LEAST_SHARE:
-        return f"the error there rises from {gain.rms_before:.3g} to {gain.rms_after:.3g} m/s²"
+        return f"{100 * max(share, 0.0):.0f} % of the excess removed"
     likelihood, std = gain.log_likelihood_per_sample, float(np.nan_to_num(gain.log_likelihood_std))
     # What is measured in other units must not overrule a share that is well above one half.
     if likelihood + _STDS * std < 0.0 and not share >= LEAST_SHARE:
         return f"log-likelihood per sample {likelihood:+.3g} ± {std:.2g}"
-    if np.isnan(share) and gain.rms_after > _NEAR_NOISE * gain.rms_before:
-        return f"the error there rises from {gain.rms_before:.3g} to {gain.rms_after:.3g} m/s²"
-    return ""
+    return rises if np.isnan(share) and gain.rms_after > _NEAR_NOISE * gain.rms_before else ""
 
 
 def impossible_sizes(

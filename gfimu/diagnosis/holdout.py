@@ -2,7 +2,7 @@
 
 With a second recording the causes are fitted to the first and judged on the second. With one, it is cut into blocks of
 some seconds, and the odd and the even blocks are predicted from each other. The drive of the held-out stretch is
-always unknown and marginalised.
+always unknown and marginalised; what came before a block is simulated with the drive of the whole run.
 """
 
 from __future__ import annotations

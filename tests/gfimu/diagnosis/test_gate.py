@@ -48,6 +48,7 @@ def twin():
             "log-likelihood per sample -0.3 ± 0.1",
         ),
         (replace(GOOD, share_std=np.nan, share_of_excess_removed=0.4), FITS, "40 % of the excess removed"),
+        (replace(GOOD, share_of_excess_removed=-0.01, rms_after=0.11), FITS, ": 0 % of the excess removed"),
         (GOOD, replace(FITS, rms_after=0.135), "the prediction error rises from 0.11 to 0.135 m/s²"),
     ],
 )
