@@ -18,7 +18,7 @@ LEVEL_ERROR = 0.2
 """What a level of a reading is found to at best, in units of its white noise: half-widths of ten narrow plays were off
 by 0.2, rms."""
 
-__all__ = ["LEVEL_ERROR", "WHOLE_NUMBERS", "Cause", "Signature", "effects_of_run"]
+__all__ = ["LEVEL_ERROR", "WHOLE_NUMBERS", "Cause", "Signature", "effects_of_run", "wired"]
 
 
 @dataclass(frozen=True)
@@ -153,6 +153,23 @@ class Cause:
 def effects_of_run(causes: Sequence[Cause], array: AccelerometerArray, run: int) -> list[Effect]:
     """Return the effects of a set of causes as they act in one run."""
     return [cause.effect(array, run) for cause in causes]
+
+
+def wired(
+    reach: NDArray[np.bool_] | None, effects: Sequence[Effect], array: AccelerometerArray
+) -> NDArray[np.bool_] | None:
+    """Return which channels of the file sizes change, shape (m, c), given those of the sensors they change.
+
+    Exchanged wires carry what changes a sensor to the other channel.
+    """
+    if reach is None:
+        return None
+    order = np.arange(array.n_channels)
+    for effect in effects:
+        if effect.name == "axis_swap":
+            places = [array.index(name) for name in effect.parameters["channels"]]
+            order[[*places[::2], *places[1::2]]] = order[[*places[1::2], *places[::2]]]
+    return np.asarray(reach[:, order])
 
 
 def per_run_mixing(pattern: Pattern, runs: int) -> NDArray[np.float64]:

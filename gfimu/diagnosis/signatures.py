@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from gfimu.array import AccelerometerArray
-from gfimu.diagnosis.causes import Cause, Signature, effects_of_run, per_run_mixing
+from gfimu.diagnosis.causes import Cause, Signature, effects_of_run, per_run_mixing, wired
 from gfimu.diagnosis.linearisation import Linearisation
 from gfimu.diagnosis.model import Effect, EffectFamily
 from gfimu.diagnosis.segment import Segment
@@ -195,7 +195,7 @@ def signature_columns(
         zero = present[at].size_values(array) if at < len(present) else np.zeros(len(sizes))
         steps = np.array([size.step * size.prior_std for size in sizes])
         prior = np.array([size.prior_std for size in sizes])
-        reach = family.reach(array)
+        reach = wired(family.reach(array), [*segment.model.effects, *fixed], array)
         for group in _disjoint(reach, len(sizes)):
             moved = zero.copy()
             moved[group] += steps[group]
@@ -251,7 +251,7 @@ def cause_columns(
         if any(size.step > 0.01 for size in sizes):
             # A tenth of the present size keeps one-sided, non-smooth effects on their side.
             step = max(step * 0.2, 0.05 * float(np.abs(cause.coordinates).max(initial=0.0)))
-        reach = cause.reach(array)
+        reach = wired(cause.reach(array), [*segment.model.effects, *fixed], array)
         for group in _disjoint(reach, len(cause.coordinates)):
             moved = cause.coordinates.copy()
             moved[group] += step

@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.diagnosis.causes import Cause, Signature, effects_of_run
+from gfimu.diagnosis.causes import Cause, Signature, effects_of_run, wired
 from gfimu.diagnosis.free_body.segment import BodyLine, BodySegment
 from gfimu.diagnosis.model import Effect, EffectFamily
 
@@ -73,7 +73,7 @@ def _size_columns(
     others = [*fixed, *(effect for effect in present if effect.name != family.name)]
     mine = next((effect for effect in present if effect.name == family.name), None)
     zero = np.zeros(len(sizes)) if mine is None else mine.size_values(array)
-    reach = family.reach(array)
+    reach = wired(family.reach(array), [*segment.model.effects, *fixed], array)
     at_zero = [] if mine is None else [mine]
     nominal = segment.predict([*others, *at_zero], line.drive)
     for group in _disjoint(reach, len(sizes)):

@@ -54,7 +54,7 @@ def test_a_walk_is_found_beside_a_slow_cause_that_is_right():
 
 def test_a_walk_over_coarse_steps_is_told_with_its_strength():
     """The edges at which coarse readings tell much move with the biases."""
-    world = draw_world(Case("walks", 91023, ("bias_random_walk", "coarse_resolution"), 1000.0, duration=20.0))
+    world = draw_world(Case("walks", 91023, ("bias_random_walk", "coarse_resolution"), 1000.0, duration=14.0))
     found = diagnose([world.recording], world.twin)
     assert found.verdict == "explained"
     told = {cause.effect: cause for cause in found.causes}
