@@ -73,7 +73,11 @@ def find_rails(
         if len(mine) < 2 * _PILE or np.ptp(mine) < _MOVES * sigma:
             continue  # a channel that hardly moves reaches no rail
         for sign in (1, -1):
-            one = _pile(sign * mine, sign * expected, step, sigma) or _flat(sign * mine, sign * expected, step, sigma)
+            one = _pile(sign * mine, sign * expected, step, sigma)
+            if one is None:
+                flat = _flat(sign * mine, sign * expected, step, sigma)
+                if flat is not None and _others_follow(run, prediction, channel, np.flatnonzero(valid)[flat[1]], white):
+                    one = flat[0]
             if one is not None:
                 found.append(Rail(channel, sign, sign * one[0], one[1]))
     return [*found, *_pinned(run, prediction, found, steps, white)]
@@ -126,10 +130,28 @@ def _visits(on: NDArray[np.bool_]) -> int:
     return int(np.sum(edges[1::2] - edges[::2] >= _STAY))
 
 
+def _others_follow(
+    run: Run, prediction: NDArray[np.float64], channel: int, rows: NDArray[np.intp], white: NDArray[np.float64]
+) -> bool:
+    """Return whether another channel follows its prediction in these rows.
+
+    Where none does, the motion is not as predicted: the reference is wrong there, and the channel that stays at its
+    highest level is right.
+    """
+    for other in range(run.readings.shape[1]):
+        valid = rows[run.valid[rows, other]]
+        mine, expected = run.readings[valid, other], prediction[valid, other]
+        if other == channel or len(valid) < _PILE or np.ptp(expected) < _MOVES * white[other]:
+            continue
+        if _FOLLOWS[0] < _slope(expected, mine) < _FOLLOWS[1]:
+            return True
+    return False
+
+
 def _flat(
     mine: NDArray[np.float64], expected: NDArray[np.float64], step: float, sigma: float
-) -> tuple[float, float] | None:
-    """Return the level at which readings stay, but for some noise, while their prediction moves beyond."""
+) -> tuple[tuple[float, float], NDArray[np.bool_]] | None:
+    """Return the level at which readings stay while their prediction moves beyond, their scatter, and which they are."""
     top = float(np.partition(mine, -_GARBAGE - 1)[-_GARBAGE - 1])
     clear = _CLEAR * (sigma + step)
     beyond = expected > top + clear
@@ -149,7 +171,8 @@ def _flat(
     ):
         return None
     stays = abs(_slope(expected[beyond], mine[beyond])) < _SLOPE
-    return (level, scatter) if stays and _FOLLOWS[0] < _slope(expected[under], mine[under]) < _FOLLOWS[1] else None
+    follows = _FOLLOWS[0] < _slope(expected[under], mine[under]) < _FOLLOWS[1]
+    return ((level, scatter), beyond) if stays and follows else None
 
 
 def _slope(x: NDArray[np.float64], y: NDArray[np.float64]) -> float:
