@@ -151,7 +151,7 @@ def _others_follow(
 def _flat(
     mine: NDArray[np.float64], expected: NDArray[np.float64], step: float, sigma: float
 ) -> tuple[tuple[float, float], NDArray[np.bool_]] | None:
-    """Return the level at which readings stay while their prediction moves beyond, their scatter, and which they are."""
+    """Return the level at which readings stay while their prediction moves beyond, their scatter, and these rows."""
     top = float(np.partition(mine, -_GARBAGE - 1)[-_GARBAGE - 1])
     clear = _CLEAR * (sigma + step)
     beyond = expected > top + clear
