@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, progress
+from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, print_text, progress
 
 if TYPE_CHECKING:
     from gfimu.scoring import Score
@@ -107,6 +107,8 @@ def _optimize(
 
 
 def _print_scores(scores: list[Score], condition: str) -> None:
+    from gfimu.scoring import ranking_remark
+
     units = sorted({entry.length_unit_m for entry in scores})
     unit = (
         f"{units[0]:g} m"
@@ -148,6 +150,9 @@ def _print_scores(scores: list[Score], condition: str) -> None:
         note="σ_α (per length unit) and σ_p for channels of standard deviation 1. σ_ω: least one sample can reach "
         f"(Cramér–Rao) at {condition}; —: one sample can't tell.",
     )
+    remark = ranking_remark(scores)
+    if remark:
+        print_text(remark)
     dirty = [entry for entry in scores if entry.omega_squared_terms]
     if dirty:
         print_table(

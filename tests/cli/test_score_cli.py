@@ -17,6 +17,14 @@ def test_without_arguments_compares_every_shipped_array(gfimu_command):
     assert "1.0607" in result.stdout
 
 
+def test_a_ranking_that_depends_on_the_figure_is_stated(gfimu_command):
+    assert (
+        "p1_face_diagonals has a lower κ but a larger GDOP"
+        in gfimu_command("score", "cube12", "p1_face_diagonals").stdout
+    )
+    assert "lower κ" not in gfimu_command("score", "cube12", "p3_three_plus_one").stdout
+
+
 def test_json_has_the_keys_of_the_contract(gfimu_command):
     result = gfimu_command("score", "cube12", "p3_three_plus_one", "--json")
     content = json.loads(result.stdout)
