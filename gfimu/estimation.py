@@ -8,7 +8,7 @@ integration: the six products of its components.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -304,6 +304,7 @@ def _by_rate_method(method: str) -> RateMethod:
     """Adapt a method of `gfimu.rate.methods`, with the sensors' errors from their data sheets."""
 
     def solve(problem: RateProblem) -> RateSolution:
+        problem, names = _of_living_channels(problem)
         rate = 1.0 / float(np.median(np.diff(problem.t_s)))
         errors = SensorErrors.from_parts(problem.array, rate, noise_std=problem.noise_std)
         settings = FilterSettings(start_omega=problem.omega0)
@@ -316,17 +317,49 @@ def _by_rate_method(method: str) -> RateMethod:
             "sign_decided_at_s": found.sign.decided_at_s if np.isfinite(found.sign.decided_at_s) else None,
             "mean_normalised_innovation_squared": found.mean_nis if np.isfinite(found.mean_nis) else None,
             "share_at_rest": float(found.rest.mean()),
-            "channels": found.channels.to_dict(),
+            "channels": _renamed(found.channels.to_dict(), names),
         }
         if method in {"filter", "smoother"}:
             consistency = judge_consistency(
                 problem.array, problem.readings, errors, found, temperature=problem.temperature,
                 filter_again=_filter_again(problem, errors, found),
             )  # fmt: skip
+            if consistency is not None and consistency.worst_channel is not None:
+                consistency = replace(consistency, worst_channel=names[consistency.worst_channel])
             remarks["consistency"] = None if consistency is None else consistency.to_dict()
         return RateSolution(found.omega, np.where(np.isfinite(found.std), found.std, np.nan), found.rest, remarks)
 
     return solve
+
+
+def _of_living_channels(problem: RateProblem) -> tuple[RateProblem, dict[str, str]]:
+    """Return the problem without channels that never have a reading, where the others see all motions.
+
+    An array of the others can recognise rest, which needs all of its channels. Its channels are numbered anew; the
+    second value gives their real names.
+    """
+    array = problem.array
+    alive: NDArray[np.bool_] = np.asarray(np.isfinite(problem.readings).any(axis=0))
+    living = [name for name, lives in zip(array.channels, alive, strict=True) if lives]
+    if alive.all() or np.linalg.matrix_rank(array.regression_matrix[alive] / _length_scale(array), tol=1e-6) < 6:
+        return problem, {name: name for name in array.channels}
+    chips = [replace(chip, axes=chip.axes[alive[array.chip_of_channel == k]]) for k, chip in enumerate(array.chips)]
+    fewer = replace(array, chips=tuple(chip for chip in chips if len(chip.axes)))
+    readings, noise = problem.readings[:, alive], problem.noise_std[alive]
+    reduced = replace(problem, array=fewer, readings=readings, noise_std=noise)
+    return reduced, dict(zip(fewer.channels, living, strict=True))
+
+
+def _length_scale(array: AccelerometerArray) -> NDArray[np.float64]:
+    return np.array([array.length_unit] * 3 + [1.0] * 3)
+
+
+def _renamed(report: dict[str, Any], names: Mapping[str, str]) -> dict[str, Any]:
+    """Return a channel report with the channels' real names."""
+    return {
+        key: {names[name]: count for name, count in value.items()} if isinstance(value, dict) else value
+        for key, value in report.items()
+    }
 
 
 def _filter_again(

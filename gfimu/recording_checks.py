@@ -201,7 +201,8 @@ def _time_text(unit: str, factor: float, reason: str) -> str:
 def _slow(recording: Recording, readings: NDArray[np.float64], limits: PartLimits) -> list[Finding]:
     """Warn of a rate that is implausible for a body that moves."""
     rate = recording.sample_rate
-    moves = np.nanstd(readings, axis=0) > 5.0 * limits.noise
+    seen = np.isfinite(readings).any(axis=0)
+    moves = np.nanstd(readings[:, seen], axis=0) > 5.0 * limits.noise[seen]
     if rate < _SLOWEST and moves.any():
         text = (
             f"column t_s gives {rate:.4g} samples per second while the body moves: if it is in milliseconds or "
@@ -270,11 +271,16 @@ def _explaining(ways: Sequence[Otherwise], before: Costs, evidence: Evidence) ->
         if not _possible(way, before, evidence) or after.worst_rest > _FITS:
             continue
         fits = max(after.parity, after.motion if compared else 0.0, after.level) < _FITS
+        if not fits:
+            continue
+        if compared and after.points and after.motion < before.motion:  # the fit of the file as given may have failed
+            again = evidence.costs(evidence.as_given(), points=after.points)
+            before = again if again.motion < before.motion else before
         impossible = _impossible(before, motion=compared)
         ratio = _left(before, after, impossible, scaled=way.kind in {"unit", "chip_unit"})
-        if impossible and fits and ratio < 1.0 - _REMOVED:
+        if impossible and ratio < 1.0 - _REMOVED:
             found.append((ratio, way, True))
-        elif not impossible and fits and _explains_noise(before, after, motion=compared):
+        elif not impossible and _explains_noise(before, after, motion=compared):
             found.append((after.total(motion=compared) / before.total(motion=compared), way, False))
     return found
 

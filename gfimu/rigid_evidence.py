@@ -90,6 +90,8 @@ class Costs:
         The same of white noise alone.
     worst_rest : float
         Least possible largest residual of a channel at rest over its limit: above 1 the limits can't explain it.
+    points : tuple of ndarray, shape (6,)
+        Rate at the start and bias of α that fit each window best.
     """
 
     rest: float
@@ -99,6 +101,7 @@ class Costs:
     parity_noise: float
     motion_noise: float
     worst_rest: float
+    points: tuple[NDArray[np.float64], ...] = ()
 
     def total(self, *, motion: bool) -> float:
         """Sum of the costs, with or without that of the motion."""
@@ -189,10 +192,18 @@ class Evidence:
         """Return the file as it says of itself."""
         return Otherwise("", "", np.eye(self.array.n_channels))
 
-    def costs(self, way: Otherwise, *, with_motion: bool = True, hopeless: float = np.inf) -> Costs:
+    def costs(
+        self,
+        way: Otherwise,
+        *,
+        with_motion: bool = True,
+        hopeless: float = np.inf,
+        points: Sequence[NDArray[np.float64]] = (),
+    ) -> Costs:
         """Return what contradicts a way to read the file.
 
-        Motion is left out where not asked for, and where rest and parity alone cost more than ``hopeless``.
+        Motion is left out where not asked for, and where rest and parity alone cost more than ``hopeless``. ``points``
+        are further points to start its fit from, one per window.
         """
         array = way.array or self.array
         matrices = self._matrices(array)
@@ -206,12 +217,18 @@ class Evidence:
             parity = float(np.trace(matrices.parity @ moved @ matrices.parity.T)) / allowed
             parity_noise = float(np.sum((matrices.parity * sigma) ** 2)) / allowed
         motion = motion_noise = np.nan
+        fitted: tuple[NDArray[np.float64], ...] = ()
         with_motion = with_motion and rest + level + parity <= hopeless
         if with_motion and matrices.clean and len(matrices.null) and self.windows:
-            found = [self._motion(window, columns, way.time, matrices) for window in self.windows]
-            energy, noise, allowed = np.sum(found, axis=0)
+            starts: Sequence[NDArray[np.float64] | None] = points or [None] * len(self.windows)
+            found = [
+                self._motion(window, columns, way.time, matrices, start)
+                for window, start in zip(self.windows, starts, strict=True)
+            ]
+            energy, noise, allowed = np.sum([figures for figures, _ in found], axis=0)
+            fitted = tuple(point for _, point in found)
             motion, motion_noise = energy / allowed, noise / allowed
-        return Costs(rest, level, parity, motion, parity_noise, motion_noise, worst)
+        return Costs(rest, level, parity, motion, parity_noise, motion_noise, worst, fitted)
 
     def _matrices(self, array: AccelerometerArray) -> _Matrices:
         if array.name not in self._cache:
@@ -275,9 +292,14 @@ class Evidence:
         return best
 
     def _motion(
-        self, window: Window, columns: NDArray[np.float64], time: float, matrices: _Matrices
-    ) -> tuple[float, float, float]:
-        """Return the energy that no rigid motion explains in a window, that of noise, and the largest allowed, summed.
+        self,
+        window: Window,
+        columns: NDArray[np.float64],
+        time: float,
+        matrices: _Matrices,
+        further: NDArray[np.float64] | None,
+    ) -> tuple[tuple[float, float, float], NDArray[np.float64]]:
+        """Return the energy that no rigid motion explains in a window, that of noise, the largest allowed; and the fit.
 
         The rate is the integral of α from an unknown start with an unknown constant bias; the null space may have a
         constant bias too.
@@ -292,12 +314,15 @@ class Evidence:
         bias_std = np.abs(matrices.alpha) @ self.limits.bias[self.alive]  # (3,) of α
         prior = noise / len(matrices.null) / np.maximum(bias_std, 1e-9) ** 2
         products = np.linalg.pinv(matrices.sensitivity, rcond=0.05) @ z[:5].mean(axis=0)
-        energy = np.inf
-        for start in [np.zeros(3), *_rates_of(products)]:
-            energy = min(energy, _unexplained(z, turned, t, matrices, start, prior))
+        energy, fitted = np.inf, np.zeros(6)
+        starts = [np.concatenate([rate, np.zeros(3)]) for rate in [np.zeros(3), *_rates_of(products)]]
+        for start in starts if further is None else [*starts, further]:
+            left, point = _unexplained(z, turned, t, matrices, start, prior)
+            if left < energy:
+                energy, fitted = left, point
             if energy < 2.0 * noise:
                 break
-        return energy, noise, allowed
+        return (energy, noise, allowed), fitted
 
 
 def _unexplained(
@@ -307,15 +332,16 @@ def _unexplained(
     matrices: _Matrices,
     start: NDArray[np.float64],
     prior: NDArray[np.float64],
-) -> float:
+) -> tuple[float, NDArray[np.float64]]:
     """Return the mean square of the null space (m, d), m/s², that the best rate at the start and bias of α leave.
 
-    ``prior`` (3,) weighs the square of the bias against the sum of squares. Levenberg's damped Gauss–Newton steps.
+    The second value are those two (6,), found from ``start``. ``prior`` (3,) weighs the square of the bias against
+    the sum of squares. Levenberg's damped Gauss–Newton steps.
     """
     count = len(t)
     weight = np.concatenate([np.zeros(3), prior])
     centred = z - z.mean(axis=0)
-    point = np.concatenate([start, np.zeros(3)])
+    point = start
     best, damping = np.inf, 1e-6
     kept = point
     normal, pull = np.zeros((6, 6)), np.zeros(6)
@@ -343,7 +369,7 @@ def _unexplained(
             if not lifted.any():
                 break
             point = kept + np.linalg.lstsq(lifted, pull, rcond=None)[0]
-    return best
+    return best, kept
 
 
 def _rates(turned: NDArray[np.float64], t: NDArray[np.float64], point: NDArray[np.float64]) -> NDArray[np.float64]:

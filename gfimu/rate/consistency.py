@@ -8,8 +8,9 @@ A real chip has errors that the filter's white noise and constant bias don't cov
 its data sheet's typical deviation only, and its bias changes with temperature. The filter takes the mean of such an
 error so far for a bias; the innovations get the rest, in proportion to how far the readings are from their mean so
 far. With g the vector of such errors in their standard deviations, the sum grows by gᵀΛg, where Λ holds the energies
-and correlations that one standard deviation of each puts into the null space. That quadratic form is taken as a gamma
-distribution of its mean tr Λ and variance 2 tr Λ² (Satterthwaite). The bound is the χ² quantile plus its quantile.
+and correlations that one standard deviation of each puts into the null space. The quantile of that quadratic form is
+that of a shifted and scaled χ² with the same mean tr Λ, variance 2 tr Λ² and skewness (Pearson 1959; Liu, Tang & Zhang
+2009). The bound is the χ² quantile of the noise plus this.
 Where that bound is exceeded, the mean is found again by filtering with such errors added, and the larger one counts.
 """
 
@@ -21,7 +22,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2, gamma
+from scipy.stats import chi2
 
 from gfimu.array import AccelerometerArray
 from gfimu.errors import InputError
@@ -158,7 +159,7 @@ def judge_consistency(
     consistent = bool(sums[0] <= limit[0]) and not late
     channel, without = None, np.nan
     if not consistent and filter_again is not None:
-        channel, without = _worst_channel(array, readings, found, parts[place].start, filter_again)
+        channel, without = _worst_channel(array, readings, found, parts[place], filter_again)
     known = count > 0 and freedom[place] > 0
     return Consistency(
         nis=float(sums[0]) / total,
@@ -254,24 +255,30 @@ def _from_first(values: NDArray[np.float64]) -> NDArray[np.float64]:
 def _slow_quantile(signatures: NDArray[np.float64], seen: NDArray[np.float64], probability: float) -> float:
     """Return the upper quantile of gᵀΛg for signatures (m, k) and what the null space sees of each pair (k, k)."""
     energies = seen * (signatures.T @ signatures)
-    mean, square = float(np.trace(energies)), float(np.sum(energies**2))
-    if not (mean > 0.0 and square > 0.0):
+    product = energies @ energies
+    mean, square, cube = float(np.trace(energies)), float(np.trace(product)), float(np.sum(product * energies))
+    if not (mean > 0.0 and square > 0.0 and cube > 0.0):
         return 0.0
-    return float(gamma.isf(probability, mean**2 / (2.0 * square), scale=2.0 * square / mean))
+    freedom = square**3 / cube**2
+    return mean + float(np.sqrt(square / freedom) * (chi2.isf(probability, freedom) - freedom))
 
 
 def _worst_channel(
     array: AccelerometerArray,
     readings: NDArray[np.float64],
     found: RateEstimate,
-    focus: int,
+    focus: slice,
     filter_again: Callable[[slice, NDArray[np.float64]], RateEstimate],
 ) -> tuple[str | None, float]:
-    """Filter again without each channel in turn: the one whose absence shrinks the innovations most, and their mean."""
-    first = max(0, min(focus - _SEARCHED // 2, len(readings) - _SEARCHED))
+    """Filter again without each channel in turn: the one whose absence shrinks the innovations most, and their mean.
+
+    None where most of the excess stays, over the run as over the second in ``focus``.
+    """
+    first = max(0, min(focus.start - _SEARCHED // 2, len(readings) - _SEARCHED))
     rows = slice(first, first + _SEARCHED)
     part = readings[rows]
-    means = np.full(array.n_channels, np.inf)
+    inside = slice(focus.start - first, min(focus.stop - first, _SEARCHED))
+    means, focused = np.full(array.n_channels, np.inf), np.full(array.n_channels, np.inf)
     for channel in range(array.n_channels):
         if not np.isfinite(part[:, channel]).any():
             continue
@@ -280,9 +287,11 @@ def _worst_channel(
         again = filter_again(rows, fewer)
         if again.nis_dof.sum() > 0:
             means[channel] = again.mean_nis
+            focused[channel] = again.nis[inside].sum() / max(1, again.nis_dof[inside].sum())
     best = int(np.argmin(means))
-    used = found.nis_dof[rows] > 0
-    before = float(found.nis[rows][used].sum() / max(1, found.nis_dof[rows][used].sum()))
-    if not np.isfinite(means[best]) or means[best] - 1.0 > _SETTLED * (before - 1.0):
+    before = found.nis[rows].sum() / max(1, found.nis_dof[rows].sum())
+    before_there = found.nis[focus].sum() / max(1, found.nis_dof[focus].sum())
+    gone = means[best] - 1.0 < _SETTLED * (before - 1.0) or focused[best] - 1.0 < _SETTLED * (before_there - 1.0)
+    if not (np.isfinite(means[best]) and gone):
         return None, np.nan
     return array.channels[best], float(means[best])

@@ -109,3 +109,83 @@ def test_measured_stream(gfimu_command, shared_data, tmp_path):
     assert 0.98 < figures["centripetal"]["slope"] < 1.02
     assert figures["centripetal"]["correlation"] >= 0.98
     assert np.isfinite(Estimate.read(out).omega_products).all()
+
+
+@pytest.fixture
+def noisy(tmp_path):
+    """The same motion, from rest, by chips with noise; returns a function that writes it changed."""
+
+    def write(change=lambda readings: None):
+        t = np.arange(1500) / 100.0
+        axis = np.array([[0.0, 0.0, 1.0]])
+        omega = (3.0 * np.sin(t - 3.0) * (t > 3.0))[:, None] * axis
+        readings = specific_force(CUBE, STANDARD_GRAVITY * axis, np.gradient(omega, t, axis=0), omega)
+        readings = readings + 0.032 * np.random.default_rng(1).standard_normal(readings.shape)
+        change(readings)
+        file = tmp_path / "noisy.parquet"
+        Recording.from_arrays(t, readings, CUBE, metadata={"mounting_rotvec_rad": [0, 0, 0]}).write(file)
+        return file
+
+    return write
+
+
+def test_a_wrong_file_is_refused_unless_forced(gfimu_command, noisy):
+    def invert(readings):
+        readings[:, 2] *= -1.0
+
+    file, out = noisy(invert), noisy().with_name("estimate.parquet")
+    file = noisy(invert)
+    refused = gfimu_command("estimate", file, "--out", out)
+    assert refused.code == 2
+    assert "a13 is inverted" in refused.stderr
+    assert "--force" in refused.stderr
+    assert len(refused.stderr.strip().splitlines()) == 1
+    assert not out.exists()
+    forced = gfimu_command("estimate", file, "--out", out, "--force", "--json")
+    assert forced.code == 0
+    assert "a13 is inverted" in json.loads(forced.stdout)["warnings"][0]
+    assert "WARNING" in gfimu_command("estimate", file, "--out", out, "--force").stdout
+
+
+def test_a_large_rest_bias_is_refused_unless_forced(gfimu_command, noisy):
+    def shift(readings):
+        readings[:, 4] += 0.3 * STANDARD_GRAVITY
+
+    file = noisy(shift)
+    out = file.with_name("estimate.parquet")
+    refused = gfimu_command("estimate", file, "--out", out, "--rest-bias")
+    assert refused.code == 2
+    assert "channel a22 reads +300 mg beyond gravity" in refused.stderr
+    assert gfimu_command("estimate", file, "--out", out, "--rest-bias", "--force").code == 0
+
+
+def test_consistency_and_dead_channels_are_printed(gfimu_command, noisy):
+    def hurt(readings):
+        readings[:, 7] = np.nan
+        readings[900:, 0] += 0.5
+
+    file = noisy(hurt)
+    out = file.with_name("estimate.parquet")
+    figures = json.loads(gfimu_command("estimate", file, "--out", out, "--method", "filter", "--json").stdout)
+    assert figures["channels_left_out"] == ["a32"]
+    assert not figures["consistency"]["consistent"]
+    assert figures["consistency"]["worst_channel"] == "a11"
+    text = gfimu_command("estimate", file, "--out", out, "--method", "filter").stdout
+    for words in ("NIS", "INCONSISTENT", "a11", "channels left out", "a32", "WARNING"):
+        assert words in text
+    clean = gfimu_command("estimate", noisy(), "--out", out, "--method", "smoother", "--json")
+    assert json.loads(clean.stdout)["consistency"]["consistent"]
+
+
+def test_the_first_call_of_the_filter_says_that_it_compiles(monkeypatch):
+    from gfimu.cli import estimate as command
+    from gfimu.rate import first_call
+    from gfimu.rate.recursion import forward
+
+    monkeypatch.setattr(first_call, "must_compile", lambda: True)
+    assert "compiling" in command._describe("filter")
+    assert "compiling" not in command._describe("integrate")
+    monkeypatch.undo()
+    if forward.signatures:
+        assert not first_call.must_compile()
+        assert command._describe("smoother") == "estimating by smoother"

@@ -1,0 +1,129 @@
+"""A filter's innovations against χ²: false alarms as stated, slow errors allowed for, faults found and named."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from rate_worlds import cube, measure, sensor_errors, tumble
+from scipy.stats import chi2
+
+from gfimu import AccelerometerArray, Recording, specific_force, summarise
+from gfimu.part_limits import PartLimits
+from gfimu.rate.consistency import FALSE_ALARM, _slow_quantile, judge_consistency, slow_error_signatures
+from gfimu.rate.filter import filter_rate
+from gfimu.rest_bias import estimate_from_rest
+from gfimu.units import STANDARD_GRAVITY
+from sim.scenarios import Scenario, simulate
+
+CUBE = AccelerometerArray.load("cube12")
+RATE = 100.0
+SCENARIOS = ("paper_run", "rest", "tumble", "driven_run", "eccentric_mount", "speed_sweep")
+
+
+def paper_run(seed, gain_std=0.0):
+    """The table left and right at two speeds for 30 s; noise as stated, biases of 35 mg."""
+    t = np.arange(3000) / RATE
+    times = [0, 3, 4, 8, 9, 13, 14.5, 16, 17, 21, 22, 26, 27.5, 30]
+    rate = np.interp(t, times, [0, 0, 2, 2, 4, 4, 0, 0, -2, -2, -4, -4, 0, 0])
+    rng = np.random.default_rng(seed)
+    axis = np.array([0.0, 0.0, 1.0])
+    level = np.tile(STANDARD_GRAVITY * axis, (len(t), 1))
+    readings = specific_force(CUBE, level, np.outer(np.gradient(rate, t), axis), np.outer(rate, axis))
+    readings = readings * (1 + gain_std * rng.standard_normal(12)) + 0.3 * rng.standard_normal(12)
+    readings = readings + PartLimits.of(CUBE, RATE).noise * rng.standard_normal(readings.shape)
+    return Recording.from_arrays(t, readings, CUBE, reference={"tacho_rad_s": rate})
+
+
+def consistency(run):
+    return estimate_from_rest(run, CUBE, method="filter").metadata["consistency"]
+
+
+def test_the_false_alarms_of_a_right_model_are_as_stated():
+    array, scores, alarms = cube(), [], 0
+    for seed in range(40):
+        motion = tumble(RATE, 6.0, duration=4.0)
+        values, errors = measure(array, motion, np.random.default_rng(seed)), sensor_errors(array, RATE)
+        found = filter_rate(array, motion.t, values, errors)
+        judged = judge_consistency(array, np.zeros_like(values), errors, found)  # no motion: no allowance
+        freedom = judged.degrees_of_freedom
+        assert judged.bound == pytest.approx(chi2.isf(FALSE_ALARM, freedom) / freedom)
+        scores.append((judged.nis - 1.0) * np.sqrt(freedom / 2.0))
+        alarms += not judged.consistent
+    assert alarms == 0  # 80 tests of 1e-4
+    # 40 standard normal scores: mean within 4/√40, mean square within 4 √(2/40).
+    assert abs(np.mean(scores)) < 4 / np.sqrt(40)
+    assert np.var(scores) == pytest.approx(1.0, abs=4 * np.sqrt(2 / 40))
+
+
+def test_the_quantile_of_a_quadratic_form():
+    rng = np.random.default_rng(1)
+    signatures = rng.normal(size=(50, 6)) * [3.0, 1.0, 0.5, 2.0, 0.1, 1.0]
+    mixed = rng.normal(size=(6, 6))
+    seen = mixed @ mixed.T
+    energies = seen * (signatures.T @ signatures)
+    drawn = rng.standard_normal((200_000, 6))
+    values = np.einsum("ij,jk,ik->i", drawn, energies, drawn)
+    for probability in (0.05, 0.01, 1e-3):
+        beyond = np.mean(values > _slow_quantile(signatures, seen, probability))
+        assert beyond < 1.6 * probability  # Satterthwaite's form is an approximation
+
+
+def test_signatures_of_slow_errors():
+    readings = np.zeros((100, 12))
+    readings[50:, 0] = 2.0
+    signatures = slow_error_signatures(CUBE, readings)
+    assert signatures.shape == (100, 36)
+    assert signatures[50, 0] == pytest.approx(0.01 * 2.0 * 50 / 51)  # 1 % of what it is off its mean so far
+    across = signatures[50, 12:].reshape(2, 12)
+    assert across[:, [1, 2]].sum() == pytest.approx(2 * np.hypot(0.01, 0.0017453293) * 2.0 * 50 / 51)
+    assert not across[:, 3:].any()
+
+
+def step(size):
+    def spoil(readings, rng, late):
+        readings[late, 0] += size
+
+    return spoil
+
+
+def gain(readings, rng, late):
+    readings[late, 6] *= 1.2
+
+
+def noise(readings, rng, late):
+    readings[late, 4] += 20 * 0.03 * rng.standard_normal(int(late.sum()))
+
+
+@pytest.mark.parametrize(
+    ("spoil", "channel"),
+    [(step(0.020 * STANDARD_GRAVITY), "a11"), (step(1.0), "a11"), (gain, "a31"), (noise, "a22")],
+    ids=["20 mg", "1 m/s²", "gain", "noise"],
+)
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_fault_in_mid_run_is_flagged_and_its_channel_named(spoil, channel, seed):
+    run = paper_run(seed, gain_std=0.01)
+    spoil(run.readings, np.random.default_rng(seed), run.t_s >= 15.0)
+    found = estimate_from_rest(run, CUBE, method="filter")
+    judged = found.metadata["consistency"]
+    assert not judged["consistent"]
+    assert judged["worst_channel"] == channel
+    assert judged["nis_without_worst"] < 1.2
+    (warning,) = summarise(found, run, CUBE).warnings
+    assert channel in warning
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_uncalibrated_chips_are_consistent(seed):
+    judged = consistency(paper_run(seed, gain_std=0.01))
+    assert judged["consistent"]
+    assert judged["worst_channel"] is None
+    assert judged["noise_bound"] < judged["bound"]
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+@pytest.mark.parametrize("seed", [11, 12])
+def test_shipped_scenarios_are_consistent(name, seed):
+    scenario = Scenario.load(name)
+    run = simulate(scenario, seed=seed)
+    judged = estimate_from_rest(run, scenario.array, method="filter").metadata["consistency"]
+    assert judged["consistent"], judged
