@@ -212,8 +212,9 @@ def possible_values(recording: Recording, model: WorldModel) -> tuple[Recording,
     recording : Recording
         With NaN in their place.
     count : int
-        How many there were.
+        How many there were, with those that were left out when the recording was read.
     """
+    already = sum(recording.corrupt.values())
     most = _WIDEST * model.expected_noise(recording.sample_rate).full_scale if len(recording) > 1 else np.inf
     wrong = ~np.isnan(recording.readings) & ~(np.abs(recording.readings) <= most)
     count = int(wrong.sum())
@@ -225,9 +226,9 @@ def possible_values(recording: Recording, model: WorldModel) -> tuple[Recording,
             reference[name] = np.where(beyond, np.nan, values)
             count += int(beyond.sum())
     if not count:
-        return recording, 0
+        return recording, already
     readings = np.where(wrong, np.nan, recording.readings) if recording.unit == "m_s2" else recording.readings
-    return replace(recording, readings=readings, reference=reference), count
+    return replace(recording, readings=readings, reference=reference), already + count
 
 
 def _unreferenced(valid: NDArray[np.bool_], period: float) -> NDArray[np.bool_]:

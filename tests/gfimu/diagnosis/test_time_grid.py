@@ -12,6 +12,8 @@ from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.diagnose import diagnose
 from gfimu.diagnosis.run import prepare_run
 from gfimu.diagnosis.time_grid import time_grid
+from gfimu.recording import Recording
+from gfimu.recording_warning import RecordingWarning
 from sim.campaign import Measurement, measure
 from sim.twin import Twin
 
@@ -133,7 +135,7 @@ def test_lost_frames_are_found_beside_jitter():
     assert "time_jitter_s" in found.noise
 
 
-def test_corrupt_values_are_left_out_and_counted():
+def test_corrupt_values_are_left_out_and_counted(tmp_path):
     twin = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
     recording = measure(np.random.default_rng(11), twin, [], Measurement(duration=12.0))
     readings, tacho = recording.readings.copy(), recording.reference["tacho_rad_s"].copy()
@@ -143,6 +145,10 @@ def test_corrupt_values_are_left_out_and_counted():
     run = prepare_run(spoiled, twin)
     assert run.impossible == 4
     assert np.abs(run.readings).max() < 1e3
+    spoiled.write(tmp_path / "spoiled.csv")
+    with pytest.warns(RecordingWarning, match="corrupt"):  # the reader leaves them out already
+        read = Recording.read(tmp_path / "spoiled.csv")
+    assert prepare_run(read, twin).impossible == 4
     found = diagnose([spoiled], twin)
     assert (found.verdict, found.causes) == ("nothing_found", ())
     assert any("4 values are left out as corrupt" in sentence for sentence in found.sentences)
