@@ -70,7 +70,7 @@ def live(
     metadata, lines = read_head(_lines(source, follow=follow) if isinstance(source, str | Path) else source)
     geometry = carried_array(metadata, source="the stream") if array is None else as_array(array)
     if geometry is None:
-        raise InputError("--array is missing, and the stream does not state its array; give it")
+        raise InputError("--array is missing, and the stream does not state its array; give --array")
     if rate is None:
         rate = metadata.get("sample_rate_hz", metadata.get("time_stamp_rate_hz"))
     if rate is None:

@@ -18,6 +18,7 @@ from gfimu.diagnosis.holdout import Holdout, gate_gains, held_out_gain, split_se
 from gfimu.diagnosis.long_run import explain_any_length
 from gfimu.diagnosis.loose_calibration import LooseCalibration, loosen, relearned
 from gfimu.diagnosis.model import Effect, WorldModel, is_of_one_recording
+from gfimu.diagnosis.naming import conflicting
 from gfimu.diagnosis.nuisances import sharpen_drives, tune_drives
 from gfimu.diagnosis.parallel import one_blas_thread
 from gfimu.diagnosis.prepared_runs import PreparedRuns
@@ -27,7 +28,7 @@ from gfimu.diagnosis.residual_tests import LeftOver
 from gfimu.diagnosis.sample_notes import with_sample_notes
 from gfimu.diagnosis.stochastic import UNEQUAL_WALK, WALK_ODDS, Walk, walk_strength
 from gfimu.diagnosis.surrogate import surrogates
-from gfimu.diagnosis.verdict import Diagnosis, Gain
+from gfimu.diagnosis.verdict import Diagnosis, Gain, NamedCause
 from gfimu.diagnosis.wandering_biases import wanders, with_walk
 from gfimu.errors import InputError
 from gfimu.recording import Recording
@@ -135,7 +136,7 @@ def _diagnose_prepared(
     if not is_unknown(explanation, left, gain):
         found = conclude(prepared, model, explanation, walk, loose, left, gain, withdrawn)
         causes = [cause for cause in found.causes if cause.effect in _fitted(explanation)]
-        refuted = impossible_sizes(causes, model.families(), model.array)
+        refuted = _impossible(explanation, causes, model)
         if refuted:  # nothing that such a twin leaves is worth a description
             return conclude(prepared, model, explanation, walk, loose, left, Gain(), withdrawn, refuted=refuted)
         refuted = judge(gain, found.residual, causes).why
@@ -152,6 +153,16 @@ def _diagnose_prepared(
 def _fitted(explanation: Explanation) -> frozenset[str]:
     """Return the names of the causes that were fitted, and of those in their place that the data can't tell apart."""
     return frozenset().union(explanation.fit.names, *(rival.names for rival in explanation.rivals))
+
+
+def _impossible(explanation: Explanation, causes: Sequence[NamedCause], model: WorldModel) -> str:
+    """Return the signature where every set of causes that the data can't tell apart holds a size beyond physics."""
+    sets = [explanation.fit.names, *(rival.names for rival in conflicting(explanation))]
+    found = [
+        impossible_sizes([cause for cause in causes if cause.effect in names], model.families(), model.array)
+        for names in sets
+    ]
+    return found[0] if all(found) else ""
 
 
 def _left_wandering(described: Explanation, walk: Walk) -> Walk | None:
