@@ -153,10 +153,11 @@ def test_what_record_is_writing(stream, counts, tmp_path, name, gfimu_command):
         first = process.stdout.readline()  # it has read what is there, and waits
         written.append(t[200:], number[200:], np.zeros(len(t) - 200, dtype=np.uint16))
         written.finish({})
-        rest, _ = process.communicate(timeout=60)
+        rest = process.stdout.read()  # communicate() would lose what readline() has read ahead
+        code = process.wait(timeout=60)
     finally:
         process.kill()
-    assert process.returncode == 0
+    assert code == 0
     check(first + rest, t, readings)
 
 
