@@ -240,7 +240,7 @@ def _named(
         share = channel_share(change[:, :-1] * segment.weight_mask[:, :-1], array.channels)
         entry = name_cause(explanation, fit, cause, likely, array, share)
         why = entry.why + _other_runs(cause, array, runs) + _or_residue(explanation, cause)
-        entry = capped(replace(entry, why=why, std=_widened(entry, cause, misfit, left)))
+        entry = capped(replace(entry, why=why, std=_widened(entry, cause, misfit, left)), cause.shape)
         entries.append((float(sum(value**2 for value in share.values())), entry))
     return [entry for _, entry in sorted(entries, key=lambda pair: -pair[0])]
 

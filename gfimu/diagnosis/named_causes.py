@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import replace
 
 from gfimu.array import AccelerometerArray
@@ -70,16 +70,18 @@ def name_cause(
         describe(cause, array, share),
         0.0 if without is None else float(fit.log_posterior - without.log_posterior),
     )
-    return capped(named)
+    return capped(named, cause.shape)
 
 
-def capped(cause: NamedCause) -> NamedCause:
-    """Return a cause no surer than 0.9 if none of its parameters stands out from its uncertainty.
+def capped(cause: NamedCause, shape: Container[str] = ()) -> NamedCause:
+    """Return a cause no surer than 0.9 if none of its sizes stands out from its uncertainty.
 
-    Phases and directions are compared with nothing; a cause without standard deviations, as a fault of the samples,
-    stays as it is.
+    A parameter of its ``shape`` (the frequency of a mode, a time constant) is never near zero and says nothing of
+    whether the effect is there; phases and directions are compared with nothing. A cause without standard deviations,
+    as a fault of the samples, stays as it is.
     """
-    judged = [key for key, std in cause.std.items() if std > 0.0 and key not in ANGLES and not key.startswith("phase")]
+    numbers = [key for key, std in cause.std.items() if std > 0.0 and key not in ANGLES and not key.startswith("phase")]
+    judged = [key for key in numbers if key not in shape] or numbers
     if not judged or any(abs(float(cause.parameters[key])) > _SEEN * cause.std[key] for key in judged):
         return cause
     return replace(cause, probability=min(cause.probability, _UNSEEN_AT_MOST))

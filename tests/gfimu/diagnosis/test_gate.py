@@ -143,6 +143,12 @@ def test_what_does_not_stand_out_from_its_uncertainty_is_not_certain(parameters,
     assert capped(NamedCause("resonance", parameters, std, 0.6)).probability == 0.6
 
 
+def test_a_frequency_that_is_known_makes_no_mode_certain():
+    """What a torque ripple left, named a mode: gain 0.17 ± 0.80, but a frequency of 24.5 ± 9.8 Hz, at P 0.997."""
+    mode = NamedCause("resonance", {"gain": 0.17, "frequency_hz": 24.5}, {"gain": 0.80, "frequency_hz": 9.8}, 0.997)
+    assert capped(mode, {"frequency_hz": 24.5}).probability == 0.9
+
+
 def test_causes_that_explain_in_part_say_so_everywhere():
     whole = made_diagnosis("explained")
     part = replace(whole, gain=replace(whole.gain, share_of_excess_removed=0.67))
