@@ -52,13 +52,16 @@ def test_smoother_agrees_with_rauch_tung_striebel_by_the_book(run):
 
 
 def test_one_compiled_form_serves_all_arrays():
+    compiled = None
     for name, gyro in (("cube12", False), ("cube12", True), ("corners8", False), ("mimu4444", False)):
         array = AccelerometerArray.load(name)
         t = np.arange(80) / RATE
         turning = np.zeros((80, 3)) if gyro else None
         for solve in (filter_rate, smooth_rate):
             solve(array, t, np.zeros((80, array.n_channels)), SensorErrors.from_parts(array, RATE), gyro=turning)
-    assert len(forward.signatures) == len(backward.signatures) == len(prepare.signatures) == 1
+        # Other tests of this process may have compiled forms of their own.
+        compiled = compiled or [len(one.signatures) for one in (forward, backward, prepare)]
+        assert [len(one.signatures) for one in (forward, backward, prepare)] == compiled
 
 
 def test_quadrature_weights():
