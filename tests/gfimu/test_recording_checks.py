@@ -152,7 +152,7 @@ def test_a_wrong_file_is_refused_with_its_cause(table_run, name):
     assert words in found[0].text
     assert "\n" not in found[0].text
     with pytest.raises(InputError, match=r"--force"):
-        estimate(wrong, CUBE)
+        refuse_or_warn(found)
     assert refuse_or_warn(found, force=True) == found
 
 
@@ -175,10 +175,12 @@ def test_a_rate_other_than_the_stated_one_is_refused(table_run):
 
 
 def test_force_keeps_the_warning(table_run):
-    wrong = with_columns(table_run, scaled([0], -1))
+    wrong = replace(table_run, readings=table_run.readings / G)
+    with pytest.raises(InputError, match="all readings are in g"):
+        estimate(wrong, CUBE)
     found = estimate(wrong, CUBE, force=True)
     assert len(found.metadata["warnings"]) == 1
-    assert "a11 is inverted" in found.metadata["warnings"][0]
+    assert "all readings are in g" in found.metadata["warnings"][0]
 
 
 @pytest.mark.parametrize("fault", ["missing", "stuck"])
