@@ -1,4 +1,4 @@
-"""`gfimu design`: the experiment that best tells effects apart."""
+"""`gfimu design`: the experiment that best separates effects."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def _design(
     out: Annotated[Path | None, typer.Option("--out", help="Write the experiment as a scenario file (.toml).")] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Propose the table profile, or the mounting, that best tells effects apart.
+    """Propose the table profile, or the mounting, that best separates effects.
 
     Example: gfimu design tacho_scale sensor_position --twin cube12_turntable --max-rate 12 --out next.toml
     """

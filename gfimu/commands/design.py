@@ -1,4 +1,4 @@
-"""Under `gfimu design`: the experiment that best tells effects apart."""
+"""Under `gfimu design`: the experiment that best separates effects."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def design(
     sample_rate: float | None = None,
     report: Callable[[float, str], None] | None = None,
 ) -> Proposal:
-    """Propose the table profile, or the mounting, that best tells effects apart.
+    """Propose the table profile, or the mounting, that best separates effects.
 
     Parameters
     ----------

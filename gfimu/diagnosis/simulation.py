@@ -26,7 +26,7 @@ _LEAST_GAIN = 0.05
 class RunUp:
     """The samples of a run before a block that is cut from it, and the drive there.
 
-    A play, a mode or a filter has a state at the start of the block that only the motion before it tells.
+    A play, a mode or a filter has a state at the start of the block that only the motion before it determines.
 
     Parameters
     ----------
