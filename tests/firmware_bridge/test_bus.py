@@ -67,10 +67,10 @@ def test_a_timer_counts_and_interrupts_on_a_bare_bus():
     timer.write(0x14, 3, 4)  # interrupt and reset on match 0
     timer.write(0x18, 99, 4)
     timer.write(0x04, 1, 4)
-    period = 100 * 4 * CYCLE
-    bus.run_until(period - 1)
+    match = 99 * 4 * CYCLE  # the count is 99 after as many ticks of the divided clock
+    bus.run_until(match - 1)
     assert not bus.nvic.level.get(1)
-    bus.run_until(period + 4 * CYCLE)
+    bus.run_until(match)
     assert bus.nvic.level[1]
     timer.write(0x00, 1, 4)
     assert not bus.nvic.level[1]
