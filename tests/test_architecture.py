@@ -124,6 +124,66 @@ def test_firmware_bridge_imports_recordings_and_the_chip_only():
     )
 
 
+COMMON = {"gfimu", "gfimu.errors", "gfimu.units", "gfimu.outputs", "gfimu.atomic_file", "gfimu.short_repr"}
+"""Modules that every room may import; of `gfimu` itself the version."""
+
+ROOMS = {
+    "gfimu.diagnosis.data": {
+        "gfimu.diagnosis.model",
+        "gfimu.diagnosis.segment",
+        "gfimu.diagnosis.stretches",
+        "gfimu.recording",
+    },
+    "gfimu.diagnosis.criticism": {"gfimu.diagnosis.coloured_noise", "gfimu.diagnosis.verdict"},
+    "gfimu.diagnosis.verdict": {"gfimu.diagnosis.model", "gfimu.diagnosis.data.run"},
+    "gfimu.diagnosis.report": {
+        "gfimu.diagnosis.calibration_residue",
+        "gfimu.diagnosis.criticism",
+        "gfimu.diagnosis.verdict",
+        "gfimu.recording",
+        "gfimu.visual",
+    },
+    "gfimu.diagnosis.design": {
+        "gfimu.diagnosis.causes",
+        "gfimu.diagnosis.coloured_noise",
+        "gfimu.diagnosis.data.run",
+        "gfimu.diagnosis.drive",
+        "gfimu.diagnosis.evidence",
+        "gfimu.diagnosis.model",
+        "gfimu.diagnosis.segment",
+        "gfimu.diagnosis.signatures",
+        "gfimu.diagnosis.stretches",
+    },
+}
+"""Folders, and what of this project each may import besides itself and the common modules."""
+
+MOST_FILES = 12
+"""In one folder of `ROOMS`."""
+
+
+def room_imports(room: str) -> set[str]:
+    """Modules of this project outside a room, and not common, that the room imports."""
+    return {
+        name
+        for module, names in IMPORTS.items()
+        if inside(module, room)
+        for name in names
+        if inside(name, *PACKAGES) and not inside(name, room) and name not in COMMON
+    }
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_rooms_import_from_the_rooms_they_name_only(room):
+    imported = room_imports(room)
+    assert {name for name in imported if not inside(name, *ROOMS[room])} == set()
+    assert {name for name in ROOMS[room] if not any(inside(one, name) for one in imported)} == set()
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_rooms_have_few_files(room):
+    assert 1 < len([file for file in FILES.values() if file.parent == FILES[room].parent]) <= MOST_FILES
+
+
 def test_no_circular_imports():
     graph = {module: {name for name in names if name in FILES} for module, names in IMPORTS.items()}
     try:

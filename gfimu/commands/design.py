@@ -12,10 +12,10 @@ from gfimu.outputs import SCENARIO, writes
 if TYPE_CHECKING:
     import numpy as np
 
+    from gfimu.diagnosis.data.run import Run
+    from gfimu.diagnosis.design.profile_search import Limits
+    from gfimu.diagnosis.design.proposal import Proposal
     from gfimu.diagnosis.model import Effect, WorldModel
-    from gfimu.diagnosis.profile_search import Limits
-    from gfimu.diagnosis.proposal import Proposal
-    from gfimu.diagnosis.run import Run
     from gfimu.recording import Recording
     from sim.twin import Twin
 
@@ -72,7 +72,7 @@ def design(
     rng : numpy.random.Generator, optional
         In place of ``seed``.
     mountings : mapping, optional
-        How else the cube may be mounted, in place of ``upright``; see `gfimu.diagnosis.design.MOUNTINGS`.
+        How else the cube may be mounted, in place of ``upright``; see `gfimu.diagnosis.design.design.MOUNTINGS`.
     recorded : sequence of Run
         Prepared recordings at hand, beside ``run``.
     sample_rate : float, optional
@@ -90,10 +90,10 @@ def design(
 
     from gfimu.atomic_file import write_text
     from gfimu.commands.opened import as_runs, as_twin
-    from gfimu.diagnosis.ambiguity import open_effects
-    from gfimu.diagnosis.design import MOUNTINGS, Limits
-    from gfimu.diagnosis.design import design as propose
-    from gfimu.diagnosis.run import prepare_run
+    from gfimu.diagnosis.data.run import prepare_run
+    from gfimu.diagnosis.design.ambiguity import open_effects
+    from gfimu.diagnosis.design.design import MOUNTINGS, Limits
+    from gfimu.diagnosis.design.design import design as propose
     from gfimu.recording import Recording
 
     if (verdict is None) == (not effects):

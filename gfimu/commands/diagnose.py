@@ -12,7 +12,7 @@ from gfimu.outputs import OutputFolder, writes
 if TYPE_CHECKING:
     from gfimu.calibration.result import Calibration
     from gfimu.diagnosis.model import WorldModel
-    from gfimu.diagnosis.verdict import Diagnosis
+    from gfimu.diagnosis.verdict.verdict import Diagnosis
     from gfimu.recording import Recording
     from sim.twin import Twin
 
@@ -84,7 +84,7 @@ def write_result(out: str | Path, found: Diagnosis, recording: Recording) -> dic
     """Write the folder of a diagnosis, with the rig of the extended twin drawn by its MuJoCo model."""
     import tomli_w
 
-    from gfimu.diagnosis.folder import write_diagnosis
+    from gfimu.diagnosis.report.folder import write_diagnosis
     from gfimu.model_files import list_models
     from sim.drawing import rig_drawing
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.model import EffectFamily, bound_of
-from gfimu.diagnosis.verdict import Gain, NamedCause, Residual
+from gfimu.diagnosis.verdict.verdict import Gain, NamedCause, Residual
 
 __all__ = ["LEAST_SHARE", "Judgement", "impossible_sizes", "judge", "measurable"]
 

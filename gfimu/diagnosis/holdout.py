@@ -24,7 +24,7 @@ from gfimu.diagnosis.fit import SMALLEST_POSITIVE, Fit
 from gfimu.diagnosis.model import Effect, is_of_one_recording
 from gfimu.diagnosis.refinement import refine, refine_each
 from gfimu.diagnosis.segment import Segment
-from gfimu.diagnosis.verdict import Gain
+from gfimu.diagnosis.verdict.verdict import Gain
 
 __all__ = ["BLOCK_DURATION", "Holdout", "gate_gains", "held_out_gain", "split_segments"]
 

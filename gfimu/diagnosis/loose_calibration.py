@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 from gfimu.diagnosis.adequacy import left_over
 from gfimu.diagnosis.calibration_residue import CalibrationResidue, tolerance_of
 from gfimu.diagnosis.causes import Cause, Signature, effects_of_run
+from gfimu.diagnosis.data.prepared_runs import PreparedRuns
 from gfimu.diagnosis.explanation import Explanation
 from gfimu.diagnosis.fit import Fit
 from gfimu.diagnosis.holdout import Holdout
 from gfimu.diagnosis.long_run import explain_any_length
 from gfimu.diagnosis.model import Effect, EffectFamily, WorldModel
-from gfimu.diagnosis.prepared_runs import PreparedRuns
 from gfimu.diagnosis.pruning import prune
 from gfimu.diagnosis.refinement import FAIR_FIT, refine
 from gfimu.diagnosis.segment import Segment

@@ -12,7 +12,7 @@ from gfimu.diagnosis.fit import Fit
 from gfimu.diagnosis.model import Effect, EffectFamily
 from gfimu.diagnosis.naming import MOST_CERTAIN, cause_parameters, describe, mimics
 from gfimu.diagnosis.signatures import ANGLES
-from gfimu.diagnosis.verdict import NamedCause
+from gfimu.diagnosis.verdict.verdict import NamedCause
 
 __all__ = ["capped", "contested", "fault_causes", "name_cause"]
 

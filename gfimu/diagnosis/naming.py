@@ -14,7 +14,7 @@ from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.causes import WHOLE_NUMBERS, Cause
 from gfimu.diagnosis.explanation import Explanation
 from gfimu.diagnosis.fit import Fit
-from gfimu.diagnosis.verdict import Rival
+from gfimu.diagnosis.verdict.verdict import Rival
 
 __all__ = [
     "AMBIGUOUS_ODDS",

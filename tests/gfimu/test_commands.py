@@ -124,7 +124,7 @@ NOTES = [
     "scenarios.Scenario | str | pathlib",
     "gfimu.recording.Recording",
     "ndarray",
-    "gfimu.diagnosis.verdict.Diagnosis",
+    "gfimu.diagnosis.verdict.verdict.Diagnosis",
     "gfimu.recording.Recording",
     "RecordingNoise",
     "gfimu.position_drift.DriftBudget",

@@ -7,7 +7,7 @@ import pytest
 
 import gfimu
 from gfimu import AccelerometerArray, Recording, SensorErrors
-from gfimu.diagnosis.distinguishability import Distinguishability
+from gfimu.diagnosis.design.distinguishability import Distinguishability
 from gfimu.linear_solution import linear_solution
 from gfimu.part import Part
 from gfimu.short_repr import short_repr

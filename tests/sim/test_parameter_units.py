@@ -5,8 +5,8 @@ import re
 import pytest
 
 from gfimu import AccelerometerArray
-from gfimu.diagnosis.plain_words import parameter_texts
-from gfimu.diagnosis.verdict import NamedCause
+from gfimu.diagnosis.report.plain_words import parameter_texts
+from gfimu.diagnosis.verdict.verdict import NamedCause
 from gfimu.units import NAME, NUMBER, RATIO, split_key
 from sim.effects import BODY_EFFECTS, EFFECTS
 from sim.effects.unknown import Unknown

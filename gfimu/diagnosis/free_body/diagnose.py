@@ -13,6 +13,8 @@ from scipy.spatial.transform import Rotation
 from gfimu.attitude import from_rotation, integrate_attitude, to_rotation
 from gfimu.diagnosis.adequacy import LEFT_OVER_ODDS
 from gfimu.diagnosis.causes import Cause, effects_of_run
+from gfimu.diagnosis.data.integrity import check_integrity
+from gfimu.diagnosis.data.run import Run
 from gfimu.diagnosis.explanation import Explanation
 from gfimu.diagnosis.fit import Fit
 from gfimu.diagnosis.free_body.engine import explain, without_cause
@@ -29,15 +31,13 @@ from gfimu.diagnosis.free_body.run import BodyRun, prepare_body_run
 from gfimu.diagnosis.free_body.segment import BodySegment
 from gfimu.diagnosis.free_body.undetermined import undetermined, undetermined_sentence
 from gfimu.diagnosis.gate import impossible_sizes, judge
-from gfimu.diagnosis.integrity import check_integrity
 from gfimu.diagnosis.model import Effect, WorldModel
 from gfimu.diagnosis.named_causes import contested, fault_causes, name_cause
 from gfimu.diagnosis.naming import channel_share, conflicting, probabilities, rival_list
+from gfimu.diagnosis.report.wording import verdict_sentences
 from gfimu.diagnosis.residual_tests import LeftOver
-from gfimu.diagnosis.run import Run
-from gfimu.diagnosis.sample_notes import with_sample_notes
-from gfimu.diagnosis.verdict import Diagnosis, Gain, NamedCause, Residual, RunView, Unexplained
-from gfimu.diagnosis.wording import verdict_sentences
+from gfimu.diagnosis.verdict.sample_notes import with_sample_notes
+from gfimu.diagnosis.verdict.verdict import Diagnosis, Gain, NamedCause, Residual, RunView, Unexplained
 from gfimu.errors import InputError
 from gfimu.recording import Recording
 

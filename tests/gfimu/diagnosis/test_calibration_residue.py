@@ -11,12 +11,12 @@ from numpy.testing import assert_allclose
 from gfimu.array import AccelerometerArray
 from gfimu.diagnosis import diagnose, engine
 from gfimu.diagnosis.calibration_residue import TOLERANCE, CalibrationResidue
+from gfimu.diagnosis.data.prepared_runs import PreparedRuns
+from gfimu.diagnosis.data.run import prepare_run
 from gfimu.diagnosis.engine import explain
 from gfimu.diagnosis.evidence import SCALES
 from gfimu.diagnosis.long_run import explain_any_length
-from gfimu.diagnosis.prepared_runs import PreparedRuns
 from gfimu.diagnosis.refinement import refine
-from gfimu.diagnosis.run import prepare_run
 from gfimu.diagnosis.screening import screen
 from gfimu.diagnosis.search import log_odds_beside_residue
 from gfimu.diagnosis.stretches import make_segments

@@ -12,7 +12,7 @@ from gfimu.diagnosis.diagnose import diagnose
 from gfimu.diagnosis.free_body.motion import BodyDrive
 from gfimu.diagnosis.free_body.run import prepare_body_run
 from gfimu.diagnosis.free_body.segment import BodySegment
-from gfimu.diagnosis.picture import write_picture
+from gfimu.diagnosis.report.picture import write_picture
 from gfimu.errors import InputError
 from gfimu.model_files import find_model, read_toml
 from sim.effects import BODY_EFFECTS, EFFECTS, NOT_OF_A_BODY

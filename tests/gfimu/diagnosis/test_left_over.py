@@ -9,7 +9,7 @@ import pytest
 
 from gfimu.array import AccelerometerArray
 from gfimu.diagnosis import diagnose
-from gfimu.diagnosis.prepared_runs import PreparedRuns
+from gfimu.diagnosis.data.prepared_runs import PreparedRuns
 from gfimu.diagnosis.refinement import refine
 from gfimu.diagnosis.residual_tests import lines
 from gfimu.recording import Recording

@@ -10,7 +10,7 @@ import pytest
 
 from gfimu.array import AccelerometerArray
 from gfimu.diagnosis import diagnose
-from gfimu.diagnosis.run import prepare_run
+from gfimu.diagnosis.data.run import prepare_run
 from gfimu.errors import InputError
 from gfimu.recording import Recording
 from sim.campaign import Measurement, hidden_effect, measure, random_profile

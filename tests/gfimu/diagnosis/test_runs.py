@@ -10,9 +10,9 @@ from numpy.testing import assert_allclose
 
 from gfimu.array import AccelerometerArray
 from gfimu.diagnosis import diagnose
+from gfimu.diagnosis.data.integrity import check_integrity
+from gfimu.diagnosis.data.run import prepare_run
 from gfimu.diagnosis.holdout import split_segments
-from gfimu.diagnosis.integrity import check_integrity
-from gfimu.diagnosis.run import prepare_run
 from gfimu.diagnosis.stretches import make_segments
 from gfimu.recording import Recording
 from gfimu.units import STANDARD_GRAVITY

@@ -9,7 +9,7 @@ import pytest
 
 from gfimu.array import AccelerometerArray
 from gfimu.diagnosis import diagnose
-from gfimu.diagnosis.prepared_runs import PreparedRuns
+from gfimu.diagnosis.data.prepared_runs import PreparedRuns
 from sim.campaign import Measurement, measure
 from sim.effects import make_effect
 from sim.motion import SpinState

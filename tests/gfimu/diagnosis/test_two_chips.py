@@ -18,7 +18,7 @@ from gfimu.diagnosis.free_body.motion import BodyDrive
 from gfimu.diagnosis.free_body.noise import Projection
 from gfimu.diagnosis.free_body.run import prepare_body_run
 from gfimu.diagnosis.free_body.segment import BodySegment
-from gfimu.diagnosis.verdict import Gain, NamedCause, Residual
+from gfimu.diagnosis.verdict.verdict import Gain, NamedCause, Residual
 from gfimu.errors import InputError
 from gfimu.recording import Recording
 from gfimu.units import STANDARD_GRAVITY
