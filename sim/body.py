@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.diagnosis.free_body.motion import BodyDrive
-from gfimu.kinematics import omega_products
+from gfimu.geometry.kinematics import omega_products
 from sim.motion import SpinState
 from sim.world import SampleContext, World
 

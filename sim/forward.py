@@ -40,7 +40,7 @@ class TableGeometry:
     tangential : ndarray, shape (c, 3)
         r × θ: reading per angular acceleration, m.
     centripetal : ndarray, shape (c, 6)
-        Reading per product of the angular rate, m (`gfimu.array.OMEGA_PRODUCTS`).
+        Reading per product of the angular rate, m (`gfimu.geometry.array.OMEGA_PRODUCTS`).
     """
 
     axes: NDArray[np.float64]

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 import gfimu
-from gfimu.array import AccelerometerArray
-from gfimu.carried_array import array_metadata
 from gfimu.errors import InputError
-from gfimu.model_files import find_model, read_toml
+from gfimu.files.model_files import find_model, read_toml
+from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
+from gfimu.recording.carried_array import array_metadata
 from gfimu.short_repr import short_repr
 from gfimu.units import STANDARD_GRAVITY
 from sim import forward

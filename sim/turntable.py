@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from scipy.interpolate import PPoly
 from scipy.spatial.transform import Rotation
 
-from gfimu.array import AccelerometerArray
 from gfimu.errors import InputError
-from gfimu.model_files import find_model
+from gfimu.files.model_files import find_model
+from gfimu.geometry.array import AccelerometerArray
 from gfimu.short_repr import short_repr
 from sim.forward import arm_growth
 from sim.motion import BodyMotion, BodyState, SpinMotion, SpinState, SplineSpin

@@ -12,12 +12,12 @@ import numpy as np
 import tomli_w
 from numpy.typing import NDArray
 
-from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.free_body.motion import BodyDrive
 from gfimu.diagnosis.model import BasisUnits, EffectFamily, ExpectedNoise, Mode, Play, Ripple
 from gfimu.errors import InputError
-from gfimu.model_files import find_model, read_toml
-from gfimu.part_files import part_table
+from gfimu.files.model_files import find_model, read_toml
+from gfimu.geometry.array import AccelerometerArray
+from gfimu.parts.files import part_table
 from gfimu.short_repr import short_repr
 from gfimu.units import STANDARD_GRAVITY
 from sim import forward

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
 from gfimu.errors import InputError
-from gfimu.outputs import SCENARIO, writes
+from gfimu.files.outputs import SCENARIO, writes
 
 if TYPE_CHECKING:
     import numpy as np
@@ -88,12 +88,12 @@ def design(
     """
     import numpy as np
 
-    from gfimu.atomic_file import write_text
     from gfimu.commands.opened import as_runs, as_twin
     from gfimu.diagnosis.data.run import prepare_run
     from gfimu.diagnosis.design.ambiguity import open_effects
     from gfimu.diagnosis.design.design import MOUNTINGS, Limits
     from gfimu.diagnosis.design.design import design as propose
+    from gfimu.files.atomic_file import write_text
     from gfimu.recording import Recording
 
     if (verdict is None) == (not effects):

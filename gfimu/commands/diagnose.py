@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
-from gfimu.outputs import OutputFolder, writes
+from gfimu.files.outputs import OutputFolder, writes
 
 if TYPE_CHECKING:
     from gfimu.calibration.result import Calibration
@@ -85,7 +85,7 @@ def write_result(out: str | Path, found: Diagnosis, recording: Recording) -> dic
     import tomli_w
 
     from gfimu.diagnosis.report.folder import write_diagnosis
-    from gfimu.model_files import list_models
+    from gfimu.files.model_files import list_models
     from sim.drawing import rig_drawing
 
     twin = cast("Twin", found.twin)
@@ -111,7 +111,7 @@ def _opened(recording: Recording | str | Path, model: Twin, unit: Calibration | 
     """Return a recording with the channels of the twin's array, calibrated where there is a calibration."""
     from gfimu.calibration.run_file import open_calibrated_run
     from gfimu.recording import Recording
-    from gfimu.recording_formats import open_recording
+    from gfimu.recording.formats import open_recording
 
     if isinstance(recording, Recording):
         return recording if unit is None else unit.apply(recording)

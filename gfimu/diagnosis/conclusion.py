@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from scipy.special import expit
 
-from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.adequacy import LEFT_OVER_ODDS
 from gfimu.diagnosis.causes import Cause, effects_of_run
 from gfimu.diagnosis.data.prepared_runs import PreparedRuns
@@ -35,6 +34,7 @@ from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.signatures import ANGLES
 from gfimu.diagnosis.stochastic import LoudestChannel, Walk, loudest_channel, white_factor
 from gfimu.diagnosis.verdict.verdict import Diagnosis, Gain, NamedCause, Residual, RunView, Unexplained
+from gfimu.geometry.array import AccelerometerArray
 
 __all__ = ["Described", "conclude", "is_dominant", "is_unknown", "without_causes"]
 

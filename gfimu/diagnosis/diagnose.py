@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from gfimu.carried_array import warn_of_other_array
 from gfimu.diagnosis.adequacy import LEFT_OVER_ODDS, left_over
 from gfimu.diagnosis.causes import effects_of_run
 from gfimu.diagnosis.conclusion import Described, conclude, is_dominant, is_unknown
@@ -32,6 +31,7 @@ from gfimu.diagnosis.verdict.verdict import Diagnosis, Gain, NamedCause
 from gfimu.diagnosis.wandering_biases import wanders, with_walk
 from gfimu.errors import InputError
 from gfimu.recording import Recording
+from gfimu.recording.carried_array import warn_of_other_array
 
 __all__ = ["diagnose"]
 

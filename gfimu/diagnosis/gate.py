@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.model import EffectFamily, bound_of
 from gfimu.diagnosis.verdict.verdict import Gain, NamedCause, Residual
+from gfimu.geometry.array import AccelerometerArray
 
 __all__ = ["LEAST_SHARE", "Judgement", "impossible_sizes", "judge", "measurable"]
 

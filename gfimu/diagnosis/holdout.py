@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
-from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.causes import Cause, effects_of_run
 from gfimu.diagnosis.coloured_noise import NoiseLevels
 from gfimu.diagnosis.drive import smooth_rate
@@ -25,6 +24,7 @@ from gfimu.diagnosis.model import Effect, is_of_one_recording
 from gfimu.diagnosis.refinement import refine, refine_each
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.verdict.verdict import Gain
+from gfimu.geometry.array import AccelerometerArray
 
 __all__ = ["BLOCK_DURATION", "Holdout", "gate_gains", "held_out_gain", "split_segments"]
 

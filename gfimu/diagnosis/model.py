@@ -12,7 +12,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gfimu.array import AccelerometerArray
+from gfimu.geometry.array import AccelerometerArray
 
 __all__ = [
     "BasisUnits",

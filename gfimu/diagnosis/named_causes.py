@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import replace
 
-from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.causes import Cause
 from gfimu.diagnosis.explanation import Explanation
 from gfimu.diagnosis.fit import Fit
@@ -13,6 +12,7 @@ from gfimu.diagnosis.model import Effect, EffectFamily
 from gfimu.diagnosis.naming import MOST_CERTAIN, cause_parameters, describe, mimics
 from gfimu.diagnosis.signatures import ANGLES
 from gfimu.diagnosis.verdict.verdict import NamedCause
+from gfimu.geometry.array import AccelerometerArray
 
 __all__ = ["capped", "contested", "fault_causes", "name_cause"]
 

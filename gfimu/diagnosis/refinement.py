@@ -13,7 +13,6 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.causes import LEVEL_ERROR, Cause, effects_of_run
 from gfimu.diagnosis.evidence import SCALES, inverse, log_evidence
 from gfimu.diagnosis.fit import SMALLEST_POSITIVE, Fit, Start
@@ -22,6 +21,7 @@ from gfimu.diagnosis.parallel import each_apart, over_segments
 from gfimu.diagnosis.search import EXTRA_CAUSE
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.signatures import ANGLES, cause_columns, shape_moved
+from gfimu.geometry.array import AccelerometerArray
 
 __all__ = ["FAIR_FIT", "refine", "refine_each"]
 

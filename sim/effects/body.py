@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from gfimu.array import AccelerometerArray
+from gfimu.geometry.array import AccelerometerArray
 from sim.effects.base import LARGEST_TURN, Effect, Pattern, Size, chip_patterns
 from sim.world import World
 

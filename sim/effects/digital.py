@@ -7,8 +7,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.array import AccelerometerArray
 from gfimu.errors import InputError
+from gfimu.geometry.array import AccelerometerArray
 from sim.effects.base import Effect, Size
 from sim.world import World
 

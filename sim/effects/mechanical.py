@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.model import Mode
+from gfimu.geometry.array import AccelerometerArray
 from sim.effects.base import LARGEST_TURN, Effect, Pattern, Size, chip_patterns
 from sim.effects.table_dynamics import SERVO_STIFFNESS, RippledSpin, TwistingSpin
 from sim.motion import SpinMotion

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.signal import lfilter
 
-from gfimu.array import AccelerometerArray
+from gfimu.geometry.array import AccelerometerArray
 from gfimu.units import STANDARD_GRAVITY
 from sim.effects.base import LARGEST_TURN, Effect, Pattern, Size, channel_patterns
 from sim.world import SensingStep, World

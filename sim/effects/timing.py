@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.array import AccelerometerArray
+from gfimu.geometry.array import AccelerometerArray
 from sim.effects.base import Effect, Size
 from sim.motion import SpinState
 from sim.world import World

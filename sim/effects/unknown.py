@@ -10,10 +10,10 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.generic_basis import OF_READING, Motion, basis_function, is_of_time
 from gfimu.diagnosis.model import BasisUnits
 from gfimu.errors import InputError
+from gfimu.geometry.array import AccelerometerArray
 from gfimu.units import STANDARD_GRAVITY
 from sim.effects.base import Effect, Pattern, Size
 from sim.motion import SpinState

@@ -15,8 +15,8 @@ from independent_world import Setting, noise_free
 from scipy.interpolate import CubicSpline
 from scipy.signal import lsim
 
-from gfimu.array import AccelerometerArray
 from gfimu.errors import InputError
+from gfimu.geometry.array import AccelerometerArray
 from sim import forward
 from sim.campaign import random_profile
 from sim.effects import EFFECTS, Effect, apply_effects, make_effect

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from gfimu.attitude import from_rotation, integrate_attitude, to_rotation
 from gfimu.diagnosis.adequacy import LEFT_OVER_ODDS
 from gfimu.diagnosis.causes import Cause, effects_of_run
 from gfimu.diagnosis.data.integrity import check_integrity
@@ -39,6 +38,7 @@ from gfimu.diagnosis.residual_tests import LeftOver
 from gfimu.diagnosis.verdict.sample_notes import with_sample_notes
 from gfimu.diagnosis.verdict.verdict import Diagnosis, Gain, NamedCause, Residual, RunView, Unexplained
 from gfimu.errors import InputError
+from gfimu.motion.attitude import from_rotation, integrate_attitude, to_rotation
 from gfimu.recording import Recording
 
 __all__ = ["diagnose_body"]

@@ -14,7 +14,7 @@ from gfimu.diagnosis.report.page import write_report
 from gfimu.diagnosis.report.picture import write_picture
 from gfimu.diagnosis.verdict.verdict import Diagnosis
 from gfimu.errors import InputError, WriteError
-from gfimu.outputs import OutputFolder, check_outputs
+from gfimu.files.outputs import OutputFolder, check_outputs
 from gfimu.visual.scene import Shape
 
 __all__ = ["FILES", "check_folder", "write_diagnosis"]

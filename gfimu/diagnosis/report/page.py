@@ -10,7 +10,6 @@ import numpy as np
 from jinja2 import Environment, FileSystemLoader, select_autoescape
 
 from gfimu import __version__
-from gfimu.atomic_file import write_text
 from gfimu.diagnosis.criticism.residuals import ResidualViews, residual_views
 from gfimu.diagnosis.report import figures
 from gfimu.diagnosis.report.plain_words import (
@@ -25,6 +24,7 @@ from gfimu.diagnosis.report.plain_words import (
     summary,
 )
 from gfimu.diagnosis.verdict.verdict import Diagnosis, NamedCause
+from gfimu.files.atomic_file import write_text
 
 __all__ = ["report_html", "write_report"]
 

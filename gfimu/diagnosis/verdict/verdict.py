@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.atomic_file import write_text
 from gfimu.diagnosis.model import WorldModel
+from gfimu.files.atomic_file import write_text
 from gfimu.short_repr import joined, short_repr
 
 __all__ = [

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d
 
-from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.data.frozen import frozen_stretches
 from gfimu.diagnosis.data.integrity import check_integrity
 from gfimu.diagnosis.data.run import prepare_run
 from gfimu.diagnosis.diagnose import diagnose
+from gfimu.geometry.array import AccelerometerArray
 from sim.campaign import Measurement, measure
 from sim.effects import make_effect
 from sim.motion import SplineSpin

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.data.prepared_runs import PreparedRuns
 from gfimu.diagnosis.data.run import prepare_run
 from gfimu.diagnosis.diagnose import diagnose
 from gfimu.errors import InputError
+from gfimu.geometry.array import AccelerometerArray
 from gfimu.units import STANDARD_GRAVITY
 from sim.campaign import Measurement, hidden_effect, measure, random_profile
 from sim.effects import EFFECTS

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d
 
-from gfimu.array import AccelerometerArray, Chip
 from gfimu.diagnosis.data.integrity import check_integrity
 from gfimu.diagnosis.data.run import prepare_run
 from gfimu.diagnosis.diagnose import diagnose
+from gfimu.geometry.array import AccelerometerArray, Chip
 from sim.campaign import Measurement, measure
 from sim.effects import make_effect
 from sim.motion import SplineSpin

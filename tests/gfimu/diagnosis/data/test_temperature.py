@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from gfimu.array import AccelerometerArray
 from gfimu.diagnosis import diagnose
 from gfimu.diagnosis.data.temperature import between_steps
+from gfimu.geometry.array import AccelerometerArray
 from sim.campaign import Measurement, measure
 from sim.effects import make_effect
 from sim.twin import Twin

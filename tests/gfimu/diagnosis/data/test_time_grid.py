@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.data.run import prepare_run
 from gfimu.diagnosis.data.time_grid import time_grid
 from gfimu.diagnosis.diagnose import diagnose
+from gfimu.errors import RecordingWarning
+from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
-from gfimu.recording_warning import RecordingWarning
 from sim.campaign import Measurement, measure
 from sim.twin import Twin
 
