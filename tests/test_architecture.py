@@ -2,6 +2,7 @@
 
 import ast
 import graphlib
+import importlib
 from collections import Counter
 from pathlib import Path
 
@@ -188,6 +189,35 @@ def test_rooms_import_from_the_rooms_they_name_only(room):
 @pytest.mark.parametrize("room", ROOMS)
 def test_rooms_have_few_files(room):
     assert 1 < len([file for file in FILES.values() if file.parent == FILES[room].parent]) <= MOST_FILES
+
+
+FORMER = {
+    "gfimu.array": "gfimu.geometry.array",
+    "gfimu.kinematics": "gfimu.geometry.kinematics",
+    "gfimu.estimation": "gfimu.motion.estimation",
+}
+"""Modules that keep a former name for the programs of users, and where their content is."""
+
+
+@pytest.mark.parametrize("former", FORMER)
+def test_former_names_of_modules_give_the_same_objects(former):
+    old, new = importlib.import_module(former), importlib.import_module(FORMER[former])
+    assert old.__all__ == new.__all__
+    assert all(getattr(old, name) is getattr(new, name) for name in old.__all__)
+
+
+def test_the_project_itself_imports_no_former_name():
+    assert not offences(lambda module: True, lambda name: name in FORMER)
+
+
+def test_packages_called_like_former_modules_hold_their_names():
+    assert importlib.import_module("gfimu.recording").Recording is gfimu.Recording
+    assert importlib.import_module("gfimu.position_drift").drift_budget is gfimu.drift_budget
+
+
+def test_few_modules_are_in_no_room():
+    loose = {module for module, file in FILES.items() if file.parent == FILES["gfimu"].parent} - {"gfimu", *FORMER}
+    assert loose == {"gfimu.bounds", "gfimu.errors", "gfimu.short_repr", "gfimu.units"}
 
 
 def test_no_circular_imports():

@@ -1,0 +1,5 @@
+"""`gfimu.motion.estimation` by its former name, for programs that import it from here."""
+
+from gfimu.motion.estimation import METHODS, Estimate, estimate
+
+__all__ = ["METHODS", "Estimate", "estimate"]
