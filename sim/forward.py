@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from sim.motion import SpinMotion, SpinState
+from gfimu.world_model import SpinState
+from sim.motion import SpinMotion
 from sim.world import Nod, SampleContext, World
 
 __all__ = [

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import PPoly
 from scipy.spatial.transform import Rotation
 
+from gfimu import world_model
 from gfimu.errors import InputError
 from gfimu.files.model_files import find_model
 from gfimu.geometry.array import AccelerometerArray
@@ -260,7 +261,7 @@ def _imposed(
 def _table_state(
     world: World,
     model: mujoco.MjModel,
-    spin: SpinState,
+    spin: world_model.SpinState,
     growth: NDArray[np.float64] | float,
     growing: NDArray[np.float64] | float,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:

@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.short_repr import short_repr
 from gfimu.units import STANDARD_GRAVITY
-from sim.motion import SpinMotion, SpinState
+from gfimu.world_model import SpinState
+from sim.motion import SpinMotion
 
 __all__ = ["DataStep", "MotionStep", "Nod", "ReferenceStep", "SampleContext", "SensingStep", "World"]
 

@@ -3,12 +3,16 @@
 import ast
 import graphlib
 import importlib
+import inspect
+import re
 from collections import Counter
 from pathlib import Path
 
 import pytest
 
 import gfimu
+from gfimu.world_model import BodyModel, ModelWithModes, ModelWithPlay, ModelWithRipple
+from sim.twin import Twin
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = ("gfimu", "sim", "firmware_bridge")
@@ -115,6 +119,38 @@ def test_sim_imports_neither_the_wire_nor_the_command_line():
     )
 
 
+def test_the_world_knows_nothing_of_the_diagnosis():
+    """The study of the diagnosis (`sim.study`) stands above both, as the commands do."""
+    assert not offences(
+        lambda module: inside(module, "sim") and not inside(module, "sim.study"),
+        lambda name: inside(name, "gfimu.diagnosis", "sim.study"),
+    )
+
+
+def test_no_cast_makes_a_twin_a_world_model():
+    protocols = "WorldModel|BodyModel|Twin|Effect|EffectFamily|Spin|Size"
+    casts = {
+        module: found
+        for module, file in FILES.items()
+        if (found := re.findall(rf"cast\(\s*[\"'][^\"']*\b(?:{protocols})\b", file.read_text(encoding="utf-8")))
+    }
+    assert casts == {}
+
+
+def test_a_twin_is_a_world_model_without_any():
+    """`sim/twin.py` lets the type checker prove it; ``Any`` in a signature would make that proof empty."""
+    protocols = (BodyModel, ModelWithModes, ModelWithPlay, ModelWithRipple)
+    methods = {name for protocol in protocols for name in dir(protocol) if not name.startswith("_")}
+    assert {"predict", "predict_body", "families", "play", "ripple", "modes", "extended"} <= methods
+    untyped = [
+        name
+        for name in methods
+        if inspect.isfunction(method := inspect.getattr_static(Twin, name, None))
+        and re.search(r"\bAny\b", str(inspect.signature(method)))
+    ]
+    assert untyped == []
+
+
 def test_firmware_bridge_imports_recordings_and_the_chip_only():
     assert not offences(
         lambda module: inside(module, "firmware_bridge"),
@@ -136,13 +172,13 @@ ROOMS = {
     "gfimu.motion": {"gfimu.files", "gfimu.geometry", "gfimu.parts", "gfimu.rate", "gfimu.recording"},
     "gfimu.position_drift": {"gfimu.geometry", "gfimu.motion", "gfimu.rate.integration"},
     "gfimu.diagnosis.data": {
-        "gfimu.diagnosis.model",
+        "gfimu.world_model",
         "gfimu.diagnosis.segment",
         "gfimu.diagnosis.stretches",
         "gfimu.recording",
     },
     "gfimu.diagnosis.criticism": {"gfimu.diagnosis.coloured_noise", "gfimu.diagnosis.verdict"},
-    "gfimu.diagnosis.verdict": {"gfimu.diagnosis.model", "gfimu.diagnosis.data.run"},
+    "gfimu.diagnosis.verdict": {"gfimu.world_model", "gfimu.diagnosis.data.run"},
     "gfimu.diagnosis.report": {
         "gfimu.diagnosis.calibration_residue",
         "gfimu.diagnosis.criticism",
@@ -156,7 +192,7 @@ ROOMS = {
         "gfimu.diagnosis.data.run",
         "gfimu.diagnosis.drive",
         "gfimu.diagnosis.evidence",
-        "gfimu.diagnosis.model",
+        "gfimu.world_model",
         "gfimu.diagnosis.segment",
         "gfimu.diagnosis.signatures",
         "gfimu.diagnosis.stretches",
@@ -195,6 +231,7 @@ FORMER = {
     "gfimu.array": "gfimu.geometry.array",
     "gfimu.kinematics": "gfimu.geometry.kinematics",
     "gfimu.estimation": "gfimu.motion.estimation",
+    "gfimu.diagnosis.model": "gfimu.world_model",
 }
 """Modules that keep a former name for the programs of users, and where their content is."""
 
@@ -217,7 +254,14 @@ def test_packages_called_like_former_modules_hold_their_names():
 
 def test_few_modules_are_in_no_room():
     loose = {module for module, file in FILES.items() if file.parent == FILES["gfimu"].parent} - {"gfimu", *FORMER}
-    assert loose == {"gfimu.bounds", "gfimu.errors", "gfimu.short_repr", "gfimu.units"}
+    assert loose == {
+        "gfimu.bounds",
+        "gfimu.errors",
+        "gfimu.generic_basis",
+        "gfimu.short_repr",
+        "gfimu.units",
+        "gfimu.world_model",
+    }
 
 
 def test_no_circular_imports():

@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from gfimu.diagnosis.model import WorldModel
     from gfimu.motion.estimation import Estimate
     from gfimu.motion.rest_bias import RestBias
     from gfimu.position_drift.monte_carlo import DriftSample
@@ -311,7 +310,7 @@ def diagnose_hidden(demo: Demo) -> None:
     )
     recording = simulate(calibrated, seed=demo.seed, out=demo.out / "hidden.parquet")
     twin = Twin.load(_TWIN)  # believes in a level table with the cube on its axis
-    found = diagnose([recording], cast("WorldModel", twin), names=["hidden.parquet"])
+    found = diagnose([recording], twin, names=["hidden.parquet"])
     written = write_result(demo.out / "diagnosis", found, recording)
     demo.written["diagnosis report"] = written["report"]
     causes = {cause.effect: cause for cause in found.causes}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING
 
 from gfimu.errors import InputError
 from gfimu.files.outputs import SCENARIO, writes
@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from gfimu.diagnosis.data.run import Run
     from gfimu.diagnosis.design.profile_search import Limits
     from gfimu.diagnosis.design.proposal import Proposal
-    from gfimu.diagnosis.model import Effect, WorldModel
     from gfimu.recording import Recording
+    from gfimu.world_model import Effect, WorldModel
     from sim.twin import Twin
 
 __all__ = ["design"]
@@ -98,8 +98,7 @@ def design(
 
     if (verdict is None) == (not effects):
         raise InputError("name effects to tell apart, or give --verdict: one of the two")
-    # Its effects are narrower than the protocol's.
-    model = cast("WorldModel", as_twin(cast("Twin | str | Path", twin)))
+    model: WorldModel = as_twin(twin) if isinstance(twin, str | Path) else twin
     asked = list(effects) if verdict is None else open_effects(verdict, model)
     at_hand = [
         prepare_run(

@@ -17,7 +17,6 @@ from gfimu.diagnosis.gate import impossible_sizes, judge, measurable
 from gfimu.diagnosis.holdout import Holdout, gate_gains, held_out_gain, split_segments
 from gfimu.diagnosis.long_run import explain_any_length
 from gfimu.diagnosis.loose_calibration import LooseCalibration, loosen, relearned
-from gfimu.diagnosis.model import Effect, WorldModel, is_of_one_recording
 from gfimu.diagnosis.naming import conflicting
 from gfimu.diagnosis.nuisances import sharpen_drives, tune_drives
 from gfimu.diagnosis.parallel import one_blas_thread
@@ -32,6 +31,7 @@ from gfimu.diagnosis.wandering_biases import wanders, with_walk
 from gfimu.errors import InputError
 from gfimu.recording import Recording
 from gfimu.recording.carried_array import warn_of_other_array
+from gfimu.world_model import Effect, WorldModel, is_of_one_recording
 
 __all__ = ["diagnose"]
 

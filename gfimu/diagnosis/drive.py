@@ -16,7 +16,7 @@ from scipy.sparse import csr_array
 
 from gfimu.diagnosis.data.run import Run
 from gfimu.diagnosis.drive_root import banded
-from gfimu.diagnosis.model import Spin, SpinState
+from gfimu.world_model import Spin, SpinState
 
 __all__ = ["DEGREE", "AngleSpline", "JoinedSpin", "ScaledSpin", "ShiftedSpin", "SplineState", "smooth_rate"]
 

@@ -20,12 +20,12 @@ from gfimu.diagnosis.explanation import Explanation
 from gfimu.diagnosis.fit import Fit
 from gfimu.diagnosis.holdout import Holdout
 from gfimu.diagnosis.long_run import explain_any_length
-from gfimu.diagnosis.model import Effect, EffectFamily, WorldModel
 from gfimu.diagnosis.pruning import prune
 from gfimu.diagnosis.refinement import FAIR_FIT, refine
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.signatures import signature_columns
 from gfimu.diagnosis.stochastic import LARGEST_USUAL_FLICKER, log_probability
+from gfimu.world_model import Effect, EffectFamily, WorldModel
 
 __all__ = ["LooseCalibration", "loosen", "relearned"]
 

@@ -24,10 +24,10 @@ from gfimu.diagnosis.drive import ShiftedSpin
 from gfimu.diagnosis.drive_derivative import Remembered, differentiate, felt_modes, felt_play, felt_ripple
 from gfimu.diagnosis.drive_jacobian import DriveJacobian
 from gfimu.diagnosis.linearisation import DriveElimination, DriveEquations, Linearisation
-from gfimu.diagnosis.model import Effect, Mode, Play, Ripple, Spin, WorldModel
 from gfimu.diagnosis.simulation import RunUp, Simulation
 from gfimu.diagnosis.slow_modes import SlowModes, WeighedModes
 from gfimu.diagnosis.spline_drive import TIME_MARGIN, SplineDrive
+from gfimu.world_model import Effect, Mode, Play, Ripple, Spin, WorldModel
 
 __all__ = ["Segment", "known_walk"]
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from gfimu.diagnosis.data.run import Run
 from gfimu.diagnosis.drive import JoinedSpin, ScaledSpin
-from gfimu.diagnosis.model import Effect, ModelWithModes, ModelWithPlay, ModelWithRipple, Spin, WorldModel
+from gfimu.world_model import Effect, ModelWithModes, ModelWithPlay, ModelWithRipple, Spin, WorldModel
 
 __all__ = ["RunUp", "Simulation"]
 

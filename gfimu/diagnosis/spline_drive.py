@@ -16,8 +16,8 @@ from gfimu.diagnosis.data.run import Run
 from gfimu.diagnosis.drive import AngleSpline
 from gfimu.diagnosis.drive_prior import DrivePrior
 from gfimu.diagnosis.knots import KNOT_SPACING, intervals_to_cut
-from gfimu.diagnosis.model import Spin
 from gfimu.diagnosis.roughness import Roughness
+from gfimu.world_model import Spin
 
 __all__ = ["TIME_MARGIN", "SplineDrive"]
 

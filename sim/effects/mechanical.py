@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from gfimu.diagnosis.model import Mode
 from gfimu.geometry.array import AccelerometerArray
+from gfimu.world_model import Mode
 from sim.effects.base import LARGEST_TURN, Effect, Pattern, Size, chip_patterns
 from sim.effects.table_dynamics import SERVO_STIFFNESS, RippledSpin, TwistingSpin
 from sim.motion import SpinMotion
@@ -303,7 +303,7 @@ class Cogging(Effect):
         """Most that its torque changes with the angle, relative to the servo's."""
         return abs(self.value("amplitude_rad_s2")) * self.value("order", 1.0) / SERVO_STIFFNESS
 
-    def rippled(self, motion: SpinMotion | Any, t: NDArray[np.float64]) -> RippledSpin:
+    def rippled(self, motion: SpinMotion, t: NDArray[np.float64]) -> RippledSpin:
         """Return the table's motion under a command over times (n,), s."""
         return RippledSpin(motion, t, self.value("amplitude_rad_s2"), self.value("order", 1.0), self.value("phase_rad"))
 

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.geometry.array import AccelerometerArray
+from gfimu.world_model import SpinState
 from sim.effects.base import Effect, Size
-from sim.motion import SpinState
 from sim.world import World
 
 __all__ = ["ChannelSkew", "ClockError", "TachoLatency", "TachoRipple", "TachoScale"]

@@ -10,13 +10,12 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.diagnosis.generic_basis import OF_READING, Motion, basis_function, is_of_time
-from gfimu.diagnosis.model import BasisUnits
 from gfimu.errors import InputError
+from gfimu.generic_basis import OF_READING, Motion, basis_function, is_of_time
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.units import STANDARD_GRAVITY
+from gfimu.world_model import BasisUnits, SpinState
 from sim.effects.base import Effect, Pattern, Size
-from sim.motion import SpinState
 from sim.world import SampleContext, World
 
 __all__ = ["Unknown", "UnknownTerm"]

@@ -18,7 +18,7 @@ from gfimu.diagnosis.data.rails import Rail, find_rails, on_rails, rail_paramete
 from gfimu.diagnosis.data.rounding import common_step
 from gfimu.diagnosis.data.run import Run, difference_noise
 from gfimu.diagnosis.data.spikes import channel_spikes
-from gfimu.diagnosis.model import Effect, WorldModel
+from gfimu.world_model import Effect, WorldModel
 
 __all__ = ["IntegrityReport", "check_integrity"]
 

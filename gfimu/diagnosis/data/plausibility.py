@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from scipy.ndimage import label
 
 from gfimu.diagnosis.data.run import REFERENCE_COLUMNS, Run
-from gfimu.diagnosis.model import WorldModel
 from gfimu.errors import InputError
 from gfimu.units import STANDARD_GRAVITY
+from gfimu.world_model import WorldModel
 
 __all__ = ["refuse_implausible"]
 

@@ -12,10 +12,10 @@ from gfimu.diagnosis.data.integrity import IntegrityReport, check_integrity
 from gfimu.diagnosis.data.plausibility import refuse_implausible
 from gfimu.diagnosis.data.run import Run, prepare_run
 from gfimu.diagnosis.data.spikes import reference_spikes
-from gfimu.diagnosis.model import Effect, WorldModel
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.stretches import make_segments
 from gfimu.recording import Recording
+from gfimu.world_model import Effect, WorldModel
 
 __all__ = ["PreparedRuns"]
 

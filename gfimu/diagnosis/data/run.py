@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from gfimu.diagnosis.data.temperature import between_steps
 from gfimu.diagnosis.data.time_grid import time_grid
-from gfimu.diagnosis.model import WorldModel
 from gfimu.errors import InputError
 from gfimu.recording import Recording
+from gfimu.world_model import WorldModel
 
 __all__ = ["GYRO_COLUMNS", "REFERENCE_COLUMNS", "Run", "difference_noise", "possible_values", "prepare_run"]
 

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from gfimu.diagnosis.model import Effect, WorldModel
 from gfimu.errors import InputError
+from gfimu.world_model import Effect, WorldModel
 
 __all__ = ["open_effects"]
 

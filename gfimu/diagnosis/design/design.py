@@ -23,9 +23,9 @@ from gfimu.diagnosis.design.distinguishability import (
 from gfimu.diagnosis.design.profile_search import Limits, improve, plain_profile, profile_of, starting_points
 from gfimu.diagnosis.design.proposal import SEPARATED, Proposal, in_words, scenario_of
 from gfimu.diagnosis.design.table_profile import TableProfile
-from gfimu.diagnosis.model import Effect, WorldModel
 from gfimu.diagnosis.stretches import make_segments
 from gfimu.errors import InputError
+from gfimu.world_model import Effect, WorldModel
 
 __all__ = ["MOUNTINGS", "Limits", "Proposal", "design"]
 

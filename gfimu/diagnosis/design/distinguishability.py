@@ -24,12 +24,12 @@ from gfimu.diagnosis.causes import Signature
 from gfimu.diagnosis.coloured_noise import NoiseLevels
 from gfimu.diagnosis.data.run import Run
 from gfimu.diagnosis.evidence import SCALES
-from gfimu.diagnosis.model import Effect, EffectFamily, Spin, WorldModel
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.signatures import signature_columns
 from gfimu.errors import InputError, unknown_name
 from gfimu.short_repr import short_repr
 from gfimu.units import STANDARD_GRAVITY
+from gfimu.world_model import Effect, EffectFamily, Spin, WorldModel
 
 __all__ = [
     "Contender",

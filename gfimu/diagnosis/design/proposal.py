@@ -12,8 +12,8 @@ import tomli_w
 from gfimu.diagnosis.design.distinguishability import Distinguishability, PlannedRun
 from gfimu.diagnosis.design.profile_search import Limits
 from gfimu.diagnosis.design.table_profile import TableProfile
-from gfimu.diagnosis.model import WorldModel
 from gfimu.short_repr import short_repr
+from gfimu.world_model import WorldModel
 
 __all__ = ["SEPARATED", "Proposal", "in_words", "scenario_of"]
 

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.diagnosis.model import WorldModel
 from gfimu.files.atomic_file import write_text
 from gfimu.short_repr import joined, short_repr
+from gfimu.world_model import WorldModel
 
 __all__ = [
     "FORMAT_VERSION",

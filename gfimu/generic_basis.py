@@ -13,8 +13,8 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.diagnosis.model import BasisUnits, SpinState
 from gfimu.errors import unknown_name
+from gfimu.world_model import BasisUnits, SpinState
 
 __all__ = [
     "FUNCTIONS",
