@@ -59,13 +59,15 @@ class Spin(Protocol):
 
 
 class Size(Protocol):
-    """One linear coordinate of an effect: key, physical prior, sign, finite-difference step.
+    """One linear coordinate of an effect: key, unit, physical prior, sign, finite-difference step.
 
     It may have ``most``, the largest size that a fit may take, and ``bound`` (see `bound_of`); others need not.
     """
 
     @property
     def key(self) -> str: ...  # noqa: D102
+    @property
+    def unit(self) -> str: ...  # noqa: D102
     @property
     def prior_std(self) -> float: ...  # noqa: D102
     @property

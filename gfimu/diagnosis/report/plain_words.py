@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gfimu.diagnosis.verdict.verdict import Diagnosis, NamedCause, RunView
-from gfimu.units import NAME, NUMBER, RATIO, STANDARD_GRAVITY, split_key
+from gfimu.units import NAME, NUMBER, RATIO, STANDARD_GRAVITY, key_name
 
 __all__ = [
     "ParameterText",
@@ -162,14 +162,15 @@ def parameter_units(diagnosis: Diagnosis, cause: NamedCause) -> Mapping[str, str
     return {} if family is None else family.parameter_units(diagnosis.twin.array)
 
 
-def parameter_texts(cause: NamedCause, units: Mapping[str, str] | None = None) -> list[ParameterText]:
+def parameter_texts(cause: NamedCause, units: Mapping[str, str]) -> list[ParameterText]:
     """Return the parameters of a cause as people read them; those that are zero and unknown are left out.
 
-    ``units`` are those that the effect declares (`parameter_units`); else the end of each key counts.
+    ``units`` are those that the effect declares (`parameter_units`); a parameter without one is a plain number.
     """
     texts = []
     for key, value in cause.parameters.items():
-        name, unit = _name_and_unit(key, units or {})
+        unit = units.get(key, "")
+        name = key_name(key, unit).replace("_", " ")
         if isinstance(value, bool) or not isinstance(value, int | float):
             plain = ", ".join(map(str, value)) if isinstance(value, list | tuple) else str(value)
             texts.append(ParameterText(name, plain, "", significant=True))
@@ -260,16 +261,6 @@ def odds(log_odds: float) -> str:
     else:
         return f"{'<' if log_odds < 0 else '>'} 1 : 10{_superscript(-_MOST_DIGITS if log_odds > 0 else _MOST_DIGITS)}"
     return f"1 : {ratio}" if log_odds <= 0 else f"{ratio} : 1"
-
-
-def _name_and_unit(key: str, declared: Mapping[str, str]) -> tuple[str, str]:
-    """Return the name of a parameter for people and its unit: as its effect declares it, else by the end of the key."""
-    name, unit = split_key(key)
-    if declared.get(key, unit) != unit:
-        name, unit = key, declared[key]
-    if not unit and "_" not in key:
-        unit = RATIO  # a channel's bare name
-    return name.replace("_", " "), unit
 
 
 def _with_std(value: float, std: float | None, unit: str) -> str:

@@ -157,27 +157,27 @@ def test_a_folder_that_cannot_be_is_refused_before_any_work(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("key", "value", "std", "name", "text", "familiar"),
+    ("key", "unit", "value", "std", "name", "text", "familiar"),
     [
-        ("x_rad", 0.0041, 0.0001, "x", "4.10 ± 0.10 mrad", "0.2349 ± 0.0057 °"),
-        ("x_m", -0.0012, 2e-5, "x", "−1.200 ± 0.020 mm", ""),
-        ("a11_m_s2", 0.5, 0.01, "a11", "0.500 ± 0.010 m/s²", "51.0 ± 1.0 mg"),
-        ("a11", 0.002, 1e-4, "a11", "0.00200 ± 0.00010", "0.200 ± 0.010 %"),
-        ("frequency_hz", 12.345, 0.01, "frequency", "12.345 ± 0.010 Hz", ""),
-        ("stretch_s2_rad2", 2.5e-5, 1e-6, "stretch", "(2.50 ± 0.10)·10⁻⁵ s²/rad²", ""),
-        ("order", 7.0, None, "order", "7", ""),
-        ("chip", "a2", None, "chip", "a2", ""),
-        ("channels", ["a11", "a12"], None, "channels", "a11, a12", ""),
+        ("x_rad", "rad", 0.0041, 0.0001, "x", "4.10 ± 0.10 mrad", "0.2349 ± 0.0057 °"),
+        ("x_m", "m", -0.0012, 2e-5, "x", "−1.200 ± 0.020 mm", ""),
+        ("a11_m_s2", "m/s²", 0.5, 0.01, "a11", "0.500 ± 0.010 m/s²", "51.0 ± 1.0 mg"),
+        ("a11", "ratio", 0.002, 1e-4, "a11", "0.00200 ± 0.00010", "0.200 ± 0.010 %"),
+        ("frequency_hz", "Hz", 12.345, 0.01, "frequency", "12.345 ± 0.010 Hz", ""),
+        ("stretch_s2_rad2", "s²/rad²", 2.5e-5, 1e-6, "stretch", "(2.50 ± 0.10)·10⁻⁵ s²/rad²", ""),
+        ("order", "number", 7.0, None, "order", "7", ""),
+        ("chip", "name", "a2", None, "chip", "a2", ""),
+        ("channels", "name", ["a11", "a12"], None, "channels", "a11, a12", ""),
     ],
 )
-def test_parameters_read_as_people_write_them(key, value, std, name, text, familiar):
+def test_parameters_read_as_people_write_them(key, unit, value, std, name, text, familiar):
     cause = NamedCause("bias", {key: value}, {} if std is None else {key: std}, 0.9)
-    (found,) = parameter_texts(cause)
+    (found,) = parameter_texts(cause, {key: unit})
     assert (found.name, found.value, found.familiar, found.significant) == (name, text, familiar, True)
 
 
 def test_a_parameter_within_its_error_is_pale():
-    (found,) = parameter_texts(NamedCause("table_tilt", {"x_rad": 1e-4}, {"x_rad": 1e-4}, 0.9))
+    (found,) = parameter_texts(NamedCause("table_tilt", {"x_rad": 1e-4}, {"x_rad": 1e-4}, 0.9), {"x_rad": "rad"})
     assert not found.significant
 
 
