@@ -161,6 +161,55 @@ def test_firmware_bridge_imports_recordings_and_the_chip_only():
     )
 
 
+def test_no_circular_imports():
+    graph = {module: {name for name in names if name in FILES} for module, names in IMPORTS.items()}
+    try:
+        graphlib.TopologicalSorter(graph).prepare()
+    except graphlib.CycleError as error:
+        pytest.fail("circular import: " + " → ".join(error.args[1]))
+
+
+def test_the_reader_of_imports_sees_every_form():
+    source = """
+import sim.world
+from typing import TYPE_CHECKING
+if TYPE_CHECKING:
+    import serial
+else:
+    import json
+def f():
+    from gfimu.geometry.array import Chip
+    from gfimu import recording
+"""
+    assert modules_imported(source) == {
+        "sim.world",
+        "typing.TYPE_CHECKING",
+        "json",
+        "gfimu.geometry.array",
+        "gfimu.recording",
+    }
+
+
+@pytest.mark.parametrize("module", FILES)
+def test_every_module_says_what_it_is(module):
+    assert ast.get_docstring(ast.parse(FILES[module].read_text(encoding="utf-8")))
+
+
+@pytest.mark.parametrize("name", gfimu.__all__)
+def test_public_names_can_be_imported(name):
+    assert getattr(gfimu, name) is not None
+
+
+def test_unknown_public_name():
+    with pytest.raises(AttributeError, match="no attribute 'nonsense'"):
+        gfimu.nonsense  # noqa: B018
+
+
+def test_test_files_have_names_of_their_own():
+    names = Counter(file.name for file in (ROOT / "tests").rglob("test_*.py"))
+    assert [name for name, count in names.items() if count > 1] == []
+
+
 COMMON = {"gfimu", "gfimu.errors", "gfimu.units", "gfimu.files.outputs", "gfimu.files.atomic_file", "gfimu.short_repr"}
 """Modules that every room may import; of `gfimu` itself the version."""
 
@@ -262,52 +311,3 @@ def test_few_modules_are_in_no_room():
         "gfimu.units",
         "gfimu.world_model",
     }
-
-
-def test_no_circular_imports():
-    graph = {module: {name for name in names if name in FILES} for module, names in IMPORTS.items()}
-    try:
-        graphlib.TopologicalSorter(graph).prepare()
-    except graphlib.CycleError as error:
-        pytest.fail("circular import: " + " → ".join(error.args[1]))
-
-
-def test_the_reader_of_imports_sees_every_form():
-    source = """
-import sim.world
-from typing import TYPE_CHECKING
-if TYPE_CHECKING:
-    import serial
-else:
-    import json
-def f():
-    from gfimu.geometry.array import Chip
-    from gfimu import recording
-"""
-    assert modules_imported(source) == {
-        "sim.world",
-        "typing.TYPE_CHECKING",
-        "json",
-        "gfimu.geometry.array",
-        "gfimu.recording",
-    }
-
-
-@pytest.mark.parametrize("module", FILES)
-def test_every_module_says_what_it_is(module):
-    assert ast.get_docstring(ast.parse(FILES[module].read_text(encoding="utf-8")))
-
-
-@pytest.mark.parametrize("name", gfimu.__all__)
-def test_public_names_can_be_imported(name):
-    assert getattr(gfimu, name) is not None
-
-
-def test_unknown_public_name():
-    with pytest.raises(AttributeError, match="no attribute 'nonsense'"):
-        gfimu.nonsense  # noqa: B018
-
-
-def test_test_files_have_names_of_their_own():
-    names = Counter(file.name for file in (ROOT / "tests").rglob("test_*.py"))
-    assert [name for name, count in names.items() if count > 1] == []
