@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gfimu.array import AccelerometerArray
 from gfimu.calibration.array_calibration import update_array_calibration
 from gfimu.calibration.faults import (
     check_gravity,
@@ -19,9 +18,10 @@ from gfimu.calibration.observations import observations_from
 from gfimu.calibration.registry import METHODS, CalibrationMethod, calibration_method
 from gfimu.calibration.result import Calibration, combine
 from gfimu.errors import InputError
-from gfimu.part import Part
+from gfimu.geometry.array import AccelerometerArray
+from gfimu.parts.part import Part
 from gfimu.recording import Recording
-from gfimu.rest import detect_rest
+from gfimu.recording.rest import detect_rest
 from gfimu.units import STANDARD_GRAVITY
 
 __all__ = [
@@ -101,7 +101,7 @@ def calibrate(
     recording : Recording
         Readings of one or more chips, in m/s² or raw counts.
     gravity : float
-        Local gravity, m/s²; see `gfimu.gravity.local_gravity`.
+        Local gravity, m/s²; see `gfimu.geometry.gravity.local_gravity`.
     n_parameters : {9, 12}, optional
         Parameters per triad; 12 by default, 9 for ``multi-position``.
     input_kind : {"averaged", "raw", "wavelet"}

@@ -13,7 +13,7 @@ from gfimu.rate.registry import RATE_METHODS, rate_method, recursive_methods
 if TYPE_CHECKING:
     import numpy as np
 
-    from gfimu.estimate_summary import EstimateSummary
+    from gfimu.motion.estimate_summary import EstimateSummary
 
 __all__ = ["register"]
 
@@ -58,7 +58,7 @@ def _estimate(
     Example: gfimu estimate run.parquet --method filter --rest-bias --out estimate.parquet
     """
     from gfimu.commands.estimate import estimate_run
-    from gfimu.estimate_summary import summarise
+    from gfimu.motion.estimate_summary import summarise
 
     with progress(_describe(method), total=1.0) as done:
         found = estimate_run(

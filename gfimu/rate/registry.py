@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
-    from gfimu.array import AccelerometerArray
+    from gfimu.geometry.array import AccelerometerArray
     from gfimu.rate.kalman import FilterSettings
     from gfimu.rate.result import RateEstimate
     from gfimu.rate.sensing import SensorErrors

@@ -19,10 +19,10 @@ from gfimu.diagnosis.fit import Fit
 from gfimu.diagnosis.free_body.segment import BodySegment
 from gfimu.diagnosis.free_body.signatures import plan_signatures, signature_columns
 from gfimu.diagnosis.free_body.undetermined import LEAST_INFORMATION, determined
-from gfimu.diagnosis.model import Effect
 from gfimu.diagnosis.pruning import LEAST_EXTRA_ODDS, LEAST_ODDS
 from gfimu.diagnosis.search import EXTRA_CAUSE, Blocks, search
 from gfimu.diagnosis.signatures import SignatureSet, hypotheses
+from gfimu.world_model import Effect
 
 __all__ = ["Known", "Screening", "explain", "learn_noise", "screen", "without_cause"]
 

@@ -10,12 +10,12 @@ import pytest
 import gfimu
 from gfimu import AccelerometerArray, Recording, specific_force
 from gfimu.errors import InputError
-from gfimu.estimation import estimate
+from gfimu.motion.estimation import estimate
+from gfimu.motion.rest_bias import estimate_from_rest
 from gfimu.rate import registry
 from gfimu.rate.methods import estimate_rate
 from gfimu.rate.registry import RATE_METHODS, RateMethod, rate_method
 from gfimu.rate.sensing import SensorErrors
-from gfimu.rest_bias import estimate_from_rest
 
 CUBE = AccelerometerArray.load("cube12")
 
