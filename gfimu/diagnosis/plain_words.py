@@ -16,6 +16,7 @@ __all__ = [
     "gain_rows",
     "headline",
     "next_steps",
+    "noise_texts",
     "odds",
     "parameter_texts",
     "parameter_units",
@@ -179,6 +180,15 @@ def parameter_texts(cause: NamedCause, units: Mapping[str, str] | None = None) -
             continue
         certain = std is None or not math.isfinite(std) or abs(value) > _SIGNIFICANT * std
         texts.append(ParameterText(name, _with_std(value, std, unit), _familiar(value, std, unit), certain))
+    return texts
+
+
+def noise_texts(noise: Mapping[str, float | str]) -> list[str]:
+    """Return the noise levels of a diagnosis as people read them: name, value and unit by the end of each key."""
+    texts = []
+    for key, value in noise.items():
+        name, unit = _name_and_unit(key, {})
+        texts.append(f"{name} {value if isinstance(value, str) else _number(value, unit).strip()}")
     return texts
 
 
