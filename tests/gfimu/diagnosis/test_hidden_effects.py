@@ -71,16 +71,22 @@ def test_no_false_alarm_is_pinned():
     assert all(PINNED.reports.get(hidden.name) == "nothing_found" for hidden in group("null"))
 
 
-def test_a_strong_torque_ripple_is_told_with_its_phase(tmp_path):
+def test_a_strong_torque_ripple_is_told_with_its_phase():
     """It holds its table: steps of a drive that does not know that ended 0.8 rad off."""
     world = draw_world(Case("reduced", 709, ("cogging",), 1500.0, duration=20.0))
-    found = diagnose([world.recording], world.twin)
-    (cause,) = found.causes
+    (cause,) = diagnose([world.recording], world.twin).causes
     ((name, truth),) = world.truth
     assert cause.effect == name == "cogging"
     assert cause.parameters["amplitude_rad_s2"] == pytest.approx(truth["amplitude_rad_s2"], rel=0.01)
     off = cause.parameters["phase_rad"] - truth["phase_rad"]
     assert abs((off + np.pi) % (2 * np.pi) - np.pi) < 0.1
+
+
+def test_nothing_is_left_of_a_ripple_for_the_extended_twin(tmp_path):
+    """The pinned single ripple is small; this one isn't."""
+    world = draw_world(Case("reduced", 600, ("cogging",), 300.0, duration=12.0))
+    found = diagnose([world.recording], world.twin)
+    assert [cause.effect for cause in found.causes] == ["cogging"]
     check_nothing_is_left(found, world.recording, tmp_path)
 
 
