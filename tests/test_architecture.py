@@ -27,24 +27,24 @@ def is_type_checking(node: ast.AST) -> bool:
     return isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test)
 
 
-def imported_names(node: ast.AST):
-    """Dotted names that the code below a node imports, inside functions too, but not for type checkers only."""
+def imported_names(node: ast.AST, *, by_types: bool = False):
+    """Dotted names that the code below a node imports, inside functions too; for type checkers only ``by_types``."""
     for child in ast.iter_child_nodes(node):
         if isinstance(child, ast.Import):
             yield from (alias.name for alias in child.names)
         elif isinstance(child, ast.ImportFrom):
             assert child.level == 0, "relative import: write the full name"
             yield from (f"{child.module}.{alias.name}" for alias in child.names)
-        elif is_type_checking(child):
+        elif is_type_checking(child) and not by_types:
             yield from imported_names(ast.Module(child.orelse, []))
         else:
-            yield from imported_names(child)
+            yield from imported_names(child, by_types=by_types)
 
 
-def modules_imported(source: str) -> set[str]:
+def modules_imported(source: str, *, by_types: bool = False) -> set[str]:
     """Modules that a source imports; names inside a project module count as that module."""
     found = set()
-    for name in imported_names(ast.parse(source)):
+    for name in imported_names(ast.parse(source), by_types=by_types):
         module = name
         while module not in FILES and "." in module and module.split(".")[0] in PACKAGES:
             module = module.rpartition(".")[0]
@@ -161,12 +161,36 @@ def test_firmware_bridge_imports_recordings_and_the_chip_only():
     )
 
 
-def test_no_circular_imports():
-    graph = {module: {name for name in names if name in FILES} for module, names in IMPORTS.items()}
+def refuse_circles(imports: dict[str, set[str]]) -> None:
+    graph = {module: {name for name in names if name in FILES} for module, names in imports.items()}
     try:
         graphlib.TopologicalSorter(graph).prepare()
     except graphlib.CycleError as error:
         pytest.fail("circular import: " + " → ".join(error.args[1]))
+
+
+def test_no_circular_imports():
+    refuse_circles(IMPORTS)
+
+
+def test_no_circles_in_firmware_bridge_even_by_types():
+    """A chip or peripheral knows the bus protocol, not the board that implements it."""
+    refuse_circles(
+        {
+            module: modules_imported(file.read_text(encoding="utf-8"), by_types=True)
+            for module, file in FILES.items()
+            if inside(module, "firmware_bridge")
+        }
+    )
+
+
+def test_peripherals_know_the_bus_and_not_the_board():
+    """The processor, the peripherals and the chips name neither the board nor each other's types for its sake."""
+    above = {"board", "fast_board", "worker"}
+    for module, file in FILES.items():
+        if inside(module, "firmware_bridge.board") and module.rpartition(".")[2] not in above:
+            names = modules_imported(file.read_text(encoding="utf-8"), by_types=True)
+            assert not names & {f"firmware_bridge.board.{name}" for name in above}, module
 
 
 def test_the_reader_of_imports_sees_every_form():
@@ -181,13 +205,9 @@ def f():
     from gfimu.geometry.array import Chip
     from gfimu import recording
 """
-    assert modules_imported(source) == {
-        "sim.world",
-        "typing.TYPE_CHECKING",
-        "json",
-        "gfimu.geometry.array",
-        "gfimu.recording",
-    }
+    run = {"sim.world", "typing.TYPE_CHECKING", "json", "gfimu.geometry.array", "gfimu.recording"}
+    assert modules_imported(source) == run
+    assert modules_imported(source, by_types=True) == run | {"serial"}
 
 
 @pytest.mark.parametrize("module", FILES)
@@ -217,7 +237,7 @@ ROOMS = {
     "gfimu.files": set(),
     "gfimu.parts": {"gfimu.files", "gfimu.geometry.array"},
     "gfimu.geometry": {"gfimu.bounds", "gfimu.files", "gfimu.parts.files"},
-    "gfimu.recording": {"gfimu.files", "gfimu.geometry", "gfimu.parts"},
+    "gfimu.recording": {"gfimu.files", "gfimu.geometry", "gfimu.parts", "gfimu.rate.integration"},
     "gfimu.motion": {"gfimu.files", "gfimu.geometry", "gfimu.parts", "gfimu.rate", "gfimu.recording"},
     "gfimu.position_drift": {"gfimu.geometry", "gfimu.motion", "gfimu.rate.integration"},
     "gfimu.diagnosis.data": {
