@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from gfimu.diagnosis.causes import Cause, effects_of_run
 from gfimu.diagnosis.evidence import log_evidence, log_evidence_each
-from gfimu.diagnosis.fit import Fit
+from gfimu.diagnosis.old_fit import Fit
 from gfimu.diagnosis.generic_basis import FUNCTIONS, Motion
 from gfimu.diagnosis.linearisation import Linearisation
 from gfimu.diagnosis.model import BasisUnits, Effect, SpinState

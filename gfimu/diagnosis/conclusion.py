@@ -13,7 +13,7 @@ from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.adequacy import LEFT_OVER_ODDS
 from gfimu.diagnosis.causes import Cause, effects_of_run
 from gfimu.diagnosis.explanation import Explanation
-from gfimu.diagnosis.fit import Fit, segments_at
+from gfimu.diagnosis.old_fit import Fit, segments_at
 from gfimu.diagnosis.generic_basis import ripple_order
 from gfimu.diagnosis.loose_calibration import LooseCalibration
 from gfimu.diagnosis.model import Effect, WorldModel
@@ -29,7 +29,7 @@ from gfimu.diagnosis.naming import (
 )
 from gfimu.diagnosis.prepared_runs import PreparedRuns
 from gfimu.diagnosis.residual_tests import LeftOver
-from gfimu.diagnosis.search import MOST_CAUSES
+from gfimu.diagnosis.old_search import MOST_CAUSES
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.signatures import ANGLES
 from gfimu.diagnosis.stochastic import LoudestChannel, Walk, loudest_channel, white_factor

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from gfimu.diagnosis.fit import Fit
+from gfimu.diagnosis.old_fit import Fit
 from gfimu.diagnosis.model import Effect
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.signatures import SignatureSet

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.diagnosis.causes import Cause
-from gfimu.diagnosis.fit import Fit
+from gfimu.diagnosis.old_fit import Fit
 from gfimu.diagnosis.model import Effect
 from gfimu.diagnosis.parallel import over_segments
 from gfimu.diagnosis.refinement import refine, refine_each

@@ -20,7 +20,7 @@ from gfimu.diagnosis.causes import Cause, effects_of_run
 from gfimu.diagnosis.coloured_noise import NoiseLevels
 from gfimu.diagnosis.drive import smooth_rate
 from gfimu.diagnosis.evidence import SCALES, inverse, likeliest_scale
-from gfimu.diagnosis.fit import SMALLEST_POSITIVE, Fit
+from gfimu.diagnosis.old_fit import SMALLEST_POSITIVE, Fit
 from gfimu.diagnosis.model import Effect, is_of_one_recording
 from gfimu.diagnosis.refinement import refine, refine_each
 from gfimu.diagnosis.segment import Segment

@@ -30,6 +30,7 @@ __all__ = [
     "Size",
     "Spin",
     "SpinState",
+    "Whitened",
     "WorldModel",
     "bound_of",
     "is_of_one_recording",
@@ -95,6 +96,9 @@ class Effect(Protocol):
     @property
     def parameters(self) -> dict[str, Any]: ...  # noqa: D102
 
+    @property
+    def memory_s(self) -> float: ...  # noqa: D102
+
     def size_values(self, array: AccelerometerArray) -> NDArray[np.float64]:
         """Return the linear coordinates."""
         ...
@@ -126,6 +130,12 @@ class EffectFamily(Protocol):
     def inexactness(self) -> float: ...  # noqa: D102
     @property
     def starts(self) -> tuple[float, ...]: ...  # noqa: D102
+    @property
+    def whole(self) -> frozenset[str]: ...  # noqa: D102
+    @property
+    def shape_limits(self) -> Mapping[str, tuple[float, float]]: ...  # noqa: D102
+    @property
+    def needs_temperature(self) -> bool: ...  # noqa: D102
 
     def __call__(self, parameters: Mapping[str, Any]) -> Effect:
         """Build an effect from its contract parameters."""
@@ -149,6 +159,12 @@ class EffectFamily(Protocol):
 
     def shapes(self, duration: float, sample_rate: float) -> tuple[dict[str, float], ...]:
         """Return the grid of shape parameters."""
+        ...
+
+    def scan(
+        self, left: Sequence[Whitened], duration: float, sample_rate: float
+    ) -> tuple[Sequence[Mapping[str, float]], float]:
+        """Return the shapes to screen, and how many independent ones they were chosen from."""
         ...
 
     def from_sizes(self, array: AccelerometerArray, values: NDArray[np.float64], shape: Mapping[str, float]) -> Effect:
@@ -283,6 +299,31 @@ class Mode:
     gain: float
     natural: float
     damping: float
+
+
+@dataclass(frozen=True)
+class Whitened:
+    """What a stretch leaves unexplained, whitened: its product with any column is that column's score.
+
+    Parameters
+    ----------
+    residual : ndarray, shape (n, c + 1)
+        W times the residual, drive at its best; the reference last.
+    weights : ndarray, shape (c + 1,)
+        One over the white variance of each observation.
+    t : ndarray, shape (n,)
+        Sample times, s.
+    state : SpinState
+        The table's motion there.
+    array : AccelerometerArray
+        The array.
+    """
+
+    residual: NDArray[np.float64]
+    weights: NDArray[np.float64]
+    t: NDArray[np.float64]
+    state: SpinState
+    array: AccelerometerArray
 
 
 class WorldModel(Protocol):

@@ -8,7 +8,7 @@ from dataclasses import replace
 from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.causes import Cause
 from gfimu.diagnosis.explanation import Explanation
-from gfimu.diagnosis.fit import Fit
+from gfimu.diagnosis.old_fit import Fit
 from gfimu.diagnosis.model import Effect, EffectFamily
 from gfimu.diagnosis.naming import MOST_CERTAIN, cause_parameters, describe, mimics
 from gfimu.diagnosis.signatures import ANGLES

@@ -13,7 +13,7 @@ from scipy.stats import chi2
 from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.causes import WHOLE_NUMBERS, Cause
 from gfimu.diagnosis.explanation import Explanation
-from gfimu.diagnosis.fit import Fit
+from gfimu.diagnosis.old_fit import Fit
 from gfimu.diagnosis.verdict import Rival
 
 __all__ = [

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from gfimu.diagnosis.causes import Cause, effects_of_run
 from gfimu.diagnosis.coloured_noise import NoiseLevels, estimate_flicker, likeliest_flicker, white_level
-from gfimu.diagnosis.fit import Fit
+from gfimu.diagnosis.old_fit import Fit
 from gfimu.diagnosis.model import Effect
 from gfimu.diagnosis.parallel import over_segments
 from gfimu.diagnosis.refinement import refine

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from gfimu.diagnosis.causes import Cause, Signature, effects_of_run
-from gfimu.diagnosis.fit import Fit, segments_at
+from gfimu.diagnosis.old_fit import Fit, segments_at
 from gfimu.diagnosis.model import Effect
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.signatures import signature_columns

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from gfimu.diagnosis.fit import Fit, without
+from gfimu.diagnosis.old_fit import Fit, without
 from gfimu.diagnosis.model import Effect
 from gfimu.diagnosis.other_orders import is_ripple, power_at_other_orders
 from gfimu.diagnosis.refinement import refine_each

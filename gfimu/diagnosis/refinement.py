@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.causes import LEVEL_ERROR, Cause, effects_of_run
 from gfimu.diagnosis.evidence import SCALES, inverse, log_evidence
-from gfimu.diagnosis.fit import SMALLEST_POSITIVE, Fit, Start
+from gfimu.diagnosis.old_fit import SMALLEST_POSITIVE, Fit, Start
 from gfimu.diagnosis.model import Effect
 from gfimu.diagnosis.parallel import each_apart, over_segments
-from gfimu.diagnosis.search import EXTRA_CAUSE
+from gfimu.diagnosis.old_search import EXTRA_CAUSE
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.signatures import ANGLES, cause_columns, shape_moved
 

@@ -12,11 +12,11 @@ from scipy.stats import chi2
 
 from gfimu.diagnosis.causes import effects_of_run
 from gfimu.diagnosis.evidence import log_evidence
-from gfimu.diagnosis.fit import Fit
+from gfimu.diagnosis.old_fit import Fit
 from gfimu.diagnosis.generic_basis import OF_READING, step_at
 from gfimu.diagnosis.model import Effect
 from gfimu.diagnosis.refinement import refine
-from gfimu.diagnosis.search import EXTRA_CAUSE
+from gfimu.diagnosis.old_search import EXTRA_CAUSE
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.signatures import cause_columns
 

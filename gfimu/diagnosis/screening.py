@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.diagnosis.causes import effects_of_run
-from gfimu.diagnosis.fit import Fit
+from gfimu.diagnosis.old_fit import Fit
 from gfimu.diagnosis.linearisation import Linearisation
 from gfimu.diagnosis.model import Effect
 from gfimu.diagnosis.parallel import over_segments

@@ -55,20 +55,20 @@ class SlowModes:
         return _log_determinant(self._basis, self._levels)
 
     @cached_property
-    def _cosines(self) -> NDArray[np.float64]:
+    def cosines(self) -> NDArray[np.float64]:
         return self._basis.matrix(len(self.share))  # (n, K)
 
     def of(self, values: NDArray[np.float64], column: int) -> NDArray[np.float64]:
         """Return what each mode has of rows (p, n) of one observation, shape (p, K)."""
-        return np.asarray(values @ self._cosines)
+        return np.asarray(values @ self.cosines)
 
     def of_each(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return what each mode has of all observations (n, c + 1), shape (K, c + 1)."""
-        return np.asarray(self._cosines.T @ values)
+        return np.asarray(self.cosines.T @ values)
 
     def back(self, sizes: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return all observations (n, c + 1) that sizes (K, c + 1) of the modes make."""
-        return np.asarray(self._cosines @ sizes)
+        return np.asarray(self.cosines @ sizes)
 
     def explained(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return what slow noise takes of the squares of all observations (n, c + 1), shape (c + 1,)."""
@@ -84,7 +84,7 @@ class SlowModes:
         weights : ndarray, shape (c + 1,)
             One over the white variance of each observation.
         """
-        slow = jacobian.slow(self._cosines)
+        slow = jacobian.slow(self.cosines)
         return DriveModes(jacobian, slow, None, jacobian.slow_rows(slow, self.share, weights))
 
 
@@ -106,7 +106,7 @@ class WeighedModes(SlowModes):
         self._root = np.sqrt(basis.variances(levels, self._count)) / levels.white
 
     @cached_property
-    def _cosines(self) -> NDArray[np.float64]:
+    def cosines(self) -> NDArray[np.float64]:
         return self._basis.matrix(self._count)
 
     @cached_property
@@ -147,6 +147,10 @@ class WeighedModes(SlowModes):
             mixing[column, :, : mine.shape[1]] = mine
         return mixing
 
+    def columns(self, column: int) -> NDArray[np.float64]:
+        """Return Q_c of one observation, shape (n, K)."""
+        return np.asarray(self.cosines @ self._mixing[column] * self._weight[:, [column]])
+
     @cached_property
     def log_determinant(self) -> float:
         """Log det of the channels' noise covariance."""
@@ -159,15 +163,15 @@ class WeighedModes(SlowModes):
 
     def of(self, values: NDArray[np.float64], column: int) -> NDArray[np.float64]:
         """Return what each mode has of rows (p, n) of one observation, shape (p, K)."""
-        return np.asarray((values * self._weight[:, column]) @ self._cosines @ self._mixing[column])
+        return np.asarray((values * self._weight[:, column]) @ self.cosines @ self._mixing[column])
 
     def of_each(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return what each mode has of all observations (n, c + 1), shape (K, c + 1)."""
-        return np.asarray(np.einsum("ckm,kc->mc", self._mixing, self._cosines.T @ (values * self._weight)))
+        return np.asarray(np.einsum("ckm,kc->mc", self._mixing, self.cosines.T @ (values * self._weight)))
 
     def back(self, sizes: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return all observations (n, c + 1) that sizes (K, c + 1) of the modes make."""
-        return np.asarray(self._cosines @ np.einsum("ckm,mc->kc", self._mixing, sizes) * self._weight)
+        return np.asarray(self.cosines @ np.einsum("ckm,mc->kc", self._mixing, sizes) * self._weight)
 
     def explained(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return what slow noise takes of the squares of all observations (n, c + 1), shape (c + 1,)."""
@@ -181,11 +185,11 @@ class WeighedModes(SlowModes):
                 for factor, mine in zip(self._factors, self._solved(values).T, strict=True)
             ]
         )
-        return np.asarray(self._cosines @ (self._root * sizes))
+        return np.asarray(self.cosines @ (self._root * sizes))
 
     def _solved(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return L⁻¹ S^½ Bᵀ/σ of all observations, shape (K, c + 1)."""
-        sizes = self._root * (self._cosines.T @ (values * self._weight))
+        sizes = self._root * (self.cosines.T @ (values * self._weight))
         return np.column_stack(
             [
                 solve_triangular(factor, mine, lower=True, check_finite=False)
@@ -199,7 +203,7 @@ class WeighedModes(SlowModes):
         for column, mixing in enumerate(self._mixing):
             part = jacobian.channel(column)
             part.data *= np.repeat(self._weight[:, column], np.diff(part.indptr))
-            slow = np.asarray(part.T @ self._cosines) @ mixing  # (m, K)
+            slow = np.asarray(part.T @ self.cosines) @ mixing  # (m, K)
             each.append(slow)
             rows.append((slow * np.sqrt(weights[column] * self.share[:, column])).T)
         stacked = np.vstack(rows)

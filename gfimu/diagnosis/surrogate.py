@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from gfimu.diagnosis.adequacy import series_products
 from gfimu.diagnosis.causes import Cause, effects_of_run
 from gfimu.diagnosis.evidence import log_evidence, log_evidence_each
-from gfimu.diagnosis.fit import Fit, segments_at
+from gfimu.diagnosis.old_fit import Fit, segments_at
 from gfimu.diagnosis.generic_basis import FUNCTIONS, OF_READING, Motion, basis_function, is_of_time, ripples, tone
 from gfimu.diagnosis.long_run import MOST_SEARCHED, spread_over_runs
 from gfimu.diagnosis.model import BasisUnits, Effect

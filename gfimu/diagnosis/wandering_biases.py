@@ -13,7 +13,7 @@ import numpy as np
 from gfimu.diagnosis.adequacy import left_over
 from gfimu.diagnosis.coloured_noise import NoiseLevels
 from gfimu.diagnosis.explanation import Explanation
-from gfimu.diagnosis.fit import Fit, segments_at
+from gfimu.diagnosis.old_fit import Fit, segments_at
 from gfimu.diagnosis.long_run import explain_any_length, settle_noise_of_any_length
 from gfimu.diagnosis.model import Effect, WorldModel
 from gfimu.diagnosis.nuisances import settle_noise

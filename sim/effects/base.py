@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.array import AccelerometerArray
+from gfimu.diagnosis.model import Whitened
 from gfimu.errors import InputError
 from gfimu.units import split_key
 from sim.world import World
@@ -93,11 +94,22 @@ class Effect(ABC):
     """Units of other parameters whose keys don't end in one; ``"ratio"``, ``"number"`` (count, factor), ``"name"``."""
     starts: ClassVar[tuple[float, ...]] = ()
     """Values in units of the prior to start from where a large size is far from linear; none by default."""
+    whole: ClassVar[frozenset[str]] = frozenset()
+    """Shape parameters that are whole numbers, chosen from a grid and not refined."""
+    shape_limits: ClassVar[Mapping[str, tuple[float, float]]] = {}
+    """Least and largest value of shape parameters."""
+    needs_temperature: ClassVar[bool] = False
+    """True where it shows only in recordings with a temperature."""
     of_one_recording: ClassVar[bool] = False
     """True where its phase is that of a clock no other recording shares: it does not predict another one."""
 
     def __init__(self, parameters: Mapping[str, Any]) -> None:
         self.parameters: dict[str, Any] = dict(parameters)
+
+    @property
+    def memory_s(self) -> float:
+        """How long a reading depends on the drive before it, s, where that is longer than a probe can measure."""
+        return 0.0
 
     @classmethod
     @abstractmethod
@@ -121,6 +133,24 @@ class Effect(ABC):
     def shapes(cls, duration: float, sample_rate: float) -> tuple[dict[str, float], ...]:
         """Return the grid of shape parameters (frequency, order, time constant) to screen over."""
         return ({},)
+
+    @classmethod
+    def scan(
+        cls, left: Sequence[Whitened], duration: float, sample_rate: float
+    ) -> tuple[Sequence[Mapping[str, float]], float]:
+        """Return the shapes to screen about a fit, and how many independent ones they were chosen from.
+
+        Parameters
+        ----------
+        left : sequence of Whitened
+            What the fit leaves of each stretch.
+        duration : float
+            Longest stretch, s.
+        sample_rate : float
+            Sample rate, Hz.
+        """
+        shapes = cls.shapes(duration, sample_rate)
+        return shapes, float(len(shapes))
 
     @classmethod
     def from_sizes(

@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.model import Mode
+from sim.effects.scans import mode_shapes, order_shapes, per_acceleration
 from sim.effects.base import LARGEST_TURN, Effect, Pattern, Size, chip_patterns
 from sim.effects.table_dynamics import SERVO_STIFFNESS, RippledSpin, TwistingSpin
 from sim.motion import SpinMotion
@@ -239,6 +240,7 @@ class CentrifugalFlex(Effect):
     place = "geometry"
     separated_by = "the cube remounted on its side, and several high speeds"
     other_units: ClassVar = {"moving_arms": "number"}
+    whole = frozenset({"moving_arms"})
 
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
@@ -268,6 +270,7 @@ class Cogging(Effect):
     place = "motion"
     separated_by = "slow steady rotation at two speeds"
     other_units: ClassVar = {"order": "number"}
+    whole = frozenset({"order"})
     inexactness = 0.02  # motor, friction and speed loop of a table are not as simple as this servo
 
     @classmethod
@@ -279,6 +282,11 @@ class Cogging(Effect):
     def shapes(cls, duration: float, sample_rate: float) -> tuple[dict[str, float], ...]:
         """Return one order; the scan over orders finds it."""
         return ({"order": 6.0},)
+
+    @classmethod
+    def scan(cls, left, duration, sample_rate):  # type: ignore[no-untyped-def]
+        """Return the strongest orders of an angular acceleration."""
+        return order_shapes(left, 4, per_acceleration)
 
     @classmethod
     def from_sizes(cls, array, values, shape) -> Effect:  # type: ignore[no-untyped-def]
@@ -321,6 +329,7 @@ class Resonance(Effect):
     separated_by = "fast ramps followed by rest, in which the mode rings down alone"
     size_unit = "ratio"
     other_units: ClassVar = {"damping_ratio": "ratio"}
+    shape_limits: ClassVar = {"damping_ratio": (1e-3, 0.3)}
 
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
@@ -333,6 +342,18 @@ class Resonance(Effect):
         top = 0.45 * sample_rate
         frequencies = np.geomspace(2.0, max(top, 2.5), 16)
         return tuple({"frequency_hz": float(f), "damping_ratio": zeta} for f in frequencies for zeta in (0.02, 0.1))
+
+    @classmethod
+    def scan(cls, left, duration, sample_rate):  # type: ignore[no-untyped-def]
+        """Return the modes that follow the residual best, and the grid."""
+        shapes, looks = mode_shapes(left, 5)
+        return (*shapes, *cls.shapes(duration, sample_rate)), looks
+
+    @property
+    def memory_s(self) -> float:
+        """Return how long it takes the mode to decay to a three-hundredth."""
+        mode = self.mode
+        return float(np.log(300.0) / (mode.damping * mode.natural))
 
     @property
     def mode(self) -> Mode:

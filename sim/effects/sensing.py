@@ -10,6 +10,7 @@ from scipy.signal import lfilter
 
 from gfimu.array import AccelerometerArray
 from gfimu.units import STANDARD_GRAVITY
+from sim.effects.scans import tone_shapes
 from sim.effects.base import LARGEST_TURN, Effect, Pattern, Size, channel_patterns
 from sim.world import SensingStep, World
 
@@ -118,6 +119,7 @@ class BiasTemperature(_PerChannel):
     name = "bias_temperature"
     summary = "offsets follow the board's temperature"
     suffix = "_m_s2_K"
+    needs_temperature = True
     prior_std = 0.8 * _MG
     separated_by = "a run in which the temperature changes while the motion does not"
 
@@ -137,6 +139,7 @@ class WarmUp(_PerChannel):
     summary = "offsets settle exponentially after power-on"
     suffix = "_m_s2"
     prior_std = 10 * _MG
+    shape_limits: ClassVar = {"time_constant_s": (1.0, 1e5)}
     separated_by = "a cold start followed by a long rest, or a longer run"
 
     @classmethod
@@ -313,6 +316,7 @@ class Hysteresis(Effect):
     summary = "play in the reading: it depends on the direction from which it came"
     place = "sensing"
     separated_by = "slow reversals of the rate"
+    shape_limits: ClassVar = {"width_m_s2": (1e-3, 20.0)}
     inexactness = 0.01  # a play remembers the extremes of a motion that is only estimated
 
     @classmethod
@@ -387,6 +391,11 @@ class InterferenceTone(Effect):
     def shapes(cls, duration: float, sample_rate: float) -> tuple[dict[str, float], ...]:
         """Return one frequency; the scan over the spectrum finds it."""
         return ({"frequency_hz": 0.2 * sample_rate},)
+
+    @classmethod
+    def scan(cls, left, duration, sample_rate):  # type: ignore[no-untyped-def]
+        """Return the strongest lines of the residual."""
+        return tone_shapes(left, 2)
 
     @classmethod
     def from_sizes(cls, array, values, shape) -> Effect:  # type: ignore[no-untyped-def]

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.array import AccelerometerArray
+from sim.effects.scans import order_shapes, per_rate
 from sim.effects.base import Effect, Size
 from sim.motion import SpinState
 from sim.world import World
@@ -101,6 +102,7 @@ class TachoRipple(Effect):
     summary = "the reference itself is modulated once or n times per revolution"
     size_unit = "ratio"
     other_units: ClassVar = {"amplitude": "ratio", "order": "number"}
+    whole = frozenset({"order"})
     place = "reference"
     separated_by = "a second reference, or slow steady rotation in both directions"
 
@@ -113,6 +115,11 @@ class TachoRipple(Effect):
     def shapes(cls, duration: float, sample_rate: float) -> tuple[dict[str, float], ...]:
         """Return one order; the scan over orders finds it."""
         return ({"order": 1.0},)
+
+    @classmethod
+    def scan(cls, left, duration, sample_rate):  # type: ignore[no-untyped-def]
+        """Return the strongest orders of a ratio of the reference."""
+        return order_shapes(left, 3, per_rate)
 
     @classmethod
     def from_sizes(cls, array, values, shape) -> Effect:  # type: ignore[no-untyped-def]

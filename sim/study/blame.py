@@ -13,7 +13,7 @@ import numpy as np
 
 from gfimu.diagnosis.causes import Cause
 from gfimu.diagnosis.explanation import Explanation
-from gfimu.diagnosis.fit import Fit
+from gfimu.diagnosis.old_fit import Fit
 from gfimu.diagnosis.long_run import explain_any_length
 from gfimu.diagnosis.parallel import one_blas_thread
 from gfimu.diagnosis.prepared_runs import PreparedRuns

@@ -14,7 +14,7 @@ from gfimu.attitude import from_rotation, integrate_attitude, to_rotation
 from gfimu.diagnosis.adequacy import LEFT_OVER_ODDS
 from gfimu.diagnosis.causes import Cause, effects_of_run
 from gfimu.diagnosis.explanation import Explanation
-from gfimu.diagnosis.fit import Fit
+from gfimu.diagnosis.old_fit import Fit
 from gfimu.diagnosis.free_body.engine import explain, without_cause
 from gfimu.diagnosis.free_body.holdout import (
     BodyHoldout,

@@ -12,7 +12,7 @@ from gfimu.diagnosis.causes import Cause, effects_of_run
 from gfimu.diagnosis.free_body.engine import Screening, learn_noise, screen
 from gfimu.diagnosis.free_body.segment import BodySegment
 from gfimu.diagnosis.model import Effect
-from gfimu.diagnosis.search import Blocks
+from gfimu.diagnosis.old_search import Blocks
 from gfimu.diagnosis.verdict import Gain
 
 __all__ = ["BodyHoldout", "gate_gains", "held_out_gain", "other_recording", "stretches"]

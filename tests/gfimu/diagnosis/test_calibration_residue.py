@@ -18,7 +18,7 @@ from gfimu.diagnosis.prepared_runs import PreparedRuns
 from gfimu.diagnosis.refinement import refine
 from gfimu.diagnosis.run import prepare_run
 from gfimu.diagnosis.screening import screen
-from gfimu.diagnosis.search import log_odds_beside_residue
+from gfimu.diagnosis.old_search import log_odds_beside_residue
 from gfimu.diagnosis.stretches import make_segments
 from sim.campaign import Measurement, measure
 from sim.effects import make_effect

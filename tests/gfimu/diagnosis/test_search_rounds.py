@@ -13,7 +13,7 @@ from gfimu.array import AccelerometerArray
 from gfimu.diagnosis import diagnose, engine, loose_calibration
 from gfimu.diagnosis.calibration_residue import CalibrationResidue
 from gfimu.diagnosis.conclusion import is_unknown
-from gfimu.diagnosis.fit import Fit
+from gfimu.diagnosis.old_fit import Fit
 from gfimu.diagnosis.nuisances import learn_noise
 from gfimu.diagnosis.prepared_runs import PreparedRuns
 from gfimu.diagnosis.refinement import refine

@@ -1,0 +1,108 @@
+"""Learning of what is not searched: the noise of every run and the roughness of every drive, at a fit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gfimu.diagnosis.coloured_noise import NoiseLevels, estimate_flicker, likeliest_flicker, white_level
+from gfimu.diagnosis.data.stretch import Stretch
+from gfimu.diagnosis.fit.gauss_newton import Point
+from gfimu.diagnosis.fit.posterior import Posterior, condition
+from gfimu.diagnosis.parallel import over_segments
+from gfimu.diagnosis.slow_modes import WeighedPowers
+from gfimu.diagnosis.terms.cause import effects_of
+from gfimu.diagnosis.terms.drive import Drive
+
+__all__ = ["learn_noise", "learn_roughness", "starting_point"]
+
+_FOLLOWED = 0.6  # over the spacing of the knots, Hz: what is faster the drive does not follow
+_LEAST_VALID = 0.01  # numerical: share of the samples that count
+_REFERENCE_ROUNDS = 5  # numerical: to the roughness of a drive from its reference alone
+
+
+def starting_point(stretches: Sequence[Stretch], spacing: float) -> Point:
+    """Return the drives that the references alone give, and the noise of the data sheet."""
+
+    def one(stretch: Stretch) -> Drive:
+        knots = max(spacing, stretch.run.sample_period)
+        std = np.inf if stretch.is_angle else stretch.start_angle_std
+        drive = Drive.still(stretch.times(), float(stretch.run.t[0]), knots, stretch.start_angle, std)
+        alone = stretch.of_reference()
+        for _ in range(_REFERENCE_ROUNDS):
+            posterior = condition(alone, drive, [], stretch.first_levels)
+            drive = drive.moved(posterior.step).relearned(posterior.covariance)
+        return drive
+
+    return Point((), tuple(over_segments(one, stretches)), tuple(s.first_levels for s in stretches))
+
+
+def _conditioned(stretches: Sequence[Stretch], point: Point) -> list[Posterior]:
+    def one(stretch: Stretch, drive: Drive, levels: NoiseLevels) -> Posterior:
+        return condition(stretch, drive, effects_of(point.causes, stretch.model.array, stretch.index), levels)
+
+    return over_segments(one, stretches, point.drives, point.levels)
+
+
+def learn_roughness(stretches: Sequence[Stretch], point: Point, rounds: int = 1) -> Point:
+    """Return the point with the roughness that its drives show under its causes."""
+    for _ in range(rounds):
+        drives = tuple(one.drive.moved(one.step).relearned(one.covariance) for one in _conditioned(stretches, point))
+        point = replace(point, drives=drives)
+    return point
+
+
+def learn_noise(stretches: Sequence[Stretch], point: Point) -> Point:
+    """Return the point with the noise that its causes and drives leave, each run's stretches together."""
+    posteriors = _conditioned(stretches, point)
+    lefts = [_left(*pair) for pair in zip(stretches, posteriors, strict=True)]
+    levels = list(point.levels)
+    for run in {stretch.index for stretch in stretches}:
+        mine = [place for place, stretch in enumerate(stretches) if stretch.index == run]
+        counts = np.array([stretches[place].mask.sum(axis=0) for place in mine], dtype=float)
+        shares = np.maximum(counts, 1e-9) / np.maximum(counts, 1e-9).sum(axis=0)  # (stretches, c + 1)
+        white = np.sqrt(sum(share * lefts[place].white ** 2 for share, place in zip(shares, mine, strict=True)))
+        first = stretches[mine[0]]
+        quantum = first.model.expected_noise(1.0 / first.run.sample_period).quantum
+        white[:-1] = np.maximum(white[:-1], 0.5 * quantum / np.sqrt(12.0))
+        white[-1] = max(white[-1], first.finest)
+        walk = point.levels[mine[0]].walk
+        flickers = [lefts[place].flicker(stretches[place], white, walk) for place in mine]
+        flicker = np.sqrt(sum(share * one**2 for share, one in zip(shares, flickers, strict=True)))
+        flicker[-1] = 0.0
+        for place in mine:
+            levels[place] = NoiseLevels(white, flicker, walk)
+    return replace(point, levels=tuple(levels))
+
+
+@dataclass(frozen=True)
+class _Left:
+    """Residual (n, c + 1) with the drive at its best, its weights, its cosines, and the white noise that it shows."""
+
+    residual: NDArray[np.float64]
+    weight: NDArray[np.float64]
+    cosines: NDArray[np.float64]
+    white: NDArray[np.float64]
+
+    def flicker(self, stretch: Stretch, white: NDArray[np.float64], walk: float) -> NDArray[np.float64]:
+        """Return the bias instability of channels and reference, shape (c + 1,)."""
+        if not stretch.steps.channels:
+            return estimate_flicker(self.cosines, white, stretch.basis, walk)
+        slow = WeighedPowers.of(stretch.basis, self.residual, self.weight)
+        return likeliest_flicker(slow.power, white, slow.flicker, slow.walk * walk**2)
+
+
+def _left(stretch: Stretch, posterior: Posterior) -> _Left:
+    seen = posterior.observed
+    residual = seen.residual - posterior.jacobian.times(posterior.step)
+    cosines = stretch.basis.transform(residual)
+    level = white_level(cosines, _FOLLOWED / posterior.drive.spline.spacing, stretch.run.sample_period)
+    # Missing samples stand as zeros, as where the reference comes at a lower rate.
+    level = level / np.sqrt(np.maximum(stretch.mask.mean(axis=0), _LEAST_VALID))
+    if stretch.steps.coarse:
+        error = np.where(stretch.mask, stretch.measured - seen.prediction, np.nan)
+        level = stretch.steps.noise_before(error, seen.levels.white, level)
+    return _Left(residual, seen.weight, cosines, level)

@@ -1,0 +1,184 @@
+"""Screening: the normal equations of the whole library about a set of causes, and every hypothesis over them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gfimu.array import AccelerometerArray
+from gfimu.diagnosis.data.stretch import Stretch
+from gfimu.diagnosis.fit.gauss_newton import Point
+from gfimu.diagnosis.fit.posterior import Posterior, condition
+from gfimu.diagnosis.model import EffectFamily, Whitened
+from gfimu.diagnosis.parallel import over_segments
+from gfimu.diagnosis.terms.cause import Cause, effects_of, mixing_of
+from gfimu.diagnosis.terms.columns import Columns
+from gfimu.diagnosis.terms.library import family_columns
+
+__all__ = ["Hypothesis", "Screening", "Signature", "screen"]
+
+_OF_MOTION = frozenset({"motion", "timing", "reference"})  # a table at rest shows nothing of these
+_FREEST = 0.5  # prior share of the freest place; the others share the rest
+
+
+@dataclass(frozen=True)
+class Signature:
+    """One effect in one shape.
+
+    Parameters
+    ----------
+    family : EffectFamily
+        The kind of effect.
+    shape : mapping
+        Shape parameters.
+    columns : ndarray of int, shape (m,) or (runs · m,)
+        The columns of its sizes; an effect that each run has anew has a block for each.
+    looks : float
+        Number of shapes that this one was chosen from.
+    """
+
+    family: EffectFamily
+    shape: Mapping[str, float]
+    columns: NDArray[np.intp]
+    looks: float
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """A cause without sizes, and the signature whose columns it uses."""
+
+    cause: Cause
+    signature: Signature
+    positive: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Screening:
+    """Normal equations in P columns, relative to no effects at all.
+
+    Parameters
+    ----------
+    signatures : tuple of Signature
+        Every effect in every shape.
+    hypotheses : tuple of Hypothesis
+        Every effect at every place.
+    gram, score : ndarray, shape (P, P) and (P,)
+        G and b.
+    base : ndarray, shape (P,)
+        The causes about which they are, in the columns.
+    responses : tuple of ndarray, each (m, P)
+        How the drive of every stretch follows the columns.
+    """
+
+    signatures: tuple[Signature, ...]
+    hypotheses: tuple[Hypothesis, ...]
+    gram: NDArray[np.float64]
+    score: NDArray[np.float64]
+    base: NDArray[np.float64]
+    responses: tuple[NDArray[np.float64], ...]
+
+    def drive_moves(self, members: Sequence[int], causes: Sequence[Cause]) -> list[NDArray[np.float64]]:
+        """Return how far every drive would follow from the base to other causes in a linear world."""
+        move = -self.base
+        for number, cause in zip(members, causes, strict=True):
+            move[self.hypotheses[number].signature.columns] += cause.mixing @ cause.coordinates
+        return [response @ move for response in self.responses]
+
+
+def screen(stretches: Sequence[Stretch], point: Point) -> Screening:
+    """Linearise the whole library about a point."""
+    array, causes = stretches[0].model.array, point.causes
+    runs = len({stretch.index for stretch in stretches})
+
+    def conditioned(stretch: Stretch, drive, levels) -> Posterior:  # noqa: ANN001
+        return condition(stretch, drive, effects_of(causes, array, stretch.index), levels)
+
+    posteriors = over_segments(conditioned, stretches, point.drives, point.levels)
+    signatures, count = _plan(stretches, posteriors, causes, runs)
+
+    def products(stretch: Stretch, posterior: Posterior):  # noqa: ANN202
+        columns = Columns.together(
+            [family_columns(stretch, posterior.observed, posterior.drive, causes, s.family, s.shape) for s in signatures]
+        )
+        at = np.concatenate([_of_run(s, array, stretch.index) for s in signatures])
+        part, right, across = posterior.products(columns)
+        response = np.zeros((posterior.jacobian.size, count))
+        response[:, at] = posterior.response(across)
+        return at, part, right, response
+
+    gram, score, responses = np.zeros((count, count)), np.zeros(count), []
+    for at, part, right, response in over_segments(products, stretches, posteriors):
+        gram[np.ix_(at, at)] += part
+        score[at] += right
+        responses.append(response)
+    base = np.zeros(count)
+    for cause in causes:
+        base[next(s for s in signatures if s.family.name == cause.name).columns] = cause.mixing @ cause.coordinates
+    hypotheses = tuple(_hypotheses(signatures, array, runs))
+    return Screening(tuple(signatures), hypotheses, gram, score + gram @ base, base, tuple(responses))
+
+
+def _of_run(signature: Signature, array: AccelerometerArray, run: int) -> NDArray[np.intp]:
+    count = len(signature.family.sizes(array))
+    block = run if len(signature.columns) > count else 0
+    return signature.columns[block * count : (block + 1) * count]
+
+
+def _plan(
+    stretches: Sequence[Stretch], posteriors: Sequence[Posterior], causes: Sequence[Cause], runs: int
+) -> tuple[list[Signature], int]:
+    """List the signatures to compute; returns them and the number of their columns."""
+    model = stretches[0].model
+    duration = max(float(s.run.t[-1] - s.start) for s in stretches)
+    rate = 1.0 / stretches[0].run.sample_period
+    warm = any(s.run.temperature is not None for s in stretches)
+    still = all(s.at_rest for s in stretches)
+    present = {cause.name: cause for cause in causes}
+    left = [_whitened(s, p, causes) for s, p in zip(stretches, posteriors, strict=True)]
+    signatures: list[Signature] = []
+    columns = 0
+    for name, family in model.families().items():
+        count = len(family.sizes(model.array))
+        if not count or (family.needs_temperature and not warm) or (still and family.place in _OF_MOTION):
+            continue
+        if name in present:
+            shapes: Sequence[Mapping[str, float]] = [present[name].shape]
+            looks = float(np.exp(-present[name].log_prior))
+        else:
+            shapes, looks = family.scan(left, duration, rate)
+        width = count * (runs if family.per_run else 1)
+        for shape in shapes:
+            signatures.append(Signature(family, dict(shape), np.arange(columns, columns + width), looks))
+            columns += width
+    return signatures, columns
+
+
+def _whitened(stretch: Stretch, posterior: Posterior, causes: Sequence[Cause]) -> Whitened:
+    effects = effects_of(causes, stretch.model.array, stretch.index)
+    return Whitened(
+        posterior.whitened,
+        posterior.observed.weights,
+        stretch.run.t,
+        stretch.motion(effects, posterior.drive.spin).at(stretch.run.t),
+        stretch.model.array,
+    )
+
+
+def _hypotheses(signatures: Sequence[Signature], array: AccelerometerArray, runs: int) -> list[Hypothesis]:
+    """List every effect at every place it can take, with its prior."""
+    families = len({signature.family.name for signature in signatures})
+    out = []
+    for signature in signatures:
+        patterns = signature.family.patterns(array)
+        anew = len(signature.columns) > len(signature.family.sizes(array))
+        for number, pattern in enumerate(patterns):
+            share = _FREEST if number == 0 else (1.0 - _FREEST) / (len(patterns) - 1)
+            share = 1.0 if len(patterns) == 1 else share
+            prior = float(np.log(share / (families * signature.looks)))
+            mixing = mixing_of(pattern, runs) if anew else pattern.mixing
+            cause = Cause(signature.family, pattern.name, mixing, signature.shape, np.zeros(mixing.shape[1]), prior)
+            out.append(Hypothesis(cause, signature, cause.positive(array)))
+    return out

@@ -1,0 +1,147 @@
+"""The drive of a table as a nuisance parameter: a spline of its angle with a prior of how it may bend.
+
+The fourth derivative of the angle in knot interval i is N(0, ρ_i²). The roughness ρ is learnt by MacKay's fixed point
+(Neural Computation 4, 1992, eq. 2.19): ρ² = Σ d² / Σ γ over some neighbouring intervals, with γ the share of each
+number that the data determine.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
+
+from gfimu.diagnosis.terms.spline import DEGREE, AngleSpline, SplineSpin
+
+__all__ = ["Drive"]
+
+KNOT_SPACING = 0.05  # s
+MARGIN = 0.4  # s beyond the samples: late chips and fast clocks ask for the motion there
+FIRST_ROUGHNESS = 3e3  # rad/s⁴
+ROUGH_FOR = 0.3  # s over which a drive is about as rough
+LEAST_ROUGHNESS = 30.0  # rad/s⁴
+_LEAST_KNOWN = 0.02  # numerical: least mean γ
+_STENCIL = np.array([1.0, -4.0, 6.0, -4.0, 1.0])
+
+
+@dataclass(frozen=True)
+class Drive:
+    """The drive of one stretch, in units of its reference.
+
+    Parameters
+    ----------
+    spline : AngleSpline
+        The spline.
+    coefficients : ndarray, shape (m,)
+        The drive.
+    roughness : ndarray, shape (m − 4,)
+        Standard deviation ρ of the fourth derivative of the angle in each interval, rad/s⁴.
+    angle, angle_std : float
+        What the angle at ``since`` is known to be, rad; an infinite standard deviation where it is not.
+    since : float
+        Time of the first sample, s.
+    """
+
+    spline: AngleSpline
+    coefficients: NDArray[np.float64]
+    roughness: NDArray[np.float64]
+    angle: float
+    angle_std: float
+    since: float
+
+    @classmethod
+    def still(
+        cls, times: NDArray[np.float64], since: float, spacing: float, angle: float, angle_std: float
+    ) -> Drive:
+        """Return a drive that is at rest, over times (any shape), s."""
+        margin = max(MARGIN, DEGREE * spacing)
+        spline = AngleSpline.over(float(times.min()) - margin, float(times.max()) + margin, spacing)
+        still = np.full(spline.size, angle if np.isfinite(angle_std) else 0.0)
+        return cls(spline, still, np.full(spline.intervals, FIRST_ROUGHNESS), angle, angle_std, since)
+
+    @property
+    def spin(self) -> SplineSpin:
+        """The motion, in units of the reference."""
+        return self.spline.spin(self.coefficients)
+
+    def moved(self, step: NDArray[np.float64]) -> Drive:
+        """Return the drive with a step (m,) added."""
+        return replace(self, coefficients=self.coefficients + step)
+
+    def covering(self, times: NDArray[np.float64]) -> Drive:
+        """Return the drive on a spline that reaches over times, s; the same where it does so already."""
+        h = self.spline.spacing
+        before = max(int(np.ceil((self.spline.start - float(times.min())) / h)), 0)
+        after = max(int(np.ceil((float(times.max()) - self.spline.stop) / h)), 0)
+        if not (before or after):
+            return self
+        spline = AngleSpline(self.spline.start - before * h, h, self.spline.intervals + before + after)
+        pad = (before, after)
+        first, last = (self.coefficients[1] - self.coefficients[0], self.coefficients[-1] - self.coefficients[-2])
+        coefficients = np.pad(self.coefficients, pad)
+        coefficients[:before] = self.coefficients[0] - first * np.arange(before, 0, -1)
+        if after:
+            coefficients[-after:] = self.coefficients[-1] + last * np.arange(1, after + 1)
+        return replace(self, spline=spline, coefficients=coefficients, roughness=np.pad(self.roughness, pad, "edge"))
+
+    def on(self, spacing: float) -> Drive:
+        """Return the drive with other distances of the knots, s."""
+        spline = AngleSpline.over(self.spline.start, self.spline.stop, spacing)
+        centres = spline.start + spline.spacing * (np.arange(spline.intervals) + 0.5)
+        mine = self.spline.start + self.spline.spacing * (np.arange(self.spline.intervals) + 0.5)
+        roughness = np.interp(centres, mine, self.roughness)
+        return replace(self, spline=spline, coefficients=spline.through(self.spin), roughness=roughness)
+
+    # -- prior ---------------------------------------------------------------------------------------------------
+
+    def energy(self) -> float:
+        """Return what the prior takes of the drive: Σ (d/ρ)² and the square of the angle at first."""
+        bent = self.spline.bend(self.coefficients) / self.roughness
+        return float(bent @ bent + self._off() ** 2)
+
+    def pull(self) -> NDArray[np.float64]:
+        """Return minus half the gradient of the energy, shape (m,)."""
+        bent = self.spline.bend(self.coefficients) / self.roughness**2 / self.spline.spacing**DEGREE
+        out = np.zeros(self.spline.size)
+        for place, weight in enumerate(_STENCIL):
+            out[place : place + len(bent)] -= weight * bent
+        if np.isfinite(self.angle_std):
+            out -= self.spline.angle_row(self.since) * (self._off() / self.angle_std)
+        return out
+
+    def add_precision(self, information: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Add the prior's precision to a matrix (m, m), in place."""
+        scale = 1.0 / (self.roughness * self.spline.spacing**DEGREE) ** 2
+        rows = np.arange(len(scale))
+        for i, one in enumerate(_STENCIL):
+            for j, other in enumerate(_STENCIL):
+                information[rows + i, rows + j] += one * other * scale
+        if np.isfinite(self.angle_std):
+            row = self.spline.angle_row(self.since) / self.angle_std
+            at = np.flatnonzero(row)
+            information[np.ix_(at, at)] += np.outer(row[at], row[at])
+        return information
+
+    @property
+    def log_precision(self) -> float:
+        """Half the log determinant of the prior's precision, up to a constant."""
+        return -float(np.log(self.roughness).sum())
+
+    def _off(self) -> float:
+        if not np.isfinite(self.angle_std):
+            return 0.0
+        return float(self.spline.angle_row(self.since) @ self.coefficients - self.angle) / self.angle_std
+
+    # -- learning ------------------------------------------------------------------------------------------------
+
+    def relearned(self, covariance: NDArray[np.float64]) -> Drive:
+        """Return the drive with the roughness that it shows, given the covariance (m, m) of its coefficients."""
+        h = self.spline.spacing
+        bend = self.spline.bend(self.coefficients)
+        spread = np.diff(np.diff(covariance, DEGREE, axis=0), DEGREE, axis=1).diagonal() / h ** (2 * DEGREE)
+        window = max(round(ROUGH_FOR / h), 1)
+        known = uniform_filter1d(np.clip(1.0 - spread / self.roughness**2, 0.0, 1.0), window, mode="nearest")
+        power = uniform_filter1d(bend**2, window, mode="nearest") / np.maximum(known, _LEAST_KNOWN)
+        return replace(self, roughness=np.sqrt(power + LEAST_ROUGHNESS**2))

@@ -1,0 +1,202 @@
+"""Derivative of the observations by the drive's coefficients, whatever the world between them does.
+
+By coloured finite differences (Curtis, Powell and Reid, J. Inst. Maths Applics 13, 1974): a coefficient acts over its
+spline support and, where the world has a memory, over some time before and after; coefficients further apart than that
+are moved together. The memory is measured by moving a few coefficients alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gfimu.diagnosis.terms.spline import DEGREE, AngleSpline
+
+__all__ = ["Jacobian", "Reach", "differentiate", "measured_reach"]
+
+Predict = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+
+STEP = 1e-6
+"""Numerical: finite difference of a coefficient of the angle, rad."""
+_FORGOTTEN = 3e-3  # numerical: share of a response's peak below which it counts as over
+_PROBES = 8  # numerical: coefficients at which the memory is measured
+_LEAST_SHARE = 1e-14  # numerical: power of a combination of observations that is rounding error of the largest
+_INTERVALS = 12  # numerical: knot intervals of a block of rows
+
+
+@dataclass(frozen=True)
+class Reach:
+    """Knot intervals before and after its spline support over which a coefficient acts."""
+
+    before: int = 0
+    after: int = 0
+
+    @property
+    def width(self) -> int:
+        """Number of coefficients that one sample depends on."""
+        return DEGREE + 1 + self.before + self.after
+
+
+@dataclass(frozen=True)
+class Jacobian:
+    """Banded derivative, factored over observations: J_c = Σ_r loading[r, c] J_r.
+
+    All sensors of a rigid body see the drive through few functions of time, so that far fewer J_r are needed than
+    there are observations.
+
+    Parameters
+    ----------
+    size : int
+        Number m of coefficients.
+    blocks : tuple of (slice, slice, ndarray)
+        Rows, coefficients, and J_r there, (R, rows, coefficients); they cover all rows.
+    loading : ndarray, shape (R, c)
+        V.
+    predictions : int
+        How many predictions it took.
+    """
+
+    size: int
+    blocks: tuple[tuple[slice, slice, NDArray[np.float64]], ...]
+    loading: NDArray[np.float64]
+    predictions: int = 0
+
+    def transposed(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return J_rᵀ v of values (n, P), the same for every r, shape (R, m, P)."""
+        out = np.zeros((len(self.loading), self.size, values.shape[1]))
+        for rows, at, block in self.blocks:
+            for total, one in zip(out, block, strict=True):
+                total[at] += one.T @ values[rows]
+        return out
+
+    def correlate(self, combined: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return Σ_r J_rᵀ v_r of values (R, n, P), shape (m, P)."""
+        out = np.zeros((self.size, combined.shape[2]))
+        for rows, at, block in self.blocks:
+            for one, values in zip(block, combined, strict=True):
+                out[at] += one.T @ values[rows]
+        return out
+
+    def times(self, step: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return J δ of every observation, shape (n, c)."""
+        parts = np.concatenate([block @ step[at] for _, at, block in self.blocks], axis=1)  # (R, n)
+        return np.asarray(parts.T @ self.loading)
+
+    def information(self, weights: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return Σ_c w_c J_cᵀJ_c for weights (c,), shape (m, m)."""
+        gram = (self.loading * weights) @ self.loading.T
+        power, turn = np.linalg.eigh(gram)
+        root = (turn * np.sqrt(np.maximum(power, 0.0))).T  # (R, R): gram = rootᵀ root
+        out = np.zeros((self.size, self.size))
+        for _, at, block in self.blocks:
+            mixed = np.tensordot(root, block, axes=1).reshape(-1, block.shape[2])
+            out[at, at] += mixed.T @ mixed
+        return out
+
+    def covariance_share(self, covariance: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return w_c tr(J_c S J_cᵀ) of each observation for a covariance S (m, m) of the coefficients, shape (c,)."""
+        inner = np.zeros((len(self.loading),) * 2)
+        for _, at, block in self.blocks:
+            moved = block @ covariance[at, at]
+            inner += np.einsum("rij,sij->rs", moved, block)
+        return np.asarray(weights * np.einsum("rc,rs,sc->c", self.loading, inner, self.loading))
+
+
+def differentiate(
+    predict: Predict,
+    spline: AngleSpline,
+    coefficients: NDArray[np.float64],
+    base: NDArray[np.float64],
+    weight: NDArray[np.float64],
+    t: NDArray[np.float64],
+    reach: Reach,
+) -> Jacobian:
+    """Differentiate a prediction by coloured finite differences.
+
+    Parameters
+    ----------
+    predict : callable
+        From coefficients (m,) to observations (n, c).
+    spline : AngleSpline
+        The drive's spline.
+    coefficients : ndarray, shape (m,)
+        Where.
+    base : ndarray, shape (n, c)
+        The prediction there.
+    weight : ndarray, shape (n, c)
+        Weight of every sample's derivative.
+    t : ndarray, shape (n,)
+        Sample times, s.
+    reach : Reach
+        Over how much more than its support a coefficient acts.
+    """
+    width, (n, c) = reach.width, base.shape
+    first = spline.interval(t)[0] + reach.after + DEGREE + 1 - width  # first coefficient of each sample
+    values = np.zeros((width, n, c))
+    rows = np.arange(n)
+    for colour in range(width):
+        moved = coefficients.copy()
+        moved[colour::width] += STEP
+        # Coefficient first + k of a sample has this colour.
+        values[(colour - first) % width, rows] = predict(moved) - base
+    places = first + np.arange(width)[:, None]
+    values *= (weight * (1.0 / STEP))[None] * ((places >= 0) & (places < spline.size))[:, :, None]
+    flat = values.reshape(-1, c)
+    power, turn = np.linalg.eigh(flat.T @ flat)
+    kept = power > _LEAST_SHARE * max(float(power[-1]), 1e-300)
+    turn = turn[:, kept] if kept.any() else turn[:, -1:]
+    parts = (flat @ turn).reshape(width, n, -1)  # (w, n, R)
+    return Jacobian(spline.size, tuple(_blocks(parts, first, spline.size)), turn.T, width + 1)
+
+
+def _blocks(
+    parts: NDArray[np.float64], first: NDArray[np.intp], size: int
+) -> list[tuple[slice, slice, NDArray[np.float64]]]:
+    """Put values (w, n, R) of coefficients first … first + w − 1 into dense blocks of some knot intervals each."""
+    width, n, count = parts.shape
+    edges = np.flatnonzero(np.diff((first - first[0]) // _INTERVALS)) + 1
+    out = []
+    for start, stop in zip([0, *edges], [*edges, n], strict=True):
+        low = int(first[start])
+        span = int(first[stop - 1]) - low + width
+        block = np.zeros((count, stop - start, span))
+        at = first[start:stop] - low
+        rows = np.arange(stop - start)
+        for k in range(width):
+            block[:, rows, at + k] = parts[k, start:stop].T
+        left, right = max(low, 0), min(low + span, size)
+        out.append((slice(start, stop), slice(left, right), np.ascontiguousarray(block[:, :, left - low : right - low])))
+    return out
+
+
+def measured_reach(
+    predict: Predict,
+    spline: AngleSpline,
+    coefficients: NDArray[np.float64],
+    base: NDArray[np.float64],
+    t: NDArray[np.float64],
+) -> Reach:
+    """Measure over how many intervals before and after its support a coefficient acts, by a few moved at once.
+
+    A memory longer than the distance of the moved coefficients has to be declared by what has it.
+    """
+    apart = spline.size // _PROBES
+    probes = np.arange(apart // 2, spline.size, apart)[:_PROBES]
+    moved = coefficients.copy()
+    moved[probes] += STEP
+    response = np.abs(predict(moved) - base)
+    size = (response / np.maximum(response.max(axis=0), 1e-300)).max(axis=1)  # (n,)
+    interval = spline.interval(t)[0]
+    before = after = 0
+    for probe in probes:
+        # A coefficient acts on intervals probe − DEGREE … probe of its support.
+        mine = (interval >= probe - DEGREE - apart // 4) & (interval < probe + 3 * apart // 4)
+        if not (mine.any() and size[mine].max() > 0.0):
+            continue
+        seen = interval[mine][size[mine] > _FORGOTTEN * size[mine].max()]
+        before = max(before, int(seen.max()) - int(probe))
+        after = max(after, int(probe) - DEGREE - int(seen.min()))
+    return Reach(before, after)
