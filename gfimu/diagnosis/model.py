@@ -136,6 +136,8 @@ class EffectFamily(Protocol):
     def shape_limits(self) -> Mapping[str, tuple[float, float]]: ...  # noqa: D102
     @property
     def needs_temperature(self) -> bool: ...  # noqa: D102
+    @property
+    def tolerance(self) -> float: ...  # noqa: D102
 
     def __call__(self, parameters: Mapping[str, Any]) -> Effect:
         """Build an effect from its contract parameters."""

@@ -43,6 +43,7 @@ class Policy:
     steps: int = 10
     settled: float = 0.3
     learnings: int = 3
+    knots: float = 0.05
     own_roughness: bool = False
     temperature: float = 1.2
     ambiguous: float = 2.0

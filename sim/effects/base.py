@@ -100,6 +100,8 @@ class Effect(ABC):
     """Least and largest value of shape parameters."""
     needs_temperature: ClassVar[bool] = False
     """True where it shows only in recordings with a temperature."""
+    tolerance: ClassVar[float] = 0.0
+    """Standard deviation of each size that a good calibration leaves, in the unit of the sizes."""
     of_one_recording: ClassVar[bool] = False
     """True where its phase is that of a clock no other recording shares: it does not predict another one."""
 

@@ -66,6 +66,7 @@ class Bias(_PerChannel):
     name = "bias"
     summary = "a constant offset per channel"
     suffix = "_m_s2"
+    tolerance = 0.3 * _MG
     prior_std = 20 * _MG
     bound = STANDARD_GRAVITY  # four times the 0.25 g that the ADXL345's data sheet allows along z
     separated_by = "static poses on several sides (six-position), or the cube remounted on its side"
@@ -81,6 +82,7 @@ class ScaleFactor(_PerChannel):
 
     name = "scale_factor"
     summary = "a gain error per channel (another supply voltage, say)"
+    tolerance = 5e-4
     prior_std = 0.02
     bound = 0.3  # three times the ±10 % that the ADXL345's data sheet allows; the MPU-9150's ±3 % is narrower
     separated_by = "static poses on several sides, or the cube remounted on its side and several speeds"

@@ -17,41 +17,20 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.diagnosis.coloured_noise import NoiseLevels
+from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.fit.evidence import SCALES, inverse, log_evidence
-from gfimu.diagnosis.fit.posterior import Posterior, condition, energy
-from gfimu.diagnosis.parallel import over_segments
+from gfimu.diagnosis.fit.linear import Linear, Point, energy_of, linearise, of_causes
 from gfimu.diagnosis.policy import Policy
-from gfimu.diagnosis.terms.cause import Cause, effects_of
-from gfimu.diagnosis.terms.drive import Drive
-from gfimu.diagnosis.terms.library import cause_columns
+from gfimu.diagnosis.terms.cause import Cause
+from gfimu.diagnosis.terms.jacobian import Jacobian
 
-__all__ = ["Fit", "Point", "fit", "log_prior"]
+__all__ = ["Fit", "fit", "log_prior"]
 
 _SHARES = (1.0, 0.3, 0.08)  # numerical: of a step that goes uphill
 _SHAPE_STEP = 0.3  # numerical: most that a shape moves in a step
 _SHAPE_PRIOR = 0.7  # numerical: standard deviation of that step
 _NARROW = 10  # numerical: width of a derivative that is cheap to take anew
-
-
-@dataclass(frozen=True)
-class Point:
-    """All that a fit changes.
-
-    Parameters
-    ----------
-    causes : tuple of Cause
-        Named causes.
-    drives : tuple of Drive
-        Drive of every stretch.
-    levels : tuple of NoiseLevels
-        Noise of every stretch.
-    """
-
-    causes: tuple[Cause, ...]
-    drives: tuple[Drive, ...]
-    levels: tuple[NoiseLevels, ...]
 
 
 @dataclass(frozen=True)
@@ -97,25 +76,30 @@ class Fit:
         return frozenset(cause.key for cause in self.causes)
 
 
-@dataclass(frozen=True)
-class _Linear:
-    """Normal equations of causes, drives integrated out, summed over stretches."""
+def fit(stretches: Sequence[Stretch], start: Point, policy: Policy, *, exact: bool = False) -> Fit:
+    """Fit drives, sizes and shapes of a set of causes under the noise and roughness of a point.
 
-    gram: NDArray[np.float64]
-    score: NDArray[np.float64]
-    objective: float
-    energy: float
-    drive_steps: tuple[NDArray[np.float64], ...]
-    responses: tuple[NDArray[np.float64], ...]
-    posteriors: tuple[Posterior, ...]
+    Parameters
+    ----------
+    stretches : sequence of Stretch
+        The data.
+    start : Point
+        Where to start; its noise, roughness and residue are kept.
+    policy : Policy
+        Thresholds.
+    exact : bool
+        Whether the derivative by the drive holds what remembers it for long: needed for the last digits of such a
+        cause only.
 
-
-def fit(stretches: Sequence[Stretch], start: Point, policy: Policy) -> Fit:
-    """Fit drives, sizes and shapes of a set of causes under the noise and roughness of a point."""
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If the start determines no drive.
+    """
     array = stretches[0].model.array
     point = replace(start, causes=tuple(cause.moved(np.zeros(cause.unknowns), array) for cause in start.causes))
     now = _energy(stretches, point)
-    linear = _linear(stretches, point)
+    linear = linearise(stretches, point, of_causes(point), exact=exact)
     done = 0
     for done in range(policy.steps):
         step, promise = _step(point.causes, linear)
@@ -129,12 +113,19 @@ def fit(stretches: Sequence[Stretch], start: Point, policy: Policy) -> Fit:
         else:
             break
         stalled = now - there < policy.settled
-        kept = linear if done % 2 == 0 else None
+        kept = _dear(linear) if done % 2 == 0 else None
         point, now = trial, there
-        linear = _linear(stretches, point, kept)
+        linear = linearise(stretches, point, of_causes(point), jacobians=kept, exact=exact)
         if stalled:
             break
-    return _judged(stretches, point, linear, done)
+    found = _judged(stretches, point, linear, done)
+    return replace(found, log_posterior=found.log_evidence + log_prior(point.causes, policy))
+
+
+def _dear(linear: Linear) -> tuple[Jacobian | None, ...]:
+    """Return the derivatives by drives that are dear to take anew: they serve two steps."""
+    each = (one.jacobian for one in linear.posteriors)
+    return tuple(jacobian if jacobian.predictions > _NARROW else None for jacobian in each)
 
 
 def log_prior(causes: Sequence[Cause], policy: Policy) -> float:
@@ -142,36 +133,8 @@ def log_prior(causes: Sequence[Cause], policy: Policy) -> float:
     return sum(cause.log_prior for cause in causes) + policy.extra_cause * max(len(causes) - 1, 0)
 
 
-def _linear(stretches: Sequence[Stretch], point: Point, kept: _Linear | None = None) -> _Linear:
-    def one(stretch: Stretch, drive: Drive, levels: NoiseLevels, before: Posterior | None):  # noqa: ANN202
-        effects = effects_of(point.causes, stretch.model.array, stretch.index)
-        # A derivative with memory is dear: it serves two steps.
-        jacobian = before.jacobian if before is not None and before.jacobian.predictions > _NARROW else None
-        posterior = condition(stretch, drive, effects, levels, jacobian=jacobian)
-        columns = cause_columns(stretch, posterior.observed, drive, point.causes)
-        gram, score, across = posterior.products(columns)
-        return posterior, gram, score, posterior.response(across)
-
-    before = kept.posteriors if kept is not None else (None,) * len(stretches)
-    rows = over_segments(one, stretches, point.drives, point.levels, before)
-    posteriors, grams, scores, responses = zip(*rows, strict=True)
-    return _Linear(
-        np.sum(grams, axis=0),
-        np.sum(scores, axis=0),
-        sum(one.objective for one in posteriors),
-        sum(one.energy for one in posteriors),
-        tuple(one.step for one in posteriors),
-        tuple(responses),
-        tuple(posteriors),
-    )
-
-
 def _energy(stretches: Sequence[Stretch], point: Point) -> float:
-    def one(stretch: Stretch, drive: Drive, levels: NoiseLevels) -> float:
-        return energy(stretch, drive, effects_of(point.causes, stretch.model.array, stretch.index), levels)
-
-    total = sum(over_segments(one, stretches, point.drives, point.levels)) + _prior_energy(point.causes)
-    return total if np.isfinite(total) else np.inf
+    return energy_of(stretches, point) + _prior_energy(point.causes)
 
 
 def _prior_energy(causes: Sequence[Cause]) -> float:
@@ -191,7 +154,7 @@ def _precision(causes: Sequence[Cause]) -> NDArray[np.float64]:
     return precision
 
 
-def _step(causes: Sequence[Cause], linear: _Linear) -> tuple[NDArray[np.float64], float]:
+def _step(causes: Sequence[Cause], linear: Linear) -> tuple[NDArray[np.float64], float]:
     """Return the step of the unknowns, and what it promises together with that of the drives."""
     promise = linear.energy - linear.objective
     if not causes:
@@ -205,7 +168,7 @@ def _step(causes: Sequence[Cause], linear: _Linear) -> tuple[NDArray[np.float64]
     return step, promise + float(step @ right)
 
 
-def _moved(point: Point, linear: _Linear, share: float, step: NDArray[np.float64], array) -> Point:  # noqa: ANN001
+def _moved(point: Point, linear: Linear, share: float, step: NDArray[np.float64], array: AccelerometerArray) -> Point:
     drives = tuple(
         drive.moved(share * (own + response @ step))
         for drive, own, response in zip(point.drives, linear.drive_steps, linear.responses, strict=True)
@@ -216,9 +179,11 @@ def _moved(point: Point, linear: _Linear, share: float, step: NDArray[np.float64
     return replace(point, causes=causes, drives=drives)
 
 
-def _judged(stretches: Sequence[Stretch], point: Point, linear: _Linear, steps: int) -> Fit:
+def _judged(stretches: Sequence[Stretch], point: Point, linear: Linear, steps: int) -> Fit:
     """Return the fit at a point: covariances, and Laplace's evidence relative to no sizes."""
-    volume = sum(one.log_volume for one in linear.posteriors)
+    volume = linear.log_volume + linear.log_noise
+    # A step that a derivative without memory promises may not come true: what counts is what the simulation leaves.
+    linear = replace(linear, objective=linear.energy)
     array, causes = stretches[0].model.array, point.causes
     if not causes:
         value = volume - 0.5 * linear.objective

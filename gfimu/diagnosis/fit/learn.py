@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 
 from gfimu.diagnosis.coloured_noise import NoiseLevels, estimate_flicker, likeliest_flicker, white_level
 from gfimu.diagnosis.data.stretch import Stretch
-from gfimu.diagnosis.fit.gauss_newton import Point
-from gfimu.diagnosis.fit.posterior import Posterior, condition
+from gfimu.diagnosis.fit.linear import Linear, Point, linearise
+from gfimu.diagnosis.fit.posterior import condition
 from gfimu.diagnosis.parallel import over_segments
 from gfimu.diagnosis.slow_modes import WeighedPowers
-from gfimu.diagnosis.terms.cause import effects_of
 from gfimu.diagnosis.terms.drive import Drive
 
 __all__ = ["learn_noise", "learn_roughness", "starting_point"]
@@ -40,25 +39,22 @@ def starting_point(stretches: Sequence[Stretch], spacing: float) -> Point:
     return Point((), tuple(over_segments(one, stretches)), tuple(s.first_levels for s in stretches))
 
 
-def _conditioned(stretches: Sequence[Stretch], point: Point) -> list[Posterior]:
-    def one(stretch: Stretch, drive: Drive, levels: NoiseLevels) -> Posterior:
-        return condition(stretch, drive, effects_of(point.causes, stretch.model.array, stretch.index), levels)
-
-    return over_segments(one, stretches, point.drives, point.levels)
-
-
 def learn_roughness(stretches: Sequence[Stretch], point: Point, rounds: int = 1) -> Point:
     """Return the point with the roughness that its drives show under its causes."""
     for _ in range(rounds):
-        drives = tuple(one.drive.moved(one.step).relearned(one.covariance) for one in _conditioned(stretches, point))
+        linear = linearise(stretches, point)
+        drives = tuple(
+            drive.moved(step).relearned(one.covariance)
+            for drive, step, one in zip(point.drives, linear.drive_steps, linear.posteriors, strict=True)
+        )
         point = replace(point, drives=drives)
     return point
 
 
 def learn_noise(stretches: Sequence[Stretch], point: Point) -> Point:
     """Return the point with the noise that its causes and drives leave, each run's stretches together."""
-    posteriors = _conditioned(stretches, point)
-    lefts = [_left(*pair) for pair in zip(stretches, posteriors, strict=True)]
+    linear = linearise(stretches, point)
+    lefts = [_left(stretch, point, linear, place) for place, stretch in enumerate(stretches)]
     levels = list(point.levels)
     for run in {stretch.index for stretch in stretches}:
         mine = [place for place, stretch in enumerate(stretches) if stretch.index == run]
@@ -95,9 +91,12 @@ class _Left:
         return likeliest_flicker(slow.power, white, slow.flicker, slow.walk * walk**2)
 
 
-def _left(stretch: Stretch, posterior: Posterior) -> _Left:
+def _left(stretch: Stretch, point: Point, linear: Linear, place: int) -> _Left:
+    posterior = linear.posteriors[place]
     seen = posterior.observed
-    residual = seen.residual - posterior.jacobian.times(posterior.step)
+    residual = seen.residual - posterior.jacobian.times(linear.drive_steps[place])
+    if point.residue is not None:
+        residual = residual - point.residue.columns[place].times(linear.residue)
     cosines = stretch.basis.transform(residual)
     level = white_level(cosines, _FOLLOWED / posterior.drive.spline.spacing, stretch.run.sample_period)
     # Missing samples stand as zeros, as where the reference comes at a lower rate.

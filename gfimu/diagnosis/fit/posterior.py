@@ -104,20 +104,16 @@ class Posterior:
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Return G (P, P), b (P,) and V (m, P) of columns."""
         seen, count = self.observed, columns.count
-        gram, score = np.zeros((count, count)), np.zeros(count)
+        gram, score = seen.products(columns)
         loading = self.jacobian.loading
         combined = np.zeros((len(loading), len(seen.residual), count))
         cross = np.zeros((self.jacobian.size, count))
         for c, (at, part, weight) in enumerate(zip(columns.places, columns.parts, seen.weights, strict=True)):
-            if not len(at):
-                continue
-            slow = seen.modes.of(part.T, c).T  # (K, p)
-            damped = seen.modes.share[:, [c]] * slow
-            gram[np.ix_(at, at)] += weight * (part.T @ part - slow.T @ damped)
-            score[at] += weight * (part.T @ seen.residual[:, c] - damped.T @ seen.slow[:, c])
-            cross[:, at] -= weight * (self.jacobian_modes[c] @ damped)
-            for r in np.flatnonzero(loading[:, c]):
-                combined[r][:, at] += (weight * loading[r, c]) * part
+            if len(at):
+                damped = seen.modes.share[:, [c]] * seen.modes.of(part.T, c).T  # (K, p)
+                cross[:, at] -= weight * (self.jacobian_modes[c] @ damped)
+                for r in np.flatnonzero(loading[:, c]):
+                    combined[r][:, at] += (weight * loading[r, c]) * part
         cross += self.jacobian.correlate(combined)
         across = solve_triangular(self.root, cross, lower=True, check_finite=False, overwrite_b=True)
         whole = gram.diagonal() * _RIDGE

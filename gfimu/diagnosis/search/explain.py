@@ -9,7 +9,8 @@ import numpy as np
 from scipy.special import logsumexp
 
 from gfimu.diagnosis.data.stretch import Stretch
-from gfimu.diagnosis.fit.gauss_newton import Fit, Point, fit, log_prior
+from gfimu.diagnosis.fit.gauss_newton import Fit, fit
+from gfimu.diagnosis.fit.linear import Point
 from gfimu.diagnosis.fit.learn import learn_noise, learn_roughness, starting_point
 from gfimu.diagnosis.parallel import each_apart
 from gfimu.diagnosis.policy import Policy
@@ -63,10 +64,10 @@ class _Sets:
 
         def one(point: Point) -> Fit | None:
             try:
-                found = fit(self.stretches, replace(point, levels=self.base.levels), self.policy)
+                point = replace(point, levels=self.base.levels, residue=self.base.residue)
+                return fit(self.stretches, point, self.policy)
             except (np.linalg.LinAlgError, ValueError):
                 return None
-            return replace(found, log_posterior=found.log_evidence + log_prior(found.causes, self.policy))
 
         new = {_key(point.causes): point for point in points if _key(point.causes) not in self.found}
         self.count += len(new)
@@ -107,7 +108,7 @@ def explain(stretches: Sequence[Stretch], policy: Policy, report: Report | None 
     """
     tell = report or (lambda share, text: None)
     tell(0.05, "drive")
-    sets = _Sets(stretches, starting_point(stretches, 0.05), policy)
+    sets = _Sets(stretches, starting_point(stretches, policy.knots), policy)
     nothing = sets.fit([sets.base])[0]
     assert nothing is not None
     sets = _under(sets, learn_roughness(stretches, nothing.point, policy.learnings), [nothing])

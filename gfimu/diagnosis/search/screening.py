@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.data.stretch import Stretch
-from gfimu.diagnosis.fit.gauss_newton import Point
-from gfimu.diagnosis.fit.posterior import Posterior, condition
+from gfimu.diagnosis.fit.linear import Point, linearise
+from gfimu.diagnosis.fit.posterior import Posterior
 from gfimu.diagnosis.model import EffectFamily, Whitened
-from gfimu.diagnosis.parallel import over_segments
 from gfimu.diagnosis.terms.cause import Cause, effects_of, mixing_of
 from gfimu.diagnosis.terms.columns import Columns
 from gfimu.diagnosis.terms.library import family_columns
@@ -93,32 +92,22 @@ def screen(stretches: Sequence[Stretch], point: Point) -> Screening:
     array, causes = stretches[0].model.array, point.causes
     runs = len({stretch.index for stretch in stretches})
 
-    def conditioned(stretch: Stretch, drive, levels) -> Posterior:  # noqa: ANN001
-        return condition(stretch, drive, effects_of(causes, array, stretch.index), levels)
+    first = linearise(stretches, replace(point, residue=None))
+    signatures, count = _plan(stretches, first.posteriors, causes, runs)
 
-    posteriors = over_segments(conditioned, stretches, point.drives, point.levels)
-    signatures, count = _plan(stretches, posteriors, causes, runs)
+    def columns(stretch: Stretch, at: Posterior) -> Columns:
+        parts = [family_columns(stretch, at.observed, at.drive, causes, s.family, s.shape) for s in signatures]
+        numbers = np.concatenate([_of_run(s, array, stretch.index) for s in signatures])
+        return Columns.together(parts).among(numbers, count)
 
-    def products(stretch: Stretch, posterior: Posterior):  # noqa: ANN202
-        columns = Columns.together(
-            [family_columns(stretch, posterior.observed, posterior.drive, causes, s.family, s.shape) for s in signatures]
-        )
-        at = np.concatenate([_of_run(s, array, stretch.index) for s in signatures])
-        part, right, across = posterior.products(columns)
-        response = np.zeros((posterior.jacobian.size, count))
-        response[:, at] = posterior.response(across)
-        return at, part, right, response
-
-    gram, score, responses = np.zeros((count, count)), np.zeros(count), []
-    for at, part, right, response in over_segments(products, stretches, posteriors):
-        gram[np.ix_(at, at)] += part
-        score[at] += right
-        responses.append(response)
+    jacobians = [one.jacobian for one in first.posteriors]
+    linear = linearise(stretches, point, columns, jacobians=jacobians)
     base = np.zeros(count)
     for cause in causes:
         base[next(s for s in signatures if s.family.name == cause.name).columns] = cause.mixing @ cause.coordinates
     hypotheses = tuple(_hypotheses(signatures, array, runs))
-    return Screening(tuple(signatures), hypotheses, gram, score + gram @ base, base, tuple(responses))
+    score = linear.score + linear.gram @ base
+    return Screening(tuple(signatures), hypotheses, linear.gram, score, base, linear.responses)
 
 
 def _of_run(signature: Signature, array: AccelerometerArray, run: int) -> NDArray[np.intp]:

@@ -62,3 +62,12 @@ class Columns:
     def times(self, sizes: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return what sizes (P,) of the columns make, shape (n, c)."""
         return np.column_stack([part @ sizes[at] for at, part in zip(self.places, self.parts, strict=True)])
+
+    def scaled(self, by: NDArray[np.float64]) -> Columns:
+        """Return the columns multiplied by numbers (P,)."""
+        parts = tuple(part * by[at] for at, part in zip(self.places, self.parts, strict=True))
+        return Columns(self.count, self.places, parts)
+
+    def among(self, numbers: NDArray[np.intp], count: int) -> Columns:
+        """Return the columns as those with these numbers (P,) of a larger set."""
+        return Columns(count, tuple(numbers[at] for at in self.places), self.parts)

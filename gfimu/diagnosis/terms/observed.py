@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from gfimu.diagnosis.coloured_noise import NoiseLevels
 from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.slow_modes import SlowModes, WeighedModes
+from gfimu.diagnosis.terms.columns import Columns
 
 __all__ = ["Observed", "observe"]
 
@@ -59,6 +60,17 @@ class Observed:
         """rᵀWr."""
         power = np.sum(self.residual**2, axis=0) - self.modes.explained(self.residual)
         return self.lacking + float(self.weights @ power)
+
+    def products(self, columns: Columns) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return AᵀWA (P, P) and AᵀWr (P,) of columns, the drive held."""
+        gram, score = np.zeros((columns.count, columns.count)), np.zeros(columns.count)
+        for c, (at, part, weight) in enumerate(zip(columns.places, columns.parts, self.weights, strict=True)):
+            if len(at):
+                slow = self.modes.of(part.T, c).T  # (K, p)
+                damped = self.modes.share[:, [c]] * slow
+                gram[np.ix_(at, at)] += weight * (part.T @ part - slow.T @ damped)
+                score[at] += weight * (part.T @ self.residual[:, c] - damped.T @ self.slow[:, c])
+        return gram, score
 
 
 def observe(stretch: Stretch, prediction: NDArray[np.float64], levels: NoiseLevels) -> Observed:
