@@ -14,7 +14,7 @@ import time
 
 import numpy as np
 
-from gfimu.attitude import integrate_attitude
+from gfimu.motion.attitude import integrate_attitude
 
 PAIRS = 7
 LOOP_SAMPLES = 20_000

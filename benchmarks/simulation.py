@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gfimu.array import AccelerometerArray
+from gfimu.geometry.array import AccelerometerArray
 from sim import forward
 from sim.profiles import Tumble, speed_sweep, spin_profile
 from sim.scenarios import Scenario, simulate

@@ -29,7 +29,7 @@ from gfimu.calibration.recursive import recursive
 from gfimu.calibration.result import Calibration
 from gfimu.calibration.six_position import six_position
 from gfimu.recording import Recording
-from gfimu.rest import Rest
+from gfimu.recording.rest import Rest
 from gfimu.sensor_noise import synthesise_noise
 
 GRAVITY = 9.81

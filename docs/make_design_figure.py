@@ -15,11 +15,11 @@ mpl.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
-from gfimu.diagnosis.design import Limits, design
-from gfimu.diagnosis.distinguishability import gained_log_likelihood
-from gfimu.diagnosis.profile_search import plain_profile
-from gfimu.diagnosis.proposal import SEPARATED
-from gfimu.diagnosis.run import prepare_run
+from gfimu.diagnosis.data.run import prepare_run
+from gfimu.diagnosis.design.design import Limits, design
+from gfimu.diagnosis.design.distinguishability import gained_log_likelihood
+from gfimu.diagnosis.design.profile_search import plain_profile
+from gfimu.diagnosis.design.proposal import SEPARATED
 from sim.campaign import Measurement, measure
 from sim.effects import make_effect
 from sim.twin import Twin

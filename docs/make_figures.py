@@ -18,12 +18,12 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from gfimu import AccelerometerArray, Recording
-from gfimu.attitude import to_rotation
-from gfimu.drift_monte_carlo import monte_carlo_drift
-from gfimu.estimation import Estimate
-from gfimu.navigation import navigate
+from gfimu.motion.attitude import to_rotation
+from gfimu.motion.estimation import Estimate
+from gfimu.motion.navigation import navigate
+from gfimu.motion.rest_bias import estimate_from_rest
 from gfimu.position_drift import TILT_LIMIT, ErrorSources, drift_budget, equivalent_rate_drift
-from gfimu.rest_bias import estimate_from_rest
+from gfimu.position_drift.monte_carlo import monte_carlo_drift
 from gfimu.units import STANDARD_GRAVITY
 from sim.effects import make_effect
 from sim.scenarios import Scenario, simulate

@@ -12,16 +12,16 @@ import matplotlib.pyplot as plt
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.array import AccelerometerArray
 from gfimu.bounds import alpha_std, rate_bound_isotropic, steady_rate_bound
-from gfimu.estimation import Estimate
-from gfimu.part import white_noise_std
+from gfimu.geometry.array import AccelerometerArray
+from gfimu.motion.estimation import Estimate
+from gfimu.motion.rest_bias import estimate_from_rest, rest_bias
+from gfimu.parts.part import white_noise_std
 from gfimu.position_drift import ErrorSources, drift_budget, equivalent_rate_drift
 from gfimu.rate.kalman import FilterSettings
 from gfimu.rate.methods import RATE_METHODS, estimate_rate
 from gfimu.rate.sensing import SensorErrors
 from gfimu.recording import Recording
-from gfimu.rest_bias import estimate_from_rest, rest_bias
 from sim.scenarios import Scenario, simulate
 
 RATE = 100.0

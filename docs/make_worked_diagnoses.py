@@ -17,10 +17,10 @@ mpl.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
+from gfimu.diagnosis.criticism.residuals import residual_views
 from gfimu.diagnosis.diagnose import diagnose
-from gfimu.diagnosis.residuals import residual_views
-from gfimu.diagnosis.verdict import Diagnosis
-from gfimu.mimu4444 import read_mimu4444
+from gfimu.diagnosis.verdict.verdict import Diagnosis
+from gfimu.recording.mimu4444 import read_mimu4444
 from sim.scenarios import Scenario, simulate
 from sim.twin import Twin
 

@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 from firmware_bridge.frames import StreamCounts
 from firmware_bridge.recorder import Batch
-from gfimu.array import AccelerometerArray
 from gfimu.errors import GfimuError
+from gfimu.files.rerun_stream import rrd_stream, viewer_stream
+from gfimu.geometry.array import AccelerometerArray
 from gfimu.rate.live import LiveRateFilter
 from gfimu.rate.sensing import SensorErrors
-from gfimu.rerun_stream import rrd_stream, viewer_stream
 
 __all__ = ["LiveView"]
 

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from firmware_bridge.adxl345_device import RAW_PER_COUNT, TICKS_PER_SECOND
-from gfimu.array import AccelerometerArray
 from gfimu.errors import InputError
+from gfimu.geometry.array import AccelerometerArray
 from sim.adxl345 import Sensor
 
 __all__ = ["Conversions", "RestPhysics", "RidePhysics", "Scene"]

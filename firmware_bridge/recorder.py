@@ -21,11 +21,11 @@ from firmware_bridge.commands import Command, Identity, Reply, encode_command, p
 from firmware_bridge.frames import FrameFormat, SampleDecoder, Samples, Status, StreamCounts, frame_format
 from firmware_bridge.journal import Journal, JournalError
 from firmware_bridge.link import Link
-from gfimu.array import AccelerometerArray
-from gfimu.carried_array import array_metadata
 from gfimu.errors import GfimuError, InputError
-from gfimu.outputs import RECORDING, check_outputs
-from gfimu.part import Part
+from gfimu.files.outputs import RECORDING, check_outputs
+from gfimu.geometry.array import AccelerometerArray
+from gfimu.parts.part import Part
+from gfimu.recording.carried_array import array_metadata
 
 __all__ = ["Batch", "RecordReport", "SampleClock", "record"]
 

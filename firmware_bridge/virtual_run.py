@@ -23,9 +23,9 @@ from firmware_bridge.commands import (
 )
 from firmware_bridge.frames import SampleDecoder, Samples, StreamCounts
 from firmware_bridge.physics import RidePhysics, Scene
-from gfimu.carried_array import array_metadata
 from gfimu.errors import InputError
 from gfimu.recording import Recording
+from gfimu.recording.carried_array import array_metadata
 
 __all__ = ["VirtualRun", "record_virtual", "typical_chips"]
 

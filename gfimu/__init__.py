@@ -31,9 +31,6 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     # What type checkers and editors see; at run time names load on first use (`_PUBLIC`).
-    from gfimu.array import AccelerometerArray as AccelerometerArray
-    from gfimu.array import Chip as Chip
-    from gfimu.attitude import integrate_attitude as integrate_attitude
     from gfimu.bounds import posterior_rate_bound as posterior_rate_bound
     from gfimu.bounds import rate_bound as rate_bound
     from gfimu.calibration.array_calibration import calibrate_array as calibrate_array
@@ -55,35 +52,38 @@ if TYPE_CHECKING:
     from gfimu.commands.score import score as score
     from gfimu.commands.simulate import simulate as simulate
     from gfimu.commands.view import view as view
-    from gfimu.dilution import gdop as gdop
-    from gfimu.drift_forms import ErrorSources as ErrorSources
-    from gfimu.drift_monte_carlo import monte_carlo_drift as monte_carlo_drift
     from gfimu.errors import GeometryError as GeometryError
     from gfimu.errors import GfimuError as GfimuError
     from gfimu.errors import InputError as InputError
-    from gfimu.estimate_summary import centripetal_agreement as centripetal_agreement
-    from gfimu.estimate_summary import summarise as summarise
-    from gfimu.estimation import Estimate as Estimate
-    from gfimu.gravity import local_gravity as local_gravity
-    from gfimu.kinematics import closed_form as closed_form
-    from gfimu.kinematics import joint_form as joint_form
-    from gfimu.kinematics import motion_from_readings as motion_from_readings
-    from gfimu.kinematics import null_space as null_space
-    from gfimu.kinematics import pseudo_inverse as pseudo_inverse
-    from gfimu.kinematics import specific_force as specific_force
-    from gfimu.mimu4444 import read_mimu4444 as read_mimu4444
-    from gfimu.navigation import level as level
-    from gfimu.navigation import navigate as navigate
+    from gfimu.geometry.array import AccelerometerArray as AccelerometerArray
+    from gfimu.geometry.array import Chip as Chip
+    from gfimu.geometry.dilution import gdop as gdop
+    from gfimu.geometry.gravity import local_gravity as local_gravity
+    from gfimu.geometry.kinematics import closed_form as closed_form
+    from gfimu.geometry.kinematics import joint_form as joint_form
+    from gfimu.geometry.kinematics import motion_from_readings as motion_from_readings
+    from gfimu.geometry.kinematics import null_space as null_space
+    from gfimu.geometry.kinematics import pseudo_inverse as pseudo_inverse
+    from gfimu.geometry.kinematics import specific_force as specific_force
+    from gfimu.motion.attitude import integrate_attitude as integrate_attitude
+    from gfimu.motion.estimate_summary import centripetal_agreement as centripetal_agreement
+    from gfimu.motion.estimate_summary import summarise as summarise
+    from gfimu.motion.estimation import Estimate as Estimate
+    from gfimu.motion.navigation import level as level
+    from gfimu.motion.navigation import navigate as navigate
+    from gfimu.motion.rest_bias import estimate_from_rest as estimate_from_rest
     from gfimu.position_drift import drift_budget as drift_budget
     from gfimu.position_drift import equivalent_rate_drift as equivalent_rate_drift
+    from gfimu.position_drift.closed_forms import ErrorSources as ErrorSources
+    from gfimu.position_drift.monte_carlo import monte_carlo_drift as monte_carlo_drift
     from gfimu.rate.integration import integrate_rate as integrate_rate
     from gfimu.rate.live import LiveRateFilter as LiveRateFilter
     from gfimu.rate.methods import estimate_rate as estimate_rate
     from gfimu.rate.result import RateEstimate as RateEstimate
     from gfimu.rate.sensing import SensorErrors as SensorErrors
     from gfimu.recording import Recording as Recording
-    from gfimu.recording_formats import open_recording as open_recording
-    from gfimu.rest_bias import estimate_from_rest as estimate_from_rest
+    from gfimu.recording.formats import open_recording as open_recording
+    from gfimu.recording.mimu4444 import read_mimu4444 as read_mimu4444
     from gfimu.sensor_noise import allan_deviation as allan_deviation
     from gfimu.sensor_noise import identify_noise as identify_noise
     from gfimu.sensor_noise import recording_noise as recording_noise
@@ -91,11 +91,11 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _PUBLIC = {
-    "AccelerometerArray": "gfimu.array",
+    "AccelerometerArray": "gfimu.geometry.array",
     "Calibration": "gfimu.calibration.result",
-    "Chip": "gfimu.array",
-    "ErrorSources": "gfimu.drift_forms",
-    "Estimate": "gfimu.estimation",
+    "Chip": "gfimu.geometry.array",
+    "ErrorSources": "gfimu.position_drift.closed_forms",
+    "Estimate": "gfimu.motion.estimation",
     "GeometryError": "gfimu.errors",
     "GfimuError": "gfimu.errors",
     "InputError": "gfimu.errors",
@@ -106,8 +106,8 @@ _PUBLIC = {
     "allan_deviation": "gfimu.sensor_noise",
     "calibrate": "gfimu.commands.calibrate",
     "calibrate_array": "gfimu.calibration.array_calibration",
-    "centripetal_agreement": "gfimu.estimate_summary",
-    "closed_form": "gfimu.kinematics",
+    "centripetal_agreement": "gfimu.motion.estimate_summary",
+    "closed_form": "gfimu.geometry.kinematics",
     "convert": "gfimu.commands.convert",
     "demo": "gfimu.commands.demo",
     "design": "gfimu.commands.design",
@@ -116,35 +116,35 @@ _PUBLIC = {
     "drift_budget": "gfimu.position_drift",
     "equivalent_rate_drift": "gfimu.position_drift",
     "estimate": "gfimu.commands.estimate",
-    "estimate_from_rest": "gfimu.rest_bias",
+    "estimate_from_rest": "gfimu.motion.rest_bias",
     "estimate_rate": "gfimu.rate.methods",
     "firmware": "gfimu.commands",
-    "gdop": "gfimu.dilution",
+    "gdop": "gfimu.geometry.dilution",
     "identify_noise": "gfimu.sensor_noise",
-    "integrate_attitude": "gfimu.attitude",
+    "integrate_attitude": "gfimu.motion.attitude",
     "integrate_rate": "gfimu.rate.integration",
-    "joint_form": "gfimu.kinematics",
-    "level": "gfimu.navigation",
+    "joint_form": "gfimu.geometry.kinematics",
+    "level": "gfimu.motion.navigation",
     "live": "gfimu.commands.live",
     "load_calibration": "gfimu.calibration.result",
-    "local_gravity": "gfimu.gravity",
-    "monte_carlo_drift": "gfimu.drift_monte_carlo",
-    "motion_from_readings": "gfimu.kinematics",
-    "navigate": "gfimu.navigation",
+    "local_gravity": "gfimu.geometry.gravity",
+    "monte_carlo_drift": "gfimu.position_drift.monte_carlo",
+    "motion_from_readings": "gfimu.geometry.kinematics",
+    "navigate": "gfimu.motion.navigation",
     "noise": "gfimu.commands.noise",
-    "null_space": "gfimu.kinematics",
-    "open_recording": "gfimu.recording_formats",
+    "null_space": "gfimu.geometry.kinematics",
+    "open_recording": "gfimu.recording.formats",
     "optimize": "gfimu.commands.optimize",
     "posterior_rate_bound": "gfimu.bounds",
-    "pseudo_inverse": "gfimu.kinematics",
+    "pseudo_inverse": "gfimu.geometry.kinematics",
     "rate_bound": "gfimu.bounds",
-    "read_mimu4444": "gfimu.mimu4444",
+    "read_mimu4444": "gfimu.recording.mimu4444",
     "record": "gfimu.commands.record",
     "recording_noise": "gfimu.sensor_noise",
     "score": "gfimu.commands.score",
     "simulate": "gfimu.commands.simulate",
-    "specific_force": "gfimu.kinematics",
-    "summarise": "gfimu.estimate_summary",
+    "specific_force": "gfimu.geometry.kinematics",
+    "summarise": "gfimu.motion.estimate_summary",
     "update_array_calibration": "gfimu.calibration.array_calibration",
     "view": "gfimu.commands.view",
 }

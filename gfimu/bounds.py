@@ -1,8 +1,9 @@
 """Lower bounds on the error of the angular rate that an accelerometer array can reach, per sample and over a run.
 
-Per sample, with α and p unknown: the null space of J sees the products of ω (`gfimu.kinematics.null_space`), so the
-Fisher information on ω is DᵀQᵀNᵀN Q D / σ², with N the whitened null space and D = ∂s/∂ω. The information grows with
-(array size × angular speed)² (Skog, Nilsson, Händel & Nehorai, IEEE Trans. Signal Process. 64, 2016).
+Per sample, with α and p unknown: the null space of J sees the products of ω
+(`gfimu.geometry.kinematics.null_space`), so the Fisher information on ω is DᵀQᵀNᵀN Q D / σ², with N the whitened null
+space and D = ∂s/∂ω. The information grows with (array size × angular speed)² (Skog, Nilsson, Händel & Nehorai, IEEE
+Trans. Signal Process. 64, 2016).
 
 Over a run: the rate is also the integral of α, which the array measures independently of the null space, and constant
 biases are learned along the way. The posterior Cramér–Rao bound of Tichavský, Muravchik & Nehorai (IEEE Trans. Signal
@@ -21,9 +22,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from gfimu.array import AccelerometerArray
 from gfimu.errors import InputError
-from gfimu.kinematics import null_space, pseudo_inverse
+from gfimu.geometry.array import AccelerometerArray
+from gfimu.geometry.kinematics import null_space, pseudo_inverse
 from gfimu.rate.sensing import ChannelTables, SensorErrors
 
 __all__ = [
@@ -59,7 +60,7 @@ def omega_products_jacobian(omega: ArrayLike) -> NDArray[np.float64]:
     Returns
     -------
     ndarray, shape (..., 6, 3)
-        Rows in the order `gfimu.array.OMEGA_PRODUCTS`, rad/s.
+        Rows in the order `gfimu.geometry.array.OMEGA_PRODUCTS`, rad/s.
     """
     x, y, z = np.moveaxis(np.asarray(omega, dtype=float), -1, 0)
     jacobian = np.zeros((*x.shape, 6, 3))

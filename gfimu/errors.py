@@ -1,11 +1,20 @@
-"""The errors a user can cause: each is one line that names the file or value and the remedy."""
+"""The errors and warnings a user can cause: each is one line that names the file or value and the remedy."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Iterable
 
-__all__ = ["GeometryError", "GfimuError", "InputError", "UnitError", "WriteError", "unknown_name"]
+__all__ = [
+    "CorruptValueWarning",
+    "GeometryError",
+    "GfimuError",
+    "InputError",
+    "RecordingWarning",
+    "UnitError",
+    "WriteError",
+    "unknown_name",
+]
 
 
 class GfimuError(Exception):
@@ -31,6 +40,14 @@ class UnitError(InputError):
 
 class GeometryError(InputError):
     """A sensor geometry that can't see the motions asked for."""
+
+
+class RecordingWarning(UserWarning):
+    """Something about a recording that a user should know, though it can be used; commands print it as one line."""
+
+
+class CorruptValueWarning(RecordingWarning):
+    """Values of a recording that can be no measurement were left out."""
 
 
 def unknown_name(kind: str, name: str, valid: Iterable[str]) -> InputError:

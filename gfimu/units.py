@@ -6,7 +6,17 @@ import math
 
 from gfimu.errors import UnitError
 
-__all__ = ["NAME", "NUMBER", "RATIO", "READING_UNITS", "REFERENCE_UNITS", "STANDARD_GRAVITY", "split_key", "split_unit"]
+__all__ = [
+    "KEY_ENDINGS",
+    "NAME",
+    "NUMBER",
+    "RATIO",
+    "READING_UNITS",
+    "REFERENCE_UNITS",
+    "STANDARD_GRAVITY",
+    "key_name",
+    "split_unit",
+]
 
 STANDARD_GRAVITY = 9.80665
 """Standard gravity, m/s²."""
@@ -35,35 +45,33 @@ REFERENCE_UNITS: dict[str, dict[str, float]] = {
 RATIO, NUMBER, NAME = "ratio", "number", "name"
 """What stands in place of a unit: a small relative number (people read percent), a count or factor, words."""
 
-_KEY_UNITS = {
-    "_m_s2_per_rad4_s4": "m/s²/(rad/s)⁴",
-    "_m_s2_rts": "m/s²/√s",
-    "_s2_rad2": "s²/rad²",
-    "_m_s2_K": "m/s²/K",
-    "_rad_s2": "rad/s²",
-    "_rad_s": "rad/s",
-    "_m_s2": "m/s²",
-    "_s2_m": "s²/m",
-    "_1_s": "1/s",
-    "_rad": "rad",
-    "_hz": "Hz",
-    "_s": "s",
-    "_m": "m",
+KEY_ENDINGS: dict[str, str] = {
+    "m/s²/(rad/s)⁴": "m_s2_per_rad4_s4",
+    "m/s²/√s": "m_s2_rts",
+    "s²/rad²": "s2_rad2",
+    "m/s²/K": "m_s2_K",
+    "rad/s²": "rad_s2",
+    "rad/s": "rad_s",
+    "m/s²": "m_s2",
+    "s²/m": "s2_m",
+    "1/s": "1_s",
+    "rad": "rad",
+    "Hz": "hz",
+    "s": "s",
+    "m": "m",
 }
-"""How a parameter's key ends and the unit this means; the longest come first."""
+"""Units of parameters as people read them, and how the key of a parameter in that unit ends."""
 
 
-def split_key(key: str) -> tuple[str, str]:
-    """Split a parameter's key into its name and the unit in which it ends: ``a11_m_s2`` into ``a11`` and m/s².
+def key_name(key: str, unit: str) -> str:
+    """Return a parameter's key without the unit in which it ends: ``a11_m_s2`` in m/s² is ``a11``.
 
-    The unit is empty where the key ends in none; a key that is nothing but a unit has the name ``value``.
+    A key that is nothing but its unit has the name ``value``; one that does not end in its unit stays as it is.
     """
-    for suffix, unit in _KEY_UNITS.items():
-        if key == suffix[1:]:
-            return "value", unit
-        if key.endswith(suffix):
-            return key.removesuffix(suffix), unit
-    return key, ""
+    ending = KEY_ENDINGS.get(unit, "")
+    if key == ending:
+        return "value"
+    return key.removesuffix(f"_{ending}") if ending else key
 
 
 def split_unit(column: str, quantity: str, units: dict[str, float] | dict[str, float | None]) -> str:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.diagnosis.free_body.motion import BodyDrive
-from gfimu.kinematics import omega_products
+from gfimu.geometry.kinematics import omega_products
+from gfimu.motion.body_drive import BodyDrive
 from sim.motion import SpinState
 from sim.world import SampleContext, World
 

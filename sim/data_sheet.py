@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.errors import InputError
-from gfimu.part_files import part_table
+from gfimu.parts.files import part_table
 from gfimu.short_repr import short_repr
 from sim.toml_table import TomlTable
 

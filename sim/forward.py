@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from sim.motion import SpinMotion, SpinState
+from gfimu.world_model import SpinState
+from sim.motion import SpinMotion
 from sim.world import Nod, SampleContext, World
 
 __all__ = [
@@ -40,7 +41,7 @@ class TableGeometry:
     tangential : ndarray, shape (c, 3)
         r × θ: reading per angular acceleration, m.
     centripetal : ndarray, shape (c, 6)
-        Reading per product of the angular rate, m (`gfimu.array.OMEGA_PRODUCTS`).
+        Reading per product of the angular rate, m (`gfimu.geometry.array.OMEGA_PRODUCTS`).
     """
 
     axes: NDArray[np.float64]

@@ -9,8 +9,8 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from gfimu.array import AccelerometerArray, Chip
 from gfimu.errors import InputError, unknown_name
+from gfimu.geometry.array import AccelerometerArray, Chip
 
 __all__ = ["array_from_mjcf"]
 

@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import BSpline, CubicSpline, PPoly
 
+from gfimu.world_model import Spin
+
 __all__ = ["BodyMotion", "BodyState", "SpinMotion", "SpinState", "SplineSpin"]
 
 
@@ -35,12 +37,8 @@ class SpinState:
     acceleration: NDArray[np.float64]
 
 
-class SpinMotion(Protocol):
-    """Spin of the table as a function of time."""
-
-    def at(self, t: ArrayLike) -> SpinState:
-        """State of the spin at times ``t``, s, shape (n,)."""
-        ...
+SpinMotion = Spin
+"""Spin of the table as a function of time; the world model's name for it is `Spin`."""
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from gfimu import world_model
 from gfimu.errors import InputError
 from sim import forward
 from sim.adxl345 import Sensor, conversion_offsets
@@ -126,7 +127,7 @@ class Ride:
             self._segments = kept | {number: CubicSpline(t, force)}
         return self._segments[number]
 
-    def _spin_at(self, t: NDArray[np.float64]) -> SpinState:
+    def _spin_at(self, t: NDArray[np.float64]) -> world_model.SpinState:
         if self.scenario.free:
             nan = np.full(len(t), np.nan)
             return SpinState(nan, nan, nan)

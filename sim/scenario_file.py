@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from gfimu.array import AccelerometerArray
 from gfimu.errors import InputError
-from gfimu.model_files import find_model, read_toml
+from gfimu.files.model_files import find_model, read_toml
+from gfimu.geometry.array import AccelerometerArray
 from gfimu.units import STANDARD_GRAVITY
 from sim.adxl345 import SensorSettings
 from sim.data_sheet import DataSheet

@@ -11,11 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 import gfimu
-from gfimu.array import AccelerometerArray
-from gfimu.carried_array import array_metadata
+from gfimu import world_model
 from gfimu.errors import InputError
-from gfimu.model_files import find_model, read_toml
+from gfimu.files.model_files import find_model, read_toml
+from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
+from gfimu.recording.carried_array import array_metadata
 from gfimu.short_repr import short_repr
 from gfimu.units import STANDARD_GRAVITY
 from sim import forward
@@ -257,7 +258,7 @@ def _rigid_body(
     return force, state if isinstance(state, BodyState) else cube_state(world, state)
 
 
-def _cube_spin(run: Scenario, world: World, t: NDArray[np.float64]) -> SpinState:
+def _cube_spin(run: Scenario, world: World, t: NDArray[np.float64]) -> world_model.SpinState:
     """Spin of the cube at the samples, for the sensing steps."""
     motion = _spin(run.motion)
     for step in (*world.motion_steps, *world.mount_steps):

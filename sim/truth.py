@@ -11,8 +11,9 @@ from scipy.spatial.transform import Rotation
 
 from gfimu.errors import InputError
 from gfimu.recording import Recording
+from gfimu.world_model import SpinState
 from sim.forward import nodding_motion
-from sim.motion import BodyState, SpinState
+from sim.motion import BodyState
 from sim.world import World
 
 if TYPE_CHECKING:

@@ -18,9 +18,10 @@ from numpy.typing import NDArray
 from scipy.interpolate import PPoly
 from scipy.spatial.transform import Rotation
 
-from gfimu.array import AccelerometerArray
+from gfimu import world_model
 from gfimu.errors import InputError
-from gfimu.model_files import find_model
+from gfimu.files.model_files import find_model
+from gfimu.geometry.array import AccelerometerArray
 from gfimu.short_repr import short_repr
 from sim.forward import arm_growth
 from sim.motion import BodyMotion, BodyState, SpinMotion, SpinState, SplineSpin
@@ -260,7 +261,7 @@ def _imposed(
 def _table_state(
     world: World,
     model: mujoco.MjModel,
-    spin: SpinState,
+    spin: world_model.SpinState,
     growth: NDArray[np.float64] | float,
     growing: NDArray[np.float64] | float,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:

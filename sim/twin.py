@@ -6,20 +6,21 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import tomli_w
 from numpy.typing import NDArray
 
-from gfimu.array import AccelerometerArray
-from gfimu.diagnosis.free_body.motion import BodyDrive
-from gfimu.diagnosis.model import BasisUnits, EffectFamily, ExpectedNoise, Mode, Play, Ripple
 from gfimu.errors import InputError
-from gfimu.model_files import find_model, read_toml
-from gfimu.part_files import part_table
+from gfimu.files.model_files import find_model, read_toml
+from gfimu.geometry.array import AccelerometerArray
+from gfimu.motion.body_drive import BodyDrive
+from gfimu.parts.files import part_table
 from gfimu.short_repr import short_repr
 from gfimu.units import STANDARD_GRAVITY
+from gfimu.world_model import BasisUnits, BodyModel, EffectFamily, ExpectedNoise, Mode, Play, Ripple, Spin
+from gfimu.world_model import Effect as AnyEffect
 from sim import forward
 from sim.body import body_channels
 from sim.effects import BODY_EFFECTS, EFFECTS, ENCODER_EFFECTS, Effect, apply_effects, make_effect
@@ -152,7 +153,7 @@ class Twin:
 
     def world(
         self,
-        effects: Sequence[Effect] = (),
+        effects: Sequence[AnyEffect] = (),
         mounting: NDArray[np.float64] | None = None,
         start: float | None = None,
     ) -> World:
@@ -171,7 +172,7 @@ class Twin:
         nominal = World(
             self.array, gravity=self.gravity, cube_offset=self.cube_offset, mount_rotvec=turned, start=start
         )
-        return apply_effects(nominal, (*self.effects, *effects))
+        return apply_effects(nominal, self._effects_with(effects))
 
     @property
     def local_gravity(self) -> float:
@@ -194,10 +195,10 @@ class Twin:
 
     def predict(
         self,
-        spin: Any,
+        spin: Spin,
         t: NDArray[np.float64],
         *,
-        effects: Sequence[Any] = (),
+        effects: Sequence[AnyEffect] = (),
         temperature: NDArray[np.float64] | None = None,
         mounting: NDArray[np.float64] | None = None,
         start: float | None = None,
@@ -214,7 +215,7 @@ class Twin:
             world = world.changed(motion_steps=())
         readings = forward.channels(world, spin, t, temperature)
         if world.data_steps:
-            readings = self._digital(readings, (*self.effects, *effects), world, t)
+            readings = self._digital(readings, self._effects_with(effects), world, t)
         if self.drive_source == "angle":
             return readings, spin.at(t - world.tacho_delay).angle
         return readings, forward.reference(world, spin, t)
@@ -224,14 +225,17 @@ class Twin:
         drive: BodyDrive,
         t: NDArray[np.float64],
         *,
-        effects: Sequence[Any] = (),
+        effects: Sequence[AnyEffect] = (),
         temperature: NDArray[np.float64] | None = None,
         start: float | None = None,
     ) -> NDArray[np.float64]:
         """Predict noise-free channels (n, c), m/s², of a free body from its gyro and its specific force."""
         world = self.world(effects).changed(start=start)
         readings = body_channels(world, drive, t, temperature)
-        return self._digital(readings, (*self.effects, *effects), world, t) if world.data_steps else readings
+        return self._digital(readings, self._effects_with(effects), world, t) if world.data_steps else readings
+
+    def _effects_with(self, effects: Sequence[AnyEffect]) -> tuple[Effect, ...]:
+        return (*self.effects, *_own(effects))
 
     def _digital(
         self, readings: NDArray[np.float64], effects: Sequence[Effect], world: World, t: NDArray[np.float64]
@@ -244,18 +248,18 @@ class Twin:
                     readings = step(t, readings, rng)
         return readings
 
-    def sample_times(self, t: NDArray[np.float64], effects: Sequence[Any] = ()) -> NDArray[np.float64]:
+    def sample_times(self, t: NDArray[np.float64], effects: Sequence[AnyEffect] = ()) -> NDArray[np.float64]:
         """Return the true time that each chip's reading and, last, the reference belong to, shape (n, k + 1)."""
         world = self.world(effects)
         return np.column_stack([world.chip_times(t), t - world.tacho_delay])
 
-    def sensing_lag(self, effects: Sequence[Any] = ()) -> float:
+    def sensing_lag(self, effects: Sequence[AnyEffect] = ()) -> float:
         """Return the time constant of the sensing chain's first-order lag, s."""
-        return float(sum(e.value("time_constant_s") for e in (*self.effects, *effects) if e.name == "sensor_lag"))
+        return float(sum(e.value("time_constant_s") for e in self._effects_with(effects) if e.name == "sensor_lag"))
 
-    def play(self, effects: Sequence[Any] = ()) -> Play | None:
+    def play(self, effects: Sequence[AnyEffect] = ()) -> Play | None:
         """Return what holds a share of the readings, of several the largest; None where nothing does."""
-        plays = [effect for effect in (*self.effects, *effects) if isinstance(effect, Hysteresis) and effect.share]
+        plays = [effect for effect in self._effects_with(effects) if isinstance(effect, Hysteresis) and effect.share]
         if not plays:
             return None
         largest = max(plays, key=lambda play: play.share)
@@ -263,24 +267,24 @@ class Twin:
         others = [effect for effect in effects if not isinstance(effect, Hysteresis)]
         return Play(largest.share, largest.value("lost_m_s2"), replace(self, effects=own), others, largest.last_moved)
 
-    def ripple(self, effects: Sequence[Any] = ()) -> Ripple | None:
+    def ripple(self, effects: Sequence[AnyEffect] = ()) -> Ripple | None:
         """Return what the table ripples by once effects are added; None where nothing does, or several things do."""
-        ripples = [effect for effect in (*self.effects, *effects) if isinstance(effect, Cogging)]
+        ripples = [effect for effect in self._effects_with(effects) if isinstance(effect, Cogging)]
         if len(ripples) != 1:
             return None
         own = tuple(effect for effect in self.effects if not isinstance(effect, Cogging))
         others = [effect for effect in effects if not isinstance(effect, Cogging)]
         return Ripple(ripples[0].steepness, replace(self, effects=own), others, ripples[0].rippled)
 
-    def modes(self, effects: Sequence[Any] = ()) -> tuple[Mode, ...]:
+    def modes(self, effects: Sequence[AnyEffect] = ()) -> tuple[Mode, ...]:
         """Return what rings between the table and the cube once effects are added."""
-        return tuple(effect.mode for effect in (*self.effects, *effects) if isinstance(effect, Resonance))
+        return tuple(effect.mode for effect in self._effects_with(effects) if isinstance(effect, Resonance))
 
-    def reference_gain(self, effects: Sequence[Any] = ()) -> float:
+    def reference_gain(self, effects: Sequence[AnyEffect] = ()) -> float:
         """Return what the reference reads per unit of motion once effects are added, relative to the twin's own."""
         if self.drive_source == "angle":
             return 1.0
-        return float(math.prod(1.0 + e.value("ratio") for e in effects if e.name == "tacho_scale"))
+        return float(math.prod(1.0 + e.value("ratio") for e in _own(effects) if e.name == "tacho_scale"))
 
     def expected_noise(self, sample_rate: float) -> ExpectedNoise:
         """Return white noise and quantisation of the part at a sample rate, as the data sheet has them."""
@@ -300,9 +304,25 @@ class Twin:
         white = np.sqrt(np.maximum(analogue, 0.0) * factor**2 + quantum**2 / 12.0)
         return ExpectedNoise(white, quantum, self.range_g * STANDARD_GRAVITY)
 
-    def extended(self, effects: Sequence[Any]) -> Twin:
+    def extended(self, effects: Sequence[AnyEffect]) -> Twin:
         """Return the twin with these effects added to its own."""
-        return replace(self, effects=(*self.effects, *effects))
+        return replace(self, effects=self._effects_with(effects))
+
+
+if TYPE_CHECKING:
+
+    def _proof(twin: Twin) -> BodyModel:
+        """Let the type checker prove that a twin is a world model, of a table and of a free body."""
+        return twin
+
+
+def _own(effects: Sequence[AnyEffect]) -> list[Effect]:
+    """Return effects as those of this simulation; raises `InputError` for those of another one."""
+    own = [effect for effect in effects if isinstance(effect, Effect)]
+    if len(own) < len(effects):
+        foreign = ", ".join(effect.name for effect in effects if not isinstance(effect, Effect))
+        raise InputError(f"not effects of this simulation: {foreign}; build them with sim.effects.make_effect")
+    return own
 
 
 def _check_keys(data: Mapping[str, Any], known: set[str], where: str) -> None:

@@ -17,10 +17,11 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.array import AccelerometerArray
+from gfimu.geometry.array import AccelerometerArray
 from gfimu.short_repr import short_repr
 from gfimu.units import STANDARD_GRAVITY
-from sim.motion import SpinMotion, SpinState
+from gfimu.world_model import SpinState
+from sim.motion import SpinMotion
 
 __all__ = ["DataStep", "MotionStep", "Nod", "ReferenceStep", "SampleContext", "SensingStep", "World"]
 

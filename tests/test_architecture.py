@@ -2,12 +2,17 @@
 
 import ast
 import graphlib
+import importlib
+import inspect
+import re
 from collections import Counter
 from pathlib import Path
 
 import pytest
 
 import gfimu
+from gfimu.world_model import BodyModel, ModelWithModes, ModelWithPlay, ModelWithRipple
+from sim.twin import Twin
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = ("gfimu", "sim", "firmware_bridge")
@@ -114,6 +119,38 @@ def test_sim_imports_neither_the_wire_nor_the_command_line():
     )
 
 
+def test_the_world_knows_nothing_of_the_diagnosis():
+    """The study of the diagnosis (`sim.study`) stands above both, as the commands do."""
+    assert not offences(
+        lambda module: inside(module, "sim") and not inside(module, "sim.study"),
+        lambda name: inside(name, "gfimu.diagnosis", "sim.study"),
+    )
+
+
+def test_no_cast_makes_a_twin_a_world_model():
+    protocols = "WorldModel|BodyModel|Twin|Effect|EffectFamily|Spin|Size"
+    casts = {
+        module: found
+        for module, file in FILES.items()
+        if (found := re.findall(rf"cast\(\s*[\"'][^\"']*\b(?:{protocols})\b", file.read_text(encoding="utf-8")))
+    }
+    assert casts == {}
+
+
+def test_a_twin_is_a_world_model_without_any():
+    """`sim/twin.py` lets the type checker prove it; ``Any`` in a signature would make that proof empty."""
+    protocols = (BodyModel, ModelWithModes, ModelWithPlay, ModelWithRipple)
+    methods = {name for protocol in protocols for name in dir(protocol) if not name.startswith("_")}
+    assert {"predict", "predict_body", "families", "play", "ripple", "modes", "extended"} <= methods
+    untyped = [
+        name
+        for name in methods
+        if inspect.isfunction(method := inspect.getattr_static(Twin, name, None))
+        and re.search(r"\bAny\b", str(inspect.signature(method)))
+    ]
+    assert untyped == []
+
+
 def test_firmware_bridge_imports_recordings_and_the_chip_only():
     assert not offences(
         lambda module: inside(module, "firmware_bridge"),
@@ -122,6 +159,109 @@ def test_firmware_bridge_imports_recordings_and_the_chip_only():
             or inside(name, "gfimu.cli", "gfimu.diagnosis", "gfimu.calibration", "gfimu.visual", "mujoco")
         ),
     )
+
+
+COMMON = {"gfimu", "gfimu.errors", "gfimu.units", "gfimu.files.outputs", "gfimu.files.atomic_file", "gfimu.short_repr"}
+"""Modules that every room may import; of `gfimu` itself the version."""
+
+ROOMS = {
+    "gfimu.files": set(),
+    "gfimu.parts": {"gfimu.files", "gfimu.geometry.array"},
+    "gfimu.geometry": {"gfimu.bounds", "gfimu.files", "gfimu.parts.files"},
+    "gfimu.recording": {"gfimu.files", "gfimu.geometry", "gfimu.parts"},
+    "gfimu.motion": {"gfimu.files", "gfimu.geometry", "gfimu.parts", "gfimu.rate", "gfimu.recording"},
+    "gfimu.position_drift": {"gfimu.geometry", "gfimu.motion", "gfimu.rate.integration"},
+    "gfimu.diagnosis.data": {
+        "gfimu.world_model",
+        "gfimu.diagnosis.segment",
+        "gfimu.diagnosis.stretches",
+        "gfimu.recording",
+    },
+    "gfimu.diagnosis.criticism": {"gfimu.diagnosis.coloured_noise", "gfimu.diagnosis.verdict"},
+    "gfimu.diagnosis.verdict": {"gfimu.world_model", "gfimu.diagnosis.data.run"},
+    "gfimu.diagnosis.report": {
+        "gfimu.diagnosis.calibration_residue",
+        "gfimu.diagnosis.criticism",
+        "gfimu.diagnosis.verdict",
+        "gfimu.recording",
+        "gfimu.visual",
+    },
+    "gfimu.diagnosis.design": {
+        "gfimu.diagnosis.causes",
+        "gfimu.diagnosis.coloured_noise",
+        "gfimu.diagnosis.data.run",
+        "gfimu.diagnosis.drive",
+        "gfimu.diagnosis.evidence",
+        "gfimu.world_model",
+        "gfimu.diagnosis.segment",
+        "gfimu.diagnosis.signatures",
+        "gfimu.diagnosis.stretches",
+    },
+}
+"""Folders, and what of this project each may import besides itself and the common modules."""
+
+MOST_FILES = 12
+"""In one folder of `ROOMS`."""
+
+
+def room_imports(room: str) -> set[str]:
+    """Modules of this project outside a room, and not common, that the room imports."""
+    return {
+        name
+        for module, names in IMPORTS.items()
+        if inside(module, room)
+        for name in names
+        if inside(name, *PACKAGES) and not inside(name, room) and name not in COMMON
+    }
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_rooms_import_from_the_rooms_they_name_only(room):
+    imported = room_imports(room)
+    assert {name for name in imported if not inside(name, *ROOMS[room])} == set()
+    assert {name for name in ROOMS[room] if not any(inside(one, name) for one in imported)} == set()
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_rooms_have_few_files(room):
+    assert 1 < len([file for file in FILES.values() if file.parent == FILES[room].parent]) <= MOST_FILES
+
+
+FORMER = {
+    "gfimu.array": "gfimu.geometry.array",
+    "gfimu.kinematics": "gfimu.geometry.kinematics",
+    "gfimu.estimation": "gfimu.motion.estimation",
+    "gfimu.diagnosis.model": "gfimu.world_model",
+}
+"""Modules that keep a former name for the programs of users, and where their content is."""
+
+
+@pytest.mark.parametrize("former", FORMER)
+def test_former_names_of_modules_give_the_same_objects(former):
+    old, new = importlib.import_module(former), importlib.import_module(FORMER[former])
+    assert old.__all__ == new.__all__
+    assert all(getattr(old, name) is getattr(new, name) for name in old.__all__)
+
+
+def test_the_project_itself_imports_no_former_name():
+    assert not offences(lambda module: True, lambda name: name in FORMER)
+
+
+def test_packages_called_like_former_modules_hold_their_names():
+    assert importlib.import_module("gfimu.recording").Recording is gfimu.Recording
+    assert importlib.import_module("gfimu.position_drift").drift_budget is gfimu.drift_budget
+
+
+def test_few_modules_are_in_no_room():
+    loose = {module for module, file in FILES.items() if file.parent == FILES["gfimu"].parent} - {"gfimu", *FORMER}
+    assert loose == {
+        "gfimu.bounds",
+        "gfimu.errors",
+        "gfimu.generic_basis",
+        "gfimu.short_repr",
+        "gfimu.units",
+        "gfimu.world_model",
+    }
 
 
 def test_no_circular_imports():
@@ -141,10 +281,16 @@ if TYPE_CHECKING:
 else:
     import json
 def f():
-    from gfimu.array import Chip
+    from gfimu.geometry.array import Chip
     from gfimu import recording
 """
-    assert modules_imported(source) == {"sim.world", "typing.TYPE_CHECKING", "json", "gfimu.array", "gfimu.recording"}
+    assert modules_imported(source) == {
+        "sim.world",
+        "typing.TYPE_CHECKING",
+        "json",
+        "gfimu.geometry.array",
+        "gfimu.recording",
+    }
 
 
 @pytest.mark.parametrize("module", FILES)

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from firmware_bridge.adxl345_device import TICKS_PER_SECOND
-from gfimu.atomic_file import atomic_path
-from gfimu.rerun_stream import rrd_stream
+from gfimu.files.atomic_file import atomic_path
+from gfimu.files.rerun_stream import rrd_stream
 
 __all__ = ["Event", "EventList", "write_rrd", "write_vcd"]
 

@@ -16,8 +16,8 @@ from pathlib import Path
 import tomli_w
 
 from firmware_bridge.lpc1768.elf import ElfImage
-from gfimu.atomic_file import atomic_path, write_text
 from gfimu.errors import GfimuError, InputError
+from gfimu.files.atomic_file import atomic_path, write_text
 
 __all__ = [
     "IMAGES",

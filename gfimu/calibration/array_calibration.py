@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from gfimu.array import AccelerometerArray
 from gfimu.calibration.array_motion import ArrayMotion, array_motion
 from gfimu.calibration.array_static import array_static
 from gfimu.calibration.array_update import array_update
@@ -15,8 +14,9 @@ from gfimu.calibration.motion_reference import motion_reference
 from gfimu.calibration.observations import Observations, averaged_poses
 from gfimu.calibration.result import Calibration
 from gfimu.errors import InputError
+from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
-from gfimu.rest import Rest, detect_rest
+from gfimu.recording.rest import Rest, detect_rest
 from gfimu.units import STANDARD_GRAVITY
 
 __all__ = ["calibrate_array", "update_array_calibration"]

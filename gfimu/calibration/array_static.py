@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import null_space
 
-from gfimu.array import AccelerometerArray
 from gfimu.calibration.coverage import check_magnitude_coverage, fit_sphere, pose_directions
 from gfimu.calibration.fit_quality import covariance_scale, odd_poses
 from gfimu.calibration.gauss_helmert import Condition, gauss_helmert
 from gfimu.calibration.observations import Observations
 from gfimu.calibration.result import Calibration, parameter_names
 from gfimu.errors import InputError
+from gfimu.geometry.array import AccelerometerArray
 
 __all__ = ["apparent_alpha", "array_static", "body_specific_force", "disagreement", "same_specific_force"]
 

@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri
 
-from gfimu.array import AccelerometerArray
 from gfimu.calibration.array_static import apparent_alpha, body_specific_force, disagreement, same_specific_force
 from gfimu.calibration.observations import Observations
 from gfimu.calibration.result import Calibration
 from gfimu.errors import InputError, UnitError
+from gfimu.geometry.array import AccelerometerArray
 
 __all__ = ["array_update"]
 

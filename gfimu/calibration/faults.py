@@ -12,7 +12,7 @@ from gfimu.calibration.coverage import distinct_poses, pose_directions, pose_lab
 from gfimu.calibration.result import Calibration
 from gfimu.errors import InputError
 from gfimu.recording import Recording
-from gfimu.rest import Rest
+from gfimu.recording.rest import Rest
 
 __all__ = ["check_gravity", "check_readings", "moved_poses", "repeated_poses", "scale_warning", "without_moved_poses"]
 

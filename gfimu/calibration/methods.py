@@ -21,9 +21,9 @@ from gfimu.calibration.result import Calibration, combine
 from gfimu.calibration.six_position import six_position
 from gfimu.calibration.twelve_position import twelve_position
 from gfimu.errors import InputError, unknown_name
-from gfimu.part import Part
+from gfimu.parts.part import Part
 from gfimu.recording import Recording
-from gfimu.rest import detect_rest
+from gfimu.recording.rest import detect_rest
 from gfimu.units import STANDARD_GRAVITY
 
 __all__ = ["METHODS", "calibrate", "calibrate_gyro"]
@@ -63,7 +63,7 @@ def calibrate(
     recording : Recording
         Readings of one or more chips, in m/s² or raw counts.
     gravity : float
-        Local gravity, m/s²; see `gfimu.gravity.local_gravity`.
+        Local gravity, m/s²; see `gfimu.geometry.gravity.local_gravity`.
     n_parameters : {9, 12}, optional
         Parameters per triad; 12 by default, 9 for ``multi-position``.
     input_kind : {"averaged", "raw", "wavelet"}

@@ -10,7 +10,7 @@ from scipy.signal import savgol_coeffs, savgol_filter
 
 from gfimu.errors import InputError
 from gfimu.recording import Recording
-from gfimu.rest import detect_rest
+from gfimu.recording.rest import detect_rest
 
 __all__ = ["MotionReference", "motion_reference"]
 

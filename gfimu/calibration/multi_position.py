@@ -16,7 +16,7 @@ from gfimu.calibration.gauss_helmert import Adjustment, Condition, gauss_helmert
 from gfimu.calibration.observations import Observations
 from gfimu.calibration.result import Calibration, parameter_names
 from gfimu.errors import unknown_name
-from gfimu.gravity import EARTH_RATE
+from gfimu.geometry.gravity import EARTH_RATE
 
 __all__ = ["WEIGHTINGS", "magnitude_condition", "multi_position", "multi_position_gyro"]
 

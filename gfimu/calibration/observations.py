@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gfimu.errors import InputError, unknown_name
 from gfimu.recording import Recording
-from gfimu.rest import Rest
+from gfimu.recording.rest import Rest
 
 __all__ = ["INPUTS", "Observations", "averaged_poses", "denoised_samples", "every_sample", "observations_from"]
 

@@ -9,10 +9,10 @@ import matplotlib as mpl
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.atomic_file import atomic_path
 from gfimu.calibration.result import Calibration
+from gfimu.files.atomic_file import atomic_path
 from gfimu.recording import Recording
-from gfimu.rest import detect_rest
+from gfimu.recording.rest import detect_rest
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

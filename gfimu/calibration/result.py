@@ -17,10 +17,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.array import AccelerometerArray
-from gfimu.atomic_file import write_text
 from gfimu.calibration.error_model import GAUGES, ErrorModel, free_elements
 from gfimu.errors import InputError, UnitError
+from gfimu.files.atomic_file import write_text
+from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
 from gfimu.short_repr import joined
 

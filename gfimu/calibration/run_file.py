@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from gfimu.array import AccelerometerArray
 from gfimu.calibration.imu_tk import read_text_triad
 from gfimu.calibration.result import Calibration
-from gfimu.carried_array import array_difference
-from gfimu.column_file import open_columns
 from gfimu.errors import InputError
-from gfimu.mimu4444 import is_mimu4444, read_mimu4444
+from gfimu.files.column_file import open_columns
+from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
-from gfimu.recording_formats import open_run
+from gfimu.recording.carried_array import array_difference
+from gfimu.recording.formats import open_run
+from gfimu.recording.mimu4444 import is_mimu4444, read_mimu4444
 
 __all__ = ["open_calibrated", "open_calibrated_run", "open_uncalibrated"]
 
@@ -54,7 +54,7 @@ def open_calibrated_run(
     Raises
     ------
     InputError
-        As `gfimu.recording_formats.open_run`, or if the calibration does not fit the recording.
+        As `gfimu.recording.formats.open_run`, or if the calibration does not fit the recording.
     """
     recording, geometry = open_run(path, array)
     if calibration.unit == "lsb" and not is_mimu4444(path):

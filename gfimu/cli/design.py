@@ -10,7 +10,7 @@ import typer
 from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, progress
 
 if TYPE_CHECKING:
-    from gfimu.diagnosis.proposal import Proposal
+    from gfimu.diagnosis.design.proposal import Proposal
 
 __all__ = ["register"]
 

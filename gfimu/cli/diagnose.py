@@ -10,7 +10,7 @@ import typer
 from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, print_text, progress
 
 if TYPE_CHECKING:
-    from gfimu.diagnosis.verdict import Diagnosis
+    from gfimu.diagnosis.verdict.verdict import Diagnosis
 
 __all__ = ["register"]
 
@@ -46,7 +46,7 @@ def _diagnose(
     A unit fresh from the bench: gfimu diagnose run.parquet --twin cube12_turntable --calibration cal.json --out d
     """
     from gfimu.commands.diagnose import diagnose
-    from gfimu.diagnosis.folder import FILES
+    from gfimu.diagnosis.report.folder import FILES
 
     with progress("diagnosing", total=1.0) as done:
         found = diagnose(runs, twin, out=out, held_out=held_out or [], calibration=calibration, report=done)
@@ -60,7 +60,7 @@ def _diagnose(
 
 def print_diagnosis(found: Diagnosis) -> None:
     """Print a diagnosis for people."""
-    from gfimu.diagnosis.plain_words import (
+    from gfimu.diagnosis.report.plain_words import (
         gain_rows,
         headline,
         next_steps,

@@ -10,8 +10,8 @@ import typer
 from gfimu.cli.output import JsonOption, print_json, print_table, print_text, progress
 
 if TYPE_CHECKING:
-    from gfimu.drift_monte_carlo import DriftSample
     from gfimu.position_drift import DriftBudget
+    from gfimu.position_drift.monte_carlo import DriftSample
 
 __all__ = ["register"]
 

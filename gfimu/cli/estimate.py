@@ -12,7 +12,7 @@ from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, p
 if TYPE_CHECKING:
     import numpy as np
 
-    from gfimu.estimate_summary import EstimateSummary
+    from gfimu.motion.estimate_summary import EstimateSummary
 
 __all__ = ["register"]
 
@@ -57,7 +57,7 @@ def _estimate(
     Example: gfimu estimate run.parquet --method filter --rest-bias --out estimate.parquet
     """
     from gfimu.commands.estimate import estimate_run
-    from gfimu.estimate_summary import summarise
+    from gfimu.motion.estimate_summary import summarise
 
     with progress(_describe(method), total=1.0) as done:
         found = estimate_run(

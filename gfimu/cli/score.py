@@ -12,7 +12,7 @@ import typer
 from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, print_text, progress
 
 if TYPE_CHECKING:
-    from gfimu.scoring import Score
+    from gfimu.geometry.scoring import Score
 
 __all__ = ["register"]
 
@@ -107,7 +107,7 @@ def _optimize(
 
 
 def _print_scores(scores: list[Score], condition: str) -> None:
-    from gfimu.scoring import ranking_remark
+    from gfimu.geometry.scoring import ranking_remark
 
     units = sorted({entry.length_unit_m for entry in scores})
     unit = (

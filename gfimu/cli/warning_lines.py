@@ -6,7 +6,7 @@ import sys
 import warnings
 from typing import Any
 
-from gfimu.recording_warning import RecordingWarning
+from gfimu.errors import RecordingWarning
 
 __all__ = ["install"]
 

@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gfimu.errors import InputError, unknown_name
-from gfimu.outputs import CALIBRATION, PICTURE, writes
+from gfimu.files.outputs import CALIBRATION, PICTURE, writes
 
 if TYPE_CHECKING:
-    from gfimu.array import AccelerometerArray
     from gfimu.calibration.result import Calibration
+    from gfimu.geometry.array import AccelerometerArray
     from gfimu.recording import Recording
 
 __all__ = ["calibrate"]
@@ -173,7 +173,7 @@ def _own_array(recording: Recording | str | Path) -> AccelerometerArray:
 
 
 def _gravity(gravity: float | None, latitude: float | None, height: float) -> float:
-    from gfimu.gravity import local_gravity
+    from gfimu.geometry.gravity import local_gravity
     from gfimu.units import STANDARD_GRAVITY
 
     if gravity is not None and latitude is not None:

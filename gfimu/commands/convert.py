@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gfimu.outputs import RECORDING, writes
+from gfimu.files.outputs import RECORDING, writes
 
 if TYPE_CHECKING:
-    from gfimu.array import AccelerometerArray
+    from gfimu.geometry.array import AccelerometerArray
     from gfimu.recording import Recording
 
 __all__ = ["convert"]
@@ -37,10 +37,10 @@ def convert(
     InputError
         If the source can't be read, or the target can't be written where it is asked for.
     """
-    from gfimu.carried_array import carried_array
     from gfimu.commands.opened import as_array
     from gfimu.recording import Recording
-    from gfimu.recording_formats import open_recording
+    from gfimu.recording.carried_array import carried_array
+    from gfimu.recording.formats import open_recording
 
     drawing = None if array is None else as_array(array)
     recording = source if isinstance(source, Recording) else open_recording(source, array=drawing)

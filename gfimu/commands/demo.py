@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gfimu.commands.diagnose import FOLDER as DIAGNOSIS
-from gfimu.outputs import OutputFolder, check_outputs, writes
+from gfimu.files.outputs import OutputFolder, check_outputs, writes
 
 if TYPE_CHECKING:
     from gfimu.commands.demo_steps import Row

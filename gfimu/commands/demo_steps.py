@@ -5,17 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from gfimu.diagnosis.model import WorldModel
-    from gfimu.drift_monte_carlo import DriftSample
-    from gfimu.estimation import Estimate
+    from gfimu.motion.estimation import Estimate
+    from gfimu.motion.rest_bias import RestBias
+    from gfimu.position_drift.monte_carlo import DriftSample
     from gfimu.recording import Recording
-    from gfimu.rest_bias import RestBias
     from sim.scenarios import Scenario
 
 __all__ = ["STEPS", "Demo", "Row"]
@@ -84,7 +83,7 @@ class Demo:
 
 def score_geometry(demo: Demo) -> None:
     """Score the array."""
-    from gfimu.scoring import score
+    from gfimu.geometry.scoring import score
 
     (cube,) = score("cube12")
     leakage = float(np.max(np.abs(cube.omega_squared_leakage)))
@@ -120,7 +119,7 @@ def simulate_run(demo: Demo) -> None:
 
 def read_biases(demo: Demo) -> None:
     """Read the channels' biases off at rest, as the paper does."""
-    from gfimu.rest_bias import rest_bias
+    from gfimu.motion.rest_bias import rest_bias
 
     array = demo.scenario.array
     demo.bias = rest_bias(demo.recording, array, gravity=demo.scenario.gravity)
@@ -139,8 +138,8 @@ def read_biases(demo: Demo) -> None:
 
 def estimate_motion(demo: Demo) -> None:
     """Estimate acceleration, rate and angle."""
-    from gfimu.estimation import estimate
-    from gfimu.rest_bias import estimate_from_rest
+    from gfimu.motion.estimation import estimate
+    from gfimu.motion.rest_bias import estimate_from_rest
 
     array = demo.scenario.array
     raw = estimate(demo.recording, array)
@@ -181,9 +180,9 @@ def estimate_motion(demo: Demo) -> None:
 
 def state_drift(demo: Demo) -> None:
     """State the position drift that was to be expected."""
-    from gfimu.drift_monte_carlo import monte_carlo_drift
-    from gfimu.part import white_noise_std
+    from gfimu.parts.part import white_noise_std
     from gfimu.position_drift import ErrorSources, drift_budget
+    from gfimu.position_drift.monte_carlo import monte_carlo_drift
 
     array, recording = demo.scenario.array, demo.recording
     noise = _rms(white_noise_std(array, recording.sample_rate))
@@ -218,7 +217,7 @@ def calibrate_chips(demo: Demo) -> None:
     from dataclasses import replace
 
     from gfimu.calibration.array_calibration import calibrate_array
-    from gfimu.estimation import estimate
+    from gfimu.motion.estimation import estimate
     from sim.pose_sequence import PoseSequence
     from sim.scenarios import simulate
 
@@ -311,7 +310,7 @@ def diagnose_hidden(demo: Demo) -> None:
     )
     recording = simulate(calibrated, seed=demo.seed, out=demo.out / "hidden.parquet")
     twin = Twin.load(_TWIN)  # believes in a level table with the cube on its axis
-    found = diagnose([recording], cast("WorldModel", twin), names=["hidden.parquet"])
+    found = diagnose([recording], twin, names=["hidden.parquet"])
     written = write_result(demo.out / "diagnosis", found, recording)
     demo.written["diagnosis report"] = written["report"]
     causes = {cause.effect: cause for cause in found.causes}

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING
 
 from gfimu.errors import InputError
-from gfimu.outputs import SCENARIO, writes
+from gfimu.files.outputs import SCENARIO, writes
 
 if TYPE_CHECKING:
     import numpy as np
 
-    from gfimu.diagnosis.model import Effect, WorldModel
-    from gfimu.diagnosis.profile_search import Limits
-    from gfimu.diagnosis.proposal import Proposal
-    from gfimu.diagnosis.run import Run
+    from gfimu.diagnosis.data.run import Run
+    from gfimu.diagnosis.design.profile_search import Limits
+    from gfimu.diagnosis.design.proposal import Proposal
     from gfimu.recording import Recording
+    from gfimu.world_model import Effect, WorldModel
     from sim.twin import Twin
 
 __all__ = ["design"]
@@ -72,7 +72,7 @@ def design(
     rng : numpy.random.Generator, optional
         In place of ``seed``.
     mountings : mapping, optional
-        How else the cube may be mounted, in place of ``upright``; see `gfimu.diagnosis.design.MOUNTINGS`.
+        How else the cube may be mounted, in place of ``upright``; see `gfimu.diagnosis.design.design.MOUNTINGS`.
     recorded : sequence of Run
         Prepared recordings at hand, beside ``run``.
     sample_rate : float, optional
@@ -88,18 +88,17 @@ def design(
     """
     import numpy as np
 
-    from gfimu.atomic_file import write_text
     from gfimu.commands.opened import as_runs, as_twin
-    from gfimu.diagnosis.ambiguity import open_effects
-    from gfimu.diagnosis.design import MOUNTINGS, Limits
-    from gfimu.diagnosis.design import design as propose
-    from gfimu.diagnosis.run import prepare_run
+    from gfimu.diagnosis.data.run import prepare_run
+    from gfimu.diagnosis.design.ambiguity import open_effects
+    from gfimu.diagnosis.design.design import MOUNTINGS, Limits
+    from gfimu.diagnosis.design.design import design as propose
+    from gfimu.files.atomic_file import write_text
     from gfimu.recording import Recording
 
     if (verdict is None) == (not effects):
         raise InputError("name effects to tell apart, or give --verdict: one of the two")
-    # Its effects are narrower than the protocol's.
-    model = cast("WorldModel", as_twin(cast("Twin | str | Path", twin)))
+    model: WorldModel = as_twin(twin) if isinstance(twin, str | Path) else twin
     asked = list(effects) if verdict is None else open_effects(verdict, model)
     at_hand = [
         prepare_run(

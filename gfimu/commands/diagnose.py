@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING
 
-from gfimu.outputs import OutputFolder, writes
+from gfimu.files.outputs import OutputFolder, writes
 
 if TYPE_CHECKING:
     from gfimu.calibration.result import Calibration
-    from gfimu.diagnosis.model import WorldModel
-    from gfimu.diagnosis.verdict import Diagnosis
+    from gfimu.diagnosis.verdict.verdict import Diagnosis
     from gfimu.recording import Recording
     from sim.twin import Twin
 
@@ -72,7 +71,7 @@ def diagnose(
     if unit is not None and unit.positions:
         model = replace(model, array=unit.calibrated_array(model.array), array_name="array.toml")
     labels = _names(runs) if names is None else names
-    found = explain(read, cast("WorldModel", model), held_out=kept, names=labels, report=report)
+    found = explain(read, model, held_out=kept, names=labels, report=report)
     if out is not None:
         if report is not None:
             report(0.99, "write the report")
@@ -84,11 +83,14 @@ def write_result(out: str | Path, found: Diagnosis, recording: Recording) -> dic
     """Write the folder of a diagnosis, with the rig of the extended twin drawn by its MuJoCo model."""
     import tomli_w
 
-    from gfimu.diagnosis.folder import write_diagnosis
-    from gfimu.model_files import list_models
+    from gfimu.diagnosis.report.folder import write_diagnosis
+    from gfimu.files.model_files import list_models
     from sim.drawing import rig_drawing
+    from sim.twin import Twin
 
-    twin = cast("Twin", found.twin)
+    twin = found.twin
+    if not isinstance(twin, Twin):
+        raise TypeError(f"only the rig of a sim.twin.Twin can be drawn, not of a {type(twin).__name__}")
     world = twin.world(mounting=recording.mounting_rotvec)
     content = twin.to_dict()
     more = {}
@@ -111,7 +113,7 @@ def _opened(recording: Recording | str | Path, model: Twin, unit: Calibration | 
     """Return a recording with the channels of the twin's array, calibrated where there is a calibration."""
     from gfimu.calibration.run_file import open_calibrated_run
     from gfimu.recording import Recording
-    from gfimu.recording_formats import open_recording
+    from gfimu.recording.formats import open_recording
 
     if isinstance(recording, Recording):
         return recording if unit is None else unit.apply(recording)

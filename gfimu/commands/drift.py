@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 from gfimu.errors import InputError
 
 if TYPE_CHECKING:
-    from gfimu.array import AccelerometerArray
-    from gfimu.drift_monte_carlo import DriftSample
+    from gfimu.geometry.array import AccelerometerArray
     from gfimu.position_drift import DriftBudget
+    from gfimu.position_drift.monte_carlo import DriftSample
 
 __all__ = ["Drift", "drift"]
 
@@ -99,8 +99,8 @@ def drift(
     import numpy as np
 
     from gfimu.commands.opened import as_array
-    from gfimu.drift_monte_carlo import monte_carlo_drift
     from gfimu.position_drift import ErrorSources, drift_budget
+    from gfimu.position_drift.monte_carlo import monte_carlo_drift
     from gfimu.units import STANDARD_GRAVITY
 
     if monte_carlo == 1 or monte_carlo < 0:

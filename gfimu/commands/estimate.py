@@ -7,14 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from gfimu.outputs import ESTIMATE, RERUN, writes
+from gfimu.files.outputs import ESTIMATE, RERUN, writes
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from gfimu.array import AccelerometerArray
     from gfimu.calibration.result import Calibration
-    from gfimu.estimation import Estimate
+    from gfimu.geometry.array import AccelerometerArray
+    from gfimu.motion.estimation import Estimate
     from gfimu.recording import Recording
 
 __all__ = ["EstimatedRun", "estimate", "estimate_run"]
@@ -77,7 +77,7 @@ def estimate(
     method : str
         Method for the angular rate: integrate, algebraic, ml, filter or smoother.
     form : {"auto", "linear", "joint", "recursive"}
-        How readings turn into α and p; see `gfimu.linear_solution`.
+        How readings turn into α and p; see `gfimu.geometry.linear_solution`.
     rest_bias : bool
         Read the biases off the first rest (table level) and take them off.
     calibration : Calibration, str or Path, optional
@@ -95,12 +95,12 @@ def estimate(
     progress : callable, optional
         Called with the share done, 0 to 1.
     omega0, quaternion0, noise_std
-        As for `gfimu.estimation.estimate`.
+        As for `gfimu.motion.estimation.estimate`.
 
     Raises
     ------
     InputError
-        As `gfimu.estimation.estimate`, or if an output can't be written where it is asked for.
+        As `gfimu.motion.estimation.estimate`, or if an output can't be written where it is asked for.
     GeometryError
         If the array can't see all six motions; the message names those it can't.
     """
@@ -141,8 +141,8 @@ def estimate_run(
     InputError
         As `estimate`.
     """
-    from gfimu.estimation import estimate as solve
-    from gfimu.rest_bias import estimate_from_rest
+    from gfimu.motion.estimation import estimate as solve
+    from gfimu.motion.rest_bias import estimate_from_rest
 
     run, geometry = _opened(recording, array, calibration)
     found = (estimate_from_rest if rest_bias else solve)(run, geometry, **options)

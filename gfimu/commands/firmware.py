@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, overload
 
 from gfimu.errors import InputError
-from gfimu.outputs import RECORDING, TRACE, OutputFolder, writes
+from gfimu.files.outputs import RECORDING, TRACE, OutputFolder, writes
 
 if TYPE_CHECKING:
     from firmware_bridge.board_process import BoardProcess

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from gfimu.errors import InputError
 
 if TYPE_CHECKING:
-    from gfimu.array import AccelerometerArray
+    from gfimu.geometry.array import AccelerometerArray
 
 __all__ = ["live"]
 
@@ -61,11 +61,11 @@ def live(
     """
     import numpy as np
 
-    from gfimu.carried_array import carried_array
     from gfimu.commands.opened import as_array
     from gfimu.rate.kalman import FilterSettings
     from gfimu.rate.sensing import SensorErrors
     from gfimu.rate.stream import filter_stream, read_head
+    from gfimu.recording.carried_array import carried_array
 
     metadata, lines = read_head(_lines(source, follow=follow) if isinstance(source, str | Path) else source)
     geometry = carried_array(metadata, source="the stream") if array is None else as_array(array)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gfimu.outputs import KALIBR, PICTURE, writes
+from gfimu.files.outputs import KALIBR, PICTURE, writes
 
 if TYPE_CHECKING:
     from gfimu.calibration.result import Calibration
@@ -47,9 +47,9 @@ def noise(
     InputError
         If the recording can't be read or never rests, or an output can't be written where it is asked for.
     """
-    from gfimu.atomic_file import write_text
     from gfimu.calibration.run_file import open_calibrated, open_uncalibrated
     from gfimu.commands.opened import as_calibration
+    from gfimu.files.atomic_file import write_text
     from gfimu.recording import Recording
     from gfimu.sensor_noise import kalibr_yaml, recording_noise
 

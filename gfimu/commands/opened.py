@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 from gfimu.errors import InputError
 
 if TYPE_CHECKING:
-    from gfimu.array import AccelerometerArray
     from gfimu.calibration.result import Calibration
+    from gfimu.geometry.array import AccelerometerArray
     from gfimu.recording import Recording
     from sim.twin import Twin
 
@@ -32,7 +32,7 @@ def as_array(array: AccelerometerArray | str | Path) -> AccelerometerArray:
         from sim.mjcf_array import array_from_mjcf
 
         return array_from_mjcf(array)
-    from gfimu.array import AccelerometerArray
+    from gfimu.geometry.array import AccelerometerArray
 
     return AccelerometerArray.load(array)
 
@@ -56,7 +56,7 @@ def as_run(
 ) -> tuple[Recording, AccelerometerArray]:
     """Return a recording with its array; the recording's own array if none is given."""
     from gfimu.recording import Recording
-    from gfimu.recording_formats import open_run
+    from gfimu.recording.formats import open_run
 
     drawing = None if array is None else as_array(array)
     if isinstance(recording, Recording):

@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gfimu.errors import InputError
-from gfimu.outputs import ARRAY_FILE, writes
+from gfimu.files.outputs import ARRAY_FILE, writes
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import ArrayLike
 
-    from gfimu.geometry_search import SearchResult
+    from gfimu.geometry.search import SearchResult
 
 __all__ = ["optimize"]
 
@@ -73,8 +73,8 @@ def optimize(
     """
     import numpy as np
 
-    from gfimu.atomic_file import write_text
-    from gfimu.geometry_search import optimize as search
+    from gfimu.files.atomic_file import write_text
+    from gfimu.geometry.search import optimize as search
 
     number = n_chips if chips is None else chips
     if number is None:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gfimu.outputs import RECORDING, RERUN, writes
+from gfimu.files.outputs import RECORDING, RERUN, writes
 
 if TYPE_CHECKING:
     from firmware_bridge.live import LiveView
@@ -96,8 +96,8 @@ def _live_view(
 ) -> LiveView:
     from firmware_bridge.frames import frame_format
     from firmware_bridge.live import LiveView
-    from gfimu.array import AccelerometerArray
-    from gfimu.part import Part
+    from gfimu.geometry.array import AccelerometerArray
+    from gfimu.parts.part import Part
 
     carried = AccelerometerArray.load(array or frame_format(form).array)
     lsb = Part.load(carried.chips[0].part, carried.part_files).lsb

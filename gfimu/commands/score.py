@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from gfimu.array import AccelerometerArray
-    from gfimu.scoring import Score
+    from gfimu.geometry.array import AccelerometerArray
+    from gfimu.geometry.scoring import Score
 
 __all__ = ["score"]
 
@@ -51,11 +51,11 @@ def score(
     InputError
         If an array is unknown or an argument is out of range.
     """
-    from gfimu.array import AccelerometerArray
     from gfimu.commands.opened import as_array
     from gfimu.errors import unknown_name
-    from gfimu.model_files import list_models
-    from gfimu.scoring import score as score_arrays
+    from gfimu.files.model_files import list_models
+    from gfimu.geometry.array import AccelerometerArray
+    from gfimu.geometry.scoring import score as score_arrays
 
     if spin_axis not in _AXES:
         raise unknown_name("axis", spin_axis, _AXES)

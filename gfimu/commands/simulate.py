@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gfimu.outputs import RECORDING, RERUN, writes
+from gfimu.files.outputs import RECORDING, RERUN, writes
 
 if TYPE_CHECKING:
     from gfimu.recording import Recording

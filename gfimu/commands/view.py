@@ -6,10 +6,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gfimu.outputs import RERUN, check_outputs, writes
+from gfimu.files.outputs import RERUN, check_outputs, writes
 
 if TYPE_CHECKING:
-    from gfimu.array import AccelerometerArray
+    from gfimu.geometry.array import AccelerometerArray
 
 __all__ = ["view"]
 

@@ -16,10 +16,8 @@ from numpy.typing import NDArray
 
 from gfimu.diagnosis.causes import Cause, effects_of_run
 from gfimu.diagnosis.evidence import log_evidence, log_evidence_each
-from gfimu.diagnosis.old_fit import Fit
-from gfimu.diagnosis.generic_basis import FUNCTIONS, Motion
 from gfimu.diagnosis.linearisation import Linearisation
-from gfimu.diagnosis.model import BasisUnits, Effect, SpinState
+from gfimu.diagnosis.old_fit import Fit
 from gfimu.diagnosis.parallel import each_apart, over_segments
 from gfimu.diagnosis.residual_tests import (
     REFERENCE,
@@ -32,6 +30,8 @@ from gfimu.diagnosis.residual_tests import (
 )
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.signatures import cause_columns
+from gfimu.generic_basis import FUNCTIONS, Motion
+from gfimu.world_model import BasisUnits, Effect, SpinState
 
 __all__ = ["LEFT_OVER_ODDS", "dependence_left", "generic_basis", "left_over", "series_products"]
 

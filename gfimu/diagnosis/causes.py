@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
-from gfimu.array import AccelerometerArray
-from gfimu.diagnosis.model import Effect, EffectFamily, Pattern
+from gfimu.geometry.array import AccelerometerArray
+from gfimu.world_model import Effect, EffectFamily, Pattern
 
 WHOLE_NUMBERS = frozenset({"order", "moving_arms"})
 """Shape parameters that are whole numbers, picked from a grid and not refined."""

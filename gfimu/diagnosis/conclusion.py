@@ -9,14 +9,11 @@ from typing import Any
 import numpy as np
 from scipy.special import expit
 
-from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.adequacy import LEFT_OVER_ODDS
 from gfimu.diagnosis.causes import Cause, effects_of_run
+from gfimu.diagnosis.data.prepared_runs import PreparedRuns
 from gfimu.diagnosis.explanation import Explanation
-from gfimu.diagnosis.old_fit import Fit, segments_at
-from gfimu.diagnosis.generic_basis import ripple_order
 from gfimu.diagnosis.loose_calibration import LooseCalibration
-from gfimu.diagnosis.model import Effect, WorldModel
 from gfimu.diagnosis.named_causes import capped, contested, fault_causes, name_cause
 from gfimu.diagnosis.naming import (
     MOST_CERTAIN,
@@ -27,14 +24,17 @@ from gfimu.diagnosis.naming import (
     probabilities,
     rival_list,
 )
-from gfimu.diagnosis.prepared_runs import PreparedRuns
-from gfimu.diagnosis.residual_tests import LeftOver
+from gfimu.diagnosis.old_fit import Fit, segments_at
 from gfimu.diagnosis.old_search import MOST_CAUSES
+from gfimu.diagnosis.report.wording import verdict_sentences
+from gfimu.diagnosis.residual_tests import LeftOver
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.signatures import ANGLES
 from gfimu.diagnosis.stochastic import LoudestChannel, Walk, loudest_channel, white_factor
-from gfimu.diagnosis.verdict import Diagnosis, Gain, NamedCause, Residual, RunView, Unexplained
-from gfimu.diagnosis.wording import verdict_sentences
+from gfimu.diagnosis.verdict.verdict import Diagnosis, Gain, NamedCause, Residual, RunView, Unexplained
+from gfimu.generic_basis import ripple_order
+from gfimu.geometry.array import AccelerometerArray
+from gfimu.world_model import Effect, WorldModel
 
 __all__ = ["Described", "conclude", "is_dominant", "is_unknown", "without_causes"]
 

@@ -7,31 +7,31 @@ from dataclasses import replace
 
 import numpy as np
 
-from gfimu.carried_array import warn_of_other_array
 from gfimu.diagnosis.adequacy import LEFT_OVER_ODDS, left_over
 from gfimu.diagnosis.causes import effects_of_run
 from gfimu.diagnosis.conclusion import Described, conclude, is_dominant, is_unknown
+from gfimu.diagnosis.data.prepared_runs import PreparedRuns
 from gfimu.diagnosis.explanation import Explanation
 from gfimu.diagnosis.free_body.diagnose import diagnose_body
 from gfimu.diagnosis.gate import impossible_sizes, judge, measurable
 from gfimu.diagnosis.holdout import Holdout, gate_gains, held_out_gain, split_segments
 from gfimu.diagnosis.long_run import explain_any_length
 from gfimu.diagnosis.loose_calibration import LooseCalibration, loosen, relearned
-from gfimu.diagnosis.model import Effect, WorldModel, is_of_one_recording
 from gfimu.diagnosis.naming import conflicting
 from gfimu.diagnosis.nuisances import sharpen_drives, tune_drives
 from gfimu.diagnosis.parallel import one_blas_thread
-from gfimu.diagnosis.prepared_runs import PreparedRuns
 from gfimu.diagnosis.pruning import prune
 from gfimu.diagnosis.refinement import refine
 from gfimu.diagnosis.residual_tests import LeftOver
-from gfimu.diagnosis.sample_notes import with_sample_notes
 from gfimu.diagnosis.stochastic import UNEQUAL_WALK, WALK_ODDS, Walk, walk_strength
 from gfimu.diagnosis.surrogate import surrogates
-from gfimu.diagnosis.verdict import Diagnosis, Gain, NamedCause
+from gfimu.diagnosis.verdict.sample_notes import with_sample_notes
+from gfimu.diagnosis.verdict.verdict import Diagnosis, Gain, NamedCause
 from gfimu.diagnosis.wandering_biases import wanders, with_walk
 from gfimu.errors import InputError
 from gfimu.recording import Recording
+from gfimu.recording.carried_array import warn_of_other_array
+from gfimu.world_model import Effect, WorldModel, is_of_one_recording
 
 __all__ = ["diagnose"]
 

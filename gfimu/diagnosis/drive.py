@@ -14,9 +14,9 @@ from scipy.linalg import solveh_banded
 from scipy.ndimage import gaussian_filter1d
 from scipy.sparse import csr_array
 
+from gfimu.diagnosis.data.run import Run
 from gfimu.diagnosis.drive_root import banded
-from gfimu.diagnosis.model import Spin, SpinState
-from gfimu.diagnosis.run import Run
+from gfimu.world_model import Spin, SpinState
 
 __all__ = ["DEGREE", "AngleSpline", "JoinedSpin", "ScaledSpin", "ShiftedSpin", "SplineState", "smooth_rate"]
 

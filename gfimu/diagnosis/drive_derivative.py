@@ -16,7 +16,10 @@ from numpy.typing import NDArray
 
 from gfimu.diagnosis.drive import AngleSpline, ShiftedSpin
 from gfimu.diagnosis.drive_jacobian import DriveJacobian, lagged
-from gfimu.diagnosis.model import (
+from gfimu.diagnosis.ringing import Ringing
+from gfimu.diagnosis.rippling import Rippling
+from gfimu.diagnosis.simulation import Simulation
+from gfimu.world_model import (
     Effect,
     Mode,
     ModelWithModes,
@@ -27,9 +30,6 @@ from gfimu.diagnosis.model import (
     Spin,
     WorldModel,
 )
-from gfimu.diagnosis.ringing import Ringing
-from gfimu.diagnosis.rippling import Rippling
-from gfimu.diagnosis.simulation import Simulation
 
 __all__ = ["Remembered", "differentiate", "felt_modes", "felt_play", "felt_ripple"]
 

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from scipy.linalg import solveh_banded
 from scipy.sparse import csr_array, diags_array
 
+from gfimu.diagnosis.data.run import Run
 from gfimu.diagnosis.drive import AngleSpline
 from gfimu.diagnosis.drive_root import banded
 from gfimu.diagnosis.roughness import Roughness
-from gfimu.diagnosis.run import Run
 
 __all__ = ["DrivePrior"]
 

@@ -14,16 +14,16 @@ from gfimu.diagnosis.calibration_residue import tolerance_of
 from gfimu.diagnosis.causes import Cause, effects_of_run
 from gfimu.diagnosis.explanation import Explanation
 from gfimu.diagnosis.far_starts import every_mode, from_far, with_honest_mode
-from gfimu.diagnosis.old_fit import Fit, Start, segments_at
-from gfimu.diagnosis.model import Effect
 from gfimu.diagnosis.nuisances import STEADY_NOISE, learn_noise, sharpen_drives, tune_drives, uncut_drives, widen_drives
+from gfimu.diagnosis.old_fit import Fit, Start, segments_at
+from gfimu.diagnosis.old_search import MOST_CAUSES, Blocks, Candidate, log_odds_beside_residue, search, swapped
 from gfimu.diagnosis.parallel import each_apart, over_segments
 from gfimu.diagnosis.pruning import RIVALS, near_rivals, prune
 from gfimu.diagnosis.refinement import FAIR_FIT, refine, refine_each
 from gfimu.diagnosis.screening import screen
-from gfimu.diagnosis.old_search import MOST_CAUSES, Blocks, Candidate, log_odds_beside_residue, search, swapped
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.signatures import SignatureSet
+from gfimu.world_model import Effect
 
 __all__ = ["Instead", "Report", "explain"]
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from gfimu.diagnosis.old_fit import Fit
-from gfimu.diagnosis.model import Effect
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.signatures import SignatureSet
+from gfimu.world_model import Effect
 
 __all__ = ["Explanation"]
 

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from gfimu.diagnosis.causes import Cause
 from gfimu.diagnosis.old_fit import Fit
-from gfimu.diagnosis.model import Effect
 from gfimu.diagnosis.parallel import over_segments
 from gfimu.diagnosis.refinement import refine, refine_each
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.signatures import Hypothesis
+from gfimu.world_model import Effect
 
 __all__ = ["every_mode", "from_far", "with_honest_mode"]
 

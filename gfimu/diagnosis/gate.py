@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gfimu.array import AccelerometerArray
-from gfimu.diagnosis.model import EffectFamily, bound_of
-from gfimu.diagnosis.verdict import Gain, NamedCause, Residual
+from gfimu.diagnosis.verdict.verdict import Gain, NamedCause, Residual
+from gfimu.geometry.array import AccelerometerArray
+from gfimu.world_model import EffectFamily, bound_of
 
 __all__ = ["LEAST_SHARE", "Judgement", "impossible_sizes", "judge", "measurable"]
 
@@ -97,7 +97,7 @@ def impossible_sizes(
     """Return a signature where a cause is larger than its part or rig can be off; empty where none is.
 
     Such a size says that the twin describes another unit: its array file, its axes or its units are wrong. The bound
-    is that of the effect's class (`gfimu.diagnosis.model.bound_of`); faults of the wiring have none.
+    is that of the effect's class (`gfimu.world_model.bound_of`); faults of the wiring have none.
 
     Parameters
     ----------

@@ -15,16 +15,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
-from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.causes import Cause, effects_of_run
 from gfimu.diagnosis.coloured_noise import NoiseLevels
 from gfimu.diagnosis.drive import smooth_rate
 from gfimu.diagnosis.evidence import SCALES, inverse, likeliest_scale
 from gfimu.diagnosis.old_fit import SMALLEST_POSITIVE, Fit
-from gfimu.diagnosis.model import Effect, is_of_one_recording
 from gfimu.diagnosis.refinement import refine, refine_each
 from gfimu.diagnosis.segment import Segment
-from gfimu.diagnosis.verdict import Gain
+from gfimu.diagnosis.verdict.verdict import Gain
+from gfimu.geometry.array import AccelerometerArray
+from gfimu.world_model import Effect, is_of_one_recording
 
 __all__ = ["BLOCK_DURATION", "Holdout", "gate_gains", "held_out_gain", "split_segments"]
 

@@ -11,8 +11,8 @@ from scipy.sparse import csr_array
 from gfimu.diagnosis.drive_jacobian import DriveJacobian
 from gfimu.diagnosis.drive_prior import DrivePrior
 from gfimu.diagnosis.drive_root import InverseRoot
-from gfimu.diagnosis.model import SpinState
 from gfimu.diagnosis.slow_modes import DriveModes
+from gfimu.world_model import SpinState
 
 __all__ = ["DriveElimination", "DriveEquations", "Linearisation"]
 

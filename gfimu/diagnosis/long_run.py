@@ -13,11 +13,11 @@ import numpy as np
 from gfimu.diagnosis.causes import Cause
 from gfimu.diagnosis.engine import Instead, Report, explain
 from gfimu.diagnosis.explanation import Explanation
-from gfimu.diagnosis.model import Effect
 from gfimu.diagnosis.nuisances import learn_noise, settle_noise, sharpen_drives, widen_drives
 from gfimu.diagnosis.pruning import RIVALS, prune
 from gfimu.diagnosis.refinement import refine
 from gfimu.diagnosis.segment import Segment
+from gfimu.world_model import Effect
 
 __all__ = ["MOST_SEARCHED", "explain_any_length", "settle_noise_of_any_length", "spread_over_runs"]
 

@@ -15,17 +15,17 @@ from numpy.typing import NDArray
 from gfimu.diagnosis.adequacy import left_over
 from gfimu.diagnosis.calibration_residue import CalibrationResidue, tolerance_of
 from gfimu.diagnosis.causes import Cause, Signature, effects_of_run
+from gfimu.diagnosis.data.prepared_runs import PreparedRuns
 from gfimu.diagnosis.explanation import Explanation
-from gfimu.diagnosis.old_fit import Fit
 from gfimu.diagnosis.holdout import Holdout
 from gfimu.diagnosis.long_run import explain_any_length
-from gfimu.diagnosis.model import Effect, EffectFamily, WorldModel
-from gfimu.diagnosis.prepared_runs import PreparedRuns
+from gfimu.diagnosis.old_fit import Fit
 from gfimu.diagnosis.pruning import prune
 from gfimu.diagnosis.refinement import FAIR_FIT, refine
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.signatures import signature_columns
 from gfimu.diagnosis.stochastic import LARGEST_USUAL_FLICKER, log_probability
+from gfimu.world_model import Effect, EffectFamily, WorldModel
 
 __all__ = ["LooseCalibration", "loosen", "relearned"]
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import replace
 
-from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.causes import Cause
 from gfimu.diagnosis.explanation import Explanation
-from gfimu.diagnosis.old_fit import Fit
-from gfimu.diagnosis.model import Effect, EffectFamily
 from gfimu.diagnosis.naming import MOST_CERTAIN, cause_parameters, describe, mimics
+from gfimu.diagnosis.old_fit import Fit
 from gfimu.diagnosis.signatures import ANGLES
-from gfimu.diagnosis.verdict import NamedCause
+from gfimu.diagnosis.verdict.verdict import NamedCause
+from gfimu.geometry.array import AccelerometerArray
+from gfimu.world_model import Effect, EffectFamily
 
 __all__ = ["capped", "contested", "fault_causes", "name_cause"]
 

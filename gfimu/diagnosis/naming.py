@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from scipy.special import softmax
 from scipy.stats import chi2
 
-from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.causes import WHOLE_NUMBERS, Cause
 from gfimu.diagnosis.explanation import Explanation
 from gfimu.diagnosis.old_fit import Fit
-from gfimu.diagnosis.verdict import Rival
+from gfimu.diagnosis.verdict.verdict import Rival
+from gfimu.geometry.array import AccelerometerArray
 
 __all__ = [
     "AMBIGUOUS_ODDS",

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from gfimu.diagnosis.causes import Cause, effects_of_run
 from gfimu.diagnosis.coloured_noise import NoiseLevels, estimate_flicker, likeliest_flicker, white_level
 from gfimu.diagnosis.old_fit import Fit
-from gfimu.diagnosis.model import Effect
 from gfimu.diagnosis.parallel import over_segments
 from gfimu.diagnosis.refinement import refine
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.slow_modes import WeighedPowers
+from gfimu.world_model import Effect
 
 __all__ = [
     "STEADY_NOISE",

@@ -9,10 +9,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.causes import Cause
 from gfimu.diagnosis.evidence import SCALES, inverse
 from gfimu.diagnosis.segment import Segment
+from gfimu.geometry.array import AccelerometerArray
 
 __all__ = ["SMALLEST_POSITIVE", "Fit", "Start", "segments_at", "without"]
 

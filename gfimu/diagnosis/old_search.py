@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag, lapack, solve_triangular
 
-from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.causes import WHOLE_NUMBERS, Cause
 from gfimu.diagnosis.evidence import SCALES, inverse, log_evidence, log_evidence_each, posterior
 from gfimu.diagnosis.signatures import Hypothesis, SignatureSet
+from gfimu.geometry.array import AccelerometerArray
 
 __all__ = ["EXTRA_CAUSE", "MOST_CAUSES", "Blocks", "Candidate", "log_odds_beside_residue", "search", "swapped"]
 

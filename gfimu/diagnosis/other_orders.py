@@ -12,9 +12,9 @@ import numpy as np
 
 from gfimu.diagnosis.causes import Cause, Signature, effects_of_run
 from gfimu.diagnosis.old_fit import Fit, segments_at
-from gfimu.diagnosis.model import Effect
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.signatures import signature_columns
+from gfimu.world_model import Effect
 
 __all__ = ["is_ripple", "power_at_other_orders"]
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from gfimu.diagnosis.old_fit import Fit, without
-from gfimu.diagnosis.model import Effect
 from gfimu.diagnosis.other_orders import is_ripple, power_at_other_orders
 from gfimu.diagnosis.refinement import refine_each
 from gfimu.diagnosis.segment import Segment
+from gfimu.world_model import Effect
 
 __all__ = ["LEAST_EXTRA_ODDS", "LEAST_ODDS", "RIVALS", "near_rivals", "prune"]
 

@@ -13,15 +13,15 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.causes import LEVEL_ERROR, Cause, effects_of_run
 from gfimu.diagnosis.evidence import SCALES, inverse, log_evidence
 from gfimu.diagnosis.old_fit import SMALLEST_POSITIVE, Fit, Start
-from gfimu.diagnosis.model import Effect
-from gfimu.diagnosis.parallel import each_apart, over_segments
 from gfimu.diagnosis.old_search import EXTRA_CAUSE
+from gfimu.diagnosis.parallel import each_apart, over_segments
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.signatures import ANGLES, cause_columns, shape_moved
+from gfimu.geometry.array import AccelerometerArray
+from gfimu.world_model import Effect
 
 __all__ = ["FAIR_FIT", "refine", "refine_each"]
 

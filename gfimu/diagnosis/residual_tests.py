@@ -13,12 +13,12 @@ from scipy.stats import chi2
 from gfimu.diagnosis.causes import effects_of_run
 from gfimu.diagnosis.evidence import log_evidence
 from gfimu.diagnosis.old_fit import Fit
-from gfimu.diagnosis.generic_basis import OF_READING, step_at
-from gfimu.diagnosis.model import Effect
-from gfimu.diagnosis.refinement import refine
 from gfimu.diagnosis.old_search import EXTRA_CAUSE
+from gfimu.diagnosis.refinement import refine
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.signatures import cause_columns
+from gfimu.generic_basis import OF_READING, step_at
+from gfimu.world_model import Effect
 
 __all__ = ["REFERENCE", "LeftOver", "changing_noise", "judges_reference", "jumps", "lines", "one_curve"]
 
@@ -50,7 +50,7 @@ class LeftOver:
     instead : bool
         Whether it takes the place of named causes, which then are a compromise, instead of adding to them.
     hints : tuple of str
-        Functions (`gfimu.diagnosis.generic_basis`) beyond the usual ones that may describe it.
+        Functions (`gfimu.generic_basis`) beyond the usual ones that may describe it.
     dependence : str
         The function that it follows, where it follows one.
     """

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from gfimu.diagnosis.drive import DEGREE, AngleSpline
-from gfimu.diagnosis.model import Mode
+from gfimu.world_model import Mode
 
 __all__ = ["Response", "Ringing"]
 

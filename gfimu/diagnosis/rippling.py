@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_array, csr_array
 
 from gfimu.diagnosis.drive import AngleSpline
-from gfimu.diagnosis.model import RippledMotion
+from gfimu.world_model import RippledMotion
 
 __all__ = ["RippleResponse", "Rippling"]
 

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d, uniform_filter1d
 from scipy.sparse import csr_array, diags_array
 
+from gfimu.diagnosis.data.run import Run
 from gfimu.diagnosis.drive import AngleSpline, smooth_rate
-from gfimu.diagnosis.run import Run
 
 __all__ = ["Roughness"]
 

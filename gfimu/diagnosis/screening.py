@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.diagnosis.causes import effects_of_run
-from gfimu.diagnosis.old_fit import Fit
 from gfimu.diagnosis.linearisation import Linearisation
-from gfimu.diagnosis.model import Effect
+from gfimu.diagnosis.old_fit import Fit
 from gfimu.diagnosis.parallel import over_segments
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.signatures import SignatureSet, hypotheses, plan_signatures, signature_columns
+from gfimu.world_model import Effect
 
 __all__ = ["screen"]
 

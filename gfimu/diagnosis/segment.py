@@ -18,16 +18,16 @@ from numpy.typing import NDArray
 
 from gfimu.diagnosis.calibration_residue import CalibrationResidue
 from gfimu.diagnosis.coloured_noise import CosineBasis, NoiseLevels
+from gfimu.diagnosis.data.rounding import COARSE, Steps
+from gfimu.diagnosis.data.run import Run, difference_noise
 from gfimu.diagnosis.drive import ShiftedSpin
 from gfimu.diagnosis.drive_derivative import Remembered, differentiate, felt_modes, felt_play, felt_ripple
 from gfimu.diagnosis.drive_jacobian import DriveJacobian
 from gfimu.diagnosis.linearisation import DriveElimination, DriveEquations, Linearisation
-from gfimu.diagnosis.model import Effect, Mode, Play, Ripple, Spin, WorldModel
-from gfimu.diagnosis.rounding import COARSE, Steps
-from gfimu.diagnosis.run import Run, difference_noise
 from gfimu.diagnosis.simulation import RunUp, Simulation
 from gfimu.diagnosis.slow_modes import SlowModes, WeighedModes
 from gfimu.diagnosis.spline_drive import TIME_MARGIN, SplineDrive
+from gfimu.world_model import Effect, Mode, Play, Ripple, Spin, WorldModel
 
 __all__ = ["Segment", "known_walk"]
 

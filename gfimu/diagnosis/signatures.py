@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.causes import Cause, Signature, effects_of_run, per_run_mixing, wired
 from gfimu.diagnosis.linearisation import Linearisation
-from gfimu.diagnosis.model import Effect, EffectFamily
 from gfimu.diagnosis.segment import Segment
+from gfimu.geometry.array import AccelerometerArray
+from gfimu.world_model import Effect, EffectFamily
 
 __all__ = [
     "ANGLES",

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gfimu.diagnosis.data.run import Run
 from gfimu.diagnosis.drive import JoinedSpin, ScaledSpin
-from gfimu.diagnosis.model import Effect, ModelWithModes, ModelWithPlay, ModelWithRipple, Spin, WorldModel
-from gfimu.diagnosis.run import Run
+from gfimu.world_model import Effect, ModelWithModes, ModelWithPlay, ModelWithRipple, Spin, WorldModel
 
 __all__ = ["RunUp", "Simulation"]
 

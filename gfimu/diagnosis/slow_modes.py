@@ -5,8 +5,8 @@ The noise of observation c is white but for a few modes, orthonormal columns Q_c
     W_c = (I − Q_c diag(s_c) Q_cᵀ) / σ_c².
 
 Where every sample counts alike the modes are cosines, the same for all observations. A coarse reading tells more at the
-edge of a step than in its middle (`gfimu.diagnosis.rounding`), so slow noise comes through with the weight w of each
-sample: with B = diag(w) C and the variances S of the cosines C,
+edge of a step than in its middle (`gfimu.diagnosis.data.rounding`), so slow noise comes through with the weight w of
+each sample: with B = diag(w) C and the variances S of the cosines C,
 
     S^½ BᵀB S^½/σ² = V Λ Vᵀ,  Q = B S^½/σ V Λ^−½,  s = Λ/(1 + Λ).
 """

@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.diagnosis.coloured_noise import NoiseLevels
+from gfimu.diagnosis.data.rounding import Steps
+from gfimu.diagnosis.data.run import Run
 from gfimu.diagnosis.drive import AngleSpline
 from gfimu.diagnosis.drive_prior import DrivePrior
 from gfimu.diagnosis.knots import KNOT_SPACING, intervals_to_cut
-from gfimu.diagnosis.model import Spin
 from gfimu.diagnosis.roughness import Roughness
-from gfimu.diagnosis.rounding import Steps
-from gfimu.diagnosis.run import Run
+from gfimu.world_model import Spin
 
 __all__ = ["TIME_MARGIN", "SplineDrive"]
 

@@ -12,10 +12,10 @@ from scipy.stats import chi2
 from gfimu.diagnosis.causes import effects_of_run
 from gfimu.diagnosis.coloured_noise import likeliest_flicker
 from gfimu.diagnosis.old_fit import Fit
-from gfimu.diagnosis.model import Effect
 from gfimu.diagnosis.segment import Segment
 from gfimu.diagnosis.slow_modes import WeighedPowers
 from gfimu.units import STANDARD_GRAVITY
+from gfimu.world_model import Effect
 
 __all__ = [
     "LARGEST_USUAL_FLICKER",

@@ -8,10 +8,10 @@ from itertools import pairwise
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
+from gfimu.diagnosis.data.run import Run, difference_noise
 from gfimu.diagnosis.drive import smooth_rate
-from gfimu.diagnosis.model import WorldModel
-from gfimu.diagnosis.run import Run, difference_noise
 from gfimu.diagnosis.segment import Segment
+from gfimu.world_model import WorldModel
 
 __all__ = ["make_segments"]
 

@@ -16,15 +16,15 @@ from numpy.typing import NDArray
 from gfimu.diagnosis.adequacy import series_products
 from gfimu.diagnosis.causes import Cause, effects_of_run
 from gfimu.diagnosis.evidence import log_evidence, log_evidence_each
-from gfimu.diagnosis.old_fit import Fit, segments_at
-from gfimu.diagnosis.generic_basis import FUNCTIONS, OF_READING, Motion, basis_function, is_of_time, ripples, tone
 from gfimu.diagnosis.long_run import MOST_SEARCHED, spread_over_runs
-from gfimu.diagnosis.model import BasisUnits, Effect
 from gfimu.diagnosis.nuisances import learn_noise
+from gfimu.diagnosis.old_fit import Fit, segments_at
 from gfimu.diagnosis.refinement import refine
 from gfimu.diagnosis.residual_tests import judges_reference
 from gfimu.diagnosis.segment import Segment
+from gfimu.generic_basis import FUNCTIONS, OF_READING, Motion, basis_function, is_of_time, ripples, tone
 from gfimu.units import STANDARD_GRAVITY
+from gfimu.world_model import BasisUnits, Effect
 
 __all__ = ["Surrogate", "surrogates"]
 
@@ -87,7 +87,7 @@ def surrogates(
     fixed : sequence of sequence of Effect
         Effects known beforehand, per segment.
     hints : sequence of str
-        Functions of `gfimu.diagnosis.generic_basis` to look at besides its own.
+        Functions of `gfimu.generic_basis` to look at besides its own.
     """
     units = _units(segments, start)
     chosen = spread_over_runs([segment.index for segment in segments], MOST_SEARCHED)

@@ -12,16 +12,16 @@ import numpy as np
 
 from gfimu.diagnosis.adequacy import left_over
 from gfimu.diagnosis.coloured_noise import NoiseLevels
+from gfimu.diagnosis.data.prepared_runs import PreparedRuns
 from gfimu.diagnosis.explanation import Explanation
-from gfimu.diagnosis.old_fit import Fit, segments_at
 from gfimu.diagnosis.long_run import explain_any_length, settle_noise_of_any_length
-from gfimu.diagnosis.model import Effect, WorldModel
 from gfimu.diagnosis.nuisances import settle_noise
-from gfimu.diagnosis.prepared_runs import PreparedRuns
+from gfimu.diagnosis.old_fit import Fit, segments_at
 from gfimu.diagnosis.pruning import LEAST_EXTRA_ODDS, prune
 from gfimu.diagnosis.refinement import refine
 from gfimu.diagnosis.segment import Segment, known_walk
 from gfimu.diagnosis.stochastic import UNEQUAL_WALK, WALK_ODDS, Walk, log_probability, walk_strength
+from gfimu.world_model import Effect, WorldModel
 
 __all__ = ["wanders", "with_walk"]
 

@@ -24,9 +24,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from gfimu.array import AccelerometerArray
 from gfimu.errors import InputError
-from gfimu.part_limits import PartLimits
+from gfimu.geometry.array import AccelerometerArray
+from gfimu.parts.limits import PartLimits
 from gfimu.rate.result import RateEstimate
 from gfimu.rate.sensing import ChannelTables, SensorErrors
 

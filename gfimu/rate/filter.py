@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gfimu.array import AccelerometerArray
 from gfimu.errors import GeometryError, InputError
+from gfimu.geometry.array import AccelerometerArray
 from gfimu.rate.kalman import FilterSettings, join, spread_rest
 from gfimu.rate.live import LiveRateFilter
 from gfimu.rate.result import RateEstimate

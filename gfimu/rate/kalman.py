@@ -18,8 +18,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gfimu.array import AccelerometerArray
 from gfimu.errors import InputError, unknown_name
+from gfimu.geometry.array import AccelerometerArray
 from gfimu.rate.backward import backward
 from gfimu.rate.preparation import prepare
 from gfimu.rate.recursion import forward

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gfimu.array import AccelerometerArray
 from gfimu.errors import InputError
+from gfimu.geometry.array import AccelerometerArray
 from gfimu.rate.kalman import FilterOutput, FilterSettings, KalmanRateFilter, empty_output, join
 from gfimu.rate.result import ChannelReport, RateEstimate, SignDecision, full_covariance
 from gfimu.rate.sensing import SensorErrors

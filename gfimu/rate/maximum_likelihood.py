@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from gfimu.array import AccelerometerArray
+from gfimu.geometry.array import AccelerometerArray
 from gfimu.rate.null_readings import align_signs, null_readings
 from gfimu.rate.result import RateEstimate, SignDecision
 from gfimu.rate.sensing import SensorErrors

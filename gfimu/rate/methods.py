@@ -20,8 +20,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gfimu.array import AccelerometerArray
 from gfimu.errors import InputError, unknown_name
+from gfimu.geometry.array import AccelerometerArray
 from gfimu.rate.algebraic import algebraic_rate
 from gfimu.rate.filter import filter_rate
 from gfimu.rate.integration import integrate_rate
@@ -94,7 +94,7 @@ def _integrate(
         raise InputError("method 'integrate' needs the rate at the start; use filter or smoother for an unknown one")
     if ChannelTables(array, errors).alpha_leak[0].any():
         raise InputError(
-            f"array {array.name!r} leaves products of the rate in α; use filter, or gfimu.estimation.estimate, which "
+            f"array {array.name!r} leaves products of the rate in α; use filter, or gfimu.estimate, which "
             "feeds the rate back"
         )
     at_rest = not np.any(settings.start_omega)

@@ -9,8 +9,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.array import AccelerometerArray
-from gfimu.linear_solution import LinearSolution
+from gfimu.geometry.array import AccelerometerArray
+from gfimu.geometry.linear_solution import LinearSolution
 from gfimu.short_repr import short_repr
 
 __all__ = ["RateMethod", "RateProblem", "RateSolution"]

@@ -42,8 +42,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.stats import chi2
 
-from gfimu.array import AccelerometerArray
 from gfimu.errors import InputError
+from gfimu.geometry.array import AccelerometerArray
 
 __all__ = ["HISTORY_BLOCKS", "KEPT_BLOCKS", "RUN_BLOCKS", "RestTest", "constant_readings"]
 

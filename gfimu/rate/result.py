@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gfimu.files.table import Tabular
 from gfimu.short_repr import joined, timing
-from gfimu.table import Tabular
 
 __all__ = ["ChannelReport", "RateEstimate", "SignDecision", "full_covariance"]
 

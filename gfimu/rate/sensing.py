@@ -20,11 +20,11 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import ArrayLike, NDArray
 
-from gfimu.array import AccelerometerArray
 from gfimu.errors import InputError
-from gfimu.kinematics import require_all_motions
-from gfimu.part import white_noise_std
-from gfimu.part_files import part_table
+from gfimu.geometry.array import AccelerometerArray
+from gfimu.geometry.kinematics import require_all_motions
+from gfimu.parts.files import part_table
+from gfimu.parts.part import white_noise_std
 from gfimu.short_repr import short_repr
 
 __all__ = ["ChannelTables", "SensorErrors"]
@@ -100,7 +100,7 @@ class SensorErrors:
     def from_parts(cls, array: AccelerometerArray, sample_rate: float, **others: Any) -> SensorErrors:
         """Take the errors from the data sheets of the array's parts (``models/parts``).
 
-        White noise is the part's (`gfimu.part.white_noise_std`), with the quantisation step's Δ²/12 added;
+        White noise is the part's (`gfimu.parts.part.white_noise_std`), with the quantisation step's Δ²/12 added;
         bias is the typical deviation at switch-on. Other fields by name; ``noise_std`` is the white part.
 
         Raises

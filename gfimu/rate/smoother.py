@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gfimu.array import AccelerometerArray
 from gfimu.errors import InputError
+from gfimu.geometry.array import AccelerometerArray
 from gfimu.rate.filter import require_finite, run_filter
 from gfimu.rate.kalman import FilterSettings, KalmanRateFilter, spread_rest
 from gfimu.rate.result import RateEstimate, SignDecision

@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from gfimu.array import AccelerometerArray
-from gfimu.column_file import head_line
 from gfimu.errors import InputError
-from gfimu.part import Part
-from gfimu.plausible import largest_of_array
+from gfimu.files.column_file import head_line
+from gfimu.geometry.array import AccelerometerArray
+from gfimu.parts.part import Part
+from gfimu.parts.plausible import largest_of_array
 from gfimu.rate.kalman import FilterSettings
 from gfimu.rate.live import LiveRateFilter
 from gfimu.rate.result import RateEstimate

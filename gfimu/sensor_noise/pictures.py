@@ -7,7 +7,7 @@ from pathlib import Path
 import matplotlib as mpl
 import numpy as np
 
-from gfimu.atomic_file import atomic_path
+from gfimu.files.atomic_file import atomic_path
 from gfimu.sensor_noise.recording_noise import RecordingNoise
 
 mpl.use("Agg")

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from gfimu.errors import InputError, unknown_name
 from gfimu.recording import Recording
-from gfimu.rest import detect_rest
+from gfimu.recording.rest import detect_rest
 from gfimu.sensor_noise.identification import TERMS, NoiseModel, identify_noise
 from gfimu.short_repr import short_repr
 

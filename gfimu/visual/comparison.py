@@ -9,8 +9,8 @@ import numpy as np
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
-from gfimu.array import AccelerometerArray
 from gfimu.errors import InputError
+from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
 from gfimu.visual.colours import MEASURED, PREDICTED_AFTER, PREDICTED_BEFORE, Colour
 from gfimu.visual.motion import KnownMotion

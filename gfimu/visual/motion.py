@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from gfimu.attitude import from_rotation, table_angle, to_rotation
+from gfimu.motion.attitude import from_rotation, table_angle, to_rotation
 from gfimu.recording import Recording
 
 __all__ = ["ExpectedDrift", "KnownMotion", "MotionEstimate", "about_z", "table_axis"]
@@ -19,7 +19,7 @@ CUBE_HEIGHT = 0.06
 
 
 class MotionEstimate(Protocol):
-    """What the picture needs of an estimate (`gfimu.estimation.Estimate` has it); body axes throughout."""
+    """What the picture needs of an estimate (`gfimu.motion.estimation.Estimate` has it); body axes throughout."""
 
     @property
     def t_s(self) -> NDArray[np.float64]:

@@ -6,12 +6,12 @@ import os
 import tempfile
 from pathlib import Path
 
-from gfimu.array import AccelerometerArray
 from gfimu.errors import GeometryError, InputError
-from gfimu.estimation import Estimate, estimate
+from gfimu.geometry.array import AccelerometerArray
+from gfimu.motion.estimation import Estimate, estimate
+from gfimu.motion.rest_bias import estimate_from_rest
 from gfimu.recording import Recording
-from gfimu.recording_formats import open_run
-from gfimu.rest_bias import estimate_from_rest
+from gfimu.recording.formats import open_run
 from gfimu.visual.run import write_run
 
 __all__ = ["picture_of", "picture_path"]
@@ -31,7 +31,7 @@ def picture_of(recording: Path, out: Path, *, array: AccelerometerArray | None =
     Parameters
     ----------
     recording : Path
-        Recording, in any format that `gfimu.recording_formats.open_run` reads.
+        Recording, in any format that `gfimu.recording.formats.open_run` reads.
     out : Path
         File to write, ``.rrd``.
     array : AccelerometerArray, optional

@@ -8,8 +8,8 @@ from pathlib import Path
 import rerun as rr
 import rerun.blueprint as rrb
 
-from gfimu.outputs import RERUN
-from gfimu.rerun_stream import rrd_stream
+from gfimu.files.outputs import RERUN
+from gfimu.files.rerun_stream import rrd_stream
 from gfimu.visual.plots import Plot
 from gfimu.visual.scene import TIMELINE, Scene
 

@@ -8,7 +8,7 @@ from pathlib import Path as FilePath
 import numpy as np
 import rerun.blueprint as rrb
 
-from gfimu.array import AccelerometerArray
+from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
 from gfimu.visual.motion import CUBE_HEIGHT, ExpectedDrift, KnownMotion, MotionEstimate, about_z
 from gfimu.visual.plots import Plot

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.array import AccelerometerArray
-from gfimu.attitude import table_angle, to_rotation
+from gfimu.geometry.array import AccelerometerArray
+from gfimu.motion.attitude import table_angle, to_rotation
 from gfimu.recording import Recording
 from gfimu.visual.colours import AXES, COMMAND, ESTIMATE, ESTIMATE_BAND, TACHO, TRUTH, chip_colour
 from gfimu.visual.motion import ExpectedDrift, KnownMotion, MotionEstimate, table_axis

@@ -14,7 +14,7 @@ import rerun.blueprint as rrb
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from gfimu.array import AccelerometerArray
+from gfimu.geometry.array import AccelerometerArray
 from gfimu.units import STANDARD_GRAVITY
 from gfimu.visual.colours import ESTIMATE, METAL, TABLE, Colour, chip_colour
 

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 from gfimu.errors import GfimuError, InputError
-from gfimu.rerun_stream import WEB_VIEWER, viewer_command
+from gfimu.files.rerun_stream import WEB_VIEWER, viewer_command
 
 __all__ = ["open_viewer"]
 

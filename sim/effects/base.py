@@ -10,10 +10,9 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.array import AccelerometerArray
-from gfimu.diagnosis.model import Whitened
 from gfimu.errors import InputError
-from gfimu.units import split_key
+from gfimu.geometry.array import AccelerometerArray
+from gfimu.world_model import Whitened
 from sim.world import World
 
 __all__ = ["LARGEST_TURN", "Effect", "Pattern", "Size", "channel_patterns", "chip_patterns"]
@@ -29,7 +28,9 @@ class Size:
     Parameters
     ----------
     key : str
-        Name of the coordinate, ending in its unit.
+        Name of the coordinate, ending in its unit where it has one.
+    unit : str
+        The unit as people read it, such as ``"m/s²"``; `gfimu.units.RATIO` for a small relative number.
     prior_std : float
         Size that would surprise nobody in the field, in that unit.
     positive : bool
@@ -44,6 +45,7 @@ class Size:
     """
 
     key: str
+    unit: str
     prior_std: float
     positive: bool = False
     step: float = 1e-3
@@ -88,10 +90,8 @@ class Effect(ABC):
     """True where another mounting or another day has its own value."""
     inexactness: ClassVar[float] = 0.0
     """Share of what it explains that its model may get wrong; beside it a further cause must explain more than that."""
-    size_unit: ClassVar[str] = ""
-    """Unit of the sizes where their keys don't end in one; ``"ratio"`` for a pure number, read in percent."""
     other_units: ClassVar[Mapping[str, str]] = {}
-    """Units of other parameters whose keys don't end in one; ``"ratio"``, ``"number"`` (count, factor), ``"name"``."""
+    """Unit of each parameter that is no size, by key; `gfimu.units.RATIO`, ``NUMBER`` or ``NAME`` where it has none."""
     starts: ClassVar[tuple[float, ...]] = ()
     """Values in units of the prior to start from where a large size is far from linear; none by default."""
     whole: ClassVar[frozenset[str]] = frozenset()
@@ -187,16 +187,14 @@ class Effect(ABC):
         return np.array([self.value(key) for key in keys])
 
     @classmethod
-    def parameter_keys(cls, array: AccelerometerArray) -> tuple[str, ...]:
-        """Return the keys a parameter table may have."""
-        grid = cls.shapes(60.0, 100.0)
-        return (*(size.key for size in cls.sizes(array)), *(grid[0] if grid else ()))
+    def parameter_units(cls, array: AccelerometerArray) -> dict[str, str]:
+        """Return the unit of each parameter by key: of the sizes, then of the others."""
+        return {**{size.key: size.unit for size in cls.sizes(array)}, **cls.other_units}
 
     @classmethod
-    def parameter_units(cls, array: AccelerometerArray) -> dict[str, str]:
-        """Return the unit of each parameter, as declared or by the end of its key; empty if it has neither."""
-        declared = dict.fromkeys((size.key for size in cls.sizes(array)), cls.size_unit) | dict(cls.other_units)
-        return {key: declared.get(key) or split_key(key)[1] for key in cls.parameter_keys(array)}
+    def parameter_keys(cls, array: AccelerometerArray) -> tuple[str, ...]:
+        """Return the keys a parameter table may have."""
+        return tuple(cls.parameter_units(array))
 
     def check(self, array: AccelerometerArray) -> None:
         """Raise `InputError` if a parameter key does not belong to this effect."""

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from gfimu.array import AccelerometerArray
+from gfimu.geometry.array import AccelerometerArray
+from gfimu.units import RATIO
 from sim.effects.base import LARGEST_TURN, Effect, Pattern, Size, chip_patterns
 from sim.world import World
 
@@ -26,7 +27,7 @@ class ChipDelay(Effect):
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
         """One delay per chip."""
-        return tuple(Size(f"{chip.name}_s", 1e-3, step=0.1) for chip in array.chips)
+        return tuple(Size(f"{chip.name}_s", "s", 1e-3, step=0.1) for chip in array.chips)
 
     @classmethod
     def patterns(cls, array: AccelerometerArray) -> tuple[Pattern, ...]:
@@ -52,7 +53,7 @@ class GyroLatency(Effect):
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
         """One delay of either sign."""
-        return (Size("delay_s", 2e-3, step=0.1),)
+        return (Size("delay_s", "s", 2e-3, step=0.1),)
 
     def apply(self, world: World) -> World:
         """Delay the reference."""
@@ -64,7 +65,6 @@ class GyroScale(Effect):
 
     name = "gyro_scale"
     summary = "the reference gyro has wrong gains"
-    size_unit = "ratio"
     place = "reference"
     separated_by = "rotation about each axis in turn, at several rates"
 
@@ -72,7 +72,7 @@ class GyroScale(Effect):
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
         """One ratio per axis."""
         # Ten times the ±3 % that the MPU-9150's data sheet allows.
-        return tuple(Size(axis, 0.02, bound=0.3) for axis in _AXES)
+        return tuple(Size(axis, RATIO, 0.02, bound=0.3) for axis in _AXES)
 
     @classmethod
     def patterns(cls, array: AccelerometerArray) -> tuple[Pattern, ...]:
@@ -97,7 +97,7 @@ class GyroMisalignment(Effect):
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
         """Rotation vector of the gyro in the body frame."""
-        return tuple(Size(f"{axis}_rad", 0.5 * _DEGREE, bound=LARGEST_TURN) for axis in _AXES)
+        return tuple(Size(f"{axis}_rad", "rad", 0.5 * _DEGREE, bound=LARGEST_TURN) for axis in _AXES)
 
     def apply(self, world: World) -> World:
         """Turn the gyro's axes by the rotation vector: it reads Rᵀω."""

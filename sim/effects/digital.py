@@ -7,8 +7,9 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.array import AccelerometerArray
 from gfimu.errors import InputError
+from gfimu.geometry.array import AccelerometerArray
+from gfimu.units import NAME, NUMBER, RATIO
 from sim.effects.base import Effect, Size
 from sim.world import World
 
@@ -29,15 +30,10 @@ class _Discrete(Effect):
     """An effect found by looking at the samples themselves: it has keys, but no small sizes."""
 
     place = "data"
-    keys: tuple[str, ...] = ()
 
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
         return ()
-
-    @classmethod
-    def parameter_keys(cls, array: AccelerometerArray) -> tuple[str, ...]:
-        return cls.keys
 
     def names(self, key: str) -> list[str]:
         """Return one or several channel names."""
@@ -51,8 +47,7 @@ class Noise(_Discrete):
     name = "noise"
     summary = "more white noise than the part should have"
     place = "noise"
-    keys = ("factor",)
-    other_units: ClassVar = {"factor": "number"}
+    other_units: ClassVar = {"factor": NUMBER}
     separated_by = "a longer rest"
 
     def apply(self, world: World) -> World:
@@ -66,7 +61,7 @@ class BiasRandomWalk(_Discrete):
     name = "bias_random_walk"
     summary = "offsets wander as a random walk"
     place = "noise"
-    keys = ("strength_m_s2_rts",)
+    other_units: ClassVar = {"strength_m_s2_rts": "m/s²/√s"}
     separated_by = "a long rest at constant temperature"
 
     def apply(self, world: World) -> World:
@@ -83,13 +78,14 @@ class Saturation(_Discrete):
 
     name = "saturation"
     summary = "readings clip below the assumed range"
-    keys = ("limit_m_s2",)
+    other_units: ClassVar = {"limit_m_s2": "m/s²"}
     separated_by = "a run at lower rates, which must agree"
 
     @classmethod
-    def parameter_keys(cls, array: AccelerometerArray) -> tuple[str, ...]:
-        """Return the common limit and two levels per channel."""
-        return (*cls.keys, *cls._side_keys(array, "upper"), *cls._side_keys(array, "lower"))
+    def parameter_units(cls, array: AccelerometerArray) -> dict[str, str]:
+        """Return the unit of the common limit and of two levels per channel."""
+        levels = (*cls._side_keys(array, "upper"), *cls._side_keys(array, "lower"))
+        return {**cls.other_units, **dict.fromkeys(levels, "m/s²")}
 
     @staticmethod
     def _side_keys(array: AccelerometerArray, side: str) -> tuple[str, ...]:
@@ -111,7 +107,7 @@ class CoarseResolution(_Discrete):
 
     name = "coarse_resolution"
     summary = "a larger LSB than assumed (10-bit mode)"
-    keys = ("step_m_s2",)
+    other_units: ClassVar = {"step_m_s2": "m/s²"}
 
     def apply(self, world: World) -> World:
         """Round the readings to the step."""
@@ -124,8 +120,7 @@ class WrongRange(_Discrete):
 
     name = "wrong_range"
     summary = "a chip is configured for another range: its readings are off by a power of two"
-    keys = ("chip", "factor")
-    other_units: ClassVar = {"chip": "name", "factor": "number"}
+    other_units: ClassVar = {"chip": NAME, "factor": NUMBER}
 
     def apply(self, world: World) -> World:
         """Multiply the chip's readings by the factor."""
@@ -142,8 +137,7 @@ class AxisSwap(_Discrete):
 
     name = "axis_swap"
     summary = "channels are exchanged by wiring"
-    keys = ("channels",)
-    other_units: ClassVar = {"channels": "name"}
+    other_units: ClassVar = {"channels": NAME}
 
     def apply(self, world: World) -> World:
         """Exchange the two channels, or the two of each pair where several follow each other."""
@@ -161,8 +155,7 @@ class SignFlip(_Discrete):
 
     name = "sign_flip"
     summary = "a channel is inverted"
-    keys = ("channel",)
-    other_units: ClassVar = {"channel": "name"}
+    other_units: ClassVar = {"channel": NAME}
 
     def apply(self, world: World) -> World:
         """Invert the channel or channels."""
@@ -177,8 +170,7 @@ class StuckChannel(_Discrete):
 
     name = "stuck_channel"
     summary = "one or several channels are frozen for a while"
-    keys = ("channel", "start_s", "stop_s")
-    other_units: ClassVar = {"channel": "name"}
+    other_units: ClassVar = {"channel": NAME, "start_s": "s", "stop_s": "s"}
 
     def apply(self, world: World) -> World:
         """Hold the channel at its last value before the start until the stop."""
@@ -204,8 +196,7 @@ class DroppedFrames(_Discrete):
 
     name = "dropped_frames"
     summary = "samples are lost"
-    keys = ("share", "count", "longest_s")
-    other_units: ClassVar = {"share": "ratio", "count": "number"}
+    other_units: ClassVar = {"share": RATIO, "count": NUMBER, "longest_s": "s"}
 
     def apply(self, world: World) -> World:
         """Lose a share of the frames at random (rows become NaN; the writer leaves them out)."""

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from gfimu.array import AccelerometerArray
-from gfimu.diagnosis.model import Mode
-from sim.effects.scans import mode_shapes, order_shapes, per_acceleration
+from gfimu.geometry.array import AccelerometerArray
+from gfimu.units import NUMBER, RATIO
+from gfimu.world_model import Mode
 from sim.effects.base import LARGEST_TURN, Effect, Pattern, Size, chip_patterns
+from sim.effects.scans import mode_shapes, order_shapes, per_acceleration
 from sim.effects.table_dynamics import SERVO_STIFFNESS, RippledSpin, TwistingSpin
 from sim.motion import SpinMotion
 from sim.world import Nod, World
@@ -49,7 +50,9 @@ class Misalignment(Effect):
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
         """Rotation vector of each chip in the body frame."""
         return tuple(
-            Size(f"{chip.name}_{axis}_rad", 0.5 * _DEGREE, bound=LARGEST_TURN) for chip in array.chips for axis in "xyz"
+            Size(f"{chip.name}_{axis}_rad", "rad", 0.5 * _DEGREE, bound=LARGEST_TURN)
+            for chip in array.chips
+            for axis in "xyz"
         )
 
     @classmethod
@@ -86,7 +89,7 @@ class SensorPosition(Effect):
         places = np.array([chip.position for chip in array.chips])
         extent = float(np.linalg.norm(places[:, None] - places, axis=2).max())
         bound = extent if extent > 0.0 else np.inf
-        return tuple(Size(f"{chip.name}_{axis}_m", 1e-3, bound=bound) for chip in array.chips for axis in "xyz")
+        return tuple(Size(f"{chip.name}_{axis}_m", "m", 1e-3, bound=bound) for chip in array.chips for axis in "xyz")
 
     @classmethod
     def reach(cls, array: AccelerometerArray) -> NDArray[np.bool_]:
@@ -110,16 +113,16 @@ class SensorPosition(Effect):
 class _TwoAxes(Effect):
     """Two sizes across the axis."""
 
-    suffix = "_rad"
+    unit = "rad"
     prior_std = 0.5 * _DEGREE
     bound = LARGEST_TURN
 
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
-        return tuple(Size(f"{axis}{cls.suffix}", cls.prior_std, bound=cls.bound) for axis in "xy")
+        return tuple(Size(f"{axis}_{cls.unit}", cls.unit, cls.prior_std, bound=cls.bound) for axis in "xy")
 
     def across(self) -> NDArray[np.float64]:
-        return np.array([self.value(f"x{self.suffix}"), self.value(f"y{self.suffix}"), 0.0])
+        return np.array([self.value(f"x_{self.unit}"), self.value(f"y_{self.unit}"), 0.0])
 
 
 class Eccentricity(_TwoAxes):
@@ -128,7 +131,7 @@ class Eccentricity(_TwoAxes):
     name = "eccentricity"
     summary = "the whole cube is off the table's axis"
     place = "geometry"
-    suffix = "_m"
+    unit = "m"
     prior_std = 1e-3
     bound = np.inf  # an arm may be mounted anywhere
     per_run = True
@@ -177,11 +180,12 @@ class AxisWobble(Effect):
     summary = "the axis nods once per revolution (bearing runout)"
     place = "geometry"
     separated_by = "rotation at two or more speeds"
+    other_units: ClassVar = {"amplitude_rad": "rad", "phase_rad": "rad", "direction_rad": "rad"}
 
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
         """Cosine and sine amplitudes of the nod."""
-        return tuple(Size(f"{wave}_rad", 0.1 * _DEGREE, bound=LARGEST_TURN) for wave in ("cosine", "sine"))
+        return tuple(Size(f"{wave}_rad", "rad", 0.1 * _DEGREE, bound=LARGEST_TURN) for wave in ("cosine", "sine"))
 
     @classmethod
     def shapes(cls, duration: float, sample_rate: float) -> tuple[dict[str, float], ...]:
@@ -202,9 +206,9 @@ class AxisWobble(Effect):
         return amplitude * np.array([np.cos(phase), -np.sin(phase)])
 
     @classmethod
-    def parameter_keys(cls, array: AccelerometerArray) -> tuple[str, ...]:
-        """Return the contract's keys and the direction of the nod."""
-        return ("amplitude_rad", "phase_rad", "direction_rad")
+    def parameter_units(cls, array: AccelerometerArray) -> dict[str, str]:
+        """Return the units of the contract's keys, amplitude and phase instead of the sizes."""
+        return dict(cls.other_units)
 
     def apply(self, world: World) -> World:
         """Let the axis nod."""
@@ -223,7 +227,7 @@ class Gravity(Effect):
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
         """One difference."""
-        return (Size("delta_m_s2", 0.015),)
+        return (Size("delta_m_s2", "m/s²", 0.015),)
 
     def apply(self, world: World) -> World:
         """Change gravity."""
@@ -241,13 +245,13 @@ class CentrifugalFlex(Effect):
     summary = "arms stretch with the rate squared"
     place = "geometry"
     separated_by = "the cube remounted on its side, and several high speeds"
-    other_units: ClassVar = {"moving_arms": "number"}
+    other_units: ClassVar = {"moving_arms": NUMBER}
     whole = frozenset({"moving_arms"})
 
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
         """One stretch, never negative."""
-        return (Size("stretch_s2_rad2", 2.5e-5, positive=True),)
+        return (Size("stretch_s2_rad2", "s²/rad²", 2.5e-5, positive=True),)
 
     @classmethod
     def shapes(cls, duration: float, sample_rate: float) -> tuple[dict[str, float], ...]:
@@ -275,14 +279,14 @@ class Cogging(Effect):
     summary = "torque ripple locked to the table's angle (n cycles per revolution)"
     place = "motion"
     separated_by = "slow steady rotation at two speeds"
-    other_units: ClassVar = {"order": "number"}
+    other_units: ClassVar = {"amplitude_rad_s2": "rad/s²", "order": NUMBER, "phase_rad": "rad"}
     whole = frozenset({"order"})
     inexactness = 0.02  # motor, friction and speed loop of a table are not as simple as this servo
 
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
         """Sine and cosine amplitudes."""
-        return (Size("sine_rad_s2", 1.0), Size("cosine_rad_s2", 1.0))
+        return (Size("sine_rad_s2", "rad/s²", 1.0), Size("cosine_rad_s2", "rad/s²", 1.0))
 
     @classmethod
     def shapes(cls, duration: float, sample_rate: float) -> tuple[dict[str, float], ...]:
@@ -308,16 +312,16 @@ class Cogging(Effect):
         return amplitude * np.array([np.cos(phase), np.sin(phase)])
 
     @classmethod
-    def parameter_keys(cls, array: AccelerometerArray) -> tuple[str, ...]:
-        """Return the contract's keys."""
-        return ("amplitude_rad_s2", "order", "phase_rad")
+    def parameter_units(cls, array: AccelerometerArray) -> dict[str, str]:
+        """Return the units of the contract's keys, amplitude and phase instead of the sizes."""
+        return dict(cls.other_units)
 
     @property
     def steepness(self) -> float:
         """Most that its torque changes with the angle, relative to the servo's."""
         return abs(self.value("amplitude_rad_s2")) * self.value("order", 1.0) / SERVO_STIFFNESS
 
-    def rippled(self, motion: SpinMotion | Any, t: NDArray[np.float64]) -> RippledSpin:
+    def rippled(self, motion: SpinMotion, t: NDArray[np.float64]) -> RippledSpin:
         """Return the table's motion under a command over times (n,), s."""
         return RippledSpin(motion, t, self.value("amplitude_rad_s2"), self.value("order", 1.0), self.value("phase_rad"))
 
@@ -333,14 +337,13 @@ class Resonance(Effect):
     summary = "a torsional mode of the mounting, rung by angular acceleration"
     place = "motion"
     separated_by = "fast ramps followed by rest, in which the mode rings down alone"
-    size_unit = "ratio"
-    other_units: ClassVar = {"damping_ratio": "ratio"}
+    other_units: ClassVar = {"frequency_hz": "Hz", "damping_ratio": RATIO}
     shape_limits: ClassVar = {"damping_ratio": (1e-3, 0.3)}
 
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
         """Participation: 1 is the whole inertia behind one spring."""
-        return (Size("gain", 0.3, positive=True, most=_WHOLE_INERTIA),)
+        return (Size("gain", RATIO, 0.3, positive=True, most=_WHOLE_INERTIA),)
 
     @classmethod
     def shapes(cls, duration: float, sample_rate: float) -> tuple[dict[str, float], ...]:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from gfimu.array import AccelerometerArray
 from gfimu.errors import unknown_name
+from gfimu.geometry.array import AccelerometerArray
 from sim.effects import body, digital, mechanical, sensing, timing
 from sim.effects.base import Effect
 from sim.effects.unknown import Unknown

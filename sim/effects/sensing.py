@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.signal import lfilter
 
-from gfimu.array import AccelerometerArray
-from gfimu.units import STANDARD_GRAVITY
-from sim.effects.scans import tone_shapes
+from gfimu.geometry.array import AccelerometerArray
+from gfimu.units import RATIO, STANDARD_GRAVITY
 from sim.effects.base import LARGEST_TURN, Effect, Pattern, Size, channel_patterns
+from sim.effects.scans import tone_shapes
 from sim.world import SensingStep, World
 
 __all__ = [
@@ -41,12 +43,15 @@ class _PerChannel(Effect):
 
     place = "sensing"
     suffix = ""
+    unit = RATIO
     prior_std = 1.0
     bound = np.inf
 
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
-        return tuple(Size(f"{channel}{cls.suffix}", cls.prior_std, bound=cls.bound) for channel in array.channels)
+        return tuple(
+            Size(f"{channel}{cls.suffix}", cls.unit, cls.prior_std, bound=cls.bound) for channel in array.channels
+        )
 
     @classmethod
     def patterns(cls, array: AccelerometerArray) -> tuple[Pattern, ...]:
@@ -66,6 +71,7 @@ class Bias(_PerChannel):
     name = "bias"
     summary = "a constant offset per channel"
     suffix = "_m_s2"
+    unit = "m/s²"
     tolerance = 0.3 * _MG
     prior_std = 20 * _MG
     bound = STANDARD_GRAVITY  # four times the 0.25 g that the ADXL345's data sheet allows along z
@@ -86,7 +92,6 @@ class ScaleFactor(_PerChannel):
     prior_std = 0.02
     bound = 0.3  # three times the ±10 % that the ADXL345's data sheet allows; the MPU-9150's ±3 % is narrower
     separated_by = "static poses on several sides, or the cube remounted on its side and several speeds"
-    size_unit = "ratio"
 
     @classmethod
     def patterns(cls, array: AccelerometerArray) -> tuple[Pattern, ...]:
@@ -106,6 +111,7 @@ class Quadratic(_PerChannel):
     name = "quadratic"
     summary = "a second-order non-linearity per channel"
     suffix = "_s2_m"
+    unit = "s²/m"
     prior_std = 3e-3 / STANDARD_GRAVITY
     separated_by = "several speeds, so that the reading's square and the reading differ; or static poses on all sides"
 
@@ -121,6 +127,7 @@ class BiasTemperature(_PerChannel):
     name = "bias_temperature"
     summary = "offsets follow the board's temperature"
     suffix = "_m_s2_K"
+    unit = "m/s²/K"
     needs_temperature = True
     prior_std = 0.8 * _MG
     separated_by = "a run in which the temperature changes while the motion does not"
@@ -140,9 +147,11 @@ class WarmUp(_PerChannel):
     name = "warm_up"
     summary = "offsets settle exponentially after power-on"
     suffix = "_m_s2"
+    unit = "m/s²"
     prior_std = 10 * _MG
     shape_limits: ClassVar = {"time_constant_s": (1.0, 1e5)}
     separated_by = "a cold start followed by a long rest, or a longer run"
+    other_units: ClassVar = {"time_constant_s": "s"}
 
     @classmethod
     def shapes(cls, duration: float, sample_rate: float) -> tuple[dict[str, float], ...]:
@@ -164,7 +173,7 @@ class VibrationRectification(_PerChannel):
     name = "vibration_rectification"
     summary = "mean readings shift with vibration, about as ω⁴"
     suffix = "_m_s2_per_rad4_s4"
-    size_unit = "m/s²/(rad/s)⁴"
+    unit = "m/s²/(rad/s)⁴"
     prior_std = 30 * _MG / 15.0**4
     separated_by = "several speeds with and without vibration isolation"
 
@@ -192,7 +201,6 @@ class CrossAxis(Effect):
     summary = "a channel picks up its neighbour on the same chip"
     place = "sensing"
     separated_by = "static poses on several sides and several speeds"
-    size_unit = "ratio"
 
     @classmethod
     def _pairs(cls, array: AccelerometerArray) -> list[tuple[int, int]]:
@@ -205,7 +213,7 @@ class CrossAxis(Effect):
         """One ratio per ordered pair of channels of a chip: ``a11_from_a12``."""
         names = array.channels
         bound = float(np.sin(LARGEST_TURN))  # an axis that is turned picks up the sine
-        return tuple(Size(f"{names[i]}_from_{names[j]}", 0.01, bound=bound) for i, j in cls._pairs(array))
+        return tuple(Size(f"{names[i]}_from_{names[j]}", RATIO, 0.01, bound=bound) for i, j in cls._pairs(array))
 
     @classmethod
     def reach(cls, array: AccelerometerArray) -> NDArray[np.bool_]:
@@ -259,7 +267,7 @@ class SensorLag(Effect):
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
         """One time constant, never negative."""
-        return (Size("time_constant_s", 5e-3, positive=True, step=0.5),)
+        return (Size("time_constant_s", "s", 5e-3, positive=True, step=0.5),)
 
     def apply(self, world: World) -> World:
         """Pass the readings through a first-order low pass."""
@@ -320,11 +328,12 @@ class Hysteresis(Effect):
     separated_by = "slow reversals of the rate"
     shape_limits: ClassVar = {"width_m_s2": (1e-3, 20.0)}
     inexactness = 0.01  # a play remembers the extremes of a motion that is only estimated
+    other_units: ClassVar = {"width_m_s2": "m/s²"}
 
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
         """One lost motion, common to all channels, never negative."""
-        return (Size("lost_m_s2", 5 * _MG, positive=True, step=0.5),)
+        return (Size("lost_m_s2", "m/s²", 5 * _MG, positive=True, step=0.5),)
 
     @classmethod
     def shapes(cls, duration: float, sample_rate: float) -> tuple[dict[str, float], ...]:
@@ -365,7 +374,7 @@ class GainDrift(Effect):
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
         """One relative drift per second."""
-        return (Size("slope_1_s", 2e-4),)
+        return (Size("slope_1_s", "1/s", 2e-4),)
 
     def apply(self, world: World) -> World:
         """Multiply the readings by 1 + slope · (t − start)."""
@@ -383,11 +392,12 @@ class InterferenceTone(Effect):
     place = "sensing"
     of_one_recording = True
     separated_by = "a run at rest, where only the tone is left"
+    other_units: ClassVar = {"amplitude_m_s2": "m/s²", "frequency_hz": "Hz", "phase_rad": "rad"}
 
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
         """Sine and cosine amplitudes."""
-        return (Size("sine_m_s2", 2 * _MG), Size("cosine_m_s2", 2 * _MG))
+        return (Size("sine_m_s2", "m/s²", 2 * _MG), Size("cosine_m_s2", "m/s²", 2 * _MG))
 
     @classmethod
     def shapes(cls, duration: float, sample_rate: float) -> tuple[dict[str, float], ...]:
@@ -413,9 +423,9 @@ class InterferenceTone(Effect):
         return amplitude * np.array([np.cos(phase), np.sin(phase)])
 
     @classmethod
-    def parameter_keys(cls, array: AccelerometerArray) -> tuple[str, ...]:
-        """Return the contract's keys."""
-        return ("amplitude_m_s2", "frequency_hz", "phase_rad")
+    def parameter_units(cls, array: AccelerometerArray) -> dict[str, str]:
+        """Return the units of the contract's keys, amplitude and phase instead of the sizes."""
+        return dict(cls.other_units)
 
     def apply(self, world: World) -> World:
         """Add amplitude · sin(2π f t + phase)."""

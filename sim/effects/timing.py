@@ -7,10 +7,11 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.array import AccelerometerArray
-from sim.effects.scans import order_shapes, per_rate
+from gfimu.geometry.array import AccelerometerArray
+from gfimu.units import NUMBER, RATIO
+from gfimu.world_model import SpinState
 from sim.effects.base import Effect, Size
-from sim.motion import SpinState
+from sim.effects.scans import order_shapes, per_rate
 from sim.world import World
 
 __all__ = ["ChannelSkew", "ClockError", "TachoLatency", "TachoRipple", "TachoScale"]
@@ -28,7 +29,7 @@ class ChannelSkew(Effect):
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
         """One delay from chip to chip."""
-        return (Size("per_chip_s", 1e-3, step=0.1),)
+        return (Size("per_chip_s", "s", 1e-3, step=0.1),)
 
     def apply(self, world: World) -> World:
         """Sample chip i late by (i − 1) times the delay."""
@@ -41,7 +42,6 @@ class ClockError(Effect):
 
     name = "clock_error"
     summary = "the board's clock runs fast or slow against the reference's"
-    size_unit = "ratio"
     place = "timing"
     separated_by = "a longer run with fast changes of the rate at its end"
     starts = (-20.0, -8.0, -3.0, 3.0, 8.0, 20.0)
@@ -49,7 +49,7 @@ class ClockError(Effect):
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
         """One ratio; positive: the board's clock is fast."""
-        return (Size("ratio", 1e-3, step=0.02, bound=0.1),)  # a free-running oscillator is within some percent
+        return (Size("ratio", RATIO, 1e-3, step=0.02, bound=0.1),)  # a free-running oscillator is within some percent
 
     def apply(self, world: World) -> World:
         """Let the board's clock show (1 + ratio) of the true time."""
@@ -68,7 +68,7 @@ class TachoLatency(Effect):
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
         """One delay, never negative."""
-        return (Size("delay_s", 1e-2, positive=True, step=0.1),)
+        return (Size("delay_s", "s", 1e-2, positive=True, step=0.1),)
 
     def apply(self, world: World) -> World:
         """Delay the reference."""
@@ -80,14 +80,13 @@ class TachoScale(Effect):
 
     name = "tacho_scale"
     summary = "the reference has a wrong gain"
-    size_unit = "ratio"
     place = "reference"
     separated_by = "fast ramps: a wrong gain of the reference scales the centripetal and tangential parts unlike"
 
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
         """One ratio."""
-        return (Size("ratio", 0.01),)
+        return (Size("ratio", RATIO, 0.01),)
 
     def apply(self, world: World) -> World:
         """Multiply the reference by 1 + ratio."""
@@ -100,8 +99,7 @@ class TachoRipple(Effect):
 
     name = "tacho_ripple"
     summary = "the reference itself is modulated once or n times per revolution"
-    size_unit = "ratio"
-    other_units: ClassVar = {"amplitude": "ratio", "order": "number"}
+    other_units: ClassVar = {"amplitude": RATIO, "order": NUMBER, "phase_rad": "rad"}
     whole = frozenset({"order"})
     place = "reference"
     separated_by = "a second reference, or slow steady rotation in both directions"
@@ -109,7 +107,7 @@ class TachoRipple(Effect):
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
         """Relative sine and cosine amplitudes."""
-        return (Size("sine", 0.01), Size("cosine", 0.01))
+        return (Size("sine", RATIO, 0.01), Size("cosine", RATIO, 0.01))
 
     @classmethod
     def shapes(cls, duration: float, sample_rate: float) -> tuple[dict[str, float], ...]:
@@ -133,9 +131,9 @@ class TachoRipple(Effect):
         return amplitude * np.array([np.cos(phase), np.sin(phase)])
 
     @classmethod
-    def parameter_keys(cls, array: AccelerometerArray) -> tuple[str, ...]:
-        """Return amplitude, order and phase."""
-        return ("amplitude", "order", "phase_rad")
+    def parameter_units(cls, array: AccelerometerArray) -> dict[str, str]:
+        """Return the units of the contract's keys, amplitude and phase instead of the sizes."""
+        return dict(cls.other_units)
 
     def apply(self, world: World) -> World:
         """Multiply the reference by 1 + amplitude · sin(order·θ + phase)."""

@@ -10,20 +10,19 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.array import AccelerometerArray
-from gfimu.diagnosis.generic_basis import OF_READING, Motion, basis_function, is_of_time
-from gfimu.diagnosis.model import BasisUnits
 from gfimu.errors import InputError
-from gfimu.units import STANDARD_GRAVITY
+from gfimu.generic_basis import OF_READING, Motion, basis_function, is_of_time
+from gfimu.geometry.array import AccelerometerArray
+from gfimu.units import NAME, STANDARD_GRAVITY
+from gfimu.world_model import BasisUnits, SpinState
 from sim.effects.base import Effect, Pattern, Size
-from sim.motion import SpinState
 from sim.world import SampleContext, World
 
 __all__ = ["Unknown", "UnknownTerm"]
 
-_REFERENCE = Size("reference_rad_s", 0.1)
+_REFERENCE = Size("reference_rad_s", "rad/s", 0.1)
 _USUAL = 0.1  # m/s²
-_UNITS = ("rate_unit_rad_s", "acceleration_unit_rad_s2", "duration_s")
+_UNITS = {"rate_unit_rad_s": "rad/s", "acceleration_unit_rad_s2": "rad/s²", "duration_s": "s"}
 
 
 class Unknown(Effect):
@@ -33,17 +32,12 @@ class Unknown(Effect):
     summary = "a dependence that the data show and nothing in the library explains"
     place = "sensing"
     separated_by = "another run with another motion: what stays is in the rig or the sensors"
-    other_units: ClassVar = {"dependence": "name"}
+    other_units: ClassVar = {"dependence": NAME, **_UNITS}
 
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
         """One coefficient per channel, and one of the reference."""
-        return (*(Size(f"{channel}_m_s2", _USUAL) for channel in array.channels), _REFERENCE)
-
-    @classmethod
-    def parameter_keys(cls, array: AccelerometerArray) -> tuple[str, ...]:
-        """Return the coefficients, the function and its units."""
-        return (*(size.key for size in cls.sizes(array)), "dependence", *_UNITS)
+        return (*(Size(f"{channel}_m_s2", "m/s²", _USUAL) for channel in array.channels), _REFERENCE)
 
     @property
     def units(self) -> BasisUnits:

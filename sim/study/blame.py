@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 
 from gfimu.diagnosis.causes import Cause
+from gfimu.diagnosis.data.prepared_runs import PreparedRuns
 from gfimu.diagnosis.explanation import Explanation
-from gfimu.diagnosis.old_fit import Fit
 from gfimu.diagnosis.long_run import explain_any_length
+from gfimu.diagnosis.old_fit import Fit
 from gfimu.diagnosis.parallel import one_blas_thread
-from gfimu.diagnosis.prepared_runs import PreparedRuns
 from gfimu.diagnosis.refinement import refine
 from sim.effects import Effect, make_effect
 from sim.study.cases import Case

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from gfimu.errors import InputError
-from gfimu.model_files import find_model, read_toml
+from gfimu.files.model_files import find_model, read_toml
 from gfimu.recording import Recording
 from gfimu.units import STANDARD_GRAVITY
 from sim.campaign import discrete_parameters

@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from gfimu.array import AccelerometerArray
-from gfimu.diagnosis.distinguishability import PlannedRun, energy_left, normal_equations, plan_contenders
-from gfimu.diagnosis.verdict import Diagnosis, NamedCause
+from gfimu.diagnosis.design.distinguishability import PlannedRun, energy_left, normal_equations, plan_contenders
+from gfimu.diagnosis.verdict.verdict import Diagnosis, NamedCause
 from gfimu.errors import InputError
+from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
 from gfimu.short_repr import short_repr
 from gfimu.units import STANDARD_GRAVITY

@@ -8,8 +8,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from gfimu.atomic_file import atomic_path
 from gfimu.errors import InputError
+from gfimu.files.atomic_file import atomic_path
 
 __all__ = ["generator_name", "keep_outcomes", "read_outcomes"]
 

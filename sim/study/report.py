@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import beta
 
-from gfimu.atomic_file import write_text
 from gfimu.errors import InputError
+from gfimu.files.atomic_file import write_text
 from sim.study.figures import draw_confusion, draw_detection, draw_reliability
 from sim.study.outcome_file import keep_outcomes
 

@@ -9,7 +9,7 @@ import pytest
 
 from gfimu import AccelerometerArray, Estimate, Recording, specific_force
 from gfimu.calibration.result import load_calibration
-from gfimu.gravity import local_gravity
+from gfimu.geometry.gravity import local_gravity
 from gfimu.sensor_noise import white_noise
 
 CUBE = AccelerometerArray.load("cube12")

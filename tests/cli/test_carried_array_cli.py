@@ -10,7 +10,7 @@ import pytest
 
 from gfimu import AccelerometerArray, Recording
 from gfimu.errors import GfimuError
-from gfimu.recording_formats import open_run
+from gfimu.recording.formats import open_run
 from sim.scenarios import simulate
 
 SCENARIO = """

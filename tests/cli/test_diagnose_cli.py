@@ -174,7 +174,7 @@ HARD = {
 @pytest.mark.parametrize(("change", "verdict", "causes"), HARD.values(), ids=HARD)
 def test_hard_input_gets_a_verdict(gfimu_command, ordinary, tmp_path, monkeypatch, change, verdict, causes):
     # The report has tests of its own and takes longer than the diagnosis.
-    monkeypatch.setattr("gfimu.diagnosis.folder.write_report", lambda path, diagnosis: path.write_text("report"))
+    monkeypatch.setattr("gfimu.diagnosis.report.folder.write_report", lambda path, diagnosis: path.write_text("report"))
     change(ordinary).write(tmp_path / "run.parquet")
     done = gfimu_command("diagnose", tmp_path / "run.parquet", "--twin", TWIN, "--out", tmp_path / "out", "--json")
     assert done.code == 0, done.stderr

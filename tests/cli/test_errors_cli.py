@@ -13,9 +13,9 @@ import pytest
 
 import gfimu
 import gfimu.commands.score
-from gfimu.atomic_file import atomic_path, write_text
 from gfimu.cli import output
 from gfimu.errors import GfimuError, WriteError
+from gfimu.files.atomic_file import atomic_path, write_text
 
 PROGRAM = [sys.executable, "-c", "from gfimu.cli import main; main()"]
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from firmware_bridge.journal import Journal
-from gfimu.array import AccelerometerArray
+from gfimu.geometry.array import AccelerometerArray
 from gfimu.rate.filter import filter_rate
 from gfimu.rate.sensing import SensorErrors
 

@@ -13,7 +13,7 @@ import typer
 
 import gfimu
 from gfimu.cli.app import program
-from gfimu.outputs import OutputFile, OutputFolder
+from gfimu.files.outputs import OutputFile, OutputFolder
 
 OTHER_WORDS = {
     "--from": "source",

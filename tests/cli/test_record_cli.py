@@ -105,7 +105,7 @@ def test_a_full_disk_at_the_end_of_a_virtual_run(gfimu_command, tmp_path, monkey
     def no_room(*_) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    monkeypatch.setattr("gfimu.column_file._write_csv", no_room)
+    monkeypatch.setattr("gfimu.files.column_file._write_csv", no_room)
     out = tmp_path / "run.csv"
     result = gfimu_command("firmware", "run", "--scenario", "rest", "--duration", "0.2", "--out", out)
     assert result.code == 1

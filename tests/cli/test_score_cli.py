@@ -4,8 +4,8 @@ import json
 
 import pytest
 
-from gfimu.array import AccelerometerArray
-from gfimu.model_files import list_models
+from gfimu.files.model_files import list_models
+from gfimu.geometry.array import AccelerometerArray
 
 
 def test_without_arguments_compares_every_shipped_array(gfimu_command):

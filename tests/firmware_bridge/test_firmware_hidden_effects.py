@@ -12,7 +12,7 @@ from firmware_bridge.adxl345_device import Adxl345Options
 from firmware_bridge.lpc1768.build import build
 from firmware_bridge.virtual_run import record_virtual
 from gfimu.diagnosis.diagnose import diagnose
-from gfimu.diagnosis.verdict import Diagnosis
+from gfimu.diagnosis.verdict.verdict import Diagnosis
 from gfimu.recording import Recording
 from sim.ride import Ride
 from sim.scenarios import Scenario

@@ -23,7 +23,7 @@ from firmware_bridge.frames import (
     frame_format,
 )
 from gfimu.errors import InputError
-from gfimu.mimu4444 import read_mimu4444
+from gfimu.recording.mimu4444 import read_mimu4444
 
 FRAME = LPC1768_DTYPE.itemsize
 

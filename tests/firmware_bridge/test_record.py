@@ -19,8 +19,8 @@ from firmware_bridge.frames import encode_samples
 from firmware_bridge.link import Link
 from firmware_bridge.recorder import SampleClock, record
 from firmware_bridge.virtual_port import open_port, serve
-from gfimu.array import AccelerometerArray
 from gfimu.errors import GfimuError, InputError
+from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
 
 needs_board = pytest.mark.skipif(

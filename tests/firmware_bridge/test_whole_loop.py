@@ -17,9 +17,9 @@ from firmware_bridge.physics import RidePhysics
 from firmware_bridge.recorder import record
 from firmware_bridge.virtual_port import open_port, serve
 from firmware_bridge.virtual_run import record_virtual
-from gfimu.array import AccelerometerArray
 from gfimu.errors import InputError
-from gfimu.estimation import estimate
+from gfimu.geometry.array import AccelerometerArray
+from gfimu.motion.estimation import estimate
 from gfimu.recording import Recording
 from sim.ride import Ride
 from sim.scenarios import Scenario, simulate

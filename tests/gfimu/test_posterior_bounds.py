@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from gfimu.array import AccelerometerArray
 from gfimu.bounds import alpha_std, posterior_rate_bound, steady_rate_bound
 from gfimu.errors import InputError
+from gfimu.geometry.array import AccelerometerArray
 from gfimu.rate.sensing import SensorErrors
 
 CUBE = AccelerometerArray.load("cube12")

@@ -7,9 +7,9 @@ import pytest
 
 import gfimu
 from gfimu import AccelerometerArray, Recording, SensorErrors
-from gfimu.diagnosis.distinguishability import Distinguishability
-from gfimu.linear_solution import linear_solution
-from gfimu.part import Part
+from gfimu.diagnosis.design.distinguishability import Distinguishability
+from gfimu.geometry.linear_solution import linear_solution
+from gfimu.parts.part import Part
 from gfimu.short_repr import short_repr
 from sim.data_sheet import DataSheet
 from sim.scenarios import Scenario

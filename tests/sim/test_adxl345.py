@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gfimu.array import AccelerometerArray
 from gfimu.errors import InputError
+from gfimu.geometry.array import AccelerometerArray
 from sim.adxl345 import Sensor, SensorErrors, SensorSettings, conversion_offsets, draw_errors, flicker, quantise
 from sim.data_sheet import DataSheet
 

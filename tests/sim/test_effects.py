@@ -5,6 +5,7 @@ shares no code with the project.
 """
 
 from dataclasses import dataclass
+from types import SimpleNamespace
 
 import mujoco
 import numpy as np
@@ -15,8 +16,8 @@ from independent_world import Setting, noise_free
 from scipy.interpolate import CubicSpline
 from scipy.signal import lsim
 
-from gfimu.array import AccelerometerArray
 from gfimu.errors import InputError
+from gfimu.geometry.array import AccelerometerArray
 from sim import forward
 from sim.campaign import random_profile
 from sim.effects import EFFECTS, Effect, apply_effects, make_effect
@@ -448,3 +449,9 @@ def test_mujoco_refuses_a_nod_that_keeps_to_no_line(cube12):
     world = apply_effects(World(cube12), [make_effect("axis_wobble", nod) for nod in nods])
     with pytest.raises(InputError, match="one direction_rad"):
         turntable_model(world)
+
+
+def test_a_twin_refuses_effects_of_another_simulation(cube12):
+    foreign = SimpleNamespace(name="drag", place="motion", parameters={})
+    with pytest.raises(InputError, match=r"not effects of this simulation: drag; build them with"):
+        Twin(cube12).extended([foreign])

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from gfimu.array import AccelerometerArray
 from gfimu.errors import InputError
-from gfimu.model_files import find_model
+from gfimu.files.model_files import find_model
+from gfimu.geometry.array import AccelerometerArray
 from sim.mjcf_array import array_from_mjcf
 
 TURNED = """<mujoco>

@@ -2,13 +2,15 @@
 
 import re
 
+import numpy as np
 import pytest
 
 from gfimu import AccelerometerArray
-from gfimu.diagnosis.plain_words import parameter_texts
-from gfimu.diagnosis.verdict import NamedCause
-from gfimu.units import NAME, NUMBER, RATIO, split_key
+from gfimu.diagnosis.report.plain_words import parameter_texts
+from gfimu.diagnosis.verdict.verdict import NamedCause
+from gfimu.units import KEY_ENDINGS, NAME, NUMBER, RATIO, key_name
 from sim.effects import BODY_EFFECTS, EFFECTS
+from sim.effects.base import Size
 from sim.effects.unknown import Unknown
 
 CUBE = AccelerometerArray.load("cube12")
@@ -18,13 +20,40 @@ LONE_UNITS = {"rad": "°", "m/s²": "mg", "rad/s": "rpm"}
 
 
 @pytest.mark.parametrize("name", REGISTRY)
-def test_every_key_has_a_unit_or_is_declared_to_have_none(name):
+def test_every_parameter_has_a_unit_or_is_declared_to_have_none(name):
     units = REGISTRY[name].parameter_units(CUBE)
     assert units.keys() == set(REGISTRY[name].parameter_keys(CUBE))
     for key, unit in units.items():
         assert unit in {RATIO, NUMBER, NAME} or PHYSICAL.fullmatch(unit), (key, unit)
-        by_key = split_key(key)[1]
-        assert by_key in {"", unit}, f"{key} ends in {by_key}, but is declared in {unit}"
+
+
+@pytest.mark.parametrize("name", REGISTRY)
+def test_every_key_ends_in_its_unit_and_in_no_other(name):
+    units = REGISTRY[name].parameter_units(CUBE) | {size.key: size.unit for size in REGISTRY[name].sizes(CUBE)}
+    for key, unit in units.items():
+        endings = [ending for ending in KEY_ENDINGS.values() if f"_{key}".endswith(f"_{ending}")]
+        longest = max(endings, key=len, default=None)
+        assert KEY_ENDINGS.get(unit) == longest, f"{key} ends in {longest}, but is declared in {unit}"
+
+
+@pytest.mark.parametrize("name", REGISTRY)
+def test_every_size_has_a_unit_of_its_own(name):
+    for size in REGISTRY[name].sizes(CUBE):
+        assert size.unit == RATIO or PHYSICAL.fullmatch(size.unit), (size.key, size.unit)
+
+
+@pytest.mark.parametrize("name", REGISTRY)
+def test_what_a_diagnosis_fits_has_units(name):
+    """Sizes and shapes become parameters, each of which has a unit."""
+    effect = REGISTRY[name]
+    for shape in effect.shapes(60.0, 100.0):
+        made = effect.from_sizes(CUBE, np.full(len(effect.sizes(CUBE)), 0.01), shape)
+        assert made.parameters.keys() <= effect.parameter_units(CUBE).keys()
+
+
+def test_a_size_needs_a_unit():
+    with pytest.raises(TypeError, match="unit"):
+        Size(key="a11_m_s2", prior_std=0.1)
 
 
 @pytest.mark.parametrize("name", REGISTRY)
@@ -43,7 +72,7 @@ def test_every_parameter_prints_with_its_unit(name):
             assert text.value.endswith((f" {unit}", f" m{unit}")), text
             assert text.familiar.endswith(LONE_UNITS.get(unit, "")), text
             assert "%" not in text.familiar
-        assert text.name == split_key(key)[0].replace("_", " ")
+        assert text.name == key_name(key, unit).replace("_", " ")
 
 
 def test_vibration_rectification_is_no_percentage():
@@ -55,6 +84,23 @@ def test_vibration_rectification_is_no_percentage():
     assert (text.name, text.value, text.familiar) == ("a11", "(5.80 ± 0.20)·10⁻⁶ m/s²/(rad/s)⁴", "")
 
 
-def test_a_key_of_no_known_kind_is_no_percentage():
-    (text,) = parameter_texts(NamedCause("new", {"strange_key": 0.01}, {"strange_key": 0.001}, 0.99))
-    assert (text.name, text.familiar) == ("strange key", "")
+@pytest.mark.parametrize("key", ["strange_key", "a11", "ratio"])
+def test_a_parameter_of_unknown_unit_is_a_plain_number(key):
+    (text,) = parameter_texts(NamedCause("new", {key: 0.01}, {key: 0.001}, 0.99), {})
+    assert (text.name, text.value, text.familiar) == (key.replace("_", " "), "0.0100 ± 0.0010", "")
+
+
+@pytest.mark.parametrize(
+    ("key", "unit", "name"),
+    [
+        ("a11_m_s2", "m/s²", "a11"),
+        ("delay_s", "s", "delay"),
+        ("s", "s", "value"),
+        ("ratio", RATIO, "ratio"),
+        ("a11_m_s2", RATIO, "a11_m_s2"),
+        ("a11_m_s2_per_rad4_s4", "m/s²/(rad/s)⁴", "a11"),
+        ("a11_m_s2", "", "a11_m_s2"),
+    ],
+)
+def test_a_key_without_its_unit(key, unit, name):
+    assert key_name(key, unit) == name

@@ -5,10 +5,10 @@ import json
 import numpy as np
 import pytest
 
-from gfimu.array import AccelerometerArray
 from gfimu.errors import InputError
-from gfimu.kinematics import specific_force
-from gfimu.model_files import list_models
+from gfimu.files.model_files import list_models
+from gfimu.geometry.array import AccelerometerArray
+from gfimu.geometry.kinematics import specific_force
 from gfimu.recording import Recording
 from sim.effects import make_effect
 from sim.scenarios import Scenario, simulate

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from gfimu.array import AccelerometerArray, Chip
 from gfimu.errors import InputError
-from gfimu.kinematics import specific_force
+from gfimu.geometry.array import AccelerometerArray, Chip
+from gfimu.geometry.kinematics import specific_force
 from gfimu.units import STANDARD_GRAVITY
 from sim import forward
 from sim.effects import make_effect

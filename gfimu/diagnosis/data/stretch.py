@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
 from gfimu.diagnosis.coloured_noise import CosineBasis, NoiseLevels
+from gfimu.diagnosis.data.rounding import COARSE, Steps
+from gfimu.diagnosis.data.run import Run, difference_noise
 from gfimu.diagnosis.drive import smooth_rate
-from gfimu.diagnosis.model import Effect, Spin, WorldModel
-from gfimu.diagnosis.rounding import COARSE, Steps
-from gfimu.diagnosis.run import Run, difference_noise
 from gfimu.diagnosis.terms.spline import JoinedSpin, ScaledSpin
+from gfimu.world_model import Effect, Spin, WorldModel
 
 __all__ = ["RunUp", "Stretch", "make_stretches"]
 

@@ -17,13 +17,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.fit.evidence import SCALES, inverse, log_evidence
 from gfimu.diagnosis.fit.linear import Linear, Point, energy_of, linearise, of_causes
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.terms.cause import Cause
 from gfimu.diagnosis.terms.jacobian import Jacobian
+from gfimu.geometry.array import AccelerometerArray
 
 __all__ = ["Fit", "fit", "log_prior"]
 

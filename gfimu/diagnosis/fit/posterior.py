@@ -23,12 +23,12 @@ from scipy.linalg.blas import dsyrk
 
 from gfimu.diagnosis.coloured_noise import NoiseLevels
 from gfimu.diagnosis.data.stretch import Stretch
-from gfimu.diagnosis.model import Effect
 from gfimu.diagnosis.slow_modes import SlowModes, WeighedModes
 from gfimu.diagnosis.terms.columns import Columns
 from gfimu.diagnosis.terms.drive import Drive
-from gfimu.diagnosis.terms.observed import Observed, observe
 from gfimu.diagnosis.terms.jacobian import Jacobian, Reach, differentiate, measured_reach
+from gfimu.diagnosis.terms.observed import Observed, observe
+from gfimu.world_model import Effect
 
 __all__ = ["Posterior", "condition", "energy", "posterior_of"]
 

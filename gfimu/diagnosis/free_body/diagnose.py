@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from gfimu.attitude import from_rotation, integrate_attitude, to_rotation
 from gfimu.diagnosis.adequacy import LEFT_OVER_ODDS
 from gfimu.diagnosis.causes import Cause, effects_of_run
+from gfimu.diagnosis.data.integrity import check_integrity
+from gfimu.diagnosis.data.run import Run
 from gfimu.diagnosis.explanation import Explanation
-from gfimu.diagnosis.old_fit import Fit
 from gfimu.diagnosis.free_body.engine import explain, without_cause
 from gfimu.diagnosis.free_body.holdout import (
     BodyHoldout,
@@ -24,22 +23,21 @@ from gfimu.diagnosis.free_body.holdout import (
     stretches,
 )
 from gfimu.diagnosis.free_body.left_over import motion_noise, structure_left
-from gfimu.diagnosis.free_body.model import BodyModel
 from gfimu.diagnosis.free_body.run import BodyRun, prepare_body_run
 from gfimu.diagnosis.free_body.segment import BodySegment
 from gfimu.diagnosis.free_body.undetermined import undetermined, undetermined_sentence
 from gfimu.diagnosis.gate import impossible_sizes, judge
-from gfimu.diagnosis.integrity import check_integrity
-from gfimu.diagnosis.model import Effect, WorldModel
 from gfimu.diagnosis.named_causes import contested, fault_causes, name_cause
 from gfimu.diagnosis.naming import channel_share, conflicting, probabilities, rival_list
+from gfimu.diagnosis.old_fit import Fit
+from gfimu.diagnosis.report.wording import verdict_sentences
 from gfimu.diagnosis.residual_tests import LeftOver
-from gfimu.diagnosis.run import Run
-from gfimu.diagnosis.sample_notes import with_sample_notes
-from gfimu.diagnosis.verdict import Diagnosis, Gain, NamedCause, Residual, RunView, Unexplained
-from gfimu.diagnosis.wording import verdict_sentences
+from gfimu.diagnosis.verdict.sample_notes import with_sample_notes
+from gfimu.diagnosis.verdict.verdict import Diagnosis, Gain, NamedCause, Residual, RunView, Unexplained
 from gfimu.errors import InputError
+from gfimu.motion.attitude import from_rotation, integrate_attitude, to_rotation
 from gfimu.recording import Recording
+from gfimu.world_model import BodyModel, Effect, WorldModel
 
 __all__ = ["diagnose_body"]
 
@@ -70,15 +68,16 @@ def diagnose_body(
     recordings, model, held_out, names, report
         As `gfimu.diagnosis.diagnose.diagnose` has them; the twin's drive source is ``gyro``.
     """
-    body_model = cast("BodyModel", model)
+    if not isinstance(model, BodyModel):
+        raise InputError("the simulation predicts no free body; drive it by tacho, angle or command, not by gyro")
     report(0.02, "read")
-    prepared = _Prepared.build(recordings, body_model, names)
+    prepared = _Prepared.build(recordings, model, names)
     segments, fixed = prepared.segments, prepared.fixed
     explanation = explain(segments, fixed, report=lambda share, text: report(0.03 + 0.8 * share, text))
     report(0.85, "hold out")
     kept = None
     if held_out:
-        kept = _Prepared.build(held_out, body_model, [f"held out {n + 1}" for n in range(len(held_out))])
+        kept = _Prepared.build(held_out, model, [f"held out {n + 1}" for n in range(len(held_out))])
     pairs = _pairs(prepared, kept, explanation)
     withdrawn: list[str] = []
     while explanation.fit.causes:

@@ -15,14 +15,14 @@ from numpy.typing import NDArray
 from gfimu.diagnosis.causes import Cause, Signature, effects_of_run
 from gfimu.diagnosis.evidence import SCALES, log_evidence
 from gfimu.diagnosis.explanation import Explanation
-from gfimu.diagnosis.old_fit import Fit
 from gfimu.diagnosis.free_body.segment import BodySegment
 from gfimu.diagnosis.free_body.signatures import plan_signatures, signature_columns
 from gfimu.diagnosis.free_body.undetermined import LEAST_INFORMATION, determined
-from gfimu.diagnosis.model import Effect
-from gfimu.diagnosis.pruning import LEAST_EXTRA_ODDS, LEAST_ODDS
+from gfimu.diagnosis.old_fit import Fit
 from gfimu.diagnosis.old_search import EXTRA_CAUSE, Blocks, search
+from gfimu.diagnosis.pruning import LEAST_EXTRA_ODDS, LEAST_ODDS
 from gfimu.diagnosis.signatures import SignatureSet, hypotheses
+from gfimu.world_model import Effect
 
 __all__ = ["Known", "Screening", "explain", "learn_noise", "screen", "without_cause"]
 

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from gfimu.diagnosis.causes import Cause, effects_of_run
 from gfimu.diagnosis.free_body.engine import Screening, learn_noise, screen
 from gfimu.diagnosis.free_body.segment import BodySegment
-from gfimu.diagnosis.model import Effect
 from gfimu.diagnosis.old_search import Blocks
-from gfimu.diagnosis.verdict import Gain
+from gfimu.diagnosis.verdict.verdict import Gain
+from gfimu.world_model import Effect
 
 __all__ = ["BodyHoldout", "gate_gains", "held_out_gain", "other_recording", "stretches"]
 

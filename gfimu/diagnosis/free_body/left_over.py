@@ -15,7 +15,7 @@ from gfimu.diagnosis.free_body.engine import Known
 from gfimu.diagnosis.free_body.segment import BodyLine, BodySegment
 from gfimu.diagnosis.free_body.signatures import plan_signatures, signature_columns
 from gfimu.diagnosis.residual_tests import LeftOver
-from gfimu.kinematics import omega_products
+from gfimu.geometry.kinematics import omega_products
 
 __all__ = ["motion_noise", "structure_left"]
 

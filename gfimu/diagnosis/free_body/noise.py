@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 from scipy.optimize import nnls
 
-from gfimu.array import AccelerometerArray
+from gfimu.geometry.array import AccelerometerArray
 
 __all__ = ["BodyNoise", "Projection", "change_of_readings", "learn_motion_noise", "white_from_rows"]
 

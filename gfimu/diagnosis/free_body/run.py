@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation, binary_erosion, uniform_filter1d
 
+from gfimu.diagnosis.data.run import GYRO_COLUMNS, Run, possible_values, prepare_run
+from gfimu.diagnosis.data.time_grid import time_grid
 from gfimu.diagnosis.free_body.gyro import smooth_gyro
-from gfimu.diagnosis.model import WorldModel
-from gfimu.diagnosis.run import GYRO_COLUMNS, Run, possible_values, prepare_run
-from gfimu.diagnosis.time_grid import time_grid
 from gfimu.recording import Recording
+from gfimu.world_model import WorldModel
 
 __all__ = ["BodyRun", "prepare_body_run"]
 

@@ -17,8 +17,6 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_solve, solve_triangular
 
 from gfimu.diagnosis.coloured_noise import CosineBasis
-from gfimu.diagnosis.free_body.model import BodyModel
-from gfimu.diagnosis.free_body.motion import BodyDrive
 from gfimu.diagnosis.free_body.noise import (
     BodyNoise,
     Projection,
@@ -27,7 +25,8 @@ from gfimu.diagnosis.free_body.noise import (
     white_from_rows,
 )
 from gfimu.diagnosis.free_body.run import BodyRun
-from gfimu.diagnosis.model import Effect
+from gfimu.motion.body_drive import BodyDrive
+from gfimu.world_model import BodyModel, Effect
 
 __all__ = ["BodyLine", "BodySegment", "Nuisances"]
 

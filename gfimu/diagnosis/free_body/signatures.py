@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from gfimu.diagnosis.causes import Cause, Signature, effects_of_run, wired
 from gfimu.diagnosis.free_body.segment import BodyLine, BodySegment
-from gfimu.diagnosis.model import Effect, EffectFamily
+from gfimu.world_model import Effect, EffectFamily
 
 __all__ = ["plan_signatures", "signature_columns"]
 

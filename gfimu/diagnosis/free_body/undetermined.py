@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import qr
 
-from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.causes import Signature
 from gfimu.diagnosis.signatures import SignatureSet
+from gfimu.geometry.array import AccelerometerArray
 
 __all__ = ["LEAST_INFORMATION", "Undetermined", "determined", "undetermined", "undetermined_sentence"]
 

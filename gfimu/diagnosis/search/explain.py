@@ -10,8 +10,8 @@ from scipy.special import logsumexp
 
 from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.fit.gauss_newton import Fit, fit
-from gfimu.diagnosis.fit.linear import Point
 from gfimu.diagnosis.fit.learn import learn_noise, learn_roughness, starting_point
+from gfimu.diagnosis.fit.linear import Point
 from gfimu.diagnosis.parallel import each_apart
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.beam import Blocks, leading_sets

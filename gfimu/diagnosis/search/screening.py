@@ -8,14 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.fit.linear import Point, linearise
 from gfimu.diagnosis.fit.posterior import Posterior
-from gfimu.diagnosis.model import EffectFamily, Whitened
 from gfimu.diagnosis.terms.cause import Cause, effects_of, mixing_of
 from gfimu.diagnosis.terms.columns import Columns
 from gfimu.diagnosis.terms.library import family_columns
+from gfimu.geometry.array import AccelerometerArray
+from gfimu.world_model import EffectFamily, Whitened
 
 __all__ = ["Hypothesis", "Screening", "Signature", "screen"]
 

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
-from gfimu.array import AccelerometerArray
-from gfimu.diagnosis.model import Effect, EffectFamily, Pattern
+from gfimu.geometry.array import AccelerometerArray
+from gfimu.world_model import Effect, EffectFamily, Pattern
 
 __all__ = ["SMALLEST_POSITIVE", "Cause", "effects_of", "mixing_of"]
 

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.diagnosis.data.stretch import Stretch
-from gfimu.diagnosis.model import Effect, EffectFamily
 from gfimu.diagnosis.terms.cause import Cause, effects_of
 from gfimu.diagnosis.terms.columns import Columns
 from gfimu.diagnosis.terms.drive import Drive
 from gfimu.diagnosis.terms.observed import Observed
+from gfimu.world_model import Effect, EffectFamily
 
 __all__ = ["cause_columns", "family_columns"]
 

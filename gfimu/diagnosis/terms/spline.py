@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import BSpline
 
-from gfimu.diagnosis.model import Spin, SpinState
+from gfimu.world_model import Spin, SpinState
 
 __all__ = ["DEGREE", "AngleSpline", "JoinedSpin", "ScaledSpin", "State"]
 

@@ -5,12 +5,12 @@ import json
 import numpy as np
 import pytest
 
-from gfimu.array import AccelerometerArray
 from gfimu.calibration.result import Calibration, combine, load_calibration, parameter_names
 from gfimu.calibration.run_file import open_calibrated_run
-from gfimu.carried_array import array_difference
 from gfimu.errors import InputError, UnitError
+from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
+from gfimu.recording.carried_array import array_difference
 
 
 @pytest.fixture

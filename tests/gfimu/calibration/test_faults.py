@@ -9,7 +9,7 @@ from gfimu.calibration.methods import METHODS, calibrate, calibrate_gyro
 from gfimu.calibration.observations import averaged_poses, denoised_samples, every_sample, observations_from
 from gfimu.errors import InputError
 from gfimu.recording import Recording
-from gfimu.rest import detect_rest
+from gfimu.recording.rest import detect_rest
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -66,7 +66,7 @@ def test_correlated_noise_widens_the_mean():
 
 
 def detect_rest_everywhere(n, length=2000):
-    from gfimu.rest import Rest
+    from gfimu.recording.rest import Rest
 
     start = np.arange(0, n, length)
     return Rest(start, start + length, 1.0, False, 101, "m_s2")

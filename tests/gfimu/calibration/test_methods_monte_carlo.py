@@ -10,7 +10,7 @@ from gfimu.calibration.observations import Observations
 from gfimu.calibration.recursive import recursive
 from gfimu.calibration.six_position import six_position
 from gfimu.calibration.twelve_position import twelve_position
-from gfimu.gravity import EARTH_RATE
+from gfimu.geometry.gravity import EARTH_RATE
 
 RUNS = 300
 

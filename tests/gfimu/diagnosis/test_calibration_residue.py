@@ -8,18 +8,18 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from gfimu.array import AccelerometerArray
 from gfimu.diagnosis import diagnose, engine
 from gfimu.diagnosis.calibration_residue import TOLERANCE, CalibrationResidue
+from gfimu.diagnosis.data.prepared_runs import PreparedRuns
+from gfimu.diagnosis.data.run import prepare_run
 from gfimu.diagnosis.engine import explain
 from gfimu.diagnosis.evidence import SCALES
 from gfimu.diagnosis.long_run import explain_any_length
-from gfimu.diagnosis.prepared_runs import PreparedRuns
-from gfimu.diagnosis.refinement import refine
-from gfimu.diagnosis.run import prepare_run
-from gfimu.diagnosis.screening import screen
 from gfimu.diagnosis.old_search import log_odds_beside_residue
+from gfimu.diagnosis.refinement import refine
+from gfimu.diagnosis.screening import screen
 from gfimu.diagnosis.stretches import make_segments
+from gfimu.geometry.array import AccelerometerArray
 from sim.campaign import Measurement, measure
 from sim.effects import make_effect
 from sim.study.cases import Case, study_cases

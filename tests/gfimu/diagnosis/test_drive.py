@@ -10,13 +10,13 @@ from numpy.testing import assert_allclose
 from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import BSpline
 
-from gfimu.array import AccelerometerArray
+from gfimu.diagnosis.data.run import prepare_run
 from gfimu.diagnosis.diagnose import diagnose
 from gfimu.diagnosis.drive import AngleSpline
 from gfimu.diagnosis.drive_jacobian import DriveJacobian, lagged
 from gfimu.diagnosis.refinement import refine
-from gfimu.diagnosis.run import prepare_run
 from gfimu.diagnosis.stretches import make_segments
+from gfimu.geometry.array import AccelerometerArray
 from sim.campaign import Measurement, measure
 from sim.effects import make_effect
 from sim.motion import SpinState

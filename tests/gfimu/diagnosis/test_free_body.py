@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
-from gfimu.attitude import to_rotation
 from gfimu.diagnosis.diagnose import diagnose
-from gfimu.diagnosis.free_body.motion import BodyDrive
 from gfimu.diagnosis.free_body.run import prepare_body_run
 from gfimu.diagnosis.free_body.segment import BodySegment
-from gfimu.diagnosis.picture import write_picture
+from gfimu.diagnosis.report.picture import write_picture
 from gfimu.errors import InputError
-from gfimu.model_files import find_model, read_toml
+from gfimu.files.model_files import find_model, read_toml
+from gfimu.motion.attitude import to_rotation
+from gfimu.motion.body_drive import BodyDrive
 from sim.effects import BODY_EFFECTS, EFFECTS, NOT_OF_A_BODY
 from sim.scenarios import Scenario, simulate
 from sim.twin import Twin

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from made_diagnoses import made_diagnosis
 
-from gfimu.array import AccelerometerArray
 from gfimu.diagnosis import diagnose
 from gfimu.diagnosis.gate import impossible_sizes, judge, measurable
 from gfimu.diagnosis.named_causes import capped
-from gfimu.diagnosis.plain_words import headline
-from gfimu.diagnosis.report import report_html
-from gfimu.diagnosis.verdict import Gain, NamedCause, Residual, Unexplained
-from gfimu.diagnosis.wording import verdict_sentences
+from gfimu.diagnosis.report.page import report_html
+from gfimu.diagnosis.report.plain_words import headline
+from gfimu.diagnosis.report.wording import verdict_sentences
+from gfimu.diagnosis.verdict.verdict import Gain, NamedCause, Residual, Unexplained
+from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
 from sim.campaign import Measurement, measure, random_profile
 from sim.effects import EFFECTS, make_effect

@@ -7,11 +7,11 @@ import re
 import numpy as np
 import pytest
 
-from gfimu.array import AccelerometerArray
 from gfimu.diagnosis import diagnose
-from gfimu.diagnosis.prepared_runs import PreparedRuns
+from gfimu.diagnosis.data.prepared_runs import PreparedRuns
 from gfimu.diagnosis.refinement import refine
 from gfimu.diagnosis.residual_tests import lines
+from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
 from gfimu.units import STANDARD_GRAVITY
 from sim.campaign import Measurement, measure

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from gfimu.array import AccelerometerArray
 from gfimu.diagnosis import diagnose, long_run, stretches, surrogate
+from gfimu.diagnosis.data.run import prepare_run
 from gfimu.diagnosis.long_run import spread_over_runs
 from gfimu.diagnosis.nuisances import settle_noise
-from gfimu.diagnosis.run import prepare_run
+from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
 from sim.campaign import Measurement, measure, random_profile
 from sim.effects import make_effect

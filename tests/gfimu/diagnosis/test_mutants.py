@@ -98,7 +98,7 @@ def everything_is_explained(patch):
 
 
 def samples_unchecked(patch):
-    module = sys.modules["gfimu.diagnosis.prepared_runs"]
+    module = sys.modules["gfimu.diagnosis.data.prepared_runs"]
     kept = module.check_integrity
     patch.setattr(module, "check_integrity", lambda *given: replace(kept(*given), effects=[], why={}))
 

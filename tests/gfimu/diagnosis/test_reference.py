@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from gfimu.array import AccelerometerArray
 from gfimu.diagnosis import diagnose
-from gfimu.diagnosis.run import prepare_run
+from gfimu.diagnosis.data.run import prepare_run
 from gfimu.errors import InputError
+from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
 from sim.campaign import Measurement, hidden_effect, measure, random_profile
 from sim.effects import EFFECTS, ENCODER_EFFECTS, NOT_OF_AN_ENCODER, Effect

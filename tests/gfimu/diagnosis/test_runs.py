@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from gfimu.array import AccelerometerArray
 from gfimu.diagnosis import diagnose
+from gfimu.diagnosis.data.integrity import check_integrity
+from gfimu.diagnosis.data.run import prepare_run
 from gfimu.diagnosis.holdout import split_segments
-from gfimu.diagnosis.integrity import check_integrity
-from gfimu.diagnosis.run import prepare_run
 from gfimu.diagnosis.stretches import make_segments
+from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
 from gfimu.units import STANDARD_GRAVITY
 from sim.campaign import Measurement, hidden_effect, measure, random_profile

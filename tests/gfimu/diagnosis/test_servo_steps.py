@@ -7,9 +7,9 @@ late.
 import numpy as np
 import pytest
 
-from gfimu.array import AccelerometerArray
 from gfimu.diagnosis import diagnose
-from gfimu.diagnosis.prepared_runs import PreparedRuns
+from gfimu.diagnosis.data.prepared_runs import PreparedRuns
+from gfimu.geometry.array import AccelerometerArray
 from sim.campaign import Measurement, measure
 from sim.effects import make_effect
 from sim.motion import SpinState

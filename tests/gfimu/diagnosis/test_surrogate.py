@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gfimu.array import AccelerometerArray
 from gfimu.diagnosis import diagnose
-from gfimu.diagnosis.folder import write_diagnosis
-from gfimu.diagnosis.plain_words import story
+from gfimu.diagnosis.report.folder import write_diagnosis
+from gfimu.diagnosis.report.plain_words import story
 from gfimu.errors import InputError
+from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
 from sim.campaign import Measurement, measure, random_profile
 from sim.effects import make_effect

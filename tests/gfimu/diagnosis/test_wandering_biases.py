@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from gfimu.diagnosis import diagnose, engine, wandering_biases
+from gfimu.diagnosis.data.prepared_runs import PreparedRuns
 from gfimu.diagnosis.engine import explain
 from gfimu.diagnosis.long_run import explain_any_length
-from gfimu.diagnosis.prepared_runs import PreparedRuns
 from gfimu.diagnosis.stochastic import Walk
 from sim.study.cases import Case
 from sim.study.outcome import draw_world

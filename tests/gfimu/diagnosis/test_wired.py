@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from gfimu.array import AccelerometerArray
 from gfimu.diagnosis.causes import Cause, Signature, wired
-from gfimu.diagnosis.prepared_runs import PreparedRuns
+from gfimu.diagnosis.data.prepared_runs import PreparedRuns
 from gfimu.diagnosis.signatures import cause_columns, signature_columns
+from gfimu.geometry.array import AccelerometerArray
 from sim.campaign import Measurement, measure
 from sim.effects import EFFECTS, make_effect
 from sim.twin import Twin

@@ -8,10 +8,10 @@ from rate_worlds import cube, measure, sensor_errors, tumble
 from scipy.stats import chi2
 
 from gfimu import AccelerometerArray, Recording, specific_force, summarise
-from gfimu.part_limits import PartLimits
+from gfimu.motion.rest_bias import estimate_from_rest
+from gfimu.parts.limits import PartLimits
 from gfimu.rate.consistency import FALSE_ALARM, _slow_quantile, judge_consistency, slow_error_signatures
 from gfimu.rate.filter import filter_rate
-from gfimu.rest_bias import estimate_from_rest
 from gfimu.units import STANDARD_GRAVITY
 from sim.scenarios import Scenario, simulate
 

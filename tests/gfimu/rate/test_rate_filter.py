@@ -9,8 +9,8 @@ import pytest
 from rate_worlds import cube, measure, readings, sensor_errors, tumble, turntable
 from reference_filter import reference_filter, reference_smoother
 
-from gfimu.array import AccelerometerArray
 from gfimu.errors import GeometryError, InputError
+from gfimu.geometry.array import AccelerometerArray
 from gfimu.rate.backward import backward
 from gfimu.rate.filter import filter_rate
 from gfimu.rate.kalman import FilterSettings, quadrature_weights

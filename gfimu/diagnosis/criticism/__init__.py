@@ -1,0 +1,1 @@
+"""What the residual shows: spectra, dependences, tests of whiteness."""

@@ -1,0 +1,1 @@
+"""Which run of the table separates named effects best."""

@@ -1,0 +1,163 @@
+"""The proposal of an experiment: in numbers, in words, and as a scenario file."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import tomli_w
+
+from gfimu.diagnosis.design.distinguishability import Distinguishability, PlannedRun
+from gfimu.diagnosis.design.profile_search import Limits
+from gfimu.diagnosis.design.table_profile import TableProfile
+from gfimu.short_repr import short_repr
+from gfimu.world_model import WorldModel
+
+__all__ = ["SEPARATED", "Proposal", "in_words", "scenario_of"]
+
+SEPARATED = 12.0
+"""D_ij from which on two effects are told apart with confidence, nats: odds of 10⁵, less what the prior costs."""
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """The experiment to do next.
+
+    Parameters
+    ----------
+    effects : tuple of str
+        The effects to tell apart.
+    profile : TableProfile
+        Motion of the table.
+    mounting : tuple of float
+        Rotation vector by which the cube is turned from upright, rad.
+    upright_too : bool
+        Whether the same profile has to be recorded upright as well, and both recordings diagnosed together.
+    before : Distinguishability
+        Of the recordings at hand; where there are none, of a plain run up to speed and back in the same time.
+    after : Distinguishability
+        Of everything together once the proposal is recorded.
+    limits : Limits
+        What the table may do.
+    text : str
+        The proposal in words.
+    scenario : mapping
+        Scenario file of the proposed recording.
+    """
+
+    effects: tuple[str, ...]
+    profile: TableProfile
+    mounting: tuple[float, float, float]
+    upright_too: bool
+    before: Distinguishability
+    after: Distinguishability
+    limits: Limits
+    text: str
+    scenario: Mapping[str, Any]
+
+    __repr__ = short_repr
+
+    @property
+    def separates(self) -> bool:
+        """Whether every effect is expected to be told from every other."""
+        return self.after.least_nats >= SEPARATED
+
+    def to_toml(self) -> str:
+        """Return the scenario file, which ``gfimu simulate`` accepts."""
+        return tomli_w.dumps(self.scenario)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON form."""
+        pairs = [
+            {
+                "effect": one,
+                "rival": other,
+                "nats_before": float(self.before.nats[i, j]),
+                "nats_after": float(self.after.nats[i, j]),
+                "unexplained_before": float(self.before.unexplained[i, j]),
+                "unexplained_after": float(self.after.unexplained[i, j]),
+            }
+            for i, one in enumerate(self.effects)
+            for j, other in enumerate(self.effects)
+            if i != j
+        ]
+        return {
+            "effects": list(self.effects),
+            "separates": self.separates,
+            "nats_needed": SEPARATED,
+            "mounting_rotvec_rad": list(self.mounting),
+            "upright_too": self.upright_too,
+            "duration_s": self.profile.duration,
+            "peak_rate_rad_s": self.profile.peak_rate,
+            "peak_acceleration_rad_s2": self.profile.peak_acceleration,
+            "segments": self.profile.to_segments(),
+            "detectability_before": self.before.detectability.tolist(),
+            "detectability_after": self.after.detectability.tolist(),
+            "pairs": pairs,
+            "text": self.text,
+        }
+
+
+def in_words(
+    before: Distinguishability,
+    after: Distinguishability,
+    mounting: str,
+    inseparable: Sequence[tuple[str, str]],
+    *,
+    recorded: bool,
+    limits: Limits,
+    asked: Limits,
+) -> str:
+    """Say what to do and what it brings, in a few sentences."""
+    i, j = after.weakest()
+    pair = f"{after.effects[i]} against {after.effects[j]}"
+    sentences = []
+    if mounting:
+        if inseparable:
+            which = "; ".join(f"{one} from {other}" for one, other in inseparable)
+            sentences.append(
+                f"No motion of an upright cube separates {which}: whatever one does, the other can do too."
+            )
+        else:
+            sentences.append("The best motion of an upright cube does not suffice.")
+        where = "record the profile so" if recorded else "record the profile upright and so mounted"
+        sentences.append(f"Mount the cube {mounting}, {where}, and diagnose the recordings together.")
+    else:
+        again = ", and diagnose it together with what is recorded" if recorded else ""
+        sentences.append(f"Record the profile with the cube upright{again}.")
+    rise = f"from {before.nats[i, j]:.3g} to {after.nats[i, j]:.3g} nats ({SEPARATED:g} needed)"
+    sentences.append(f"The weakest margin, {pair}, goes {rise}.")
+    if after.least_nats < SEPARATED:
+        if after.least_nats > 0.02 * SEPARATED:
+            times = SEPARATED / after.least_nats
+            sentences.append(f"That is not enough at this size: allow about {times:.2g} times the time, or more rate.")
+        else:
+            sentences.append("These limits can't separate them: allow more rate or acceleration, or a remounting.")
+    if limits.rate < asked.rate:
+        sentences.append(f"The rate stays below {limits.rate:.3g} rad/s, where the sensors would clip.")
+    return " ".join(sentences)
+
+
+def scenario_of(
+    model: WorldModel,
+    effects: Sequence[str],
+    profile: TableProfile,
+    mounting: tuple[float, float, float],
+    sample_rate: float,
+    text: str,
+) -> dict[str, Any]:
+    """Return the scenario file: the twin's world without chip errors, on the profile."""
+    twin = tomllib.loads(model.to_toml())
+    return {
+        **twin,
+        "name": "separate_" + "_".join(effects),
+        "description": text,
+        "sample_rate_hz": sample_rate,
+        "duration_s": profile.duration,
+        "mounting_rotvec_rad": list(mounting),
+        "sensor": {**twin.get("sensor", {}), "errors": False},
+        "reference": {"tacho_noise_std_rad_s": PlannedRun.reference_noise},
+        "motion": {"kind": "profile", "segment": profile.to_segments()},
+    }

@@ -1,0 +1,254 @@
+"""Figures of a diagnosis report, as SVG text; dense lines are pictures inside it, so that files stay small."""
+
+from __future__ import annotations
+
+import io
+import re
+import zlib
+from collections.abc import Sequence
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import SymLogNorm
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
+
+from gfimu.diagnosis.criticism.dependence import Dependence, Fingerprint
+from gfimu.diagnosis.criticism.residual_spectrum import ResidualSpectrum
+from gfimu.diagnosis.criticism.residuals import ResidualSize, Whiteness
+from gfimu.diagnosis.verdict.verdict import RunView
+
+__all__ = [
+    "before_after_figure",
+    "channels_figure",
+    "dependence_figure",
+    "fingerprint_figure",
+    "spectrum_figure",
+    "whiteness_figure",
+]
+
+_BEFORE, _AFTER, _NOISE, _INK, _PALE = "#d64545", "#1f9d6b", "#8a8f98", "#22262e", "#c9ced6"
+_CHANNELS = ("#d98200", "#2f7fc1", "#00896b", "#b4499a")
+_DIVERGING = "RdBu_r"
+_MOST_POINTS = 4000
+_MOST_FREQUENCIES = 1200
+_DPI = 110
+_CHANCE = 3.0
+_SMOOTH_S = 0.15
+_STYLE = {
+    "font.family": "sans-serif",
+    "font.size": 10,
+    "svg.fonttype": "none",
+    "svg.hashsalt": "gfimu",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.edgecolor": _NOISE,
+    "axes.labelcolor": _INK,
+    "text.color": _INK,
+    "xtick.color": _INK,
+    "ytick.color": _INK,
+    "legend.frameon": False,
+}
+
+
+def before_after_figure(run: RunView, size: ResidualSize) -> str:
+    """Draw the residual of the channel that was worst, and the rms of every channel, before and after."""
+    with mpl.rc_context(_STYLE):
+        figure = Figure(figsize=(11.0, 3.3), layout="constrained")
+        trace, bars = figure.subplots(1, 2, width_ratios=[3, 2])
+        worst = int(np.nanargmax(size.before / size.floor))
+        _trace(trace, run, worst, size.floor[worst])
+        trace.set_title(f"measured − predicted, channel {size.channels[worst]}", loc="left", fontsize=10.5)
+        trace.set_ylabel("m/s²")
+        trace.set_xlabel("time, s")
+        _legend_above(trace)
+        _bars(bars, size)
+        return _svg(figure)
+
+
+def channels_figure(run: RunView, size: ResidualSize) -> str:
+    """Draw the residual of every channel over time on one scale."""
+    count = len(size.channels)
+    columns = 3 if count % 3 == 0 else 4
+    rows = -(-count // columns)
+    with mpl.rc_context(_STYLE):
+        figure = Figure(figsize=(11.0, 1.35 * rows + 0.4), layout="constrained")
+        axes = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+        for channel, axis in enumerate(axes.flat):
+            if channel >= count:
+                axis.set_axis_off()
+                continue
+            _trace(axis, run, channel, size.floor[channel])
+            axis.set_title(size.channels[channel], loc="left", fontsize=9, pad=2)
+        for axis in axes[:, 0]:
+            axis.set_ylabel("m/s²")
+        for axis in axes[-1]:
+            axis.set_xlabel("time, s")
+        return _svg(figure)
+
+
+def dependence_figure(dependence: Dependence, channels: Sequence[str]) -> str:
+    """Draw the mean residual over one quantity, before and after, the four strongest channels in colour."""
+    with mpl.rc_context(_STYLE):
+        figure = Figure(figsize=(5.4, 2.3), layout="constrained")
+        pair = figure.subplots(1, 2, sharey=True)
+        strongest = list(np.argsort(-dependence.amplitude_before)[: len(_CHANNELS)])
+        for axis, mean, title in zip(pair, (dependence.before, dependence.after), ("before", "after"), strict=True):
+            axis.axhline(0.0, color=_NOISE, linewidth=0.6)
+            for channel in range(len(channels)):
+                if channel not in strongest:
+                    axis.plot(dependence.centres[:, channel], mean[:, channel], color=_PALE, linewidth=0.8)
+            for colour, channel in zip(_CHANNELS, strongest, strict=False):
+                axis.plot(
+                    dependence.centres[:, channel],
+                    mean[:, channel],
+                    color=colour,
+                    linewidth=1.3,
+                    label=channels[channel],
+                )
+            axis.set_title(title, loc="left", fontsize=9.5, pad=3)
+            axis.set_xlabel(f"{dependence.symbol}, {dependence.unit}")
+        pair[0].set_ylabel("mean residual, m/s²")
+        pair[1].legend(fontsize=8, loc="upper right", handlelength=1.0, labelspacing=0.2)
+        return _svg(figure)
+
+
+def spectrum_figure(spectrum: ResidualSpectrum) -> str:
+    """Draw a spectrum before and after against noise."""
+    with mpl.rc_context(_STYLE):
+        figure = Figure(figsize=(5.4, 2.5), layout="constrained")
+        axis = figure.subplots()
+        group = max(1, len(spectrum.at) // _MOST_FREQUENCIES)
+        starts = np.arange(0, len(spectrum.at), group)
+        axis.plot(spectrum.at[starts], spectrum.noise[starts], color=_NOISE, linestyle="--", label="noise")
+        for values, colour, label in ((spectrum.before, _BEFORE, "before"), (spectrum.after, _AFTER, "after")):
+            peaks = np.maximum.reduceat(values, starts)  # a line must not vanish between the points drawn
+            axis.plot(spectrum.at[starts], peaks, color=colour, linewidth=0.9, label=label)
+        axis.set_yscale("log")
+        if spectrum.unit == "Hz":
+            axis.set_xscale("log")
+        else:
+            axis.set_xlim(0, float(spectrum.at[-1]))
+        axis.set_xlabel("frequency, Hz" if spectrum.unit == "Hz" else spectrum.unit)
+        axis.set_ylabel(spectrum.quantity)
+        _legend_above(axis)
+        return _svg(figure)
+
+
+def whiteness_figure(whiteness: Whiteness) -> str:
+    """Draw the cumulative periodogram of every channel: noise gives the diagonal."""
+    with mpl.rc_context(_STYLE):
+        figure = Figure(figsize=(5.4, 2.5), layout="constrained")
+        pair = figure.subplots(1, 2, sharey=True)
+        frequency = whiteness.frequency
+        step = max(1, len(frequency) // 400)
+        band = 1.95 / np.sqrt(len(frequency))  # of the Kolmogorov distribution, 1 in 1000
+        for axis, curves, colour, title in (
+            (pair[0], whiteness.cumulative_before, _BEFORE, "before"),
+            (pair[1], whiteness.cumulative_after, _AFTER, "after"),
+        ):
+            ends, line = frequency[[0, -1]], np.array([0.0, 1.0])
+            axis.fill_between(ends, line - band, line + band, color=_PALE, alpha=0.6, linewidth=0)
+            axis.plot(frequency[::step], curves[::step], color=colour, linewidth=0.8, rasterized=True)
+            axis.set_title(title, loc="left", fontsize=9.5, pad=3)
+            axis.set_xlabel("frequency, Hz")
+            axis.set_ylim(0, 1)
+        pair[0].set_ylabel("share of the power below")
+        return _svg(figure)
+
+
+def fingerprint_figure(fingerprint: Fingerprint) -> str:
+    """Draw how strongly each channel follows each basic term, before and after, in standard deviations of chance."""
+    count, terms = fingerprint.before.shape
+    largest = max(10.0, float(np.abs(fingerprint.before).max()), float(np.abs(fingerprint.after).max()))
+    with mpl.rc_context(_STYLE):
+        figure = Figure(figsize=(11.0, 0.24 * count + 1.2), layout="constrained")
+        pair = figure.subplots(1, 2, sharey=True)
+        norm = SymLogNorm(linthresh=_CHANCE, vmin=-largest, vmax=largest)
+        for axis, values, title in zip(pair, (fingerprint.before, fingerprint.after), ("before", "after"), strict=True):
+            shown = np.where(np.abs(values) < _CHANCE, 0.0, values)
+            axis.imshow(shown, cmap=_DIVERGING, norm=norm, aspect="auto", interpolation="nearest")
+            axis.set_xticks(range(terms), fingerprint.terms, rotation=40, ha="right")
+            axis.set_yticks(range(count), fingerprint.channels)
+            axis.set_title(title, loc="left", fontsize=10)
+            axis.tick_params(length=0)
+        bar = figure.colorbar(ScalarMappable(norm, _DIVERGING), ax=pair.tolist(), shrink=0.9, pad=0.01)
+        ticks = [tick for tick in (3, 10, 30, 100, 1000, 10_000) if tick <= largest]
+        bar.set_ticks(
+            [-tick for tick in ticks[::-1]] + ticks,
+            labels=[f"−{tick}" for tick in ticks[::-1]] + [f"{t}" for t in ticks],
+        )
+        bar.set_label("standard deviations")
+        return _svg(figure)
+
+
+def _trace(axis: Axes, run: RunView, channel: int, floor: float) -> None:
+    """Residual of one channel over time: samples pale, their moving mean strong, noise as a band of ±2σ."""
+    period = float(run.t[1] - run.t[0])
+    for prediction, colour, label, order in ((run.before, _BEFORE, "before", 2), (run.after, _AFTER, "after", 3)):
+        residual = np.where(run.valid[:, channel], run.measured[:, channel] - prediction[:, channel], np.nan)
+        t, shown = _thinned(run.t, residual)
+        axis.plot(t, shown, color=colour, linewidth=0.5, alpha=0.3, rasterized=True, zorder=order)
+        mean = _moving_mean(residual, max(round(_SMOOTH_S / period), 1))
+        t, shown = _thinned(run.t, mean)
+        axis.plot(t, shown, color=colour, linewidth=1.1, label=label, rasterized=True, zorder=order + 2)
+    axis.axhspan(-2 * floor, 2 * floor, color=_PALE, alpha=0.55, linewidth=0, label="noise, ±2σ", zorder=1)
+    axis.margins(x=0.01)
+
+
+def _moving_mean(values: NDArray[np.float64], width: int) -> NDArray[np.float64]:
+    """Mean over a window of the valid samples in it, NaN where there are none."""
+    valid = np.isfinite(values)
+    total = uniform_filter1d(np.where(valid, values, 0.0), width, mode="constant")
+    share = uniform_filter1d(valid.astype(float), width, mode="constant")
+    return np.where(share > 0.5 / width, total / np.maximum(share, 1e-12), np.nan)
+
+
+def _thinned(t: NDArray[np.float64], values: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Lowest and highest value of each group of samples, so that a long run keeps its outline."""
+    group = -(-2 * len(t) // _MOST_POINTS)
+    if group < 3:
+        return t, values
+    whole = len(t) // group * group
+    blocks = values[:whole].reshape(-1, group)
+    blocks = np.where(np.isfinite(blocks), blocks, np.nan)
+    ends = np.column_stack([np.fmin.reduce(blocks, axis=1), np.fmax.reduce(blocks, axis=1)]).ravel()
+    return np.repeat(t[:whole:group], 2), ends
+
+
+def _bars(axis: Axes, size: ResidualSize) -> None:
+    place = np.arange(len(size.channels))
+    axis.bar(place - 0.2, size.before, 0.4, color=_BEFORE, label="before")
+    axis.bar(place + 0.2, size.after, 0.4, color=_AFTER, label="after")
+    axis.hlines(size.floor, place - 0.45, place + 0.45, color=_INK, linewidth=1.2, label="noise")
+    if np.nanmax(size.before) > 20 * np.nanmin(size.floor):
+        axis.set_yscale("log")
+    axis.set_xticks(place, size.channels, rotation=60 if len(place) > 8 else 0, fontsize=8.5)
+    axis.set_ylabel("m/s²")
+    axis.set_title("rms per channel", loc="left", fontsize=10.5)
+    axis.margins(x=0.01)
+    _legend_above(axis)
+
+
+def _legend_above(axis: Axes) -> None:
+    legend = axis.legend(
+        loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, fontsize=8.5, handlelength=1.2, borderpad=0
+    )
+    for line in legend.get_lines():
+        line.set_linewidth(2.0)
+
+
+def _svg(figure: Figure) -> str:
+    buffer = io.StringIO()
+    figure.savefig(buffer, format="svg", dpi=_DPI, metadata={"Date": None})
+    text = buffer.getvalue()
+    text = text[text.index("<svg") :]
+    text = re.sub(r"<metadata>.*?</metadata>", "", text, count=1, flags=re.DOTALL)
+    text = re.sub(r'(<image\b[^>]*?) id="[^"]*"', r"\1", text)  # equal pictures would share one name
+    # Several figures share one page: their definitions must not share names; the size follows the page.
+    tag = f"f{zlib.crc32(text.encode()):08x}"
+    text = re.sub(r'(\bid="|url\(#|href="#)', rf"\g<1>{tag}_", text)
+    return re.sub(r"<svg [^>]*>", lambda match: re.sub(r' (width|height)="[^"]*"', "", match.group(0)), text, count=1)

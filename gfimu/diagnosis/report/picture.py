@@ -1,0 +1,131 @@
+"""The rerun recording of a diagnosis: measured and predicted channels, the reference, and the rig in 3-D."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import fields, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from gfimu.diagnosis.report.plain_words import headline, next_steps, parameter_texts, parameter_units, percent, story
+from gfimu.diagnosis.verdict.verdict import Diagnosis, RunView
+from gfimu.recording import Recording
+from gfimu.visual import KnownMotion, Line, Plot, write_comparison
+from gfimu.visual.colours import COMMAND, MEASURED, PREDICTED_AFTER, PREDICTED_BEFORE
+from gfimu.visual.scene import Shape
+
+__all__ = ["write_picture"]
+
+_CUBE_CENTRE = (0.0, 0.0, 0.06)
+_MOST_SAMPLES = 20_000
+_PER_CHANNEL = ("white",)
+
+
+def write_picture(
+    path: str | Path,
+    diagnosis: Diagnosis,
+    *,
+    run: int = 0,
+    mounting: NDArray[np.float64] | None = None,
+    cube_centre: Sequence[float] = _CUBE_CENTRE,
+    shapes: Mapping[str, Sequence[Shape]] | None = None,
+) -> None:
+    """Write ``diagnosis.rrd`` for one run of a diagnosis.
+
+    Parameters
+    ----------
+    path : str or Path
+        File to write, ``.rrd``.
+    diagnosis : Diagnosis
+        The diagnosis.
+    run : int
+        Which of its runs.
+    mounting : ndarray, shape (3,), optional
+        Rotation vector from the cube as it stood to the table frame, rad; upright by default.
+    cube_centre : sequence of float, shape (3,)
+        Centre of the cube in the table frame, m.
+    shapes : mapping of str to sequence of Shape, optional
+        Shapes of ``base``, ``table`` and ``cube`` of the extended rig; a plain rig otherwise.
+    """
+    view, every = _thinned(diagnosis.runs[run])
+    array = diagnosis.twin.array
+    readings = np.where(view.valid, view.measured, np.nan)
+    recording = Recording.from_arrays(view.t, readings, array)
+    turn = np.zeros(3) if mounting is None else mounting
+    write_comparison(
+        path,
+        recording,
+        array,
+        view.before,
+        view.after,
+        known=_motion(view, turn, np.asarray(cube_centre, dtype=float)),
+        plots=_plots(view),
+        shapes=shapes,
+        notes=_notes(diagnosis) + (f"\n\nThe run is long: every {every}th sample is shown." if every > 1 else ""),
+        title=f"diagnosis of {view.name}: {diagnosis.verdict.replace('_', ' ')}",
+    )
+
+
+def _thinned(view: RunView) -> tuple[RunView, int]:
+    """Keep every k-th sample of a long run, so that the file can be opened; returns k too."""
+    every = -(-len(view.t) // _MOST_SAMPLES)
+    if every == 1:
+        return view, 1
+    kept: dict[str, Any] = {
+        item.name: value[::every] if isinstance(value := getattr(view, item.name), np.ndarray) else value
+        for item in fields(view)
+        if item.name not in _PER_CHANNEL
+    }
+    return replace(view, **kept), every
+
+
+def _motion(view: RunView, mounting: NDArray[np.float64], centre: NDArray[np.float64]) -> KnownMotion | None:
+    """Motion of the cube with the drive as estimated, its centre carried round by the table; a free body has none."""
+    if view.attitude is not None:
+        return KnownMotion("gyro, integrated", view.t, view.attitude, centre)
+    if not np.isfinite(view.angle).all():
+        return None
+    table = Rotation.from_rotvec(np.outer(view.angle, [0.0, 0.0, 1.0]))
+    attitude = table * Rotation.from_rotvec(mounting)
+    return KnownMotion(
+        "drive, estimated", view.t, attitude.as_quat(scalar_first=True), table.apply(centre), angle=view.angle
+    )
+
+
+def _plots(view: RunView) -> list[Plot]:
+    reference = np.where(np.isfinite(view.reference), view.reference, np.nan)
+    if not np.isfinite(view.angle).all():
+        return [
+            Plot("gyro, magnitude of its rate, rad/s", [Line("|ω|", view.t, reference, MEASURED)], legend=False),
+            Plot(
+                "angular acceleration from the gyro, magnitude, rad/s²",
+                [Line("|α|", view.t, view.acceleration, COMMAND)],
+                legend=False,
+            ),
+        ]
+    return [
+        Plot(
+            "reference that drives the table",
+            [
+                Line("measured", view.t, reference, MEASURED, 2.0),
+                Line("predicted before", view.t, view.reference_before, PREDICTED_BEFORE),
+                Line("predicted after", view.t, view.reference_after, PREDICTED_AFTER),
+            ],
+        ),
+        Plot("rate of the table, estimated, rad/s", [Line("ω", view.t, view.rate, COMMAND)], legend=False),
+        Plot("angular acceleration, estimated, rad/s²", [Line("α", view.t, view.acceleration, COMMAND)], legend=False),
+    ]
+
+
+def _notes(diagnosis: Diagnosis) -> str:
+    lines = [f"# {headline(diagnosis)}", "", story(diagnosis), ""]
+    for cause in diagnosis.causes:
+        texts = parameter_texts(cause, parameter_units(diagnosis, cause))
+        sizes = "; ".join(f"{one.name} {one.value}" for one in texts if one.significant)
+        lines.append(f"- **{cause.effect}** {sizes} (probability {percent(cause.probability)})")
+    lines += ["", "**Next.**", *[f"- {step}" for step in next_steps(diagnosis)]]
+    return "\n".join(lines)

@@ -1,0 +1,308 @@
+"""Plain words: a diagnosis as people read it, the same on the terminal and in the report."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from gfimu.diagnosis.verdict.verdict import Diagnosis, NamedCause, RunView
+from gfimu.units import NAME, NUMBER, RATIO, STANDARD_GRAVITY, key_name
+
+__all__ = [
+    "ParameterText",
+    "gain_rows",
+    "headline",
+    "next_steps",
+    "odds",
+    "parameter_texts",
+    "parameter_units",
+    "percent",
+    "story",
+    "summary",
+]
+
+_OF_A_CALIBRATION = frozenset({"bias", "scale_factor", "misalignment", "cross_axis"})
+_SIGNIFICANT = 2.0
+_THOUSANDTHS = ("rad", "m", "s")
+_SMALL = 0.1
+_MOST_DECIMALS = 5
+_MOST_DIGITS = 100
+
+
+@dataclass(frozen=True)
+class ParameterText:
+    """One parameter as people read it.
+
+    Parameters
+    ----------
+    name : str
+        Key without its unit: ``"x"``, ``"a11"``, ``"frequency"``.
+    value : str
+        Value ± standard deviation with unit.
+    familiar : str
+        The same in the unit people think in (degrees, millimetres, mg), or empty.
+    significant : bool
+        Whether it differs from zero by more than twice its standard deviation.
+    """
+
+    name: str
+    value: str
+    familiar: str
+    significant: bool
+
+
+def headline(diagnosis: Diagnosis) -> str:
+    """Return the verdict in one sentence."""
+    found = [_short(diagnosis, cause) for cause in diagnosis.causes]
+    match diagnosis.verdict:
+        case "nothing_found" if diagnosis.calibration_residue:
+            return "No single thing is wrong: the simulation's numbers are all a little off, as after a calibration."
+        case "nothing_found":
+            return "Nothing is wrong with the simulation that this recording could show."
+        case "unknown" if found:
+            return f"Found: {_joined(found)}. Something else is real too, and nothing in the library explains it."
+        case "unknown":
+            return "Something real is missing in the simulation, and nothing in the library explains it."
+        case "ambiguous":
+            contested = [cause for cause in diagnosis.causes if cause.not_distinguishable_from] or diagnosis.causes
+            names = dict.fromkeys(name for one in contested for name in (one.effect, *one.not_distinguishable_from))
+            candidates = _joined([_words(diagnosis, name) for name in names], "or")
+            text = f"Something is missing in the simulation, but this recording can't tell which: {candidates}."
+            certain = [_short(diagnosis, cause) for cause in diagnosis.causes if cause not in contested]
+            return f"Found: {_joined(certain)}. {text.replace('Something', 'Something else', 1)}" if certain else text
+        case _ if diagnosis.in_part:
+            share = percent(diagnosis.gain.share_of_excess_removed)
+            return f"Found in part what the simulation leaves out: {_joined(found)} ({share} of the error is gone)."
+        case _ if len(found) == 1:
+            return f"Found what the simulation leaves out: {found[0]}."
+        case _:
+            return f"Found {_count(len(found))} things that the simulation leaves out: {_joined(found)}."
+
+
+def summary(diagnosis: Diagnosis, cause: NamedCause) -> str:
+    """Return what is wrong according to a cause, in the effect's own words, and where."""
+    family = diagnosis.twin.families().get(cause.effect)
+    words = str(family.summary) if family is not None else cause.effect.replace("_", " ")
+    return f"{words} ({cause.place})" if cause.place else words
+
+
+def _short(diagnosis: Diagnosis, cause: NamedCause) -> str:
+    """Return the summary up to its explanation, and the place."""
+    words = _words(diagnosis, cause.effect)
+    return f"{words} ({cause.place})" if cause.place else words
+
+
+def _words(diagnosis: Diagnosis, effect: str) -> str:
+    family = diagnosis.twin.families().get(effect)
+    return str(family.summary).split(":", maxsplit=1)[0] if family is not None else effect.replace("_", " ")
+
+
+def story(diagnosis: Diagnosis) -> str:
+    """Return what was compared and how much the verdict improves it, for a reader who knows nothing of it."""
+    residual, gain = diagnosis.residual, diagnosis.gain
+    count = len(diagnosis.twin.array.channels)
+    before, after, floor = residual.rms_before, residual.rms_after, residual.noise_floor
+    text = (
+        f"A simulation of the rig predicted what its {count} accelerometer channels should have read. "
+        f"It misses the measurement by {before:.3g} m/s² rms; the sensors' own noise is {floor:.3g} m/s². "
+    )
+    silent = sorted({channel for run in diagnosis.runs for channel in _silent(diagnosis, run)})
+    if silent:
+        text += f"Left out for want of a usable sample: {_joined(silent)}. "
+    if diagnosis.verdict == "nothing_found" and diagnosis.calibration_residue:
+        return text + (
+            f"With small corrections of every bias, gain, axis and position it misses by {after:.3g} m/s²; no single "
+            "cause predicts the data better."
+        )
+    if diagnosis.verdict == "nothing_found":
+        return text + "No cause in the library, and no pattern of any other kind, predicts the data better than chance."
+    if diagnosis.causes:
+        what = (
+            "either of these" if diagnosis.verdict == "ambiguous" else "this" if len(diagnosis.causes) == 1 else "these"
+        )
+        text += f"With {what} put into the simulation it misses by {after:.3g} m/s²"
+        text += ", which is noise. " if after < 1.05 * floor else ". "
+    if diagnosis.unexplained.extends_twin:
+        text += f"With a description that has no name in the simulation it misses by {after:.3g} m/s². "
+    if math.isfinite(gain.share_of_excess_removed):
+        text += (
+            f"On data that the fit never saw ({gain.held_out}), {percent(gain.share_of_excess_removed)} of the error "
+            "beyond noise is gone. "
+        )
+        if diagnosis.unexplained.left_out and math.isfinite(gain.share_in_any_recording):
+            text += f"In any other recording it would be {percent(max(gain.share_in_any_recording, 0.0))}. "
+    left_out = diagnosis.unexplained.left_out
+    if left_out:
+        what = f"{_count(left_out)} terms" if left_out > 1 else "one term"
+        text += (
+            f"Of what describes it {what} of absolute time {'are' if left_out > 1 else 'is'} not in twin.toml: another "
+            "recording has other phases, and no second one confirms them. "
+        )
+    if diagnosis.unexplained.significant:
+        text += f"Left unexplained: {diagnosis.unexplained.signature}. "
+    level = float(diagnosis.noise.get("bias_instability_largest_m_s2", 0.0))
+    if level > 0.0:
+        name = diagnosis.noise["bias_instability_largest_channel"]
+        text += f"The largest slow noise is that of {name}, {level / STANDARD_GRAVITY * 1e3:.2g} mg. "
+    return text.strip()
+
+
+def _silent(diagnosis: Diagnosis, run: RunView) -> list[str]:
+    """Return the channels of a run without a single usable sample."""
+    alive = np.asarray(run.valid.any(axis=0))
+    return [name for name, good in zip(diagnosis.twin.array.channels, alive, strict=True) if not good]
+
+
+def parameter_units(diagnosis: Diagnosis, cause: NamedCause) -> Mapping[str, str]:
+    """Return the units that the effect of a cause declares for its parameters, by key."""
+    family = diagnosis.twin.families().get(cause.effect)
+    return {} if family is None else family.parameter_units(diagnosis.twin.array)
+
+
+def parameter_texts(cause: NamedCause, units: Mapping[str, str]) -> list[ParameterText]:
+    """Return the parameters of a cause as people read them; those that are zero and unknown are left out.
+
+    ``units`` are those that the effect declares (`parameter_units`); a parameter without one is a plain number.
+    """
+    texts = []
+    for key, value in cause.parameters.items():
+        unit = units.get(key, "")
+        name = key_name(key, unit).replace("_", " ")
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            plain = ", ".join(map(str, value)) if isinstance(value, list | tuple) else str(value)
+            texts.append(ParameterText(name, plain, "", significant=True))
+            continue
+        std = cause.std.get(key)
+        if value == 0 and not std:
+            continue
+        certain = std is None or not math.isfinite(std) or abs(value) > _SIGNIFICANT * std
+        texts.append(ParameterText(name, _with_std(value, std, unit), _familiar(value, std, unit), certain))
+    return texts
+
+
+def gain_rows(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:
+    """Return what the extension is worth on held-out data: what, before, after."""
+    gain = diagnosis.gain
+    rows = [
+        ("prediction error, rms", _number(gain.rms_before, "m/s²"), _number(gain.rms_after, "m/s²")),
+        ("rate error, rms", _number(gain.rate_rmse_before, "rad/s"), _number(gain.rate_rmse_after, "rad/s")),
+        ("position drift", _number(gain.drift_before, "m"), _number(gain.drift_after, "m")),
+    ]
+    return [row for row in rows if row[1] or row[2]]
+
+
+def next_steps(diagnosis: Diagnosis) -> list[str]:
+    """Return what to do next, most useful first."""
+    steps = []
+    remedies = dict.fromkeys(cause.would_be_separated_by for cause in diagnosis.causes if cause.would_be_separated_by)
+    match diagnosis.verdict:
+        case "nothing_found" if diagnosis.calibration_residue:
+            steps.append("Keep twin.toml, which has the corrections, or calibrate the unit again.")
+        case "nothing_found":
+            steps.append(
+                "Keep the simulation as it is. A longer run, with faster ramps in both directions, would show "
+                "smaller errors."
+            )
+        case "ambiguous":
+            steps += [f"To tell the candidates apart, record: {remedy}." for remedy in remedies]
+            steps.append("Give both recordings to one call of gfimu diagnose; it fits them together.")
+        case "unknown":
+            steps.append("Look at the residual views of the report for where the discrepancy sits.")
+            if diagnosis.unexplained.extends_twin:
+                steps.append("Until it has a name, simulate with twin.toml: its terms called unknown describe it.")
+            steps.append("Record another run with another motion: what stays is in the rig or the sensors.")
+        case _:
+            more = "no more than what is left unexplained" if diagnosis.unexplained.significant else "nothing"
+            steps.append(f"Confirm on another recording: gfimu diagnose OTHER --twin twin.toml should find {more}.")
+            steps.append("Correct the rig or calibrate it, or keep twin.toml as the simulation from now on.")
+    every = [cause.effect for cause in diagnosis.causes if cause.effect in _OF_A_CALIBRATION and "all" in cause.place]
+    if every:
+        steps.insert(
+            0,
+            f"If the unit is not calibrated, do that first: {_joined(every)} on all channels is what such a unit looks "
+            "like, and one run can't tell many wrong numbers from each other. Record static poses; then "
+            "gfimu calibrate twelve-position POSES --array ARRAY --out cal.json and "
+            "gfimu diagnose RUN --calibration cal.json.",
+        )
+    if diagnosis.verdict == "explained":
+        for cause in diagnosis.causes:
+            if cause.not_distinguishable_from:
+                others = _joined(list(cause.not_distinguishable_from), "or")
+                remedy = f" To be sure, record: {cause.would_be_separated_by}." if cause.would_be_separated_by else ""
+                steps.append(
+                    f"{cause.effect} is the simplest story; by a coincidence {others} could imitate it here.{remedy}"
+                )
+    if not diagnosis.gain.held_out and diagnosis.verdict != "nothing_found":
+        steps.append("Record a second run: with --held-out its gain is measured on data that the fit never saw.")
+    return [step.strip() for step in steps]
+
+
+def percent(share: float) -> str:
+    """Return a share in percent, never rounded up to certainty."""
+    if not math.isfinite(share):
+        return "–"
+    if 0.999 < share < 1.0:
+        return "> 99.9 %"
+    return f"{100 * share:.3g} %"
+
+
+def odds(log_odds: float) -> str:
+    """Return log odds against the verdict as people say them: ``"1 : 20"``, ``"1 : 10⁵²"``."""
+    if not math.isfinite(log_odds):
+        return "–"
+    if abs(log_odds) < math.log(1e4):
+        ratio = f"{math.exp(abs(log_odds)):.2g}"
+        ratio = f"{float(ratio):.0f}" if float(ratio) >= 10 else ratio
+    elif abs(log_odds) < math.log(10.0) * _MOST_DIGITS:
+        ratio = f"10{_superscript(round(abs(log_odds) / math.log(10)))}"
+    else:
+        return f"{'<' if log_odds < 0 else '>'} 1 : 10{_superscript(-_MOST_DIGITS if log_odds > 0 else _MOST_DIGITS)}"
+    return f"1 : {ratio}" if log_odds <= 0 else f"{ratio} : 1"
+
+
+def _with_std(value: float, std: float | None, unit: str) -> str:
+    """Return value ± standard deviation, in thousandths of its unit where it is small."""
+    unit = "" if unit in {RATIO, NUMBER, NAME} else unit
+    scale = max(abs(value), std or 0.0)
+    if unit in _THOUSANDTHS and scale < _SMALL:
+        value, std, unit = 1e3 * value, None if std is None else 1e3 * std, f"m{unit}"
+    if std is None or not math.isfinite(std) or std <= 0:
+        text = f"{value:.4g}"
+    else:
+        decimals = max(1 - math.floor(math.log10(std)), 0)
+        if decimals > _MOST_DECIMALS and abs(value) < _SMALL:
+            power = math.floor(math.log10(max(abs(value), std)))
+            return f"({_with_std(value / 10**power, std / 10**power, '')})·10{_superscript(power)} {unit}".strip()
+        text = f"{value:.{decimals}f} ± {std:.{decimals}f}"
+    return f"{text} {unit}".strip().replace("-", "−")
+
+
+def _superscript(power: int) -> str:
+    return str(power).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+
+
+def _familiar(value: float, std: float | None, unit: str) -> str:
+    factors = {"rad": (180 / math.pi, "°"), "m/s²": (1e3 / STANDARD_GRAVITY, "mg"), "rad/s": (30 / math.pi, "rpm")}
+    if unit == RATIO and abs(value) < _SMALL:
+        factors[RATIO] = (100.0, "%")
+    if unit not in factors:
+        return ""
+    factor, name = factors[unit]
+    return _with_std(factor * value, None if std is None else factor * std, name)
+
+
+def _number(value: float, unit: str) -> str:
+    return f"{value:.3g} {unit}" if math.isfinite(value) else ""
+
+
+def _count(number: int) -> str:
+    return {2: "two", 3: "three", 4: "four"}.get(number, str(number))
+
+
+def _joined(parts: list[str], word: str = "and") -> str:
+    if len(parts) < 2:
+        return "".join(parts)
+    return f"{', '.join(parts[:-1])} {word} {parts[-1]}" if len(parts) > 2 else f"{parts[0]} {word} {parts[1]}"

@@ -1,0 +1,1 @@
+"""The result of a diagnosis: causes, residual, gain, and what is unexplained."""

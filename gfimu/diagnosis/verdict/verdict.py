@@ -1,0 +1,357 @@
+"""The verdict: what a diagnosis says, with its numbers, in a form that prints, saves and draws."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gfimu.files.atomic_file import write_text
+from gfimu.short_repr import joined, short_repr
+from gfimu.world_model import WorldModel
+
+__all__ = [
+    "FORMAT_VERSION",
+    "IN_PART",
+    "Diagnosis",
+    "Gain",
+    "NamedCause",
+    "Residual",
+    "Rival",
+    "RunView",
+    "Unexplained",
+]
+
+FORMAT_VERSION = 1
+IN_PART = 0.9
+"""Share of the held-out excess below which causes explain in part."""
+
+
+@dataclass(frozen=True)
+class NamedCause:
+    """One cause that the diagnosis names.
+
+    Parameters
+    ----------
+    effect : str
+        Contract name.
+    parameters : mapping
+        Values by contract key (numbers, names or lists of names).
+    std : mapping
+        Standard deviations of those that are estimated.
+    probability : float
+        Probability that this effect is among the causes.
+    place : str
+        Where it acts (``"chip a2"``), empty where it has only one place.
+    not_distinguishable_from : tuple of str
+        Effects that explain these data as well.
+    would_be_separated_by : str
+        Excitation that would tell them apart.
+    why : str
+        One sentence: where and how it shows.
+    log_odds : float
+        Log odds of the explanation with this cause against the best one without it.
+    """
+
+    effect: str
+    parameters: Mapping[str, Any]
+    std: Mapping[str, float]
+    probability: float
+    place: str = ""
+    not_distinguishable_from: tuple[str, ...] = ()
+    would_be_separated_by: str = ""
+    why: str = ""
+    log_odds: float = 0.0
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON form of the contract."""
+        parameters = {
+            key: {"value": value, "std": self.std.get(key)} if isinstance(value, int | float) else {"value": value}
+            for key, value in self.parameters.items()
+        }
+        return {
+            "effect": self.effect,
+            "parameters": parameters,
+            "probability": self.probability,
+            "place": self.place,
+            "not_distinguishable_from": list(self.not_distinguishable_from),
+            "would_be_separated_by": self.would_be_separated_by,
+            "why": self.why,
+            "log_odds": self.log_odds,
+        }
+
+
+@dataclass(frozen=True)
+class Rival:
+    """Another explanation and why it lost.
+
+    Parameters
+    ----------
+    effects : tuple of str
+        Its effects.
+    log_odds : float
+        Log odds against the verdict (negative: less probable).
+    why : str
+        One sentence.
+    """
+
+    effects: tuple[str, ...]
+    log_odds: float
+    why: str = ""
+
+
+@dataclass(frozen=True)
+class Residual:
+    """Size of the residual before and after, m/s², over valid samples of all channels.
+
+    ``before_by_channel`` and ``after_by_channel`` hold it per channel; ``noise_floor`` is the rms of the noise as
+    estimated from the data.
+    """
+
+    rms_before: float
+    rms_after: float
+    noise_floor: float
+    before_by_channel: Mapping[str, float]
+    after_by_channel: Mapping[str, float]
+
+    @classmethod
+    def of_views(cls, views: Sequence[RunView], channels: Sequence[str], noise_floor: float) -> Residual:
+        """Measure the residual over the valid samples of all runs."""
+        count = np.maximum(np.sum([view.valid.sum(axis=0) for view in views], axis=0), 1)
+        before, after = (
+            np.sum([np.sum(np.where(v.valid, v.measured - getattr(v, name), 0.0) ** 2, axis=0) for v in views], axis=0)
+            for name in ("before", "after")
+        )
+        return cls(
+            float(np.sqrt(before.sum() / count.sum())),
+            float(np.sqrt(after.sum() / count.sum())),
+            noise_floor,
+            dict(zip(channels, map(float, np.sqrt(before / count)), strict=True)),
+            dict(zip(channels, map(float, np.sqrt(after / count)), strict=True)),
+        )
+
+
+@dataclass(frozen=True)
+class Gain:
+    """What the extension is worth on data that the fit never saw.
+
+    Parameters
+    ----------
+    held_out : str
+        Which data, in words: another recording, or blocks of this one; empty where none could be held out.
+    rms_before, rms_after : float
+        Residual rms on them, m/s².
+    share_of_excess_removed : float
+        1 − (after² − floor²)/(before² − floor²), channels and reference together in units of their noise, each with
+        the drive that suits it best; NaN where there was no excess.
+    log_likelihood_per_sample, log_likelihood_std : float
+        Gain per sample and its standard error.
+    rate_rmse_before, rate_rmse_after : float
+        Rate of the array against the reference, rad/s.
+    drift_before, drift_after : float
+        Position drift of the held-out stretch, m.
+    share_std : float
+        Standard error of ``share_of_excess_removed`` by the noise; NaN where it was not estimated.
+    share_in_any_recording : float
+        The same share without terms of absolute time, which another recording has otherwise; NaN where nothing can
+        be said.
+    """
+
+    held_out: str = ""
+    rms_before: float = float("nan")
+    rms_after: float = float("nan")
+    share_of_excess_removed: float = float("nan")
+    log_likelihood_per_sample: float = float("nan")
+    log_likelihood_std: float = float("nan")
+    rate_rmse_before: float = float("nan")
+    rate_rmse_after: float = float("nan")
+    drift_before: float = float("nan")
+    drift_after: float = float("nan")
+    share_std: float = float("nan")
+    share_in_any_recording: float = float("nan")
+
+
+@dataclass(frozen=True)
+class Unexplained:
+    """What is left and nothing in the library explains.
+
+    Parameters
+    ----------
+    significant : bool
+        Whether it is more than chance.
+    signature : str
+        Which channels, which dependence, in words.
+    log_odds : float
+        Log odds of the strongest term against chance.
+    surrogate : mapping of str to float
+        Data-driven terms: coefficients by what they are of, with its unit, and function: ``"a11_m_s2: rate²"``.
+    extends_twin : bool
+        Whether such terms are in the extended twin, as they predict data that their fit never saw.
+    left_out : int
+        How many of the terms are not in it, as they are of absolute time, which another recording has otherwise.
+    """
+
+    significant: bool = False
+    signature: str = ""
+    log_odds: float = 0.0
+    surrogate: Mapping[str, float] = field(default_factory=dict)
+    extends_twin: bool = False
+    left_out: int = 0
+
+
+@dataclass(frozen=True)
+class RunView:
+    """A run as the report shows it; arrays of n samples and c channels.
+
+    ``rate``, ``acceleration``, ``angle`` are the drive's posterior mean with the causes in; ``before`` is what the
+    given twin predicts, ``after`` the extended one. ``white`` is the noise per channel. ``attitude``, shape (n, 4), is
+    the quaternion (w, x, y, z), body to world, of a free body, which has no ``angle``.
+    """
+
+    name: str
+    t: NDArray[np.float64]
+    measured: NDArray[np.float64]
+    valid: NDArray[np.bool_]
+    before: NDArray[np.float64]
+    after: NDArray[np.float64]
+    reference: NDArray[np.float64]
+    reference_before: NDArray[np.float64]
+    reference_after: NDArray[np.float64]
+    angle: NDArray[np.float64]
+    rate: NDArray[np.float64]
+    acceleration: NDArray[np.float64]
+    temperature: NDArray[np.float64] | None
+    white: NDArray[np.float64]
+    attitude: NDArray[np.float64] | None = None
+
+    __repr__ = short_repr
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """The result of a diagnosis.
+
+    Parameters
+    ----------
+    verdict : {"nothing_found", "explained", "ambiguous", "unknown"}
+        The verdict.
+    causes : tuple of NamedCause
+        By contribution; of an ambiguous verdict, the effects that can't be told apart.
+    residual, gain, unexplained
+        See their classes.
+    rivals : tuple of Rival
+        Other explanations, best first.
+    twin : WorldModel
+        The extended twin.
+    runs : tuple of RunView
+        The data for pictures.
+    sentences : tuple of str
+        The verdict in words, most important first.
+    noise : mapping
+        Noise levels estimated: ``white_over_data_sheet``, ``bias_instability_m_s2`` (median of the channels),
+        ``bias_instability_largest_m_s2`` and ``bias_instability_largest_channel``, ``reference_white``; and
+        ``calibration_residue``, small errors of all the twin's numbers at once, in units of what a good calibration
+        leaves (0 where there are none).
+    undetermined : tuple of mapping
+        Combinations of sizes that these data can't see, which stay at zero: ``effect``, ``combination`` (weights by
+        key) and ``text``.
+    """
+
+    verdict: str
+    causes: tuple[NamedCause, ...]
+    residual: Residual
+    gain: Gain
+    unexplained: Unexplained
+    rivals: tuple[Rival, ...]
+    twin: WorldModel
+    runs: tuple[RunView, ...]
+    sentences: tuple[str, ...]
+    noise: Mapping[str, Any]
+    undetermined: tuple[Mapping[str, Any], ...] = ()
+
+    @property
+    def in_part(self) -> bool:
+        """Whether the causes stand but leave more than a tenth of the excess on held-out data."""
+        return self.verdict == "explained" and self.gain.share_of_excess_removed < IN_PART
+
+    def __repr__(self) -> str:
+        causes = ", ".join(f"{cause.effect} {100 * cause.probability:.3g} %" for cause in self.causes)
+        size = f"residual {self.residual.rms_before:.3g} -> {self.residual.rms_after:.3g} m/s²"
+        return joined(self, [self.verdict, causes, size, f"{len(self.runs)} runs"])
+
+    @property
+    def calibration_residue(self) -> float:
+        """Size of a residue of the twin's calibration, 0 where there is none."""
+        return float(self.noise.get("calibration_residue", 0.0))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON form of the contract."""
+        residual = self.residual
+        gain = self.gain
+        return {
+            "format_version": FORMAT_VERSION,
+            "verdict": self.verdict,
+            "in_part": self.in_part,
+            "sentences": list(self.sentences),
+            "causes": [cause.to_dict() for cause in self.causes],
+            "residual": {
+                "rms_before": residual.rms_before,
+                "rms_after": residual.rms_after,
+                "noise_floor": residual.noise_floor,
+                "unit": "m/s2",
+                "before_by_channel": dict(residual.before_by_channel),
+                "after_by_channel": dict(residual.after_by_channel),
+            },
+            "gain": {
+                "held_out": gain.held_out,
+                "held_out_rms_before": gain.rms_before,
+                "held_out_rms_after": gain.rms_after,
+                "share_of_excess_removed": gain.share_of_excess_removed,
+                "share_of_excess_removed_std": gain.share_std,
+                "share_in_any_recording": gain.share_in_any_recording,
+                "log_likelihood_per_sample": gain.log_likelihood_per_sample,
+                "log_likelihood_std": gain.log_likelihood_std,
+                "rate_rmse_before_rad_s": gain.rate_rmse_before,
+                "rate_rmse_after_rad_s": gain.rate_rmse_after,
+                "position_drift_before_m": gain.drift_before,
+                "position_drift_after_m": gain.drift_after,
+            },
+            "unexplained": {
+                "significant": self.unexplained.significant,
+                "signature": self.unexplained.signature,
+                "log_odds": self.unexplained.log_odds,
+                "surrogate": dict(self.unexplained.surrogate),
+                "extends_twin": self.unexplained.extends_twin,
+                "left_out": self.unexplained.left_out,
+            },
+            "rivals": [{"effects": list(r.effects), "log_odds": r.log_odds, "why": r.why} for r in self.rivals],
+            "noise": dict(self.noise),
+            "undetermined": [dict(one) for one in self.undetermined],
+        }
+
+    def to_json(self) -> str:
+        """Return ``verdict.json``; NaN becomes null."""
+        return json.dumps(_finite(self.to_dict()), indent=2, allow_nan=False) + "\n"
+
+    def write(self, directory: str | Path) -> None:
+        """Write ``verdict.json`` and ``twin.toml`` into a folder."""
+        folder = Path(directory)
+        write_text(folder / "twin.toml", self.twin.to_toml())
+        write_text(folder / "verdict.json", self.to_json())
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_finite(item) for item in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float) and not np.isfinite(value):
+        return None
+    return value

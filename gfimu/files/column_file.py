@@ -1,0 +1,303 @@
+"""Tables of named columns in CSV or Parquet files, with metadata, read and written block by block.
+
+Both formats carry the same metadata: Parquet as key–value pairs of the file, CSV as leading ``# key: value`` lines;
+values are JSON. A block is small against the table, so reading needs no second copy of the data.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.csv as pa_csv
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from gfimu.errors import InputError
+from gfimu.files.atomic_file import atomic_path
+from gfimu.files.table import ArrowStream, column_type, from_json, metadata_of_schema, numbers, schema_metadata, to_json
+from gfimu.files.table_columns import TableColumns
+
+__all__ = ["ColumnFile", "head_line", "open_columns", "write_columns"]
+
+_BLOCK_BYTES = 1 << 20
+_BLOCK_ROWS = 1 << 16
+_ROW_GROUP_ROWS = 1 << 18
+_MISSING = ["", "nan", "NaN", "NAN", "NA", "N/A", "null", "NULL"]
+
+
+class ColumnFile(Protocol):
+    """An open table: its column names, metadata, an upper bound of its rows, and its blocks."""
+
+    names: list[str]
+    metadata: dict[str, Any]
+    max_rows: int
+
+    @property
+    def file(self) -> Path | str:
+        """The file, or what messages call the table."""
+        ...
+
+    def blocks(self, columns: Sequence[str]) -> Iterator[list[NDArray[np.float64]]]:
+        """Yield the named columns as numbers, block by block; missing values are NaN."""
+        ...
+
+    def read_as_found(self, columns: Sequence[str]) -> dict[str, NDArray[Any]]:
+        """Return columns with the type the file gives them (numbers or text)."""
+        ...
+
+    def place(self, row: int) -> str:
+        """Say where a row (from 0) stands in the file, for messages."""
+        ...
+
+
+def open_columns(source: str | Path | ArrowStream | ColumnFile) -> ColumnFile:
+    """Open a CSV or Parquet file (told apart by content), or a table object.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, empty, binary but not Parquet, damaged, or repeats a column name; or if ``source`` is
+        neither a path nor a table.
+    """
+    if not isinstance(source, str | Path):
+        return source if isinstance(source, TableColumns) else TableColumns(source)
+    file = Path(source)
+    try:
+        with file.open("rb") as stream:
+            magic = stream.read(4)
+    except FileNotFoundError:
+        raise InputError(f"{file}: no such file; check the path") from None
+    except OSError as error:
+        raise InputError(f"{file}: {error.strerror or error}; check the path") from None
+    if not magic:
+        raise InputError(f"{file}: empty file; record again or give another file")
+    table: ColumnFile = _ParquetColumns(file) if magic == b"PAR1" else _CsvColumns(file)
+    repeated = sorted({name for name in table.names if table.names.count(name) > 1})
+    if repeated:
+        raise InputError(f"{file}: column {repeated[0]!r} appears twice; keep one")
+    return table
+
+
+def head_line(line: str) -> dict[str, Any]:
+    """Return the metadata of one ``# key: value`` line at the head of a CSV file; empty if it holds none."""
+    key, colon, value = line.lstrip("# ").partition(":")
+    return {key.strip(): from_json(value.strip())} if colon else {}
+
+
+def write_columns(path: str | Path, columns: Mapping[str, NDArray[Any]], metadata: Mapping[str, Any]) -> None:
+    """Write columns of equal length to a ``.csv`` or ``.parquet`` file, whole or not at all.
+
+    NaN becomes an empty cell in CSV and stays NaN in Parquet; numbers are written so that they read back exactly.
+
+    Raises
+    ------
+    InputError
+        If the extension is neither ``.csv`` nor ``.parquet``, a metadata key can't stand in a CSV line, or the folder
+        can't be written to.
+    GfimuError
+        If writing fails, as on a full disk.
+    """
+    file = Path(path)
+    if file.suffix == ".parquet":
+        with atomic_path(file) as temporary:
+            _write_parquet(temporary, columns, metadata)
+    elif file.suffix == ".csv":
+        for key in metadata:
+            if key != key.strip() or not key or any(mark in key for mark in ":\r\n"):
+                raise InputError(f"{file}: metadata key {key!r} can't stand in a CSV file; rename it")
+        with atomic_path(file) as temporary:
+            _write_csv(temporary, columns, metadata)
+    else:
+        raise InputError(f"{file}: unknown file format {file.suffix!r}; use .csv or .parquet")
+
+
+def _write_parquet(file: Path, columns: Mapping[str, NDArray[Any]], metadata: Mapping[str, Any]) -> None:
+    fields = [(name, column_type(values)) for name, values in columns.items()]
+    schema = pa.schema(fields, metadata=schema_metadata(metadata))
+    # Readings are nearly random in their low bits: a dictionary would only cost time and memory.
+    with pq.ParquetWriter(file, schema, compression="zstd", use_dictionary=False, write_page_checksum=True) as writer:
+        for rows in _row_blocks(columns, _ROW_GROUP_ROWS):
+            writer.write_table(pa.table([pa.array(values[rows]) for values in columns.values()], schema=schema))
+
+
+def _write_csv(file: Path, columns: Mapping[str, NDArray[Any]], metadata: Mapping[str, Any]) -> None:
+    with file.open("w", encoding="utf-8", newline="") as text:
+        for key, value in metadata.items():
+            text.write(f"# {key}: {to_json(value)}\n")
+        csv.writer(text, lineterminator="\n").writerow(columns)
+    options = pa_csv.WriteOptions(include_header=False, quoting_style="needed")
+    with file.open("ab") as stream:
+        for rows in _row_blocks(columns, _BLOCK_ROWS):
+            block = pa.table({name: pa.array(values[rows], from_pandas=True) for name, values in columns.items()})
+            pa_csv.write_csv(block, stream, options)
+
+
+def _row_blocks(columns: Mapping[str, NDArray[Any]], size: int) -> Iterator[slice]:
+    n = len(next(iter(columns.values())))
+    for start in range(0, n, size):
+        yield slice(start, min(start + size, n))
+
+
+class _ParquetColumns:
+    """Columns of a Parquet file."""
+
+    def __init__(self, file: Path) -> None:
+        self.file = file
+        try:
+            # Buffered reading streams pages; without it a whole column chunk would be held beside the data.
+            self._parquet = pq.ParquetFile(file, pre_buffer=False, buffer_size=1 << 20, page_checksum_verification=True)
+        except (pa.ArrowException, OSError) as error:
+            raise InputError(f"{file}: damaged Parquet file ({_first_line(error)}); write it again") from None
+        schema = self._parquet.schema_arrow
+        self._types = dict(zip(schema.names, schema.types, strict=True))
+        self.names: list[str] = list(schema.names)
+        self.max_rows: int = self._parquet.metadata.num_rows
+        self.metadata = metadata_of_schema(self._parquet.metadata.metadata)
+
+    def blocks(self, columns: Sequence[str]) -> Iterator[list[NDArray[np.float64]]]:
+        for name in columns:
+            kind = self._types[name]
+            if not (pa.types.is_floating(kind) or pa.types.is_integer(kind)):
+                raise InputError(f"{self.file}: column {name} holds {kind}, not numbers; write it as numbers")
+        try:
+            for batch in self._parquet.iter_batches(batch_size=_BLOCK_ROWS, columns=list(columns), use_threads=False):
+                yield [numbers(batch.column(name)) for name in columns]
+        except (pa.ArrowException, OSError) as error:
+            raise self._damaged(error) from None
+
+    def read_as_found(self, columns: Sequence[str]) -> dict[str, NDArray[Any]]:
+        try:
+            return {name: self._parquet.read(columns=[name]).column(name).to_numpy() for name in columns}
+        except (pa.ArrowException, OSError) as error:
+            raise self._damaged(error) from None
+
+    def place(self, row: int) -> str:
+        return f"sample {row + 1}"
+
+    def _damaged(self, error: Exception) -> InputError:
+        return InputError(f"{self.file}: damaged Parquet file ({_first_line(error)}); write it again")
+
+
+class _CsvColumns:
+    """Columns of a CSV file with optional leading ``# key: value`` lines."""
+
+    def __init__(self, file: Path) -> None:
+        self.file = file
+        self.metadata: dict[str, Any] = {}
+        self._header_lines = 0
+        header = ""
+        try:
+            with file.open(encoding="utf-8-sig") as stream:
+                for line in stream:
+                    self._header_lines += 1
+                    if "\x00" in line:
+                        raise self._binary()
+                    if line.strip() and not line.startswith("#"):
+                        header = line
+                        break
+                    self.metadata |= head_line(line)
+        except UnicodeDecodeError:
+            raise self._binary() from None
+        if not header:
+            raise InputError(f"{file}: no header line; the first line must name the columns, such as t_s,a11_m_s2")
+        self.names = [name.strip() for name in next(csv.reader([header.strip()], skipinitialspace=True))]
+        if len(self.names) == 1 and any(mark in header for mark in ";\t"):
+            raise InputError(f"{file}: columns are not separated by commas; write it with commas")
+        self.max_rows = _count_lines(file) - self._header_lines
+
+    def blocks(self, columns: Sequence[str]) -> Iterator[list[NDArray[np.float64]]]:
+        if self.max_rows == 0:
+            return
+        convert = pa_csv.ConvertOptions(
+            include_columns=list(columns),
+            column_types=dict.fromkeys(columns, pa.float64()),
+            null_values=_MISSING,
+        )
+        try:
+            with pa_csv.open_csv(self.file, read_options=self._read_options(), convert_options=convert) as reader:
+                for batch in reader:
+                    yield [numbers(column) for column in batch.columns]
+        except (pa.ArrowException, OSError) as error:
+            if "Empty CSV" not in str(error):
+                raise self._locate(columns, error) from None
+
+    def read_as_found(self, columns: Sequence[str]) -> dict[str, NDArray[Any]]:
+        if not columns:  # an empty list of columns means all of them to the CSV reader
+            return {}
+        read = self._read_options()
+        convert = pa_csv.ConvertOptions(include_columns=list(columns), null_values=_MISSING)
+        try:
+            table = pa_csv.read_csv(self.file, read_options=read, convert_options=convert)
+        except pa.ArrowException:
+            # A column that turns from numbers to text further down: keep it as text.
+            convert.column_types = dict.fromkeys(columns, pa.string())
+            try:
+                table = pa_csv.read_csv(self.file, read_options=read, convert_options=convert)
+            except pa.ArrowException as error:
+                raise self._locate(columns, error) from None
+        return {name: table.column(name).to_numpy() for name in columns}
+
+    def place(self, row: int) -> str:
+        samples = -1
+        with self.file.open(encoding="utf-8-sig", errors="replace") as stream:
+            for number, line in enumerate(stream, start=1):
+                samples += number > self._header_lines and bool(line.strip())
+                if samples == row:
+                    return f"line {number}"
+        return f"sample {row + 1}"
+
+    def _read_options(self) -> pa_csv.ReadOptions:
+        return pa_csv.ReadOptions(
+            column_names=self.names, skip_rows=self._header_lines, block_size=_BLOCK_BYTES, use_threads=False
+        )
+
+    def _binary(self) -> InputError:
+        return InputError(f"{self.file}: binary data, not a table; give a .csv or .parquet file")
+
+    def _locate(self, columns: Sequence[str], error: Exception) -> InputError:
+        """Find the line and column that the CSV reader refused."""
+        wanted = {self.names.index(name): name for name in columns}
+        with self.file.open(encoding="utf-8-sig", errors="replace", newline=None) as stream:
+            for number, line in enumerate(stream, start=1):
+                if number <= self._header_lines or not line.strip():
+                    continue
+                cells = next(csv.reader([line.rstrip("\r\n").replace("\x00", "�")]))
+                if len(cells) != len(self.names):
+                    return InputError(
+                        f"{self.file}: line {number} has {len(cells)} columns, the header {len(self.names)}; "
+                        "the file is cut off or damaged there"
+                    )
+                for place, name in wanted.items():
+                    if cells[place] not in _MISSING and not _is_number(cells[place]):
+                        return InputError(
+                            f"{self.file}: line {number}, column {name}: {cells[place].strip()[:40]!r} is not a "
+                            "number; leave the cell empty where a value is missing"
+                        )
+        return InputError(f"{self.file}: not a readable CSV file ({_first_line(error)}); write it again")
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return "_" not in cell  # Python reads 1_000 as a number, files don't
+
+
+def _count_lines(file: Path) -> int:
+    """Upper bound of the lines of a file, whatever ends them."""
+    feeds = returns = 0
+    with file.open("rb") as stream:
+        while block := stream.read(_BLOCK_BYTES):
+            feeds += block.count(b"\n")
+            returns += block.count(b"\r")
+    return max(feeds, returns) + 1
+
+
+def _first_line(error: Exception) -> str:
+    return str(error).splitlines()[0][:120] if str(error) else type(error).__name__

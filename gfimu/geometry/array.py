@@ -1,0 +1,259 @@
+"""Accelerometer arrays: where each sensing axis sits on the body and where it points.
+
+The array is the geometry only. The regression matrix J of the GF-IMU paper (its step 4) and the matrix Q of the
+centripetal terms follow from it; both are in body axes about the body's origin.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomli_w
+from numpy.typing import ArrayLike, NDArray
+
+from gfimu.errors import InputError
+from gfimu.files.model_files import find_model, read_toml
+from gfimu.parts.files import add_part_file, is_part_file
+from gfimu.short_repr import joined, short_repr
+
+__all__ = ["OMEGA_PRODUCTS", "AccelerometerArray", "Chip"]
+
+OMEGA_PRODUCTS = ("xx", "yy", "zz", "xy", "xz", "yz")
+"""Order of the six products of the angular rate that the columns of Q multiply."""
+
+_AXIS_NORM_TOLERANCE = 1e-6
+
+
+@dataclass(frozen=True)
+class Chip:
+    """One accelerometer chip with one, two or three sensing axes at one point of the body.
+
+    Parameters
+    ----------
+    name : str
+        Chip name; channel names are this plus ``1``, ``2``, ``3``.
+    position : ndarray, shape (3,)
+        Position of the proof mass in the body frame, m.
+    axes : ndarray, shape (k, 3)
+        Unit vectors of the sensing axes in the body frame.
+    part : str
+        Name of the part in ``models/parts``, or of a part file of the user's.
+    """
+
+    name: str
+    position: NDArray[np.float64]
+    axes: NDArray[np.float64]
+    part: str = "adxl345"
+
+    __repr__ = short_repr
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Channel names, one per sensing axis."""
+        return tuple(f"{self.name}{axis + 1}" for axis in range(len(self.axes)))
+
+
+@dataclass(frozen=True)
+class AccelerometerArray:
+    """A rigid set of accelerometer chips.
+
+    Parameters
+    ----------
+    name : str
+        Name of the array.
+    chips : tuple of Chip
+        The chips, in the order of the channels.
+    length_unit : float
+        Length that scoring calls 1, m (half the cube's edge for a cube).
+    description : str
+        One line for people.
+    part_files : mapping of str to str
+        Text of the part files that are not in ``models/parts``, by the name that the chips use.
+    """
+
+    name: str
+    chips: tuple[Chip, ...]
+    length_unit: float = 0.05
+    description: str = ""
+    part_files: Mapping[str, str] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        parts = ", ".join(dict.fromkeys(chip.part for chip in self.chips))
+        return joined(self, [repr(self.name), f"{len(self.chips)} chips ({parts})", f"{self.n_channels} channels"])
+
+    @cached_property
+    def channels(self) -> tuple[str, ...]:
+        """Names of the channels, in column order of every reading matrix."""
+        return tuple(channel for chip in self.chips for channel in chip.channels)
+
+    @cached_property
+    def positions(self) -> NDArray[np.float64]:
+        """Position of each sensing axis in the body frame, m, shape (c, 3)."""
+        return np.repeat(self.chip_positions, [len(chip.axes) for chip in self.chips], axis=0)
+
+    @cached_property
+    def axes(self) -> NDArray[np.float64]:
+        """Unit vector of each sensing axis in the body frame, shape (c, 3)."""
+        return np.concatenate([chip.axes for chip in self.chips])
+
+    @cached_property
+    def chip_positions(self) -> NDArray[np.float64]:
+        """Position of each chip in the body frame, m, shape (k, 3)."""
+        return np.array([chip.position for chip in self.chips])
+
+    @cached_property
+    def chip_of_channel(self) -> NDArray[np.intp]:
+        """Index of the chip that each channel belongs to, shape (c,)."""
+        return np.repeat(np.arange(len(self.chips)), [len(chip.axes) for chip in self.chips])
+
+    @property
+    def n_channels(self) -> int:
+        """Number of sensing axes."""
+        return len(self.channels)
+
+    @cached_property
+    def regression_matrix(self) -> NDArray[np.float64]:
+        """Regression matrix J, shape (c, 6): reading = J [alpha; p] + centripetal terms.
+
+        Row i is [(r_i × θ_i)ᵀ, θ_iᵀ] (GF-IMU paper, step 4); lengths in m.
+        """
+        return np.hstack([np.cross(self.positions, self.axes), self.axes])
+
+    @cached_property
+    def centripetal_matrix(self) -> NDArray[np.float64]:
+        """Matrix Q, shape (c, 6): Q s = θ_iᵀ (ωωᵀ − |ω|² I) r_i with s the products `OMEGA_PRODUCTS` of ω."""
+        x, y, z = self.positions.T
+        a, b, c = self.axes.T
+        return np.column_stack(
+            [
+                -(b * y + c * z),
+                -(a * x + c * z),
+                -(a * x + b * y),
+                a * y + b * x,
+                a * z + c * x,
+                b * z + c * y,
+            ]
+        )
+
+    def index(self, channel: str) -> int:
+        """Column of a channel; raises `InputError` that lists the channels."""
+        try:
+            return self.channels.index(channel)
+        except ValueError:
+            raise InputError(
+                f"array {self.name!r} has no channel {channel!r}; its channels: {', '.join(self.channels)}"
+            ) from None
+
+    def with_geometry(self, positions: ArrayLike, axes: Sequence[ArrayLike]) -> AccelerometerArray:
+        """Return the same chips at other positions, shape (k, 3), m, with other axes, each of shape (k_i, 3)."""
+        moved = np.asarray(positions, dtype=float)
+        chips = tuple(
+            replace(chip, position=position, axes=np.asarray(chip_axes, dtype=float))
+            for chip, position, chip_axes in zip(self.chips, moved, axes, strict=True)
+        )
+        return replace(self, chips=chips)
+
+    def with_part(self, part: str) -> AccelerometerArray:
+        """Return the same array with every chip of one part."""
+        return replace(self, chips=tuple(replace(chip, part=part) for chip in self.chips))
+
+    def with_part_file(self, part: str, *, beside: Path | None = None) -> tuple[AccelerometerArray, str]:
+        """Return the array with the text of a part file kept in it, and the name by which it is kept.
+
+        A part of ``models/parts`` stays as it is. Raises `InputError` if there is no such file.
+        """
+        if not is_part_file(part):
+            return self, part
+        files, kept = add_part_file(self.part_files, part, beside)
+        return replace(self, part_files=files), kept
+
+    def relative_to(self, origin: ArrayLike) -> AccelerometerArray:
+        """Return the same array with its body origin moved to ``origin``, shape (3,), m."""
+        return self.with_geometry(self.chip_positions - np.asarray(origin, dtype=float), [c.axes for c in self.chips])
+
+    @classmethod
+    def load(cls, name: str | Path, *, beside: Path | None = None) -> AccelerometerArray:
+        """Load an array by name (in ``models/arrays``) or from a TOML file.
+
+        Raises
+        ------
+        InputError
+            If the array is unknown (the message lists the names) or the file is malformed.
+        """
+        path = find_model("arrays", name, beside=beside)
+        array = cls.from_dict(read_toml(path), source=str(path))
+        for part in dict.fromkeys(chip.part for chip in array.chips if is_part_file(chip.part)):
+            if any((folder / part).is_file() for folder in (path.parent, Path())):  # others fail where they are needed
+                array, kept = array.with_part_file(part, beside=path.parent)
+                chips = tuple(replace(chip, part=kept) if chip.part == part else chip for chip in array.chips)
+                array = replace(array, chips=chips)
+        return array
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any], *, source: str = "array") -> AccelerometerArray:
+        """Build an array from the keys of an array file (contract: ``name``, ``[[chip]]``)."""
+        known = {"name", "chip", "length_unit_m", "description"}
+        for key in data:
+            if key not in known:
+                raise InputError(f"{source}: unknown key {key!r}; valid: {', '.join(sorted(known))}")
+        entries = data.get("chip")
+        if not isinstance(entries, list) or not entries:
+            raise InputError(f"{source}: no [[chip]] table; list at least one chip with position_m and axes")
+        chips = tuple(_chip(entry, number, source) for number, entry in enumerate(entries, start=1))
+        channels = [channel for chip in chips for channel in chip.channels]
+        if len(set(channels)) != len(channels):
+            raise InputError(f"{source}: two chips share a name; give each its own")
+        length = data.get("length_unit_m")
+        if length is None:
+            length = float(np.max(np.abs([chip.position for chip in chips]))) or 1.0
+        return cls(str(data.get("name", Path(source).stem)), chips, float(length), str(data.get("description", "")))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the content of the array file."""
+        return {
+            "name": self.name,
+            "description": self.description,
+            "length_unit_m": self.length_unit,
+            "chip": [
+                {
+                    "name": chip.name,
+                    "part": chip.part,
+                    "position_m": chip.position.tolist(),
+                    "axes": chip.axes.tolist(),
+                }
+                for chip in self.chips
+            ],
+        }
+
+    def to_toml(self) -> str:
+        """Return the text of the array file."""
+        return tomli_w.dumps(self.to_dict())
+
+
+def _chip(entry: Mapping[str, Any], number: int, source: str) -> Chip:
+    """Check one ``[[chip]]`` table and build the chip."""
+    where = f"{source}: chip {number}"
+    known = {"name", "part", "position_m", "axes"}
+    for key in entry:
+        if key not in known:
+            raise InputError(f"{where}: unknown key {key!r}; valid: {', '.join(sorted(known))}")
+    try:
+        position = np.array(entry["position_m"], dtype=float)
+        axes = np.atleast_2d(np.array(entry["axes"], dtype=float))
+    except KeyError as error:
+        raise InputError(f"{where}: key {error.args[0]!r} is missing; add it") from None
+    except (TypeError, ValueError):
+        raise InputError(f"{where}: position_m and axes must be lists of numbers") from None
+    if position.shape != (3,) or axes.ndim != 2 or axes.shape[1] != 3 or not 1 <= len(axes) <= 3:
+        raise InputError(f"{where}: position_m needs three numbers and axes one to three rows of three")
+    if not (np.isfinite(position).all() and np.isfinite(axes).all()):
+        raise InputError(f"{where}: position_m and axes must be finite numbers")
+    norms = np.linalg.norm(axes, axis=1)
+    if np.any(np.abs(norms - 1) > _AXIS_NORM_TOLERANCE):
+        raise InputError(f"{where}: axes must be unit vectors; one has length {norms[np.argmax(abs(norms - 1))]:.6g}")
+    return Chip(str(entry.get("name", f"a{number}")), position, axes, str(entry.get("part", "adxl345")))

@@ -1,0 +1,215 @@
+"""Key figures of an estimate, and how it agrees with the references recorded beside the readings."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from gfimu.geometry.array import AccelerometerArray
+from gfimu.geometry.kinematics import null_space, omega_products
+from gfimu.motion.estimation import Estimate
+from gfimu.recording import Recording
+from gfimu.short_repr import short_repr
+
+__all__ = ["Agreement", "EstimateSummary", "centripetal_agreement", "summarise"]
+
+_AXES = ("x", "y", "z")
+_TURNING_RATE = 2.0
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """How well the centripetal terms in the null space agree with a gyro.
+
+    Parameters
+    ----------
+    slope : float
+        Least-squares slope through the origin of measured against expected terms; 1 is perfect.
+    correlation : float
+        Correlation of the two.
+    samples : int
+        Samples used: those with a gyro reading, every channel, and the body turning.
+    """
+
+    slope: float
+    correlation: float
+    samples: int
+
+
+@dataclass(frozen=True)
+class EstimateSummary:
+    """Key figures of an estimate; unknown ones are NaN or None.
+
+    Parameters
+    ----------
+    array, method, form : str
+        What was estimated, and how.
+    samples, gaps, samples_without_estimate : int
+        Samples, places where samples are lost, and samples whose channels don't suffice.
+    duration_s, sample_rate_hz : float
+        Length and nominal rate of the recording.
+    p_rms_m_s2, alpha_rms_rad_s2, omega_rms_rad_s : ndarray, shape (3,)
+        Root mean squares by body axis.
+    omega_std_rad_s : ndarray, shape (3,)
+        Standard deviation of the rate at the last sample, by noise alone.
+    angle_rad : float
+        Angle turned about the table's axis at the last sample.
+    tacho_rmse_rad_s, gyro_rmse_rad_s : float or None
+        Root mean square difference of the rate from the tachometer and, over all three axes, from the gyro.
+    centripetal : Agreement or None
+        Centripetal terms against the gyro.
+    consistency : mapping or None
+        Of the filter's or smoother's innovations: the figures of `gfimu.rate.consistency.Consistency`.
+    channels_left_out : tuple of str
+        Dead channels that the estimate goes without.
+    warnings : tuple of str
+        What the checks of the recording found, and an inconsistent filter.
+    """
+
+    array: str
+    method: str
+    form: str
+    samples: int
+    gaps: int
+    samples_without_estimate: int
+    duration_s: float
+    sample_rate_hz: float
+    p_rms_m_s2: NDArray[np.float64]
+    alpha_rms_rad_s2: NDArray[np.float64]
+    omega_rms_rad_s: NDArray[np.float64]
+    omega_std_rad_s: NDArray[np.float64]
+    angle_rad: float
+    tacho_rmse_rad_s: float | None
+    gyro_rmse_rad_s: float | None
+    centripetal: Agreement | None
+    consistency: Mapping[str, Any] | None = None
+    channels_left_out: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+
+    __repr__ = short_repr
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the figures by name, for JSON."""
+        return asdict(self)
+
+
+def summarise(estimate: Estimate, recording: Recording, array: AccelerometerArray) -> EstimateSummary:
+    """Sum up an estimate and compare it with the references of its recording.
+
+    Parameters
+    ----------
+    estimate : Estimate
+        What `gfimu.estimate` found.
+    recording : Recording
+        The recording it was found from.
+    array : AccelerometerArray
+        The array that was recorded.
+    """
+    known = np.isfinite(estimate.omega).all(axis=1) & np.isfinite(estimate.p).all(axis=1)
+    last = int(np.flatnonzero(known)[-1]) if known.any() else -1
+    axis = Rotation.from_rotvec(recording.mounting_rotvec).inv().apply([0.0, 0.0, 1.0])
+    tacho = recording.reference.get("tacho_rad_s")
+    gyro = _gyro(recording)
+    consistency = estimate.metadata.get("consistency")
+    return EstimateSummary(
+        array=array.name,
+        method=str(estimate.metadata.get("method", "")),
+        form=str(estimate.metadata.get("form", "")),
+        samples=len(estimate),
+        gaps=len(recording.gaps),
+        samples_without_estimate=int(np.sum(~known)),
+        duration_s=recording.duration,
+        sample_rate_hz=recording.sample_rate,
+        p_rms_m_s2=_rms(estimate.p[known]),
+        alpha_rms_rad_s2=_rms(estimate.alpha[known]),
+        omega_rms_rad_s=_rms(estimate.omega[known]),
+        omega_std_rad_s=estimate.omega_std[last],
+        angle_rad=float(estimate.angle[last]),
+        tacho_rmse_rad_s=None if tacho is None else _rms_difference(estimate.omega @ axis, tacho),
+        gyro_rmse_rad_s=None if gyro is None else _rms_difference(estimate.omega, gyro),
+        centripetal=centripetal_agreement(recording, array),
+        consistency=consistency,
+        channels_left_out=tuple(estimate.metadata.get("channels_left_out", ())),
+        warnings=(*estimate.metadata.get("warnings", ()), *_inconsistency(consistency)),
+    )
+
+
+def _inconsistency(consistency: Mapping[str, Any] | None) -> list[str]:
+    """Return the warning of a filter whose innovations are larger than it states, if they are."""
+    if consistency is None or consistency["consistent"]:
+        return []
+    mean, bound = consistency["nis"], consistency["bound"]
+    if mean > bound:
+        what = f"the innovations are {mean:.2f} times as large as stated (NIS; {bound:.2f} at most for a right model)"
+    else:
+        mean, bound, start = (consistency[name] for name in ("worst_second", "worst_second_bound", "worst_second_at_s"))
+        what = (
+            f"the innovations are {mean:.2f} times as large as stated (NIS; {bound:.2f} at most for a right model) "
+            f"in the second from {start:.4g} s on"
+        )
+    channel = consistency["worst_channel"]
+    if channel is None:
+        whose = "no single channel explains it: check gains (calibrate), array and sample times"
+    else:
+        whose = f"channel {channel} disagrees most: without it they are {consistency['nis_without_worst']:.2f}"
+    return [f"the estimate is worse than its standard deviation says: {what}; {whose}"]
+
+
+def centripetal_agreement(
+    recording: Recording, array: AccelerometerArray, *, slowest: float = _TURNING_RATE
+) -> Agreement | None:
+    """Compare the centripetal terms that the null space sees with those of the reference gyro.
+
+    Parameters
+    ----------
+    recording : Recording
+        Readings and the references ``gyro_x_rad_s``, ``gyro_y_rad_s``, ``gyro_z_rad_s``.
+    array : AccelerometerArray
+        The array that was recorded.
+    slowest : float
+        Samples slower than this are left out, rad/s.
+
+    Returns
+    -------
+    Agreement or None
+        All combinations of the null space together, each weighted as the geometry weights it, m/s² against m/s²;
+        None without a gyro, without a null space that sees ω, or with fewer than three samples.
+    """
+    space = null_space(array)
+    gyro = _gyro(recording)
+    if space.rank == 0 or gyro is None:
+        return None
+    readings = recording.for_array(array)
+    chosen = np.isfinite(readings).all(axis=1) & (np.linalg.norm(gyro, axis=1) > slowest)  # NaN compares false
+    if chosen.sum() < 3:
+        return None
+    measured = (readings[chosen] @ space.basis[: space.rank].T).ravel()
+    expected = (omega_products(gyro[chosen]) @ space.sensitivity[: space.rank].T).ravel()
+    slope = float(measured @ expected / (expected @ expected))
+    return Agreement(slope, float(np.corrcoef(measured, expected)[0, 1]), int(chosen.sum()))
+
+
+def _gyro(recording: Recording) -> NDArray[np.float64] | None:
+    """Return the reference gyro, shape (n, 3), rad/s; None if an axis was not recorded."""
+    names = [f"gyro_{axis}_rad_s" for axis in _AXES]
+    if any(name not in recording.reference for name in names):
+        return None
+    return np.column_stack([recording.reference[name] for name in names])
+
+
+def _rms(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Root mean square of each column; NaN without rows."""
+    return np.sqrt(np.mean(values**2, axis=0)) if len(values) else np.full(values.shape[1:], np.nan)
+
+
+def _rms_difference(estimate: NDArray[np.float64], reference: NDArray[np.float64]) -> float | None:
+    """Root mean square of the differences where both are known, each axis an observation of its own."""
+    difference = (estimate - reference).ravel()
+    difference = difference[np.isfinite(difference)]
+    return math.sqrt(float(np.mean(difference**2))) if len(difference) else None

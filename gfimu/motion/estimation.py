@@ -1,0 +1,430 @@
+"""Estimate the motion of an accelerometer array from a recording: p, α, ω, attitude and table angle.
+
+The steps are those of the GF-IMU paper: the regression matrix turns readings into p and α (step 5), a method turns α
+into ω (step 10), and ω turns into attitude and angle. Beside them stands what the null space says about ω without any
+integration: the six products of its components.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial.transform import Rotation
+
+from gfimu import __version__
+from gfimu.errors import InputError, unknown_name
+from gfimu.files.column_file import open_columns, write_columns
+from gfimu.files.table import ArrowStream, Tabular
+from gfimu.geometry.array import OMEGA_PRODUCTS, AccelerometerArray
+from gfimu.geometry.linear_solution import linear_solution
+from gfimu.motion.attitude import from_rotation, integrate_attitude, table_angle, to_rotation
+from gfimu.motion.navigation import level, navigate
+from gfimu.motion.rest_navigation import navigate_with_rest
+from gfimu.parts.part import white_noise_std
+from gfimu.rate.consistency import judge_consistency
+from gfimu.rate.feedback import integrate_rate_recursively
+from gfimu.rate.integration import integrate_rate
+from gfimu.rate.kalman import FilterSettings
+from gfimu.rate.methods import RATE_METHODS, estimate_rate
+from gfimu.rate.problem import RateMethod, RateProblem, RateSolution
+from gfimu.rate.result import RateEstimate
+from gfimu.rate.sensing import SensorErrors
+from gfimu.recording import Recording
+from gfimu.recording.checks import Finding, check_recording, refuse_or_warn, without_dead_channels
+from gfimu.short_repr import joined, timing
+
+__all__ = ["METHODS", "Estimate", "estimate"]
+
+FORMAT_VERSION = 1
+_AXES = ("x", "y", "z")
+_LEVEL_SECONDS = 1.0
+
+
+@dataclass(frozen=True)
+class Estimate(Tabular):
+    """Motion of the body at each sample of a recording; NaN where it could not be found.
+
+    Parameters
+    ----------
+    t_s : ndarray, shape (n,)
+        Sample times, s.
+    p : ndarray, shape (n, 3)
+        Specific force of the body origin, body axes, m/s².
+    alpha : ndarray, shape (n, 3)
+        Angular acceleration, body axes, rad/s².
+    omega, omega_std : ndarray, shape (n, 3)
+        Angular rate and the standard deviation that the channels' white noise gives it, body axes, rad/s.
+    quaternion : ndarray, shape (n, 4)
+        Attitude (w, x, y, z), body to world.
+    angle : ndarray, shape (n,)
+        Angle turned about the table's axis since the first sample, rad, not wrapped.
+    omega_products, omega_products_std : ndarray, shape (n, 6)
+        Products of ω from the null space, in the order `gfimu.geometry.array.OMEGA_PRODUCTS`, and their standard
+        deviation, rad²/s²; NaN where the array doesn't see one.
+    velocity, position : ndarray, shape (n, 3), optional
+        Velocity, m/s, and position, m, of the body origin in the world, where asked for.
+    metadata : mapping
+        Array, method, form, format and software version.
+    """
+
+    t_s: NDArray[np.float64]
+    p: NDArray[np.float64]
+    alpha: NDArray[np.float64]
+    omega: NDArray[np.float64]
+    omega_std: NDArray[np.float64]
+    quaternion: NDArray[np.float64]
+    angle: NDArray[np.float64]
+    omega_products: NDArray[np.float64]
+    omega_products_std: NDArray[np.float64]
+    velocity: NDArray[np.float64] | None = None
+    position: NDArray[np.float64] | None = None
+    metadata: Mapping[str, Any] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return len(self.t_s)
+
+    def __repr__(self) -> str:
+        names = [str(self.metadata[key]) for key in ("array", "method") if key in self.metadata]
+        return joined(self, [*names, timing(self.t_s), "with position" if self.position is not None else ""])
+
+    def to_columns(self) -> dict[str, NDArray[np.float64]]:
+        """Return the columns of the Estimate file, by name with unit."""
+        columns = {"t_s": self.t_s}
+        for attribute, names in _VECTOR_COLUMNS.items():
+            values = getattr(self, attribute)
+            if values is not None:
+                columns |= {name: values[:, place] for place, name in enumerate(names)}
+        return columns | {"angle_rad": self.angle}
+
+    def write(self, path: str | Path) -> None:
+        """Write the Estimate file, ``.csv`` or ``.parquet``, whole or not at all."""
+        write_columns(path, self.to_columns(), self.metadata)
+
+    @classmethod
+    def read(cls, path: str | Path | ArrowStream) -> Estimate:
+        """Read an Estimate file, or a table object with its columns.
+
+        Raises
+        ------
+        InputError
+            If the file can't be read, lacks a column, or has another format version.
+        """
+        table = open_columns(path)
+        version = table.metadata.get("format_version", FORMAT_VERSION)
+        if version != FORMAT_VERSION:
+            raise InputError(
+                f"{table.file}: Estimate format {version}; this gfimu reads {FORMAT_VERSION}: estimate again"
+            )
+        optional = {
+            attribute for attribute in ("velocity", "position") if _VECTOR_COLUMNS[attribute][0] not in table.names
+        }
+        vectors = {attribute: names for attribute, names in _VECTOR_COLUMNS.items() if attribute not in optional}
+        wanted = ["t_s", "angle_rad", *(name for names in vectors.values() for name in names)]
+        missing = [name for name in wanted if name not in table.names]
+        if missing:
+            raise InputError(f"{table.file}: column {missing[0]} is missing; give a file that gfimu estimate wrote")
+        blocks = [np.column_stack(block) for block in table.blocks(wanted)]
+        if not blocks:
+            raise InputError(f"{table.file}: no samples below the header; estimate again")
+        values = dict(zip(wanted, np.concatenate(blocks).T, strict=True))
+        return cls(
+            t_s=values["t_s"],
+            angle=values["angle_rad"],
+            metadata=table.metadata,
+            **{attribute: np.column_stack([values[name] for name in names]) for attribute, names in vectors.items()},
+        )
+
+
+_VECTOR_COLUMNS: dict[str, tuple[str, ...]] = {
+    "p": tuple(f"p_{axis}_m_s2" for axis in _AXES),
+    "alpha": tuple(f"alpha_{axis}_rad_s2" for axis in _AXES),
+    "omega": tuple(f"omega_{axis}_rad_s" for axis in _AXES),
+    "omega_std": tuple(f"omega_{axis}_std_rad_s" for axis in _AXES),
+    "quaternion": ("q_w", "q_x", "q_y", "q_z"),
+    "omega_products": tuple(f"omega_{pair}_rad2_s2" for pair in OMEGA_PRODUCTS),
+    "omega_products_std": tuple(f"omega_{pair}_std_rad2_s2" for pair in OMEGA_PRODUCTS),
+    "velocity": tuple(f"velocity_{axis}_m_s" for axis in _AXES),
+    "position": tuple(f"position_{axis}_m" for axis in _AXES),
+}
+
+
+def estimate(
+    recording: Recording,
+    array: AccelerometerArray,
+    *,
+    method: str = "integrate",
+    form: str = "auto",
+    omega0: ArrayLike | None = (0.0, 0.0, 0.0),
+    quaternion0: ArrayLike | None = None,
+    noise_std: ArrayLike | None = None,
+    with_position: bool = False,
+    fuse_gyro: bool = False,
+    force: bool = False,
+    findings: Sequence[Finding] | None = None,
+    progress: Callable[[float], object] | None = None,
+) -> Estimate:
+    """Estimate p, α, ω, attitude and table angle at every sample of a recording.
+
+    Parameters
+    ----------
+    recording : Recording
+        Readings in m/s². Samples that lack channels are solved from the others where those suffice.
+    array : AccelerometerArray
+        The array that was recorded.
+    method : str
+        Method for the angular rate, one of `METHODS`.
+    form : {"auto", "linear", "joint", "recursive"}
+        How readings turn into α and p; see `gfimu.geometry.linear_solution`.
+    omega0 : array_like, shape (3,), or None
+        Angular rate at the first sample, body axes, rad/s; None if it isn't known (``filter`` and ``smoother`` only).
+    quaternion0 : array_like, shape (4,), optional
+        Attitude (w, x, y, z) at the first sample. By default the recording's mounting, or without one the attitude
+        that levels the mean of p over the first second, with heading zero; good if the origin is not accelerated then.
+    noise_std : array_like, scalar or shape (c,), optional
+        Standard deviation of one sample of each channel, m/s²; by default from the parts' data sheets.
+    with_position : bool
+        Whether to integrate p to velocity and position as well, from rest at the origin.
+    fuse_gyro : bool
+        Whether ``filter`` and ``smoother`` use the recording's gyro as well.
+    force : bool
+        Whether to go on with a recording that its checks refuse; what they found is kept as a warning.
+    findings : sequence of Finding, optional
+        What `gfimu.recording.checks.check_recording` found, if it was run already.
+    progress : callable, optional
+        Called with the share of the work that ``filter`` and ``smoother`` have done so far, 0 to 1.
+
+    Returns
+    -------
+    Estimate
+        Its metadata hold ``warnings`` and, with ``filter`` and ``smoother``, ``consistency``
+        (`gfimu.rate.consistency.Consistency`).
+
+    Raises
+    ------
+    InputError
+        If the recording lacks channels, the method or form is unknown, no sample suffices for p and α, or the
+        recording contradicts itself and another unit, order or array explains it (see ``force``).
+    GeometryError
+        If the array can't see all six motions; the message names those it can't.
+    """
+    if method not in METHODS:
+        raise unknown_name("method", method, METHODS)
+    found = refuse_or_warn(check_recording(recording, array) if findings is None else findings, force=force)
+    recording = without_dead_channels(recording, array, found)
+    readings = recording.for_array(array)
+    rate0 = None if omega0 is None else np.asarray(omega0, dtype=float)
+    if rate0 is None and method not in {"filter", "smoother"}:
+        raise InputError(f"method {method!r} needs the rate at the start; use filter or smoother for an unknown one")
+    if fuse_gyro and method not in {"filter", "smoother"}:
+        raise InputError(f"method {method!r} can't use a gyro; use filter or smoother")
+    if rate0 is not None and (rate0.shape != (3,) or not np.isfinite(rate0).all()):
+        raise InputError(f"omega0 is {omega0!r}; it must hold three finite numbers, in rad/s")
+    noise = white_noise_std(array, recording.sample_rate) if noise_std is None else np.asarray(noise_std, dtype=float)
+    noise = np.broadcast_to(noise, array.n_channels)
+    linear = linear_solution(array, readings, noise, form=form)
+    usable = np.isfinite(linear.motion).all(axis=1)
+    if not usable.any():
+        raise InputError("no sample has enough channels for p and alpha; check the recording for missing readings")
+
+    gyro = _gyro(recording) if fuse_gyro else None
+    temperature = recording.reference.get("temperature_degC")
+    problem = RateProblem(array, recording.t_s, readings, noise, linear, rate0, gyro, temperature, progress)
+    dead = [name for finding in found if finding.kind == "dead" for name in finding.channels]
+    try:
+        rate = METHODS[method](problem)
+    except InputError as error:
+        if not dead or method in {"filter", "smoother"}:
+            raise
+        names = ", ".join(dead)
+        raise InputError(f"without the dead {names}: {error}; --method filter may do without it") from None
+    motion = linear.with_omega(rate.omega)
+    alpha, p = motion[:, :3], motion[:, 3:]
+    start = (
+        _initial_attitude(recording, motion, rate.omega)
+        if quaternion0 is None
+        else np.asarray(quaternion0, dtype=float)
+    )
+    quaternion = integrate_attitude(recording.t_s, rate.omega, alpha, start)
+    mounting = Rotation.from_rotvec(recording.mounting_rotvec)
+    axis = mounting.inv().apply([0.0, 0.0, 1.0])  # the table's axis in body axes
+    travelled = None
+    if rate.rest is not None and rate.rest.any():  # gravity shows the tilt there, and the velocity is zero
+        levelled = navigate_with_rest(recording.t_s, p, quaternion, rate.rest)
+        quaternion = levelled.quaternion
+        travelled = levelled if with_position else None
+    elif with_position:
+        travelled = navigate(recording.t_s, p, quaternion)
+    return Estimate(
+        t_s=recording.t_s,
+        p=p,
+        alpha=alpha,
+        omega=rate.omega,
+        omega_std=rate.omega_std,
+        quaternion=quaternion,
+        angle=table_angle(recording.t_s, rate.omega, axis=axis),
+        omega_products=linear.omega_products,
+        omega_products_std=linear.omega_products_std,
+        velocity=None if travelled is None else travelled.velocity,
+        position=None if travelled is None else travelled.position,
+        metadata={
+            "array": array.name,
+            "method": method,
+            "form": linear.form,
+            **rate.remarks,
+            "warnings": [finding.text for finding in found],
+            "channels_left_out": dead,
+            "mounting_rotvec_rad": recording.mounting_rotvec.tolist(),
+            "format_version": FORMAT_VERSION,
+            "software_version": __version__,
+        },
+    )
+
+
+def _integrate(problem: RateProblem) -> RateSolution:
+    """Integrate α from the first sample (paper, step 10 d); the variance of white noise adds up."""
+    linear, t = problem.linear, problem.t_s
+    start = np.zeros(3) if problem.omega0 is None else problem.omega0
+    alpha = linear.motion[:, :3]
+    leakage = linear.leakage[:, :3]
+    if leakage.any():
+        omega = integrate_rate_recursively(t, alpha, leakage, linear.pattern, start)
+    else:
+        omega = integrate_rate(t, alpha, start)
+    return RateSolution(
+        omega, np.sqrt(_integrated_variance(t, np.where(np.isnan(omega), np.nan, linear.alpha_variance)))
+    )
+
+
+def _by_rate_method(method: str) -> RateMethod:
+    """Adapt a method of `gfimu.rate.methods`, with the sensors' errors from their data sheets."""
+
+    def solve(problem: RateProblem) -> RateSolution:
+        problem, names = _of_living_channels(problem)
+        rate = 1.0 / float(np.median(np.diff(problem.t_s)))
+        errors = SensorErrors.from_parts(problem.array, rate, noise_std=problem.noise_std)
+        settings = FilterSettings(start_omega=problem.omega0)
+        found = estimate_rate(
+            problem.array, problem.t_s, problem.readings, errors, method=method, settings=settings, gyro=problem.gyro,
+            progress=problem.progress,
+        )  # fmt: skip
+        remarks = {
+            "sign": found.sign.state,
+            "sign_decided_at_s": found.sign.decided_at_s if np.isfinite(found.sign.decided_at_s) else None,
+            "mean_normalised_innovation_squared": found.mean_nis if np.isfinite(found.mean_nis) else None,
+            "share_at_rest": float(found.rest.mean()),
+            "channels": _renamed(found.channels.to_dict(), names),
+        }
+        if method in {"filter", "smoother"}:
+            consistency = judge_consistency(
+                problem.array, problem.readings, errors, found, temperature=problem.temperature,
+                filter_again=_filter_again(problem, errors, found),
+            )  # fmt: skip
+            if consistency is not None and consistency.worst_channel is not None:
+                consistency = replace(consistency, worst_channel=names[consistency.worst_channel])
+            remarks["consistency"] = None if consistency is None else consistency.to_dict()
+        return RateSolution(found.omega, np.where(np.isfinite(found.std), found.std, np.nan), found.rest, remarks)
+
+    return solve
+
+
+def _of_living_channels(problem: RateProblem) -> tuple[RateProblem, dict[str, str]]:
+    """Return the problem without channels that never have a reading, where the others see all motions.
+
+    An array of the others can recognise rest, which needs all of its channels. Its channels are numbered anew; the
+    second value gives their real names.
+    """
+    array = problem.array
+    alive: NDArray[np.bool_] = np.asarray(np.isfinite(problem.readings).any(axis=0))
+    living = [name for name, lives in zip(array.channels, alive, strict=True) if lives]
+    if alive.all() or np.linalg.matrix_rank(array.regression_matrix[alive] / _length_scale(array), tol=1e-6) < 6:
+        return problem, {name: name for name in array.channels}
+    chips = [replace(chip, axes=chip.axes[alive[array.chip_of_channel == k]]) for k, chip in enumerate(array.chips)]
+    fewer = replace(array, chips=tuple(chip for chip in chips if len(chip.axes)))
+    readings, noise = problem.readings[:, alive], problem.noise_std[alive]
+    reduced = replace(problem, array=fewer, readings=readings, noise_std=noise)
+    return reduced, dict(zip(fewer.channels, living, strict=True))
+
+
+def _length_scale(array: AccelerometerArray) -> NDArray[np.float64]:
+    return np.array([array.length_unit] * 3 + [1.0] * 3)
+
+
+def _renamed(report: dict[str, Any], names: Mapping[str, str]) -> dict[str, Any]:
+    """Return a channel report with the channels' real names."""
+    return {
+        key: {names[name]: count for name, count in value.items()} if isinstance(value, dict) else value
+        for key, value in report.items()
+    }
+
+
+def _filter_again(
+    problem: RateProblem, errors: SensorErrors, found: RateEstimate
+) -> Callable[[slice, NDArray[np.float64]], RateEstimate]:
+    """Return a filter of some rows with other readings that starts as the one before did, or from what it found."""
+
+    def run(rows: slice, readings: NDArray[np.float64]) -> RateEstimate:
+        if rows.start == 0 and problem.omega0 is not None:
+            settings = FilterSettings(start_omega=problem.omega0)
+        else:
+            std = float(np.nan_to_num(found.std[rows.start]).max())
+            settings = FilterSettings(start_omega=found.omega[rows.start], start_std=max(std, 1e-3))
+        gyro = None if problem.gyro is None else problem.gyro[rows]
+        return estimate_rate(
+            problem.array, problem.t_s[rows], readings, errors, method="filter", settings=settings, gyro=gyro
+        )
+
+    return run
+
+
+METHODS: dict[str, RateMethod] = {
+    "integrate": _integrate,
+    **{name: _by_rate_method(name) for name in RATE_METHODS if name != "integrate"},
+}
+"""Methods for the angular rate, by name."""
+
+
+def _integrated_variance(t: NDArray[np.float64], variance: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Variance of the integral of white samples, each weighted with half the time to its neighbours; (n, 3)."""
+    valid = np.isfinite(variance).all(axis=1)
+    steps = np.diff(t[valid])
+    squared = variance[valid]
+    result = np.full_like(variance, np.nan)
+    if not valid.any():
+        return result
+    half_before = np.concatenate([[0.0], steps / 2.0])[:, None]
+    half_after = np.concatenate([steps / 2.0, [0.0]])[:, None]
+    passed = np.cumsum(squared * (half_before + half_after) ** 2, axis=0)
+    last = squared * (half_before**2 - (half_before + half_after) ** 2)  # the newest sample has no time after it yet
+    result[valid] = np.maximum(passed + last, 0.0)
+    result[np.argmax(valid)] = 0.0
+    return result
+
+
+def _gyro(recording: Recording) -> NDArray[np.float64]:
+    """Return the recording's gyro, shape (n, 3), rad/s."""
+    names = [f"gyro_{axis}_rad_s" for axis in _AXES]
+    missing = [name for name in names if name not in recording.reference]
+    if missing:
+        raise InputError(f"the recording has no {', '.join(missing)}; record a gyro, or estimate without one")
+    return np.column_stack([recording.reference[name] for name in names])
+
+
+def _initial_attitude(
+    recording: Recording, motion: NDArray[np.float64], omega: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Attitude at the first sample: as mounted if the recording says so, else levelled."""
+    if "mounting_rotvec_rad" in recording.metadata:
+        return from_rotation(Rotation.from_rotvec(recording.mounting_rotvec))
+    known = np.flatnonzero(np.isfinite(motion).all(axis=1) & np.isfinite(omega).all(axis=1))
+    if not known.size:
+        raise InputError("p is unknown at every sample; check the recording for missing readings")
+    t = recording.t_s[known]
+    first = known[t < t[0] + _LEVEL_SECONDS]
+    # Turn each p back into the axes of the first sample, so that a body that turns meanwhile is levelled too.
+    turned = to_rotation(integrate_attitude(recording.t_s[first], omega[first], motion[first, :3]))
+    return level(turned.apply(motion[first, 3:]))

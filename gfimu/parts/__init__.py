@@ -1,0 +1,1 @@
+"""Parts: what the data sheets of chips state, and what a channel of them can read."""

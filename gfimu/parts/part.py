@@ -1,0 +1,77 @@
+"""Accelerometer parts: what a data sheet says that estimation needs (``models/parts/*.toml``)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gfimu.errors import InputError
+from gfimu.geometry.array import AccelerometerArray
+from gfimu.parts.files import part_table
+from gfimu.short_repr import short_repr
+
+__all__ = ["Part", "white_noise_std"]
+
+
+@dataclass(frozen=True)
+class Part:
+    """One accelerometer part.
+
+    Parameters
+    ----------
+    name : str
+        Part name.
+    lsb : float
+        Size of one count, m/s².
+    noise_std_100_hz : ndarray, shape (3,)
+        Standard deviation of a sample at an output data rate of 100 Hz, per sensing axis, m/s².
+    """
+
+    name: str
+    lsb: float
+    noise_std_100_hz: NDArray[np.float64]
+
+    __repr__ = short_repr
+
+    @classmethod
+    def load(cls, name: str, files: Mapping[str, str] | None = None) -> Part:
+        """Load a part by name (in ``models/parts``) or from a TOML file.
+
+        Parameters
+        ----------
+        name : str
+            Name in ``models/parts``, name of one of ``files``, or path of a part file.
+        files : mapping of str to str, optional
+            Part files that an array carries (`gfimu.AccelerometerArray.part_files`).
+
+        Raises
+        ------
+        InputError
+            If the part is unknown (the message lists the names), or its file lacks a figure.
+        """
+        data, source = part_table(name, files or {})
+        try:
+            lsb = float(data["lsb_m_s2"])
+            noise_lsb = np.asarray(data["noise_lsb_rms_100_hz"], dtype=float)
+        except KeyError as error:
+            raise InputError(f"{source}: key {error.args[0]!r} is missing; add it") from None
+        except (TypeError, ValueError):
+            raise InputError(f"{source}: lsb_m_s2 must be a number and noise_lsb_rms_100_hz three numbers") from None
+        if noise_lsb.shape != (3,) or not lsb > 0:
+            raise InputError(f"{source}: lsb_m_s2 must be positive and noise_lsb_rms_100_hz three numbers")
+        return cls(str(data.get("name", name)), lsb, noise_lsb * lsb)
+
+
+def white_noise_std(array: AccelerometerArray, sample_rate: float) -> NDArray[np.float64]:
+    """Return the standard deviation of one sample of each channel by the data sheets, shape (c,), m/s².
+
+    The noise is white up to half the output data rate, so it grows with the square root of ``sample_rate``, Hz, from
+    100 Hz on; below that the data sheets give the figure for 100 Hz.
+    """
+    parts = {chip.part: Part.load(chip.part, array.part_files) for chip in array.chips}
+    at_100_hz = [parts[chip.part].noise_std_100_hz[: len(chip.axes)] for chip in array.chips]
+    return np.concatenate(at_100_hz) * math.sqrt(max(sample_rate, 100.0) / 100.0)

@@ -1,0 +1,376 @@
+"""Position-drift budget: how far strapdown navigation runs off, cause by cause, from the errors of the sensors.
+
+Errors of the channels become errors of p and α through the array's pseudo-inverse, and these become position by the
+closed forms of `gfimu.position_drift.closed_forms`. The forms are of first order; each budget states until when the
+attitude error stays below `TILT_LIMIT`, which is as long as they hold, and adds the one effect of second order that
+shows before: tilt ψ leaves only g cos ψ of gravity, so the unit seems to fall. `gfimu.position_drift.monte_carlo`
+checks the budget against the full nonlinear navigation.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gfimu.errors import InputError
+from gfimu.geometry.array import AccelerometerArray
+from gfimu.geometry.kinematics import omega_leakage, pseudo_inverse
+from gfimu.position_drift.closed_forms import (
+    ErrorSources,
+    accumulated_covariance,
+    attitude_growth,
+    position_from_alpha,
+    position_from_p,
+    position_from_rate,
+)
+from gfimu.short_repr import short_repr
+from gfimu.units import STANDARD_GRAVITY
+
+__all__ = [
+    "TILT_LIMIT",
+    "DriftBudget",
+    "DriftTerm",
+    "ErrorSources",
+    "drift_budget",
+    "equivalent_rate_drift",
+]
+
+TILT_LIMIT = 0.25
+"""Attitude error up to which the first-order forms are taken to hold, rad, one standard deviation per axis."""
+
+_FORMAT_VERSION = 1
+_LONGEST_SEARCH = 1000.0  # times the time asked for
+_MOST_RADIANS = 1e4
+_DEG_H = math.degrees(1.0) * 3600.0
+
+
+@dataclass(frozen=True)
+class DriftTerm:
+    """Share of one cause in the position error.
+
+    Parameters
+    ----------
+    name : str
+        The cause.
+    form : str
+        Its law at rest.
+    size : float
+        Largest standard deviation per axis of the error that drives it, in ``size_unit``.
+    size_unit : str
+        Unit of ``size``.
+    std : ndarray, shape (3,)
+        Standard deviation of the position error in world axes, m.
+    share : float
+        Share of the total variance, all axes.
+    """
+
+    name: str
+    form: str
+    size: float
+    size_unit: str
+    std: NDArray[np.float64]
+    share: float
+
+    __repr__ = short_repr
+
+
+@dataclass(frozen=True)
+class DriftBudget:
+    """Position error after a time, cause by cause.
+
+    Parameters
+    ----------
+    array : str
+        Name of the array.
+    time : float
+        Time since the start of navigation, s.
+    rate : float
+        Rate of the table, rad/s.
+    offset : tuple of float
+        Horizontal position of the unit from the axis at the start, m.
+    sources : ErrorSources
+        What was assumed of the sensors.
+    terms : tuple of DriftTerm
+        The causes.
+    covariance : ndarray, shape (3, 3)
+        Covariance of the total position error in world axes, m².
+    fall : float
+        Mean vertical error, m, negative: tilt always loses some of gravity (second order).
+    tilt_std, heading_std : float
+        Attitude error at ``time`` about a horizontal axis and about the vertical, rad.
+    attitude_error : float
+        The attitude error at ``time`` that counts for validity (`AttitudeGrowth.deciding`), rad.
+    valid_until : float
+        Time at which that error reaches `TILT_LIMIT`, s; infinite
+        if it does not within a thousand times ``time`` (or 10⁴ rad of turning).
+    alpha_overtakes : float
+        Time at which, at rest, a bias acting through α has moved the unit as far as the one acting through p, s.
+    note : str
+        What the budget leaves out, empty if nothing.
+    """
+
+    array: str
+    time: float
+    rate: float
+    offset: tuple[float, float]
+    sources: ErrorSources
+    terms: tuple[DriftTerm, ...]
+    covariance: NDArray[np.float64]
+    fall: float
+    tilt_std: float
+    heading_std: float
+    attitude_error: float
+    valid_until: float
+    alpha_overtakes: float
+    note: str = ""
+    format_version: int = _FORMAT_VERSION
+
+    __repr__ = short_repr
+
+    @property
+    def total_std(self) -> NDArray[np.float64]:
+        """Standard deviation of the position error in world axes, m, shape (3,)."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def valid(self) -> bool:
+        """Whether the first-order forms hold at ``time``."""
+        return self.time <= self.valid_until
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the content as plain values, with units in the keys."""
+        return {
+            "format_version": self.format_version,
+            "array": self.array,
+            "time_s": self.time,
+            "rate_rad_s": self.rate,
+            "offset_m": list(self.offset),
+            "sources": {
+                "bias_m_s2": self.sources.bias,
+                "noise_density_m_s2_sqrt_hz": self.sources.noise_density,
+                "bias_random_walk_m_s2_sqrt_s": self.sources.bias_random_walk,
+                "rate_drift_rad_s": self.sources.rate_drift,
+            },
+            "terms": [
+                {
+                    "name": term.name,
+                    "form_at_rest": term.form,
+                    "size": term.size,
+                    "size_unit": term.size_unit,
+                    "std_m": term.std.tolist(),
+                    "share": term.share,
+                }
+                for term in self.terms
+            ],
+            "total_std_m": self.total_std.tolist(),
+            "fall_m": self.fall,
+            "tilt_std_rad": self.tilt_std,
+            "heading_std_rad": self.heading_std,
+            "attitude_error_rad": self.attitude_error,
+            "tilt_limit_rad": TILT_LIMIT,
+            "valid": self.valid,
+            "valid_until_s": self.valid_until,
+            "alpha_overtakes_p_s": self.alpha_overtakes,
+            "note": self.note,
+        }
+
+
+def equivalent_rate_drift(
+    position_error: ArrayLike, time: float, *, p_bias: ArrayLike = 0.0, gravity: float = STANDARD_GRAVITY
+) -> NDArray[np.float64]:
+    """Constant rate drift that explains a horizontal position error of a unit at rest, in °/h.
+
+    Parameters
+    ----------
+    position_error : array_like
+        Horizontal position error, m, of any shape.
+    time : float
+        Time since the start of navigation, s.
+    p_bias : array_like
+        Known bias of p along the same axis, m/s²; its ½bt² is taken off first.
+    gravity : float
+        Magnitude of gravity, m/s².
+
+    Returns
+    -------
+    ndarray
+        Drift d with error = ½bt² + g d t³/6, degrees per hour. An error along x stands for a drift about +y, an
+        error along y for one about −x.
+
+    Raises
+    ------
+    InputError
+        If ``time`` is not positive.
+
+    Notes
+    -----
+    The GF-IMU paper's inversion of its eq. 30 on the position error measured after 30 s (about 30 °/h). The result
+    is in the field's unit, degrees per hour, as its name for a figure of merit; everything else here is SI.
+    """
+    if not (math.isfinite(time) and time > 0):
+        raise InputError(f"time is {time} s; it must be above zero")
+    from_drift = np.asarray(position_error, dtype=float) - 0.5 * np.asarray(p_bias, dtype=float) * time**2
+    return from_drift * 6.0 / (gravity * time**3) * _DEG_H
+
+
+def drift_budget(
+    array: AccelerometerArray,
+    time: float,
+    sources: ErrorSources,
+    *,
+    rate: float = 0.0,
+    offset: tuple[float, float] = (0.0, 0.0),
+    gravity: float = STANDARD_GRAVITY,
+) -> DriftBudget:
+    """Position error after a time from the sensors' errors, through the array's geometry.
+
+    Parameters
+    ----------
+    array : AccelerometerArray
+        The array; its pseudo-inverse maps errors of the channels to errors of [alpha; p].
+    time : float
+        Time since the start of navigation, s.
+    sources : ErrorSources
+        Errors of the sensors.
+    rate : float
+        Constant rate of the table about the vertical, rad/s; 0 at rest.
+    offset : tuple of float
+        Horizontal position of the unit from the axis, body axes at the start, m.
+    gravity : float
+        Magnitude of gravity, m/s².
+
+    Returns
+    -------
+    DriftBudget
+        Standard deviations by cause and in total, the mean fall, and the validity limit.
+
+    Raises
+    ------
+    InputError
+        If ``time`` is not positive or a value is not finite.
+    GeometryError
+        If the array can't see all six motions.
+    """
+    if not (math.isfinite(time) and time > 0):
+        raise InputError(f"time is {time} s; it must be above zero")
+    if not np.isfinite([rate, *offset, gravity]).all():
+        raise InputError("rate, offset and gravity must be finite numbers")
+    unit = motion_covariance(array)  # (6, 6) of [alpha; p] for channels of unit variance
+    alpha_only, p_only = unit.copy(), unit.copy()
+    alpha_only[3:], alpha_only[:, 3:], p_only[:3], p_only[:, :3] = 0.0, 0.0, 0.0, 0.0
+    sd_alpha, sd_p = math.sqrt(unit.diagonal()[:3].max()), math.sqrt(unit.diagonal()[3:].max())
+    covariance_of = _Covariances(time, rate, complex(*offset), gravity)
+
+    growth = attitude_growth(unit[:3, :3], sources, time, rate, off_axis=any(offset))
+    # Tilt ψ leaves g cos ψ of gravity: δz̈ = −g ψ²/2, with ψ² the sum over two horizontal axes.
+    fall = float(-gravity * np.trapezoid((time - growth.t_s) * growth.tilt**2, growth.t_s))
+
+    bias, walk, drift = sources.bias, sources.bias_random_walk, sources.rate_drift
+    density = sources.noise_density / math.sqrt(2.0)  # two-sided: variance per channel = density² · sample rate
+    constant, white, walking = covariance_of.constant, covariance_of.white, covariance_of.walking
+    of_drift = drift**2 * covariance_of.rate_drift()
+    # For constant errors ψ² is exponentially distributed: the fall scatters by its mean (by less for noise).
+    of_fall = np.diag([0.0, 0.0, fall**2])
+    rows = [
+        ("bias of p", "b t²/2", bias * sd_p, "m/s²", bias**2 * constant(p_only)),
+        ("drift of the rate", "g d t³/6", drift, "rad/s", of_drift),
+        ("bias of alpha", "g b t⁴/24", bias * sd_alpha, "rad/s²", bias**2 * constant(alpha_only)),
+        ("noise of p", "√(S t³/3)", density * sd_p, "m/s²/√Hz", density**2 * white(p_only)),
+        ("noise of alpha", "g √(S t⁷/252)", density * sd_alpha, "rad/s²/√Hz", density**2 * white(alpha_only)),
+        ("walk of the bias of p", "K √(t⁵/20)", walk * sd_p, "m/s²/√s", walk**2 * walking(p_only)),
+        ("walk of the bias of alpha", "g K √(t⁹/5184)", walk * sd_alpha, "rad/s²/√s", walk**2 * walking(alpha_only)),
+        ("gravity lost by tilt", "∬ g ψ²/2", float(growth.tilt[-1]), "rad", of_fall),
+    ]
+    # The whole covariance, not the sum of its parts: in a skew geometry the errors of alpha and p are correlated.
+    covariance = bias**2 * constant(unit) + of_drift + density**2 * white(unit) + walk**2 * walking(unit) + of_fall
+    total = float(np.trace(covariance)) or 1.0
+    return DriftBudget(
+        array=array.name,
+        time=time,
+        rate=rate,
+        offset=offset,
+        sources=sources,
+        terms=tuple(
+            DriftTerm(name, form, size, size_unit, np.sqrt(part.diagonal()), float(np.trace(part)) / total)
+            for name, form, size, size_unit, part in rows
+            if size > 0
+        ),
+        covariance=covariance,
+        fall=fall,
+        tilt_std=float(growth.tilt[-1]),
+        heading_std=float(growth.heading[-1]),
+        attitude_error=float(growth.deciding[-1]),
+        valid_until=_valid_until(unit[:3, :3], sources, time, rate, off_axis=any(offset)),
+        alpha_overtakes=math.sqrt(12.0 * sd_p / (gravity * sd_alpha)),
+        note=_leakage_note(array, rate),
+    )
+
+
+def motion_covariance(array: AccelerometerArray) -> NDArray[np.float64]:
+    """Covariance of [alpha; p] for channels of unit variance, shape (6, 6)."""
+    inverse = pseudo_inverse(array)
+    return inverse @ inverse.T
+
+
+def _leakage_note(array: AccelerometerArray, rate: float) -> str:
+    if rate and np.any(omega_leakage(array)):
+        return (
+            f"array {array.name!r} lets ω² into its linear solution; the budget takes the correction for it as exact, "
+            "so at speed the true drift is larger"
+        )
+    return ""
+
+
+@dataclass(frozen=True)
+class _Covariances:
+    """Covariance of the position, (3, 3), from errors of [alpha; p] of a given covariance, (6, 6)."""
+
+    time: float
+    rate: float
+    offset: complex
+    gravity: float
+
+    def constant(self, motion: NDArray[np.float64]) -> NDArray[np.float64]:
+        response = self._of_bias(np.asarray(self.time))  # (3, 6)
+        return response @ motion @ response.T
+
+    def rate_drift(self) -> NDArray[np.float64]:
+        response = position_from_rate(self.time, self.rate, self.offset, self.gravity)
+        return response @ response.T
+
+    def white(self, motion: NDArray[np.float64]) -> NDArray[np.float64]:
+        return accumulated_covariance(self._of_impulse, motion, self.time, self.rate)
+
+    def walking(self, motion: NDArray[np.float64]) -> NDArray[np.float64]:
+        return accumulated_covariance(self._of_bias, motion, self.time, self.rate)
+
+    def _of_bias(self, t: NDArray[np.float64]) -> NDArray[np.float64]:
+        from_alpha = position_from_alpha(t, self.rate, self.offset, self.gravity)
+        return np.concatenate([from_alpha, position_from_p(t, self.rate)], axis=-1)  # (..., 3, 6)
+
+    def _of_impulse(self, t: NDArray[np.float64]) -> NDArray[np.float64]:
+        # An impulse of alpha is a step of the rate, one of p a step of the velocity.
+        from_alpha = position_from_rate(t, self.rate, self.offset, self.gravity)
+        return np.concatenate([from_alpha, t[:, None, None] * np.eye(3)], axis=-1)  # (m, 3, 6)
+
+
+def _valid_until(
+    alpha_covariance: NDArray[np.float64], sources: ErrorSources, time: float, rate: float, *, off_axis: bool
+) -> float:
+    """First time at which the attitude error reaches the limit, s; infinite if it was not found."""
+    horizon = time
+    while horizon <= _LONGEST_SEARCH * time and abs(rate) * horizon < max(_MOST_RADIANS, abs(rate) * time + 1.0):
+        growth = attitude_growth(alpha_covariance, sources, horizon, rate, off_axis=off_axis)
+        beyond = np.flatnonzero(growth.deciding >= TILT_LIMIT)
+        if len(beyond) == 0:
+            horizon *= 4.0
+        elif beyond[0] < len(growth.t_s) // 2:
+            horizon = float(growth.t_s[max(beyond[0], 1)])  # look closer
+        else:
+            pair = slice(int(beyond[0]) - 1, int(beyond[0]) + 1)
+            return float(np.interp(TILT_LIMIT, growth.deciding[pair], growth.t_s[pair]))
+    return math.inf

@@ -1,0 +1,437 @@
+"""Checks of a recording against its array alone: units, time, order and sign of the channels, dead channels.
+
+The array's redundant directions and gravity at rest tell whether the channels fit one rigid body
+(`gfimu.recording.rigid_evidence`). A recording is refused only where errors within the data sheets' limits can't be the
+reason and one other way to read the file explains nearly all of it; where that other way explains nearly all of a
+smaller contradiction, there is a warning; otherwise nothing is said.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gfimu.errors import InputError
+from gfimu.files.model_files import list_models
+from gfimu.geometry.array import AccelerometerArray
+from gfimu.parts.limits import PartLimits
+from gfimu.recording.recording import Recording
+from gfimu.recording.rigid_evidence import Costs, Evidence, Otherwise, gather
+from gfimu.units import STANDARD_GRAVITY
+
+__all__ = ["Finding", "check_recording", "dead_channels", "refuse_or_warn", "without_dead_channels"]
+
+_FEWEST = 50  # samples
+_LEAST_NOISE = 0.3  # of the data sheet's: from that on a channel surely has noise of its own
+_MOST_NOISE = 4.0  # of the data sheet's, in another unit
+_REMOVED = 0.8  # of the contradiction, by the other way to read the file
+_FITS = 1.0  # of what the limits allow
+_SIGNIFICANT = 3.0  # times what white noise gives, for a warning
+_REMOVED_FOR_WARNING = 0.9
+_WORSE = 0.1  # by which a cost may grow that was possible before
+_ALIKE = 1.5  # ratio of the costs of two ways that can't be told apart
+_RATE_RATIO = 1.5  # between the rate by the times and the metadata's, for a refusal
+_FASTEST = 2.0  # times the part's fastest output data rate
+_SLOWEST = 2.0  # Hz, a rate that is plausible for a moving body
+
+_CLEAR = 0.02  # of the contradiction is left: no need to look further
+_OF_ALL = frozenset({"time", "unit", "array"})
+
+_TIME_UNITS = {1e-3: "milliseconds", 1e-6: "microseconds"}
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something wrong with a recording.
+
+    Parameters
+    ----------
+    kind : str
+        ``time``, ``unit``, ``chip_unit``, ``sign``, ``exchange``, ``duplicate``, ``array``, ``rest_bias`` or ``dead``.
+    text : str
+        Cause and remedy, one line.
+    refused : bool
+        Whether the recording should not be used as it is; otherwise this is a warning.
+    channels : tuple of str
+        Channels that it is about.
+    """
+
+    kind: str
+    text: str
+    refused: bool
+    channels: tuple[str, ...] = ()
+
+
+def refuse_or_warn(findings: Iterable[Finding], *, force: bool = False) -> tuple[Finding, ...]:
+    """Raise for the first finding that refuses the recording, unless forced; returns all of them.
+
+    Raises
+    ------
+    InputError
+        With the cause and the remedy.
+    """
+    found = tuple(findings)
+    for finding in found:
+        if finding.refused and not force:
+            raise InputError(f"{finding.text}; --force (force=True) estimates nevertheless")
+    return found
+
+
+def dead_channels(recording: Recording, array: AccelerometerArray) -> tuple[Finding, ...]:
+    """Return the channels without any reading, or with one value throughout while the others have noise."""
+    readings = recording.for_array(array)
+    limits = _limits(recording, array)
+    found = []
+    present = np.isfinite(readings)
+    constant = _constant(readings)
+    noisy = np.zeros(array.n_channels, dtype=bool) if limits is None else _noise(readings) > _LEAST_NOISE * limits.noise
+    others = int(np.count_nonzero(noisy)) >= max(1, int(np.count_nonzero(~constant & present.any(axis=0))) // 2)
+    for name, seen, held, column in zip(array.channels, present.T, constant, readings.T, strict=True):
+        if not seen.any():
+            text = f"channel {name} has no readings; the estimate goes on without it: check its wiring"
+            found.append(Finding("dead", text, False, (name,)))
+        elif held and others and len(column) >= _FEWEST:
+            value = column[seen][0]
+            text = f"channel {name} reads {value:.4g} m/s² throughout; the estimate goes on without it: check its chip"
+            found.append(Finding("dead", text, False, (name,)))
+    return tuple(found)
+
+
+def without_dead_channels(recording: Recording, array: AccelerometerArray, findings: Iterable[Finding]) -> Recording:
+    """Return the recording with the readings of dead channels marked as missing."""
+    dead = [name for finding in findings if finding.kind == "dead" for name in finding.channels]
+    if not dead:
+        return recording
+    readings = recording.for_array(array).copy()
+    readings[:, [array.index(name) for name in dead]] = np.nan
+    return replace(recording, readings=readings, channels=array.channels)
+
+
+def check_recording(recording: Recording, array: AccelerometerArray) -> tuple[Finding, ...]:
+    """Look for a wrong unit, time, order or sign of columns, a wrong array, and dead channels.
+
+    Parameters
+    ----------
+    recording : Recording
+        Readings in m/s².
+    array : AccelerometerArray
+        The array that it is taken to be of.
+
+    Returns
+    -------
+    tuple of Finding
+        Refusals first. Empty for a recording that a correct array within its data sheets' limits may have made.
+
+    Raises
+    ------
+    InputError
+        If the recording lacks channels of the array, or holds raw counts.
+    """
+    readings = recording.for_array(array)
+    dead = dead_channels(recording, array)
+    limits = _limits(recording, array)
+    if limits is None or len(recording) < _FEWEST:
+        return dead
+    alive = np.array([not any(name in one.channels for one in dead) for name in array.channels])
+    found = [*_time_against_metadata(recording), *_duplicates(readings, limits, array)]
+    if not found and np.count_nonzero(alive) > 3:
+        evidence = gather(recording, array, limits, alive)
+        found += _decide(evidence, recording)
+        if not found:
+            found += _slow(recording, readings, limits)
+    return (*sorted(found, key=lambda one: not one.refused), *dead)
+
+
+def _limits(recording: Recording, array: AccelerometerArray) -> PartLimits | None:
+    """Return the limits by the data sheets; None where they are not known."""
+    if len(recording) < 2:
+        return None
+    try:
+        return PartLimits.of(array, min(max(recording.sample_rate, 1.0), 1e5))
+    except InputError:
+        return None
+
+
+def _constant(readings: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Tell which channels (c,) hold one value in all their samples."""
+    top = np.where(np.isfinite(readings), readings, -np.inf).max(axis=0, initial=-np.inf)
+    low = np.where(np.isfinite(readings), readings, np.inf).min(axis=0, initial=np.inf)
+    return np.asarray(top == low)
+
+
+def _noise(readings: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the noise of each channel (c,) by the median of its second differences, m/s²."""
+    second = np.abs(np.diff(readings, n=2, axis=0))
+    seen = np.isfinite(second).any(axis=0) if len(second) else np.zeros(readings.shape[1], dtype=bool)
+    noise = np.zeros(readings.shape[1])
+    if seen.any():
+        noise[seen] = np.nanmean(np.minimum(second[:, seen], 20 * np.nanmean(second[:, seen], axis=0)), axis=0)
+    return noise / (np.sqrt(6.0) * np.sqrt(2.0 / np.pi))
+
+
+def _time_against_metadata(recording: Recording) -> list[Finding]:
+    """Compare the rate by the sample times with the one that the metadata state."""
+    stated = recording.metadata.get("sample_rate_hz")
+    if not isinstance(stated, int | float) or isinstance(stated, bool) or not 0.0 < stated < np.inf:
+        return []
+    ratio = float(stated) / recording.sample_rate
+    if 1.0 / _RATE_RATIO < ratio < _RATE_RATIO:
+        return []
+    for factor, name in _TIME_UNITS.items():
+        if abs(ratio * factor - 1.0) < _RATE_RATIO - 1.0:
+            text = _time_text(
+                name, factor, f"the metadata state {stated:g} Hz, the column gives {recording.sample_rate:.4g} Hz"
+            )
+            return [Finding("time", text, True)]
+    text = (
+        f"column t_s gives {recording.sample_rate:.4g} Hz and the metadata state {stated:g} Hz; "
+        "correct t_s, or sample_rate_hz in the metadata"
+    )
+    return [Finding("time", text, False)]
+
+
+def _time_text(unit: str, factor: float, reason: str) -> str:
+    return f"column t_s is in {unit}: {reason}; multiply it by {factor:g}"
+
+
+def _slow(recording: Recording, readings: NDArray[np.float64], limits: PartLimits) -> list[Finding]:
+    """Warn of a rate that is implausible for a body that moves."""
+    rate = recording.sample_rate
+    seen = np.isfinite(readings).any(axis=0)
+    moves = np.nanstd(readings[:, seen], axis=0) > 5.0 * limits.noise[seen]
+    if rate < _SLOWEST and moves.any():
+        text = (
+            f"column t_s gives {rate:.4g} samples per second while the body moves: if it is in milliseconds or "
+            "microseconds, convert it to seconds"
+        )
+        return [Finding("time", text, False)]
+    if rate > 1.5 * limits.output_rate[1]:
+        text = (
+            f"column t_s gives {rate:.4g} samples per second and the part's fastest rate is "
+            f"{limits.output_rate[1]:g} Hz; check its unit"
+        )
+        return [Finding("time", text, False)]
+    return []
+
+
+def _duplicates(readings: NDArray[np.float64], limits: PartLimits, array: AccelerometerArray) -> list[Finding]:
+    """Find columns that hold the same values throughout though each should have noise of its own."""
+    noise = _noise(readings)
+    found = []
+    for one, two in combinations(range(array.n_channels), 2):
+        if min(noise[one] / limits.noise[one], noise[two] / limits.noise[two]) < _LEAST_NOISE:
+            continue
+        if np.array_equal(readings[:, one], readings[:, two], equal_nan=True):
+            names = array.channels[one], array.channels[two]
+            text = (
+                f"channels {names[0]} and {names[1]} hold the same values in all {len(readings)} samples: one column "
+                "was written twice; export the recording again, or leave the wrong one empty"
+            )
+            found.append(Finding("duplicate", text, True, names))
+    return found
+
+
+def _decide(evidence: Evidence, recording: Recording) -> list[Finding]:
+    """Compare the file as given with the other ways to read it."""
+    given = evidence.as_given()
+    before = evidence.costs(given)
+    if not _contradicts(before, evidence):
+        return []
+    found: list[tuple[float, Otherwise, bool]] = []
+    ways = _ways(evidence, recording)
+    few = [way for way in ways if way.kind in _OF_ALL]
+    for group in (few, [way for way in ways if way.kind not in _OF_ALL]):
+        found += _explaining(group, before, evidence)
+        if min((ratio for ratio, *_ in found), default=1.0) < _CLEAR:
+            break
+    if not found:
+        return []
+    found.sort(key=lambda one: one[0])
+    best = found[0]
+    alike = [way for ratio, way, _ in found[1:] if ratio < _ALIKE * best[0]]
+    return [_finding(best[1], alike, refused=best[2])]
+
+
+def _explaining(ways: Sequence[Otherwise], before: Costs, evidence: Evidence) -> list[tuple[float, Otherwise, bool]]:
+    """Return the ways that explain a contradiction: what is left of its cost, the way, and whether to refuse."""
+    # Wiring shows in the combinations that no motion changes, where there are any; else in the whole motion.
+    hopeless = before.total(motion=True)
+    costs = [
+        evidence.costs(way, with_motion=not evidence.has_parity or way.kind in _OF_ALL, hopeless=hopeless)
+        for way in ways
+    ]
+    usable = any(one.motion < _FITS for one in [before, *costs])
+    found = []
+    for way, after in zip(ways, costs, strict=True):
+        compared = usable and bool(np.isfinite(after.motion))
+        if not _possible(way, before, evidence) or after.worst_rest > _FITS:
+            continue
+        fits = max(after.parity, after.motion if compared else 0.0, after.level) < _FITS
+        if not fits:
+            continue
+        if compared and after.points and after.motion < before.motion:  # the fit of the file as given may have failed
+            again = evidence.costs(evidence.as_given(), points=after.points)
+            before = again if again.motion < before.motion else before
+        impossible = _impossible(before, motion=compared)
+        ratio = _left(before, after, impossible, scaled=way.kind in {"unit", "chip_unit"})
+        if impossible and ratio < 1.0 - _REMOVED:
+            found.append((ratio, way, True))
+        elif not impossible and _explains_noise(before, after, motion=compared):
+            found.append((after.total(motion=compared) / before.total(motion=compared), way, False))
+    return found
+
+
+def _impossible(costs: Costs, *, motion: bool) -> tuple[str, ...]:
+    """Return the costs that errors within the limits can't be the reason for."""
+    beyond = {
+        "rest": costs.worst_rest > _FITS,
+        "level": costs.level > _FITS,
+        "parity": costs.parity > _FITS,
+        "motion": motion and costs.motion > _FITS,
+    }
+    return tuple(name for name, is_beyond in beyond.items() if is_beyond)
+
+
+def _left(before: Costs, after: Costs, impossible: Sequence[str], *, scaled: bool) -> float:
+    """Return what is left of the impossible costs, or 1 if another one grows (larger readings have larger errors)."""
+    others = {"rest", "level", "parity", "motion"} - set(impossible)
+    grown = [name for name in others if getattr(after, name) > getattr(before, name) + _WORSE]  # false for NaN
+    if any(not scaled or getattr(after, name) > _FITS for name in grown):
+        return 1.0
+    return float(
+        sum(getattr(after, name) for name in impossible) / max(sum(getattr(before, name) for name in impossible), 1e-12)
+    )
+
+
+def _contradicts(costs: Costs, evidence: Evidence) -> bool:
+    """Tell whether there is a contradiction at all."""
+    moving = costs.motion > _SIGNIFICANT * costs.motion_noise  # false for NaN
+    if evidence.has_parity:
+        moving = moving and costs.motion > _FITS
+    return max(costs.worst_rest, costs.level) > 0.5 or costs.parity > _SIGNIFICANT * costs.parity_noise or bool(moving)
+
+
+def _explains_noise(before: Costs, after: Costs, *, motion: bool) -> bool:
+    """Tell whether a contradiction is significant and gone, at rest as in motion."""
+    pairs = [(before.parity - before.parity_noise, after.parity - before.parity_noise, before.parity_noise)]
+    if motion:
+        pairs.append((before.motion - before.motion_noise, after.motion - before.motion_noise, before.motion_noise))
+    if before.worst_rest > 0.5:
+        pairs.append((before.rest, after.rest, 0.1))
+    left = [
+        rest_after - (1.0 - _REMOVED_FOR_WARNING) * excess
+        for excess, rest_after, noise in pairs
+        if excess > _SIGNIFICANT * noise
+    ]
+    worse = after.rest > before.rest + _WORSE or after.level > before.level + _WORSE
+    return bool(left) and max(left) < 0.0 and not worse
+
+
+def _possible(way: Otherwise, before: Costs, evidence: Evidence) -> bool:
+    """Tell whether a way is possible at all.
+
+    Another unit of time has to give a rate that the part has; another unit of all readings has to be asked for by
+    gravity at rest; and the noise has to fit another unit, as it shrinks and grows with the readings.
+    """
+    if way.kind == "time":
+        return evidence.sample_rate / way.time < _FASTEST * evidence.limits.output_rate[1]
+    if way.kind == "unit" and not (len(evidence.rests) and before.level > _FITS):
+        return False
+    if way.kind not in {"unit", "chip_unit"}:
+        return True
+    scale = np.abs(np.diag(way.columns))
+    changed = evidence.alive & (scale != 1.0)
+    return bool(np.median(scale[changed] * evidence.quiet[changed] / evidence.limits.noise[changed]) < _MOST_NOISE)
+
+
+def _finding(way: Otherwise, alike: Sequence[Otherwise], *, refused: bool) -> Finding:
+    text = way.text if refused else f"{way.text} (likely, not certain)"
+    others = [one for one in alike if one.kind == way.kind and one.channels != way.channels][:3]
+    if others and way.channels:
+        text += "; as likely: " + ", or ".join(" and ".join(one.channels) for one in others)
+    return Finding(way.kind, text, refused, way.channels)
+
+
+def _ways(evidence: Evidence, recording: Recording) -> list[Otherwise]:
+    """List the other ways to read the file."""
+    array = evidence.array
+    names, chip_of = array.channels, array.chip_of_channel
+    count = len(names)
+    identity = np.eye(count)
+    ways = [
+        Otherwise(
+            "time",
+            _time_text(name, factor, "the turning that the channels show takes that much less time"),
+            identity,
+            time=factor,
+        )
+        for factor, name in _TIME_UNITS.items()
+    ]
+    lsb = evidence.limits.lsb
+    units = {
+        "g": ("_g", np.full(count, STANDARD_GRAVITY)),
+        "mg": ("_mg", np.full(count, STANDARD_GRAVITY / 1000.0)),
+        "counts of the converter": ("_lsb", lsb),
+        "cm/s²": ("", np.full(count, 0.01)),
+        "mm/s²": ("", np.full(count, 0.001)),
+    }
+    for unit, (suffix, scale) in units.items():
+        remedy = f"name the columns {names[0]}{suffix} …" if suffix else f"multiply them by {scale[0]:g}"
+        rest = evidence.gravity_at_rest(evidence.as_given())
+        seen = f"gravity reads {np.median(rest):.4g} at rest" if len(rest) else "the motion fits no other unit"
+        ways.append(Otherwise("unit", f"all readings are in {unit}, not in m/s²: {seen}; {remedy}", np.diag(scale)))
+        for number, chip in enumerate(array.chips):
+            mine = chip_of == number
+            columns = ", ".join(f"{name}{suffix}" for name in chip.channels)
+            cure = f"name its columns {columns}" if suffix else f"multiply its columns by {scale[0]:g}"
+            text = f"chip {chip.name} reads in {unit}, the others in m/s²; {cure}"
+            ways.append(Otherwise("chip_unit", text, np.diag(np.where(mine, scale, 1.0)), channels=chip.channels))
+    for channel, name in enumerate(names):
+        sign = np.ones(count)
+        sign[channel] = -1.0
+        text = f"channel {name} is inverted; change the sign of its column, or of its axis in the array file"
+        ways.append(Otherwise("sign", text, np.diag(sign), channels=(name,)))
+    for number, chip in enumerate(array.chips):
+        if len(chip.axes) > 1:
+            text = (
+                f"all channels of chip {chip.name} are inverted; "
+                "change the sign of its columns, or of its axes in the array file"
+            )
+            ways.append(
+                Otherwise("sign", text, np.diag(np.where(chip_of == number, -1.0, 1.0)), channels=chip.channels)
+            )
+    ways.append(Otherwise("sign", "all channels are inverted; change the sign of all columns", -identity, channels=()))
+    for one, two in combinations(range(count), 2):
+        order = np.arange(count)
+        order[[one, two]] = order[[two, one]]
+        text = f"channels {names[one]} and {names[two]} are exchanged; exchange the names of their columns"
+        ways.append(Otherwise("exchange", text, identity[order], channels=(names[one], names[two])))
+    for one, two in combinations(range(len(array.chips)), 2):
+        first, second = np.flatnonzero(chip_of == one), np.flatnonzero(chip_of == two)
+        if len(first) == len(second) > 1:
+            order = np.arange(count)
+            order[np.concatenate([first, second])] = np.concatenate([second, first])
+            chips = array.chips[one].name, array.chips[two].name
+            text = f"chips {chips[0]} and {chips[1]} are exchanged; exchange the names of their columns"
+            ways.append(Otherwise("exchange", text, identity[order], channels=chips))
+    return ways + _other_arrays(array)
+
+
+def _other_arrays(array: AccelerometerArray) -> list[Otherwise]:
+    """List the shipped arrays that have the same channels."""
+    ways = []
+    for name in list_models("arrays"):
+        other = AccelerometerArray.load(name)
+        if set(other.channels) != set(array.channels) or other.name == array.name:
+            continue
+        same = other.channels == array.channels
+        if same and np.allclose(other.positions, array.positions, atol=1e-9) and np.allclose(other.axes, array.axes):
+            continue
+        order = [array.index(channel) for channel in other.channels]
+        text = f"the readings are not those of array {array.name!r} but fit {name!r}; give it with --array {name}"
+        ways.append(Otherwise("array", text, np.eye(array.n_channels)[order], array=other))
+    return ways

@@ -1,0 +1,70 @@
+"""Opening a recording whatever wrote it: the project's CSV and Parquet, or a stream that has an importer."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import cast
+
+from gfimu.errors import InputError
+from gfimu.files.column_file import ColumnFile, open_columns
+from gfimu.files.table import ArrowStream
+from gfimu.files.table_columns import TableColumns
+from gfimu.geometry.array import AccelerometerArray
+from gfimu.recording.carried_array import carried_array, check_all_channels
+from gfimu.recording.mimu4444 import is_mimu4444, read_mimu4444
+from gfimu.recording.recording import Recording
+
+__all__ = ["open_recording", "open_run"]
+
+
+def open_recording(path: str | Path | ArrowStream, *, array: AccelerometerArray | None = None) -> Recording:
+    """Read a recording from a CSV or Parquet file, a MIMU4444 stream (told apart by content), or a table object.
+
+    Raises
+    ------
+    InputError
+        As `gfimu.Recording.read` and `gfimu.recording.mimu4444.read_mimu4444`.
+    """
+    if isinstance(path, str | Path) and is_mimu4444(path):
+        return read_mimu4444(path)
+    return Recording.read(path, array=array)
+
+
+def open_run(
+    path: str | Path | ArrowStream, array: AccelerometerArray | None = None
+) -> tuple[Recording, AccelerometerArray]:
+    """Read a recording together with its array.
+
+    Parameters
+    ----------
+    path : str, Path or table
+        The recording, as `gfimu.Recording.read` takes it, or a MIMU4444 stream.
+    array : AccelerometerArray, optional
+        The array; by default the one that the recording carries or, as older ones do, names.
+
+    Raises
+    ------
+    InputError
+        As `open_recording`; also if the array is neither given nor in the recording, is damaged there, or does not
+        have the channels of the recording.
+    """
+    if array is not None:
+        return open_recording(path, array=array), array
+    if isinstance(path, str | Path):
+        if is_mimu4444(path):
+            return read_mimu4444(path), AccelerometerArray.load("mimu4444")
+        own = _own_array(open_columns(path), Path(path).parent)
+        return Recording.read(path, array=own), own
+    table = TableColumns(path)  # an Arrow stream can be read only once
+    own = _own_array(table, None)
+    return Recording.read(cast("ArrowStream", table), array=own), own
+
+
+def _own_array(table: ColumnFile, beside: Path | None) -> AccelerometerArray:
+    """Return the array that a recording carries or names."""
+    own = carried_array(table.metadata, source=table.file, beside=beside)
+    if own is None:
+        raise InputError(f"{table.file}: the recording does not name its array; give it with --array")
+    if "array_toml" in table.metadata:
+        check_all_channels(table.names, own, table.file)
+    return own

@@ -1,0 +1,174 @@
+"""Clipping at rails: a few counts wide, of one side, of one channel or chip, in every turn; and channels that stop."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.ndimage import gaussian_filter1d
+
+from gfimu.diagnosis.data.integrity import check_integrity
+from gfimu.diagnosis.data.run import prepare_run
+from gfimu.diagnosis.diagnose import diagnose
+from gfimu.geometry.array import AccelerometerArray, Chip
+from sim.campaign import Measurement, measure
+from sim.effects import make_effect
+from sim.motion import SplineSpin
+from sim.twin import Twin
+
+STEP = 3.9e-3 * 9.80665  # m/s²
+TWIN = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
+NAMES = TWIN.array.channels
+
+
+def none(rng, count):
+    return np.zeros(count)
+
+
+def rare(rng, count):
+    """One in 45 up to ten counts beyond: 13 of 590 on a real rail."""
+    return np.where(rng.random(count) < 1 / 45, rng.integers(1, 11, count), 0)
+
+
+def noisy(rng, count):
+    return rng.normal(0.0, 2.0, count)
+
+
+@functools.cache
+def swinging():
+    """A table whose rate swings every 2.5 s, so that centripetal readings peak for a second each time."""
+    t = np.arange(-2.0, 22.0, 5e-3)
+    rate = np.clip(t - 1.5, 0.0, 1.0) * (9.0 + 3.0 * np.sin(2 * np.pi * t / 2.5))
+    motion = SplineSpin.through(t, gaussian_filter1d(rate, 30.0))
+    return measure(np.random.default_rng(11), TWIN, [], Measurement(duration=20.0), motion=motion), motion
+
+
+def clipped(upper, lower, scatter):
+    """Recording with the upper and lower sides of channels clipped, levels by channel in m/s², noise in counts."""
+    recording, _ = swinging()
+    rng, readings = np.random.default_rng(3), recording.readings.copy()
+    for levels, sign in ((upper, 1), (lower, -1)):
+        for channel, level in levels.items():
+            column = readings[:, NAMES.index(channel)]
+            rail = np.round(level / STEP) * STEP
+            over = sign * column > sign * rail
+            assert over.sum() > 100
+            column[over] = rail + sign * np.round(scatter(rng, int(over.sum()))) * STEP
+    return replace(recording, readings=readings)
+
+
+def checked(recording):
+    run = prepare_run(recording, TWIN)
+    prediction = TWIN.predict(swinging()[1], run.t)[0]
+    return check_integrity(TWIN, run, prediction), prediction
+
+
+CHIP = {"a41": 4.0, "a42": 4.0, "a43": 4.0}
+WORLDS = {
+    "one channel, upper side": ({"a31": 4.5}, {}),
+    "one channel, lower side": ({}, {"a11": -5.0}),
+    "one chip, upper side": (CHIP, {}),
+    "unlike above and below": ({"a31": 4.5, "a22": 4.5, "a41": 4.5, "a42": 4.5}, {"a11": -5.5, "a12": -5.5}),
+    "each channel its own": ({"a31": 4.5, "a22": 5.5}, {"a11": -3.5}),
+}
+
+
+@pytest.mark.parametrize("scatter", [none, rare, noisy])
+@pytest.mark.parametrize("world", WORLDS)
+def test_a_rail_is_saturation_with_its_side_and_level_and_no_stuck_channel(world, scatter):
+    upper, lower = WORLDS[world]
+    report, prediction = checked(clipped(upper, lower, scatter))
+    (effect,) = report.effects
+    assert effect.name == "saturation"
+    levels = {f"{name}_upper_m_s2": level for name, level in upper.items()}
+    levels |= {f"{name}_lower_m_s2": level for name, level in lower.items()}
+    limit = effect.parameters["limit_m_s2"]
+    assert limit == pytest.approx(np.median(np.abs([*levels.values()])), abs=2 * STEP)
+    found = {key: value for key, value in effect.parameters.items() if key != "limit_m_s2"}
+    assert found == pytest.approx(levels, abs=2 * STEP)
+    # What is on a rail is left out, what is below it is not.
+    for sides, sign in ((upper, 1), (lower, -1)):
+        for name, level in sides.items():
+            valid, truth = report.run.valid[:, NAMES.index(name)], sign * prediction[:, NAMES.index(name)]
+            assert not valid[truth > sign * level + 3 * STEP].any()
+            below = truth < sign * level - 10 * STEP
+            assert valid[below].mean() > 0.98 if below.any() else name == "a43"  # it reads gravity, always beyond
+
+
+def test_rails_of_all_channels_at_one_level_are_one_limit():
+    top = {name: 4.5 for name in NAMES if swinging()[0].readings[:, NAMES.index(name)].max() > 5.0}
+    bottom = {name: -4.5 for name in NAMES if swinging()[0].readings[:, NAMES.index(name)].min() < -5.0}
+    report, _ = checked(clipped(top, bottom, rare))
+    (effect,) = report.effects
+    assert effect.name == "saturation"
+    assert effect.parameters == {"limit_m_s2": pytest.approx(4.5, abs=STEP)}
+
+
+def test_the_extended_twin_clips_as_the_recording_does():
+    recording = clipped({"a31": 4.5}, {}, rare)
+    found = diagnose([recording], TWIN)
+    assert (found.verdict, [cause.effect for cause in found.causes]) == ("explained", ["saturation"])
+    assert "a31 at +4.5" in found.causes[0].why
+    saved = Twin.from_dict(found.twin.to_dict())
+    again = diagnose([recording], saved)
+    assert (again.verdict, again.causes) == ("nothing_found", ())
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_channel_that_stops_at_an_ordinary_value_is_stuck(seed):
+    recording, _ = swinging()
+    start = float(np.random.default_rng(seed).uniform(3.0, 16.0))
+    readings = recording.readings.copy()
+    frozen = (recording.t_s >= start) & (recording.t_s < start + 1.3)
+    readings[frozen, 6] = readings[np.argmax(frozen) - 1, 6]
+    report, _ = checked(replace(recording, readings=readings))
+    (effect,) = report.effects
+    assert (effect.name, effect.parameters["channel"]) == ("stuck_channel", "a31")
+
+
+def test_a_channel_that_stops_at_its_peak_is_stuck():
+    """Once, at its largest value but one: the noise of other peaks is read above it."""
+    recording, _ = swinging()
+    readings = recording.readings.copy()
+    peak = int(np.argmax(readings[:1500, 6]))
+    readings[peak : peak + 120, 6] = readings[peak - 3, 6]
+    report, _ = checked(replace(recording, readings=readings))
+    assert [effect.name for effect in report.effects] == ["stuck_channel"]
+
+
+def test_a_recording_that_repeats_its_last_frame_has_no_stuck_channel():
+    recording, _ = swinging()
+    readings = recording.readings.copy()
+    readings[900:1000] = readings[900]
+    report, _ = checked(replace(recording, readings=readings))
+    assert "stuck_channel" not in {effect.name for effect in report.effects}
+
+
+def test_saturation_of_single_sides_clips_only_those():
+    effect = make_effect("saturation", {"limit_m_s2": 3.0, "a11_upper_m_s2": 3.0}, TWIN.array)
+    (step,) = TWIN.world([effect]).data_steps
+    readings = np.array([[9.0, 9.0] + [0.0] * 10, [-9.0, -9.0] + [0.0] * 10])
+    clipped_now = step(np.arange(2.0), readings, np.random.default_rng(0))
+    assert clipped_now[:, :2].tolist() == [[3.0, 9.0], [-9.0, -9.0]]
+
+
+@pytest.mark.parametrize("scatter", [none, rare, noisy])
+def test_a_rig_of_one_chip_that_clips_in_every_turn_on_one_side(scatter):
+    """No other channel reaches a limit; and the chip is 7 % further out than its twin has it."""
+    one, true = (
+        Twin(array=AccelerometerArray("one", (Chip("a", np.array([arm, 0.0, 0.0]), np.eye(3)),)), array_name="one")
+        for arm in (0.05, 0.0535)
+    )
+    motion = swinging()[1]
+    recording = measure(np.random.default_rng(2), true, [], Measurement(duration=20.0), motion=motion)
+    readings, rail = recording.readings.copy(), round(-5.0 / STEP) * STEP
+    over = readings[:, 0] < rail
+    readings[over, 0] = rail - np.round(scatter(np.random.default_rng(3), int(over.sum()))) * STEP
+    run = prepare_run(replace(recording, readings=readings), one)
+    report = check_integrity(one, run, one.predict(motion, run.t)[0])
+    (effect,) = report.effects
+    assert effect.name == "saturation"
+    assert effect.parameters["a1_lower_m_s2"] == pytest.approx(-5.0, abs=2 * STEP)
+    assert report.run.valid[over, 0].mean() < 0.01  # but for the tail of its noise

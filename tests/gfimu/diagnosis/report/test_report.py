@@ -1,0 +1,202 @@
+"""The report: complete, self-contained, small, and its words follow the numbers."""
+
+from __future__ import annotations
+
+import html
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+from xml.etree import ElementTree as ET
+
+import numpy as np
+import pytest
+from made_diagnoses import made_diagnosis
+
+from gfimu.diagnosis.report.folder import check_folder, write_diagnosis
+from gfimu.diagnosis.report.page import report_html
+from gfimu.diagnosis.report.plain_words import headline, next_steps, odds, parameter_texts, percent, story
+from gfimu.diagnosis.verdict.verdict import NamedCause
+from gfimu.errors import InputError
+
+VERDICTS = ("explained", "ambiguous", "unknown", "nothing_found")
+
+
+class Page(HTMLParser):
+    """Tags that are open, and what the page refers to."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.links: list[str] = []
+
+    def handle_starttag(self, tag, attrs):
+        if tag not in {"meta", "br", "link", "img", "hr"}:
+            self.open.append(tag)
+        self.links += [value for key, value in attrs if key in {"href", "src", "xlink:href"}]
+
+    def handle_startendtag(self, tag, attrs):
+        self.links += [value for key, value in attrs if key in {"href", "src", "xlink:href"}]
+
+    def handle_endtag(self, tag):
+        assert self.open, tag
+        assert self.open.pop() == tag
+
+
+@pytest.fixture(scope="module")
+def pages():
+    """One page per verdict; of the unknown one, a channel is dead and the file has a hostile name."""
+    made = {verdict: made_diagnosis(verdict) for verdict in VERDICTS}
+    (run,) = made["unknown"].runs
+    valid = run.valid.copy()
+    valid[:, 4] = False
+    hostile = replace(run, name="<script>alert(1)</script>.csv", valid=valid)
+    made["unknown"] = replace(made["unknown"], runs=(hostile,))
+    return {verdict: report_html(diagnosis) for verdict, diagnosis in made.items()}
+
+
+def words_of(page: str) -> str:
+    text = re.sub(r"<style>.*?</style>|<svg.*?</svg>", "", page, flags=re.DOTALL)
+    return re.sub(r"\s+", " ", html.unescape(re.sub(r"<[^>]+>", " ", text)))
+
+
+@pytest.mark.parametrize("verdict", VERDICTS)
+def test_the_page_is_whole_and_needs_no_network(pages, verdict):
+    page = Page()
+    page.feed(pages[verdict])
+    assert page.open == []
+    assert page.links
+    assert all(link.startswith(("#", "data:")) for link in page.links)
+    assert not re.search(r"url\((?!#)|@import|<script", pages[verdict])
+    assert len(pages[verdict].encode()) < 3_000_000
+
+
+@pytest.mark.parametrize("verdict", VERDICTS)
+def test_every_figure_is_a_picture_of_its_own(pages, verdict):
+    figures = re.findall(r"<svg.*?</svg>", pages[verdict], flags=re.DOTALL)
+    assert len(figures) >= 11  # before/after, fingerprint, nine or more views, all channels
+    for figure in figures:
+        ET.fromstring(figure)
+    names = re.findall(r'\bid="([^"]+)"', pages[verdict])
+    assert len(names) == len(set(names))
+    used = re.findall(r'(?:url\(|href=")#([^)"]+)', pages[verdict])
+    assert set(used) <= set(names)
+
+
+def test_the_first_screen_says_what_is_wrong_how_much_and_what_to_do(pages):
+    text = words_of(pages["explained"])
+    first = text[: text.index("Other explanations")]
+    for words in (
+        "Explained",
+        "Found what the simulation leaves out: the table's axis is not vertical.",
+        "99 % of the error beyond noise is gone",
+        "4.000 ± 0.050 mrad",
+        "0.2292 ± 0.0029 °",
+        "99.9 %",
+        "What to do next",
+        "twin.toml",
+    ):
+        assert words in first
+    assert "axis_wobble" in text
+    assert "1 : 10⁵²" in text
+    assert "its inertial part at high rate is not in the data" in text
+
+
+def test_each_verdict_has_its_own_words(pages):
+    assert "can't tell which: the whole cube is off the table's axis or a chip is not where" in words_of(
+        pages["ambiguous"]
+    )
+    assert "remounted on its side" in words_of(pages["ambiguous"])
+    assert "nothing in the library explains it" in words_of(pages["unknown"])
+    assert "once per revolution in a11 and a12" in words_of(pages["unknown"])
+    assert "function a11_m_s2 cos θ 0.02" in words_of(pages["unknown"])
+    calm = words_of(pages["nothing_found"])
+    assert "Nothing is wrong with the simulation that this recording could show." in calm
+    assert "None named." in calm
+
+
+def test_the_sentences_of_the_views_are_on_the_page(pages):
+    assert "once per revolution" in words_of(pages["explained"])
+    assert "after: gone" in words_of(pages["explained"])
+    assert "Before," not in words_of(pages["nothing_found"])
+
+
+def test_text_from_outside_cannot_break_the_page(pages):
+    assert "<script" not in pages["unknown"]
+    assert "&lt;script&gt;" in pages["unknown"]
+
+
+def test_a_dead_channel_is_named(pages):
+    assert "Left out for want of a usable sample: a22." in words_of(pages["unknown"])
+
+
+def test_the_folder_holds_all_files_or_none(tmp_path, monkeypatch):
+    diagnosis = made_diagnosis("explained")
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "verdict.json").write_text("kept")
+    monkeypatch.setattr("gfimu.diagnosis.report.folder.write_picture", lambda *_, **__: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        write_diagnosis(tmp_path / "out", diagnosis)
+    assert [file.name for file in (tmp_path / "out").iterdir()] == ["verdict.json"]
+    assert (tmp_path / "out" / "verdict.json").read_text() == "kept"
+    monkeypatch.undo()
+    written = write_diagnosis(tmp_path / "out", diagnosis)
+    names = {"verdict.json", "twin.toml", "report.html", "diagnosis.rrd"}
+    assert {file.name for file in (tmp_path / "out").iterdir()} == names == {path.name for path in written.values()}
+
+
+def test_a_folder_that_cannot_be_is_refused_before_any_work(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="choose a folder"):
+        check_folder(tmp_path / "file")
+    with pytest.raises(InputError, match="choose a folder"):
+        check_folder(tmp_path / "file" / "below")
+    with pytest.raises(InputError, match="choose a folder"):
+        check_folder(tmp_path / "new" / "below")
+    check_folder(tmp_path / "new")
+    assert not (tmp_path / "new").exists()
+
+
+@pytest.mark.parametrize(
+    ("key", "unit", "value", "std", "name", "text", "familiar"),
+    [
+        ("x_rad", "rad", 0.0041, 0.0001, "x", "4.10 ± 0.10 mrad", "0.2349 ± 0.0057 °"),
+        ("x_m", "m", -0.0012, 2e-5, "x", "−1.200 ± 0.020 mm", ""),
+        ("a11_m_s2", "m/s²", 0.5, 0.01, "a11", "0.500 ± 0.010 m/s²", "51.0 ± 1.0 mg"),
+        ("a11", "ratio", 0.002, 1e-4, "a11", "0.00200 ± 0.00010", "0.200 ± 0.010 %"),
+        ("frequency_hz", "Hz", 12.345, 0.01, "frequency", "12.345 ± 0.010 Hz", ""),
+        ("stretch_s2_rad2", "s²/rad²", 2.5e-5, 1e-6, "stretch", "(2.50 ± 0.10)·10⁻⁵ s²/rad²", ""),
+        ("order", "number", 7.0, None, "order", "7", ""),
+        ("chip", "name", "a2", None, "chip", "a2", ""),
+        ("channels", "name", ["a11", "a12"], None, "channels", "a11, a12", ""),
+    ],
+)
+def test_parameters_read_as_people_write_them(key, unit, value, std, name, text, familiar):
+    cause = NamedCause("bias", {key: value}, {} if std is None else {key: std}, 0.9)
+    (found,) = parameter_texts(cause, {key: unit})
+    assert (found.name, found.value, found.familiar, found.significant) == (name, text, familiar, True)
+
+
+def test_a_parameter_within_its_error_is_pale():
+    (found,) = parameter_texts(NamedCause("table_tilt", {"x_rad": 1e-4}, {"x_rad": 1e-4}, 0.9), {"x_rad": "rad"})
+    assert not found.significant
+
+
+def test_odds_and_percent():
+    assert odds(-np.log(20.0)) == "1 : 20"
+    assert odds(-52 * np.log(10.0)) == "1 : 10⁵²"
+    assert odds(np.log(3.0)) == "3 : 1"
+    assert odds(-1e6) == "< 1 : 10¹⁰⁰"
+    assert percent(0.9995) == "> 99.9 %"
+    assert percent(0.97) == "97 %"
+    assert percent(float("nan")) == "–"
+
+
+def test_several_causes_are_counted_and_named():
+    diagnosis = made_diagnosis("explained")
+    second = NamedCause(
+        "eccentricity", {"x_m": 1e-3}, {"x_m": 1e-5}, 0.98, not_distinguishable_from=("sensor_position",)
+    )
+    both = replace(diagnosis, causes=(*diagnosis.causes, second))
+    assert headline(both).startswith("Found two things that the simulation leaves out: ")
+    assert "these put into the simulation" in story(both)
+    assert any("sensor_position could imitate" in step for step in next_steps(both))

@@ -1,0 +1,84 @@
+"""Biases read off at rest: exact without noise, within their own standard deviation with it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.integrate import cumulative_trapezoid
+from scipy.spatial.transform import Rotation
+
+from gfimu import AccelerometerArray, InputError, Recording, specific_force
+from gfimu.motion.rest_bias import RestBias, estimate_from_rest, rest_bias
+
+ARRAY = AccelerometerArray.load("cube12")
+BIAS = np.linspace(-0.5, 0.4, 12)
+
+
+def recording(noise: float, *, mounting=(0.0, 0.0, 0.0), seed: int = 0, still: bool = True) -> Recording:
+    t = np.arange(1000) * 0.01
+    rate = np.where(t > 4.0, 3.0 * np.sin(3.0 * (t - 4.0)), 0.0) if still else 3.0 * np.sin(3.0 * t)
+    acceleration = np.gradient(rate, t)
+    up = Rotation.from_rotvec(mounting).inv().apply([0.0, 0.0, 1.0])
+    readings = specific_force(ARRAY, np.tile(9.80665 * up, (len(t), 1)), np.outer(acceleration, up), np.outer(rate, up))
+    rng = np.random.default_rng(seed)
+    readings = readings + BIAS + noise * rng.standard_normal(readings.shape)
+    return Recording.from_arrays(
+        t, readings, ARRAY, reference={"tacho_rad_s": rate}, metadata={"mounting_rotvec_rad": list(mounting)}
+    )
+
+
+@pytest.mark.parametrize("mounting", [(0.0, 0.0, 0.0), (np.pi / 2, 0.0, 0.0)])
+def test_exact_without_noise_however_the_cube_lies(mounting):
+    found = rest_bias(recording(1e-9, mounting=mounting), ARRAY)
+    assert_allclose(found.bias, BIAS, atol=1e-8)
+    assert 0.0 <= found.start_s < found.stop_s <= 4.0
+
+
+def test_the_error_is_as_large_as_it_says():
+    scores = []
+    for seed in range(40):
+        found = rest_bias(recording(0.03, seed=seed), ARRAY)
+        scores.append((found.bias - BIAS) / found.std)
+    # 480 standard normal scores: their variance is within 4 standard deviations, 4 √(2/480), of 1.
+    assert np.var(scores) == pytest.approx(1.0, abs=4 * np.sqrt(2 / 480))
+
+
+def test_what_is_left_grows_in_the_rate_as_it_says():
+    t = np.arange(0.0, 5.0, 0.01)
+    std = np.linspace(0.001, 0.003, 12)
+    expected = RestBias(ARRAY, np.zeros(12), std, 0.0, 1.0).rate_std(t)[-1]
+    errors = np.random.default_rng(3).standard_normal((4000, 12)) * std
+    alpha = errors @ np.linalg.pinv(ARRAY.regression_matrix)[:3].T
+    final = alpha * cumulative_trapezoid(np.ones_like(t), t)[-1]
+    assert_allclose(final.std(axis=0), expected, rtol=4 / np.sqrt(2 * 4000))
+
+
+def test_removing_leaves_the_ideal_readings():
+    run = recording(1e-9)
+    clean = rest_bias(run, ARRAY).remove(run)
+    assert_allclose(clean.readings, run.readings - BIAS, atol=1e-8)
+
+
+def test_no_rest_is_refused():
+    with pytest.raises(InputError, match="no rest"):
+        rest_bias(recording(0.03, still=False), ARRAY)
+
+
+def test_a_dead_channel_is_named():
+    run = recording(0.03)
+    run.readings[:, 4] = np.nan
+    with pytest.raises(InputError, match="a22"):
+        rest_bias(run, ARRAY)
+
+
+def test_the_rate_stays_within_the_band_it_gives():
+    scores = []
+    for seed in range(40):
+        run = recording(0.03, seed=seed)
+        found = estimate_from_rest(run, ARRAY, noise_std=0.03)
+        error = found.omega[-1, 2] - run.reference["tacho_rad_s"][-1]
+        scores.append(error / found.omega_std[-1, 2])
+    # The mean square of 40 standard normal scores is within 4 standard deviations, 4 √(2/40), of 1.
+    assert np.mean(np.square(scores)) == pytest.approx(1.0, abs=4 * np.sqrt(2 / 40))
+    assert found.metadata["rest_bias_m_s2"]["a11"] == pytest.approx(BIAS[0], abs=0.02)
