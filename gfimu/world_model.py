@@ -37,6 +37,7 @@ __all__ = [
     "WorldModel",
     "bound_of",
     "is_of_one_recording",
+    "shapes_to_screen",
 ]
 
 
@@ -101,9 +102,6 @@ class Effect(Protocol):
     @property
     def parameters(self) -> dict[str, Any]: ...  # noqa: D102
 
-    @property
-    def memory_s(self) -> float: ...  # noqa: D102
-
     def size_values(self, array: AccelerometerArray) -> NDArray[np.float64]:
         """Return the linear coordinates."""
         ...
@@ -119,7 +117,12 @@ def is_of_one_recording(family: EffectFamily) -> bool:
 
 
 class EffectFamily(Protocol):
-    """A kind of effect: its coordinates, places, shapes and how to build one."""
+    """A kind of effect: its coordinates, places, shapes and how to build one.
+
+    What else it may know of itself is optional: ``whole`` (shape parameters that are whole numbers), ``shape_limits``
+    (least and largest value by shape parameter), ``needs_temperature``, ``tolerance`` (what a good calibration leaves of
+    each size), ``of_one_recording``, ``memory_s`` of an effect, and ``scan`` (`shapes_to_screen`).
+    """
 
     @property
     def name(self) -> str: ...  # noqa: D102
@@ -135,14 +138,6 @@ class EffectFamily(Protocol):
     def inexactness(self) -> float: ...  # noqa: D102
     @property
     def starts(self) -> tuple[float, ...]: ...  # noqa: D102
-    @property
-    def whole(self) -> frozenset[str]: ...  # noqa: D102
-    @property
-    def shape_limits(self) -> Mapping[str, tuple[float, float]]: ...  # noqa: D102
-    @property
-    def needs_temperature(self) -> bool: ...  # noqa: D102
-    @property
-    def tolerance(self) -> float: ...  # noqa: D102
 
     def __call__(self, parameters: Mapping[str, Any]) -> Effect:
         """Build an effect from its contract parameters."""
@@ -168,15 +163,25 @@ class EffectFamily(Protocol):
         """Return the grid of shape parameters."""
         ...
 
-    def scan(
-        self, left: Sequence[Whitened], duration: float, sample_rate: float
-    ) -> tuple[Sequence[Mapping[str, float]], float]:
-        """Return the shapes to screen, and how many independent ones they were chosen from."""
-        ...
-
     def from_sizes(self, array: AccelerometerArray, values: NDArray[np.float64], shape: Mapping[str, float]) -> Effect:
         """Build an effect from its linear coordinates."""
         ...
+
+
+def shapes_to_screen(
+    family: EffectFamily, left: Sequence[Whitened], duration: float, sample_rate: float
+) -> tuple[Sequence[Mapping[str, float]], float]:
+    """Return the shapes of a kind of effect to screen, and how many independent ones they were chosen from.
+
+    A family with a method ``scan(left, duration, sample_rate)`` looks for them in what a fit leaves; of others it is
+    the whole grid.
+    """
+    scan = getattr(family, "scan", None)
+    if scan is not None:
+        shapes, looks = scan(left, duration, sample_rate)
+        return shapes, float(looks)
+    grid = family.shapes(duration, sample_rate)
+    return grid, float(len(grid))
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
-from gfimu.world_model import Whitened
 from sim.world import World
 
 __all__ = ["LARGEST_TURN", "Effect", "Pattern", "Size", "channel_patterns", "chip_patterns"]
@@ -135,24 +134,6 @@ class Effect(ABC):
     def shapes(cls, duration: float, sample_rate: float) -> tuple[dict[str, float], ...]:
         """Return the grid of shape parameters (frequency, order, time constant) to screen over."""
         return ({},)
-
-    @classmethod
-    def scan(
-        cls, left: Sequence[Whitened], duration: float, sample_rate: float
-    ) -> tuple[Sequence[Mapping[str, float]], float]:
-        """Return the shapes to screen about a fit, and how many independent ones they were chosen from.
-
-        Parameters
-        ----------
-        left : sequence of Whitened
-            What the fit leaves of each stretch.
-        duration : float
-            Longest stretch, s.
-        sample_rate : float
-            Sample rate, Hz.
-        """
-        shapes = cls.shapes(duration, sample_rate)
-        return shapes, float(len(shapes))
 
     @classmethod
     def from_sizes(

@@ -192,11 +192,11 @@ def _jacobian(
     stretch: Stretch, drive: Drive, effects: Sequence[Effect], seen: Observed, *, exact: bool
 ) -> Jacobian:
     """Differentiate by the drive; unless ``exact``, without what remembers the drive for long."""
-    longest = max((effect.memory_s for effect in (*stretch.model.effects, *effects)), default=0.0)
+    longest = max((_memory(effect) for effect in (*stretch.model.effects, *effects)), default=0.0)
     present = list(effects)
     base = seen.prediction
     if longest > _LONG_MEMORY and not exact:
-        present = [effect for effect in effects if effect.memory_s <= _LONG_MEMORY]
+        present = [effect for effect in effects if _memory(effect) <= _LONG_MEMORY]
         base = stretch.predict(present, drive.spin)
 
     def predict(coefficients: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -206,6 +206,11 @@ def _jacobian(
     if exact and longest > 0.0:
         reach = Reach(min(max(reach.before, int(longest / drive.spline.spacing)), _MOST_INTERVALS), reach.after)
     return differentiate(predict, drive.spline, drive.coefficients, base, seen.weight, stretch.run.t, reach)
+
+
+def _memory(effect: Effect) -> float:
+    """Return how long readings depend on the drive before them by an effect, s; others need not say so."""
+    return float(getattr(effect, "memory_s", 0.0))
 
 
 def _modes_of(jacobian: Jacobian, modes: SlowModes, weight: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:

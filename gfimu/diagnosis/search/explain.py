@@ -40,6 +40,8 @@ class Explanation:
         Other sets, best first, under the same nuisances.
     screening : Screening
         The last one, about the best set.
+    stretches : tuple of Stretch
+        The data.
     """
 
     best: Fit
@@ -47,6 +49,7 @@ class Explanation:
     without: dict[str, Fit]
     rivals: tuple[Fit, ...]
     screening: Screening
+    stretches: tuple[Stretch, ...] = ()
     fits: int = 0
     screenings: int = 0
 
@@ -138,7 +141,7 @@ def explain(stretches: Sequence[Stretch], policy: Policy, report: Report | None 
         screening = screen(stretches, best.point)
         screenings += 1
     rivals = tuple(one for one in sets.ranked() if one.causes and one.key != best.key)
-    return Explanation(best, _nothing(sets), without, rivals, screening, fits, screenings)
+    return Explanation(best, _nothing(sets), without, rivals, screening, tuple(stretches), fits, screenings)
 
 
 def _nothing(sets: _Sets) -> Fit:

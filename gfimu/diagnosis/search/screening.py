@@ -15,7 +15,7 @@ from gfimu.diagnosis.terms.cause import Cause, effects_of, mixing_of
 from gfimu.diagnosis.terms.columns import Columns
 from gfimu.diagnosis.terms.library import family_columns
 from gfimu.geometry.array import AccelerometerArray
-from gfimu.world_model import EffectFamily, Whitened
+from gfimu.world_model import EffectFamily, Whitened, shapes_to_screen
 
 __all__ = ["Hypothesis", "Screening", "Signature", "screen"]
 
@@ -131,13 +131,13 @@ def _plan(
     columns = 0
     for name, family in model.families().items():
         count = len(family.sizes(model.array))
-        if not count or (family.needs_temperature and not warm) or (still and family.place in _OF_MOTION):
+        if not count or (getattr(family, "needs_temperature", False) and not warm) or (still and family.place in _OF_MOTION):
             continue
         if name in present:
             shapes: Sequence[Mapping[str, float]] = [present[name].shape]
             looks = float(np.exp(-present[name].log_prior))
         else:
-            shapes, looks = family.scan(left, duration, rate)
+            shapes, looks = shapes_to_screen(family, left, duration, rate)
         width = count * (runs if family.per_run else 1)
         for shape in shapes:
             signatures.append(Signature(family, dict(shape), np.arange(columns, columns + width), looks))

@@ -66,7 +66,7 @@ class Cause:
     @cached_property
     def free_shape(self) -> tuple[str, ...]:
         """Shape parameters that a fit may move."""
-        whole = self.family.whole
+        whole = getattr(self.family, "whole", frozenset())
         return tuple(key for key in self.shape if key not in whole)
 
     @property
@@ -123,7 +123,7 @@ class Cause:
         """Return a shape parameter after a step in its natural coordinate: log, or linear for angles."""
         if key.endswith("_rad"):
             return float(self.shape[key]) + step
-        low, high = self.family.shape_limits.get(key, (0.0, np.inf))
+        low, high = getattr(self.family, "shape_limits", {}).get(key, (0.0, np.inf))
         return float(np.clip(self.shape[key] * np.exp(step), low, high))
 
 

@@ -67,16 +67,21 @@ class Residue:
         array, found, place = stretch.model.array, [], 0
         for family in _families(stretch):
             count = len(family.sizes(array))
-            values = self.scale * family.tolerance * sizes[place : place + count]
+            values = self.scale * _std(family) * sizes[place : place + count]
             found.append(family.from_sizes(array, values, {}))
             place += count
         return tuple(found)
 
 
 def _families(stretch: Stretch) -> list[EffectFamily]:
-    return [family for family in stretch.model.families().values() if family.tolerance > 0.0]
+    return [family for family in stretch.model.families().values() if _std(family) > 0.0]
 
 
 def _tolerance(family: EffectFamily, array: AccelerometerArray) -> float:
     """Return the standard deviation of the sizes in units of their prior."""
-    return float(family.tolerance / family.sizes(array)[0].prior_std)
+    return float(_std(family) / family.sizes(array)[0].prior_std)
+
+
+def _std(family: EffectFamily) -> float:
+    """Return what a good calibration leaves of each size of a family, in its unit; others need not say so."""
+    return float(getattr(family, "tolerance", 0.0))
