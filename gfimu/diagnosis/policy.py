@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from gfimu.units import STANDARD_GRAVITY
+
 __all__ = ["Policy"]
 
 
@@ -48,3 +50,25 @@ class Policy:
     temperature: float = 1.2
     ambiguous: float = 2.0
     rivals: int = 4
+    walk_odds: float = 10.0
+    largest_flicker: float = 1.5e-3 * STANDARD_GRAVITY
+    unequal_walk: float = 14.0
+    least_walk: float = 3e-3
+    walk_to_drive: float = 0.08
+    loud_ratio: float = 4.0
+    loud_odds: float = 2.0
+    white_ratio: float = 1.3
+    white_ratio_least: float = 1.15
+    white_accuracy: float = 0.01
+    residue_odds: tuple[tuple[float, float], ...] = ((1.0, 3.0), (3.0, 7.0))
+    worth_a_search: float = 3.0
+    most_searched: int = 6
+    most_certain: float = 0.997
+    mimic_energy: float = 6.0
+    seen: float = 2.0
+    unseen_at_most: float = 0.9
+    lack_odds: float = 10.0
+    inexactness: float = 2.5e-3
+    dominant: float = 0.03
+    beyond_chance: float = 4.0
+    least_gain: float = 2.0
