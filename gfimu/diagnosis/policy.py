@@ -46,7 +46,6 @@ class Policy:
     settled: float = 0.3
     learnings: int = 3
     knots: float = 0.05
-    own_roughness: bool = False
     temperature: float = 1.2
     ambiguous: float = 2.0
     rivals: int = 4
@@ -72,3 +71,5 @@ class Policy:
     dominant: float = 0.03
     beyond_chance: float = 4.0
     least_gain: float = 2.0
+    fair: float = 1.6
+    knot_odds: float = 100.0

@@ -9,7 +9,7 @@ import numpy as np
 
 from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.fit.gauss_newton import Fit, fit
-from gfimu.diagnosis.fit.learn import learn_noise, learn_roughness, starting_point
+from gfimu.diagnosis.fit.learn import learn_noise, learn_roughness, sharpened, starting_point
 from gfimu.diagnosis.fit.linear import Point, with_residue
 from gfimu.diagnosis.parallel import each_apart
 from gfimu.diagnosis.policy import Policy
@@ -117,15 +117,16 @@ def explain(
     sets = _started(stretches, policy) if start is None else Sets(stretches, start, policy)
     if start is not None:
         sets.fit([start, replace(start, causes=())])
-    fits = 0
+    fits, seen = 0, set()
     for number in range(policy.rounds):
         tell(0.1 + 0.8 * number / policy.rounds, f"search {number + 1}")
         before = sets.best
         _fit_leaders(sets, screen(stretches, before.point), before)
         best = prune(sets)
         fits += sets.count
-        if best.key == before.key and number > 0:
+        if number > 0 and best.key in seen:
             break
+        seen.add(best.key)
         sets = _under(sets, _relearned(stretches, best.point, policy), _near(sets, best))
     return explained(sets, prune(sets), fits + sets.count)
 
@@ -136,12 +137,14 @@ def _started(stretches: Sequence[Stretch], policy: Policy) -> Sets:
     nothing = sets.fit([sets.base])[0]
     if nothing is None:
         raise np.linalg.LinAlgError("the reference determines no drive")
-    return _under(sets, learn_roughness(stretches, nothing.point, policy.learnings), [nothing])
+    point = sharpened(stretches, learn_roughness(stretches, nothing.point, policy.learnings), policy)
+    return _under(sets, point, [nothing])
 
 
 def _relearned(stretches: Sequence[Stretch], point: Point, policy: Policy) -> Point:
     """Return a point with all nuisance parameters learnt from what its causes leave."""
-    point = learn_noise(stretches, learn_roughness(stretches, point, policy.learnings))
+    point = sharpened(stretches, learn_roughness(stretches, point, policy.learnings), policy)
+    point = learn_noise(stretches, point)
     return point if point.residue is None else with_residue(stretches, point, point.residue.scale)
 
 
@@ -174,13 +177,9 @@ def _under(sets: Sets, base: Point, some: Sequence[Fit]) -> Sets:
     new = Sets(sets.stretches, base, sets.policy)
     points = []
     for one in some:
-        if sets.policy.own_roughness:
-            drives = learn_roughness(sets.stretches, replace(one.point, levels=base.levels), 1).drives
-        else:
-            drives = tuple(
-                replace(learnt, coefficients=mine.coefficients)
-                for learnt, mine in zip(base.drives, one.point.drives, strict=True)
-            )
+        drives = tuple(
+            learnt.following(mine) for learnt, mine in zip(base.drives, one.point.drives, strict=True)
+        )
         points.append(replace(one.point, drives=drives))
     new.fit(points)
     return new

@@ -86,6 +86,11 @@ class Drive:
             coefficients[-after:] = self.coefficients[-1] + last * np.arange(1, after + 1)
         return replace(self, spline=spline, coefficients=coefficients, roughness=np.pad(self.roughness, pad, "edge"))
 
+    def following(self, other: Drive) -> Drive:
+        """Return this drive's spline and prior with the motion of another."""
+        same = other.spline == self.spline
+        return replace(self, coefficients=other.coefficients if same else self.spline.through(other.spin))
+
     def on(self, spacing: float) -> Drive:
         """Return the drive with other distances of the knots, s."""
         spline = AngleSpline.over(self.spline.start, self.spline.stop, spacing)
@@ -127,7 +132,7 @@ class Drive:
     @property
     def log_precision(self) -> float:
         """Half the log determinant of the prior's precision, up to a constant."""
-        return -float(np.log(self.roughness).sum())
+        return -float(np.log(self.roughness * self.spline.spacing**DEGREE).sum())
 
     def _off(self) -> float:
         if not np.isfinite(self.angle_std):
