@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from gfimu.units import STANDARD_GRAVITY
+
 __all__ = ["Policy"]
 
 
@@ -31,6 +33,24 @@ class Policy:
         Gauss–Newton steps of a fit.
     settled : float
         Nats that a step must promise to be taken.
+    largest_flicker : float
+        Largest usual bias instability, m/s²: 1.5 mg, above the data sheet's of an ADXL345. More is something else.
+    walk_odds : float
+        Log odds that a random walk of the biases needs over bias instability alone; the same as for a lack of fit.
+    unequal_walk : float
+        `Walk.unequal`, nats, from which the channels differ too much for a random walk: a chance of one in a million.
+    least_walk : float
+        Weakest random walk that differs from bias instability, m/s² per √s.
+    walk_to_drive : float
+        Share of a walk's strength that is uncertain, as the drive follows what all channels have in common.
+    loud_ratio : float
+        Bias instability of one channel over the median of the others; right verdicts of 130 cases reached 3.0.
+    loud_odds : float
+        Nats by which its level must be likelier than that ratio: two standard deviations.
+    white_ratio, white_ratio_least : float
+        White noise over the expected one, median and least of the channels, beyond what parts of a kind differ by.
+    white_accuracy : float
+        Share of a white level that is uncertain, as the level is a robust one.
     """
 
     beam: int = 6
@@ -48,3 +68,13 @@ class Policy:
     temperature: float = 1.2
     ambiguous: float = 2.0
     rivals: int = 4
+    largest_flicker: float = 1.5e-3 * STANDARD_GRAVITY
+    walk_odds: float = 10.0
+    unequal_walk: float = 14.0
+    least_walk: float = 3e-3
+    walk_to_drive: float = 0.08
+    loud_ratio: float = 4.0
+    loud_odds: float = 2.0
+    white_ratio: float = 1.3
+    white_ratio_least: float = 1.15
+    white_accuracy: float = 0.01
