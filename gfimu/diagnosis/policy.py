@@ -51,6 +51,16 @@ class Policy:
         White noise over the expected one, median and least of the channels, beyond what parts of a kind differ by.
     white_accuracy : float
         Share of a white level that is uncertain, as the level is a robust one.
+    lack_odds : float
+        Log odds from which a lack of fit is significant; one in 320 runs with nothing hidden reached it.
+    every_channel, every_function : float
+        Nats by which one function on all channels, and all functions on one series, must beat a simpler finding.
+    steady_noise : float
+        Range of the noise power over six parts of the samples, of its mean: a part's own noise changes by less.
+    spikes, spike_share : float
+        Isolated bad samples, and their share of all, that happen in any recording.
+    spike_odds : float
+        Log odds of each where there are more.
     """
 
     beam: int = 6
@@ -78,3 +88,10 @@ class Policy:
     white_ratio: float = 1.3
     white_ratio_least: float = 1.15
     white_accuracy: float = 0.01
+    lack_odds: float = 10.0
+    every_channel: float = 2.0
+    every_function: float = 5.0
+    steady_noise: float = 0.25
+    spikes: float = 3.0
+    spike_share: float = 1e-4
+    spike_odds: float = 10.0
