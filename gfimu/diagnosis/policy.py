@@ -61,6 +61,18 @@ class Policy:
         Isolated bad samples, and their share of all, that happen in any recording.
     spike_odds : float
         Log odds of each where there are more.
+    most_terms, terms_per_round : int
+        Terms of a surrogate, and those that are chosen before they are fitted.
+    term_odds : float
+        Log odds that a term of a surrogate needs.
+    comparable : float
+        Share of a round's best log odds below which a term waits for the next round: a large term is not linear.
+    nearly_all : float
+        Share of the log odds of a function on all channels below which one channel alone must stay.
+    least_described : float
+        Share of the excess misfit that a round of terms must take away to describe anything.
+    searched_stretches : int
+        Stretches of a long recording on which terms are chosen.
     """
 
     beam: int = 6
@@ -95,3 +107,10 @@ class Policy:
     spikes: float = 3.0
     spike_share: float = 1e-4
     spike_odds: float = 10.0
+    most_terms: int = 16
+    terms_per_round: int = 6
+    term_odds: float = 8.0
+    comparable: float = 0.1
+    nearly_all: float = 0.9
+    least_described: float = 0.03
+    searched_stretches: int = 8

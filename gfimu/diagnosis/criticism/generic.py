@@ -95,7 +95,7 @@ def series_products(
 
 
 def _by_series(values: NDArray[np.float64], weight: NDArray[np.float64]) -> Columns:
-    """Return functions (n, k) or (c + 1, n, k) as columns of each series under the weights (n, c + 1) of its samples."""
+    """Return functions (n, k) or (c + 1, n, k) as columns of each series, its samples weighted by (n, c + 1)."""
     each = np.broadcast_to(values, (weight.shape[1], *values.shape[-2:]))
     count = values.shape[-1]
     places = tuple(np.arange(series * count, (series + 1) * count) for series in range(len(each)))

@@ -97,9 +97,10 @@ def lack_of_fit(
 def dependence_unexplained(stretches: Sequence[Stretch], point: Point, policy: Policy = Policy()) -> LackOfFit:
     """Score every function on every channel and the reference, each on all channels, and all on each series.
 
-    A cause with a memory (``memory_s``), as a mode on the table, acts back on the table. A drive whose prior is smoother
-    than that motion is too smooth by a share of its jerk, which the reference shows: beside such a cause the jerk of the
-    reference is no sign of anything else.
+    A cause with a memory (``memory_s``), as a mode on the table, acts back on the table. A drive whose prior is
+    smoother than that motion is too smooth by a share of its jerk, which the reference shows: beside such a cause the
+    jerk of the reference is no sign of anything else. The fit has to be at its optimum, which beside a long memory
+    only the exact derivative reaches (``fit(…, exact=True)``).
     """
     channels = stretches[0].model.array.channels
     gram, score = _products(stretches, point)
