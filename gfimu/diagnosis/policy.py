@@ -33,6 +33,46 @@ class Policy:
         Gauss–Newton steps of a fit.
     settled : float
         Nats that a step must promise to be taken.
+    largest_flicker : float
+        Largest usual bias instability, m/s²: 1.5 mg, above the data sheet's of an ADXL345. More is something else.
+    walk_odds : float
+        Log odds that a random walk of the biases needs over bias instability alone; the same as for a lack of fit.
+    unequal_walk : float
+        `Walk.unequal`, nats, from which the channels differ too much for a random walk: a chance of one in a million.
+    least_walk : float
+        Weakest random walk that differs from bias instability, m/s² per √s.
+    walk_to_drive : float
+        Share of a walk's strength that is uncertain, as the drive follows what all channels have in common.
+    loud_ratio : float
+        Bias instability of one channel over the median of the others; right verdicts of 130 cases reached 3.0.
+    loud_odds : float
+        Nats by which its level must be likelier than that ratio: two standard deviations.
+    white_ratio, white_ratio_least : float
+        White noise over the expected one, median and least of the channels, beyond what parts of a kind differ by.
+    white_accuracy : float
+        Share of a white level that is uncertain, as the level is a robust one.
+    lack_odds : float
+        Log odds from which a lack of fit is significant; one in 320 runs with nothing hidden reached it.
+    every_channel, every_function : float
+        Nats by which one function on all channels, and all functions on one series, must beat a simpler finding.
+    steady_noise : float
+        Range of the noise power over six parts of the samples, of its mean: a part's own noise changes by less.
+    spikes, spike_share : float
+        Isolated bad samples, and their share of all, that happen in any recording.
+    spike_odds : float
+        Log odds of each where there are more.
+    most_terms, terms_per_round : int
+        Terms of a surrogate, and those that are chosen before they are fitted.
+    term_odds : float
+        Log odds that a term of a surrogate needs.
+    comparable : float
+        Share of a round's best log odds below which a term waits for the next round: a large term is not linear.
+    nearly_all : float
+        Share of the log odds of a function on all channels below which one channel alone must stay.
+    least_described : float
+        Share of the excess misfit that a round of terms must take away to describe anything.
+    searched_stretches : int
+        Stretches of a long recording on which terms are chosen.
     """
 
     beam: int = 6
@@ -49,8 +89,8 @@ class Policy:
     temperature: float = 1.2
     ambiguous: float = 2.0
     rivals: int = 4
-    walk_odds: float = 10.0
     largest_flicker: float = 1.5e-3 * STANDARD_GRAVITY
+    walk_odds: float = 10.0
     unequal_walk: float = 14.0
     least_walk: float = 3e-3
     walk_to_drive: float = 0.08
@@ -59,6 +99,19 @@ class Policy:
     white_ratio: float = 1.3
     white_ratio_least: float = 1.15
     white_accuracy: float = 0.01
+    lack_odds: float = 10.0
+    every_channel: float = 2.0
+    every_function: float = 5.0
+    steady_noise: float = 0.25
+    spikes: float = 3.0
+    spike_share: float = 1e-4
+    spike_odds: float = 10.0
+    most_terms: int = 16
+    terms_per_round: int = 6
+    term_odds: float = 8.0
+    comparable: float = 0.1
+    nearly_all: float = 0.9
+    least_described: float = 0.03
     residue_odds: tuple[tuple[float, float], ...] = ((1.0, 3.0), (3.0, 7.0))
     worth_a_search: float = 3.0
     most_searched: int = 6
@@ -66,7 +119,6 @@ class Policy:
     mimic_energy: float = 6.0
     seen: float = 2.0
     unseen_at_most: float = 0.9
-    lack_odds: float = 10.0
     inexactness: float = 2.5e-3
     dominant: float = 0.03
     beyond_chance: float = 4.0

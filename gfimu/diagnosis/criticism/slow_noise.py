@@ -180,7 +180,7 @@ def white_factor(
         return None
     factor = float(np.median(factor_each))
     samples = sum(len(stretch.run.t) for stretch in stretches)
-    return factor, factor / np.sqrt(samples * len(ratio) / 4.0) + policy.white_accuracy * factor
+    return factor, factor * float(1.0 / np.sqrt(samples * len(ratio) / 4.0) + policy.white_accuracy)
 
 
 def _counts(stretches: Sequence[Stretch]) -> list[int]:
