@@ -13,7 +13,7 @@ from gfimu.diagnosis.conclusion import Described, conclude, is_dominant, is_unkn
 from gfimu.diagnosis.data.prepared_runs import PreparedRuns
 from gfimu.diagnosis.explanation import Explanation
 from gfimu.diagnosis.free_body.diagnose import diagnose_body
-from gfimu.diagnosis.gate import impossible_sizes, judge, measurable
+from gfimu.diagnosis.criticism.gate import impossible_sizes, judge, measurable
 from gfimu.diagnosis.holdout import Holdout, gate_gains, held_out_gain, split_segments
 from gfimu.diagnosis.long_run import explain_any_length
 from gfimu.diagnosis.loose_calibration import LooseCalibration, loosen, relearned
