@@ -17,9 +17,10 @@ from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.slow_modes import WeighedPowers
 from gfimu.diagnosis.terms.drive import Drive
 
-__all__ = ["learn_noise", "learn_roughness", "sharpened", "starting_point"]
+__all__ = ["FOLLOWED", "learn_noise", "learn_roughness", "sharpened", "starting_point"]
 
-_FOLLOWED = 0.6  # over the spacing of the knots, Hz: what is faster the drive does not follow
+FOLLOWED = 0.6
+"""Over the spacing of the knots, Hz: what is faster the drive does not follow."""
 _LEAST_VALID = 0.01  # numerical: share of the samples that count
 _REFERENCE_ROUNDS = 5  # numerical: to the roughness of a drive from its reference alone
 
@@ -117,7 +118,7 @@ def _left(stretch: Stretch, point: Point, linear: Linear, place: int) -> _Left:
     if point.residue is not None:
         residual = residual - point.residue.columns[place].times(linear.residue)
     cosines = stretch.basis.transform(residual)
-    level = white_level(cosines, _FOLLOWED / posterior.drive.spline.spacing, stretch.run.sample_period)
+    level = white_level(cosines, FOLLOWED / posterior.drive.spline.spacing, stretch.run.sample_period)
     # Missing samples stand as zeros, as where the reference comes at a lower rate.
     level = level / np.sqrt(np.maximum(stretch.mask.mean(axis=0), _LEAST_VALID))
     if stretch.steps.coarse:
