@@ -143,9 +143,9 @@ class _Diagnosis:
         return lack_of_fit(
             explanation.stretches,
             explanation.best,
-            self._policy,
             spikes=self._prepared.spikes,
             rounded=self._prepared.rounded,
+            policy=self._policy,
         )
 
     def _pairs(self, explanation: Explanation, fit: Fit, duration: float | None = None) -> list[Holdout]:

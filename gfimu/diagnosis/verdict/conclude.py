@@ -188,7 +188,7 @@ def conclude(
     rivals = conflicting(explanation, policy)
     named = named_causes(explanation, explanation.best, policy)
     believed = _believed(explanation, described, unknown=unknown)
-    loudest = loudest_channel(explanation.stretches, believed.point)
+    loudest = loudest_channel(explanation.stretches, believed.point, policy)
     apart = stands_out(explanation, left, policy)
     runs = _views(prepared, explanation.stretches, believed)
     if unknown:
@@ -201,11 +201,11 @@ def conclude(
     elif named or found:
         verdict, causes = "explained", (*found, *named)
     else:
-        verdict, causes = "unknown" if loudest.stands_out else "nothing_found", ()
+        verdict, causes = "unknown" if loudest.stands_out(policy) else "nothing_found", ()
     shown = left.signature if (unknown and not refuted) or apart else ""
     unexplained = Unexplained(
-        unknown or apart or loudest.stands_out,
-        "; ".join(part for part in (refuted, shown, _loud(loudest)) if part),
+        unknown or apart or loudest.stands_out(policy),
+        "; ".join(part for part in (refuted, shown, _loud(loudest, policy)) if part),
         left.log_odds,
         left.surrogate if described is None else _coefficients(described.whole.causes, first),
         described is not None and described.carried is not None,
@@ -249,8 +249,8 @@ def _believed(explanation: Explanation, described: Described | None, *, unknown:
     return described.carried if described is not None and described.carried is not None else explanation.nothing
 
 
-def _loud(loudest: LoudestChannel) -> str:
-    if not loudest.stands_out:
+def _loud(loudest: LoudestChannel, policy: Policy) -> str:
+    if not loudest.stands_out(policy):
         return ""
     return (
         f"the slow noise of channel {loudest.name} is {loudest.ratio:.1f} times the median of the other channels: "
