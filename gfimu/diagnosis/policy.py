@@ -158,3 +158,4 @@ class Policy:
     least_gain: float = 2.0
     fair: float = 1.6
     knot_odds: float = 100.0
+    hopeless: float = 40.0

@@ -103,6 +103,7 @@ def linearise(
     *,
     jacobians: Sequence[Jacobian | None] | None = None,
     exact: bool = False,
+    responses: bool = True,
 ) -> Linear:
     """Linearise stretches about a point.
 
@@ -118,8 +119,11 @@ def linearise(
         Derivatives by the drives, where they are taken as they were.
     exact : bool
         Whether these hold what remembers the drive for long.
+    responses : bool
+        Whether it matters how the drives follow the unknowns.
     """
     residues = point.residue.columns if point.residue is not None else (None,) * len(stretches)
+    follow = responses or point.residue is not None
     known = jacobians if jacobians is not None else (None,) * len(stretches)
 
     def one(
@@ -132,10 +136,10 @@ def linearise(
         if not parts:
             return posterior, np.zeros((0, 0)), np.zeros(0), np.zeros((len(drive.coefficients), 0))
         gram, score, across = posterior.products(Columns.together(parts))
-        return posterior, gram, score, posterior.response(across)
+        return posterior, gram, score, posterior.response(across) if follow else across[:, :0]
 
     rows = over_segments(one, stretches, point.drives, point.levels, known, residues)
-    posteriors, grams, scores, responses = zip(*rows, strict=True)
+    posteriors, grams, scores, ways = zip(*rows, strict=True)
     whole = Linear(
         np.sum(grams, axis=0),
         np.sum(scores, axis=0),
@@ -143,7 +147,7 @@ def linearise(
         sum(one.objective for one in posteriors),
         sum(one.log_volume for one in posteriors),
         tuple(one.step for one in posteriors),
-        tuple(responses),
+        tuple(ways),
         tuple(posteriors),
         np.zeros(0),
     )

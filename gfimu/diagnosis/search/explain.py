@@ -121,14 +121,16 @@ def explain(
     for number in range(policy.rounds):
         tell(0.1 + 0.8 * number / policy.rounds, f"search {number + 1}")
         before = sets.best
-        _fit_leaders(sets, screen(stretches, before.point), before)
+        screening = screen(stretches, before.point)
+        _fit_leaders(sets, screening, before)
         best = prune(sets)
         fits += sets.count
         if number > 0 and best.key in seen:
             break
         seen.add(best.key)
         sets = _under(sets, _relearned(stretches, best.point, policy), _near(sets, best))
-    return explained(sets, prune(sets), fits + sets.count)
+    best = prune(sets)
+    return explained(sets, best, fits + sets.count, screening if best.key == before.key else None)
 
 
 def _started(stretches: Sequence[Stretch], policy: Policy) -> Sets:
@@ -154,14 +156,15 @@ def _near(sets: Sets, best: Fit) -> list[Fit]:
     return [best, _nothing(sets), *close[: sets.policy.rivals + 1]]
 
 
-def explained(sets: Sets, best: Fit, fits: int) -> Explanation:
-    """Return the best of some sets with what it is compared with."""
+def explained(sets: Sets, best: Fit, fits: int, screening: Screening | None = None) -> Explanation:
+    """Return the best of some sets with what it is compared with, and a screening about it, taken where there is none."""
     without = {
         cause.name: sets.found[best.key - {cause.key}] for cause in best.causes if best.key - {cause.key} in sets.found
     }
     rivals = tuple(one for one in sets.ranked() if one.causes and one.key != best.key)
     nothing = _nothing(sets)
-    return Explanation(best, nothing, without, rivals, screen(sets.stretches, best.point), tuple(sets.stretches), fits)
+    about = screening if screening is not None else screen(sets.stretches, best.point)
+    return Explanation(best, nothing, without, rivals, about, tuple(sets.stretches), fits)
 
 
 def _nothing(sets: Sets) -> Fit:

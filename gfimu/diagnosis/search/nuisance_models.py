@@ -17,7 +17,7 @@ from gfimu.diagnosis.criticism.slow_noise import Walk, walk_strength
 from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.fit.gauss_newton import Fit
 from gfimu.diagnosis.fit.learn import learn_noise
-from gfimu.diagnosis.fit.linear import Point, with_residue
+from gfimu.diagnosis.fit.linear import Point, linearise, with_residue
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.explain import Explanation, Sets, explain, prune
 from gfimu.diagnosis.terms.residue import Residue
@@ -101,13 +101,25 @@ def _start(
     tried: list[Fit] = []
     for one in known:
         for base in (one.best, one.nothing) if one.best.causes else (one.best,):
-            sets = Sets(stretches, admit(base.point), policy)
-            if sets.fit([sets.base])[0] is not None:
+            point = admit(base.point)
+            if base.log_posterior + _promise(stretches, base.point, point) < best + odds - policy.hopeless:
+                continue
+            sets = Sets(stretches, point, policy)
+            if sets.fit([point])[0] is not None:
                 tried.append(prune(sets))
     leading = max(tried, key=lambda one: one.log_posterior, default=None)
     if leading is None or leading.log_posterior < best + odds - policy.worth_a_search:
         return None
     return leading.point
+
+
+def _promise(stretches: Sequence[Stretch], before: Point, after: Point) -> float:
+    """Return what another model of the nuisance parameters brings in a linear world, nats."""
+    values = []
+    for point in (before, after):
+        linear = linearise(stretches, point)
+        values.append(linear.log_volume + linear.log_noise - 0.5 * linear.objective)
+    return values[1] - values[0]
 
 
 def _understood(

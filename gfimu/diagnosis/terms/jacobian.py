@@ -72,6 +72,13 @@ class Jacobian:
                 total[at] += one.T @ values[rows]
         return out
 
+    def transposed_one(self, r: int, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return J_rᵀ v of values (n, P) for one r, shape (m, P)."""
+        out = np.zeros((self.size, values.shape[1]))
+        for rows, at, block in self.blocks:
+            out[at] += block[r].T @ values[rows]
+        return out
+
     def correlate(self, combined: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return Σ_r J_rᵀ v_r of values (R, n, P), shape (m, P)."""
         out = np.zeros((self.size, combined.shape[2]))
