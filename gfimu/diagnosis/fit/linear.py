@@ -85,10 +85,7 @@ class Linear:
     @cached_property
     def log_noise(self) -> float:
         """−½ log det of the noise covariance: to compare points of different noise."""
-        seen = [one.observed for one in self.posteriors]
-        reference = sum(float((one.weight[:, -1] > 0.0).sum() * np.log(one.levels.white[-1])) for one in seen)
-        # Coarse readings have probabilities, whose misfit holds all of the noise.
-        return -0.5 * sum(one.modes.log_determinant for one in seen if one.lacking == 0.0) - reference
+        return sum(one.observed.log_noise for one in self.posteriors)
 
 
 def of_causes(point: Point) -> ColumnsOf:

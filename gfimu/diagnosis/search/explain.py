@@ -122,7 +122,7 @@ def explain(
         tell(0.1 + 0.8 * number / policy.rounds, f"search {number + 1}")
         before = sets.best
         screening = screen(stretches, before.point)
-        _fit_leaders(sets, screening, before)
+        _fit_leaders(sets, screening, before, near=number > 0)
         best = prune(sets)
         fits += sets.count
         if number > 0 and best.key in seen:
@@ -188,12 +188,15 @@ def _under(sets: Sets, base: Point, some: Sequence[Fit]) -> Sets:
     return new
 
 
-def _fit_leaders(sets: Sets, screening: Screening, about: Fit) -> None:
+def _fit_leaders(sets: Sets, screening: Screening, about: Fit, *, near: bool) -> None:
+    """Fit the sets that lead in a linear world; ``near`` the best, where that world is the true one, only close ones."""
     policy = sets.policy
     blocks = Blocks(screening, policy)
     most = min(max(2, len(about.causes) + 1), policy.most_causes)
     points = []
-    for candidate in leading_sets(blocks, most, policy)[: policy.beam]:
+    candidates = leading_sets(blocks, most, policy)[: policy.beam]
+    least = candidates[0].log_odds - policy.close if near and candidates else -np.inf
+    for candidate in (one for one in candidates if one.log_odds >= least):
         causes = blocks.causes(candidate.members)
         moves = screening.drive_moves(candidate.members, causes)
         drives = tuple(drive.moved(move) for drive, move in zip(about.point.drives, moves, strict=True))

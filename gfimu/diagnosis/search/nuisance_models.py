@@ -64,7 +64,7 @@ def understand(stretches: Sequence[Stretch], policy: Policy, report: Report | No
     return replace(found[0], log_odds=values[0] - values[1] if len(values) > 1 else np.inf)
 
 
-_Admit = Callable[[Point], Point]
+_Admit = Callable[[Point], Point | None]
 
 
 def _models(
@@ -81,15 +81,21 @@ def _models(
     if first.first_levels.walk == 0.0:
         found.append(("random walk", lambda p: _walking(stretches, p, policy), policy.walk_odds))
         for scale, odds in residues[:1]:
-            both = lambda p, s=scale: with_residue(stretches, _walking(stretches, p, policy), s)  # noqa: E731
+
+            def both(point: Point, scale: float = scale) -> Point | None:
+                walking = _walking(stretches, point, policy)
+                return None if walking is None else with_residue(stretches, walking, scale)
+
             found.append(("random walk and calibration residue", both, policy.walk_odds + odds))
     return found
 
 
-def _walking(stretches: Sequence[Stretch], point: Point, policy: Policy) -> Point:
-    """Return the point with biases that walk as much as its residuals do, and the bias instability beside that."""
-    strength = walk_strength(stretches, point, policy).strength
-    levels = tuple(NoiseLevels(one.white, one.flicker, strength) for one in point.levels)
+def _walking(stretches: Sequence[Stretch], point: Point, policy: Policy) -> Point | None:
+    """Return the point with biases that walk as its residuals do, if they do, and the bias instability beside that."""
+    walk = walk_strength(stretches, point, policy)
+    if not walk.is_likely(policy):
+        return None
+    levels = tuple(NoiseLevels(one.white, one.flicker, walk.strength) for one in point.levels)
     return learn_noise(stretches, replace(point, levels=levels))
 
 
@@ -102,6 +108,8 @@ def _start(
     for one in known:
         for base in (one.best, one.nothing) if one.best.causes else (one.best,):
             point = admit(base.point)
+            if point is None:
+                continue
             if base.log_posterior + _promise(stretches, base.point, point) < best + odds - policy.hopeless:
                 continue
             sets = Sets(stretches, point, policy)

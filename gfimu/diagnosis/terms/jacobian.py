@@ -23,7 +23,7 @@ STEP = 1e-6
 """Numerical: finite difference of a coefficient of the angle, rad."""
 _FORGOTTEN = 3e-3  # numerical: share of a response's peak below which it counts as over
 _PROBES = 8  # numerical: coefficients at which the memory is measured
-_LEAST_SHARE = 1e-14  # numerical: power of a combination of observations that is rounding error of the largest
+_LEAST_SHARE = 1e-11  # numerical: power of a combination of observations that is second order in the step
 _INTERVALS = 12  # numerical: knot intervals of a block of rows
 
 
