@@ -152,7 +152,11 @@ def _relearned(stretches: Sequence[Stretch], point: Point, policy: Policy) -> Po
 
 def _near(sets: Sets, best: Fit) -> list[Fit]:
     """Return the sets that are worth another look under other nuisance parameters."""
-    close = [one for one in sets.ranked() if one.log_posterior > best.log_posterior - sets.policy.close]
+    close = [
+        one
+        for one in sets.ranked()
+        if one.log_posterior > best.log_posterior - sets.policy.close and not one.key > best.key
+    ]
     return [best, _nothing(sets), *close[: sets.policy.rivals + 1]]
 
 
@@ -194,7 +198,7 @@ def _fit_leaders(sets: Sets, screening: Screening, about: Fit, *, near: bool) ->
     blocks = Blocks(screening, policy)
     most = min(max(2, len(about.causes) + 1), policy.most_causes)
     points = []
-    candidates = leading_sets(blocks, most, policy)[: policy.beam]
+    candidates = leading_sets(blocks, most, policy)
     least = candidates[0].log_odds - policy.close if near and candidates else -np.inf
     for candidate in (one for one in candidates if one.log_odds >= least):
         causes = blocks.causes(candidate.members)
