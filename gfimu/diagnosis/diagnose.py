@@ -14,6 +14,7 @@ from gfimu.diagnosis.criticism.surrogate import surrogates
 from gfimu.diagnosis.data.prepared_runs import PreparedRuns
 from gfimu.diagnosis.data.stretch import make_stretches
 from gfimu.diagnosis.fit.gauss_newton import Fit
+from gfimu.diagnosis.fit.learn import predicted_by_reference
 from gfimu.diagnosis.free_body.diagnose import diagnose_body
 from gfimu.diagnosis.parallel import one_blas_thread
 from gfimu.diagnosis.policy import Policy
@@ -29,7 +30,7 @@ from gfimu.recording.carried_array import warn_of_other_array
 from gfimu.recording import Recording
 from gfimu.world_model import WorldModel, is_of_one_recording
 
-__all__ = ["diagnose"]
+__all__ = ["diagnose", "prepare"]
 
 Report = Callable[[float, str], None]
 
@@ -81,10 +82,15 @@ def diagnose(
         if model.drive_source == "gyro":
             return diagnose_body(recordings, model, held_out=held_out, names=labels, report=tell)
         tell(0.02, "read")
-        prepared = PreparedRuns.build(recordings, model, labels)
-        kept = PreparedRuns.build(held_out, model, held_labels) if held_out else None
+        prepared = prepare(recordings, model, labels)
+        kept = prepare(held_out, model, held_labels) if held_out else None
         found = _Diagnosis(prepared, kept, model, policy or Policy(), tell).verdict()
         return with_sample_notes(found, prepared.runs)
+
+
+def prepare(recordings: Sequence[Recording], model: WorldModel, names: Sequence[str]) -> PreparedRuns:
+    """Read recordings of a table and find the faults of their samples."""
+    return PreparedRuns.build(recordings, model, names, predicted_by_reference)
 
 
 class _Diagnosis:

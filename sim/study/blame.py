@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from gfimu.diagnosis.data.prepared_runs import PreparedRuns
 from gfimu.diagnosis.data.stretch import make_stretches
+from gfimu.diagnosis.diagnose import prepare
 from gfimu.diagnosis.fit.gauss_newton import Fit, fit
 from gfimu.diagnosis.parallel import one_blas_thread
 from gfimu.diagnosis.policy import Policy
@@ -55,7 +55,7 @@ def truth_over_found(world: HiddenWorld) -> float:
     """Return the log posterior of the truth less that of what the search finds, under the noise it ends with."""
     policy = Policy()
     with one_blas_thread():
-        prepared = PreparedRuns.build([world.recording], world.twin, ["run"])
+        prepared = prepare([world.recording], world.twin, ["run"])
         stretches = make_stretches(world.twin, prepared.runs, prepared.effects)
         found = understand_any_length(stretches, policy, lambda share, text: None).explanation
         hidden = [_as_cause(make_effect(name, values), world, found) for name, values in world.truth]

@@ -9,15 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.diagnosis.coloured_noise import NoiseLevels, estimate_flicker, likeliest_flicker, white_level
-from gfimu.diagnosis.data.stretch import Stretch
+from gfimu.diagnosis.data.run import Run
+from gfimu.diagnosis.data.stretch import Stretch, make_stretches
 from gfimu.diagnosis.fit.linear import Linear, Point, linearise
-from gfimu.diagnosis.fit.posterior import condition
 from gfimu.diagnosis.parallel import over_segments
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.slow_modes import WeighedPowers
 from gfimu.diagnosis.terms.drive import Drive
+from gfimu.world_model import WorldModel
 
-__all__ = ["FOLLOWED", "learn_noise", "learn_roughness", "sharpened", "starting_point"]
+__all__ = ["FOLLOWED", "learn_noise", "learn_roughness", "predicted_by_reference", "sharpened", "starting_point"]
 
 FOLLOWED = 0.6
 """Over the spacing of the knots, Hz: what is faster the drive does not follow."""
@@ -27,18 +28,27 @@ _REFERENCE_ROUNDS = 5  # numerical: to the roughness of a drive from its referen
 
 def starting_point(stretches: Sequence[Stretch], spacing: float) -> Point:
     """Return the drives that the references alone give, and the noise of the data sheet."""
+    drives = tuple(over_segments(lambda stretch: _by_reference(stretch, spacing), stretches))
+    return Point((), drives, tuple(stretch.first_levels for stretch in stretches))
 
-    def one(stretch: Stretch) -> Drive:
-        knots = max(spacing, stretch.run.sample_period)
-        std = np.inf if stretch.is_angle else stretch.start_angle_std
-        drive = Drive.still(stretch.times(), float(stretch.run.t[0]), knots, stretch.start_angle, std)
-        alone = stretch.of_reference()
-        for _ in range(_REFERENCE_ROUNDS):
-            posterior = condition(alone, drive, [], stretch.first_levels)
-            drive = drive.moved(posterior.step).relearned(posterior.covariance)
-        return drive
 
-    return Point((), tuple(over_segments(one, stretches)), tuple(s.first_levels for s in stretches))
+def _by_reference(stretch: Stretch, spacing: float) -> Drive:
+    knots = max(spacing, stretch.run.sample_period)
+    times = stretch.times()
+    std = np.inf if stretch.is_angle else stretch.start_angle_std
+    drive = Drive.still(times, float(stretch.run.t[0]), knots, stretch.start_angle, std)
+    noise = stretch.steps.reference_noise(float(stretch.first_levels.white[-1]))
+    weights = np.where(stretch.run.reference_valid, noise, np.inf)
+    order = 0 if stretch.is_angle else 1
+    return drive.by_reference(times[:, -1], stretch.run.reference, weights, order, _REFERENCE_ROUNDS)
+
+
+def predicted_by_reference(model: WorldModel, run: Run) -> NDArray[np.float64]:
+    """Predict the channels (n, c), m/s², of a run as its reference alone drives a model."""
+    stretches = make_stretches(model, [run], [[]])
+    point = starting_point(stretches, Policy().knots)
+    parts = [stretch.predict([], drive.spin)[:, :-1] for stretch, drive in zip(stretches, point.drives, strict=True)]
+    return np.concatenate(parts)
 
 
 def learn_roughness(stretches: Sequence[Stretch], point: Point, rounds: int = 1) -> Point:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import cho_solve_banded, cholesky_banded
 from scipy.ndimage import uniform_filter1d
 
 from gfimu.diagnosis.terms.spline import DEGREE, AngleSpline, SplineSpin
@@ -168,10 +169,64 @@ class Drive:
 
     def relearned(self, covariance: NDArray[np.float64]) -> Drive:
         """Return the drive with the roughness that it shows, given the covariance (m, m) of its coefficients."""
-        h = self.spline.spacing
-        bend = self.spline.bend(self.coefficients)
-        spread = np.diff(np.diff(covariance, DEGREE, axis=0), DEGREE, axis=1).diagonal() / h ** (2 * DEGREE)
-        window = max(round(ROUGH_FOR / h), 1)
+        spread = np.diff(np.diff(covariance, DEGREE, axis=0), DEGREE, axis=1).diagonal()
+        return self._rougher(spread / self.spline.spacing ** (2 * DEGREE))
+
+    def _rougher(self, spread: NDArray[np.float64]) -> Drive:
+        """Return the drive with the roughness that it shows, given the variance (k,) of the fourth derivative."""
+        window = max(round(ROUGH_FOR / self.spline.spacing), 1)
         known = uniform_filter1d(np.clip(1.0 - spread / self.roughness**2, 0.0, 1.0), window, mode="nearest")
-        power = uniform_filter1d(bend**2, window, mode="nearest") / np.maximum(known, _LEAST_KNOWN)
-        return replace(self, roughness=np.sqrt(power + LEAST_ROUGHNESS**2))
+        power = uniform_filter1d(self.spline.bend(self.coefficients) ** 2, window, mode="nearest")
+        return replace(self, roughness=np.sqrt(power / np.maximum(known, _LEAST_KNOWN) + LEAST_ROUGHNESS**2))
+
+    def by_reference(
+        self, t: NDArray[np.float64], values: NDArray[np.float64], std: NDArray[np.float64], order: int, rounds: int
+    ) -> Drive:
+        """Return the drive that a reference alone gives, and the roughness that it shows.
+
+        Parameters
+        ----------
+        t : ndarray, shape (n,)
+            Times at which the reference was read, s.
+        values : ndarray, shape (n,)
+            Angle, rad, or rate, rad/s, in units of the reference.
+        std : ndarray, shape (n,)
+            Standard deviations; infinite where a value does not count.
+        order : int
+            0 for an angle, 1 for a rate.
+        rounds : int
+            How often the roughness is learnt.
+        """
+        first, rows = self.spline.rows(t, order)  # (n,), (n, 5)
+        weight, size = 1.0 / std**2, self.spline.size
+        data, right = np.zeros((DEGREE + 1, size)), np.zeros(size)
+        for i in range(DEGREE + 1):
+            np.add.at(right, first + i, rows[:, i] * weight * values)
+            for j in range(i, DEGREE + 1):
+                np.add.at(data[j - i], first + i, rows[:, i] * weight * rows[:, j])
+        drive = replace(self, coefficients=np.zeros(size))
+        stencil = np.zeros((size, self.spline.intervals))
+        for place, one in enumerate(_STENCIL):
+            stencil[np.arange(self.spline.intervals) + place, np.arange(self.spline.intervals)] = one
+        for _ in range(rounds):
+            bands = data + drive._precision_bands()
+            root = cholesky_banded(bands, lower=True, check_finite=False)
+            drive = replace(drive, coefficients=np.zeros(size))
+            coefficients = cho_solve_banded((root, True), right + drive.pull(), check_finite=False)
+            spread = cho_solve_banded((root, True), stencil, check_finite=False)
+            spread = np.einsum("mk,mk->k", stencil, spread) / self.spline.spacing ** (2 * DEGREE)
+            drive = replace(drive, coefficients=coefficients)._rougher(spread)
+        return drive
+
+    def _precision_bands(self) -> NDArray[np.float64]:
+        """Return the lower bands of the prior's precision, shape (5, m)."""
+        bands = np.zeros((DEGREE + 1, self.spline.size))
+        scale = 1.0 / (self.roughness * self.spline.spacing**DEGREE) ** 2
+        for i, one in enumerate(_STENCIL):
+            for j in range(i, DEGREE + 1):
+                bands[j - i, i : i + len(scale)] += one * _STENCIL[j] * scale
+        if np.isfinite(self.angle_std):
+            row = self.spline.angle_row(self.since) / self.angle_std
+            for apart in range(DEGREE + 1):
+                bands[apart, : len(row) - apart] += row[apart:] * row[: len(row) - apart]
+        return bands

@@ -73,6 +73,14 @@ class AngleSpline:
         row[first[0] : first[0] + DEGREE + 1] = np.vander(passed, DEGREE + 1, increasing=True)[0] @ _pieces()
         return row
 
+    def rows(self, t: NDArray[np.float64], order: int) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+        """Return the first coefficient (n,) at each time, and what the angle, or a derivative, takes of five, (n, 5)."""
+        first, passed = self.interval(t)
+        pieces = _pieces()
+        for _ in range(order):
+            pieces = pieces[1:] * np.arange(1.0, len(pieces))[:, None] / self.spacing
+        return first, np.vander(passed, len(pieces), increasing=True) @ pieces
+
     def bend(self, coefficients: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the fourth derivative of the angle in each interval (k,), rad/s⁴, of coefficients (m,)."""
         return np.asarray(np.diff(coefficients, DEGREE, axis=0) / self.spacing**DEGREE)
