@@ -45,14 +45,14 @@ class Policy:
         About how long a held-out block is, s: several blocks in the shortest run, each much longer than a corner of
         the drive.
     block_angle_std : float
-        Standard deviation of the table's angle at the first sample of a block, rad: what the fit of the whole run
-        leaves open.
+        Standard deviation of the table's angle at the first sample of a block, rad: its uncertainty after the
+        fit of the whole run.
     significant_excess : float
         Standard errors of the noise floor from which held-out misfit counts as an excess.
     least_excess : float
         Share of the noise floor from which it counts: what the spectrum of slow noise may be wrong by.
     floor_slack : float
-        Standard errors by which the noise floor may be raised to what the fitted part leaves.
+        Standard errors by which the noise floor may be raised to the misfit of the fitted part.
     clipped : float
         Squares of fast residuals, in variances, at which they are clipped for the noise floor, so that a line does not
         count as noise: 3 σ.

@@ -1,4 +1,4 @@
-"""A held-out stretch measured: how far the given and the extended simulation are from it, and from its noise."""
+"""A held-out stretch measured: misfits of the given and of the extended simulation, and their noise floor."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _LEAST_VALID = 1e-3  # numerical: share of the samples that count
 
 @dataclass(frozen=True)
 class Measured:
-    """A held-out stretch: misfits of the given and the extended simulation, and what noise alone would leave.
+    """A held-out stretch: misfits of the given and of the extended simulation, and their noise floor.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ class Measured:
     floor, floor_variance : float
         Their expectation by noise alone, and its variance.
     fitted : float
-        What as many observations of the fitted part leave.
+        Whitened squares of as many observations of the fitted part.
     squares : tuple of float
         Sums of squares of the channels before and after, (m/s²)².
     samples, rows : int
@@ -131,7 +131,7 @@ def gain_of(measured: Sequence[Measured], policy: Policy, *, label: str) -> Gain
     )
     floor, fitted = (float(sum(getattr(one, name) for one in measured)) for name in ("floor", "fitted"))
     error = float(np.sqrt(sum(one.floor_variance for one in measured)))
-    # What the fitted part leaves within the error of the floor is noise whose learnt level is too low.
+    # A misfit of the fitted part within the error of the floor is noise whose learnt level is too low.
     floor += float(np.clip(fitted - floor, 0.0, policy.floor_slack * error))
     share, std = _share(before - floor, after - floor, error, floor, policy)
     blocks = np.concatenate([one.blocks for one in measured])
@@ -190,7 +190,7 @@ def _at_best(stretch: Stretch, drive: Drive, levels: NoiseLevels, policy: Policy
 
 
 def _floor(stretch: Stretch, drive: Drive, white: NDArray[np.float64], policy: Policy) -> tuple[float, float]:
-    """Return the squares that noise leaves of whitened residuals (n, c + 1), and their variance.
+    """Return the expected squares of whitened residuals (n, c + 1) by noise alone, and their variance.
 
     The white noise is that of the fast half, which the drive does not follow; squares are clipped, so that a line does
     not count as noise.

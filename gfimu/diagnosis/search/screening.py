@@ -17,7 +17,7 @@ from gfimu.diagnosis.terms.library import family_columns
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.world_model import EffectFamily, Whitened, shapes_to_screen
 
-__all__ = ["Hypothesis", "Screening", "Signature", "screen"]
+__all__ = ["Hypothesis", "Screening", "Signature", "columns_of_run", "screen"]
 
 _OF_MOTION = frozenset({"motion", "timing", "reference"})  # a table at rest shows nothing of these
 _FREEST = 0.5  # prior share of the freest place; the others share the rest
@@ -97,7 +97,7 @@ def screen(stretches: Sequence[Stretch], point: Point) -> Screening:
 
     def columns(stretch: Stretch, at: Posterior) -> Columns:
         parts = [family_columns(stretch, at.observed, at.drive, causes, s.family, s.shape) for s in signatures]
-        numbers = np.concatenate([_of_run(s, array, stretch.index) for s in signatures])
+        numbers = np.concatenate([columns_of_run(s, array, stretch.index) for s in signatures])
         return Columns.together(parts).among(numbers, count)
 
     jacobians = [one.jacobian for one in first.posteriors]
@@ -110,7 +110,8 @@ def screen(stretches: Sequence[Stretch], point: Point) -> Screening:
     return Screening(tuple(signatures), hypotheses, linear.gram, score, base, linear.responses)
 
 
-def _of_run(signature: Signature, array: AccelerometerArray, run: int) -> NDArray[np.intp]:
+def columns_of_run(signature: Signature, array: AccelerometerArray, run: int) -> NDArray[np.intp]:
+    """Return the columns of a signature's sizes in a run, shape (m,)."""
     count = len(signature.family.sizes(array))
     block = run if len(signature.columns) > count else 0
     return signature.columns[block * count : (block + 1) * count]
