@@ -96,13 +96,13 @@ def test_the_jerk_of_the_reference_is_no_sign_beside_a_cause_with_a_memory():
     assert beside.log_odds < found.log_odds
 
 
-def test_a_weakly_damped_mode_that_is_fitted_exactly_lacks_nothing():
-    """The drive's prior is smoother than a table that a mode acts back on: its jerk alone would be a lack of fit."""
+def test_a_weakly_damped_mode_that_is_fitted_exactly_leaves_no_dependence():
+    """The drive's prior is smoother than a table that a mode acts back on: the jerk of its reference has 11 nats."""
     shape = {"frequency_hz": 3.97, "damping_ratio": 0.0125}
     mode = make_effect("resonance", {"gain": 0.82, **shape})
     run = recorded(7, effects=[mode], duration=20.0)
     stretches, fit = fitted(run, causes=[cause("resonance", shape=shape)], exact=True)
-    assert lack_of_fit(stretches, fit).log_odds < 5.0
+    assert dependence_unexplained(stretches, fit.point).log_odds < 5.0
 
 
 def test_many_isolated_samples_are_a_lack_of_fit():

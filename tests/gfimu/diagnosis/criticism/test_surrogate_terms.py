@@ -84,7 +84,7 @@ def test_a_hint_is_taken_where_it_predicts_best():
 
 
 def test_terms_that_were_chosen_on_some_runs_are_fitted_to_all():
-    stretches, nothing = fitted(recorded(3, pickup), recorded(30, pickup), recorded(31, pickup))
+    stretches, nothing = fitted(recorded(3, pickup), recorded(30, pickup))
     # Every run gives one at least: two stretches of the first leave it one.
     twice = (stretches[0], *stretches)
     point = replace(
@@ -92,7 +92,7 @@ def test_terms_that_were_chosen_on_some_runs_are_fitted_to_all():
         drives=(nothing.point.drives[0], *nothing.point.drives),
         levels=(nothing.point.levels[0], *nothing.point.levels),
     )
-    found = surrogates(twice, replace(nothing, point=point), replace(POLICY, searched_stretches=3))
+    found = surrogates(twice, replace(nothing, point=point), replace(POLICY, most_searched=2))
     [term] = found[-1].terms
-    assert len(found[-1].fit.point.drives) == 4
+    assert len(found[-1].fit.point.drives) == 3
     assert term.sizes(twin().array, 0).sum() / term.family.units.rate == pytest.approx(0.02, rel=0.03)
