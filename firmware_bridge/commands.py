@@ -4,19 +4,22 @@ from __future__ import annotations
 
 import enum
 import struct
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from firmware_bridge.checksum import crc16
-from firmware_bridge.frames import FrameType
 from gfimu.errors import InputError
 
 __all__ = [
+    "LPC1768_DIALOGUE",
     "RATES_HZ",
     "RATE_CODE_AUTO",
     "Command",
+    "Dialogue",
+    "FrameType",
     "Identity",
     "Reply",
     "Result",
@@ -35,6 +38,14 @@ RATES_HZ = (10, 3200)
 
 _LARGEST_RATE_CODE = 15
 _PAYLOADS = {3: "<HB", 4: "<BB", 5: "<B", 7: "<I"}
+
+
+class FrameType(enum.IntEnum):
+    """Content of an `lpc1768` frame."""
+
+    SAMPLE = 1
+    IDENTITY = 2
+    REPLY = 3
 
 
 class Command(enum.IntEnum):
@@ -126,6 +137,28 @@ class Identity:
         return 1 if self.full_resolution else self.range_g // 2
 
 
+@dataclass(frozen=True)
+class Dialogue:
+    """Commands that a board understands, and how its answers are read.
+
+    Parameters
+    ----------
+    identify : bytes
+        Command that asks for the identity.
+    identify_code : int
+        Number of that command in its reply.
+    start : bytes
+        Command that starts the stream of samples.
+    parse : callable
+        Packet that is no sample to `Reply` or `Identity`, or None.
+    """
+
+    identify: bytes
+    identify_code: int
+    start: bytes
+    parse: Callable[[Any], Reply | Identity | None]
+
+
 def encode_command(command: int, *values: int) -> bytes:
     """Encode a command with its values (docs/frames.md)."""
     try:
@@ -184,3 +217,9 @@ def parse_message(packet: Any) -> Reply | Identity | None:
         drop,
         tuple(bool(present >> (sensors + k) & 1) for k in range(sensors)),
     )
+
+
+LPC1768_DIALOGUE = Dialogue(
+    encode_command(Command.IDENTIFY), Command.IDENTIFY, encode_command(Command.START), parse_message
+)
+"""The dialogue of the project's firmware."""

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from firmware_bridge.checksum import crc16, crc16_rows, sum16_rows
+from firmware_bridge.commands import LPC1768_DIALOGUE, Dialogue, FrameType
 from firmware_bridge.packets import PacketLayout, PacketScanner
 from gfimu.errors import unknown_name
 from gfimu.short_repr import short_repr
@@ -40,14 +41,6 @@ NO_TEMPERATURE = -(1 << 15)
 
 SYNC = (0xA5, 0x5A)
 _LONGEST_GAP_OVER_WRAP_S = 10.0
-
-
-class FrameType(enum.IntEnum):
-    """What an `lpc1768` frame carries."""
-
-    SAMPLE = 1
-    IDENTITY = 2
-    REPLY = 3
 
 
 class Status(enum.IntFlag):
@@ -104,7 +97,7 @@ MIMU4444_DTYPE = np.dtype(
 
 @dataclass(frozen=True)
 class FrameFormat:
-    """One entry of the format registry.
+    """One frame format: all that decoding and recording need to know of a board's stream.
 
     Parameters
     ----------
@@ -113,13 +106,25 @@ class FrameFormat:
     layout : PacketLayout
         The packet on the wire.
     clock_field : str
-        Field that holds the board's time stamp.
+        Field that holds the board's time stamp, an unsigned integer.
     clock_hz : float
         Ticks of the time stamp per second.
     array : str
         Array file whose channels the counts belong to.
     channels : tuple of int
-        Columns of the ``counts`` field that are the array's channels, in order.
+        Columns of the counts that are the array's channels, in order.
+    sequence_field : str
+        Field that holds the sequence number, an unsigned integer.
+    counts_field : str
+        Field that holds the raw counts, signed integers.
+    status_field : str, optional
+        Field with status bits as in `Status`; None if there is none.
+    sample_type : tuple of (str, int), optional
+        Field and its value that mark a packet as a sample; None if every packet is one.
+    no_reading : int, optional
+        Count that stands for a missing reading.
+    dialogue : Dialogue, optional
+        Commands and answers of the board; None if it only sends.
     """
 
     name: str
@@ -128,42 +133,68 @@ class FrameFormat:
     clock_hz: float
     array: str
     channels: tuple[int, ...]
+    sequence_field: str = "sequence"
+    counts_field: str = "counts"
+    status_field: str | None = None
+    sample_type: tuple[str, int] | None = None
+    no_reading: int | None = None
+    dialogue: Dialogue | None = None
 
     def is_sample(self, packets: NDArray[Any]) -> NDArray[np.bool_]:
         """Tell which packets, shape (n,), carry a sample."""
-        if "type" not in (self.layout.dtype.names or ()):
+        if self.sample_type is None:
             return np.ones(len(packets), dtype=bool)
-        return np.asarray(packets["type"] == FrameType.SAMPLE)
+        field, value = self.sample_type
+        return np.asarray(packets[field] == value)
 
     def status(self, packets: NDArray[Any]) -> NDArray[np.uint16]:
         """Status bits of the packets, shape (n,); zero in formats without them."""
-        if "status" not in (self.layout.dtype.names or ()):
+        if self.status_field is None:
             return np.zeros(len(packets), dtype=np.uint16)
-        return packets["status"].astype(np.uint16)
+        return packets[self.status_field].astype(np.uint16)
+
+    def counts(self, packets: NDArray[Any]) -> NDArray[Any]:
+        """Raw counts of the array's channels, shape (n, c), in the byte order of this machine."""
+        counts = packets[self.counts_field][:, list(self.channels)]
+        return np.asarray(counts, dtype=counts.dtype.newbyteorder("="))
+
+    def mask_of(self, field: str) -> int:
+        """Largest value of an unsigned field, at which it wraps; of 8 bytes, only 63 bits are used."""
+        return (1 << min(8 * self.layout.dtype[field].itemsize, 63)) - 1
 
 
 FORMATS: dict[str, FrameFormat] = {
-    "lpc1768": FrameFormat(
-        "lpc1768",
-        PacketLayout(LPC1768_DTYPE, ((0, SYNC[0]), (1, SYNC[1]), (2, FRAME_VERSION)), crc16_rows),
-        clock_field="time_us",
-        clock_hz=1e6,
-        array="cube12",
-        channels=tuple(range(12)),
-    ),
-    "mimu4444": FrameFormat(
-        "mimu4444",
-        PacketLayout(MIMU4444_DTYPE, ((0, 0xAA), (3, 0x64)), sum16_rows),
-        clock_field="ticks",
-        clock_hz=64e6,
-        array="mimu4444",
-        channels=tuple(6 * chip + axis for chip in range(8) for axis in range(3)),
-    ),
+    known.name: known
+    for known in (
+        FrameFormat(
+            "lpc1768",
+            PacketLayout(LPC1768_DTYPE, ((0, SYNC[0]), (1, SYNC[1]), (2, FRAME_VERSION)), crc16_rows),
+            clock_field="time_us",
+            clock_hz=1e6,
+            array="cube12",
+            channels=tuple(range(12)),
+            status_field="status",
+            sample_type=("type", FrameType.SAMPLE),
+            no_reading=-(1 << 15),
+            dialogue=LPC1768_DIALOGUE,
+        ),
+        FrameFormat(
+            "mimu4444",
+            PacketLayout(MIMU4444_DTYPE, ((0, 0xAA), (3, 0x64)), sum16_rows),
+            clock_field="ticks",
+            clock_hz=64e6,
+            array="mimu4444",
+            channels=tuple(6 * chip + axis for chip in range(8) for axis in range(3)),
+        ),
+    )
 }
+"""Every frame format by name."""
 
 
-def frame_format(name: str) -> FrameFormat:
-    """Look up a frame format; raises `InputError` that lists the formats."""
+def frame_format(name: str | FrameFormat) -> FrameFormat:
+    """Return a frame format given as such or by name; raises `InputError` that lists the formats."""
+    if isinstance(name, FrameFormat):
+        return name
     if name not in FORMATS:
         raise unknown_name("frame format", name, FORMATS)
     return FORMATS[name]
@@ -234,8 +265,8 @@ class Samples:
     """
 
     ticks: NDArray[np.int64]
-    sequence: NDArray[np.uint16]
-    counts: NDArray[np.int16]
+    sequence: NDArray[Any]
+    counts: NDArray[Any]
     status: NDArray[np.uint16]
     lost_before: NDArray[np.int64]
     segment: NDArray[np.int64]
@@ -270,8 +301,8 @@ class SampleDecoder:
 
     Parameters
     ----------
-    name : str
-        Format name in `FORMATS`.
+    form : str or FrameFormat
+        The format, or its name in `FORMATS`.
 
     Attributes
     ----------
@@ -279,8 +310,8 @@ class SampleDecoder:
         Packets that are no samples (identity, replies), since the caller last cleared the list.
     """
 
-    def __init__(self, name: str = "lpc1768") -> None:
-        self.format = frame_format(name)
+    def __init__(self, form: str | FrameFormat = "lpc1768") -> None:
+        self.format = frame_format(form)
         self.messages: list[NDArray[Any]] = []
         self._scanner = PacketScanner(self.format.layout)
         self._last: tuple[int, int, int] | None = None  # sequence, raw clock, unwrapped ticks
@@ -321,11 +352,12 @@ class SampleDecoder:
         status = self.format.status(packets)
         lost, fresh, ticks = np.zeros((3, n), dtype=np.int64)
         if n:
-            sequence = packets["sequence"].astype(np.int64)
+            wrap = self.format.mask_of(self.format.sequence_field)
+            sequence = packets[self.format.sequence_field].astype(np.int64)
             clock = packets[self.format.clock_field].astype(np.int64)
             last_sequence, last_clock, last_ticks = self._last or (int(sequence[0]) - 1, int(clock[0]), int(clock[0]))
-            steps = np.diff(sequence, prepend=last_sequence) & 0xFFFF
-            spans = np.diff(clock, prepend=last_clock) & 0xFFFFFFFF
+            steps = np.diff(sequence, prepend=last_sequence) & wrap
+            spans = np.diff(clock, prepend=last_clock) & self.format.mask_of(self.format.clock_field)
             first = (status & Status.FIRST) != 0
             # A clock that went back has wrapped if that makes a short step; otherwise the board started anew.
             back = np.diff(clock, prepend=last_clock) < 0
@@ -336,7 +368,7 @@ class SampleDecoder:
             for place in np.flatnonzero(odd).tolist():
                 fresh[place] = anew[place]
                 known = not (first[place] or anew[place])
-                gap = _samples_in_gap(steps[place], spans[place], periods.before(place)) if known else None
+                gap = _samples_in_gap(steps[place], spans[place], periods.before(place), wrap + 1) if known else None
                 if gap is None:
                     periods.start_anew(place)  # sampling began again, perhaps at another rate
                 else:
@@ -350,8 +382,9 @@ class SampleDecoder:
         self._segment += int(fresh.sum())
         self._samples += n
         self._lost += int(lost.sum())
-        counts = packets["counts"][:, list(self.format.channels)].astype(np.int16)
-        return Samples(ticks, packets["sequence"].astype(np.uint16), counts, status, lost, segment)
+        numbers = packets[self.format.sequence_field]
+        numbers = numbers.astype(numbers.dtype.newbyteorder("="))
+        return Samples(ticks, numbers, self.format.counts(packets), status, lost, segment)
 
 
 class _RecentPeriods:
@@ -377,15 +410,15 @@ class _RecentPeriods:
         return (self._earlier + here)[-self.LENGTH :]
 
 
-def _samples_in_gap(step: int, span: int, periods: list[int]) -> int | None:
+def _samples_in_gap(step: int, span: int, periods: list[int], numbers: int) -> int | None:
     """Sample periods between a sample and the one before it; None if time and sequence contradict each other.
 
-    The sequence number knows the gap modulo 2¹⁶; the time stamp, divided by the sample period, knows the rest.
+    The sequence number counts the gap modulo ``numbers``; the time stamp, divided by the sample period, gives the rest.
     """
     if step == 0:
         return None
     if not periods:
         return int(step)
     by_clock = float(span) / float(np.median(periods))
-    gap = int(step) + 65536 * max(0, round((by_clock - int(step)) / 65536))
+    gap = int(step) + numbers * max(0, round((by_clock - int(step)) / numbers))
     return gap if abs(gap - by_clock) <= 1.5 + 0.05 * gap else None

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 import gfimu
 from firmware_bridge.clock import ClockFit, HostClock, SampleRate
-from firmware_bridge.commands import Command, Identity, Reply, encode_command, parse_message
+from firmware_bridge.commands import Dialogue, Identity, Reply
 from firmware_bridge.frames import FrameFormat, SampleDecoder, Samples, Status, StreamCounts, frame_format
 from firmware_bridge.journal import Journal, JournalError
 from firmware_bridge.link import Link
@@ -30,7 +30,6 @@ from gfimu.recording.carried_array import array_metadata
 __all__ = ["Batch", "RecordReport", "SampleClock", "record"]
 
 _FLUSH_S = 0.25
-_NO_READING = -(1 << 15)
 _SILENCE_S = 5.0
 _ANSWER_S = 0.5  # samples wait so long for the board to tell their scale
 _SETUP_ANSWER_S = 3.0  # and so long if they will be left out because the board was not set up yet
@@ -129,7 +128,7 @@ class _Session:
     def __init__(
         self, form: FrameFormat, array: AccelerometerArray, out: Path, metadata: dict[str, Any], *, has_setup: bool
     ) -> None:
-        self.decoder = SampleDecoder(form.name)
+        self.decoder = SampleDecoder(form)
         self.clock = HostClock()
         self.times = SampleClock(form.clock_hz)
         self.rate = SampleRate(form.clock_hz)
@@ -140,7 +139,7 @@ class _Session:
         self.first_s: float | None = None
         self.last_s = 0.0
         self.status_counts: dict[str, int] = {}
-        self.waiting_for_board = form.name == "lpc1768"  # for its answer to the setup, which tells the scale
+        self.waiting_for_board = form.dialogue is not None  # for its answer to the setup, which gives the scale
         self.give_up_s = time.monotonic() + (_SETUP_ANSWER_S if has_setup else _ANSWER_S)
         self._form, self._array, self._out, self._metadata = form, array, out, metadata
         self._has_setup = has_setup
@@ -152,14 +151,9 @@ class _Session:
     def take(self, data: bytes, host_s: float) -> Batch | None:
         """Decode bytes read at ``host_s``; return the samples they complete."""
         samples = self.decoder.feed(data)
-        for packet in self.decoder.messages:
-            message = parse_message(packet)
-            if isinstance(message, Identity) and self.asked:
-                self.identity = message
-            elif isinstance(message, Reply):
-                self.asked |= message.command == Command.IDENTIFY
-                if message.result:
-                    self.refused.append(message)
+        if self._form.dialogue is not None:
+            for packet in self.decoder.messages:
+                self._hear(self._form.dialogue, packet)
         self.decoder.messages.clear()
         if not len(samples):
             return None
@@ -173,6 +167,16 @@ class _Session:
                 return None
             return self.release()
         return self._accept(samples, host_s)
+
+    def _hear(self, dialogue: Dialogue, packet: NDArray[Any]) -> None:
+        """Take an answer of the board; identities of an earlier listener do not count."""
+        message = dialogue.parse(packet)
+        if isinstance(message, Identity) and self.asked:
+            self.identity = message
+        elif isinstance(message, Reply):
+            self.asked |= message.command == dialogue.identify_code
+            if message.result:
+                self.refused.append(message)
 
     def release(self) -> Batch | None:
         """Take the samples that were held back until the board's answer told their scale."""
@@ -190,9 +194,10 @@ class _Session:
     def _accept(self, samples: Samples, host_s: float) -> Batch:
         """Scale samples and place them in time."""
         counts = samples.counts.astype(float)
-        if self._form.name == "lpc1768":
-            counts[samples.counts == _NO_READING] = np.nan
-            counts *= self.identity.count_size if self.identity else 1
+        if self._form.no_reading is not None:
+            counts[samples.counts == self._form.no_reading] = np.nan
+        if self.identity is not None:
+            counts *= self.identity.count_size
         batch = Batch(self.times.place(samples, host_s), counts, samples.status)
         self.rate.add(samples)
         for flag in Status:
@@ -231,7 +236,7 @@ def record(
     out: str | Path,
     *,
     duration_s: float | None = None,
-    form: str = "lpc1768",
+    form: str | FrameFormat = "lpc1768",
     array: str = "",
     baud: int = 1_562_500,
     setup: tuple[bytes, ...] = (),
@@ -249,8 +254,8 @@ def record(
         ``.csv`` or ``.parquet``; can be read at any moment, at most half a second behind.
     duration_s : float, optional
         Length of the recording, s of board time; by default until stopped.
-    form : str
-        Frame format: ``lpc1768`` or ``mimu4444``.
+    form : str or FrameFormat
+        Frame format, or its name in `firmware_bridge.frames.FORMATS`.
     array : str
         Array file; by default the format's.
     baud : int
@@ -276,16 +281,20 @@ def record(
     target = Path(out)
     check_outputs([("out", target, RECORDING)])
     layout = frame_format(form)
+    if setup and layout.dialogue is None:
+        raise InputError(f"format {layout.name} has no commands: rate and range can't be set; leave them out")
     carried = AccelerometerArray.load(array or layout.array)
     if carried.n_channels != len(layout.channels):
-        raise InputError(f"array {carried.name!r} has {carried.n_channels} channels, {form} {len(layout.channels)}")
+        raise InputError(
+            f"array {carried.name!r} has {carried.n_channels} channels, {layout.name} {len(layout.channels)}"
+        )
     part = carried.chips[0].part
     metadata: dict[str, Any] = {
         **array_metadata(carried),
         "part": part,
         "lsb_m_s2": Part.load(part, carried.part_files).lsb,
         "port": port,
-        "format": form,
+        "format": layout.name,
         "started_utc": datetime.now(UTC).isoformat(timespec="milliseconds"),
         "software_version": gfimu.__version__,
         "time_stamp_clock": "board",
@@ -297,7 +306,7 @@ def record(
             link,
             session,
             duration_s,
-            setup if form == "lpc1768" else (),
+            setup,
             on_batch,
             lambda: asked() or (stop is not None and stop()),
         )
@@ -315,7 +324,7 @@ def record(
         if isinstance(trouble, GfimuError):
             raise trouble
         raise InputError(
-            f"{port}: no {form} frame came; check the port, the baud rate ({baud}) and --format "
+            f"{port}: no {layout.name} frame came; check the port, the baud rate ({baud}) and --format "
             f"({session.decoder.counts.skipped_bytes} bytes were no frames)"
         )
     counts = session.decoder.counts
@@ -369,8 +378,9 @@ def _run(
     heard_at = asked_at = time.monotonic()
     for command in setup:
         link.write(command)
-    if session.decoder.format.name == "lpc1768":
-        link.write(encode_command(Command.IDENTIFY))
+    dialogue = session.decoder.format.dialogue
+    if dialogue is not None:
+        link.write(dialogue.identify)
     restarts = 0
     seen: Identity | None = None
     try:
@@ -383,8 +393,8 @@ def _run(
                 batch = session.take(chunk.data, chunk.host_s)
                 if session.identity is not seen:
                     seen = session.identity
-                    if seen is not None and not seen.streaming:
-                        link.write(encode_command(Command.START))  # someone stopped it
+                    if dialogue is not None and seen is not None and not seen.streaming:
+                        link.write(dialogue.start)  # someone stopped it
                 if session.decoder.counts.restarts > restarts:
                     restarts = session.decoder.counts.restarts
                     for command in setup:
@@ -403,9 +413,9 @@ def _run(
                 return None
             if session.first_s is None and now - heard_at > _SILENCE_S:
                 return None
-            if session.identity is None and now - asked_at > _IDENTIFY_EVERY_S:
+            if dialogue is not None and session.identity is None and now - asked_at > _IDENTIFY_EVERY_S:
                 asked_at = now
-                link.write(encode_command(Command.IDENTIFY))
+                link.write(dialogue.identify)
     except GfimuError as error:
         return error
     return None

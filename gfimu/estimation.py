@@ -1,5 +1,5 @@
 """`gfimu.motion.estimation` by its former name, for programs that import it from here."""
 
-from gfimu.motion.estimation import METHODS, Estimate, estimate
+from gfimu.motion.estimation import Estimate, estimate
 
-__all__ = ["METHODS", "Estimate", "estimate"]
+__all__ = ["Estimate", "estimate"]

@@ -2,6 +2,7 @@
 
 import os
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -52,3 +53,20 @@ def shared_data() -> Path:
     if not folder.is_dir():
         pytest.skip(f"measured data not found at {folder}")
     return folder
+
+
+@pytest.fixture(scope="session")
+def made_once(tmp_path_factory) -> Callable[[str, Callable[[], str]], str]:
+    """Texts that are costly to make, as ``made_once(file_name, make)``: the test processes of one run share them."""
+    folder = tmp_path_factory.getbasetemp()
+    folder = folder.parent if _share else folder  # of the whole run
+
+    def text(name: str, make: Callable[[], str]) -> str:
+        path = folder / name
+        if not path.exists():
+            part = path.with_name(f"{name}.{os.getpid()}")
+            part.write_text(make(), encoding="utf-8")
+            part.replace(path)  # the other process sees all of it or nothing
+        return path.read_text(encoding="utf-8")
+
+    return text

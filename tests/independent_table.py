@@ -160,13 +160,14 @@ def differenced_readings(rig, t, angle, rate):
         nod = np.outer(amplitude * np.cos(angle + phase), [np.cos(azimuth), np.sin(azimuth), 0.0])
         frame = Rotation.from_rotvec(nod).as_matrix() @ frame
     arms = rig.arms[None] * (1.0 + rig.stretch * rate**2)[:, None, None]
-    positions = np.einsum("nij,nkj->nki", frame, arms)
+    to_rig = frame.transpose(0, 2, 1)
+    positions = arms @ to_rig  # (n, 4, 3)
     h = t[1] - t[0]
     inner = len(t) - 8
     acceleration = sum(c * positions[k : k + inner] for k, c in enumerate(_STENCIL)) / h**2
     acceleration = np.concatenate([acceleration[:1]] * 4 + [acceleration] + [acceleration[-1:]] * 4)
-    axes = np.einsum("nij,kaj->nkai", frame, rig.axes)
-    return np.einsum("nkai,nki->nka", axes, acceleration - rig.down).reshape(len(t), 12)
+    axes = (rig.axes.reshape(12, 3) @ to_rig).reshape(len(t), 4, 3, 3)
+    return (axes @ (acceleration - rig.down)[..., None]).reshape(len(t), 12)
 
 
 def random_command(rng, duration, top=15.0):

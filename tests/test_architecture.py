@@ -27,24 +27,24 @@ def is_type_checking(node: ast.AST) -> bool:
     return isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test)
 
 
-def imported_names(node: ast.AST):
-    """Dotted names that the code below a node imports, inside functions too, but not for type checkers only."""
+def imported_names(node: ast.AST, *, by_types: bool = False):
+    """Dotted names that the code below a node imports, inside functions too; for type checkers only ``by_types``."""
     for child in ast.iter_child_nodes(node):
         if isinstance(child, ast.Import):
             yield from (alias.name for alias in child.names)
         elif isinstance(child, ast.ImportFrom):
             assert child.level == 0, "relative import: write the full name"
             yield from (f"{child.module}.{alias.name}" for alias in child.names)
-        elif is_type_checking(child):
+        elif is_type_checking(child) and not by_types:
             yield from imported_names(ast.Module(child.orelse, []))
         else:
-            yield from imported_names(child)
+            yield from imported_names(child, by_types=by_types)
 
 
-def modules_imported(source: str) -> set[str]:
+def modules_imported(source: str, *, by_types: bool = False) -> set[str]:
     """Modules that a source imports; names inside a project module count as that module."""
     found = set()
-    for name in imported_names(ast.parse(source)):
+    for name in imported_names(ast.parse(source), by_types=by_types):
         module = name
         while module not in FILES and "." in module and module.split(".")[0] in PACKAGES:
             module = module.rpartition(".")[0]
@@ -161,6 +161,75 @@ def test_firmware_bridge_imports_recordings_and_the_chip_only():
     )
 
 
+def refuse_circles(imports: dict[str, set[str]]) -> None:
+    graph = {module: {name for name in names if name in FILES} for module, names in imports.items()}
+    try:
+        graphlib.TopologicalSorter(graph).prepare()
+    except graphlib.CycleError as error:
+        pytest.fail("circular import: " + " → ".join(error.args[1]))
+
+
+def test_no_circular_imports():
+    refuse_circles(IMPORTS)
+
+
+def test_no_circles_in_firmware_bridge_even_by_types():
+    """A chip or peripheral knows the bus protocol, not the board that implements it."""
+    refuse_circles(
+        {
+            module: modules_imported(file.read_text(encoding="utf-8"), by_types=True)
+            for module, file in FILES.items()
+            if inside(module, "firmware_bridge")
+        }
+    )
+
+
+def test_peripherals_know_the_bus_and_not_the_board():
+    """The processor, the peripherals and the chips name neither the board nor each other's types for its sake."""
+    above = {"board", "fast_board", "worker"}
+    for module, file in FILES.items():
+        if inside(module, "firmware_bridge.board") and module.rpartition(".")[2] not in above:
+            names = modules_imported(file.read_text(encoding="utf-8"), by_types=True)
+            assert not names & {f"firmware_bridge.board.{name}" for name in above}, module
+
+
+def test_the_reader_of_imports_sees_every_form():
+    source = """
+import sim.world
+from typing import TYPE_CHECKING
+if TYPE_CHECKING:
+    import serial
+else:
+    import json
+def f():
+    from gfimu.geometry.array import Chip
+    from gfimu import recording
+"""
+    run = {"sim.world", "typing.TYPE_CHECKING", "json", "gfimu.geometry.array", "gfimu.recording"}
+    assert modules_imported(source) == run
+    assert modules_imported(source, by_types=True) == run | {"serial"}
+
+
+@pytest.mark.parametrize("module", FILES)
+def test_every_module_says_what_it_is(module):
+    assert ast.get_docstring(ast.parse(FILES[module].read_text(encoding="utf-8")))
+
+
+@pytest.mark.parametrize("name", gfimu.__all__)
+def test_public_names_can_be_imported(name):
+    assert getattr(gfimu, name) is not None
+
+
+def test_unknown_public_name():
+    with pytest.raises(AttributeError, match="no attribute 'nonsense'"):
+        gfimu.nonsense  # noqa: B018
+
+
+def test_test_files_have_names_of_their_own():
+    names = Counter(file.name for file in (ROOT / "tests").rglob("test_*.py"))
+    assert [name for name, count in names.items() if count > 1] == []
+
+
 COMMON = {"gfimu", "gfimu.errors", "gfimu.units", "gfimu.files.outputs", "gfimu.files.atomic_file", "gfimu.short_repr"}
 """Modules that every room may import; of `gfimu` itself the version."""
 
@@ -168,7 +237,7 @@ ROOMS = {
     "gfimu.files": set(),
     "gfimu.parts": {"gfimu.files", "gfimu.geometry.array"},
     "gfimu.geometry": {"gfimu.bounds", "gfimu.files", "gfimu.parts.files"},
-    "gfimu.recording": {"gfimu.files", "gfimu.geometry", "gfimu.parts"},
+    "gfimu.recording": {"gfimu.files", "gfimu.geometry", "gfimu.parts", "gfimu.rate.integration"},
     "gfimu.motion": {"gfimu.files", "gfimu.geometry", "gfimu.parts", "gfimu.rate", "gfimu.recording"},
     "gfimu.position_drift": {"gfimu.geometry", "gfimu.motion", "gfimu.rate.integration"},
     "gfimu.diagnosis.data": {
@@ -239,7 +308,7 @@ FORMER = {
 @pytest.mark.parametrize("former", FORMER)
 def test_former_names_of_modules_give_the_same_objects(former):
     old, new = importlib.import_module(former), importlib.import_module(FORMER[former])
-    assert old.__all__ == new.__all__
+    assert set(old.__all__) <= set(new.__all__)
     assert all(getattr(old, name) is getattr(new, name) for name in old.__all__)
 
 
@@ -262,52 +331,3 @@ def test_few_modules_are_in_no_room():
         "gfimu.units",
         "gfimu.world_model",
     }
-
-
-def test_no_circular_imports():
-    graph = {module: {name for name in names if name in FILES} for module, names in IMPORTS.items()}
-    try:
-        graphlib.TopologicalSorter(graph).prepare()
-    except graphlib.CycleError as error:
-        pytest.fail("circular import: " + " → ".join(error.args[1]))
-
-
-def test_the_reader_of_imports_sees_every_form():
-    source = """
-import sim.world
-from typing import TYPE_CHECKING
-if TYPE_CHECKING:
-    import serial
-else:
-    import json
-def f():
-    from gfimu.geometry.array import Chip
-    from gfimu import recording
-"""
-    assert modules_imported(source) == {
-        "sim.world",
-        "typing.TYPE_CHECKING",
-        "json",
-        "gfimu.geometry.array",
-        "gfimu.recording",
-    }
-
-
-@pytest.mark.parametrize("module", FILES)
-def test_every_module_says_what_it_is(module):
-    assert ast.get_docstring(ast.parse(FILES[module].read_text(encoding="utf-8")))
-
-
-@pytest.mark.parametrize("name", gfimu.__all__)
-def test_public_names_can_be_imported(name):
-    assert getattr(gfimu, name) is not None
-
-
-def test_unknown_public_name():
-    with pytest.raises(AttributeError, match="no attribute 'nonsense'"):
-        gfimu.nonsense  # noqa: B018
-
-
-def test_test_files_have_names_of_their_own():
-    names = Counter(file.name for file in (ROOT / "tests").rglob("test_*.py"))
-    assert [name for name, count in names.items() if count > 1] == []

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Protocol
+from typing import Any
 
 from firmware_bridge.adxl345_device import TICKS_PER_SECOND, Adxl345, LineFault
+from firmware_bridge.board.bus import Tracer
 from firmware_bridge.board.cpu import Cpu
 from firmware_bridge.board.dwt import CycleCounter
 from firmware_bridge.board.gpdma import Gpdma
@@ -21,7 +22,7 @@ from firmware_bridge.board.uart import Uart
 from firmware_bridge.board.watchdog import Watchdog
 from firmware_bridge.lpc1768.elf import ElfImage
 
-__all__ = ["Board", "Tracer"]
+__all__ = ["Board"]
 
 _ACCESS_CYCLES = 4
 _SPI_SELECT_PORT = 2  # P2.0…P2.3 select sensors 1…4
@@ -43,18 +44,8 @@ _STORED = (
 )
 
 
-class Tracer(Protocol):
-    """Takes note of what happens on the board."""
-
-    def access(self, ticks: int, peripheral: str, offset: int, value: int, *, write: bool) -> None:
-        """Note that a register was read or written."""
-
-    def exception(self, ticks: int, number: int, *, entered: bool) -> None:
-        """Note that an exception was entered or left."""
-
-
 class Board:
-    """A board with one firmware image.
+    """A board with one firmware image; the `firmware_bridge.board.bus.Bus` of its peripherals and its processor.
 
     Parameters
     ----------

@@ -12,14 +12,14 @@ import ctypes
 import mmap
 import struct
 from array import array
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
+from firmware_bridge.board.bus import Bus, Tracer
 from firmware_bridge.board.faults import BoardFault, FaultKind
-from firmware_bridge.board.nvic import SVCALL, UNMASKABLE
+from firmware_bridge.board.nvic import SVCALL, UNMASKABLE, Nvic
 from gfimu.errors import InputError
 
 if TYPE_CHECKING:
-    from firmware_bridge.board.board import Board
     from firmware_bridge.lpc1768.elf import ElfImage
 
 try:
@@ -89,20 +89,67 @@ class _Registers:
         self._write(self._handle, self._names, self._places, self._count)
 
 
+class CoreBus(Bus, Protocol):
+    """The bus as the processor sees it: also the events that are due, resets and sleep.
+
+    Attributes
+    ----------
+    access_ticks : int
+        Time of one register access, ticks.
+    accesses : int
+        Register accesses so far.
+    until : int
+        Time of the next event, ticks.
+    reset_cause : int or None
+        Cause of a reset that was requested.
+    stopped : bool
+        Whether the processor was stopped to look at what has come.
+    sleeping : bool
+        Whether a slice of time ended in WFI.
+    exceptions : int
+        Exceptions entered so far.
+    tracer : Tracer or None
+        Is given every exception.
+    """
+
+    access_ticks: int
+    accesses: int
+    until: int
+    reset_cause: int | None
+    stopped: bool
+    sleeping: bool
+    exceptions: int
+    tracer: Tracer | None
+
+    @property
+    def nvic(self) -> Nvic:
+        """Interrupt controller."""
+
+    @property
+    def seconds(self) -> float:
+        """Virtual time, s."""
+
+    def service(self) -> None:
+        """Do the events that are due."""
+
+    def do_reset(self) -> None:
+        """Carry out a requested reset."""
+
+
 class Cpu:
     """Processor core and memories.
 
     Parameters
     ----------
-    board : Board
+    bus : CoreBus
         The board around it.
     image : ElfImage
         What is in the flash.
     """
 
-    def __init__(self, board: Board, image: ElfImage) -> None:
+    def __init__(self, bus: CoreBus, image: ElfImage) -> None:
         require_unicorn()
-        self.board = board
+        self.bus = bus
         self.image = image
         self.limit = 0
         self._next_exception = 0
@@ -201,20 +248,20 @@ class Cpu:
 
     def map_registers(self, base: int, size: int, read: Any, write: Any) -> None:
         """Send accesses to an address range to ``read(offset, size)`` and ``write(offset, value, size)``."""
-        board = self.board
+        bus = self.bus
 
         def on_read(_: int, offset: int, width: int) -> int:
-            board.now = now = board.now + board.access_ticks
-            board.accesses += 1
-            if now >= board.until:
-                board.service()
+            bus.now = now = bus.now + bus.access_ticks
+            bus.accesses += 1
+            if now >= bus.until:
+                bus.service()
             return read(offset, width) & 0xFFFFFFFF
 
         def on_write(_: int, offset: int, width: int, value: int) -> None:
-            board.now = now = board.now + board.access_ticks
-            board.accesses += 1
-            if now >= board.until:
-                board.service()
+            bus.now = now = bus.now + bus.access_ticks
+            bus.accesses += 1
+            if now >= bus.until:
+                bus.service()
             write(offset, value, width)
 
         callbacks = _MMIO_READ(on_read), _MMIO_WRITE(on_write)
@@ -226,45 +273,45 @@ class Cpu:
             raise unicorn.UcError(error)
 
     def _block_hook(self) -> Any:
-        board, stop, handle = self.board, _LIBRARY.uc_emu_stop, self._handle
+        bus, stop, handle = self.bus, _LIBRARY.uc_emu_stop, self._handle
 
         def on_block(_: int, __: int, size: int) -> None:
-            now = board.now
-            if now >= board.alarm:
+            now = bus.now
+            if now >= bus.alarm:
                 if self._must_stop():
-                    board.stopped = True
+                    bus.stopped = True
                     stop(handle)
                     return
-                now = board.now
-            board.now = now + (size >> 1) * board.cycle  # about one cycle per half-word of code
+                now = bus.now
+            bus.now = now + (size >> 1) * bus.cycle  # about one cycle per half-word of code
 
         return on_block
 
     def _must_stop(self) -> bool:
         """Look, before a block is executed, whether an interrupt or the end of the slice comes first."""
-        board = self.board
-        if board.now >= board.until:
-            board.service()
-        if board.reset_cause is not None:
+        bus = self.bus
+        if bus.now >= bus.until:
+            bus.service()
+        if bus.reset_cause is not None:
             return True
         self._next_exception = self._deliverable()
-        return self._next_exception != 0 or board.now >= self.limit
+        return self._next_exception != 0 or bus.now >= self.limit
 
     def _deliverable(self) -> int:
         """Exception to enter now, 0 if none; sets the alarm for the next look."""
-        board, nvic = self.board, self.board.nvic
+        bus, nvic = self.bus, self.bus.nvic
         exception = 0
         if nvic.pending & nvic.enabled:
             primask = self._primask.read()[0]
             if primask & 1 and not nvic.pending & UNMASKABLE:
-                board.alarm = -1  # look at every block until the mask is gone
+                bus.alarm = -1  # look at every block until the mask is gone
                 return 0
             exception = nvic.best()
             if exception and nvic.masked(exception, primask, *self._masks.read()):
-                board.alarm = -1
+                bus.alarm = -1
                 return 0
-        until, limit = board.until, self.limit
-        board.alarm = until if until < limit else limit  # noqa: FURB136 - this runs twenty times a sample
+        until, limit = bus.until, self.limit
+        bus.alarm = until if until < limit else limit  # noqa: FURB136 - this runs twenty times a sample
         return exception
 
     def _on_intr(self, _: int, number: int) -> None:
@@ -292,7 +339,7 @@ class Cpu:
 
     def enter(self, exception: int) -> None:
         """Exception entry (ARMv7-M ARM B1.5.6): stack eight words, run the handler on the main stack."""
-        board, nvic = self.board, self.board.nvic
+        bus, nvic = self.bus, self.bus.nvic
         r0, r1, r2, r3, r12, lr, xpsr, sp, control = self._core.read()
         padding = sp & 4
         frame = sp - _FRAME_BYTES - padding
@@ -308,17 +355,17 @@ class Cpu:
         if process_stack:
             self.uc.reg_write(arm.UC_ARM_REG_CONTROL, control & ~2)
         nvic.enter(exception)
-        board.now += _ENTRY_CYCLES * board.cycle
-        board.exceptions += 1
-        if board.tracer is not None:
-            board.tracer.exception(board.now, exception, entered=True)
+        bus.now += _ENTRY_CYCLES * bus.cycle
+        bus.exceptions += 1
+        if bus.tracer is not None:
+            bus.tracer.exception(bus.now, exception, entered=True)
         vector = nvic.vtor + 4 * exception
         table = self._flash[vector : vector + 4] if vector < FLASH_SIZE else self.peek(vector, 4)
         self.pc = int.from_bytes(table, "little") | 1
 
     def leave(self) -> None:
         """Exception return (ARMv7-M ARM B1.5.8)."""
-        board, nvic = self.board, self.board.nvic
+        bus, nvic = self.bus, self.bus.nvic
         if not nvic.active:
             raise self._fault(FaultKind.EXCEPTION_RETURN, "exception return outside an exception")
         ended = nvic.active[-1]
@@ -343,29 +390,29 @@ class Cpu:
             values[0] = after
             self._unstack.write()
         self.pc = pc | 1
-        board.now += _ENTRY_CYCLES * board.cycle
-        if board.tracer is not None:
-            board.tracer.exception(board.now, ended, entered=False)
+        bus.now += _ENTRY_CYCLES * bus.cycle
+        if bus.tracer is not None:
+            bus.tracer.exception(bus.now, ended, entered=False)
 
     # Running
 
     def run(self, limit: int) -> None:
         """Run until virtual time reaches ``limit`` (ticks)."""
-        board, nvic = self.board, self.board.nvic
+        bus, nvic = self.bus, self.bus.nvic
         start, handle, pc_register = _LIBRARY.uc_emu_start, self._handle, self._pc
         self.limit = limit
-        board.alarm = -1
-        while board.now < limit:
-            if board.now >= board.until:
-                board.service()
-            if board.reset_cause is not None:
-                board.do_reset()
+        bus.alarm = -1
+        while bus.now < limit:
+            if bus.now >= bus.until:
+                bus.service()
+            if bus.reset_cause is not None:
+                bus.do_reset()
                 self._next_exception = 0
             exception = self._next_exception or self._deliverable()
             if exception:
                 self._next_exception = 0
                 self.enter(exception)
-                board.alarm = -1 if nvic.pending else min(board.until, limit)
+                bus.alarm = -1 if nvic.pending else min(bus.until, limit)
             error = start(handle, self.pc, _UNTIL, 0, 0)
             if error:
                 raise self._fault(FaultKind.of(error), "")
@@ -381,8 +428,8 @@ class Cpu:
                 self._supervisor_call = False
                 nvic.pend(SVCALL)
                 continue
-            if self.board.stopped:
-                self.board.stopped = False
+            if self.bus.stopped:
+                self.bus.stopped = False
                 continue
             if not self._sleep(limit):
                 return
@@ -393,14 +440,14 @@ class Cpu:
 
     def _sleep(self, limit: int) -> bool:
         """WFI: skip to the event that wakes the processor; False if the slice ends first."""
-        board = self.board
-        while not board.nvic.wakes and board.reset_cause is None:
-            if board.until > limit:
-                board.now = max(board.now, limit)
-                board.sleeping = True
+        bus = self.bus
+        while not bus.nvic.wakes and bus.reset_cause is None:
+            if bus.until > limit:
+                bus.now = max(bus.now, limit)
+                bus.sleeping = True
                 return False
-            board.now = max(board.now, board.until)
-            board.service()
+            bus.now = max(bus.now, bus.until)
+            bus.service()
         return True
 
     # Faults
@@ -411,7 +458,7 @@ class Cpu:
         registers = {
             name: int(self.uc.reg_read(getattr(arm, f"UC_ARM_REG_{name.upper()}"))) & 0xFFFFFFFF for name in names
         }
-        active = self.board.nvic.active[-1] if self.board.nvic.active else 0
+        active = self.bus.nvic.active[-1] if self.bus.nvic.active else 0
         return BoardFault(
-            kind, registers["pc"], registers, self.image.symbol_at(registers["pc"]), detail, active, self.board.seconds
+            kind, registers["pc"], registers, self.image.symbol_at(registers["pc"]), detail, active, self.bus.seconds
         )

@@ -213,7 +213,7 @@ class _FastCpu(Cpu):
 
     def reset(self) -> None:
         super().reset()
-        self.board.shared.pc = self.pc  # type: ignore[attr-defined]
+        self.bus.shared.pc = self.pc  # type: ignore[attr-defined]
 
 
 class FastBoard(Board):

@@ -6,12 +6,9 @@ Other peripherals as sources or destinations are not modelled: such a channel st
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
+from firmware_bridge.board.bus import Bus
 from firmware_bridge.board.peripheral import NEVER, Peripheral
-
-if TYPE_CHECKING:
-    from firmware_bridge.board.board import Board
 
 __all__ = ["Gpdma"]
 
@@ -39,8 +36,8 @@ class _Channel:
 class Gpdma(Peripheral):
     """Moves one unit per event: at the bus's pace between memories, at the line's pace into a UART."""
 
-    def __init__(self, board: Board) -> None:
-        super().__init__(board, "gpdma", 0x50004000, 0x4000, irq=26)
+    def __init__(self, bus: Bus) -> None:
+        super().__init__(bus, "gpdma", 0x50004000, 0x4000, irq=26)
 
     def reset(self) -> None:
         """All channels off."""
@@ -81,50 +78,50 @@ class Gpdma(Peripheral):
         return self.terminal & masks
 
     def _update(self) -> None:
-        self.board.nvic.set_line(self.irq, level=self._pending())
+        self.bus.nvic.set_line(self.irq, level=self._pending())
 
     def _pace(self, channel: _Channel) -> int:
         """Ticks from one unit to the next; 0 for a channel that can't move."""
         kind = channel.config >> 11 & 7
         if kind == _MEMORY_TO_MEMORY:
-            return _UNIT_CYCLES * self.board.cycle
+            return _UNIT_CYCLES * self.bus.cycle
         uart = _UART_TRANSMITTERS.get(channel.config >> 6 & 31)
         if kind == _MEMORY_TO_PERIPHERAL and uart is not None:
-            return self.board.uarts[uart].character
+            return self.bus.uarts[uart].character
         return 0
 
     def _start(self, channel: _Channel) -> None:
         running = channel.config & _ENABLE and self.config & _ENABLE
         pace = self._pace(channel) if running else 0
-        channel.due = self.board.now + _UNIT_CYCLES * self.board.cycle if pace else NEVER
+        channel.due = self.bus.now + _UNIT_CYCLES * self.bus.cycle if pace else NEVER
         self._plan()
 
     def _plan(self) -> None:
-        self.board.schedule(self.slot, min(channel.due for channel in self.channels))
+        self.bus.schedule(self.slot, min(channel.due for channel in self.channels))
 
     def event(self) -> None:
         """Move the units that are due."""
         for number, channel in enumerate(self.channels):
-            if channel.due <= self.board.now:
+            if channel.due <= self.bus.now:
                 self._move(number, channel)
         self._plan()
 
     def _move(self, number: int, channel: _Channel) -> None:
         if channel.control & _COUNT:
             width = 1 << (channel.control >> 18 & 7)
-            self.board.write_bus(channel.destination, self.board.read_bus(channel.source, width), width)
+            self.bus.write_bus(channel.destination, self.bus.read_bus(channel.source, width), width)
             channel.source += width if channel.control & _SOURCE_UP else 0
             channel.destination += width if channel.control & _DESTINATION_UP else 0
             channel.control -= 1
         if channel.control & _COUNT:
-            channel.due = self.board.now + self._pace(channel)
+            channel.due = self.bus.now + self._pace(channel)
             return
         if channel.control & _TERMINAL:
             self.terminal |= 1 << number
         if channel.link:
-            words = [self.board.read_bus((channel.link & ~3) + 4 * k, 4) for k in range(4)]
+            words = [self.bus.read_bus((channel.link & ~3) + 4 * k, 4) for k in range(4)]
             channel.source, channel.destination, channel.link, channel.control = words
-            channel.due = self.board.now + self._pace(channel)
+            channel.due = self.bus.now + self._pace(channel)
         else:
             channel.config &= ~_ENABLE
             channel.due = NEVER

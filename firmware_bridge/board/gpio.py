@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
+from firmware_bridge.board.bus import Bus
 from firmware_bridge.board.peripheral import Peripheral
-
-if TYPE_CHECKING:
-    from firmware_bridge.board.board import Board
 
 __all__ = ["Gpio", "GpioInterrupts"]
 
@@ -22,9 +19,9 @@ OnChange = Callable[[int, int, int], None]
 class Gpio(Peripheral):
     """Five ports of 32 pins; inputs are pulled up unless driven with `drive`."""
 
-    def __init__(self, board: Board) -> None:
+    def __init__(self, bus: Bus) -> None:
         self.on_change: OnChange | None = None
-        super().__init__(board, "gpio", 0x2009C000, 0x4000)
+        super().__init__(bus, "gpio", 0x2009C000, 0x4000)
 
     def reset(self) -> None:
         """All pins are inputs with pull-ups."""
@@ -88,15 +85,15 @@ class Gpio(Peripheral):
             self.levels[port] = levels
             if self.on_change is not None:
                 self.on_change(port, changed, levels)
-            if self.board.gpio_interrupts.watching:
-                self.board.gpio_interrupts.pins_changed(port, changed, levels)
+            if self.bus.gpio_interrupts.watching:
+                self.bus.gpio_interrupts.pins_changed(port, changed, levels)
 
 
 class GpioInterrupts(Peripheral):
     """Rising and falling edges of ports 0 and 2, on the interrupt they share with EINT3."""
 
-    def __init__(self, board: Board) -> None:
-        super().__init__(board, "gpioint", 0x40028000, irq=_EINT3)
+    def __init__(self, bus: Bus) -> None:
+        super().__init__(bus, "gpioint", 0x40028000, irq=_EINT3)
 
     def reset(self) -> None:
         """No edge enabled."""
@@ -113,7 +110,7 @@ class GpioInterrupts(Peripheral):
         self._update()
 
     def _update(self) -> None:
-        self.board.nvic.set_line(self.irq, level=any(self.status.values()))
+        self.bus.nvic.set_line(self.irq, level=any(self.status.values()))
 
     def read(self, offset: int, size: int) -> int:
         """IOIntStatus, IO0IntStatR … IO2IntEnF."""

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
+from firmware_bridge.board.bus import Bus
 from firmware_bridge.board.peripheral import NEVER, Peripheral
-
-if TYPE_CHECKING:
-    from firmware_bridge.board.board import Board
 
 __all__ = ["I2c", "I2cDevice"]
 
@@ -38,10 +36,10 @@ class I2cDevice(Protocol):
 class I2c(Peripheral):
     """Each step of the bus takes its bit times and ends with SI set and the state in I2STAT."""
 
-    def __init__(self, board: Board, name: str, base: int, irq: int, clock_place: int) -> None:
+    def __init__(self, bus: Bus, name: str, base: int, irq: int, clock_place: int) -> None:
         self.clock_place = clock_place
         self.devices: list[I2cDevice] = []
-        super().__init__(board, name, base, irq=irq)
+        super().__init__(bus, name, base, irq=irq)
 
     def reset(self) -> None:
         """Off."""
@@ -56,8 +54,8 @@ class I2c(Peripheral):
         self._next_data: int | None = None
 
     def _bits(self, count: int) -> int:
-        divider = self.board.system_control.peripheral_divider(self.clock_place)
-        return count * (self.high + self.low) * self.board.cycle * divider
+        divider = self.bus.system_control.peripheral_divider(self.clock_place)
+        return count * (self.high + self.low) * self.bus.cycle * divider
 
     def read(self, offset: int, size: int) -> int:
         """I2CONSET, I2STAT, I2DAT, clock registers."""
@@ -87,13 +85,13 @@ class I2c(Peripheral):
             self.stored[offset] = value
 
     def _update(self) -> None:
-        self.board.nvic.set_line(self.irq, level=self.control & _INTERRUPT)
+        self.bus.nvic.set_line(self.irq, level=self.control & _INTERRUPT)
 
     def _step(self) -> None:
         """Begin what the control bits ask for; nothing happens while SI is set or a step is under way."""
         if not self.control & _ENABLE or self.control & _INTERRUPT or self._step_pending:
             return
-        now = self.board.now
+        now = self.bus.now
         if self.control & _STOP and self._owns_bus:
             self.control &= ~_STOP
             if self._talking is not None:
@@ -120,11 +118,11 @@ class I2c(Peripheral):
     def _finish(self, status: int, bits: int, data: int | None = None) -> None:
         self._next_status, self._next_data = status, data
         self._step_pending = True
-        self.board.schedule(self.slot, self.board.now + self._bits(bits))
+        self.bus.schedule(self.slot, self.bus.now + self._bits(bits))
 
     def event(self) -> None:
         """End a step on the bus."""
-        self.board.schedule(self.slot, NEVER)
+        self.bus.schedule(self.slot, NEVER)
         self._step_pending = False
         self.status = self._next_status
         if self._next_data is not None:

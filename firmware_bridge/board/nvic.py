@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from firmware_bridge.board.bus import Bus
 from firmware_bridge.board.peripheral import Peripheral
-
-if TYPE_CHECKING:
-    from firmware_bridge.board.board import Board
 
 __all__ = ["FIRST_IRQ", "PENDSV", "SVCALL", "SYSTICK", "UNMASKABLE", "Nvic"]
 
@@ -26,8 +22,8 @@ _RESET_REQUEST = 1 << 2
 class Nvic(Peripheral):
     """Pending, enabled and active exceptions and their priorities; also the registers from 0xE000E000 on."""
 
-    def __init__(self, board: Board) -> None:
-        super().__init__(board, "nvic", 0xE000E000)
+    def __init__(self, bus: Bus) -> None:
+        super().__init__(bus, "nvic", 0xE000E000)
 
     def reset(self) -> None:
         """Nothing enabled, pending or active."""
@@ -60,7 +56,7 @@ class Nvic(Peripheral):
     def pend(self, exception: int) -> None:
         """Make an exception pending."""
         self.pending |= 1 << exception
-        self.board.alarm = -1  # look at the next block
+        self.bus.alarm = -1  # look at the next block
 
     def _set_running(self) -> None:
         """Note the priority of what runs now, without the mask registers."""
@@ -121,7 +117,7 @@ class Nvic(Peripheral):
             whole = self.read(offset & ~3, 4)
             return whole >> 8 * (offset & 3) & ((1 << 8 * size) - 1)
         if 0x10 <= offset < 0x20:
-            return self.board.systick.read(offset, size)
+            return self.bus.systick.read(offset, size)
         for start, bits in ((0x100, self.enabled), (0x180, self.enabled), (0x200, self.pending), (0x280, self.pending)):
             if start <= offset < start + 8:
                 return bits >> (FIRST_IRQ + 8 * (offset - start)) & 0xFFFFFFFF
@@ -161,7 +157,7 @@ class Nvic(Peripheral):
         elif 0xD18 <= offset < 0xD24:
             self._set_priorities(4 + offset - 0xD18, value, size)
         elif 0x10 <= offset < 0x20:
-            self.board.systick.write(offset, value, size)
+            self.bus.systick.write(offset, value, size)
         elif 0x100 <= offset < 0x108:
             self.enabled |= value << (FIRST_IRQ + 8 * (offset - 0x100)) & _EXISTING
         elif 0x180 <= offset < 0x188:
@@ -184,7 +180,7 @@ class Nvic(Peripheral):
         else:
             self._stored[offset & ~3] = value
         self._set_running()  # priorities or groups may be others now
-        self.board.alarm = -1
+        self.bus.alarm = -1
 
     def _set_priorities(self, first: int, value: int, size: int) -> None:
         for k in range(size):
@@ -197,4 +193,4 @@ class Nvic(Peripheral):
         self._priority_group = value >> 8 & 7
         self.group_mask = 0xFF & ~((2 << self._priority_group) - 1)
         if value & _RESET_REQUEST:
-            self.board.request_reset(0)
+            self.bus.request_reset(0)

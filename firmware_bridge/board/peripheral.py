@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from firmware_bridge.board.board import Board
+from firmware_bridge.board.bus import Bus
 
 __all__ = ["NEVER", "Peripheral", "StoredRegisters"]
 
@@ -18,8 +15,8 @@ class Peripheral:
 
     Parameters
     ----------
-    board : Board
-        The board; gives time (``board.now``, ticks), the interrupt controller and the other peripherals.
+    bus : Bus
+        Time (``bus.now``, ticks), events, interrupt lines, clocks and memory of the board.
     name : str
         Name in traces.
     base, size : int
@@ -28,13 +25,13 @@ class Peripheral:
         Interrupt number, or −1.
     """
 
-    def __init__(self, board: Board, name: str, base: int, size: int = 0x1000, irq: int = -1) -> None:
-        self.board = board
+    def __init__(self, bus: Bus, name: str, base: int, size: int = 0x1000, irq: int = -1) -> None:
+        self.bus = bus
         self.name = name
         self.base = base
         self.size = size
         self.irq = irq
-        self.slot = board.add(self)
+        self.slot = bus.add(self)
 
     def reset(self) -> None:
         """Return to the state after reset."""

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections import deque
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
+from firmware_bridge.board.bus import Bus
 from firmware_bridge.board.peripheral import NEVER, Peripheral
-
-if TYPE_CHECKING:
-    from firmware_bridge.board.board import Board
 
 __all__ = ["SpiDevice", "Ssp"]
 
@@ -37,10 +35,10 @@ class SpiDevice(Protocol):
 class Ssp(Peripheral):
     """A word written to the data register is exchanged when the words before it are through."""
 
-    def __init__(self, board: Board, name: str, base: int, irq: int, clock_place: int) -> None:
+    def __init__(self, bus: Bus, name: str, base: int, irq: int, clock_place: int) -> None:
         self.clock_place = clock_place
         self.selected: SpiDevice | None = None
-        super().__init__(board, name, base, irq=irq)
+        super().__init__(bus, name, base, irq=irq)
 
     def reset(self) -> None:
         """Disabled, FIFOs empty."""
@@ -51,13 +49,13 @@ class Ssp(Peripheral):
         self._set_word()
 
     def _set_word(self) -> None:
-        divider = self.board.system_control.peripheral_divider(self.clock_place)
+        divider = self.bus.system_control.peripheral_divider(self.clock_place)
         self.bits = (self.control0 & 15) + 1
-        self.bit = max(2, self.prescaler) * ((self.control0 >> 8 & 0xFF) + 1) * self.board.cycle * divider
+        self.bit = max(2, self.prescaler) * ((self.control0 >> 8 & 0xFF) + 1) * self.bus.cycle * divider
 
     def _received(self) -> int:
         """Words in the receive FIFO now."""
-        now = self.board.now
+        now = self.bus.now
         count = 0
         for through, _ in self.words:
             if through > now:
@@ -73,7 +71,7 @@ class Ssp(Peripheral):
         """SSP registers."""
         if offset == 0x08:
             words = self.words
-            if not words or words[0][0] > self.board.now:
+            if not words or words[0][0] > self.bus.now:
                 return 0
             value = words.popleft()[1]
             if self.mask:
@@ -92,9 +90,9 @@ class Ssp(Peripheral):
         }.get(offset, 0)
 
     def _status(self) -> int:
-        if self.done > self.board.now and self.board.spinning(self.slot):
-            self.board.wait_until(self.done)
-        if self.done <= self.board.now:
+        if self.done > self.bus.now and self.bus.spinning(self.slot):
+            self.bus.wait_until(self.done)
+        if self.done <= self.bus.now:
             received, waiting = len(self.words), 0
             status = _TX_EMPTY | _TX_NOT_FULL
         else:
@@ -123,7 +121,7 @@ class Ssp(Peripheral):
             self._update_interrupt()
 
     def _exchange(self, value: int) -> None:
-        words, bits, start = self.words, self.bits, self.board.now
+        words, bits, start = self.words, self.bits, self.bus.now
         crowded = len(words) >= _DEPTH
         if not self.control1 & 2 or (crowded and self._waiting() >= _DEPTH):
             return
@@ -152,17 +150,17 @@ class Ssp(Peripheral):
         self.raw &= ~(_RX_HALF | _TX_HALF)
         self.raw |= _RX_HALF if received >= _DEPTH // 2 else 0
         self.raw |= _TX_HALF if self._waiting() <= _DEPTH // 2 else 0
-        if received and self.board.now >= self.words[received - 1][0] + _TIMEOUT_BITS * self.bit:
+        if received and self.bus.now >= self.words[received - 1][0] + _TIMEOUT_BITS * self.bit:
             self.raw |= _TIMEOUT
 
     def _update_interrupt(self) -> None:
         self._update_raw()
-        self.board.nvic.set_line(self.irq, level=self.raw & self.mask)
-        later = [through for through, _ in self.words if through > self.board.now]
+        self.bus.nvic.set_line(self.irq, level=self.raw & self.mask)
+        later = [through for through, _ in self.words if through > self.bus.now]
         when = later[0] if later else NEVER
         if not later and self.words and not self.raw & _TIMEOUT:
             when = self.words[-1][0] + _TIMEOUT_BITS * self.bit
-        self.board.schedule(self.slot, when if self.mask else NEVER)
+        self.bus.schedule(self.slot, when if self.mask else NEVER)
 
     def event(self) -> None:
         """Note that a word is through, or that words waited too long in the receive FIFO."""

@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from firmware_bridge.adxl345_device import TICKS_PER_SECOND
+from firmware_bridge.board.bus import Bus
 from firmware_bridge.board.peripheral import Peripheral
-
-if TYPE_CHECKING:
-    from firmware_bridge.board.board import Board
 
 __all__ = ["BROWN_OUT", "EXTERNAL", "POWER_ON", "SYSTEM_RESET", "WATCHDOG", "SystemControl"]
 
@@ -30,9 +26,9 @@ class SystemControl(Peripheral):
     sheet ES_LPC176x allows (PCLKSELx.1, "may not take effect"). The board records a warning.
     """
 
-    def __init__(self, board: Board) -> None:
+    def __init__(self, bus: Bus) -> None:
         self.cause = POWER_ON
-        super().__init__(board, "syscon", 0x400FC000, 0x4000)
+        super().__init__(bus, "syscon", 0x400FC000, 0x4000)
 
     def reset(self) -> None:
         """Start on the internal oscillator, PLL off; the reset cause adds up until the firmware clears it."""
@@ -65,8 +61,8 @@ class SystemControl(Peripheral):
 
     def _update(self) -> None:
         cycle = max(1, round(TICKS_PER_SECOND / self.core_hz))
-        if cycle != self.board.cycle:
-            self.board.change_clock(cycle)
+        if cycle != self.bus.cycle:
+            self.bus.change_clock(cycle)
 
     def read(self, offset: int, size: int) -> int:
         """Return registers as written; status bits say ready and locked."""
@@ -106,10 +102,10 @@ class SystemControl(Peripheral):
             return
         if self._pll_control & _CONNECTED == _CONNECTED:
             name = f"PCLKSEL{_PERIPHERAL_CLOCKS.index(offset)}"
-            self.board.warn(
+            self.bus.warn(
                 f"{name} = {value:#010x} ignored: written while PLL0 is connected (errata sheet ES_LPC176x, "
                 "PCLKSELx.1); write it before"
             )
             return
         self.registers[offset] = value
-        self.board.change_clock(self.board.cycle)
+        self.bus.change_clock(self.bus.cycle)

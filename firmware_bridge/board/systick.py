@@ -36,7 +36,7 @@ class SysTick(Peripheral):
     def _current(self) -> int:
         if self.wrap >= NEVER:
             return self.stopped_at
-        return (self.wrap - self.board.now) // self.board.cycle & 0xFFFFFF
+        return (self.wrap - self.bus.now) // self.bus.cycle & 0xFFFFFF
 
     def write(self, offset: int, value: int, size: int) -> None:
         """Control, reload and current value (writing it clears it)."""
@@ -48,25 +48,25 @@ class SysTick(Peripheral):
                 self._set_wrap(NEVER)
             elif not was:
                 remaining = self.stopped_at or self.reload + 1
-                self._set_wrap(self.board.now + remaining * self.board.cycle if self.reload else NEVER)
+                self._set_wrap(self.bus.now + remaining * self.bus.cycle if self.reload else NEVER)
         elif offset == 0x14:
             self.reload = value & 0xFFFFFF
         elif offset == 0x18:
             self.flag = 0
             self.stopped_at = 0
             if self.control & _ENABLE and self.reload:
-                self._set_wrap(self.board.now + (self.reload + 1) * self.board.cycle)
+                self._set_wrap(self.bus.now + (self.reload + 1) * self.bus.cycle)
 
     def _set_wrap(self, when: int) -> None:
         self.wrap = when
-        self.board.schedule(self.slot, when)
+        self.bus.schedule(self.slot, when)
 
     def event(self) -> None:
         """Wrap: set the flag, raise the exception."""
         self.flag = _COUNT_FLAG
-        self._set_wrap(self.wrap + (self.reload + 1) * self.board.cycle if self.reload else NEVER)
+        self._set_wrap(self.wrap + (self.reload + 1) * self.bus.cycle if self.reload else NEVER)
         if self.control & _INTERRUPT:
-            self.board.nvic.pend(SYSTICK)
+            self.bus.nvic.pend(SYSTICK)
 
     def clock_will_change(self) -> None:
         """Keep the count."""
@@ -75,4 +75,4 @@ class SysTick(Peripheral):
     def clock_changed(self) -> None:
         """Count on at the new rate."""
         if self.wrap < NEVER:
-            self._set_wrap(self.board.now + self.stopped_at * self.board.cycle)
+            self._set_wrap(self.bus.now + self.stopped_at * self.bus.cycle)

@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from firmware_bridge.board.bus import Bus
 from firmware_bridge.board.peripheral import NEVER, Peripheral
-
-if TYPE_CHECKING:
-    from firmware_bridge.board.board import Board
 
 __all__ = ["Timer"]
 
@@ -18,9 +14,9 @@ _WRAP = 1 << 32
 class Timer(Peripheral):
     """The count is worked out when it is read; only matches that do something are events."""
 
-    def __init__(self, board: Board, name: str, base: int, irq: int, clock_place: int) -> None:
+    def __init__(self, bus: Bus, name: str, base: int, irq: int, clock_place: int) -> None:
         self.clock_place = clock_place
-        super().__init__(board, name, base, irq=irq)
+        super().__init__(bus, name, base, irq=irq)
 
     def reset(self) -> None:
         """Stop, at zero."""
@@ -37,22 +33,22 @@ class Timer(Peripheral):
         self._set_tick()
 
     def _set_tick(self) -> None:
-        divider = self.board.system_control.peripheral_divider(self.clock_place)
-        self.tick = self.board.cycle * divider * (self.prescale + 1)
+        divider = self.bus.system_control.peripheral_divider(self.clock_place)
+        self.tick = self.bus.cycle * divider * (self.prescale + 1)
 
     def count(self) -> int:
         """Timer counter now."""
-        if self.control != _ENABLE or self.board.now < self.start:
+        if self.control != _ENABLE or self.bus.now < self.start:
             return self.start_count
-        return (self.start_count + (self.board.now - self.start) // self.tick) & 0xFFFFFFFF
+        return (self.start_count + (self.bus.now - self.start) // self.tick) & 0xFFFFFFFF
 
     def _hold(self) -> None:
         """Restart the reckoning from the present count."""
         count = self.count()
-        if self.control == _ENABLE and self.board.now > self.start:
-            self.start += (self.board.now - self.start) // self.tick * self.tick
+        if self.control == _ENABLE and self.bus.now > self.start:
+            self.start += (self.bus.now - self.start) // self.tick * self.tick
         elif self.control != _ENABLE:
-            self.start = self.board.now
+            self.start = self.bus.now
         self.start_count = count
 
     def _plan(self, *, after_match: bool = False) -> None:
@@ -68,7 +64,7 @@ class Timer(Peripheral):
                     if when < self.due:
                         self.due = when
                         self.due_match = number
-        self.board.schedule(self.slot, self.due)
+        self.bus.schedule(self.slot, self.due)
 
     def event(self) -> None:
         """Do what the match register that was reached asks for."""
@@ -88,7 +84,7 @@ class Timer(Peripheral):
             self.start, self.start_count = self.due + self.tick, 0
         self._plan(after_match=not clear)
         if self.interrupts:
-            self.board.nvic.set_line(self.irq, level=True)
+            self.bus.nvic.set_line(self.irq, level=True)
 
     def read(self, offset: int, size: int) -> int:
         """Timer registers."""
@@ -111,15 +107,15 @@ class Timer(Peripheral):
         if offset == 0x00:
             self.interrupts &= ~value
             if not self.interrupts:
-                self.board.nvic.set_line(self.irq, level=False)
+                self.bus.nvic.set_line(self.irq, level=False)
             return
         self._hold()
         if offset == 0x04:
             self.control = value & 3
             if value & _RESET:  # held at zero while the bit is set
-                self.start, self.start_count = self.board.now, 0
+                self.start, self.start_count = self.bus.now, 0
         elif offset == 0x08:
-            self.start, self.start_count = self.board.now, value
+            self.start, self.start_count = self.bus.now, value
         elif offset == 0x0C:
             self.prescale = value
             self._set_tick()

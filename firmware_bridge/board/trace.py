@@ -47,7 +47,7 @@ class Event:
 
 
 class EventList:
-    """Collects events in memory (a `firmware_bridge.board.board.Tracer`)."""
+    """Collects events in memory (a `firmware_bridge.board.bus.Tracer`)."""
 
     def __init__(self) -> None:
         self._events: list[Event] = []

@@ -4,13 +4,10 @@ from __future__ import annotations
 
 from array import array
 from collections import deque
-from typing import TYPE_CHECKING
 
 from firmware_bridge.adxl345_device import TICKS_PER_SECOND
+from firmware_bridge.board.bus import Bus
 from firmware_bridge.board.peripheral import NEVER, Peripheral
-
-if TYPE_CHECKING:
-    from firmware_bridge.board.board import Board
 
 __all__ = ["FRAMING_ERROR", "Uart"]
 
@@ -25,11 +22,11 @@ _TIMEOUT_CHARACTERS = 4
 class Uart(Peripheral):
     """Sends into ``sent`` with the time each byte left the line; receives what is put on the line with `receive`."""
 
-    def __init__(self, board: Board, name: str, base: int, irq: int, clock_place: int) -> None:
+    def __init__(self, bus: Bus, name: str, base: int, irq: int, clock_place: int) -> None:
         self.clock_place = clock_place
         self.sent = bytearray()
         self.sent_at = array("q")
-        super().__init__(board, name, base, irq=irq)
+        super().__init__(bus, name, base, irq=irq)
 
     def reset(self) -> None:
         """Set registers to their reset values; bytes that have not left the line are lost."""
@@ -45,9 +42,9 @@ class Uart(Peripheral):
         self._set_character()
 
     def _set_character(self) -> None:
-        divider = self.board.system_control.peripheral_divider(self.clock_place)
+        divider = self.bus.system_control.peripheral_divider(self.clock_place)
         multiplier, add = self.fraction >> 4 & 15 or 1, self.fraction & 15
-        bit = 16 * (self.divisor or 1) * self.board.cycle * divider * (multiplier + add) / multiplier
+        bit = 16 * (self.divisor or 1) * self.bus.cycle * divider * (multiplier + add) / multiplier
         self.character = max(1, round(_BITS_PER_CHARACTER * bit))
         self._lone_byte = self.character * (_BITS_PER_CHARACTER - 1) // _BITS_PER_CHARACTER
 
@@ -60,14 +57,14 @@ class Uart(Peripheral):
 
     def cut_unsent(self) -> None:
         """Forget bytes that have not wholly left the line: the power failed."""
-        while self.sent_at and self.sent_at[-1] > self.board.now:
+        while self.sent_at and self.sent_at[-1] > self.bus.now:
             self.sent_at.pop()
             del self.sent[-1]
 
     def take_sent(self) -> tuple[bytes, array[int]]:
         """Bytes that have left the line by now, and when; they are handed out once."""
         count = len(self.sent_at)
-        while count and self.sent_at[count - 1] > self.board.now:
+        while count and self.sent_at[count - 1] > self.bus.now:
             count -= 1
         bytes_out, at = bytes(self.sent[:count]), self.sent_at[:count]
         del self.sent[:count]
@@ -76,7 +73,7 @@ class Uart(Peripheral):
 
     def receive(self, data: bytes, errors: int = 0) -> None:
         """Put bytes on the receiving line, one after another from now on; ``errors`` are line status bits."""
-        when = max(self.board.now, self.on_line[-1][0] if self.on_line else 0)
+        when = max(self.bus.now, self.on_line[-1][0] if self.on_line else 0)
         for byte in data:
             when += self.character
             self.on_line.append((when, byte, errors))
@@ -85,11 +82,11 @@ class Uart(Peripheral):
     def _plan(self) -> None:
         next_byte = self.on_line[0][0] if self.on_line else NEVER
         self.planned = min(next_byte, self.empty_at, self.timeout_at)
-        self.board.schedule(self.slot, self.planned)
+        self.bus.schedule(self.slot, self.planned)
 
     def event(self) -> None:
         """Take a byte that has arrived, or note that the transmitter ran empty or the receiver waited too long."""
-        now = self.board.now
+        now = self.bus.now
         while self.on_line and self.on_line[0][0] <= now:
             when, byte, errors = self.on_line.popleft()
             if len(self.receiver) >= (_DEPTH if self.fifo_control & 1 else 1):
@@ -121,7 +118,7 @@ class Uart(Peripheral):
         return 0x01
 
     def _update_line(self) -> None:
-        self.board.nvic.set_line(self.irq, level=self._cause() != 1)
+        self.bus.nvic.set_line(self.irq, level=self._cause() != 1)
 
     # Registers
 
@@ -148,20 +145,20 @@ class Uart(Peripheral):
             return 0
         byte, _ = self.receiver.popleft()
         self.timeout = False
-        self.timeout_at = self.board.now + _TIMEOUT_CHARACTERS * self.character if self.receiver else NEVER
+        self.timeout_at = self.bus.now + _TIMEOUT_CHARACTERS * self.character if self.receiver else NEVER
         self._plan()
         self._update_line()
         return byte
 
     def _line_status(self) -> int:
-        now = self.board.now
+        now = self.bus.now
         empty = self.sent_end - self.character  # when the last byte moves to the shift register
-        if now < empty and not self.receiver and self.board.spinning(self.slot):
-            self.board.wait_until(empty)
-            now = self.board.now
-        elif empty <= now < self.sent_end and not self.receiver and self.board.spinning(self.slot):
-            self.board.wait_until(self.sent_end)
-            now = self.board.now
+        if now < empty and not self.receiver and self.bus.spinning(self.slot):
+            self.bus.wait_until(empty)
+            now = self.bus.now
+        elif empty <= now < self.sent_end and not self.receiver and self.bus.spinning(self.slot):
+            self.bus.wait_until(self.sent_end)
+            now = self.bus.now
         status = self.errors | (_READY if self.receiver else 0)
         if now >= self.sent_end - self.character:
             status |= _THR_EMPTY
@@ -206,7 +203,7 @@ class Uart(Peripheral):
             self._set_character()
 
     def _send(self, byte: int) -> None:
-        now, empty, character = self.board.now, self.sent_end, self.character
+        now, empty, character = self.bus.now, self.sent_end, self.character
         if empty <= now:
             empty = now
         elif empty > now + (_DEPTH if self.fifo_control & 1 else 1) * character:

@@ -27,13 +27,13 @@ class Watchdog(Peripheral):
 
     def _tick(self) -> int:
         if self.clock & 3 == 1:
-            return self.board.cycle * self.board.system_control.peripheral_divider(0) * _PREDIVIDER
+            return self.bus.cycle * self.bus.system_control.peripheral_divider(0) * _PREDIVIDER
         return TICKS_PER_SECOND // _INTERNAL_OSCILLATOR_HZ * _PREDIVIDER
 
     def read(self, offset: int, size: int) -> int:
         """WDMOD, WDTC, WDTV, WDCLKSEL."""
         if offset == 0x0C:
-            return max(0, (self.expires - self.board.now) // self._tick()) if self.expires < NEVER else self.constant
+            return max(0, (self.expires - self.bus.now) // self._tick()) if self.expires < NEVER else self.constant
         return {0x00: self.mode, 0x04: self.constant, 0x10: self.clock}.get(offset, 0)
 
     def write(self, offset: int, value: int, size: int) -> None:
@@ -44,8 +44,8 @@ class Watchdog(Peripheral):
             self.constant = max(_MINIMUM, value)
         elif offset == 0x08:
             if self._fed == 0xAA and value == 0x55 and self.mode & _ENABLE:
-                self.expires = self.board.now + self.constant * self._tick()
-                self.board.schedule(self.slot, self.expires)
+                self.expires = self.bus.now + self.constant * self._tick()
+                self.bus.schedule(self.slot, self.expires)
             self._fed = value
         elif offset == 0x10:
             self.clock = value
@@ -53,10 +53,10 @@ class Watchdog(Peripheral):
     def event(self) -> None:
         """Nobody fed it in time."""
         self.expires = NEVER
-        self.board.schedule(self.slot, NEVER)
+        self.bus.schedule(self.slot, NEVER)
         self.mode |= _TIMED_OUT
         if self.mode & _RESET_ENABLE:
-            self.board.request_reset(WATCHDOG)
+            self.bus.request_reset(WATCHDOG)
         else:
             self.mode |= _INTERRUPT
-            self.board.nvic.set_line(self.irq, level=True)
+            self.bus.nvic.set_line(self.irq, level=True)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from gfimu.calibration.array_calibration import update_array_calibration
 from gfimu.calibration.faults import (
     check_gravity,
     check_readings,
@@ -14,33 +14,70 @@ from gfimu.calibration.faults import (
     scale_warning,
     without_moved_poses,
 )
-from gfimu.calibration.multi_position import multi_position, multi_position_gyro
 from gfimu.calibration.observations import observations_from
-from gfimu.calibration.recursive import recursive
+from gfimu.calibration.registry import METHODS, CalibrationMethod, calibration_method
 from gfimu.calibration.result import Calibration, combine
-from gfimu.calibration.six_position import six_position
-from gfimu.calibration.twelve_position import twelve_position
-from gfimu.errors import InputError, unknown_name
+from gfimu.errors import InputError
+from gfimu.geometry.array import AccelerometerArray
 from gfimu.parts.part import Part
 from gfimu.recording import Recording
 from gfimu.recording.rest import detect_rest
 from gfimu.units import STANDARD_GRAVITY
 
-__all__ = ["METHODS", "calibrate", "calibrate_gyro"]
+__all__ = [
+    "METHODS",
+    "CalibrationTask",
+    "calibrate",
+    "calibrate_gyro",
+    "calibrate_reference_gyro",
+    "calibrate_triads",
+    "calibrate_whole_array",
+    "run_calibration",
+]
 
-METHODS: dict[str, Callable[..., Calibration]] = {
-    "six-position": six_position,
-    "recursive": recursive,
-    "multi-position": multi_position,
-    "twelve-position": twelve_position,
-}
-"""Methods for one triad by name."""
 
-_GAUGES = {
-    12: {"six-position": "poses", "recursive": "poses", "multi-position": "coarse", "twelve-position": "coarse"},
-    9: dict.fromkeys(METHODS, "x_axis"),
-}
-_DEFAULT_PARAMETERS = {"six-position": 12, "recursive": 12, "multi-position": 9, "twelve-position": 12}
+@dataclass(frozen=True)
+class CalibrationTask:
+    """What a calibration method works on; each method uses the fields its record lists.
+
+    Parameters
+    ----------
+    recording : Recording
+        Readings in m/s² or raw counts.
+    gravity : float
+        Local gravity, m/s².
+    n_parameters : {9, 12}, optional
+        Parameters per triad; the method's default if not given.
+    input_kind : {"averaged", "raw", "wavelet"}
+        Rows that the fit uses.
+    rest_threshold : float, optional
+        Threshold of rest, reading unit squared; chosen by the data if not given.
+    min_rest_s : float, optional
+        Shortest pose, s; the method's default if not given.
+    levelling_std_rad : float, optional
+        Standard deviation of the tilt of a pose, rad.
+    array : AccelerometerArray, optional
+        The drawing.
+    motion : Recording, optional
+        Recording with the motion, if it is another one.
+    update : Calibration, optional
+        Calibration of an earlier run to carry over.
+    turn_on_std_m_s2, bias_walk_m_s2_rt_s : float
+        With ``update``: change of a bias between power-ons, m/s², and random walk between poses, m/s²/√s.
+    """
+
+    recording: Recording
+    gravity: float = STANDARD_GRAVITY
+    n_parameters: int | None = None
+    input_kind: str = "averaged"
+    rest_threshold: float | None = None
+    min_rest_s: float | None = None
+    levelling_std_rad: float | None = None
+    array: AccelerometerArray | None = None
+    motion: Recording | None = None
+    update: Calibration | None = None
+    turn_on_std_m_s2: float = 0.03
+    bias_walk_m_s2_rt_s: float = 0.0
 
 
 def calibrate(
@@ -51,15 +88,16 @@ def calibrate(
     n_parameters: int | None = None,
     input_kind: str = "averaged",
     rest_threshold: float | None = None,
-    min_rest_s: float = 1.0,
+    min_rest_s: float | None = None,
     levelling_std_rad: float | None = None,
+    array: AccelerometerArray | None = None,
 ) -> Calibration:
-    """Calibrate every triad of a recording of static poses.
+    """Calibrate a recording of static poses by a method of `gfimu.calibration.registry.METHODS`.
 
     Parameters
     ----------
     method : str
-        A key of `METHODS`.
+        A key of `gfimu.calibration.registry.METHODS`.
     recording : Recording
         Readings of one or more chips, in m/s² or raw counts.
     gravity : float
@@ -67,13 +105,15 @@ def calibrate(
     n_parameters : {9, 12}, optional
         Parameters per triad; 12 by default, 9 for ``multi-position``.
     input_kind : {"averaged", "raw", "wavelet"}
-        What the method is given.
+        Rows that the fit uses.
     rest_threshold : float, optional
         Threshold of rest, reading unit squared; chosen by the data if not given.
-    min_rest_s : float
-        Shortest pose, s.
+    min_rest_s : float, optional
+        Shortest pose, s; the method's default if not given.
     levelling_std_rad : float, optional
         Standard deviation of the tilt of a pose, rad, for the methods that rely on levelled faces.
+    array : AccelerometerArray, optional
+        The drawing, for the methods that calibrate an array as a whole.
 
     Returns
     -------
@@ -85,23 +125,34 @@ def calibrate(
     InputError
         If the method is unknown, the data are faulty, or the poses don't suffice.
     """
-    if method not in METHODS:
-        raise unknown_name("calibration method", method, METHODS)
-    parameters = n_parameters or _DEFAULT_PARAMETERS[method]
-    if parameters not in _GAUGES:
-        raise InputError(f"{parameters} parameters: choose 12 (full M) or 9 (triangular M)")
-    warnings = list(check_gravity(gravity))
-    rest = detect_rest(recording, threshold=rest_threshold, min_duration_s=min_rest_s)
+    record = calibration_method(method)
+    task = CalibrationTask(
+        recording, gravity, n_parameters, input_kind, rest_threshold, min_rest_s, levelling_std_rad, array
+    )
+    return run_calibration(record, task)
+
+
+def run_calibration(method: CalibrationMethod, task: CalibrationTask) -> Calibration:
+    """Calibrate by the record of a method; raises as `calibrate`."""
+    result: Calibration = method.run(method, task)
+    return result
+
+
+def calibrate_triads(method: CalibrationMethod, task: CalibrationTask) -> Calibration:
+    """Calibrate every triad of a recording of static poses by itself; the runner of the methods for one triad."""
+    recording, gauge = task.recording, _gauge(method, task.n_parameters)
+    warnings = list(check_gravity(task.gravity))
+    rest = detect_rest(recording, threshold=task.rest_threshold, min_duration_s=_min_rest(method, task))
     warnings += check_readings(recording, rest)
     rest, moved = without_moved_poses(recording, rest)
     warnings += moved
-    observations = observations_from(recording, rest, input_kind)
+    observations = observations_from(recording, rest, task.input_kind)
     options: dict[str, float] = {}
-    if levelling_std_rad is not None and method in {"six-position", "twelve-position"}:
-        options["levelling_std_rad"] = levelling_std_rad
+    if task.levelling_std_rad is not None and "levelling_std_rad" in method.options:
+        options["levelling_std_rad"] = task.levelling_std_rad
+    fit = method.fit
     results = [
-        METHODS[method](observations.of_chip(chip), gravity=gravity, gauge=_GAUGES[parameters][method], **options)
-        for chip in observations.chips
+        fit(observations.of_chip(chip), gravity=task.gravity, gauge=gauge, **options) for chip in observations.chips
     ]
     result = combine(results)
     warnings += repeated_poses(observations.of_chip(observations.chips[0]).means)
@@ -119,28 +170,75 @@ def calibrate(
     )
 
 
-def calibrate_gyro(
-    recording: Recording, *, rest_threshold: float | None = None, min_rest_s: float = 1.0
-) -> Calibration:
-    """Calibrate the reference gyro of a recording at rest against the Earth's rate.
+def calibrate_whole_array(method: CalibrationMethod, task: CalibrationTask) -> Calibration:
+    """Calibrate all chips of an array together, or carry an earlier calibration over; runner of ``array``."""
+    if task.array is None:
+        raise InputError(f"calibration method {method.name!r} needs the array; give its name or file")
+    if task.update is not None:
+        return update_array_calibration(
+            task.update,
+            task.recording,
+            task.array,
+            turn_on_std_m_s2=task.turn_on_std_m_s2,
+            bias_walk_m_s2_rt_s=task.bias_walk_m_s2_rt_s,
+            rest_threshold=task.rest_threshold,
+            min_rest_s=_min_rest(method, task),
+        )
+    result: Calibration = method.fit(
+        task.recording,
+        task.array,
+        gravity=task.gravity,
+        motion=task.motion,
+        rest_threshold=task.rest_threshold,
+        min_rest_s=_min_rest(method, task),
+    )
+    return result
+
+
+def calibrate_reference_gyro(method: CalibrationMethod, task: CalibrationTask) -> Calibration:
+    """Calibrate the reference gyro of a recording at rest against the Earth's rate; runner of ``gyro``.
 
     Raises
     ------
     InputError
         If the recording has no gyro columns or no rest.
     """
+    recording = task.recording
     names = [f"gyro_{axis}_rad_s" for axis in "xyz"]
     missing = [name for name in names if name not in recording.reference]
     if missing:
         raise InputError(f"the recording lacks {', '.join(missing)}; a gyro calibration needs all three")
-    rest = detect_rest(recording, threshold=rest_threshold, min_duration_s=min_rest_s)
+    rest = detect_rest(recording, threshold=task.rest_threshold, min_duration_s=_min_rest(method, task))
     rates = replace(
         recording,
         readings=np.column_stack([recording.reference[name] for name in names]),
         channels=("gyro1", "gyro2", "gyro3"),
         unit="rad_s",
     )
-    return multi_position_gyro(observations_from(rates, rest, "averaged"))
+    result: Calibration = method.fit(observations_from(rates, rest, "averaged"))
+    return result
+
+
+def calibrate_gyro(
+    recording: Recording, *, rest_threshold: float | None = None, min_rest_s: float | None = None
+) -> Calibration:
+    """Calibrate the reference gyro of a recording at rest against the Earth's rate; raises as `calibrate`."""
+    return calibrate("gyro", recording, rest_threshold=rest_threshold, min_rest_s=min_rest_s)
+
+
+def _gauge(method: CalibrationMethod, n_parameters: int | None) -> str:
+    """Gauge that goes with a number of parameters per triad."""
+    count = next(iter(method.gauges)) if n_parameters is None else n_parameters
+    if count not in method.gauges:
+        models = {12: "12 (full M)", 9: "9 (triangular M)"}
+        valid = " or ".join(models[number] for number in sorted(method.gauges, reverse=True))
+        raise InputError(f"{count} parameters: choose {valid}")
+    return method.gauges[count]
+
+
+def _min_rest(method: CalibrationMethod, task: CalibrationTask) -> float:
+    """Shortest pose, s."""
+    return task.min_rest_s or method.min_rest_s
 
 
 def _nominal_scales(recording: Recording, chips: tuple[str, ...]) -> dict[str, float]:

@@ -6,7 +6,9 @@ each pose with its covariance, and samples denoised by the discrete wavelet tran
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 import pywt
@@ -19,9 +21,6 @@ from gfimu.recording.rest import Rest
 __all__ = ["INPUTS", "Observations", "averaged_poses", "denoised_samples", "every_sample", "observations_from"]
 
 Floats = NDArray[np.float64]
-
-INPUTS = ("averaged", "raw", "wavelet")
-"""Names of the inputs."""
 
 _BLOCKS = 10
 _COUNT_VARIANCE = 1.0 / 12.0
@@ -169,10 +168,15 @@ def denoised_samples(recording: Recording, rest: Rest, *, wavelet: str = "db4", 
 
 def observations_from(recording: Recording, rest: Rest, kind: str) -> Observations:
     """Build the observations of a named input; raises `InputError` that lists the inputs."""
-    makers = {"averaged": averaged_poses, "raw": every_sample, "wavelet": denoised_samples}
-    if kind not in makers:
+    if kind not in INPUTS:
         raise unknown_name("input", kind, INPUTS)
-    return makers[kind](recording, rest)
+    return INPUTS[kind](recording, rest)
+
+
+INPUTS: Mapping[str, Callable[[Recording, Rest], Observations]] = MappingProxyType(
+    {"averaged": averaged_poses, "raw": every_sample, "wavelet": denoised_samples}
+)
+"""What makes the observations of each input, by name."""
 
 
 def _build(recording: Recording, rest: Rest, kind: str) -> Observations:

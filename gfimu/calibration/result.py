@@ -8,6 +8,7 @@ another unit than those it was made from.
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -28,6 +29,9 @@ __all__ = ["FORMAT_VERSION", "Calibration", "combine", "load_calibration", "para
 
 FORMAT = "gfimu-calibration"
 FORMAT_VERSION = 1
+
+_ROUNDING = 1e-6
+"""Numerical tolerance of the covariance check, as a correlation: asymmetry, and how far below zero an eigenvalue is."""
 
 _AXES = "xyz"
 _READING_UNITS = {"lsb": ("lsb", "m_s2"), "m_s2": ("m_s2", "m_s2"), "rad_s": ("rad_s", "rad_s")}
@@ -95,6 +99,8 @@ class Calibration:
             raise InputError(f"a calibration of {count} parameters needs that many values and their covariance matrix")
         if len(self.channels) % 3 or not self.channels:
             raise InputError("a calibration needs three channels per chip")
+        _check_finite(self.names, self.values)
+        _check_covariance(self.names, self.covariance)
         if self.null_space.size == 0:
             object.__setattr__(self, "null_space", np.empty((count, 0)))
 
@@ -270,7 +276,10 @@ class Calibration:
             "null_space": self.null_space.T.tolist(),
             "statements": list(self.statements),
             "warnings": list(self.warnings),
-            "statistics": dict(self.statistics),
+            "statistics": {
+                key: None if isinstance(value, float) and not math.isfinite(value) else value
+                for key, value in self.statistics.items()
+            },
         }
 
     def save(self, path: str | Path) -> None:
@@ -309,7 +318,7 @@ class Calibration:
                 null_space.T if null_space.size else np.empty((len(parameters), 0)),
                 tuple(data.get("statements", ())),
                 tuple(data.get("warnings", ())),
-                dict(data.get("statistics", {})),
+                {key: math.nan if value is None else value for key, value in data.get("statistics", {}).items()},
             )
             calibration.models  # noqa: B018  a damaged parameter list shows here, not at the first use
         except KeyError as error:
@@ -317,6 +326,38 @@ class Calibration:
         except (TypeError, ValueError, AttributeError) as error:
             raise InputError(f"{source}: damaged calibration file ({error}); calibrate again") from None
         return calibration
+
+
+def _check_finite(names: tuple[str, ...], values: NDArray[np.float64]) -> None:
+    """Refuse values that hold NaN or infinity; the message names the first parameter."""
+    bad = np.flatnonzero(~np.isfinite(values))
+    if bad.size:
+        raise InputError(f"parameter {names[bad[0]]} is {values[bad[0]]}; calibrate again, with more poses")
+
+
+def _check_covariance(names: tuple[str, ...], covariance: NDArray[np.float64]) -> None:
+    """Refuse a matrix that is no covariance: not finite, not symmetric, or not positive semi-definite.
+
+    All three are judged on the correlations, because the parameters have different units and sizes.
+    """
+    remedy = "calibrate again, with more poses"
+    row, column = (int(place[0]) if len(place) else -1 for place in np.nonzero(~np.isfinite(covariance)))
+    if row >= 0:
+        raise InputError(f"the covariance of {names[row]} and {names[column]} is {covariance[row, column]}; {remedy}")
+    variance = np.diag(covariance)
+    if (variance < 0.0).any():
+        worst = int(np.argmin(variance))
+        raise InputError(f"the variance of {names[worst]} is negative ({variance[worst]:.3g}); {remedy}")
+    std = np.sqrt(variance)
+    unit = np.where(std > 0.0, std, 1.0)
+    correlation = covariance / np.outer(unit, unit)
+    apart = np.abs(correlation - correlation.T)
+    if apart.max(initial=0.0) > _ROUNDING:
+        row, column = divmod(int(np.argmax(apart)), len(names))
+        raise InputError(f"the covariance matrix is not symmetric at {names[row]} and {names[column]}; {remedy}")
+    least = float(np.linalg.eigvalsh(correlation).min(initial=0.0))
+    if least < -_ROUNDING * len(names):
+        raise InputError(f"the covariance matrix is not positive semi-definite (eigenvalue {least:.3g}); {remedy}")
 
 
 def load_calibration(path: str | Path) -> Calibration:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from gfimu.calibration.registry import METHODS
 from gfimu.cli.output import JsonOption, print_json, print_paths, print_table
 
 if TYPE_CHECKING:
@@ -14,7 +15,6 @@ if TYPE_CHECKING:
 
 __all__ = ["register"]
 
-_METHOD_NAMES = "six-position, recursive, multi-position, twelve-position, array, gyro"
 _PAIRS = ("xy", "xz", "yz")
 _NOTABLE = 0.9
 
@@ -25,7 +25,7 @@ def register(app: typer.Typer) -> None:
 
 
 def _calibrate(
-    method: Annotated[str, typer.Argument(help=f"Method: {_METHOD_NAMES}.")],
+    method: Annotated[str, typer.Argument(help=f"Method: {', '.join(METHODS)}.")],
     run: Annotated[
         Path,
         typer.Argument(help="Recording of static poses: .csv, .parquet, a MIMU4444 stream, or text rows time x y z."),
@@ -41,7 +41,7 @@ def _calibrate(
         int | None, typer.Option("--parameters", help="Per chip: 12 (full matrix) or 9 (triangular).")
     ] = None,
     input_kind: Annotated[
-        str, typer.Option("--input", help="What the method is given: averaged, raw or wavelet.")
+        str, typer.Option("--input", help="Rows that the fit uses: averaged, raw or wavelet.")
     ] = "averaged",
     rest_threshold: Annotated[
         float | None,

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, print_text, progress
+from gfimu.rate.registry import RATE_METHODS, rate_method, recursive_methods
 
 if TYPE_CHECKING:
     import numpy as np
@@ -15,6 +16,8 @@ if TYPE_CHECKING:
     from gfimu.motion.estimate_summary import EstimateSummary
 
 __all__ = ["register"]
+
+_RECURSIVE = recursive_methods(", ")
 
 
 def register(app: typer.Typer) -> None:
@@ -29,9 +32,7 @@ def _estimate(
         str | None,
         typer.Option("--array", help="Array: a name, a .toml file or MJCF sites (.xml); else the recording's own."),
     ] = None,
-    method: Annotated[
-        str, typer.Option("--method", help="Angular rate by: integrate, algebraic, ml, filter or smoother.")
-    ] = "integrate",
+    method: Annotated[str, typer.Option("--method", help=f"Angular rate by: {', '.join(RATE_METHODS)}.")] = "integrate",
     form: Annotated[
         str, typer.Option("--form", help="How readings turn into p and α: auto, linear, joint or recursive.")
     ] = "auto",
@@ -42,9 +43,9 @@ def _estimate(
         Path | None, typer.Option("--calibration", help="Calibration to apply first (JSON, from `gfimu calibrate`).")
     ] = None,
     unknown_start: Annotated[
-        bool, typer.Option("--unknown-start", help="The run may start spinning (filter, smoother).")
+        bool, typer.Option("--unknown-start", help=f"The run may start spinning ({_RECURSIVE}).")
     ] = False,
-    gyro: Annotated[bool, typer.Option("--gyro", help="Fuse the recording's gyro (filter, smoother).")] = False,
+    gyro: Annotated[bool, typer.Option("--gyro", help=f"Fuse the recording's gyro ({_RECURSIVE}).")] = False,
     position: Annotated[bool, typer.Option("--position", help="Integrate to velocity and position too.")] = False,
     force: Annotated[
         bool, typer.Option("--force", help="Go on where the checks of units, time, array and channels refuse the file.")
@@ -88,7 +89,7 @@ def _estimate(
 
 def _describe(method: str) -> str:
     """Return what is being done, for the progress bar; says so when the filter is compiled first."""
-    if method in {"filter", "smoother"}:
+    if rate_method(method).recursive:
         from gfimu.rate.first_call import must_compile
 
         if must_compile():

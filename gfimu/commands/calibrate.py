@@ -5,18 +5,26 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gfimu.errors import InputError, unknown_name
+from gfimu.errors import InputError
 from gfimu.files.outputs import CALIBRATION, PICTURE, writes
 
 if TYPE_CHECKING:
+    from gfimu.calibration.registry import CalibrationMethod
     from gfimu.calibration.result import Calibration
     from gfimu.geometry.array import AccelerometerArray
     from gfimu.recording import Recording
 
 __all__ = ["calibrate"]
 
-_MIN_REST_S = 1.0
-_MIN_REST_ARRAY_S = 2.0
+
+_OPTION_NAMES = {
+    "motion": "--motion is the motion of a whole array",
+    "update": "--update carries the calibration of a whole array over",
+    "levelling_std_rad": "--levelling-std is the tilt of levelled faces",
+    "n_parameters": "--parameters chooses the model of single chips",
+    "input_kind": "--input chooses the rows for single chips",
+}
+"""What the options are that some methods do not use, by the field of the task."""
 
 
 @writes(reads=("recording", "array", "motion", "update"), out=CALIBRATION, picture=PICTURE)
@@ -48,7 +56,7 @@ def calibrate(
     Parameters
     ----------
     method : str
-        A key of `gfimu.calibration.methods.METHODS`, ``array`` or ``gyro``.
+        A key of `gfimu.calibration.registry.METHODS`.
     recording : Recording, str or Path
         Static poses in m/s² or raw counts, or the file.
     out : str or Path, optional
@@ -62,7 +70,7 @@ def calibrate(
     parameters, n_parameters : {9, 12}, optional
         Parameters per triad; two names of one argument.
     input_kind : {"averaged", "raw", "wavelet"}
-        What the method is given (``--input``).
+        Rows that the fit uses (``--input``).
     rest_threshold : float, optional
         Threshold of rest, reading unit squared; chosen by the data if not given.
     min_rest, min_rest_s : float, optional
@@ -84,42 +92,39 @@ def calibrate(
         If the method is unknown, the data are faulty, the poses don't suffice, or an output can't be written where it
         is asked for.
     """
-    from gfimu.calibration.methods import METHODS, calibrate_gyro
-    from gfimu.calibration.methods import calibrate as calibrate_triads
-    from gfimu.commands.opened import as_array
+    from gfimu.calibration.methods import CalibrationTask, run_calibration
+    from gfimu.calibration.registry import calibration_method
+    from gfimu.commands.opened import as_array, as_calibration
 
-    if method not in {*METHODS, "array", "gyro"}:
-        raise unknown_name("calibration method", method, (*METHODS, "array", "gyro"))
-    if update is not None and method != "array":
-        raise InputError(f"--update carries the calibration of a whole array over; use it with array, not {method}")
+    chosen = calibration_method(method)
+    levelling = levelling_std_rad if levelling_std is None else levelling_std
+    count = n_parameters if parameters is None else parameters
+    _refuse_unused(
+        chosen,
+        motion=motion,
+        update=update,
+        levelling_std_rad=levelling,
+        n_parameters=count,
+        input_kind=None if input_kind == "averaged" else input_kind,
+    )
     drawing = None if array is None else as_array(array)
     local_gravity = _gravity(gravity, latitude, height)
     run = _uncalibrated(recording, drawing)
-    rest_s = min_rest_s if min_rest is None else min_rest
-    if method == "array":
-        result = _calibrate_array(
-            run,
-            drawing or _own_array(recording),
-            local_gravity,
-            rest_threshold,
-            rest_s or _MIN_REST_ARRAY_S,
-            None if motion is None else _uncalibrated(motion, drawing),
-            update,
-            (turn_on_std, bias_walk),
-        )
-    elif method == "gyro":
-        result = calibrate_gyro(run, rest_threshold=rest_threshold, min_rest_s=rest_s or _MIN_REST_S)
-    else:
-        result = calibrate_triads(
-            method,
-            run,
-            gravity=local_gravity,
-            n_parameters=n_parameters if parameters is None else parameters,
-            input_kind=input_kind,
-            rest_threshold=rest_threshold,
-            min_rest_s=rest_s or _MIN_REST_S,
-            levelling_std_rad=levelling_std_rad if levelling_std is None else levelling_std,
-        )
+    task = CalibrationTask(
+        run,
+        gravity=local_gravity,
+        n_parameters=count,
+        input_kind=input_kind,
+        rest_threshold=rest_threshold,
+        min_rest_s=min_rest_s if min_rest is None else min_rest,
+        levelling_std_rad=levelling,
+        array=_own_array(recording) if drawing is None and "array" in chosen.options else drawing,
+        motion=None if motion is None else _uncalibrated(motion, drawing),
+        update=None if update is None else as_calibration(update),
+        turn_on_std_m_s2=turn_on_std,
+        bias_walk_m_s2_rt_s=bias_walk,
+    )
+    result = run_calibration(chosen, task)
     if out is not None:
         result.save(out)
     if picture is not None:
@@ -129,34 +134,14 @@ def calibrate(
     return result
 
 
-def _calibrate_array(
-    run: Recording,
-    array: AccelerometerArray,
-    gravity: float,
-    rest_threshold: float | None,
-    min_rest_s: float,
-    motion: Recording | None,
-    update: Calibration | str | Path | None,
-    change: tuple[float, float],
-) -> Calibration:
-    """Calibrate a whole array anew, or carry an earlier calibration over."""
-    from gfimu.calibration.array_calibration import calibrate_array, update_array_calibration
-    from gfimu.commands.opened import as_calibration
+def _refuse_unused(method: CalibrationMethod, **given: object) -> None:
+    """Refuse an option that the method would ignore."""
+    from gfimu.calibration.registry import METHODS
 
-    if update is None:
-        return calibrate_array(
-            run, array, gravity=gravity, motion=motion, rest_threshold=rest_threshold, min_rest_s=min_rest_s
-        )
-    turn_on_std, bias_walk = change
-    return update_array_calibration(
-        as_calibration(update),
-        run,
-        array,
-        turn_on_std_m_s2=turn_on_std,
-        bias_walk_m_s2_rt_s=bias_walk,
-        rest_threshold=rest_threshold,
-        min_rest_s=min_rest_s,
-    )
+    for name, value in given.items():
+        if value is not None and name not in method.options:
+            users = " or ".join(other.name for other in METHODS.values() if name in other.options)
+            raise InputError(f"{_OPTION_NAMES[name]}; use it with {users}, not {method.name}")
 
 
 def _uncalibrated(recording: Recording | str | Path, array: AccelerometerArray | None) -> Recording:

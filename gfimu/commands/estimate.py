@@ -75,7 +75,7 @@ def estimate(
     out : str or Path, optional
         Estimate file to write, ``.parquet`` or ``.csv``.
     method : str
-        Method for the angular rate: integrate, algebraic, ml, filter or smoother.
+        Method for the angular rate, a key of `gfimu.rate.registry.RATE_METHODS`.
     form : {"auto", "linear", "joint", "recursive"}
         How readings turn into α and p; see `gfimu.geometry.linear_solution`.
     rest_bias : bool

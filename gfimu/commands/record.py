@@ -47,7 +47,7 @@ def record(
     range_g : int, optional
         Ask the board for ±2, 4, 8 or 16 g (``--range``).
     form : str
-        Frame format (``--format``): ``lpc1768`` or ``mimu4444``.
+        Frame format (``--format``): a key of `firmware_bridge.frames.FORMATS`.
     array : str
         Array on the board; the format's by default.
     baud : int

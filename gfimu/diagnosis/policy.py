@@ -33,6 +33,29 @@ class Policy:
         Gauss–Newton steps of a fit.
     settled : float
         Nats that a step must promise to be taken.
+    least_share : float
+        Share of the held-out excess below which causes are withdrawn: they miss more than they explain.
+    gate_stds : float
+        Standard errors beyond which a held-out figure counts.
+    worse : float
+        Ratio of the rms after to the rms before up to which a rise is the noise of the drive.
+    near_noise : float
+        Ratio of an rms to the noise floor up to which it is no evidence against a cause.
+    block_duration : float
+        About how long a held-out block is, s: several blocks in the shortest run, each much longer than a corner of
+        the drive.
+    block_angle_std : float
+        Standard deviation of the table's angle at the first sample of a block, rad: what the fit of the whole run
+        leaves open.
+    significant_excess : float
+        Standard errors of the noise floor from which held-out misfit counts as an excess.
+    least_excess : float
+        Share of the noise floor from which it counts: what the spectrum of slow noise may be wrong by.
+    floor_slack : float
+        Standard errors by which the noise floor may be raised to what the fitted part leaves.
+    clipped : float
+        Squares of fast residuals, in variances, at which they are clipped for the noise floor, so that a line does not
+        count as noise: 3 σ.
     largest_flicker : float
         Largest usual bias instability, m/s²: 1.5 mg, above the data sheet's of an ADXL345. More is something else.
     walk_odds : float
@@ -86,10 +109,19 @@ class Policy:
     settled: float = 0.3
     learnings: int = 3
     knots: float = 0.05
-    own_roughness: bool = False
     temperature: float = 1.2
     ambiguous: float = 2.0
     rivals: int = 4
+    least_share: float = 0.5
+    gate_stds: float = 2.0
+    worse: float = 1.01
+    near_noise: float = 1.1
+    block_duration: float = 8.0
+    block_angle_std: float = 5e-3
+    significant_excess: float = 4.0
+    least_excess: float = 0.01
+    floor_slack: float = 3.0
+    clipped: float = 9.0
     largest_flicker: float = 1.5e-3 * STANDARD_GRAVITY
     walk_odds: float = 10.0
     unequal_walk: float = 14.0
@@ -113,4 +145,17 @@ class Policy:
     comparable: float = 0.1
     nearly_all: float = 0.9
     least_described: float = 0.03
-    searched_stretches: int = 8
+    residue_odds: tuple[tuple[float, float], ...] = ((1.0, 3.0), (3.0, 7.0))
+    worth_a_search: float = 3.0
+    most_searched: int = 6
+    most_certain: float = 0.997
+    mimic_energy: float = 6.0
+    seen: float = 2.0
+    unseen_at_most: float = 0.9
+    inexactness: float = 2.5e-3
+    dominant: float = 0.03
+    beyond_chance: float = 4.0
+    least_gain: float = 2.0
+    fair: float = 1.6
+    knot_odds: float = 100.0
+    hopeless: float = 40.0

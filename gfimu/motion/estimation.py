@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from gfimu import __version__
-from gfimu.errors import InputError, unknown_name
+from gfimu.errors import InputError
 from gfimu.files.column_file import open_columns, write_columns
 from gfimu.files.table import ArrowStream, Tabular
 from gfimu.geometry.array import OMEGA_PRODUCTS, AccelerometerArray
@@ -30,15 +30,16 @@ from gfimu.rate.consistency import judge_consistency
 from gfimu.rate.feedback import integrate_rate_recursively
 from gfimu.rate.integration import integrate_rate
 from gfimu.rate.kalman import FilterSettings
-from gfimu.rate.methods import RATE_METHODS, estimate_rate
-from gfimu.rate.problem import RateMethod, RateProblem, RateSolution
+from gfimu.rate.methods import estimate_rate
+from gfimu.rate.problem import RateProblem, RateSolution
+from gfimu.rate.registry import RateMethod, rate_method
 from gfimu.rate.result import RateEstimate
 from gfimu.rate.sensing import SensorErrors
 from gfimu.recording import Recording
 from gfimu.recording.checks import Finding, check_recording, refuse_or_warn, without_dead_channels
 from gfimu.short_repr import joined, timing
 
-__all__ = ["METHODS", "Estimate", "estimate"]
+__all__ = ["Estimate", "estimate"]
 
 FORMAT_VERSION = 1
 _AXES = ("x", "y", "z")
@@ -177,7 +178,7 @@ def estimate(
     array : AccelerometerArray
         The array that was recorded.
     method : str
-        Method for the angular rate, one of `METHODS`.
+        Method for the angular rate, a key of `gfimu.rate.registry.RATE_METHODS`.
     form : {"auto", "linear", "joint", "recursive"}
         How readings turn into α and p; see `gfimu.geometry.linear_solution`.
     omega0 : array_like, shape (3,), or None
@@ -212,16 +213,15 @@ def estimate(
     GeometryError
         If the array can't see all six motions; the message names those it can't.
     """
-    if method not in METHODS:
-        raise unknown_name("method", method, METHODS)
+    chosen = rate_method(method)
     found = refuse_or_warn(check_recording(recording, array) if findings is None else findings, force=force)
     recording = without_dead_channels(recording, array, found)
     readings = recording.for_array(array)
     rate0 = None if omega0 is None else np.asarray(omega0, dtype=float)
-    if rate0 is None and method not in {"filter", "smoother"}:
-        raise InputError(f"method {method!r} needs the rate at the start; use filter or smoother for an unknown one")
-    if fuse_gyro and method not in {"filter", "smoother"}:
-        raise InputError(f"method {method!r} can't use a gyro; use filter or smoother")
+    if rate0 is None:
+        chosen.refuse_unknown_start()
+    if fuse_gyro:
+        chosen.refuse_gyro()
     if rate0 is not None and (rate0.shape != (3,) or not np.isfinite(rate0).all()):
         raise InputError(f"omega0 is {omega0!r}; it must hold three finite numbers, in rad/s")
     noise = white_noise_std(array, recording.sample_rate) if noise_std is None else np.asarray(noise_std, dtype=float)
@@ -236,9 +236,9 @@ def estimate(
     problem = RateProblem(array, recording.t_s, readings, noise, linear, rate0, gyro, temperature, progress)
     dead = [name for finding in found if finding.kind == "dead" for name in finding.channels]
     try:
-        rate = METHODS[method](problem)
+        rate = _solve_rate(chosen, problem)
     except InputError as error:
-        if not dead or method in {"filter", "smoother"}:
+        if not dead or chosen.recursive:
             raise
         names = ", ".join(dead)
         raise InputError(f"without the dead {names}: {error}; --method filter may do without it") from None
@@ -300,36 +300,37 @@ def _integrate(problem: RateProblem) -> RateSolution:
     )
 
 
-def _by_rate_method(method: str) -> RateMethod:
-    """Adapt a method of `gfimu.rate.methods`, with the sensors' errors from their data sheets."""
+def _solve_rate(method: RateMethod, problem: RateProblem) -> RateSolution:
+    """Find the angular rate: the solution for α integrated, or the sensors' errors taken from their data sheets."""
+    return _integrate(problem) if method.open_loop else _with_sensor_errors(method, problem)
 
-    def solve(problem: RateProblem) -> RateSolution:
-        problem, names = _of_living_channels(problem)
-        rate = 1.0 / float(np.median(np.diff(problem.t_s)))
-        errors = SensorErrors.from_parts(problem.array, rate, noise_std=problem.noise_std)
-        settings = FilterSettings(start_omega=problem.omega0)
-        found = estimate_rate(
-            problem.array, problem.t_s, problem.readings, errors, method=method, settings=settings, gyro=problem.gyro,
-            progress=problem.progress,
+
+def _with_sensor_errors(method: RateMethod, problem: RateProblem) -> RateSolution:
+    """Run a method of `gfimu.rate.methods` with the sensors' errors from their data sheets."""
+    problem, names = _of_living_channels(problem)
+    rate = 1.0 / float(np.median(np.diff(problem.t_s)))
+    errors = SensorErrors.from_parts(problem.array, rate, noise_std=problem.noise_std)
+    settings = FilterSettings(start_omega=problem.omega0)
+    found = estimate_rate(
+        problem.array, problem.t_s, problem.readings, errors, method=method.name, settings=settings,
+        gyro=problem.gyro, progress=problem.progress,
+    )  # fmt: skip
+    remarks = {
+        "sign": found.sign.state,
+        "sign_decided_at_s": found.sign.decided_at_s if np.isfinite(found.sign.decided_at_s) else None,
+        "mean_normalised_innovation_squared": found.mean_nis if np.isfinite(found.mean_nis) else None,
+        "share_at_rest": float(found.rest.mean()),
+        "channels": _renamed(found.channels.to_dict(), names),
+    }
+    if method.recursive:
+        consistency = judge_consistency(
+            problem.array, problem.readings, errors, found, temperature=problem.temperature,
+            filter_again=_filter_again(problem, errors, found),
         )  # fmt: skip
-        remarks = {
-            "sign": found.sign.state,
-            "sign_decided_at_s": found.sign.decided_at_s if np.isfinite(found.sign.decided_at_s) else None,
-            "mean_normalised_innovation_squared": found.mean_nis if np.isfinite(found.mean_nis) else None,
-            "share_at_rest": float(found.rest.mean()),
-            "channels": _renamed(found.channels.to_dict(), names),
-        }
-        if method in {"filter", "smoother"}:
-            consistency = judge_consistency(
-                problem.array, problem.readings, errors, found, temperature=problem.temperature,
-                filter_again=_filter_again(problem, errors, found),
-            )  # fmt: skip
-            if consistency is not None and consistency.worst_channel is not None:
-                consistency = replace(consistency, worst_channel=names[consistency.worst_channel])
-            remarks["consistency"] = None if consistency is None else consistency.to_dict()
-        return RateSolution(found.omega, np.where(np.isfinite(found.std), found.std, np.nan), found.rest, remarks)
-
-    return solve
+        if consistency is not None and consistency.worst_channel is not None:
+            consistency = replace(consistency, worst_channel=names[consistency.worst_channel])
+        remarks["consistency"] = None if consistency is None else consistency.to_dict()
+    return RateSolution(found.omega, np.where(np.isfinite(found.std), found.std, np.nan), found.rest, remarks)
 
 
 def _of_living_channels(problem: RateProblem) -> tuple[RateProblem, dict[str, str]]:
@@ -379,13 +380,6 @@ def _filter_again(
         )
 
     return run
-
-
-METHODS: dict[str, RateMethod] = {
-    "integrate": _integrate,
-    **{name: _by_rate_method(name) for name in RATE_METHODS if name != "integrate"},
-}
-"""Methods for the angular rate, by name."""
 
 
 def _integrated_variance(t: NDArray[np.float64], variance: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -20,6 +20,7 @@ from gfimu.geometry.array import AccelerometerArray
 from gfimu.geometry.kinematics import specific_force
 from gfimu.motion.estimation import Estimate, estimate
 from gfimu.parts.limits import PartLimits
+from gfimu.rate.registry import rate_method
 from gfimu.recording import Recording
 from gfimu.recording.checks import Finding, check_recording, refuse_or_warn, without_dead_channels
 from gfimu.recording.rest import detect_rest
@@ -165,7 +166,7 @@ def estimate_from_rest(
     array : AccelerometerArray
         Geometry of the channels.
     method : str
-        Method for the angular rate. The standard deviation of ``integrate`` grows by what is left of the biases.
+        Method for the angular rate. The standard deviation of ``integrate`` grows by the uncertainty of the biases.
     gravity : float
         Local gravity, m/s².
     force : bool
@@ -184,7 +185,7 @@ def estimate_from_rest(
     found = rest_bias(recording, array, gravity=gravity, without=dead)
     findings += refuse_or_warn(found.findings(), force=force)
     result = estimate(found.remove(recording), array, method=method, findings=findings, force=force, **options)
-    left = found.rate_std(result.t_s) if method == "integrate" else 0.0
+    left = found.rate_std(result.t_s) if rate_method(method).open_loop else 0.0
     biases = dict(zip(array.channels, found.bias.tolist(), strict=True))
     return replace(
         result,

@@ -7,6 +7,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from gfimu.errors import InputError
+from gfimu.rate.quadrature import polynomial_weights
 
 __all__ = ["integrate_rate_recursively"]
 
@@ -94,7 +95,7 @@ def _integrate(t, linear, leakage, pattern, omega0, longest):  # type: ignore[no
     omega = np.empty((n, 3))
     omega[0] = omega0
     older, last, new = np.zeros(3), np.empty(3), np.empty(3)
-    guess, fixed = np.empty(3), np.empty(3)
+    guess, fixed, weights = np.empty(3), np.empty(3), np.empty(3)
     _acceleration(linear[0], leakage[pattern[0]], omega[0], last)
     step_before = 0.0  # no usable sample before the last one
     for i in range(1, n):
@@ -102,20 +103,17 @@ def _integrate(t, linear, leakage, pattern, omega0, longest):  # type: ignore[no
         if h > longest:
             step_before = 0.0
         if h <= _STEP_RATIO * step_before and step_before <= _STEP_RATIO * h:
-            k = step_before
-            w_new = h * (2.0 * h + 3.0 * k) / (6.0 * (h + k))
-            w_last = h * (h + 3.0 * k) / (6.0 * k)
-            w_older = -(h**3) / (6.0 * k * (h + k))
+            polynomial_weights(t, i - 2, 3, i - 1, weights)  # older, last, new
         else:
-            w_new, w_last, w_older = 0.5 * h, 0.5 * h, 0.0
+            weights[0], weights[1], weights[2] = 0.0, 0.5 * h, 0.5 * h
         for axis in range(3):
-            fixed[axis] = omega[i - 1, axis] + w_last * last[axis] + w_older * older[axis]
+            fixed[axis] = omega[i - 1, axis] + weights[1] * last[axis] + weights[0] * older[axis]
             guess[axis] = omega[i - 1, axis] + h * last[axis]
         for _ in range(_ITERATIONS):
             _acceleration(linear[i], leakage[pattern[i]], guess, new)
             change, size = 0.0, 0.0
             for axis in range(3):
-                value = fixed[axis] + w_new * new[axis]
+                value = fixed[axis] + weights[2] * new[axis]
                 change = max(change, abs(value - guess[axis]))
                 size = max(size, abs(value))
                 guess[axis] = value

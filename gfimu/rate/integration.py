@@ -27,39 +27,21 @@ rate behind a long one is only as good as that straight line.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
+from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from gfimu.errors import InputError, unknown_name
+from gfimu.rate.quadrature import STENCILS, Stencil, polynomial_weights
+from gfimu.rate.recursion_data import COMPILE
 
-__all__ = ["METHODS", "integrate_rate", "integrate_samples", "sample_integrals"]
-
-
-@dataclass(frozen=True)
-class _Stencil:
-    """Samples that the polynomial of one interval passes through, counted from the interval's left end."""
-
-    before: tuple[int, int]  # first sample for intervals of even and of odd number
-    points: int
-    causal: bool = False
+__all__ = ["METHODS", "integrate_rate", "integrate_samples"]
 
 
-_STENCILS = {
-    "trapezoid": _Stencil((0, 0), 2, causal=True),
-    "runge_kutta": _Stencil((0, -1), 3),
-    "adams_moulton4": _Stencil((-2, -2), 4, causal=True),
-    "centred4": _Stencil((-1, -1), 4),
-    "centred6": _Stencil((-2, -2), 6),
-}
-
-METHODS = tuple(_STENCILS)
+METHODS = tuple(STENCILS)
 """Names of the integration methods."""
 
 _GAP_PERIODS = 1.5
-_UNIFORM_TOLERANCE = 1e-7
-_BLOCK = 1 << 15
 
 
 def integrate_rate(
@@ -137,34 +119,6 @@ def integrate_samples(
     return result.reshape(np.shape(samples))
 
 
-def sample_integrals(t: ArrayLike, samples: ArrayLike, *, method: str = "runge_kutta") -> NDArray[np.float64]:
-    """Integral of sampled quantities over each sample interval.
-
-    Parameters
-    ----------
-    t : array_like, shape (n,)
-        Sample times, s, strictly increasing.
-    samples : array_like, shape (n, k)
-        Samples, all finite.
-    method : str
-        As for `integrate_rate`.
-
-    Returns
-    -------
-    ndarray, shape (n − 1, k)
-        Integral from sample i to i + 1, in the unit of ``samples`` times s.
-
-    Raises
-    ------
-    InputError
-        As for `integrate_rate`, and if a sample is not finite.
-    """
-    times, values = _checked(t, samples)
-    if not np.isfinite(values).all():
-        raise InputError("samples hold NaN or infinity; drop those rows before integrating interval by interval")
-    return _integrals(times, values, method)
-
-
 def _checked(t: ArrayLike, samples: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return times (n,) and samples (n, k), checked."""
     times = np.asarray(t, dtype=float)
@@ -180,25 +134,29 @@ def _checked(t: ArrayLike, samples: ArrayLike) -> tuple[NDArray[np.float64], NDA
 
 def _integrals(t: NDArray[np.float64], values: NDArray[np.float64], method: str) -> NDArray[np.float64]:
     """Integral over each interval, shape (n − 1, k)."""
-    if method not in _STENCILS:
+    if method not in STENCILS:
         raise unknown_name("integration method", method, METHODS)
     n = len(t)
     if n < 2:
         return np.zeros((0, values.shape[1]))
-    first, points = _place_stencils(t, _STENCILS[method])
-    left = np.arange(n - 1)
-    integrals = np.empty((n - 1, values.shape[1]))
-    shape_of_stencil = (left - first) * (points.max() + 1) + points
-    for shape in np.unique(shape_of_stencil):
-        members = np.flatnonzero(shape_of_stencil == shape)
-        for block in np.split(members, range(_BLOCK, len(members), _BLOCK)):
-            columns = first[block, None] + np.arange(points[block[0]])  # (m, points)
-            weights = _weights(t, block, columns)
-            integrals[block] = np.einsum("mp,mpk->mk", weights, values[columns])
+    first, points = _place_stencils(t, STENCILS[method])
+    integrals = np.zeros((n - 1, values.shape[1]))
+    _sum_intervals(np.ascontiguousarray(t), np.ascontiguousarray(values), first, points, integrals)
     return integrals
 
 
-def _place_stencils(t: NDArray[np.float64], stencil: _Stencil) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+@njit(**COMPILE)
+def _sum_intervals(t, values, first, points, integrals):  # type: ignore[no-untyped-def]
+    """Weigh and add the samples of every interval's stencil."""
+    weights = np.empty(points.max())
+    for left in range(len(first)):
+        polynomial_weights(t, first[left], points[left], left, weights)
+        for j in range(points[left]):
+            for k in range(values.shape[1]):
+                integrals[left, k] += weights[j] * values[first[left] + j, k]
+
+
+def _place_stencils(t: NDArray[np.float64], stencil: Stencil) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """First sample and number of samples of the stencil of each interval, so that none crosses a gap."""
     step = np.diff(t)
     period = np.median(step)
@@ -217,15 +175,3 @@ def _place_stencils(t: NDArray[np.float64], stencil: _Stencil) -> tuple[NDArray[
         points = np.minimum(stencil.points, stop - start + 1)
         first = np.minimum(first, stop - points + 1)
     return np.where(gap, left, first), np.where(gap, 2, points)
-
-
-def _weights(t: NDArray[np.float64], left: NDArray[np.intp], columns: NDArray[np.intp]) -> NDArray[np.float64]:
-    """Weights of the samples ``columns`` in the integral from sample ``left`` to the next, shape (m, points), s."""
-    step = t[left + 1] - t[left]
-    nodes = (t[columns] - t[left, None]) / step[:, None]  # (m, points), the interval is [0, 1]
-    uniform = np.ptp(nodes, axis=0).max() < _UNIFORM_TOLERANCE
-    powers = np.arange(columns.shape[1])
-    # Exact for the monomials x^j: Σ_i w_i x_i^j = 1/(j + 1).
-    vandermonde = (nodes[:1] if uniform else nodes)[:, None, :] ** powers[:, None]  # (m or 1, points, points)
-    weights = np.linalg.solve(vandermonde, np.broadcast_to(1.0 / (powers + 1.0), vandermonde.shape[:2])[..., None])
-    return weights[..., 0] * step[:, None]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from numba import njit
 
+from gfimu.rate.quadrature import polynomial_weights
 from gfimu.rate.recursion_data import COMPILE
 
 __all__ = ["interval_weights"]
@@ -23,26 +24,8 @@ def interval_weights(data, tuning, k, closing, weights):  # type: ignore[no-unty
             for j in range(points):
                 weights[j] = tuning.weights[left, j] * step
         else:
-            _uneven_weights(data.t, start, points, k - 1, weights)
+            polynomial_weights(data.t, start, points, k - 1, weights)
         return start, points
     weights[0] = 0.5 * step
     weights[1] = 0.5 * step
     return k - 1, 2
-
-
-@njit(**COMPILE)
-def _uneven_weights(t, start, points, left, weights):  # type: ignore[no-untyped-def]
-    """Integrate Lagrange's polynomials of uneven nodes from sample ``left`` to the next (Gauss–Legendre, exact)."""
-    step = t[left + 1] - t[left]
-    for j in range(points):
-        weights[j] = 0.0
-    for g in range(3):
-        abscissa = 0.5 + (g - 1) * 0.3872983346207417
-        share = 0.4444444444444444 if g == 1 else 0.2777777777777778
-        at = t[left] + abscissa * step
-        for j in range(points):
-            basis = 1.0
-            for i in range(points):
-                if i != j:
-                    basis *= (at - t[start + i]) / (t[start + j] - t[start + i])
-            weights[j] += share * basis * step

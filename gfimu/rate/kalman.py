@@ -22,6 +22,7 @@ from gfimu.errors import InputError, unknown_name
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.rate.backward import backward
 from gfimu.rate.preparation import prepare
+from gfimu.rate.quadrature import STENCILS, even_weights
 from gfimu.rate.recursion import forward
 from gfimu.rate.recursion_data import (
     BLOCK,
@@ -44,11 +45,12 @@ __all__ = [
     "FilterSettings",
     "KalmanRateFilter",
     "join",
-    "quadrature_weights",
     "spread_rest",
 ]
 
-QUADRATURES = {"centred6": (6, 2), "centred4": (4, 1), "adams_moulton4": (4, 2), "trapezoid": (2, 0)}
+QUADRATURES = {
+    name: (stencil.points, -stencil.before[0]) for name, stencil in STENCILS.items() if not stencil.alternates
+}
 """Samples of the stencil and the interval of it that is integrated; what lies behind it is the filter's lag."""
 
 _CHUNK = 4096
@@ -109,15 +111,6 @@ def join(parts: Sequence[FilterOutput]) -> FilterOutput:
     )
 
 
-def quadrature_weights(points: int) -> NDArray[np.float64]:
-    """Integrals of Lagrange's polynomials through ``points`` even nodes over each interval, (points − 1, points)."""
-    nodes = np.arange(points, dtype=float)
-    vandermonde = nodes ** np.arange(points)[:, None]  # (power, node)
-    power = np.arange(1, points + 1)[:, None]
-    moments = (nodes[1:] ** power - nodes[:-1] ** power) / power  # (power, interval)
-    return np.asarray(np.linalg.solve(vandermonde, moments).T, dtype=float)
-
-
 class KalmanRateFilter:
     """The filter as a process: takes samples, gives estimates `lag` samples later.
 
@@ -161,7 +154,7 @@ class KalmanRateFilter:
         self.settings = settings or FilterSettings()
         self.tables = ChannelTables(array, errors)
         points, position = QUADRATURES[self.settings.quadrature]
-        weights = quadrature_weights(points)
+        weights = even_weights(points)
         self.lag = points - 2 - position
         self._gyro = gyro
         c, d = array.n_channels, self.tables.n_null

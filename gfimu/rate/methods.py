@@ -20,19 +20,24 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gfimu.errors import InputError, unknown_name
+from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.rate.algebraic import algebraic_rate
-from gfimu.rate.filter import filter_rate
 from gfimu.rate.integration import integrate_rate
 from gfimu.rate.kalman import FilterSettings
 from gfimu.rate.maximum_likelihood import maximum_likelihood_rate
 from gfimu.rate.null_readings import null_readings
+from gfimu.rate.registry import RATE_METHODS, rate_method
 from gfimu.rate.result import RateEstimate
 from gfimu.rate.sensing import ChannelTables, SensorErrors
-from gfimu.rate.smoother import smooth_rate
 
-__all__ = ["RATE_METHODS", "estimate_rate"]
+__all__ = [
+    "RATE_METHODS",
+    "algebraic_from_rest",
+    "estimate_rate",
+    "integrate_from_rest",
+    "maximum_likelihood_from_rest",
+]
 
 
 def estimate_rate(
@@ -58,8 +63,8 @@ def estimate_rate(
         Specific force, m/s²; NaN where a channel is missing.
     errors : SensorErrors
         Errors of the sensors; `SensorErrors.from_parts` takes them from data sheets.
-    method : {"integrate", "algebraic", "ml", "filter", "smoother"}
-        See the module's table.
+    method : str
+        A key of `gfimu.rate.registry.RATE_METHODS`; see the module's table.
     settings : FilterSettings, optional
         Start of the run, quadrature, recognition of rest. The per-sample methods and the integration take their
         biases from a leading rest if the start is at rest.
@@ -75,23 +80,23 @@ def estimate_rate(
     GeometryError
         If the array can't see what the method needs.
     """
-    if method not in RATE_METHODS:
-        raise unknown_name("method", method, RATE_METHODS)
-    chosen = settings or FilterSettings()
-    if method in {"filter", "smoother"}:
-        solve = filter_rate if method == "filter" else smooth_rate
-        return solve(array, t, readings, errors, chosen, gyro=gyro, progress=progress)
+    chosen = rate_method(method)
+    start = settings or FilterSettings()
+    if chosen.recursive:
+        return chosen.solver(array, t, readings, errors, start, gyro=gyro, progress=progress)
     if gyro is not None:
-        raise InputError(f"method {method!r} can't use a gyro; use filter or smoother")
-    return _SIMPLE[method](array, t, readings, errors, chosen)
+        chosen.refuse_gyro()
+    if chosen.open_loop and start.start_omega is None:
+        chosen.refuse_unknown_start()
+    return chosen.solver(array, t, readings, errors, start)
 
 
-def _integrate(
+def integrate_from_rest(
     array: AccelerometerArray, t: ArrayLike, readings: ArrayLike, errors: SensorErrors, settings: FilterSettings
 ) -> RateEstimate:
     """Integrate α (GF-IMU paper, step 10 d) with the mean over a leading rest as bias."""
     if settings.start_omega is None:
-        raise InputError("method 'integrate' needs the rate at the start; use filter or smoother for an unknown one")
+        raise InputError("an integration needs the rate at the start; give it as start_omega")
     if ChannelTables(array, errors).alpha_leak[0].any():
         raise InputError(
             f"array {array.name!r} leaves products of the rate in α; use filter, or gfimu.estimate, which "
@@ -113,29 +118,33 @@ def _integrate(
     )
 
 
+def algebraic_from_rest(
+    array: AccelerometerArray, t: ArrayLike, readings: ArrayLike, errors: SensorErrors, settings: FilterSettings
+) -> RateEstimate:
+    """Solve the products of ω sample by sample in closed form, with the mean over a leading rest as bias."""
+    return _per_sample(algebraic_rate, array, t, readings, errors, settings)
+
+
+def maximum_likelihood_from_rest(
+    array: AccelerometerArray, t: ArrayLike, readings: ArrayLike, errors: SensorErrors, settings: FilterSettings
+) -> RateEstimate:
+    """Solve ω sample by sample by maximum likelihood, with the mean over a leading rest as bias."""
+    return _per_sample(maximum_likelihood_rate, array, t, readings, errors, settings)
+
+
 def _per_sample(
     solve: Callable[..., RateEstimate],
-) -> Callable[[AccelerometerArray, ArrayLike, ArrayLike, SensorErrors, FilterSettings], RateEstimate]:
-    def run(
-        array: AccelerometerArray, t: ArrayLike, readings: ArrayLike, errors: SensorErrors, settings: FilterSettings
-    ) -> RateEstimate:
-        start: NDArray[np.float64] | None = settings.start_omega
-        at_rest = start is not None and not np.any(start)
-        found = solve(array, t, readings, errors, start_at_rest=at_rest)
-        if start is not None and np.any(start):  # a known rate at the start settles the sign there
-            known = np.flatnonzero(np.isfinite(found.omega).all(axis=1))
-            if known.size and found.omega[known[0]] @ start < 0:
-                found = replace(found, omega=-found.omega)
-        return found
-
-    return run
-
-
-_SIMPLE = {
-    "integrate": _integrate,
-    "algebraic": _per_sample(algebraic_rate),
-    "ml": _per_sample(maximum_likelihood_rate),
-}
-
-RATE_METHODS = ("integrate", "algebraic", "ml", "filter", "smoother")
-"""Names of the methods."""
+    array: AccelerometerArray,
+    t: ArrayLike,
+    readings: ArrayLike,
+    errors: SensorErrors,
+    settings: FilterSettings,
+) -> RateEstimate:
+    start: NDArray[np.float64] | None = settings.start_omega
+    at_rest = start is not None and not np.any(start)
+    found = solve(array, t, readings, errors, start_at_rest=at_rest)
+    if start is not None and np.any(start):  # a known rate at the start settles the sign there
+        known = np.flatnonzero(np.isfinite(found.omega).all(axis=1))
+        if known.size and found.omega[known[0]] @ start < 0:
+            found = replace(found, omega=-found.omega)
+    return found

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from gfimu.geometry.array import AccelerometerArray
 from gfimu.geometry.linear_solution import LinearSolution
 from gfimu.short_repr import short_repr
 
-__all__ = ["RateMethod", "RateProblem", "RateSolution"]
+__all__ = ["RateProblem", "RateSolution"]
 
 
 @dataclass(frozen=True)
@@ -69,11 +69,3 @@ class RateSolution:
     remarks: Mapping[str, Any] = field(default_factory=dict)
 
     __repr__ = short_repr
-
-
-class RateMethod(Protocol):
-    """A method for the angular rate."""
-
-    def __call__(self, problem: RateProblem) -> RateSolution:
-        """Find the angular rate at every sample."""
-        ...

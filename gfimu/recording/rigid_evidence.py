@@ -25,6 +25,7 @@ from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.geometry.kinematics import omega_products
 from gfimu.parts.limits import PartLimits
+from gfimu.rate.integration import integrate_samples
 from gfimu.recording.recording import Recording
 from gfimu.recording.rest import detect_rest
 from gfimu.units import STANDARD_GRAVITY
@@ -480,9 +481,7 @@ def _windows(
     windows = []
     for start in chosen:
         part = slice(start, start + length)
-        integrals = np.zeros((length, values.shape[1]))
-        steps = np.diff(t[part])[:, None] * 0.5 * (values[part][1:] + values[part][:-1])
-        integrals[1:] = np.cumsum(steps, axis=0)
+        integrals = integrate_samples(t[part], values[part], method="trapezoid")
         rows = np.unique(np.linspace(0, length - 1, min(_ROWS, length)).astype(int))
         windows.append(Window(values[part][rows], integrals[rows], t[part][rows] - t[start], 1.0 / group))
     return tuple(windows)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from gfimu import AccelerometerArray, Estimate, Recording, specific_force
+from gfimu.calibration.registry import METHODS
 from gfimu.calibration.result import load_calibration
 from gfimu.geometry.gravity import local_gravity
 from gfimu.sensor_noise import white_noise
@@ -176,6 +177,14 @@ def test_raw_counts(gfimu_command, tmp_path, poses, run):
         (("multi-position", "POSES", "--parameters", 10), "choose 12"),
         (("multi-position", "POSES", "--input", "boiled"), "unknown input 'boiled'"),
         (("gyro", "POSES"), "lacks gyro_x_rad_s"),
+        (("gyro", "POSES", "--update", "POSES"), "use it with array, not gyro"),
+        (("six-position", "POSES", "--motion", "RUN"), "use it with array, not six-position"),
+        (
+            ("recursive", "POSES", "--levelling-std", 0.001),
+            "use it with six-position or twelve-position, not recursive",
+        ),
+        (("array", "POSES", "--parameters", 9), "twelve-position, not array"),
+        (("array", "POSES", "--input", "raw"), "twelve-position, not array"),
         (("array", "POSES", "--array", "mimu4444"), "column m11"),
         (("multi-position", "missing.csv"), "missing.csv"),
     ],
@@ -190,6 +199,28 @@ def test_bad_input(gfimu_command, poses, run, arguments, message):
     assert result.stderr.count("\n") == 1
     assert "Traceback" not in result.stderr
     assert not out.exists()
+
+
+def test_a_calibration_with_nan_covariance_is_one_line(gfimu_command, poses, run):
+    """Its covariance is the prior of an update: NaN there would make every number of the result NaN."""
+    good, bad = poses.with_name("good.json"), poses.with_name("nan.json")
+    assert gfimu_command("calibrate", "array", poses, "--gravity", GRAVITY, "--out", good).code == 0
+    content = json.loads(good.read_text())
+    content["covariance"][3][3] = float("nan")
+    bad.write_text(json.dumps(content))
+    for command in (
+        ("calibrate", "array", poses, "--update", bad, "--out", poses.with_name("out.json")),
+        ("estimate", run, "--calibration", bad, "--out", run.with_name("estimate.parquet")),
+    ):
+        refused = gfimu_command(*command)
+        assert refused.code == 2
+        assert "nan.json: damaged calibration file (the covariance of a1_M_yx and a1_M_yx is nan" in refused.stderr
+        assert refused.stderr.count("\n") == 1
+
+
+def test_the_help_lists_every_method(gfimu_command):
+    shown = " ".join(gfimu_command("calibrate", "--help").stdout.replace("│", " ").split())
+    assert ", ".join(METHODS) in shown
 
 
 def test_estimate_refuses_a_file_that_is_no_calibration(gfimu_command, run):

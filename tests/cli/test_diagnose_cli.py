@@ -37,7 +37,19 @@ def eccentric(tmp_path_factory):
     return path
 
 
-def test_a_hidden_cause_is_found_told_and_written(gfimu_command, eccentric, tmp_path):
+@pytest.fixture
+def plain_report(monkeypatch):
+    """Call it and the reports from then on are a word: the report has tests of its own, and drawing takes seconds."""
+
+    def spare() -> None:
+        monkeypatch.setattr(
+            "gfimu.diagnosis.report.folder.write_report", lambda path, diagnosis: path.write_text("report")
+        )
+
+    return spare
+
+
+def test_a_hidden_cause_is_found_told_and_written(gfimu_command, eccentric, tmp_path, plain_report):
     out = tmp_path / "made"
     done = gfimu_command("diagnose", eccentric, "--twin", TWIN, "--out", out)
     assert done.code == 0, done.stderr
@@ -61,6 +73,7 @@ def test_a_hidden_cause_is_found_told_and_written(gfimu_command, eccentric, tmp_
     assert residual["rms_after"] < 1.05 * residual["noise_floor"] < residual["rms_before"]
 
     # The extended twin loads back and simulates; with it the same data hold nothing more.
+    plain_report()
     again = gfimu_command("diagnose", eccentric, "--twin", out / "twin.toml", "--out", tmp_path / "again", "--json")
     assert again.code == 0, again.stderr
     report = json.loads(again.stdout)
@@ -70,7 +83,9 @@ def test_a_hidden_cause_is_found_told_and_written(gfimu_command, eccentric, tmp_
     assert gfimu_command("simulate", out / "twin.toml", "--out", tmp_path / "again.parquet").code == 0
 
 
-def test_an_uncalibrated_unit_is_told_to_be_calibrated_and_then_only_the_rig_is_left(gfimu_command, tmp_path):
+def test_an_uncalibrated_unit_is_told_to_be_calibrated_and_then_only_the_rig_is_left(
+    gfimu_command, tmp_path, plain_report
+):
     run, poses, cal = tmp_path / "run.parquet", tmp_path / "poses.parquet", tmp_path / "cal.json"
     simulate(Scenario.load("eccentric_mount"), seed=3).slice(0, 2400).write(run)
     simulate(Scenario.load("calibration_poses"), seed=3).write(poses)
@@ -78,6 +93,7 @@ def test_an_uncalibrated_unit_is_told_to_be_calibrated_and_then_only_the_rig_is_
     assert raw.code == 0, raw.stderr
     assert "If the unit is not calibrated, do that first" in " ".join(raw.stdout.split())
     assert "If the unit is not calibrated, do that first" in (tmp_path / "raw" / "report.html").read_text()
+    plain_report()
     made = gfimu_command("calibrate", "twelve-position", poses, "--array", "cube12", "--out", cal)
     assert made.code == 0, made.stderr
     done = gfimu_command("diagnose", run, "--twin", TWIN, "--calibration", cal, "--out", tmp_path / "cal", "--json")
@@ -102,7 +118,8 @@ def test_a_calibration_of_another_unit_is_refused(gfimu_command, ordinary, tmp_p
     assert not out.exists()
 
 
-def test_fitted_positions_of_a_calibration_are_the_twins(gfimu_command, ordinary, tmp_path):
+def test_fitted_positions_of_a_calibration_are_the_twins(gfimu_command, ordinary, tmp_path, plain_report):
+    plain_report()
     run, cal, out = tmp_path / "run.parquet", tmp_path / "cal.json", tmp_path / "out"
     ordinary.write(run)
     for scenario in ("calibration_poses", "tumble"):
@@ -117,7 +134,8 @@ def test_fitted_positions_of_a_calibration_are_the_twins(gfimu_command, ordinary
     assert 0 < np.abs(fitted - drawn).max() < 0.01
 
 
-def test_an_array_file_moves_with_the_twin(gfimu_command, ordinary, tmp_path):
+def test_an_array_file_moves_with_the_twin(gfimu_command, ordinary, tmp_path, plain_report):
+    plain_report()
     (tmp_path / "mine.toml").write_text(AccelerometerArray.load("cube12").to_toml().replace('"cube12"', '"mine"'))
     (tmp_path / "twin.toml").write_text('array = "mine.toml"\n')
     ordinary.write(tmp_path / "run.parquet")
@@ -172,9 +190,8 @@ HARD = {
 
 
 @pytest.mark.parametrize(("change", "verdict", "causes"), HARD.values(), ids=HARD)
-def test_hard_input_gets_a_verdict(gfimu_command, ordinary, tmp_path, monkeypatch, change, verdict, causes):
-    # The report has tests of its own and takes longer than the diagnosis.
-    monkeypatch.setattr("gfimu.diagnosis.report.folder.write_report", lambda path, diagnosis: path.write_text("report"))
+def test_hard_input_gets_a_verdict(gfimu_command, ordinary, tmp_path, plain_report, change, verdict, causes):
+    plain_report()
     change(ordinary).write(tmp_path / "run.parquet")
     done = gfimu_command("diagnose", tmp_path / "run.parquet", "--twin", TWIN, "--out", tmp_path / "out", "--json")
     assert done.code == 0, done.stderr

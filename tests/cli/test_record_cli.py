@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from firmware_bridge import board_process
+from firmware_bridge.frames import FORMATS
 from gfimu.recording import Recording
 
 pytestmark = pytest.mark.skipif(not board_process.emulator_available(), reason="the emulator is in the extra")
@@ -142,3 +143,8 @@ def test_an_interrupted_recording_is_whole(tmp_path) -> None:
         port.close()
     assert out.read_bytes()[:4] == b"PAR1"
     assert len(Recording.read(out)) > 0
+
+
+def test_the_help_lists_every_format(gfimu_command) -> None:
+    shown = " ".join(gfimu_command("record", "--help").stdout.replace("│", " ").split())
+    assert f"Frame format: {' or '.join(FORMATS)}." in shown

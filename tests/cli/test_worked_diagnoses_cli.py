@@ -7,7 +7,12 @@ import shlex
 import struct
 import sys
 
+import numpy as np
 import pytest
+
+from gfimu.diagnosis.diagnose import diagnose
+from gfimu.recording.mimu4444 import read_mimu4444
+from sim.twin import Twin
 
 
 @pytest.fixture(scope="module")
@@ -57,43 +62,78 @@ def test_the_ripple_is_at_once_per_revolution(script, project_root, tmp_path):
     assert [cause.effect for cause in table.causes] == ["table_tilt"]
 
 
+def lag_of_the_page(page):
+    return 1e-3 * float(re.search(r"(−[\d.]+) ± [\d.]+ ms: the accelerometers lag", page)[1].replace("−", "-"))
+
+
+def causes_of_the_page(page):
+    return set(re.findall(r"^\| `(\w+)` \| (?!what)", page, re.MULTILINE))
+
+
+def check_what_its_makers_state(board):
+    """Data sheet: offsets of 80 to 150 mg, gains of 3 %: the largest of 24 below two sigma and not below a tenth."""
+    causes = {cause.effect: cause for cause in board.causes}
+    assert board.verdict == "explained"
+    assert 0.3 < max(map(abs, causes["bias"].parameters.values())) < 2.9
+    assert 0.002 < max(map(abs, causes["scale_factor"].parameters.values())) < 0.03
+    assert board.unexplained.significant
+    assert "as if each were sampled at an instant of its own" in board.unexplained.signature
+    assert "channel m41 has a tone" in board.unexplained.signature
+    # Chips on clocks of their own: the innovations of the rate filter say 1.5 ms.
+    assert board.noise["disagreement_s"] == pytest.approx(1.5e-3, rel=0.4)
+    assert board.gain.held_out == "another recording"
+    assert board.gain.log_likelihood_per_sample > 5 * board.gain.log_likelihood_std
+
+
+def check_figures(board, script, project_root, folder):
+    for name, draw in (("diagnosis_board", script.board_residual), ("diagnosis_board_noise", script.board_noise)):
+        path = folder / f"{name}.png"
+        draw(board, path)
+        assert path.stat().st_size < 150_000
+        assert same_size(path, project_root)
+
+
+def seventy_seconds(recording):
+    """The last two poses of a recording of the board and the first half minute of its motion."""
+    return recording.slice(*np.searchsorted(recording.t_s, [440.0, 510.0]))
+
+
+def test_seventy_seconds_of_a_real_board_show_most_of_what_the_page_says(
+    script, shared_data, page, project_root, tmp_path
+):
+    """All of it takes a minute and a half, and is the study below."""
+    runs = [seventy_seconds(read_mimu4444(shared_data / "mimu4444" / f"exp_{number}.bin.gz")) for number in (1, 2)]
+    board = diagnose(runs[:1], Twin.load("mimu4444_free"), held_out=runs[1:])
+    check_what_its_makers_state(board)
+    named = {cause.effect for cause in board.causes}
+    # The lag and the displacements are of the fast motion that is cut off.
+    assert {"bias", "scale_factor", "cross_axis"} <= named <= causes_of_the_page(page)
+    assert script.still_and_moving(board)["rest"] == pytest.approx((0.30, 0.044), rel=0.05)
+    check_figures(board, script, project_root, tmp_path)
+
+
 @pytest.fixture(scope="module")
 def board(script, shared_data):
     """Diagnosis of the real board, its gain on the other recording."""
     return script.diagnose_board(shared_data / "mimu4444")
 
 
+@pytest.mark.study
 def test_a_real_board_has_the_errors_that_its_makers_state_and_more_noise_in_motion(board, page):
+    check_what_its_makers_state(board)
     causes = {cause.effect: cause for cause in board.causes}
-    assert board.verdict == "explained"
-    told = set(re.findall(r"^\| `(\w+)` \| (?!what)", page, re.MULTILINE))
-    assert set(causes) == told
-    # Data sheet: offsets of 80 to 150 mg, gains of 3 %: the largest of 24 below two sigma and not below a tenth.
-    assert 0.3 < max(map(abs, causes["bias"].parameters.values())) < 2.9
-    assert 0.002 < max(map(abs, causes["scale_factor"].parameters.values())) < 0.03
+    assert set(causes) == causes_of_the_page(page)
     # The accelerometers are within a millimetre of where the drawing has them; the packages are 4 mm wide.
     assert max(map(abs, causes["sensor_position"].parameters.values())) < 1e-3
-    quoted = float(re.search(r"(−[\d.]+) ± [\d.]+ ms: the accelerometers lag", page)[1].replace("−", "-"))
-    assert 1e3 * causes["gyro_latency"].parameters["delay_s"] == pytest.approx(quoted, abs=0.05)
-    assert board.unexplained.significant
-    assert "as if each were sampled at an instant of its own" in board.unexplained.signature
-    assert "channel m41 has a tone" in board.unexplained.signature
-    # Chips on clocks of their own: the innovations of the rate filter say 1.5 ms.
-    assert board.noise["disagreement_s"] == pytest.approx(1.5e-3, rel=0.4)
+    assert causes["gyro_latency"].parameters["delay_s"] == pytest.approx(lag_of_the_page(page), abs=0.05e-3)
 
 
+@pytest.mark.study
 def test_the_extension_of_a_real_board_helps_on_the_other_recording(board, script, page, project_root, tmp_path):
-    gain = board.gain
-    assert gain.held_out == "another recording"
-    assert gain.log_likelihood_per_sample > 5 * gain.log_likelihood_std
     share = float(re.search(r"(\d+) % of the excess over that noise is gone", page)[1])
-    assert 100 * gain.share_of_excess_removed == pytest.approx(share, abs=2)
+    assert 100 * board.gain.share_of_excess_removed == pytest.approx(share, abs=2)
     assert board.residual.rms_after > 3 * board.residual.noise_floor  # what the motion adds counts as error
     sizes = script.still_and_moving(board)
     assert sizes["rest"] == pytest.approx((0.30, 0.044), rel=0.05)
     assert sizes["motion"][1] == pytest.approx(1.2, rel=0.05)
-    for name, draw in (("diagnosis_board", script.board_residual), ("diagnosis_board_noise", script.board_noise)):
-        path = tmp_path / f"{name}.png"
-        draw(board, path)
-        assert path.stat().st_size < 150_000
-        assert same_size(path, project_root)
+    check_figures(board, script, project_root, tmp_path)

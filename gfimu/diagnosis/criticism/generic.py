@@ -83,7 +83,7 @@ def series_products(
         named = cause_columns(stretch, at.observed, at.drive, point.causes)
         return Columns.together([named, _by_series(values_of(stretch, at), at.observed.weight)])
 
-    linear = linearise(stretches, point, columns)
+    linear = linearise(stretches, point, columns, responses=False)
     named = sum(cause.unknowns for cause in point.causes)
     gram, score = linear.gram, linear.score
     if not named:

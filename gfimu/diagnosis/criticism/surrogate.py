@@ -103,7 +103,7 @@ def surrogates(
         Functions of `gfimu.generic_basis` to look at besides its own.
     """
     units = basis_units(stretches, nothing.point)
-    chosen = _spread([stretch.index for stretch in stretches], policy.searched_stretches)
+    chosen = _spread([stretch.index for stretch in stretches], policy.most_searched)
     if len(chosen) == len(stretches):
         return _ever_richer(stretches, nothing.point, policy, units, hints)
     point = nothing.point

@@ -84,10 +84,8 @@ class Linear:
 
     @cached_property
     def log_noise(self) -> float:
-        """−½ log det of the noise covariance of the channels: to compare points of different noise."""
-        seen = [one.observed for one in self.posteriors]
-        # Coarse readings have probabilities, whose misfit holds all of the noise.
-        return -0.5 * sum(one.modes.log_determinant for one in seen if one.lacking == 0.0)
+        """−½ log det of the noise covariance: to compare points of different noise."""
+        return sum(one.observed.log_noise for one in self.posteriors)
 
 
 def of_causes(point: Point) -> ColumnsOf:
@@ -102,6 +100,7 @@ def linearise(
     *,
     jacobians: Sequence[Jacobian | None] | None = None,
     exact: bool = False,
+    responses: bool = True,
 ) -> Linear:
     """Linearise stretches about a point.
 
@@ -117,8 +116,11 @@ def linearise(
         Derivatives by the drives, where they are taken as they were.
     exact : bool
         Whether these hold what remembers the drive for long.
+    responses : bool
+        Whether it matters how the drives follow the unknowns.
     """
     residues = point.residue.columns if point.residue is not None else (None,) * len(stretches)
+    follow = responses or point.residue is not None
     known = jacobians if jacobians is not None else (None,) * len(stretches)
 
     def one(
@@ -131,10 +133,10 @@ def linearise(
         if not parts:
             return posterior, np.zeros((0, 0)), np.zeros(0), np.zeros((len(drive.coefficients), 0))
         gram, score, across = posterior.products(Columns.together(parts))
-        return posterior, gram, score, posterior.response(across)
+        return posterior, gram, score, posterior.response(across) if follow else across[:, :0]
 
     rows = over_segments(one, stretches, point.drives, point.levels, known, residues)
-    posteriors, grams, scores, responses = zip(*rows, strict=True)
+    posteriors, grams, scores, ways = zip(*rows, strict=True)
     whole = Linear(
         np.sum(grams, axis=0),
         np.sum(scores, axis=0),
@@ -142,7 +144,7 @@ def linearise(
         sum(one.objective for one in posteriors),
         sum(one.log_volume for one in posteriors),
         tuple(one.step for one in posteriors),
-        tuple(responses),
+        tuple(ways),
         tuple(posteriors),
         np.zeros(0),
     )

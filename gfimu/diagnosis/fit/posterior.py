@@ -105,16 +105,17 @@ class Posterior:
         """Return G (P, P), b (P,) and V (m, P) of columns."""
         seen, count = self.observed, columns.count
         gram, score = seen.products(columns)
-        loading = self.jacobian.loading
-        combined = np.zeros((len(loading), len(seen.residual), count))
         cross = np.zeros((self.jacobian.size, count))
         for c, (at, part, weight) in enumerate(zip(columns.places, columns.parts, seen.weights, strict=True)):
             if len(at):
                 damped = seen.modes.share[:, [c]] * seen.modes.of(part.T, c).T  # (K, p)
                 cross[:, at] -= weight * (self.jacobian_modes[c] @ damped)
-                for r in np.flatnonzero(loading[:, c]):
-                    combined[r][:, at] += (weight * loading[r, c]) * part
-        cross += self.jacobian.correlate(combined)
+        for r, row in enumerate(self.jacobian.loading):
+            combined = np.zeros((len(seen.residual), count))  # one at a time: together they would fill the memory
+            for c in np.flatnonzero(row):
+                if len(columns.places[c]):
+                    combined[:, columns.places[c]] += (seen.weights[c] * row[c]) * columns.parts[c]
+            cross += self.jacobian.transposed_one(r, combined)
         across = solve_triangular(self.root, cross, lower=True, check_finite=False, overwrite_b=True)
         whole = gram.diagonal() * _RIDGE
         gram -= across.T @ across

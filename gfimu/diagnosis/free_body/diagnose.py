@@ -26,7 +26,7 @@ from gfimu.diagnosis.free_body.left_over import motion_noise, structure_left
 from gfimu.diagnosis.free_body.run import BodyRun, prepare_body_run
 from gfimu.diagnosis.free_body.segment import BodySegment
 from gfimu.diagnosis.free_body.undetermined import undetermined, undetermined_sentence
-from gfimu.diagnosis.gate import impossible_sizes, judge
+from gfimu.diagnosis.criticism.gate import impossible_sizes, judge
 from gfimu.diagnosis.named_causes import contested, fault_causes, name_cause
 from gfimu.diagnosis.naming import channel_share, conflicting, probabilities, rival_list
 from gfimu.diagnosis.old_fit import Fit

@@ -16,6 +16,7 @@ from gfimu.diagnosis.report.plain_words import (
     gain_rows,
     headline,
     next_steps,
+    noise_texts,
     odds,
     parameter_texts,
     parameter_units,
@@ -91,6 +92,7 @@ def _content(diagnosis: Diagnosis) -> Mapping[str, Any]:
         "any_share": _share_in_any_recording(diagnosis),
         "steps": next_steps(diagnosis),
         "noise": diagnosis.noise,
+        "noise_texts": noise_texts(diagnosis.noise),
         "runs": [
             {
                 "name": run.name,

@@ -16,6 +16,7 @@ __all__ = [
     "gain_rows",
     "headline",
     "next_steps",
+    "noise_texts",
     "odds",
     "parameter_texts",
     "parameter_units",
@@ -27,6 +28,13 @@ __all__ = [
 _OF_A_CALIBRATION = frozenset({"bias", "scale_factor", "misalignment", "cross_axis"})
 _SIGNIFICANT = 2.0
 _THOUSANDTHS = ("rad", "m", "s")
+_NOISE_UNITS = {
+    "bias_instability_m_s2": "m/s²",
+    "bias_instability_largest_m_s2": "m/s²",
+    "time_jitter_s": "s",
+    "disagreement_s": "s",
+    "gyro_bias_rad_s": "rad/s",
+}  # of `Diagnosis.noise`; a level without one is a plain number or a name
 _SMALL = 0.1
 _MOST_DECIMALS = 5
 _MOST_DIGITS = 100
@@ -180,6 +188,16 @@ def parameter_texts(cause: NamedCause, units: Mapping[str, str]) -> list[Paramet
             continue
         certain = std is None or not math.isfinite(std) or abs(value) > _SIGNIFICANT * std
         texts.append(ParameterText(name, _with_std(value, std, unit), _familiar(value, std, unit), certain))
+    return texts
+
+
+def noise_texts(noise: Mapping[str, float | str]) -> list[str]:
+    """Return the noise levels of a diagnosis as people read them: name, value and unit."""
+    texts = []
+    for key, value in noise.items():
+        unit = _NOISE_UNITS.get(key, "")
+        name = key_name(key, unit).replace("_", " ")
+        texts.append(f"{name} {value if isinstance(value, str) else _number(value, unit).strip()}")
     return texts
 
 

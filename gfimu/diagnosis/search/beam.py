@@ -108,7 +108,15 @@ def leading_sets(blocks: Blocks, most: int, policy: Policy) -> list[Candidate]:
         every += larger
         front = _distinct(larger, blocks.hypotheses, policy.beam)
     every.sort(key=lambda one: -one.log_odds)
-    return _distinct(every, blocks.hypotheses, 2 * policy.beam)
+    worth = [one for one in _distinct(every, blocks.hypotheses, 4 * policy.beam) if _is_worth(blocks, one, policy)]
+    return worth[: policy.beam]
+
+
+def _is_worth(blocks: Blocks, candidate: Candidate, policy: Policy) -> bool:
+    """Tell whether every member of a set adds something to the others, as much as makes it worth a fit."""
+    members = candidate.members
+    rests = [tuple(other for other in members if other != member) for member in members] if len(members) > 1 else []
+    return all(candidate.log_odds - blocks.log_odds(rest) >= policy.worth_a_search for rest in rests)
 
 
 def _distinct(candidates: Sequence[Candidate], hypotheses: Sequence[Hypothesis], count: int) -> list[Candidate]:

@@ -6,19 +6,18 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import logsumexp
 
 from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.fit.gauss_newton import Fit, fit
-from gfimu.diagnosis.fit.learn import learn_noise, learn_roughness, starting_point
-from gfimu.diagnosis.fit.linear import Point
+from gfimu.diagnosis.fit.learn import learn_noise, learn_roughness, sharpened, starting_point
+from gfimu.diagnosis.fit.linear import Point, with_residue
 from gfimu.diagnosis.parallel import each_apart
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.beam import Blocks, leading_sets
 from gfimu.diagnosis.search.screening import Screening, screen
 from gfimu.diagnosis.terms.cause import Cause
 
-__all__ = ["Explanation", "explain"]
+__all__ = ["Explanation", "Sets", "explain", "explained", "prune", "reduced"]
 
 Report = Callable[[float, str], None]
 _Key = frozenset[tuple[str, str]]
@@ -51,10 +50,9 @@ class Explanation:
     screening: Screening
     stretches: tuple[Stretch, ...] = ()
     fits: int = 0
-    screenings: int = 0
 
 
-class _Sets:
+class Sets:
     """Fits of sets of causes under the same nuisances; each set is fitted once."""
 
     def __init__(self, stretches: Sequence[Stretch], base: Point, policy: Policy) -> None:
@@ -97,8 +95,10 @@ def _posterior(found: Fit) -> float:
     return found.log_posterior
 
 
-def explain(stretches: Sequence[Stretch], policy: Policy, report: Report | None = None) -> Explanation:
-    """Find the most probable set of causes.
+def explain(
+    stretches: Sequence[Stretch], policy: Policy, *, start: Point | None = None, report: Report | None = None
+) -> Explanation:
+    """Find the most probable set of causes under one model of the nuisance parameters.
 
     Parameters
     ----------
@@ -106,45 +106,72 @@ def explain(stretches: Sequence[Stretch], policy: Policy, report: Report | None 
         The data.
     policy : Policy
         Thresholds.
+    start : Point, optional
+        Where to start, with its causes and its model of the nuisance parameters: a random walk of the biases, a residue
+        of the calibration. By default nothing is known but the reference and the data sheet.
     report : callable, optional
         Called with the share done and a line of text.
     """
     tell = report or (lambda share, text: None)
     tell(0.05, "drive")
-    sets = _Sets(stretches, starting_point(stretches, policy.knots), policy)
-    nothing = sets.fit([sets.base])[0]
-    assert nothing is not None
-    sets = _under(sets, learn_roughness(stretches, nothing.point, policy.learnings), [nothing])
-    fits = screenings = 0
-    screening, about = None, None
+    sets = _started(stretches, policy) if start is None else Sets(stretches, start, policy)
+    if start is not None:
+        sets.fit([start, replace(start, causes=())])
+    fits, seen = 0, set()
     for number in range(policy.rounds):
         tell(0.1 + 0.8 * number / policy.rounds, f"search {number + 1}")
         before = sets.best
-        screening, about = screen(stretches, before.point), before
-        screenings += 1
-        _fit_leaders(sets, screening, before)
+        screening = screen(stretches, before.point)
+        _fit_leaders(sets, screening, before, near=number > 0)
         best = prune(sets)
-        same = best.key == before.key
         fits += sets.count
-        if same and number > 0:
+        if number > 0 and best.key in seen:
             break
-        learnt = learn_noise(stretches, learn_roughness(stretches, best.point, policy.learnings))
-        ranked = sets.ranked()
-        close = [one for one in ranked if one.log_posterior > best.log_posterior - policy.close]
-        sets = _under(sets, learnt, [best, _nothing(sets), *close[: policy.rivals + 1]])
+        seen.add(best.key)
+        sets = _under(sets, _relearned(stretches, best.point, policy), _near(sets, best))
     best = prune(sets)
-    fits += sets.count
+    return explained(sets, best, fits + sets.count, screening if best.key == before.key else None)
+
+
+def _started(stretches: Sequence[Stretch], policy: Policy) -> Sets:
+    """Return sets under the roughness that channels and reference show without a cause; the noise not yet."""
+    sets = Sets(stretches, starting_point(stretches, policy.knots), policy)
+    nothing = sets.fit([sets.base])[0]
+    if nothing is None:
+        raise np.linalg.LinAlgError("the reference determines no drive")
+    point = sharpened(stretches, learn_roughness(stretches, nothing.point, policy.learnings), policy)
+    return _under(sets, point, [nothing])
+
+
+def _relearned(stretches: Sequence[Stretch], point: Point, policy: Policy) -> Point:
+    """Return a point with all nuisance parameters learnt from what its causes leave."""
+    point = sharpened(stretches, learn_roughness(stretches, point, policy.learnings), policy)
+    point = learn_noise(stretches, point)
+    return point if point.residue is None else with_residue(stretches, point, point.residue.scale)
+
+
+def _near(sets: Sets, best: Fit) -> list[Fit]:
+    """Return the sets that are worth another look under other nuisance parameters."""
+    close = [
+        one
+        for one in sets.ranked()
+        if one.log_posterior > best.log_posterior - sets.policy.close and not one.key > best.key
+    ]
+    return [best, _nothing(sets), *close[: sets.policy.rivals + 1]]
+
+
+def explained(sets: Sets, best: Fit, fits: int, screening: Screening | None = None) -> Explanation:
+    """Return the best of some sets with what it is compared with, and a screening about it, taken where there is none."""
     without = {
         cause.name: sets.found[best.key - {cause.key}] for cause in best.causes if best.key - {cause.key} in sets.found
     }
-    if about is not best or screening is None:
-        screening = screen(stretches, best.point)
-        screenings += 1
     rivals = tuple(one for one in sets.ranked() if one.causes and one.key != best.key)
-    return Explanation(best, _nothing(sets), without, rivals, screening, tuple(stretches), fits, screenings)
+    nothing = _nothing(sets)
+    about = screening if screening is not None else screen(sets.stretches, best.point)
+    return Explanation(best, nothing, without, rivals, about, tuple(sets.stretches), fits)
 
 
-def _nothing(sets: _Sets) -> Fit:
+def _nothing(sets: Sets) -> Fit:
     found = sets.found.get(frozenset())
     if found is None:
         found = sets.fit([replace(sets.best.point, causes=())])[0]
@@ -152,41 +179,48 @@ def _nothing(sets: _Sets) -> Fit:
     return found
 
 
-def _under(sets: _Sets, base: Point, some: Sequence[Fit]) -> _Sets:
+def _under(sets: Sets, base: Point, some: Sequence[Fit]) -> Sets:
     """Fit sets anew under other nuisances."""
-    new = _Sets(sets.stretches, base, sets.policy)
+    new = Sets(sets.stretches, base, sets.policy)
     points = []
     for one in some:
-        if sets.policy.own_roughness:
-            drives = learn_roughness(sets.stretches, replace(one.point, levels=base.levels), 1).drives
-        else:
-            drives = tuple(
-                replace(learnt, coefficients=mine.coefficients)
-                for learnt, mine in zip(base.drives, one.point.drives, strict=True)
-            )
+        drives = tuple(
+            learnt.following(mine) for learnt, mine in zip(base.drives, one.point.drives, strict=True)
+        )
         points.append(replace(one.point, drives=drives))
     new.fit(points)
     return new
 
 
-def _fit_leaders(sets: _Sets, screening: Screening, about: Fit) -> None:
+def _fit_leaders(sets: Sets, screening: Screening, about: Fit, *, near: bool) -> None:
+    """Fit the sets that lead in a linear world; ``near`` the best, where that world is the true one, only close ones."""
     policy = sets.policy
     blocks = Blocks(screening, policy)
     most = min(max(2, len(about.causes) + 1), policy.most_causes)
     points = []
-    for candidate in leading_sets(blocks, most, policy)[: policy.beam]:
+    candidates = leading_sets(blocks, most, policy)
+    least = candidates[0].log_odds - policy.close if near and candidates else -np.inf
+    for candidate in (one for one in candidates if one.log_odds >= least):
         causes = blocks.causes(candidate.members)
         moves = screening.drive_moves(candidate.members, causes)
         drives = tuple(drive.moved(move) for drive, move in zip(about.point.drives, moves, strict=True))
-        points.append(replace(about.point, causes=_started(causes), drives=drives))
+        points.append(replace(about.point, causes=causes, drives=drives))
     sets.fit(points)
 
 
-def _started(causes: tuple[Cause, ...]) -> tuple[Cause, ...]:
-    return causes
+def reduced(explanation: Explanation, name: str, policy: Policy) -> Explanation:
+    """Return the explanation without one of its causes, the others judged anew."""
+    sets = Sets(explanation.stretches, explanation.best.point, policy)
+    for one in (explanation.without[name], explanation.nothing):
+        sets.found[one.key] = one
+    for one in explanation.rivals:
+        if name not in one.names:
+            sets.found[one.key] = one
+    sets.found = {key: one for key, one in sets.found.items() if one.key <= explanation.best.key}
+    return explained(sets, prune(sets), explanation.fits)
 
 
-def prune(sets: _Sets) -> Fit:
+def prune(sets: Sets) -> Fit:
     """Return the most probable set, without causes that the data hardly ask for."""
     best = sets.best
     while best.causes:
@@ -201,13 +235,3 @@ def prune(sets: _Sets) -> Fit:
             return best
         best = top
     return best
-
-
-def probabilities(explanation: Explanation, policy: Policy) -> dict[str, float]:
-    """Return the probability of each effect to be among the causes, over all sets that were fitted."""
-    fits = {one.key: one for one in (*explanation.rivals, *explanation.without.values(), explanation.nothing)}
-    fits[explanation.best.key] = explanation.best
-    weight = np.array([one.log_posterior for one in fits.values()]) / policy.temperature
-    weight = np.exp(weight - logsumexp(weight))
-    names = frozenset().union(*(one.names for one in fits.values()))
-    return {name: float(sum(w for w, one in zip(weight, fits.values(), strict=True) if name in one.names)) for name in names}

@@ -42,6 +42,8 @@ class Cause:
         Of the coordinates.
     shape_std : mapping
         Standard deviations of the shape parameters.
+    held : bool
+        Whether a fit holds the shape as it is.
     """
 
     family: EffectFamily
@@ -52,6 +54,7 @@ class Cause:
     log_prior: float = 0.0
     covariance: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))
     shape_std: Mapping[str, float] = field(default_factory=dict)
+    held: bool = False
 
     @property
     def name(self) -> str:
@@ -66,6 +69,8 @@ class Cause:
     @cached_property
     def free_shape(self) -> tuple[str, ...]:
         """Shape parameters that a fit may move."""
+        if self.held:
+            return ()
         whole = getattr(self.family, "whole", frozenset())
         return tuple(key for key in self.shape if key not in whole)
 

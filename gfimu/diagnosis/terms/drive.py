@@ -23,6 +23,7 @@ FIRST_ROUGHNESS = 3e3  # rad/s⁴
 ROUGH_FOR = 0.3  # s over which a drive is about as rough
 LEAST_ROUGHNESS = 30.0  # rad/s⁴
 _LEAST_KNOWN = 0.02  # numerical: least mean γ
+_ON_A_KNOT = 1e-6  # numerical: knot intervals
 _STENCIL = np.array([1.0, -4.0, 6.0, -4.0, 1.0])
 
 
@@ -86,6 +87,35 @@ class Drive:
             coefficients[-after:] = self.coefficients[-1] + last * np.arange(1, after + 1)
         return replace(self, spline=spline, coefficients=coefficients, roughness=np.pad(self.roughness, pad, "edge"))
 
+    def following(self, other: Drive) -> Drive:
+        """Return this drive's spline and prior with the motion of another."""
+        same = other.spline == self.spline
+        return replace(self, coefficients=other.coefficients if same else self.spline.through(other.spin))
+
+    def within(self, start: float, stop: float, since: float, angle_std: float) -> Drive:
+        """Return the part of the drive over a span of time, s, on its own knots.
+
+        Parameters
+        ----------
+        start, stop : float
+            Times that it must reach over, as far as the whole does, s.
+        since : float
+            Time of its first sample, s.
+        angle_std : float
+            Standard deviation of the angle there, rad, where the whole has one.
+        """
+        h = self.spline.spacing
+        first, last = np.clip(np.array([start, stop]) - self.spline.start, 0.0, self.spline.stop - self.spline.start) / h
+        low, high = int(np.floor(first + _ON_A_KNOT)), int(np.ceil(last - _ON_A_KNOT))
+        return Drive(
+            AngleSpline(self.spline.start + low * h, h, high - low),
+            self.coefficients[low : high + DEGREE],
+            self.roughness[low:high],
+            float(self.spin.at(np.array([since])).angle[0]),
+            angle_std if np.isfinite(self.angle_std) else np.inf,
+            since,
+        )
+
     def on(self, spacing: float) -> Drive:
         """Return the drive with other distances of the knots, s."""
         spline = AngleSpline.over(self.spline.start, self.spline.stop, spacing)
@@ -127,7 +157,7 @@ class Drive:
     @property
     def log_precision(self) -> float:
         """Half the log determinant of the prior's precision, up to a constant."""
-        return -float(np.log(self.roughness).sum())
+        return -float(np.log(self.roughness * self.spline.spacing**DEGREE).sum())
 
     def _off(self) -> float:
         if not np.isfinite(self.angle_std):

@@ -23,7 +23,7 @@ STEP = 1e-6
 """Numerical: finite difference of a coefficient of the angle, rad."""
 _FORGOTTEN = 3e-3  # numerical: share of a response's peak below which it counts as over
 _PROBES = 8  # numerical: coefficients at which the memory is measured
-_LEAST_SHARE = 1e-14  # numerical: power of a combination of observations that is rounding error of the largest
+_LEAST_SHARE = 1e-11  # numerical: power of a combination of observations that is second order in the step
 _INTERVALS = 12  # numerical: knot intervals of a block of rows
 
 
@@ -70,6 +70,13 @@ class Jacobian:
         for rows, at, block in self.blocks:
             for total, one in zip(out, block, strict=True):
                 total[at] += one.T @ values[rows]
+        return out
+
+    def transposed_one(self, r: int, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return J_rᵀ v of values (n, P) for one r, shape (m, P)."""
+        out = np.zeros((self.size, values.shape[1]))
+        for rows, at, block in self.blocks:
+            out[at] += block[r].T @ values[rows]
         return out
 
     def correlate(self, combined: NDArray[np.float64]) -> NDArray[np.float64]:

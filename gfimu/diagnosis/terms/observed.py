@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.diagnosis.coloured_noise import NoiseLevels
+from gfimu.diagnosis.data.rounding import Steps
 from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.slow_modes import SlowModes, WeighedModes
 from gfimu.diagnosis.terms.columns import Columns
@@ -36,6 +37,8 @@ class Observed:
         Modes of slow noise.
     levels : NoiseLevels
         The noise.
+    steps : Steps
+        Steps that observations are rounded to, where these are coarse.
     """
 
     prediction: NDArray[np.float64]
@@ -44,6 +47,7 @@ class Observed:
     lacking: float
     modes: SlowModes
     levels: NoiseLevels
+    steps: Steps = Steps()
 
     @cached_property
     def weights(self) -> NDArray[np.float64]:
@@ -60,6 +64,16 @@ class Observed:
         """rᵀWr."""
         power = np.sum(self.residual**2, axis=0) - self.modes.explained(self.residual)
         return self.lacking + float(self.weights @ power)
+
+    @cached_property
+    def log_noise(self) -> float:
+        """−½ log det of the noise covariance; of coarse observations the misfit holds it."""
+        total = 0.0
+        if not self.steps.channels:
+            total -= 0.5 * self.modes.log_determinant
+        if not self.steps.reference:
+            total -= float((self.weight[:, -1] > 0.0).sum() * np.log(self.levels.white[-1]))
+        return total
 
     def products(self, columns: Columns) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return AᵀWA (P, P) and AᵀWr (P,) of columns, the drive held."""
@@ -81,7 +95,7 @@ def observe(stretch: Stretch, prediction: NDArray[np.float64], levels: NoiseLeve
         return Observed(prediction, residual, stretch.mask.astype(float), 0.0, SlowModes(basis, levels), levels)
     working, weight, lacking = steps.weigh(residual, levels.white, stretch.mask)
     if not steps.channels:
-        return Observed(prediction, working, weight, lacking, SlowModes(basis, levels), levels)
+        return Observed(prediction, working, weight, lacking, SlowModes(basis, levels), levels, steps)
     modes = WeighedModes(basis, levels, weight)
     # A random walk over coarse steps moves the edges at which readings are informative: they are expanded about the
     # most probable walk (penalised quasi-likelihood, Breslow and Clayton 1993). Bias instability keeps within a step.
@@ -95,4 +109,4 @@ def observe(stretch: Stretch, prediction: NDArray[np.float64], levels: NoiseLeve
         working = working + weight * slow
         modes = WeighedModes(basis, levels, weight)
     # Laplace: the log determinant of what is known of slow noise goes with the misfit.
-    return Observed(prediction, working, weight, lacking + modes.log_narrowing, modes, levels)
+    return Observed(prediction, working, weight, lacking + modes.log_narrowing, modes, levels, steps)

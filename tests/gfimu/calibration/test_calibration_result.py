@@ -1,6 +1,7 @@
 """The result class: file round trip, units, apply and invert."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -156,3 +157,77 @@ def test_files_that_are_none(tmp_path):
     (tmp_path / "text.json").write_text("hello")
     with pytest.raises(InputError, match="not a calibration file"):
         load_calibration(tmp_path / "text.json")
+
+
+def test_a_statistic_that_is_not_defined_is_null_in_the_file(calibration, tmp_path):
+    """Nine poses for nine parameters have no redundancy, so that the variance factor is NaN."""
+    undefined = replace(calibration, statistics={"variance_factor": float("nan"), "poses": 9.0})
+    undefined.save(tmp_path / "cal.json")
+    content = json.loads((tmp_path / "cal.json").read_text())
+    assert content["statistics"] == {"variance_factor": None, "poses": 9.0}
+    assert np.isnan(load_calibration(tmp_path / "cal.json").statistics["variance_factor"])
+
+
+def with_nan(matrix):
+    matrix[2, 5] = matrix[5, 2] = np.nan
+
+
+def with_infinity(matrix):
+    matrix[0, 0] = np.inf
+
+
+def lopsided(matrix):
+    matrix[2, 5] += 0.01 * np.sqrt(matrix[2, 2] * matrix[5, 5])
+
+
+def of_negative_variance(matrix):
+    matrix[11, 11] = -1e-9
+
+
+def indefinite(matrix):
+    matrix[3, 4] = matrix[4, 3] = 1.5 * np.sqrt(matrix[3, 3] * matrix[4, 4])
+
+
+def correlated_without_variance(matrix):
+    matrix[6, :] = matrix[:, 6] = 0.0
+    matrix[6, 0] = matrix[0, 6] = 1.0
+
+
+NOT_COVARIANCES = [
+    (with_nan, "the covariance of a1_M_xz and a1_M_yz is nan"),
+    (with_infinity, "the covariance of a1_M_xx and a1_M_xx is inf"),
+    (lopsided, "the covariance matrix is not symmetric at a1_M_xz and a1_M_yz"),
+    (of_negative_variance, "the variance of a1_b_z is negative"),
+    (indefinite, "the covariance matrix is not positive semi-definite"),
+    (correlated_without_variance, "the covariance matrix is not positive semi-definite"),
+]
+
+
+@pytest.mark.parametrize(("spoil", "message"), NOT_COVARIANCES)
+def test_a_matrix_that_is_no_covariance_is_refused(calibration, tmp_path, spoil, message):
+    matrix = calibration.covariance.copy()
+    spoil(matrix)
+    with pytest.raises(InputError, match=message) as made:
+        replace(calibration, covariance=matrix)
+    (tmp_path / "cal.json").write_text(json.dumps(calibration.to_dict() | {"covariance": matrix.tolist()}))
+    with pytest.raises(InputError, match=f"cal.json: .*{message}") as read:
+        load_calibration(tmp_path / "cal.json")
+    assert "calibrate again" in str(made.value)
+    assert "\n" not in str(made.value) + str(read.value)
+
+
+def test_a_singular_covariance_and_its_rounding_are_accepted(calibration):
+    """Undetermined directions have no variance; products of matrices are symmetric to rounding only."""
+    rng = np.random.default_rng(8)
+    root = rng.normal(size=(12, 3)) * np.logspace(-6, 3, 12)[:, None]
+    singular = root @ root.T
+    singular *= 1.0 + 1e-13 * rng.standard_normal((12, 12))
+    replace(calibration, covariance=singular)
+    replace(calibration, covariance=np.zeros((12, 12)))
+
+
+def test_a_value_that_is_not_finite_is_refused(calibration):
+    values = calibration.values.copy()
+    values[9] = np.inf
+    with pytest.raises(InputError, match="parameter a1_b_x is inf"):
+        replace(calibration, values=values)

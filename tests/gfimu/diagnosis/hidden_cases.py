@@ -8,8 +8,10 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from gfimu.diagnosis import Diagnosis
 from sim.effects import EFFECTS
 from sim.study.cases import EXOTICS, Case, study_cases
+from sim.study.outcome import HiddenWorld, outcome_of
 from sim.study.report import score
 
 _TESTS = Path(__file__).resolve().parents[2]
@@ -53,6 +55,12 @@ class HiddenCase:
         """
         judged = score(outcome)
         return judged["unknown"] if self.outside else judged["fair"]
+
+
+def outcome_in(world: HiddenWorld, hidden: HiddenCase, found: Diagnosis) -> dict[str, Any]:
+    """Return the outcome of a world that was drawn and diagnosed, as `sim.study.outcome.run_case` does of a case."""
+    limits = {"reached": world.reached, "left_by": world.left_by, "drive_unknown": world.drive_unknown}
+    return {"key": hidden.name, **hidden.case.to_dict(), **limits, **outcome_of(found, world.truth)}
 
 
 _SHORT = {"duration": 12.0}

@@ -2,12 +2,14 @@
 
 import copy
 import functools
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
 from gfimu.diagnosis.diagnose import diagnose
+from gfimu.diagnosis.free_body.diagnose import diagnose_body
 from gfimu.diagnosis.free_body.run import prepare_body_run
 from gfimu.diagnosis.free_body.segment import BodySegment
 from gfimu.diagnosis.report.picture import write_picture
@@ -242,3 +244,9 @@ def test_a_recording_without_its_gyro_is_refused():
     del recording.reference["gyro_y_rad_s"]
     with pytest.raises(InputError, match=r"column gyro_y_rad_s is missing, but the twin's drive source is 'gyro'"):
         diagnose([recording], twin())
+
+
+def test_a_simulation_that_predicts_no_free_body_is_refused():
+    model = SimpleNamespace(drive_source="gyro")
+    with pytest.raises(InputError, match="the simulation predicts no free body"):
+        diagnose_body([], model, names=[], report=lambda share, text: None)

@@ -8,7 +8,7 @@ import pytest
 from made_diagnoses import made_diagnosis
 
 from gfimu.diagnosis import diagnose
-from gfimu.diagnosis.gate import impossible_sizes, judge, measurable
+from gfimu.diagnosis.criticism.gate import impossible_sizes, judge, measurable
 from gfimu.diagnosis.named_causes import capped
 from gfimu.diagnosis.report.page import report_html
 from gfimu.diagnosis.report.plain_words import headline

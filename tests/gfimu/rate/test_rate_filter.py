@@ -13,10 +13,11 @@ from gfimu.errors import GeometryError, InputError
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.rate.backward import backward
 from gfimu.rate.filter import filter_rate
-from gfimu.rate.kalman import FilterSettings, quadrature_weights
+from gfimu.rate.kalman import FilterSettings
 from gfimu.rate.live import LiveRateFilter
 from gfimu.rate.methods import RATE_METHODS, estimate_rate
 from gfimu.rate.preparation import prepare
+from gfimu.rate.quadrature import even_weights
 from gfimu.rate.recursion import forward
 from gfimu.rate.sensing import ChannelTables, SensorErrors
 from gfimu.rate.smoother import smooth_rate
@@ -65,9 +66,9 @@ def test_one_compiled_form_serves_all_arrays():
 
 
 def test_quadrature_weights():
-    np.testing.assert_allclose(quadrature_weights(2), [[0.5, 0.5]], rtol=1e-14)
-    np.testing.assert_allclose(quadrature_weights(4)[2] * 24, [1, -5, 19, 9], rtol=1e-12)  # Adams–Moulton
-    np.testing.assert_allclose(quadrature_weights(6)[2] * 1440, [11, -93, 802, 802, -93, 11], rtol=1e-10)
+    np.testing.assert_allclose(even_weights(2), [[0.5, 0.5]], rtol=1e-14)
+    np.testing.assert_allclose(even_weights(4)[2] * 24, [1, -5, 19, 9], rtol=1e-12)  # Adams–Moulton
+    np.testing.assert_allclose(even_weights(6)[2] * 1440, [11, -93, 802, 802, -93, 11], rtol=1e-10)
 
 
 @pytest.mark.parametrize("start", [np.zeros(3), None], ids=["rest", "unknown"])

@@ -6,7 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gfimu.errors import InputError
-from gfimu.rate.integration import METHODS, integrate_rate, integrate_samples, sample_integrals
+from gfimu.rate.integration import METHODS, integrate_rate, integrate_samples
+from gfimu.rate.kalman import QUADRATURES
+from gfimu.rate.quadrature import STENCILS, even_weights, polynomial_weights
 
 DEGREE = {"trapezoid": 1, "runge_kutta": 2, "adams_moulton4": 3, "centred4": 3, "centred6": 5}
 ORDER = {"trapezoid": 2, "runge_kutta": 4, "adams_moulton4": 3, "centred4": 4, "centred6": 6}
@@ -39,9 +41,8 @@ def test_weights_are_the_textbook_ones(method, weights, first):
         impulse[sample] = 1.0
         place = sample - interval - first
         expected = weights[place] if 0 <= place < len(weights) else 0.0
-        assert sample_integrals(np.arange(12.0), impulse, method=method)[interval, 0] == pytest.approx(
-            expected, abs=1e-14
-        )
+        integral = integrate_samples(np.arange(12.0), impulse[:, 0], method=method)
+        assert integral[interval + 1] - integral[interval] == pytest.approx(expected, abs=1e-14)
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -160,6 +161,49 @@ def test_bad_input(t, alpha, method, words):
         integrate_rate(t, alpha, method=method)
 
 
-def test_interval_integrals_refuse_nan():
-    with pytest.raises(InputError, match="NaN"):
-        sample_integrals([0.0, 1.0], [[np.nan], [0.0]])
+def weights_by_moments(nodes, left):
+    """Weights that integrate the monomials exactly, from Vandermonde's system: another way to the same numbers."""
+    step = nodes[left + 1] - nodes[left]
+    places = (nodes - nodes[left]) / step
+    powers = np.arange(len(nodes))
+    return np.linalg.solve(places ** powers[:, None], 1.0 / (powers + 1.0)) * step
+
+
+@pytest.mark.parametrize("points", [2, 3, 4, 5, 6])
+def test_weights_on_uneven_samples_agree_with_the_moments(points):
+    rng = np.random.default_rng(points)
+    for left in range(points - 1):
+        nodes = 3.0 + np.cumsum(rng.uniform(0.7, 1.4, points)) * 0.01
+        weights = np.full(points + 1, np.nan)
+        polynomial_weights(nodes, 0, points, left, weights)
+        np.testing.assert_allclose(weights[:points], weights_by_moments(nodes, left), rtol=1e-9, atol=1e-15)
+        assert np.isnan(weights[points])
+        np.testing.assert_allclose(
+            even_weights(points)[left], weights_by_moments(np.arange(points), left), rtol=1e-11, atol=1e-14
+        )
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_jittered_run_is_the_sum_of_the_stencils_by_moments(method):
+    """The former way, interval by interval, to rounding."""
+    rng = np.random.default_rng(5)
+    t = np.cumsum(rng.uniform(0.9, 1.1, 60)) * 0.01
+    values = rng.standard_normal((60, 2))
+    stencil = STENCILS[method]
+    expected = np.zeros((60, 2))
+    for left in range(59):
+        first = max(left + stencil.before[left % 2], 0)
+        points = left + 2 - first if stencil.causal else stencil.points
+        first = min(first, 60 - points)
+        rows = slice(first, first + points)
+        expected[left + 1] = expected[left] + weights_by_moments(t[rows], left - first) @ values[rows]
+    np.testing.assert_allclose(integrate_samples(t, values, method=method), expected, rtol=1e-10, atol=1e-14)
+
+
+def test_the_filter_takes_its_stencils_from_the_same_table():
+    assert QUADRATURES == {"centred6": (6, 2), "centred4": (4, 1), "adams_moulton4": (4, 2), "trapezoid": (2, 0)}
+    for name, (points, position) in QUADRATURES.items():
+        impulses = np.eye(12)
+        integrals = np.diff(integrate_samples(np.arange(12.0), impulses, method=name), axis=0)  # (interval, sample)
+        first = 5 - position
+        np.testing.assert_allclose(integrals[5, first : first + points], even_weights(points)[position], atol=1e-14)

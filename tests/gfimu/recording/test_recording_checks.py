@@ -56,9 +56,10 @@ def world(rng, name="cube12", kind="table", errors="typical"):
     upright = kind in {"table", "spin upright"}
     attitude = Rotation.identity() if upright else Rotation.random(random_state=int(rng.integers(1 << 30)))
     up = np.empty((len(t), 3))
-    for row, step in enumerate(Rotation.from_rotvec(rate / RATE)):
-        up[row] = attitude.inv().apply([0.0, 0.0, 1.0])
-        attitude = attitude * step
+    now = attitude.inv().apply([0.0, 0.0, 1.0])
+    for row, back in enumerate(Rotation.from_rotvec(-rate / RATE).as_matrix()):
+        up[row] = now
+        now = back @ now
     force = (0.0 if kind == "fall" else STANDARD_GRAVITY) * up
     sheet = PartLimits.of(array, RATE)
     real, size = array, array.n_channels

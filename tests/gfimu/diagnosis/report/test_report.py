@@ -42,16 +42,33 @@ class Page(HTMLParser):
         assert self.open.pop() == tag
 
 
-@pytest.fixture(scope="module")
-def pages():
-    """One page per verdict; of the unknown one, a channel is dead and the file has a hostile name."""
-    made = {verdict: made_diagnosis(verdict) for verdict in VERDICTS}
-    (run,) = made["unknown"].runs
-    valid = run.valid.copy()
-    valid[:, 4] = False
-    hostile = replace(run, name="<script>alert(1)</script>.csv", valid=valid)
-    made["unknown"] = replace(made["unknown"], runs=(hostile,))
-    return {verdict: report_html(diagnosis) for verdict, diagnosis in made.items()}
+def page_of(verdict: str) -> str:
+    """The page of a verdict; of the unknown one, a channel is dead and the file has a hostile name."""
+    diagnosis = made_diagnosis(verdict)
+    if verdict == "unknown":
+        (run,) = diagnosis.runs
+        valid = run.valid.copy()
+        valid[:, 4] = False
+        hostile = replace(run, name="<script>alert(1)</script>.csv", valid=valid)
+        diagnosis = replace(diagnosis, runs=(hostile,))
+    return report_html(diagnosis)
+
+
+class Pages(dict):
+    """Pages by verdict, each drawn when a test first reads it: one takes seconds."""
+
+    def __init__(self, made_once):
+        self._made_once = made_once
+
+    def __missing__(self, verdict):
+        self[verdict] = self._made_once(f"report-{verdict}.html", lambda: page_of(verdict))
+        return self[verdict]
+
+
+@pytest.fixture(scope="session")
+def pages(made_once):
+    """One page per verdict."""
+    return Pages(made_once)
 
 
 def words_of(page: str) -> str:
@@ -120,6 +137,12 @@ def test_the_sentences_of_the_views_are_on_the_page(pages):
     assert "Before," not in words_of(pages["nothing_found"])
 
 
+def test_noise_levels_have_their_units(pages):
+    assert "white over data sheet 1; bias instability 0.0015 m/s²; reference white 0.02. Made by gfimu" in words_of(
+        pages["explained"]
+    )
+
+
 def test_text_from_outside_cannot_break_the_page(pages):
     assert "<script" not in pages["unknown"]
     assert "&lt;script&gt;" in pages["unknown"]
@@ -133,12 +156,17 @@ def test_the_folder_holds_all_files_or_none(tmp_path, monkeypatch):
     diagnosis = made_diagnosis("explained")
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "verdict.json").write_text("kept")
-    monkeypatch.setattr("gfimu.diagnosis.report.folder.write_picture", lambda *_, **__: 1 / 0)
-    with pytest.raises(ZeroDivisionError):
-        write_diagnosis(tmp_path / "out", diagnosis)
+    written_report = []  # drawing it takes seconds, and the pages above are of it
+    monkeypatch.setattr(
+        "gfimu.diagnosis.report.folder.write_report", lambda path, _: written_report.append(path.write_text("report"))
+    )
+    with monkeypatch.context() as patch:
+        patch.setattr("gfimu.diagnosis.report.folder.write_picture", lambda *_, **__: 1 / 0)
+        with pytest.raises(ZeroDivisionError):
+            write_diagnosis(tmp_path / "out", diagnosis)
     assert [file.name for file in (tmp_path / "out").iterdir()] == ["verdict.json"]
     assert (tmp_path / "out" / "verdict.json").read_text() == "kept"
-    monkeypatch.undo()
+    assert len(written_report) == 1  # before the picture failed
     written = write_diagnosis(tmp_path / "out", diagnosis)
     names = {"verdict.json", "twin.toml", "report.html", "diagnosis.rrd"}
     assert {file.name for file in (tmp_path / "out").iterdir()} == names == {path.name for path in written.values()}

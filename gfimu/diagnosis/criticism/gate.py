@@ -10,17 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.verdict.verdict import Gain, NamedCause, Residual
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.world_model import EffectFamily, bound_of
 
-__all__ = ["LEAST_SHARE", "Judgement", "impossible_sizes", "judge", "measurable"]
-
-LEAST_SHARE = 0.5
-"""Share of the held-out excess below which causes are withdrawn: they miss more than they explain."""
-_STDS = 2.0  # standard errors beyond which a figure counts
-_WORSE = 1.01  # of the rms before: an in-sample error that is larger by less is the noise of the drive
-_NEAR_NOISE = 1.1  # of the noise floor: an error within it is no evidence against a cause
+__all__ = ["Judgement", "impossible_sizes", "judge", "measurable"]
 
 
 @dataclass(frozen=True)
@@ -39,7 +34,7 @@ class Judgement:
     why: str = ""
 
 
-def judge(gain: Gain, residual: Residual, causes: Sequence[NamedCause]) -> Judgement:
+def judge(gain: Gain, residual: Residual, causes: Sequence[NamedCause], policy: Policy = Policy()) -> Judgement:
     """Judge causes by what they are worth on held-out data and on the fitted data.
 
     They are withdrawn where they predict held-out data worse than the given simulation, remove less than half of the
@@ -53,14 +48,16 @@ def judge(gain: Gain, residual: Residual, causes: Sequence[NamedCause]) -> Judge
         The error on the fitted data.
     causes : sequence of NamedCause
         The causes, for the words.
+    policy : Policy
+        Thresholds.
     """
     if not causes:
         return Judgement()
-    figure = _held_out_figure(gain)
+    figure = _held_out_figure(gain, policy)
     if figure:
         return Judgement(True, f"{_found(causes)} do not predict data the fit never saw: {figure}")
     before, after = residual.rms_before, residual.rms_after
-    if after > max(_WORSE * before, _NEAR_NOISE * residual.noise_floor):
+    if after > max(policy.worse * before, policy.near_noise * residual.noise_floor):
         worse = f"the prediction error rises from {before:.3g} to {after:.3g} m/s²"
         return Judgement(True, f"{_found(causes)} make the simulation worse: {worse}")
     return Judgement()
@@ -75,20 +72,20 @@ def measurable(gain: Gain) -> Gain:
     return Gain(gain.held_out) if rises and np.isnan(gain.share_of_excess_removed) else gain
 
 
-def _held_out_figure(gain: Gain) -> str:
+def _held_out_figure(gain: Gain, policy: Policy) -> str:
     """Return the held-out figure that withdraws causes, in words, or nothing."""
     share = gain.share_of_excess_removed
-    upper = share + _STDS * float(np.nan_to_num(gain.share_std))
+    upper = share + policy.gate_stds * float(np.nan_to_num(gain.share_std))
     rises = f"the error there rises from {gain.rms_before:.3g} to {gain.rms_after:.3g} m/s²"
-    if upper < LEAST_SHARE and share < 0.0 and gain.rms_after > _WORSE * gain.rms_before:
+    if upper < policy.least_share and share < 0.0 and gain.rms_after > policy.worse * gain.rms_before:
         return rises
-    if upper < LEAST_SHARE:
+    if upper < policy.least_share:
         return f"{100 * max(share, 0.0):.0f} % of the excess removed"
     likelihood, std = gain.log_likelihood_per_sample, float(np.nan_to_num(gain.log_likelihood_std))
     # What is measured in other units must not overrule a share that is well above one half.
-    if likelihood + _STDS * std < 0.0 and not share >= LEAST_SHARE:
+    if likelihood + policy.gate_stds * std < 0.0 and not share >= policy.least_share:
         return f"log-likelihood per sample {likelihood:+.3g} ± {std:.2g}"
-    return rises if np.isnan(share) and gain.rms_after > _NEAR_NOISE * gain.rms_before else ""
+    return rises if np.isnan(share) and gain.rms_after > policy.near_noise * gain.rms_before else ""
 
 
 def impossible_sizes(

@@ -1,0 +1,142 @@
+"""Models of the nuisance parameters, compared by evidence: biases that walk, a calibration that is a little off.
+
+The search runs with white noise and bias instability alone. A random walk of the biases, a residue of the calibration
+and both together are alternatives; a closed form of what each would bring beside the best set, and beside nothing,
+says whether it is worth a search of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gfimu.diagnosis.coloured_noise import NoiseLevels
+from gfimu.diagnosis.criticism.slow_noise import Walk, walk_strength
+from gfimu.diagnosis.data.stretch import Stretch
+from gfimu.diagnosis.fit.gauss_newton import Fit
+from gfimu.diagnosis.fit.learn import learn_noise
+from gfimu.diagnosis.fit.linear import Point, linearise, with_residue
+from gfimu.diagnosis.policy import Policy
+from gfimu.diagnosis.search.explain import Explanation, Sets, explain, prune
+from gfimu.diagnosis.terms.residue import Residue
+
+__all__ = ["Understanding", "understand"]
+
+Report = Callable[[float, str], None]
+
+
+@dataclass(frozen=True)
+class Understanding:
+    """The best explanation of all models of the nuisance parameters.
+
+    Parameters
+    ----------
+    explanation : Explanation
+        Under the most probable model.
+    walk : Walk, optional
+        The random walk of the biases, where that model has one.
+    residue : float
+        Size of the residue of the calibration in units of its tolerances; 0 where it has none.
+    log_odds : float
+        For this model over the next.
+    """
+
+    explanation: Explanation
+    walk: Walk | None
+    residue: float
+    log_odds: float
+
+
+def understand(stretches: Sequence[Stretch], policy: Policy, report: Report | None = None) -> Understanding:
+    """Explain stretches under every model of the nuisance parameters that is worth a search."""
+    tell = report or (lambda share, text: None)
+    found = [_understood(stretches, explain(stretches, policy, report=lambda s, text: tell(0.6 * s, text)), policy, 0.0)]
+    for name, admit, odds in _models(stretches, found[0].explanation, policy):
+        tell(0.6, name)
+        known = {one.explanation.best.key: one for one in found}
+        start = _start(stretches, [known[key].explanation for key in known], admit, odds, policy)
+        if start is not None:
+            found.append(_understood(stretches, explain(stretches, policy, start=start), policy, odds))
+    found.sort(key=lambda one: one.explanation.best.log_posterior - one.log_odds, reverse=True)
+    values = [one.explanation.best.log_posterior - one.log_odds for one in found]
+    return replace(found[0], log_odds=values[0] - values[1] if len(values) > 1 else np.inf)
+
+
+_Admit = Callable[[Point], Point | None]
+
+
+def _models(
+    stretches: Sequence[Stretch], plain: Explanation, policy: Policy
+) -> list[tuple[str, _Admit, float]]:
+    """Return the alternatives: name, what admits it at a point, and the log odds that it needs."""
+    first = stretches[0]
+    found: list[tuple[str, _Admit, float]] = []
+    residues: list[tuple[float, float]] = []
+    if Residue.is_possible(first) and not any(s.steps.channels for s in stretches):
+        residues = list(policy.residue_odds)
+    for scale, odds in residues:
+        found.append((f"calibration residue × {scale:g}", lambda p, s=scale: with_residue(stretches, p, s), odds))
+    if first.first_levels.walk == 0.0:
+        found.append(("random walk", lambda p: _walking(stretches, p, policy), policy.walk_odds))
+        for scale, odds in residues[:1]:
+
+            def both(point: Point, scale: float = scale) -> Point | None:
+                walking = _walking(stretches, point, policy)
+                return None if walking is None else with_residue(stretches, walking, scale)
+
+            found.append(("random walk and calibration residue", both, policy.walk_odds + odds))
+    return found
+
+
+def _walking(stretches: Sequence[Stretch], point: Point, policy: Policy) -> Point | None:
+    """Return the point with biases that walk as its residuals do, if they do, and the bias instability beside that."""
+    walk = walk_strength(stretches, point, policy)
+    if not walk.is_likely(policy):
+        return None
+    levels = tuple(NoiseLevels(one.white, one.flicker, walk.strength) for one in point.levels)
+    return learn_noise(stretches, replace(point, levels=levels))
+
+
+def _start(
+    stretches: Sequence[Stretch], known: Sequence[Explanation], admit: _Admit, odds: float, policy: Policy
+) -> Point | None:
+    """Return where a search under another model starts, if that may beat what is known."""
+    best = max(one.best.log_posterior for one in known)
+    tried: list[Fit] = []
+    for one in known:
+        for base in (one.best, one.nothing) if one.best.causes else (one.best,):
+            point = admit(base.point)
+            if point is None:
+                continue
+            if base.log_posterior + _promise(stretches, base.point, point) < best + odds - policy.hopeless:
+                continue
+            sets = Sets(stretches, point, policy)
+            if sets.fit([point])[0] is not None:
+                tried.append(prune(sets))
+    leading = max(tried, key=lambda one: one.log_posterior, default=None)
+    if leading is None or leading.log_posterior < best + odds - policy.worth_a_search:
+        return None
+    return leading.point
+
+
+def _promise(stretches: Sequence[Stretch], before: Point, after: Point) -> float:
+    """Return what another model of the nuisance parameters brings in a linear world, nats."""
+    values = []
+    for point in (before, after):
+        linear = linearise(stretches, point)
+        values.append(linear.log_volume + linear.log_noise - 0.5 * linear.objective)
+    return values[1] - values[0]
+
+
+def _understood(
+    stretches: Sequence[Stretch], explanation: Explanation, policy: Policy, odds: float
+) -> Understanding:
+    point = explanation.best.point
+    walk = None
+    if point.levels[0].walk > 0.0 and stretches[0].first_levels.walk == 0.0:
+        bare = replace(point, levels=tuple(NoiseLevels(one.white, one.flicker) for one in point.levels))
+        walk = walk_strength(stretches, bare, policy)
+    residue = 0.0 if point.residue is None else point.residue.scale
+    return Understanding(explanation, walk, residue, odds)
