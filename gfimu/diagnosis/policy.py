@@ -94,7 +94,7 @@ class Policy:
         Share of the log odds of a function on all channels below which one channel alone must stay.
     least_described : float
         Share of the excess misfit that a round of terms must take away to describe anything.
-    searched_stretches : int
+    most_searched : int
         Stretches of a long recording on which terms are chosen.
     """
 

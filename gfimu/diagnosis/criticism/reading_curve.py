@@ -1,4 +1,4 @@
-"""Whether one cubic of a channel's reading does what several named effects on that channel do together."""
+"""Whether a cubic of a channel's reading explains more than the named effects on that channel."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ __all__ = ["reading_curve"]
 def reading_curve(stretches: Sequence[Stretch], found: Fit, policy: Policy = Policy()) -> LackOfFit:
     """Compare a cubic of one channel's reading with the effects of a fit that distort this channel.
 
-    A cubic is close to the sum of several terms of a polynomial, as of an offset, a gain and a square. Where the cubic
+    A cubic is close to a polynomial of the reading, as an offset, a gain and a square are together. Where the cubic
     alone is more probable, these are a compromise.
 
     Parameters
@@ -36,7 +36,7 @@ def reading_curve(stretches: Sequence[Stretch], found: Fit, policy: Policy = Pol
     array, best = stretches[0].model.array, LackOfFit(-np.inf, "", {})
     for number, channel in enumerate(array.channels):
         mine = [cause for cause in found.causes if _distorts(cause, array.n_channels, number)]
-        if len(mine) < 2 or all(cause.place != f"channel {channel}" for cause in mine):
+        if all(cause.place != f"channel {channel}" for cause in mine):
             continue
         family = stretches[0].model.unnamed(OF_READING, basis_units(stretches, found.point))
         cubic = Cause(family, OF_READING, np.eye(array.n_channels)[:, [number]], {}, np.zeros(1))

@@ -98,7 +98,7 @@ def surrogates(
         No cause.
     policy : Policy
         Thresholds of fits, and ``most_terms``, ``terms_per_round``, ``term_odds``, ``comparable``, ``nearly_all``,
-        ``least_described`` and ``searched_stretches``.
+        ``least_described`` and ``most_searched``.
     hints : sequence of str
         Functions of `gfimu.generic_basis` to look at besides its own.
     """
