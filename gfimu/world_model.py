@@ -37,6 +37,7 @@ __all__ = [
     "WorldModel",
     "bound_of",
     "is_of_one_recording",
+    "is_of_wiring",
     "shapes_to_screen",
 ]
 
@@ -116,12 +117,19 @@ def is_of_one_recording(family: EffectFamily) -> bool:
     return bool(getattr(family, "of_one_recording", False))
 
 
+def is_of_wiring(effect: Effect) -> bool:
+    """Tell whether a fault of the samples changes a prediction without noise; others need not say so."""
+    return bool(getattr(effect, "of_wiring", False))
+
+
 class EffectFamily(Protocol):
     """A kind of effect: its coordinates, places, shapes and how to build one.
 
     What else it may know of itself is optional: ``whole`` (shape parameters that are whole numbers), ``shape_limits``
     (least and largest value by shape parameter), ``needs_temperature``, ``tolerance`` (what a good calibration leaves of
-    each size), ``of_one_recording``, ``memory_s`` of an effect, and ``scan`` (`shapes_to_screen`).
+    each size), ``of_one_recording``, ``of_wiring`` (`is_of_wiring`), ``of_pose`` (it depends on the specific force
+    alone), ``contained_in`` (effects that can do all that it does), ``memory_s`` and, of a fault of the samples,
+    ``channel_order`` of an effect, and ``scan`` (`shapes_to_screen`).
     """
 
     @property

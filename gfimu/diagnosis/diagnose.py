@@ -80,7 +80,8 @@ def diagnose(
         warn_of_other_array(recording.metadata, model.array, label)
     with one_blas_thread():
         if model.drive_source == "gyro":
-            return diagnose_body(recordings, model, held_out=held_out, names=labels, report=tell)
+            settings = policy or Policy()
+            return diagnose_body(recordings, model, held_out=held_out, names=labels, report=tell, policy=settings)
         tell(0.02, "read")
         prepared = prepare(recordings, model, labels)
         kept = prepare(held_out, model, held_labels) if held_out else None

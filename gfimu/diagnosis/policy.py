@@ -96,6 +96,15 @@ class Policy:
         Share of the excess misfit that a round of terms must take away to describe anything.
     most_searched : int
         Stretches of a long recording on which terms are chosen.
+    body_causes : int
+        Largest set of a free body: arrays that are carried about differ from their twin in more than a table's do.
+    body_rounds : int
+        Of screening and learning on a free body, each a Gauss–Newton step.
+    body_dominant : float
+        As ``dominant``, of a free body: real hands, wheels and belts leave up to a tenth beside what is right.
+    body_spike_share : float
+        Share of isolated bad samples of a free body beyond which they are no faults: it moves faster than the samples
+        follow.
     """
 
     beam: int = 6
@@ -159,3 +168,7 @@ class Policy:
     fair: float = 1.6
     knot_odds: float = 100.0
     hopeless: float = 40.0
+    body_causes: int = 8
+    body_rounds: int = 12
+    body_dominant: float = 0.1
+    body_spike_share: float = 2e-3

@@ -103,6 +103,13 @@ class Effect(ABC):
     """Standard deviation of each size that a good calibration leaves, in the unit of the sizes."""
     of_one_recording: ClassVar[bool] = False
     """True where its phase is that of a clock no other recording shares: it does not predict another one."""
+    of_wiring: ClassVar[bool] = False
+    """True for a fault of the samples that changes a prediction without noise: it carries readings elsewhere or scales
+    them."""
+    of_pose: ClassVar[bool] = False
+    """True where it depends on the specific force alone: while a body rests it is constant, as slow noise nearly is."""
+    contained_in: ClassVar[frozenset[str]] = frozenset()
+    """Effects that can do all that it does: beside one of them it has no size of its own."""
 
     def __init__(self, parameters: Mapping[str, Any]) -> None:
         self.parameters: dict[str, Any] = dict(parameters)

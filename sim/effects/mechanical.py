@@ -44,6 +44,7 @@ class Misalignment(Effect):
     summary = "a chip's sensing axes are turned against the body"
     tolerance = float(np.deg2rad(0.02))
     place = "geometry"
+    contained_in = frozenset({"cross_axis"})
     separated_by = "the cube remounted on its side, or static poses on several sides"
 
     @classmethod

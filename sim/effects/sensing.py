@@ -73,6 +73,7 @@ class Bias(_PerChannel):
     suffix = "_m_s2"
     unit = "m/s²"
     tolerance = 0.3 * _MG
+    of_pose = True
     prior_std = 20 * _MG
     bound = STANDARD_GRAVITY  # four times the 0.25 g that the ADXL345's data sheet allows along z
     separated_by = "static poses on several sides (six-position), or the cube remounted on its side"
@@ -89,6 +90,7 @@ class ScaleFactor(_PerChannel):
     name = "scale_factor"
     summary = "a gain error per channel (another supply voltage, say)"
     tolerance = 5e-4
+    of_pose = True
     prior_std = 0.02
     bound = 0.3  # three times the ±10 % that the ADXL345's data sheet allows; the MPU-9150's ±3 % is narrower
     separated_by = "static poses on several sides, or the cube remounted on its side and several speeds"
@@ -110,6 +112,7 @@ class Quadratic(_PerChannel):
 
     name = "quadratic"
     summary = "a second-order non-linearity per channel"
+    of_pose = True
     suffix = "_s2_m"
     unit = "s²/m"
     prior_std = 3e-3 / STANDARD_GRAVITY
@@ -200,6 +203,7 @@ class CrossAxis(Effect):
     name = "cross_axis"
     summary = "a channel picks up its neighbour on the same chip"
     place = "sensing"
+    of_pose = True
     separated_by = "static poses on several sides and several speeds"
 
     @classmethod

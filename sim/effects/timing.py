@@ -23,6 +23,7 @@ class ChannelSkew(Effect):
     name = "channel_skew"
     summary = "chips are sampled one after another, not together"
     place = "timing"
+    contained_in = frozenset({"chip_delay"})
     separated_by = "fast changes of the rate"
     starts = (-200.0, -80.0, -30.0, -10.0, 10.0, 30.0, 80.0, 200.0)
 

@@ -16,7 +16,7 @@ from gfimu.diagnosis.data.rounding import COARSE, Steps
 from gfimu.diagnosis.data.run import Run, difference_noise
 from gfimu.diagnosis.drive import smooth_rate
 from gfimu.diagnosis.terms.spline import JoinedSpin, ScaledSpin
-from gfimu.world_model import Effect, Spin, WorldModel
+from gfimu.world_model import Effect, Spin, WorldModel, is_of_wiring
 
 __all__ = ["RunUp", "Stretch", "make_stretches"]
 
@@ -193,7 +193,7 @@ def make_stretches(model: WorldModel, runs: Sequence[Run], known: Sequence[Seque
         noise = difference_noise(run.reference[run.reference_valid])
         steps, _ = Steps.of_reference(run.reference[run.reference_valid], noise)
         steps = replace(steps, channels=_coarse_step(model, run, faults))
-        acting = tuple(fault for fault in faults if fault.name != "coarse_resolution" and _acts(fault))
+        acting = tuple(fault for fault in faults if is_of_wiring(fault))
         pieces: list[tuple[int, int, bool]] = []
         for first, end in pairwise([0, *run.resumed, len(run.t)]):
             count = max(1, round((end - first) * run.sample_period / _DURATION))
@@ -215,11 +215,6 @@ def make_stretches(model: WorldModel, runs: Sequence[Run], known: Sequence[Seque
                 )
             )
     return tuple(stretches)
-
-
-def _acts(fault: Effect) -> bool:
-    """Tell whether a fault changes a noise-free prediction."""
-    return fault.name in {"axis_swap", "sign_flip", "wrong_range"}
 
 
 def _coarse_step(model: WorldModel, run: Run, faults: Sequence[Effect]) -> float:

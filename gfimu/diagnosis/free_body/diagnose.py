@@ -9,12 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from gfimu.diagnosis.adequacy import LEFT_OVER_ODDS
-from gfimu.diagnosis.causes import Cause, effects_of_run
+from gfimu.diagnosis.criticism.gate import impossible_sizes, judge
+from gfimu.diagnosis.criticism.lack_of_fit import LackOfFit
 from gfimu.diagnosis.data.integrity import check_integrity
 from gfimu.diagnosis.data.run import Run
-from gfimu.diagnosis.explanation import Explanation
-from gfimu.diagnosis.free_body.engine import explain, without_cause
+from gfimu.diagnosis.free_body.explain import BodyFit, explain, reduced
 from gfimu.diagnosis.free_body.holdout import (
     BodyHoldout,
     gate_gains,
@@ -22,35 +21,37 @@ from gfimu.diagnosis.free_body.holdout import (
     other_recording,
     stretches,
 )
-from gfimu.diagnosis.free_body.left_over import motion_noise, structure_left
+from gfimu.diagnosis.free_body.lack_of_fit import motion_noise, unexplained_structure
 from gfimu.diagnosis.free_body.run import BodyRun, prepare_body_run
 from gfimu.diagnosis.free_body.segment import BodySegment
 from gfimu.diagnosis.free_body.undetermined import undetermined, undetermined_sentence
-from gfimu.diagnosis.criticism.gate import impossible_sizes, judge
-from gfimu.diagnosis.named_causes import contested, fault_causes, name_cause
-from gfimu.diagnosis.naming import channel_share, conflicting, probabilities, rival_list
-from gfimu.diagnosis.old_fit import Fit
+from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.report.wording import verdict_sentences
-from gfimu.diagnosis.residual_tests import LeftOver
+from gfimu.diagnosis.search.comparison import Comparison
+from gfimu.diagnosis.terms.cause import Cause, effects_of
+from gfimu.diagnosis.verdict.naming import (
+    channel_share,
+    conflicting,
+    contested,
+    fault_causes,
+    name_cause,
+    probabilities,
+    rival_list,
+)
 from gfimu.diagnosis.verdict.sample_notes import with_sample_notes
 from gfimu.diagnosis.verdict.verdict import Diagnosis, Gain, NamedCause, Residual, RunView, Unexplained
 from gfimu.errors import InputError
 from gfimu.motion.attitude import from_rotation, integrate_attitude, to_rotation
 from gfimu.recording import Recording
-from gfimu.world_model import BodyModel, Effect, WorldModel
+from gfimu.world_model import BodyModel, Effect, WorldModel, is_of_wiring
 
 __all__ = ["diagnose_body"]
 
 Report = Callable[[float, str], None]
 
-_LEAST_GAIN = 2.0
-_DOMINANT = 0.1
-_INEXACTNESS = 2.5e-3
-_WIRING = ("axis_swap", "sign_flip", "wrong_range")
-_SWEEPS = 12
-_MOST_SPIKES = 2e-3
-_ALIVE = 0.5  # of the samples, with a value
-_FEWEST = 80  # samples
+_SWEEPS = 12  # numerical: reweightings until the channels that disagree have no weight
+_ALIVE = 0.5  # numerical: of the samples, with a value
+_FEWEST = 80  # numerical: samples
 
 
 def diagnose_body(
@@ -60,43 +61,46 @@ def diagnose_body(
     held_out: Sequence[Recording] = (),
     names: Sequence[str],
     report: Report,
+    policy: Policy = Policy(),
 ) -> Diagnosis:
     """Diagnose recordings of a body that moves freely, its rate from a gyro, its specific force unknown.
 
     Parameters
     ----------
-    recordings, model, held_out, names, report
+    recordings, model, held_out, names, report, policy
         As `gfimu.diagnosis.diagnose.diagnose` has them; the twin's drive source is ``gyro``.
     """
     if not isinstance(model, BodyModel):
         raise InputError("the simulation predicts no free body; drive it by tacho, angle or command, not by gyro")
     report(0.02, "read")
-    prepared = _Prepared.build(recordings, model, names)
+    prepared = _Prepared.build(recordings, model, names, policy)
     segments, fixed = prepared.segments, prepared.fixed
-    explanation = explain(segments, fixed, report=lambda share, text: report(0.03 + 0.8 * share, text))
+    explanation = explain(segments, fixed, policy, report=lambda share, text: report(0.03 + 0.8 * share, text))
     report(0.85, "hold out")
     kept = None
     if held_out:
-        kept = _Prepared.build(held_out, model, [f"held out {n + 1}" for n in range(len(held_out))])
+        kept = _Prepared.build(held_out, model, [f"held out {n + 1}" for n in range(len(held_out))], policy)
     pairs = _pairs(prepared, kept, explanation)
     withdrawn: list[str] = []
-    while explanation.fit.causes:
-        gains = gate_gains(explanation.fit.causes, pairs)
+    while explanation.best.causes:
+        gains = gate_gains(explanation.best.causes, pairs, policy)
         worst = min(gains, key=lambda name: gains[name])
-        if gains[worst] >= _LEAST_GAIN:
+        if gains[worst] >= policy.least_gain:
             break
         withdrawn.append(worst)
-        explanation = without_cause(segments, explanation.fit.causes, fixed, worst)
-    report(0.92, "look at what is left")
-    noise = motion_noise(segments)
-    structure, tone = structure_left(segments, explanation.fit.causes, fixed)
+        explanation = reduced(segments, explanation.best.causes, fixed, worst, policy)
+    report(0.92, "lack of fit")
+    noise = motion_noise(segments, policy)
+    structure, tone = unexplained_structure(segments, explanation.best.causes, fixed, policy)
     report(0.96, "measure the gain")
     gain, over_noise = Gain(), float("nan")
-    if explanation.fit.causes or any(fixed):
+    if explanation.best.causes or any(fixed):
         constant = [effect for effects in fixed for effect in effects]
         label = "another recording" if kept else "stretches of the recording, each from the others"
-        gain, over_noise = held_out_gain(explanation.fit.causes, pairs, constant, label)
-    found = _verdict(prepared, explanation, (structure, tone, noise), gain, withdrawn, over_noise)
+        gain, over_noise = held_out_gain(explanation.best.causes, pairs, constant, policy, label=label)
+    found = _verdict(
+        prepared, explanation, (structure, tone, noise), gain, policy, withdrawn=withdrawn, over_noise=over_noise
+    )
     return with_sample_notes(found, [segment.run for segment in segments])
 
 
@@ -110,14 +114,16 @@ class _Prepared:
     why: dict[str, str]
 
     @classmethod
-    def build(cls, recordings: Sequence[Recording], model: BodyModel, names: Sequence[str]) -> _Prepared:
+    def build(
+        cls, recordings: Sequence[Recording], model: BodyModel, names: Sequence[str], policy: Policy
+    ) -> _Prepared:
         segments, faults, why = [], [], {}
         for number, (recording, name) in enumerate(zip(recordings, names, strict=True)):
             body = prepare_body_run(recording, model, name=name)
             _refuse_too_few(body.run, model, name)
             checked = check_integrity(model, body.run, robust_prediction(BodySegment(model, body, number)))
             run = checked.run
-            if checked.spikes > _MOST_SPIKES * run.valid.size:
+            if checked.spikes > policy.body_spike_share * run.valid.size:
                 # So many are no faults: the hand moves faster than the samples follow.
                 run = replace(run, valid=run.valid | body.run.valid & ~_lost_for_good(body, run.valid))
             _refuse_too_few(run, model, name)
@@ -129,7 +135,7 @@ class _Prepared:
     @property
     def fixed(self) -> list[list[Effect]]:
         """Faults of the wiring, which change a noise-free prediction."""
-        return [[effect for effect in effects if effect.name in _WIRING] for effects in self.faults]
+        return [[effect for effect in effects if is_of_wiring(effect)] for effects in self.faults]
 
 
 def _refuse_too_few(run: Run, model: BodyModel, name: str) -> None:
@@ -176,65 +182,72 @@ def robust_prediction(segment: BodySegment) -> NDArray[np.float64]:
     return np.asarray(rigid + (rest @ inverse.T) @ axes.T)
 
 
-def _pairs(prepared: _Prepared, kept: _Prepared | None, explanation: Explanation) -> list[BodyHoldout]:
+def _pairs(prepared: _Prepared, kept: _Prepared | None, explanation: Comparison[BodyFit]) -> list[BodyHoldout]:
     if kept is None:
         return stretches(prepared.segments, prepared.fixed)
     for segment in kept.segments:
         segment.index = 0
-    return other_recording(prepared.segments, prepared.fixed, kept.segments, kept.fixed, explanation.fit.causes)
+    return other_recording(prepared.segments, prepared.fixed, kept.segments, kept.fixed, explanation.best.causes)
 
 
 def _verdict(
     prepared: _Prepared,
-    explanation: Explanation,
-    left: tuple[LeftOver, LeftOver, LeftOver],
+    explanation: Comparison[BodyFit],
+    left: tuple[LackOfFit, LackOfFit, LackOfFit],
     gain: Gain,
+    policy: Policy,
+    *,
     withdrawn: Sequence[str],
     over_noise: float,
 ) -> Diagnosis:
     """Put everything together; ``over_noise`` is the share of the held-out misfit over all noise that is removed."""
     model, segments = prepared.model, prepared.segments
-    fit = explanation.fit
+    fit = explanation.best
     removed = max(explanation.nothing.objective - fit.objective, 0.0)
     # No model is exact: what follows the motion must also stand out against what the causes explain.
-    thresholds = (max(LEFT_OVER_ODDS, _INEXACTNESS * removed), LEFT_OVER_ODDS, LEFT_OVER_ODDS)
-    told = [one for one, threshold in zip(left, thresholds, strict=True) if one.log_odds > threshold]
-    dominant = any(2 * one.log_odds > _DOMINANT * removed for one in told if one is not left[-1])
-    found = fault_causes((effect for effects in prepared.faults for effect in effects), prepared.why)
-    likely = probabilities(explanation)
-    named = [_named(explanation, fit, cause, likely, segments[0]) for cause in fit.causes]
-    rivals = conflicting(explanation)
+    least = policy.lack_odds
+    thresholds = (max(least, policy.inexactness * removed), least, least)
+    significant = [one for one, threshold in zip(left, thresholds, strict=True) if one.log_odds > threshold]
+    dominant = any(2 * one.log_odds > policy.body_dominant * removed for one in significant if one is not left[-1])
+    found = fault_causes((effect for effects in prepared.faults for effect in effects), prepared.why, policy)
+    likely = probabilities(explanation, policy)
+    named = [_named(explanation, fit, cause, likely, segments[0], policy) for cause in fit.causes]
+    rivals = conflicting(explanation, policy)
     families = model.families()
     views = _views(prepared, fit.causes)
     residual = Residual.of_views(views, model.array.channels, segments[0].noise_floor)
-    refuted = _refuted(named, residual, replace(gain, share_of_excess_removed=over_noise), model)
+    refuted = _refuted(named, residual, replace(gain, share_of_excess_removed=over_noise), model, policy)
     if refuted or dominant:
         views = _views(prepared, ())
         residual = Residual.of_views(views, model.array.channels, segments[0].noise_floor)
         gain = Gain()  # nothing stands that could be worth something
     dominant = dominant or bool(refuted)
-    extension = [] if dominant else [cause.effect(model.array) for cause in fit.causes]
+    extension = [] if dominant else [cause.effect(model.array, 0) for cause in fit.causes]
     faults = [families[cause.effect](cause.parameters) for cause in found if cause.effect in families]
     causes: tuple[NamedCause, ...] = (*found, *named)
-    if dominant or (told and not causes):
+    if dominant or (significant and not causes):
         verdict, causes = "unknown", tuple(found)
     elif rivals:
         verdict = "ambiguous"
         others = {cause.name: (rival, cause) for rival in rivals for cause in rival.causes}
         every = [
             *named,
-            *(_named(explanation, *at, likely, segments[0]) for name, at in others.items() if name not in fit.names),
+            *(
+                _named(explanation, *at, likely, segments[0], policy)
+                for name, at in others.items()
+                if name not in fit.names
+            ),
         ]
         causes = (*found, *contested(every, [fit, *rivals], families))
     else:
         verdict = "explained" if causes else "nothing_found"
     unexplained = Unexplained(
-        bool(told) or bool(refuted),
-        "; ".join([*([refuted] if refuted else []), *(one.signature for one in told)]),
+        bool(significant) or bool(refuted),
+        "; ".join([*([refuted] if refuted else []), *(one.signature for one in significant)]),
         max(one.log_odds for one in left),
-        {key: value for one in told for key, value in one.surrogate.items()},
+        {key: value for one in significant for key, value in one.surrogate.items()},
     )
-    unseen = undetermined(explanation.signatures, model.array)
+    unseen = undetermined(explanation.screening, model.array)
     words = verdict_sentences(verdict, causes, residual, gain, unexplained, withdrawn)
     words = (*words, undetermined_sentence(unseen)) if unseen else words
     first = segments[0]
@@ -248,16 +261,18 @@ def _verdict(
     }
     twin = model.extended([*faults, *extension])
     combinations = tuple(one.to_dict() for one in unseen)
-    rivals_told = rival_list(explanation)
+    other_sets = rival_list(explanation, policy)
     return Diagnosis(
-        verdict, causes, residual, gain, unexplained, rivals_told, twin, views, words, levels, undetermined=combinations
+        verdict, causes, residual, gain, unexplained, other_sets, twin, views, words, levels, undetermined=combinations
     )
 
 
-def _refuted(named: Sequence[NamedCause], residual: Residual, gain: Gain, model: BodyModel) -> str:
+def _refuted(
+    named: Sequence[NamedCause], residual: Residual, gain: Gain, model: BodyModel, policy: Policy = Policy()
+) -> str:
     """Return why causes must not stand, or nothing: the gate's word, or sizes that no part can have."""
     beyond = impossible_sizes(named, model.families(), model.array)
-    return beyond or judge(gain, residual, named).why
+    return beyond or judge(gain, residual, named, policy).why
 
 
 def _views(prepared: _Prepared, causes: Sequence[Cause]) -> tuple[RunView, ...]:
@@ -266,12 +281,17 @@ def _views(prepared: _Prepared, causes: Sequence[Cause]) -> tuple[RunView, ...]:
 
 
 def _named(
-    explanation: Explanation, fit: Fit, cause: Cause, likely: dict[str, float], segment: BodySegment
+    explanation: Comparison[BodyFit],
+    fit: BodyFit,
+    cause: Cause,
+    likely: dict[str, float],
+    segment: BodySegment,
+    policy: Policy,
 ) -> NamedCause:
     array = segment.model.array
     change = segment.predict([cause.effect(array, segment.index)]) - segment.predict([])
     seen = change - (change @ segment.projection.to_force.T) @ array.axes.T
-    return name_cause(explanation, fit, cause, likely, array, channel_share(seen, array.channels))
+    return name_cause(explanation, fit, cause, likely, array, channel_share(seen, array.channels), policy)
 
 
 def _view(segment: BodySegment, known: Sequence[Effect], causes: Sequence[Cause]) -> RunView:
@@ -279,7 +299,7 @@ def _view(segment: BodySegment, known: Sequence[Effect], causes: Sequence[Cause]
     run = segment.run
     measured = np.where(run.valid, run.readings, 0.0)
     predictions = []
-    for effects in ([], [*known, *effects_of_run(causes, segment.model.array, segment.index)]):
+    for effects in ([], [*known, *effects_of(causes, segment.model.array, segment.index)]):
         line = segment.linearise(effects)
         predictions.append(measured - segment.motion_removed(line))
     rate, acceleration = line.drive.rate_at()

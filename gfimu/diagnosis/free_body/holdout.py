@@ -8,18 +8,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.diagnosis.causes import Cause, effects_of_run
-from gfimu.diagnosis.free_body.engine import Screening, learn_noise, screen
+from gfimu.diagnosis.free_body.explain import Sets, learn_noise
+from gfimu.diagnosis.free_body.screening import BodyScreening, coordinates_of, of_families, screen
 from gfimu.diagnosis.free_body.segment import BodySegment
-from gfimu.diagnosis.old_search import Blocks
+from gfimu.diagnosis.policy import Policy
+from gfimu.diagnosis.terms.cause import Cause, effects_of
 from gfimu.diagnosis.verdict.verdict import Gain
 from gfimu.world_model import Effect
 
 __all__ = ["BodyHoldout", "gate_gains", "held_out_gain", "other_recording", "stretches"]
 
-_STRETCHES = 16
-_BLOCK = 40
-_EXCESS = 0.02
+_STRETCHES = 16  # numerical: of a run, held out in turn
+_BLOCK = 40  # numerical: groups of samples whose gain counts as one value
 
 
 @dataclass(frozen=True)
@@ -58,38 +58,32 @@ def other_recording(
     return [BodyHoldout(list(segments), known, list(held_out), [list(effects) for effects in held_fixed])]
 
 
-def gate_gains(causes: Sequence[Cause], pairs: Sequence[BodyHoldout]) -> dict[str, float]:
+def gate_gains(causes: Sequence[Cause], pairs: Sequence[BodyHoldout], policy: Policy) -> dict[str, float]:
     """Return the log predictive gain of each cause on held-out data, the other causes refitted without it."""
     gains = {cause.name: 0.0 for cause in causes}
-    names = set(gains)
+    chosen = of_families(causes)
     for pair in pairs:
-        train = screen(pair.train, causes, pair.train_fixed, only=names)
-        test = screen(pair.test, causes, pair.test_fixed, only=names)
-        blocks = Blocks(train.signatures)
-        places = {(h.name, h.pattern): number for number, h in reversed(list(enumerate(blocks.hypotheses)))}
-        whole = tuple(places[cause.key] for cause in causes)
-        best = _squares(test, _columns(train, blocks, whole))
-        for cause, number in zip(causes, whole, strict=True):
+        sets = Sets(screen(pair.train, causes, pair.train_fixed, chosen=chosen), policy)
+        test = screen(pair.test, causes, pair.test_fixed, chosen=chosen)
+        whole = sets.members(causes)
+        best = _squares(test, sets, whole)
+        for number in whole:
             rest = tuple(member for member in whole if member != number)
-            gains[cause.name] += 0.5 * (_squares(test, _columns(train, blocks, rest)) - best) / len(pairs)
+            name = sets.hypotheses[number].cause.name
+            gains[name] += 0.5 * (_squares(test, sets, rest) - best) / len(pairs)
     return gains
 
 
-def _columns(screening: Screening, blocks: Blocks, members: tuple[int, ...]) -> NDArray[np.float64]:
-    """Return a set, fitted, in the columns of the normal equations."""
-    at = np.zeros(len(screening.at))
-    for member, cause in zip(members, screening.fit(blocks, members).causes, strict=True):
-        at[blocks.hypotheses[member].signature.columns] = cause.mixing @ cause.coordinates
-    return at
-
-
-def _squares(screening: Screening, at: NDArray[np.float64]) -> float:
-    signatures = screening.signatures
-    return screening.nothing - 2 * float(signatures.score @ at) + float(at @ signatures.gram @ at)
+def _squares(test: BodyScreening, sets: Sets, members: tuple[int, ...]) -> float:
+    """Return the sum of squares that a set, fitted on other data, leaves of held-out data."""
+    at = np.zeros(len(test.base))
+    for member, cause in zip(members, sets.fit(members).causes, strict=True):
+        at[sets.hypotheses[member].signature.columns] = coordinates_of(cause)
+    return test.nothing - 2 * float(test.score @ at) + float(at @ test.gram @ at)
 
 
 def held_out_gain(
-    causes: Sequence[Cause], pairs: Sequence[BodyHoldout], constant: Sequence[Effect], label: str
+    causes: Sequence[Cause], pairs: Sequence[BodyHoldout], constant: Sequence[Effect], policy: Policy, *, label: str
 ) -> tuple[Gain, float]:
     """Measure what causes, fitted on one part, are worth on the other.
 
@@ -110,12 +104,10 @@ def held_out_gain(
     for pair in pairs:
         fitted = tuple(causes)
         if len(pairs) > 1 and causes:
-            train = screen(pair.train, causes, pair.train_fixed, only={cause.name for cause in causes})
-            blocks = Blocks(train.signatures)
-            places = {(h.name, h.pattern): number for number, h in reversed(list(enumerate(blocks.hypotheses)))}
-            fitted = train.fit(blocks, tuple(places[cause.key] for cause in causes)).causes
+            sets = Sets(screen(pair.train, causes, pair.train_fixed, chosen=of_families(causes)), policy)
+            fitted = sets.fit(sets.members(causes)).causes
         for segment, known in zip(pair.test, pair.test_fixed, strict=True):
-            effects = [*known, *effects_of_run(fitted, segment.model.array, segment.index)]
+            effects = [*known, *effects_of(fitted, segment.model.array, segment.index)]
             plain = [effect for effect in known if effect not in constant]
             use = (segment.use & segment.in_stretch)[:, None] & segment.run.valid
             squares, rows = [], []
@@ -133,10 +125,10 @@ def held_out_gain(
             whole = len(change) // _BLOCK * _BLOCK
             gains.append(change[:whole].reshape(-1, _BLOCK).mean(axis=1) if whole else change)
     excess = before - floor
-    share = 1.0 - max(after - floor, 0.0) / excess if excess > _EXCESS * floor else float("nan")
+    share = 1.0 - max(after - floor, 0.0) / excess if excess > policy.least_excess * floor else float("nan")
     likelihood = np.concatenate(gains)
     over = misfits - rows_counted
-    over_noise = 1.0 - max(over[1], 0.0) / over[0] if over[0] > _EXCESS * rows_counted else float("nan")
+    over_noise = 1.0 - max(over[1], 0.0) / over[0] if over[0] > policy.least_excess * rows_counted else float("nan")
     gain = Gain(
         label,
         float(np.sqrt(before / samples)),

@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import qr
 
-from gfimu.diagnosis.causes import Signature
-from gfimu.diagnosis.signatures import SignatureSet
+from gfimu.diagnosis.search.screening import Screening, Signature
 from gfimu.geometry.array import AccelerometerArray
 
 __all__ = ["LEAST_INFORMATION", "Undetermined", "determined", "undetermined", "undetermined_sentence"]
@@ -24,7 +23,7 @@ LEAST_INFORMATION = 0.5
 """Information of the data over that of the prior below which a combination stays at zero."""
 _LEAST_WEIGHT = 0.1  # of the largest in a combination
 _ALIKE = 0.15  # by which weights of sizes that move alike may differ
-_TOLD = 3  # combinations in a sentence
+_LISTED = 3  # combinations in a sentence
 
 
 @dataclass(frozen=True)
@@ -66,12 +65,12 @@ def determined(
     return strength, turn, strength > LEAST_INFORMATION
 
 
-def undetermined(signatures: SignatureSet, array: AccelerometerArray) -> tuple[Undetermined, ...]:
+def undetermined(screening: Screening, array: AccelerometerArray) -> tuple[Undetermined, ...]:
     """Return the combinations of the sizes of each effect without a shape that the data can't determine."""
     found: list[Undetermined] = []
-    for signature in signatures.signatures:
+    for signature in screening.signatures:
         if not signature.shape:
-            found += _of_effect(signature, signatures.gram, array)
+            found += _of_effect(signature, screening.gram, array)
     return tuple(found)
 
 
@@ -99,7 +98,7 @@ def undetermined_sentence(combinations: tuple[Undetermined, ...]) -> str:
     if len(combinations) == 1:
         return f"These data can't determine one combination, which stays at zero: {combinations[0].text}."
     # One of each effect first: they say most.
-    first = list({one.effect: one for one in reversed(combinations)}.values())[::-1][:_TOLD]
+    first = list({one.effect: one for one in reversed(combinations)}.values())[::-1][:_LISTED]
     named = "; ".join(one.text for one in first)
     return (
         f"These data can't determine {len(combinations)} combinations, which stay at zero with the ± of what is usual, "

@@ -14,6 +14,7 @@ from gfimu.diagnosis.fit.linear import Point, with_residue
 from gfimu.diagnosis.parallel import each_apart
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.beam import Blocks, leading_sets
+from gfimu.diagnosis.search.comparison import Comparison
 from gfimu.diagnosis.search.screening import Screening, screen
 from gfimu.diagnosis.terms.cause import Cause
 
@@ -24,30 +25,17 @@ _Key = frozenset[tuple[str, str]]
 
 
 @dataclass(frozen=True)
-class Explanation:
+class Explanation(Comparison[Fit]):
     """What a search ended with.
 
     Parameters
     ----------
-    best : Fit
-        The most probable set.
-    nothing : Fit
-        No cause at all, under the same nuisances.
-    without : dict of str to Fit
-        The best fit without each cause.
-    rivals : tuple of Fit
-        Other sets, best first, under the same nuisances.
-    screening : Screening
-        The last one, about the best set.
+    best, nothing, without, rivals, screening
+        As `Comparison` has them.
     stretches : tuple of Stretch
         The data.
     """
 
-    best: Fit
-    nothing: Fit
-    without: dict[str, Fit]
-    rivals: tuple[Fit, ...]
-    screening: Screening
     stretches: tuple[Stretch, ...] = ()
     fits: int = 0
 

@@ -17,7 +17,7 @@ from gfimu.diagnosis.terms.library import family_columns
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.world_model import EffectFamily, Whitened, shapes_to_screen
 
-__all__ = ["Hypothesis", "Screening", "Signature", "columns_of_run", "screen"]
+__all__ = ["Hypothesis", "Screening", "Signature", "columns_of_run", "hypotheses_of", "screen"]
 
 _OF_MOTION = frozenset({"motion", "timing", "reference"})  # a table at rest shows nothing of these
 _FREEST = 0.5  # prior share of the freest place; the others share the rest
@@ -105,7 +105,7 @@ def screen(stretches: Sequence[Stretch], point: Point) -> Screening:
     base = np.zeros(count)
     for cause in causes:
         base[next(s for s in signatures if s.family.name == cause.name).columns] = cause.mixing @ cause.coordinates
-    hypotheses = tuple(_hypotheses(signatures, array, runs))
+    hypotheses = tuple(hypotheses_of(signatures, array, runs))
     score = linear.score + linear.gram @ base
     return Screening(tuple(signatures), hypotheses, linear.gram, score, base, linear.responses)
 
@@ -157,7 +157,7 @@ def _whitened(stretch: Stretch, posterior: Posterior, causes: Sequence[Cause]) -
     )
 
 
-def _hypotheses(signatures: Sequence[Signature], array: AccelerometerArray, runs: int) -> list[Hypothesis]:
+def hypotheses_of(signatures: Sequence[Signature], array: AccelerometerArray, runs: int) -> list[Hypothesis]:
     """List every effect at every place it can take, with its prior."""
     families = len({signature.family.name for signature in signatures})
     out = []

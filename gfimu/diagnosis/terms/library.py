@@ -12,6 +12,7 @@ from gfimu.diagnosis.terms.cause import Cause, effects_of
 from gfimu.diagnosis.terms.columns import Columns
 from gfimu.diagnosis.terms.drive import Drive
 from gfimu.diagnosis.terms.observed import Observed
+from gfimu.diagnosis.terms.reach import behind_wiring, disjoint
 from gfimu.world_model import Effect, EffectFamily
 
 __all__ = ["cause_columns", "family_columns"]
@@ -95,7 +96,7 @@ def _differences(
     base, weight, spin, count = seen.prediction, seen.weight, drive.spin, len(scale)
     places: list[list[int]] = [[] for _ in range(base.shape[1])]
     parts: list[list[NDArray[np.float64]]] = [[] for _ in range(base.shape[1])]
-    for group in _disjoint(reach, count):
+    for group in disjoint(reach, count):
         change = (stretch.predict(changed(group), spin) - base) * weight
         there = change.any(axis=0)
         for unknown in group:
@@ -112,22 +113,5 @@ def _differences(
 
 
 def _reach(stretch: Stretch, reach: NDArray[np.bool_] | None) -> NDArray[np.bool_] | None:
-    """Return which channels each unknown changes, (k, c); None where that is not known, as behind exchanged wires."""
-    wired = any(effect.place == "data" for effect in (*stretch.model.effects, *stretch.known))
-    return None if wired else reach
-
-
-def _disjoint(reach: NDArray[np.bool_] | None, count: int) -> list[list[int]]:
-    """Group unknowns whose reaches do not overlap."""
-    if reach is None:
-        return [[unknown] for unknown in range(count)]
-    groups: list[tuple[list[int], NDArray[np.bool_]]] = []
-    for unknown in range(count):
-        for members, taken in groups:
-            if not (taken & reach[unknown]).any():
-                members.append(unknown)
-                np.logical_or(taken, reach[unknown], out=taken)
-                break
-        else:
-            groups.append(([unknown], reach[unknown].copy()))
-    return [members for members, _ in groups]
+    """Return which channels each unknown changes, (k, c); None where that is not known."""
+    return behind_wiring(reach, (*stretch.model.effects, *stretch.known), stretch.model.array)

@@ -1,4 +1,4 @@
-"""What the named causes leave on a free body: a dependence on motion or time, a tone, or noise that grows with it."""
+"""Lack of fit of a free body: a dependence on motion or time, a tone, or noise that grows with the motion."""
 
 from __future__ import annotations
 
@@ -8,31 +8,30 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
-from gfimu.diagnosis.adequacy import LEFT_OVER_ODDS
-from gfimu.diagnosis.causes import Cause, effects_of_run
-from gfimu.diagnosis.evidence import log_evidence, log_evidence_each
-from gfimu.diagnosis.free_body.engine import Known
+from gfimu.diagnosis.criticism.lack_of_fit import LackOfFit
+from gfimu.diagnosis.fit.evidence import log_evidence, log_evidence_each
+from gfimu.diagnosis.free_body.screening import Known, of_families, plan_signatures, signature_columns
 from gfimu.diagnosis.free_body.segment import BodyLine, BodySegment
-from gfimu.diagnosis.free_body.signatures import plan_signatures, signature_columns
-from gfimu.diagnosis.residual_tests import LeftOver
+from gfimu.diagnosis.policy import Policy
+from gfimu.diagnosis.terms.cause import Cause, effects_of
 from gfimu.geometry.kinematics import omega_products
 
-__all__ = ["motion_noise", "structure_left"]
+__all__ = ["motion_noise", "unexplained_structure"]
 
-_UNIT = 0.03
-_STEPS = 8
-_LOWEST_TONE = 1.0
-_WINDOW = 1024
-_NEIGHBOURS = 41
+_UNIT = 0.03  # numerical: m/s², rms of a function of unit coefficient
+_STEPS = 8  # numerical: parts of a run at whose edges a step is looked for
+_LOWEST_TONE = 1.0  # numerical: Hz; below it slow noise and the motion are free
+_WINDOW = 1024  # numerical: samples in which an oscillator that is not steady is a line
+_NEIGHBOURS = 41  # numerical: frequencies about a line that give its background
 _DISAGREE = ("every channel: disagreement per rate of change of the reading, s", "agitation")
 _LOST = ("angular acceleration missed by the gyro: rad/s² per m/s³ of change", "acceleration_slope")
 
 
-def motion_noise(segments: Sequence[BodySegment]) -> LeftOver:
+def motion_noise(segments: Sequence[BodySegment], policy: Policy) -> LackOfFit:
     """Return the noise that grows with the motion, which no effect of the library is."""
-    noises = [segment.noise for segment in segments if segment.noise.log_odds > LEFT_OVER_ODDS]
+    noises = [segment.noise for segment in segments if segment.noise.log_odds > policy.lack_odds]
     if not noises:
-        return LeftOver(-np.inf, "", {})
+        return LackOfFit(-np.inf, "", {})
     noise = max(noises, key=lambda one: one.log_odds)
     parts, surrogate = [], {}
     if noise.agitation:
@@ -48,17 +47,19 @@ def motion_noise(segments: Sequence[BodySegment]) -> LeftOver:
             f"the angular acceleration differs from what the gyro's samples say by {typical:.2g} rad/s² rms in motion"
         )
         surrogate[_LOST[0]] = noise.acceleration_slope
-    return LeftOver(noise.log_odds, "; ".join(parts), surrogate)
+    return LackOfFit(noise.log_odds, "; ".join(parts), surrogate)
 
 
-def structure_left(segments: Sequence[BodySegment], causes: Sequence[Cause], fixed: Known) -> tuple[LeftOver, LeftOver]:
-    """Find the strongest dependence of any channel on motion or time that is left, and the strongest tone."""
+def unexplained_structure(
+    segments: Sequence[BodySegment], causes: Sequence[Cause], fixed: Known, policy: Policy
+) -> tuple[LackOfFit, LackOfFit]:
+    """Find the strongest unexplained dependence of any channel on motion or time, and the strongest tone."""
     segment, known = max(zip(segments, fixed, strict=True), key=lambda pair: pair[0].run.duration)
     array = segment.model.array
-    effects = [*known, *effects_of_run(causes, array, segment.index)]
+    effects = [*known, *effects_of(causes, array, segment.index)]
     line = segment.linearise(effects)
     found = []
-    signatures = plan_signatures([segment], causes, {cause.name for cause in causes})
+    signatures = plan_signatures([segment], causes, of_families(causes))
     named = signature_columns(segment, signatures, causes, known, line)
     nuisances = segment.nuisances(effects, line)
     functions = _functions(segment, line)
@@ -82,8 +83,11 @@ def structure_left(segments: Sequence[BodySegment], causes: Sequence[Cause], fix
             cross = named.T @ columns - named_taken.T @ taken
             gain = np.linalg.solve(inner, np.column_stack([cross, own]))
             gram, score = gram - cross.T @ gain[:, :-1], score - cross.T @ gain[:, -1]
-        found.append(_strongest(name, gram, score, [array.channels[c] for c in alive], total, len(functions)))
-    return max(found, key=lambda one: one.log_odds), _tone(segment, segment.motion_corrected(effects, line, nuisances))
+        channels = [array.channels[c] for c in alive]
+        found.append(_strongest(name, gram, score, channels, (total, len(functions)), policy))
+    return max(found, key=lambda one: one.log_odds), _tone(
+        segment, segment.motion_corrected(effects, line, nuisances), policy
+    )
 
 
 def _strongest(
@@ -91,21 +95,22 @@ def _strongest(
     gram: NDArray[np.float64],
     score: NDArray[np.float64],
     channels: Sequence[str],
-    total: int,
-    functions: int,
-) -> LeftOver:
+    looks: tuple[int, int],
+    policy: Policy,
+) -> LackOfFit:
+    """Return the stronger of one channel and all; ``looks`` has the number of tests of each kind."""
     diagonal = np.maximum(gram.diagonal(), 1e-9)
-    each = log_evidence_each(diagonal, score, np.zeros(len(score), dtype=bool)) - np.log(total)
+    each = log_evidence_each(diagonal, score, np.zeros(len(score), dtype=bool)) - np.log(looks[0])
     top = int(np.argmax(each))
     size = score[top] / (diagonal[top] + 1e-2) * _UNIT
-    one = LeftOver(float(each[top]), f"channel {channels[top]} depends on {name}", {f"{channels[top]}: {name}": size})
-    every = float(log_evidence(gram + 1e-9 * np.eye(len(score)), score)) - np.log(functions)
-    if every <= one.log_odds + 2.0:
+    one = LackOfFit(float(each[top]), f"channel {channels[top]} depends on {name}", {f"{channels[top]}: {name}": size})
+    every = float(log_evidence(gram + 1e-9 * np.eye(len(score)), score)) - np.log(looks[1])
+    if every <= one.log_odds + policy.every_channel:
         return one
     values = np.linalg.solve(gram + 1e-2 * np.eye(len(score)), score) * _UNIT
     strong = [channels[c] for c in np.argsort(-np.abs(score / np.sqrt(diagonal)))[:4]]
     text = f"several channels (strongest {', '.join(strong)}) depend on {name}"
-    return LeftOver(every, text, {f"{channel}: {name}": float(v) for channel, v in zip(channels, values, strict=True)})
+    return LackOfFit(every, text, {f"{channel}: {name}": float(v) for channel, v in zip(channels, values, strict=True)})
 
 
 def _functions(segment: BodySegment, line: BodyLine) -> dict[str, NDArray[np.float64]]:
@@ -126,14 +131,14 @@ def _functions(segment: BodySegment, line: BodyLine) -> dict[str, NDArray[np.flo
     return out
 
 
-def _tone(segment: BodySegment, residual: NDArray[np.float64]) -> LeftOver:
+def _tone(segment: BodySegment, residual: NDArray[np.float64], policy: Policy) -> LackOfFit:
     """Test every channel for a narrow line, over the whole run and, as oscillators wander, over short windows."""
     noise = segment.noise
     change = np.where(segment.body.rest, 0.0, segment.change)
     spread = np.sqrt(1.0 + (noise.agitation * change / noise.typical) ** 2)
     left = np.where(segment.use[:, None], residual / spread[:, None], 0.0)[:, segment.alive]
     channels = [name for name, alive in zip(segment.model.array.channels, segment.alive, strict=True) if alive]
-    found = LeftOver(-np.inf, "", {})
+    found = LackOfFit(-np.inf, "", {})
     for length in {len(left), min(_WINDOW, len(left))}:
         count = len(left) // length
         pieces = left[: count * length].reshape(count, length, -1)
@@ -153,10 +158,10 @@ def _tone(segment: BodySegment, residual: NDArray[np.float64]) -> LeftOver:
             text = f"channel {channels[channel]} has a tone at {at:.2f} Hz, about {amplitude:.2g} m/s²"
             if count > 1:
                 tops = frequency[high][np.argmax(ratio[:, :, channel], axis=1)]
-                sure = odds[:, :, channel].max(axis=1) > LEFT_OVER_ODDS
+                sure = odds[:, :, channel].max(axis=1) > policy.lack_odds
                 low, top = tops[sure].min(initial=at), tops[sure].max(initial=at)
                 text += f", wandering from {low:.3g} to {top:.3g} Hz" if top - low > 4 * frequency[1] else ""
-            found = LeftOver(
+            found = LackOfFit(
                 float(odds[window, place, channel]), text, {f"{channels[channel]}: tone at {at:.4f} Hz": amplitude}
             )
     return found
