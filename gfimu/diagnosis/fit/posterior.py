@@ -109,13 +109,7 @@ class Posterior:
         for c, (at, part, weight) in enumerate(zip(columns.places, columns.parts, seen.weights, strict=True)):
             if len(at):
                 damped = seen.modes.share[:, [c]] * seen.modes.of(part.T, c).T  # (K, p)
-                cross[:, at] -= weight * (self.jacobian_modes[c] @ damped)
-        for r, row in enumerate(self.jacobian.loading):
-            combined = np.zeros((len(seen.residual), count))  # one at a time: together they would fill the memory
-            for c in np.flatnonzero(row):
-                if len(columns.places[c]):
-                    combined[:, columns.places[c]] += (seen.weights[c] * row[c]) * columns.parts[c]
-            cross += self.jacobian.transposed_one(r, combined)
+                cross[:, at] += weight * (self.jacobian.backward(c, part) - self.jacobian_modes[c] @ damped)
         across = solve_triangular(self.root, cross, lower=True, check_finite=False, overwrite_b=True)
         whole = gram.diagonal() * _RIDGE
         gram -= across.T @ across
@@ -164,11 +158,7 @@ def posterior_of(seen: Observed, jacobian: Jacobian, drive: Drive) -> Posterior:
     weights, share = seen.weights, seen.modes.share
     information = drive.add_precision(jacobian.information(weights))
     modes = _modes_of(jacobian, seen.modes, seen.weight)
-    rows = np.concatenate(
-        [mine[:, used] * np.sqrt(weights[c] * share[used, c]) for c, mine in enumerate(modes) if (used := share[:, c] > _LEAST_SHARE).any()]
-        or [np.zeros((jacobian.size, 0))],
-        axis=1,
-    )
+    rows = _slow_rows(jacobian, modes, share, weights, shared=not isinstance(seen.modes, WeighedModes))
     if rows.shape[1]:
         information = dsyrk(-1.0, rows, beta=1.0, c=information.T, lower=1, overwrite_c=1)
     root = _cholesky(np.asfortranarray(information))
@@ -207,6 +197,33 @@ def _jacobian(
     if exact and longest > 0.0:
         reach = Reach(min(max(reach.before, int(longest / drive.spline.spacing)), _MOST_INTERVALS), reach.after)
     return differentiate(predict, drive.spline, drive.coefficients, base, seen.weight, stretch.run.t, reach)
+
+
+def _slow_rows(
+    jacobian: Jacobian,
+    modes: tuple[NDArray[np.float64], ...],
+    share: NDArray[np.float64],
+    weights: NDArray[np.float64],
+    *,
+    shared: bool,
+) -> NDArray[np.float64]:
+    """Return U (m, k): slow noise takes UUᵀ of JᵀWJ.
+
+    Where all observations share the modes, as many columns as there are functions of time through which they see the
+    drive suffice for each mode, instead of one for each observation.
+    """
+    if not shared:
+        parts = [mine * np.sqrt(weights[c] * share[:, c]) for c, mine in enumerate(modes)]
+        rows = np.concatenate(parts, axis=1)
+        return rows[:, np.einsum("mk,mk->k", rows, rows) > 0.0]
+    loading = jacobian.loading
+    # J_r Qᵀ from J_c Q: the loading has orthonormal rows.
+    each = np.tensordot(loading, np.stack(modes), axes=1)  # (R, m, K)
+    power, turn = np.linalg.eigh(np.einsum("rc,kc,sc->krs", loading * weights, share, loading))  # (K, R), (K, R, R)
+    kept = power > _LEAST_SHARE * power.max(initial=1e-300)
+    roots = turn * np.sqrt(np.maximum(power, 0.0))[:, None, :]
+    rows = np.einsum("krq,rmk->mkq", roots, each, optimize=True)
+    return np.ascontiguousarray(rows.reshape(len(rows), -1)[:, kept.ravel()])
 
 
 def _memory(effect: Effect) -> float:

@@ -17,6 +17,7 @@ from gfimu.diagnosis.search.beam import Blocks, leading_sets
 from gfimu.diagnosis.search.comparison import Comparison
 from gfimu.diagnosis.search.screening import Screening, screen
 from gfimu.diagnosis.terms.cause import Cause
+from gfimu.diagnosis.terms.drive import Drive
 
 __all__ = ["Explanation", "Sets", "explain", "explained", "prune", "reduced"]
 
@@ -38,6 +39,7 @@ class Explanation(Comparison[Fit]):
 
     stretches: tuple[Stretch, ...] = ()
     fits: int = 0
+    by_reference: tuple[Drive, ...] = ()
 
 
 class Sets:
@@ -102,8 +104,12 @@ def explain(
     """
     tell = report or (lambda share, text: None)
     tell(0.05, "drive")
-    sets = _started(stretches, policy) if start is None else Sets(stretches, start, policy)
-    if start is not None:
+    first: tuple[Drive, ...] = ()
+    if start is None:
+        reference = starting_point(stretches, policy.knots)
+        sets, first = _started(stretches, reference, policy), reference.drives
+    else:
+        sets = Sets(stretches, start, policy)
         sets.fit([start, replace(start, causes=())])
     fits, seen = 0, set()
     for number in range(policy.rounds):
@@ -116,14 +122,16 @@ def explain(
         if number > 0 and best.key in seen:
             break
         seen.add(best.key)
-        sets = _under(sets, _relearned(stretches, best.point, policy), _near(sets, best))
+        learnt = _relearned(stretches, best.point, policy, sharpen=best.key != before.key)
+        sets = _under(sets, learnt, _near(sets, best))
     best = prune(sets)
-    return explained(sets, best, fits + sets.count, screening if best.key == before.key else None)
+    found = explained(sets, best, fits + sets.count, screening if best.key == before.key else None)
+    return replace(found, by_reference=first)
 
 
-def _started(stretches: Sequence[Stretch], policy: Policy) -> Sets:
+def _started(stretches: Sequence[Stretch], reference: Point, policy: Policy) -> Sets:
     """Return sets under the roughness that channels and reference show without a cause; the noise not yet."""
-    sets = Sets(stretches, starting_point(stretches, policy.knots), policy)
+    sets = Sets(stretches, reference, policy)
     nothing = sets.fit([sets.base])[0]
     if nothing is None:
         raise np.linalg.LinAlgError("the reference determines no drive")
@@ -131,10 +139,10 @@ def _started(stretches: Sequence[Stretch], policy: Policy) -> Sets:
     return _under(sets, point, [nothing])
 
 
-def _relearned(stretches: Sequence[Stretch], point: Point, policy: Policy) -> Point:
-    """Return a point with all nuisance parameters learnt from what its causes leave."""
-    point = sharpened(stretches, learn_roughness(stretches, point, policy.learnings), policy)
-    point = learn_noise(stretches, point)
+def _relearned(stretches: Sequence[Stretch], point: Point, policy: Policy, *, sharpen: bool) -> Point:
+    """Return a point with all nuisance parameters learnt from what its causes leave; the knots where asked."""
+    point = learn_roughness(stretches, point, policy.learnings)
+    point = learn_noise(stretches, sharpened(stretches, point, policy) if sharpen else point)
     return point if point.residue is None else with_residue(stretches, point, point.residue.scale)
 
 
@@ -187,7 +195,9 @@ def _fit_leaders(sets: Sets, screening: Screening, about: Fit, *, near: bool) ->
     most = min(max(2, len(about.causes) + 1), policy.most_causes)
     points = []
     candidates = leading_sets(blocks, most, policy)
-    least = candidates[0].log_odds - policy.close if near and candidates else -np.inf
+    least = -policy.worth_a_search  # less than nothing, by more than a linear form may err
+    if near and candidates:
+        least = max(least, candidates[0].log_odds - policy.close)
     for candidate in (one for one in candidates if one.log_odds >= least):
         causes = blocks.causes(candidate.members)
         moves = screening.drive_moves(candidate.members, causes)

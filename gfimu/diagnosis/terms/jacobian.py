@@ -72,11 +72,11 @@ class Jacobian:
                 total[at] += one.T @ values[rows]
         return out
 
-    def transposed_one(self, r: int, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return J_rᵀ v of values (n, P) for one r, shape (m, P)."""
+    def backward(self, c: int, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return J_cᵀ v of values (n, P) of one observation, shape (m, P)."""
         out = np.zeros((self.size, values.shape[1]))
         for rows, at, block in self.blocks:
-            out[at] += block[r].T @ values[rows]
+            out[at] += np.tensordot(self.loading[:, c], block, axes=1).T @ values[rows]
         return out
 
     def correlate(self, combined: NDArray[np.float64]) -> NDArray[np.float64]:

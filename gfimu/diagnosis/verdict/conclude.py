@@ -15,6 +15,7 @@ from gfimu.diagnosis.criticism.slow_noise import LoudestChannel, loudest_channel
 from gfimu.diagnosis.data.prepared_runs import PreparedRuns
 from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.fit.gauss_newton import Fit
+from gfimu.diagnosis.fit.learn import starting_point
 from gfimu.diagnosis.fit.linear import linearise
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.report.wording import verdict_sentences
@@ -33,7 +34,7 @@ from gfimu.diagnosis.verdict.naming import (
     capped,
 )
 from gfimu.diagnosis.verdict.verdict import Diagnosis, Gain, NamedCause, Residual, RunView, Unexplained
-from gfimu.world_model import Effect, WorldModel
+from gfimu.world_model import Effect, Spin, WorldModel
 
 __all__ = ["Described", "conclude", "is_dominant", "is_unknown", "named_causes"]
 
@@ -341,9 +342,7 @@ def _view(prepared: PreparedRuns, number: int, stretches: Sequence[Stretch], bel
     )
 
 
-def _by_reference(stretch: Stretch, spline: AngleSpline) -> Any:
-    from gfimu.diagnosis.fit.learn import starting_point
-
+def _by_reference(stretch: Stretch, spline: AngleSpline) -> Spin:
     return starting_point([stretch], spline.spacing).drives[0].spin
 
 
