@@ -84,7 +84,7 @@ def lack_of_fit(
     for test in (lines,) if cut else (lines, jumps):
         each = over_segments(test, stretches, seen)
         # Each stretch is one more place to find something by chance.
-        candidates += [replace(one, log_odds=one.log_odds - np.log(len(stretches))) for one in each]
+        candidates += [replace(one, log_odds=one.log_odds - float(np.log(len(stretches)))) for one in each]
     if not rounded:
         states = [motion_of(one, fit.point, drive) for one, drive in zip(stretches, fit.point.drives, strict=True)]
         candidates.append(changing_noise(stretches, seen, states, policy))

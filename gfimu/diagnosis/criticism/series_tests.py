@@ -84,10 +84,10 @@ def lines(stretch: Stretch, seen: Observed) -> LackOfFit:
     level = np.median(power[frequency >= _SLOWEST_LINE], axis=0) / np.log(2.0)
     power = power / np.maximum(level, _LEAST_LINE_LEVEL)
     place, number = np.unravel_index(int(np.argmax(power)), power.shape)
-    one = float(power[place, number]) - np.log(n * power.shape[1])
+    one = float(power[place, number]) - float(np.log(n * power.shape[1]))
     summed = 2.0 * power[:, : len(channels)].sum(axis=1)
     peak = int(np.argmax(summed))
-    every = -_log_tail(float(summed[peak]), 2 * len(channels)) - np.log(n)
+    every = -_log_tail(float(summed[peak]), 2 * len(channels)) - float(np.log(n))
     if one < every:
         return LackOfFit(every, f"several channels share a tone at {frequency[peak]:.3f} Hz", {})
     name, at = series[number], float(frequency[place])
@@ -125,7 +125,8 @@ def jumps(stretch: Stretch, seen: Observed) -> LackOfFit:
         usual = np.sqrt(usual * np.maximum(usual, np.median(usual)))
         power = np.nan_to_num((change / usual) ** 2)
         place, channel = np.unravel_index(int(np.argmax(power)), power.shape)
-        odds = 0.5 * float(power[place, channel]) - np.log(2 * duration / width * len(channels) * len(_WIDTHS))
+        looks = 2 * duration / width * len(channels) * len(_WIDTHS)
+        odds = 0.5 * float(power[place, channel]) - float(np.log(looks))
         if odds > best.log_odds:
             when = float(stretch.run.t[min(int(place) + size, len(mask) - 1)])
             jump, name = float(change[place, channel] * seen.levels.white[channel]), channels[channel]
@@ -182,7 +183,7 @@ def changing_noise(
                 continue
             # The mean square of second differences of white noise has about n/1.8 degrees of freedom per channel.
             statistic = float(np.sum(counts / 1.8 / 2 * (spread - 1) ** 2))
-            odds = -_log_tail(statistic, _PARTS - 1) - np.log(3.0 * len(stretches))
+            odds = -_log_tail(statistic, _PARTS - 1) - float(np.log(3.0 * len(stretches)))
             if odds > best.log_odds:
                 best = LackOfFit(odds, f"the noise of all channels changes with {name}", {})
     return best
