@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gfimu.diagnosis.free_body.explain import Sets, learn_noise
 from gfimu.diagnosis.free_body.screening import BodyScreening, coordinates_of, of_families, screen

@@ -1,7 +1,7 @@
 """Sets of causes compared under the same nuisance parameters: all that a verdict asks of a search.
 
-A table and a free body marginalise different nuisance parameters, so that what a fit holds differs; what a verdict needs
-of it does not.
+A table and a free body marginalise different nuisance parameters, so that what a fit holds differs; what a verdict
+needs of it does not.
 """
 
 from __future__ import annotations

@@ -21,7 +21,9 @@ def behind_wiring(
     Exchanged wires carry what changes a sensor to another channel. None where the reach is not known, as behind an
     effect on the samples that does not state the order of its channels (``channel_order``).
     """
-    for effect in effects if reach is not None else ():
+    if reach is None:
+        return None
+    for effect in effects:
         if effect.place == "data":
             order = getattr(effect, "channel_order", None)
             if order is None:
