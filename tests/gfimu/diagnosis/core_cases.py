@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 from scipy.linalg import block_diag, cho_factor, cho_solve
 
 from gfimu.diagnosis.coloured_noise import NoiseLevels
@@ -32,7 +33,7 @@ def small_twin(array: str = "p2_face_centres", rate: float = 50.0, **changes) ->
 def lively(duration: float = 20.0) -> SplineSpin:
     """A motion that turns and swings from the first sample on, so that every term of the readings is there."""
     t = np.arange(-2.0, duration + 2.0, 0.02)
-    return SplineSpin.through(t, 3.0 + 2.0 * np.sin(2.0 * t) + 1.5 * np.sin(0.7 * t + 0.3))
+    return SplineSpin(CubicSpline(t, 3.0 + 2.0 * np.sin(2.0 * t) + 1.5 * np.sin(0.7 * t + 0.3)))
 
 
 def stretches_of(
