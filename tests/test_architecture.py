@@ -247,11 +247,11 @@ ROOMS = {
         "gfimu.recording",
     },
     "gfimu.diagnosis.criticism": {
-        "gfimu.diagnosis.coloured_noise",
+        "gfimu.diagnosis.terms.coloured_noise",
         "gfimu.diagnosis.data.stretch",
         "gfimu.diagnosis.drive",
         "gfimu.diagnosis.fit",
-        "gfimu.diagnosis.parallel",
+        "gfimu.diagnosis.fit.parallel",
         "gfimu.diagnosis.policy",
         "gfimu.diagnosis.terms",
         "gfimu.diagnosis.verdict",
@@ -267,7 +267,7 @@ ROOMS = {
         "gfimu.visual",
     },
     "gfimu.diagnosis.design": {
-        "gfimu.diagnosis.coloured_noise",
+        "gfimu.diagnosis.terms.coloured_noise",
         "gfimu.diagnosis.data",
         "gfimu.diagnosis.drive",
         "gfimu.diagnosis.fit",

@@ -15,8 +15,8 @@ from gfimu.diagnosis.data.prepared_runs import PreparedRuns
 from gfimu.diagnosis.data.stretch import make_stretches
 from gfimu.diagnosis.fit.gauss_newton import Fit
 from gfimu.diagnosis.fit.learn import predicted_by_reference
+from gfimu.diagnosis.fit.parallel import one_blas_thread
 from gfimu.diagnosis.free_body.diagnose import diagnose_body
-from gfimu.diagnosis.parallel import one_blas_thread
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.explain import Explanation, reduced
 from gfimu.diagnosis.search.long_run import understand_any_length
@@ -26,8 +26,8 @@ from gfimu.diagnosis.verdict.naming import conflicting
 from gfimu.diagnosis.verdict.sample_notes import with_sample_notes
 from gfimu.diagnosis.verdict.verdict import Diagnosis, Gain
 from gfimu.errors import InputError
-from gfimu.recording.carried_array import warn_of_other_array
 from gfimu.recording import Recording
+from gfimu.recording.carried_array import warn_of_other_array
 from gfimu.world_model import WorldModel, is_of_one_recording
 
 __all__ = ["diagnose", "prepare"]

@@ -15,7 +15,7 @@ import numpy as np
 from gfimu.diagnosis.data.stretch import make_stretches
 from gfimu.diagnosis.diagnose import prepare
 from gfimu.diagnosis.fit.gauss_newton import Fit, fit
-from gfimu.diagnosis.parallel import one_blas_thread
+from gfimu.diagnosis.fit.parallel import one_blas_thread
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.explain import Explanation
 from gfimu.diagnosis.search.long_run import understand_any_length

@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 from scipy.stats import chi2
 
-from gfimu.diagnosis.coloured_noise import NoiseLevels
+from gfimu.diagnosis.data.run import smooth_rate
 from gfimu.diagnosis.data.stretch import Stretch
-from gfimu.diagnosis.drive import smooth_rate
 from gfimu.diagnosis.fit.gauss_newton import fit
 from gfimu.diagnosis.fit.learn import FOLLOWED
 from gfimu.diagnosis.fit.linear import Point
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.terms.cause import Cause, effects_of
+from gfimu.diagnosis.terms.coloured_noise import NoiseLevels
 from gfimu.diagnosis.terms.drive import Drive
 from gfimu.diagnosis.terms.observed import observe
 from gfimu.diagnosis.verdict.verdict import Gain

@@ -13,16 +13,16 @@ from itertools import pairwise
 
 import numpy as np
 
-from gfimu.diagnosis.coloured_noise import NoiseLevels
 from gfimu.diagnosis.criticism.held_out_stretch import Measured, gain_of, measure
 from gfimu.diagnosis.data.stretch import RunUp, Stretch
 from gfimu.diagnosis.fit.evidence import SCALES, inverse, likeliest_scale
 from gfimu.diagnosis.fit.gauss_newton import Fit, fit
 from gfimu.diagnosis.fit.learn import learn_roughness, starting_point
 from gfimu.diagnosis.fit.linear import Point, linearise, with_residue
-from gfimu.diagnosis.parallel import each_apart, over_segments
+from gfimu.diagnosis.fit.parallel import each_apart, over_segments
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.terms.cause import Cause, effects_of
+from gfimu.diagnosis.terms.coloured_noise import NoiseLevels
 from gfimu.diagnosis.terms.drive import MARGIN, Drive
 from gfimu.diagnosis.verdict.verdict import Gain
 from gfimu.geometry.array import AccelerometerArray

@@ -29,8 +29,8 @@ from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.fit.evidence import log_evidence, log_evidence_each
 from gfimu.diagnosis.fit.gauss_newton import Fit
 from gfimu.diagnosis.fit.linear import Point
+from gfimu.diagnosis.fit.parallel import over_segments
 from gfimu.diagnosis.fit.posterior import Posterior
-from gfimu.diagnosis.parallel import over_segments
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.terms.cause import effects_of
 from gfimu.diagnosis.terms.drive import Drive

@@ -15,8 +15,8 @@ from scipy.fft import rfft
 from scipy.signal import welch
 from scipy.stats import gamma
 
-from gfimu.diagnosis.coloured_noise import CosineBasis
 from gfimu.diagnosis.criticism.dependence import CHANCE, listed
+from gfimu.diagnosis.terms.coloured_noise import CosineBasis
 from gfimu.diagnosis.verdict.verdict import RunView
 
 __all__ = ["ResidualSpectrum", "SpectralLine", "order_spectrum", "time_spectrum"]

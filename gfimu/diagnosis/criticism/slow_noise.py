@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from gfimu.diagnosis.coloured_noise import NoiseLevels, likeliest_flicker
 from gfimu.diagnosis.criticism.observed_at import observed_at
 from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.fit.linear import Point
 from gfimu.diagnosis.policy import Policy
-from gfimu.diagnosis.slow_modes import WeighedPowers
+from gfimu.diagnosis.terms.coloured_noise import NoiseLevels, likeliest_flicker
 from gfimu.diagnosis.terms.observed import Observed
+from gfimu.diagnosis.terms.slow_modes import WeighedPowers
 
 __all__ = ["LoudestChannel", "Walk", "loudest_channel", "walk_strength", "white_factor"]
 

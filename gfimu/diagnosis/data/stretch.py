@@ -11,10 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
-from gfimu.diagnosis.coloured_noise import CosineBasis, NoiseLevels
 from gfimu.diagnosis.data.rounding import COARSE, Steps
-from gfimu.diagnosis.data.run import Run, difference_noise
-from gfimu.diagnosis.drive import smooth_rate
+from gfimu.diagnosis.data.run import Run, difference_noise, smooth_rate
+from gfimu.diagnosis.terms.coloured_noise import CosineBasis, NoiseLevels
 from gfimu.diagnosis.terms.spline import JoinedSpin, ScaledSpin
 from gfimu.world_model import Effect, Spin, WorldModel, is_of_wiring
 

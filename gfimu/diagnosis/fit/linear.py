@@ -9,11 +9,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.diagnosis.coloured_noise import NoiseLevels
 from gfimu.diagnosis.data.stretch import Stretch
+from gfimu.diagnosis.fit.parallel import over_segments
 from gfimu.diagnosis.fit.posterior import Posterior, condition, energy
-from gfimu.diagnosis.parallel import over_segments
 from gfimu.diagnosis.terms.cause import Cause, effects_of
+from gfimu.diagnosis.terms.coloured_noise import NoiseLevels
 from gfimu.diagnosis.terms.columns import Columns
 from gfimu.diagnosis.terms.drive import Drive
 from gfimu.diagnosis.terms.jacobian import Jacobian
@@ -194,12 +194,7 @@ def energy_of(stretches: Sequence[Stretch], point: Point) -> float:
 
 
 def _explained(residue: Residue, posteriors: Sequence[Posterior]) -> float:
-    return _taken(
-        [
-            one.observed.products(columns)
-            for one, columns in zip(posteriors, residue.columns, strict=True)
-        ]
-    )
+    return _taken([one.observed.products(columns) for one, columns in zip(posteriors, residue.columns, strict=True)])
 
 
 def _taken(products: Sequence[tuple[NDArray[np.float64], NDArray[np.float64]]]) -> float:

@@ -21,13 +21,13 @@ from numpy.typing import NDArray
 from scipy.linalg import lapack, solve_triangular
 from scipy.linalg.blas import dsyrk
 
-from gfimu.diagnosis.coloured_noise import NoiseLevels
 from gfimu.diagnosis.data.stretch import Stretch
-from gfimu.diagnosis.slow_modes import SlowModes, WeighedModes
+from gfimu.diagnosis.terms.coloured_noise import NoiseLevels
 from gfimu.diagnosis.terms.columns import Columns
 from gfimu.diagnosis.terms.drive import Drive
 from gfimu.diagnosis.terms.jacobian import Jacobian, Reach, differentiate, measured_reach
 from gfimu.diagnosis.terms.observed import Observed, observe
+from gfimu.diagnosis.terms.slow_modes import SlowModes, WeighedModes
 from gfimu.world_model import Effect
 
 __all__ = ["Posterior", "condition", "energy", "posterior_of"]
@@ -99,9 +99,7 @@ class Posterior:
         inverse, _ = lapack.dpotri(self.root, lower=1)
         return np.asarray(np.tril(inverse) + np.tril(inverse, -1).T)
 
-    def products(
-        self, columns: Columns
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    def products(self, columns: Columns) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Return G (P, P), b (P,) and V (m, P) of columns."""
         seen, count = self.observed, columns.count
         gram, score = seen.products(columns)
@@ -179,9 +177,7 @@ def _cholesky(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(root)
 
 
-def _jacobian(
-    stretch: Stretch, drive: Drive, effects: Sequence[Effect], seen: Observed, *, exact: bool
-) -> Jacobian:
+def _jacobian(stretch: Stretch, drive: Drive, effects: Sequence[Effect], seen: Observed, *, exact: bool) -> Jacobian:
     """Differentiate by the drive; unless ``exact``, without what remembers the drive for long."""
     longest = max((_memory(effect) for effect in (*stretch.model.effects, *effects)), default=0.0)
     present = list(effects)

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gfimu.diagnosis.calibration_residue import TOLERANCE
 from gfimu.diagnosis.verdict.verdict import IN_PART, Gain, NamedCause, Residual, Unexplained
 from gfimu.units import STANDARD_GRAVITY
 
@@ -153,12 +152,10 @@ def _many(functions: int) -> str:
 
 
 def _residue_sentence(scale: float) -> str:
-    bias, gain, axes, place = TOLERANCE.values()
+    times = "what" if scale == 1.0 else f"{scale:g} times what"
     return (
-        "The twin's calibration is a little off everywhere, by some "
-        f"{scale * bias / STANDARD_GRAVITY * 1e3:.1f} mg of bias, {scale * gain:.2%} of gain, "
-        f"{np.rad2deg(scale * axes):.2f}° of the axes and {scale * place * 1e3:.2f} mm of position, as a calibration "
-        "leaves it; no single cause stands behind that, and the extended twin has the corrections."
+        f"The twin's calibration is a little off everywhere, by {times} a good calibration leaves of bias, gain, axes and "
+        "position; no single cause stands behind that, and the extended twin has the corrections."
     )
 
 

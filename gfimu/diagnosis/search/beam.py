@@ -84,8 +84,7 @@ class Blocks:
         mean = np.where(positive, np.maximum(mean, 1e-3), mean)
         ends = np.cumsum([len(self.hypotheses[number].positive) for number in members])[:-1]
         return tuple(
-            self.hypotheses[number].cause.at(part)
-            for number, part in zip(members, np.split(mean, ends), strict=True)
+            self.hypotheses[number].cause.at(part) for number, part in zip(members, np.split(mean, ends), strict=True)
         )
 
 

@@ -11,7 +11,7 @@ from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.fit.gauss_newton import Fit, fit
 from gfimu.diagnosis.fit.learn import learn_noise, learn_roughness, sharpened, starting_point
 from gfimu.diagnosis.fit.linear import Point, with_residue
-from gfimu.diagnosis.parallel import each_apart
+from gfimu.diagnosis.fit.parallel import each_apart
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.beam import Blocks, leading_sets
 from gfimu.diagnosis.search.comparison import Comparison
@@ -180,9 +180,7 @@ def _under(sets: Sets, base: Point, some: Sequence[Fit]) -> Sets:
     new = Sets(sets.stretches, base, sets.policy)
     points = []
     for one in some:
-        drives = tuple(
-            learnt.following(mine) for learnt, mine in zip(base.drives, one.point.drives, strict=True)
-        )
+        drives = tuple(learnt.following(mine) for learnt, mine in zip(base.drives, one.point.drives, strict=True))
         points.append(replace(one.point, drives=drives))
     new.fit(points)
     return new

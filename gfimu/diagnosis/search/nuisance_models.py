@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gfimu.diagnosis.coloured_noise import NoiseLevels
 from gfimu.diagnosis.criticism.slow_noise import Walk, walk_strength
 from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.fit.gauss_newton import Fit
@@ -20,6 +19,7 @@ from gfimu.diagnosis.fit.learn import learn_noise
 from gfimu.diagnosis.fit.linear import Point, linearise, with_residue
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.explain import Explanation, Sets, explain, prune
+from gfimu.diagnosis.terms.coloured_noise import NoiseLevels
 from gfimu.diagnosis.terms.residue import Residue
 
 __all__ = ["Understanding", "understand"]
@@ -52,7 +52,9 @@ class Understanding:
 def understand(stretches: Sequence[Stretch], policy: Policy, report: Report | None = None) -> Understanding:
     """Explain stretches under every model of the nuisance parameters that is worth a search."""
     tell = report or (lambda share, text: None)
-    found = [_understood(stretches, explain(stretches, policy, report=lambda s, text: tell(0.6 * s, text)), policy, 0.0)]
+    found = [
+        _understood(stretches, explain(stretches, policy, report=lambda s, text: tell(0.6 * s, text)), policy, 0.0)
+    ]
     for name, admit, odds in _models(stretches, found[0].explanation, policy):
         tell(0.6, name)
         known = {one.explanation.best.key: one for one in found}
@@ -67,9 +69,7 @@ def understand(stretches: Sequence[Stretch], policy: Policy, report: Report | No
 _Admit = Callable[[Point], Point | None]
 
 
-def _models(
-    stretches: Sequence[Stretch], plain: Explanation, policy: Policy
-) -> list[tuple[str, _Admit, float]]:
+def _models(stretches: Sequence[Stretch], plain: Explanation, policy: Policy) -> list[tuple[str, _Admit, float]]:
     """Return the alternatives: name, what admits it at a point, and the log odds that it needs."""
     first = stretches[0]
     found: list[tuple[str, _Admit, float]] = []
@@ -130,9 +130,7 @@ def _promise(stretches: Sequence[Stretch], before: Point, after: Point) -> float
     return values[1] - values[0]
 
 
-def _understood(
-    stretches: Sequence[Stretch], explanation: Explanation, policy: Policy, odds: float
-) -> Understanding:
+def _understood(stretches: Sequence[Stretch], explanation: Explanation, policy: Policy, odds: float) -> Understanding:
     point = explanation.best.point
     walk = None
     if point.levels[0].walk > 0.0 and stretches[0].first_levels.walk == 0.0:

@@ -132,7 +132,11 @@ def _plan(
     columns = 0
     for name, family in model.families().items():
         count = len(family.sizes(model.array))
-        if not count or (getattr(family, "needs_temperature", False) and not warm) or (still and family.place in _OF_MOTION):
+        if (
+            not count
+            or (getattr(family, "needs_temperature", False) and not warm)
+            or (still and family.place in _OF_MOTION)
+        ):
             continue
         if name in present:
             shapes: Sequence[Mapping[str, float]] = [present[name].shape]

@@ -37,9 +37,7 @@ class Columns:
         """Take columns (n, c, P), weighed by sample (n, c)."""
         there = values.any(axis=0)  # (c, P)
         places = tuple(np.flatnonzero(mine) for mine in there)
-        parts = tuple(
-            np.ascontiguousarray(values[:, c, at] * mask[:, [c]]) for c, at in enumerate(places)
-        )
+        parts = tuple(np.ascontiguousarray(values[:, c, at] * mask[:, [c]]) for c, at in enumerate(places))
         return cls(values.shape[2], places, parts)
 
     @classmethod

@@ -54,9 +54,7 @@ class Drive:
     since: float
 
     @classmethod
-    def still(
-        cls, times: NDArray[np.float64], since: float, spacing: float, angle: float, angle_std: float
-    ) -> Drive:
+    def still(cls, times: NDArray[np.float64], since: float, spacing: float, angle: float, angle_std: float) -> Drive:
         """Return a drive that is at rest, over times (any shape), s."""
         margin = max(MARGIN, DEGREE * spacing)
         spline = AngleSpline.over(float(times.min()) - margin, float(times.max()) + margin, spacing)
@@ -106,7 +104,9 @@ class Drive:
             Standard deviation of the angle there, rad, where the whole has one.
         """
         h = self.spline.spacing
-        first, last = np.clip(np.array([start, stop]) - self.spline.start, 0.0, self.spline.stop - self.spline.start) / h
+        first, last = (
+            np.clip(np.array([start, stop]) - self.spline.start, 0.0, self.spline.stop - self.spline.start) / h
+        )
         low, high = int(np.floor(first + _ON_A_KNOT)), int(np.ceil(last - _ON_A_KNOT))
         return Drive(
             AngleSpline(self.spline.start + low * h, h, high - low),

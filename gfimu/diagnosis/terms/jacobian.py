@@ -175,7 +175,9 @@ def _blocks(
         for k in range(width):
             block[:, rows, at + k] = parts[k, start:stop].T
         left, right = max(low, 0), min(low + span, size)
-        out.append((slice(start, stop), slice(left, right), np.ascontiguousarray(block[:, :, left - low : right - low])))
+        out.append(
+            (slice(start, stop), slice(left, right), np.ascontiguousarray(block[:, :, left - low : right - low]))
+        )
     return out
 
 

@@ -23,7 +23,12 @@ _ON_ITS_SIDE = 0.05  # numerical: of the present size, the step of such an effec
 
 
 def family_columns(
-    stretch: Stretch, seen: Observed, drive: Drive, causes: Sequence[Cause], family: EffectFamily, shape: Mapping[str, float]
+    stretch: Stretch,
+    seen: Observed,
+    drive: Drive,
+    causes: Sequence[Cause],
+    family: EffectFamily,
+    shape: Mapping[str, float],
 ) -> Columns:
     """Return what each size of a family, in units of its prior, adds beside causes.
 
@@ -55,9 +60,7 @@ def cause_columns(stretch: Stretch, seen: Observed, drive: Drive, causes: Sequen
         count = len(cause.coordinates)
         step = _step(cause, stretch)
 
-        def replaced(
-            other: Cause, number: int = number
-        ) -> list[Effect]:
+        def replaced(other: Cause, number: int = number) -> list[Effect]:
             return [*present[:number], other.effect(array, stretch.index), *present[number + 1 :]]
 
         def changed(group: Sequence[int], cause: Cause = cause, count: int = count, step: float = step) -> list[Effect]:

@@ -8,11 +8,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.diagnosis.coloured_noise import NoiseLevels
 from gfimu.diagnosis.data.rounding import Steps
 from gfimu.diagnosis.data.stretch import Stretch
-from gfimu.diagnosis.slow_modes import SlowModes, WeighedModes
+from gfimu.diagnosis.terms.coloured_noise import NoiseLevels
 from gfimu.diagnosis.terms.columns import Columns
+from gfimu.diagnosis.terms.slow_modes import SlowModes, WeighedModes
 
 __all__ = ["Observed", "observe"]
 

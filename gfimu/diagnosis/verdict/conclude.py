@@ -24,6 +24,7 @@ from gfimu.diagnosis.search.nuisance_models import Understanding
 from gfimu.diagnosis.terms.cause import Cause, effects_of
 from gfimu.diagnosis.terms.spline import AngleSpline
 from gfimu.diagnosis.verdict.naming import (
+    capped,
     channel_share,
     conflicting,
     contested,
@@ -31,7 +32,6 @@ from gfimu.diagnosis.verdict.naming import (
     name_cause,
     probabilities,
     rival_list,
-    capped,
 )
 from gfimu.diagnosis.verdict.verdict import Diagnosis, Gain, NamedCause, Residual, RunView, Unexplained
 from gfimu.world_model import Effect, Spin, WorldModel
@@ -114,9 +114,7 @@ def named_causes(explanation: Explanation, fit: Fit, policy: Policy) -> list[Nam
     return [entry for _, entry in sorted(entries, key=lambda pair: -pair[0])]
 
 
-def _widened(
-    explanation: Explanation, fit: Fit, named: NamedCause, cause: Cause, policy: Policy
-) -> dict[str, float]:
+def _widened(explanation: Explanation, fit: Fit, named: NamedCause, cause: Cause, policy: Policy) -> dict[str, float]:
     """Widen standard deviations where a cause does not fit to the noise.
 
     All by the root of the misfit over the noise; where the model of the effect is a rough one, by the share of what it

@@ -6,12 +6,7 @@ import sys
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
-
-from gfimu.diagnosis import diagnose, engine
 from gfimu.diagnosis.calibration_residue import TOLERANCE, CalibrationResidue
-from gfimu.diagnosis.data.prepared_runs import PreparedRuns
-from gfimu.diagnosis.data.run import prepare_run
 from gfimu.diagnosis.engine import explain
 from gfimu.diagnosis.evidence import SCALES
 from gfimu.diagnosis.long_run import explain_any_length
@@ -19,6 +14,11 @@ from gfimu.diagnosis.old_search import log_odds_beside_residue
 from gfimu.diagnosis.refinement import refine
 from gfimu.diagnosis.screening import screen
 from gfimu.diagnosis.stretches import make_segments
+from numpy.testing import assert_allclose
+
+from gfimu.diagnosis import diagnose, engine
+from gfimu.diagnosis.data.prepared_runs import PreparedRuns
+from gfimu.diagnosis.data.run import prepare_run
 from gfimu.geometry.array import AccelerometerArray
 from sim.campaign import Measurement, measure
 from sim.effects import make_effect

@@ -4,14 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
-
 from gfimu.diagnosis.causes import Cause
-from gfimu.diagnosis.coloured_noise import NoiseLevels
-from gfimu.diagnosis.data.run import prepare_run
 from gfimu.diagnosis.holdout import Holdout, held_out_gain, split_segments
 from gfimu.diagnosis.refinement import refine
 from gfimu.diagnosis.stretches import make_segments
+from numpy.testing import assert_allclose
+
+from gfimu.diagnosis.data.run import prepare_run
+from gfimu.diagnosis.terms.coloured_noise import NoiseLevels
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
 from sim.campaign import Measurement, measure, random_profile

@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from gfimu.diagnosis.named_causes import capped
 from made_diagnoses import made_diagnosis
 
 from gfimu.diagnosis import diagnose
-from gfimu.diagnosis.named_causes import capped
 from gfimu.diagnosis.report.page import report_html
 from gfimu.diagnosis.report.plain_words import headline
 from gfimu.diagnosis.report.wording import verdict_sentences

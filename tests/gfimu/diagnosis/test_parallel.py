@@ -8,7 +8,7 @@ import time
 import pytest
 
 from gfimu.diagnosis import parallel
-from gfimu.diagnosis.parallel import each_apart, over_segments
+from gfimu.diagnosis.fit.parallel import each_apart, over_segments
 
 
 def test_results_come_in_the_order_of_the_items():

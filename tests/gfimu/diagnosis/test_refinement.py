@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
-
 from gfimu.diagnosis.calibration_residue import CalibrationResidue
 from gfimu.diagnosis.causes import effects_of_run
-from gfimu.diagnosis.data.run import prepare_run
 from gfimu.diagnosis.old_fit import Start, without
 from gfimu.diagnosis.old_search import Blocks
 from gfimu.diagnosis.refinement import refine, refine_each
 from gfimu.diagnosis.screening import screen
 from gfimu.diagnosis.signatures import Signature, cause_columns, hypotheses, signature_columns
 from gfimu.diagnosis.stretches import make_segments
+from numpy.testing import assert_allclose
+
+from gfimu.diagnosis.data.run import prepare_run
 from gfimu.geometry.array import AccelerometerArray
 from sim.campaign import Measurement, measure
 from sim.effects import make_effect

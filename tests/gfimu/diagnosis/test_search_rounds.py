@@ -7,17 +7,17 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
-
-from gfimu.diagnosis import diagnose, engine, loose_calibration
 from gfimu.diagnosis.calibration_residue import CalibrationResidue
 from gfimu.diagnosis.conclusion import is_unknown
-from gfimu.diagnosis.data.prepared_runs import PreparedRuns
 from gfimu.diagnosis.nuisances import learn_noise
 from gfimu.diagnosis.old_fit import Fit
 from gfimu.diagnosis.refinement import refine
 from gfimu.diagnosis.residual_tests import LeftOver
 from gfimu.diagnosis.signatures import Signature, hypotheses
+from numpy.testing import assert_allclose
+
+from gfimu.diagnosis import diagnose, engine, loose_calibration
+from gfimu.diagnosis.data.prepared_runs import PreparedRuns
 from gfimu.diagnosis.verdict.verdict import Gain
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording

@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
+from gfimu.diagnosis.stretches import make_segments
 from numpy.testing import assert_allclose
 
-from gfimu.diagnosis.coloured_noise import CosineBasis, NoiseLevels, likeliest_flicker
 from gfimu.diagnosis.data.rounding import rounded_likelihood
 from gfimu.diagnosis.data.run import prepare_run
-from gfimu.diagnosis.slow_modes import SlowModes, WeighedModes, WeighedPowers
-from gfimu.diagnosis.stretches import make_segments
+from gfimu.diagnosis.terms.coloured_noise import CosineBasis, NoiseLevels, likeliest_flicker
+from gfimu.diagnosis.terms.slow_modes import SlowModes, WeighedModes, WeighedPowers
 from gfimu.geometry.array import AccelerometerArray
 from sim.campaign import Measurement, measure
 from sim.twin import Twin

@@ -6,14 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from core_cases import cause_of, dense, dense_gaussian, lively, part_of, small_twin, stretches_of
 from numpy.testing import assert_allclose
 from scipy.special import ndtr
 
-from core_cases import cause_of, dense, dense_gaussian, lively, part_of, small_twin, stretches_of
-from gfimu.diagnosis.coloured_noise import NoiseLevels
 from gfimu.diagnosis.data.rounding import Steps
 from gfimu.diagnosis.fit.learn import starting_point
 from gfimu.diagnosis.fit.posterior import condition, energy
+from gfimu.diagnosis.terms.coloured_noise import NoiseLevels
 from gfimu.diagnosis.terms.columns import Columns
 from gfimu.diagnosis.terms.drive import Drive
 from gfimu.diagnosis.terms.library import family_columns
@@ -196,9 +196,7 @@ def test_scores_of_coarse_readings_are_slopes_of_their_probability(coarse):
     columns = random_columns(coarse)
     _, score = seen.products(Columns.of(columns, seen.weight))
     for k in range(columns.shape[2]):
-        up, down = (
-            rounded_misfit(coarse, seen.prediction + size * columns[:, :, k], levels) for size in (1e-4, -1e-4)
-        )
+        up, down = (rounded_misfit(coarse, seen.prediction + size * columns[:, :, k], levels) for size in (1e-4, -1e-4))
         assert score[k] == pytest.approx(-0.25 * (up - down) / 1e-4, rel=1e-4, abs=1e-3)
 
 
@@ -211,7 +209,14 @@ def test_coarse_readings_equal_a_dense_gaussian_of_their_weights(coarse, kind):
     seen, columns = posterior.observed, random_columns(coarse)
     gram, score, _ = posterior.products(Columns.of(columns, seen.weight))
     truth = dense_gaussian(
-        coarse, drive, EFFECTS_THERE, levels, columns, modes=64, residual=seen.residual / seen.weight, weight=seen.weight
+        coarse,
+        drive,
+        EFFECTS_THERE,
+        levels,
+        columns,
+        modes=64,
+        residual=seen.residual / seen.weight,
+        weight=seen.weight,
     )
     scale = np.sqrt(np.diag(truth.gram))
     tolerance = 1e-3 if kind == "white" else 0.03  # modes with a share below 0.05 are left out

@@ -20,10 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
-from gfimu.diagnosis.coloured_noise import CosineBasis, NoiseLevels
-from gfimu.diagnosis.drive_jacobian import DriveJacobian
+from gfimu.diagnosis.terms.coloured_noise import CosineBasis, NoiseLevels
 
-__all__ = ["DriveModes", "SlowModes", "WeighedModes", "WeighedPowers"]
+__all__ = ["SlowModes", "WeighedModes", "WeighedPowers"]
 
 _WEAKEST = 0.05
 _MOST_COSINES = 128
@@ -73,19 +72,6 @@ class SlowModes:
     def explained(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return what slow noise takes of the squares of all observations (n, c + 1), shape (c + 1,)."""
         return np.asarray(np.sum(self.of_each(values) ** 2 * self.share, axis=0))
-
-    def of_drive(self, jacobian: DriveJacobian, weights: NDArray[np.float64]) -> DriveModes:
-        """Return what each mode has of the drive's coefficients.
-
-        Parameters
-        ----------
-        jacobian : DriveJacobian
-            J.
-        weights : ndarray, shape (c + 1,)
-            One over the white variance of each observation.
-        """
-        slow = jacobian.slow(self.cosines)
-        return DriveModes(jacobian, slow, None, jacobian.slow_rows(slow, self.share, weights))
 
 
 class WeighedModes(SlowModes):
@@ -195,59 +181,6 @@ class WeighedModes(SlowModes):
                 solve_triangular(factor, mine, lower=True, check_finite=False)
                 for factor, mine in zip(self._factors, sizes.T, strict=True)
             ]
-        )
-
-    def of_drive(self, jacobian: DriveJacobian, weights: NDArray[np.float64]) -> DriveModes:
-        """Return what each mode has of the drive's coefficients (`SlowModes.of_drive`)."""
-        each, rows = [], []
-        for column, mixing in enumerate(self._mixing):
-            part = jacobian.channel(column)
-            part.data *= np.repeat(self._weight[:, column], np.diff(part.indptr))
-            slow = np.asarray(part.T @ self.cosines) @ mixing  # (m, K)
-            each.append(slow)
-            rows.append((slow * np.sqrt(weights[column] * self.share[:, column])).T)
-        stacked = np.vstack(rows)
-        size = np.einsum("km,km->k", stacked, stacked)
-        return DriveModes(jacobian, None, each, stacked[size > _NO_POWER * size.max(initial=0.0)])
-
-
-@dataclass(frozen=True)
-class DriveModes:
-    """What each mode of slow noise has of the drive's coefficients.
-
-    Parameters
-    ----------
-    jacobian : DriveJacobian
-        J.
-    slow : ndarray, shape (R, m, K), optional
-        The Jacobian's parts in modes that all observations share.
-    each : list of ndarray, each (m, K), optional
-        J_cᵀQ_c where they do not.
-    rows : ndarray, shape (k, m)
-        Uᵀ: what the slow noise takes away of JᵀWJ is UUᵀ.
-    """
-
-    jacobian: DriveJacobian
-    slow: NDArray[np.float64] | None
-    each: list[NDArray[np.float64]] | None
-    rows: NDArray[np.float64]
-
-    def of(self, column: int) -> NDArray[np.float64]:
-        """Return J_cᵀQ_c, shape (m, K)."""
-        if self.each is not None:
-            return self.each[column]
-        assert self.slow is not None
-        used = np.flatnonzero(self.jacobian.loading[:, column])
-        return np.asarray(np.tensordot(self.jacobian.loading[used, column], self.slow[used], axes=1))
-
-    def through(self, damped: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return Σ_c w_c J_cᵀQ_c D_c of columns in the modes, D (c + 1, P, K), shape (m, P)."""
-        if self.each is not None:
-            return np.asarray(sum(w * slow @ mine.T for w, slow, mine in zip(weights, self.each, damped, strict=True)))
-        assert self.slow is not None
-        loading = self.jacobian.loading * weights
-        return np.asarray(
-            sum(slow @ np.tensordot(row, damped, axes=1).T for row, slow in zip(loading, self.slow, strict=True))
         )
 
 
