@@ -37,6 +37,7 @@ __all__ = [
     "WorldModel",
     "bound_of",
     "is_of_one_recording",
+    "memory_of",
     "is_of_wiring",
     "shapes_to_screen",
 ]
@@ -120,6 +121,11 @@ def is_of_one_recording(family: EffectFamily) -> bool:
 def is_of_wiring(effect: Effect) -> bool:
     """Tell whether a fault of the samples changes a prediction without noise; others need not say so."""
     return bool(getattr(effect, "of_wiring", False))
+
+
+def memory_of(effect: Effect) -> float:
+    """Return how long a reading depends on the drive before it by an effect, s; others need not say so."""
+    return float(getattr(effect, "memory_s", 0.0))
 
 
 class EffectFamily(Protocol):

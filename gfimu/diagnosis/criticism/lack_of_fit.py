@@ -35,7 +35,7 @@ from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.terms.cause import effects_of
 from gfimu.diagnosis.terms.drive import Drive
 from gfimu.generic_basis import FUNCTIONS
-from gfimu.world_model import BasisUnits
+from gfimu.world_model import BasisUnits, memory_of
 
 __all__ = ["JERK", "LackOfFit", "dependence_unexplained", "lack_of_fit"]
 
@@ -100,7 +100,7 @@ def dependence_unexplained(stretches: Sequence[Stretch], point: Point, policy: P
     A cause with a memory (``memory_s``), as a mode on the table, acts back on the table. A drive whose prior is
     smoother than that motion is too smooth by a share of its jerk, which the reference shows: beside such a cause the
     jerk of the reference is no sign of anything else. The fit has to be at its optimum, which beside a long memory
-    only the exact derivative reaches (``fit(…, exact=True)``).
+    only the exact derivative reaches (`Point.exact`).
     """
     channels = stretches[0].model.array.channels
     gram, score = _products(stretches, point)
@@ -179,4 +179,4 @@ def _functions(stretch: Stretch, point: Point, drive: Drive, units: BasisUnits) 
 def _has_memory(stretches: Sequence[Stretch], point: Point) -> bool:
     first = stretches[0]
     present = (*first.model.effects, *effects_of(point.causes, first.model.array, first.index))
-    return any(getattr(effect, "memory_s", 0.0) > 0.0 for effect in present)
+    return any(memory_of(effect) > 0.0 for effect in present)

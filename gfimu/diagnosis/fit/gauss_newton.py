@@ -76,7 +76,7 @@ class Fit:
         return frozenset(cause.key for cause in self.causes)
 
 
-def fit(stretches: Sequence[Stretch], start: Point, policy: Policy, *, exact: bool = False) -> Fit:
+def fit(stretches: Sequence[Stretch], start: Point, policy: Policy) -> Fit:
     """Fit drives, sizes and shapes of a set of causes under the noise and roughness of a point.
 
     Parameters
@@ -87,9 +87,6 @@ def fit(stretches: Sequence[Stretch], start: Point, policy: Policy, *, exact: bo
         Where to start; its noise, roughness and residue are kept.
     policy : Policy
         Thresholds.
-    exact : bool
-        Whether the derivative by the drive holds what remembers it for long: needed for the last digits of such a
-        cause only.
 
     Raises
     ------
@@ -99,7 +96,7 @@ def fit(stretches: Sequence[Stretch], start: Point, policy: Policy, *, exact: bo
     array = stretches[0].model.array
     point = replace(start, causes=tuple(cause.moved(np.zeros(cause.unknowns), array) for cause in start.causes))
     now = _energy(stretches, point)
-    linear = linearise(stretches, point, of_causes(point), exact=exact)
+    linear = linearise(stretches, point, of_causes(point))
     done = 0
     for done in range(policy.steps):
         step, promise = _step(point.causes, linear)
@@ -115,7 +112,7 @@ def fit(stretches: Sequence[Stretch], start: Point, policy: Policy, *, exact: bo
         stalled = now - there < policy.settled
         kept = _dear(linear) if done % 2 == 0 else None
         point, now = trial, there
-        linear = linearise(stretches, point, of_causes(point), jacobians=kept, exact=exact)
+        linear = linearise(stretches, point, of_causes(point), jacobians=kept)
         if stalled:
             break
     found = _judged(stretches, point, linear, done)

@@ -40,12 +40,16 @@ class Point:
         Noise of every stretch.
     residue : Residue, optional
         Residue of the calibration, where it is admitted; its sizes are integrated out.
+    exact : bool
+        Whether the derivatives by the drives hold what remembers these for long (a lightly damped mode). That is dear,
+        and needed for the last digits of such a cause and of what it leaves.
     """
 
     causes: tuple[Cause, ...]
     drives: tuple[Drive, ...]
     levels: tuple[NoiseLevels, ...]
     residue: Residue | None = None
+    exact: bool = False
 
 
 @dataclass(frozen=True)
@@ -99,7 +103,6 @@ def linearise(
     columns_of: ColumnsOf | None = None,
     *,
     jacobians: Sequence[Jacobian | None] | None = None,
-    exact: bool = False,
     responses: bool = True,
 ) -> Linear:
     """Linearise stretches about a point.
@@ -114,8 +117,6 @@ def linearise(
         From a stretch and its posterior to the columns of the unknowns, numbered alike in all stretches.
     jacobians : sequence of Jacobian, optional
         Derivatives by the drives, where they are taken as they were.
-    exact : bool
-        Whether these hold what remembers the drive for long.
     responses : bool
         Whether it matters how the drives follow the unknowns.
     """
@@ -127,7 +128,7 @@ def linearise(
         stretch: Stretch, drive: Drive, levels: NoiseLevels, jacobian: Jacobian | None, residue: Columns | None
     ) -> tuple[Posterior, NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         effects = effects_of(point.causes, stretch.model.array, stretch.index)
-        posterior = condition(stretch, drive, effects, levels, jacobian=jacobian, exact=exact)
+        posterior = condition(stretch, drive, effects, levels, jacobian=jacobian, exact=point.exact)
         parts = [] if residue is None else [residue]
         parts += [] if columns_of is None else [columns_of(stretch, posterior)]
         if not parts:

@@ -28,7 +28,7 @@ from gfimu.diagnosis.terms.drive import Drive
 from gfimu.diagnosis.terms.jacobian import Jacobian, Reach, differentiate, measured_reach
 from gfimu.diagnosis.terms.observed import Observed, observe
 from gfimu.diagnosis.terms.slow_modes import SlowModes, WeighedModes
-from gfimu.world_model import Effect
+from gfimu.world_model import Effect, memory_of
 
 __all__ = ["Posterior", "condition", "energy", "posterior_of"]
 
@@ -179,11 +179,11 @@ def _cholesky(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _jacobian(stretch: Stretch, drive: Drive, effects: Sequence[Effect], seen: Observed, *, exact: bool) -> Jacobian:
     """Differentiate by the drive; unless ``exact``, without what remembers the drive for long."""
-    longest = max((_memory(effect) for effect in (*stretch.model.effects, *effects)), default=0.0)
+    longest = max((memory_of(effect) for effect in (*stretch.model.effects, *effects)), default=0.0)
     present = list(effects)
     base = seen.prediction
     if longest > _LONG_MEMORY and not exact:
-        present = [effect for effect in effects if _memory(effect) <= _LONG_MEMORY]
+        present = [effect for effect in effects if memory_of(effect) <= _LONG_MEMORY]
         base = stretch.predict(present, drive.spin)
 
     def predict(coefficients: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -220,11 +220,6 @@ def _slow_rows(
     roots = turn * np.sqrt(np.maximum(power, 0.0))[:, None, :]
     rows = np.einsum("krq,rmk->mkq", roots, each, optimize=True)
     return np.ascontiguousarray(rows.reshape(len(rows), -1)[:, kept.ravel()])
-
-
-def _memory(effect: Effect) -> float:
-    """Return how long readings depend on the drive before them by an effect, s; others need not say so."""
-    return float(getattr(effect, "memory_s", 0.0))
 
 
 def _modes_of(jacobian: Jacobian, modes: SlowModes, weight: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:

@@ -18,8 +18,9 @@ from gfimu.diagnosis.search.comparison import Comparison
 from gfimu.diagnosis.search.screening import Screening, screen
 from gfimu.diagnosis.terms.cause import Cause
 from gfimu.diagnosis.terms.drive import Drive
+from gfimu.world_model import memory_of
 
-__all__ = ["Explanation", "Sets", "explain", "explained", "prune", "reduced"]
+__all__ = ["Explanation", "Sets", "exactly", "explain", "explained", "prune", "reduced"]
 
 Report = Callable[[float, str], None]
 _Key = frozenset[tuple[str, str]]
@@ -214,6 +215,47 @@ def reduced(explanation: Explanation, name: str, policy: Policy) -> Explanation:
             sets.found[one.key] = one
     sets.found = {key: one for key, one in sets.found.items() if one.key <= explanation.best.key}
     return explained(sets, prune(sets), explanation.fits)
+
+
+def exactly(explanation: Explanation, policy: Policy) -> Explanation:
+    """Return the explanation with its best set at its very optimum, where a cause of it remembers the drive for long.
+
+    What sets are compared by stays: it is of the same derivative for all.
+    """
+    best, stretches = explanation.best, explanation.stretches
+    if not any(_remembers(cause, stretches[0]) for cause in best.causes):
+        return explanation
+    try:
+        near = fit(stretches, replace(best.point, exact=True), policy)
+        point = learn_noise(stretches, learn_roughness(stretches, near.point))
+        found, nothing = fit(stretches, point, policy), fit(stretches, replace(point, causes=(), exact=False), policy)
+    except np.linalg.LinAlgError:
+        return explanation
+    causes = tuple(
+        _widened(one, other) if _remembers(one, stretches[0]) else one
+        for one, other in zip(found.causes, best.causes, strict=True)
+    )
+    found = replace(found, point=replace(found.point, causes=causes))
+    return replace(explanation, best=_compared_as(found, best), nothing=_compared_as(nothing, explanation.nothing))
+
+
+def _remembers(cause: Cause, stretch: Stretch) -> bool:
+    return memory_of(cause.effect(stretch.model.array, stretch.index)) > 0.0
+
+
+def _widened(cause: Cause, other: Cause) -> Cause:
+    """Return a cause whose uncertainty holds how far it is from another fit of it.
+
+    Whether the drive or a mode rings, only the prior of the drive decides, which is learnt beside it: the covariance
+    alone is too small.
+    """
+    apart = cause.coordinates - other.coordinates
+    shape_std = {key: float(np.hypot(std, cause.shape[key] - other.shape[key])) for key, std in cause.shape_std.items()}
+    return replace(cause, covariance=cause.covariance + np.outer(apart, apart), shape_std=shape_std)
+
+
+def _compared_as(found: Fit, other: Fit) -> Fit:
+    return replace(found, log_evidence=other.log_evidence, log_posterior=other.log_posterior)
 
 
 def prune(sets: Sets) -> Fit:

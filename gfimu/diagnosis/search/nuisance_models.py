@@ -18,7 +18,7 @@ from gfimu.diagnosis.fit.gauss_newton import Fit
 from gfimu.diagnosis.fit.learn import learn_noise
 from gfimu.diagnosis.fit.linear import Point, linearise, with_residue
 from gfimu.diagnosis.policy import Policy
-from gfimu.diagnosis.search.explain import Explanation, Sets, explain, prune
+from gfimu.diagnosis.search.explain import Explanation, Sets, exactly, explain, prune
 from gfimu.diagnosis.terms.coloured_noise import NoiseLevels
 from gfimu.diagnosis.terms.residue import Residue
 
@@ -63,7 +63,8 @@ def understand(stretches: Sequence[Stretch], policy: Policy, report: Report | No
             found.append(_understood(stretches, explain(stretches, policy, start=start), policy, odds))
     found.sort(key=lambda one: one.explanation.best.log_posterior - one.log_odds, reverse=True)
     values = [one.explanation.best.log_posterior - one.log_odds for one in found]
-    return replace(found[0], log_odds=values[0] - values[1] if len(values) > 1 else np.inf)
+    odds = values[0] - values[1] if len(values) > 1 else np.inf
+    return replace(found[0], explanation=exactly(found[0].explanation, policy), log_odds=odds)
 
 
 _Admit = Callable[[Point], Point | None]
