@@ -168,6 +168,7 @@ class Policy:
     fair: float = 1.6
     knot_odds: float = 100.0
     hopeless: float = 40.0
+    steady: float = 5.0
     body_causes: int = 8
     body_rounds: int = 12
     body_dominant: float = 0.1

@@ -123,7 +123,7 @@ def explain(
         if number > 0 and best.key in seen:
             break
         seen.add(best.key)
-        learnt = _relearned(stretches, best.point, policy, sharpen=best.key != before.key)
+        learnt = _relearned(stretches, best, policy, sharpen=best.key != before.key)
         sets = _under(sets, learnt, _near(sets, best))
     best = prune(sets)
     found = explained(sets, best, fits + sets.count, screening if best.key == before.key else None)
@@ -140,11 +140,24 @@ def _started(stretches: Sequence[Stretch], reference: Point, policy: Policy) -> 
     return _under(sets, point, [nothing])
 
 
-def _relearned(stretches: Sequence[Stretch], point: Point, policy: Policy, *, sharpen: bool) -> Point:
-    """Return a point with all nuisance parameters learnt from what its causes leave; the knots where asked."""
-    point = learn_roughness(stretches, point, policy.learnings)
-    point = learn_noise(stretches, sharpened(stretches, point, policy) if sharpen else point)
-    return point if point.residue is None else with_residue(stretches, point, point.residue.scale)
+def _relearned(stretches: Sequence[Stretch], best: Fit, policy: Policy, *, sharpen: bool) -> Point:
+    """Return a point with all nuisance parameters learnt from what a set leaves, until that gains no more.
+
+    The roughness that was learnt without a cause has taken in what that does; each round gives some of it back.
+    """
+    found, point = best, best.point
+    for _ in range(policy.rounds):
+        before = found
+        point = learn_roughness(stretches, found.point, policy.learnings)
+        point = learn_noise(stretches, sharpened(stretches, point, policy) if sharpen else point)
+        if point.residue is not None:
+            point = with_residue(stretches, point, point.residue.scale)
+        if not best.causes:  # what nothing leaves is learnt once: a cause may yet explain it
+            break
+        found = fit(stretches, point, policy)
+        if found.log_posterior - before.log_posterior < policy.steady:
+            break
+    return replace(point, drives=found.point.drives) if found is not best else point
 
 
 def _near(sets: Sets, best: Fit) -> list[Fit]:
