@@ -240,36 +240,59 @@ ROOMS = {
     "gfimu.recording": {"gfimu.files", "gfimu.geometry", "gfimu.parts", "gfimu.rate.integration"},
     "gfimu.motion": {"gfimu.files", "gfimu.geometry", "gfimu.parts", "gfimu.rate", "gfimu.recording"},
     "gfimu.position_drift": {"gfimu.geometry", "gfimu.motion", "gfimu.rate.integration"},
+    # The rooms of the diagnosis, each of which may import those above it; an exception to that has a comment.
     "gfimu.diagnosis.data": {
-        "gfimu.world_model",
-        "gfimu.diagnosis.segment",
-        "gfimu.diagnosis.stretches",
+        "gfimu.diagnosis.terms.coloured_noise",  # a stretch has the basis of cosines of its slow noise
+        "gfimu.diagnosis.terms.spline",  # a stretch knows the angle of its reference as a spline
         "gfimu.recording",
+        "gfimu.world_model",
     },
-    "gfimu.diagnosis.criticism": {
-        "gfimu.diagnosis.terms.coloured_noise",
-        "gfimu.diagnosis.data.stretch",
-        "gfimu.diagnosis.drive",
-        "gfimu.diagnosis.fit",
-        "gfimu.diagnosis.fit.parallel",
+    "gfimu.diagnosis.terms": {"gfimu.diagnosis.data", "gfimu.geometry.array", "gfimu.world_model"},
+    "gfimu.diagnosis.fit": {
+        "gfimu.diagnosis.data",
         "gfimu.diagnosis.policy",
         "gfimu.diagnosis.terms",
-        "gfimu.diagnosis.verdict",
         "gfimu.geometry.array",
         "gfimu.world_model",
     },
-    "gfimu.diagnosis.verdict": {"gfimu.world_model", "gfimu.diagnosis.data.run"},
-    "gfimu.diagnosis.report": {
-        "gfimu.diagnosis.calibration_residue",
+    "gfimu.diagnosis.search": {
+        "gfimu.diagnosis.criticism.slow_noise",  # how strong a random walk is that another model starts with
+        "gfimu.diagnosis.data",
+        "gfimu.diagnosis.fit",
+        "gfimu.diagnosis.policy",
+        "gfimu.diagnosis.terms",
+        "gfimu.geometry.array",
+        "gfimu.world_model",
+    },
+    "gfimu.diagnosis.criticism": {
+        "gfimu.diagnosis.data",
+        "gfimu.diagnosis.fit",
+        "gfimu.diagnosis.policy",
+        "gfimu.diagnosis.terms",
+        "gfimu.diagnosis.verdict.verdict",  # the classes of the result: what the gate judges, what the views show
+        "gfimu.generic_basis",
+        "gfimu.geometry.array",
+        "gfimu.world_model",
+    },
+    "gfimu.diagnosis.verdict": {
         "gfimu.diagnosis.criticism",
+        "gfimu.diagnosis.data",
+        "gfimu.diagnosis.fit",
+        "gfimu.diagnosis.policy",
+        "gfimu.diagnosis.report.wording",  # the verdict holds its sentences
+        "gfimu.diagnosis.search",
+        "gfimu.diagnosis.terms",
+        "gfimu.geometry.array",
+        "gfimu.world_model",
+    },
+    "gfimu.diagnosis.report": {
+        "gfimu.diagnosis.criticism.views",
         "gfimu.diagnosis.verdict",
         "gfimu.recording",
         "gfimu.visual",
     },
     "gfimu.diagnosis.design": {
-        "gfimu.diagnosis.terms.coloured_noise",
         "gfimu.diagnosis.data",
-        "gfimu.diagnosis.drive",
         "gfimu.diagnosis.fit",
         "gfimu.diagnosis.policy",
         "gfimu.diagnosis.search.screening",
@@ -299,6 +322,27 @@ def test_rooms_import_from_the_rooms_they_name_only(room):
     imported = room_imports(room)
     assert {name for name in imported if not inside(name, *ROOMS[room])} == set()
     assert {name for name in ROOMS[room] if not any(inside(one, name) for one in imported)} == set()
+
+
+UPWARDS = {
+    ("data", "terms.coloured_noise"),
+    ("data", "terms.spline"),
+    ("search", "criticism.slow_noise"),
+    ("criticism", "verdict.verdict"),
+    ("verdict", "report.wording"),
+}
+"""Rooms of the diagnosis that import a module of a room below theirs in `ROOMS`; why is said there."""
+
+
+def test_rooms_of_the_diagnosis_import_those_above_them_only():
+    rooms = [room for room in ROOMS if inside(room, "gfimu.diagnosis")]
+    found = {
+        (room.removeprefix("gfimu.diagnosis."), name.removeprefix("gfimu.diagnosis."))
+        for place, room in enumerate(rooms)
+        for name in room_imports(room)
+        if inside(name, *rooms[place + 1 :])
+    }
+    assert found == UPWARDS
 
 
 @pytest.mark.parametrize("room", ROOMS)

@@ -16,9 +16,9 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
-from gfimu.diagnosis.criticism.dependence import Dependence, Fingerprint
-from gfimu.diagnosis.criticism.residual_spectrum import ResidualSpectrum
-from gfimu.diagnosis.criticism.residuals import ResidualSize, Whiteness
+from gfimu.diagnosis.criticism.views.dependence import Dependence, Fingerprint
+from gfimu.diagnosis.criticism.views.residual_spectrum import ResidualSpectrum
+from gfimu.diagnosis.criticism.views.residuals import ResidualSize, Whiteness
 from gfimu.diagnosis.verdict.verdict import RunView
 
 __all__ = [

@@ -10,7 +10,7 @@ import numpy as np
 from jinja2 import Environment, FileSystemLoader, select_autoescape
 
 from gfimu import __version__
-from gfimu.diagnosis.criticism.residuals import ResidualViews, residual_views
+from gfimu.diagnosis.criticism.views.residuals import ResidualViews, residual_views
 from gfimu.diagnosis.report import figures
 from gfimu.diagnosis.report.plain_words import (
     gain_rows,

@@ -5,13 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from gfimu.diagnosis.named_causes import capped
 from made_diagnoses import made_diagnosis
 
 from gfimu.diagnosis import diagnose
+from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.report.page import report_html
 from gfimu.diagnosis.report.plain_words import headline
 from gfimu.diagnosis.report.wording import verdict_sentences
+from gfimu.diagnosis.verdict.naming import capped
 from gfimu.diagnosis.verdict.verdict import NamedCause
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
@@ -39,14 +40,14 @@ def twin():
     ],
 )
 def test_what_does_not_stand_out_from_its_uncertainty_is_not_certain(parameters, std, probability):
-    assert capped(NamedCause("resonance", parameters, std, 0.997)).probability == probability
-    assert capped(NamedCause("resonance", parameters, std, 0.6)).probability == 0.6
+    assert capped(NamedCause("resonance", parameters, std, 0.997), Policy()).probability == probability
+    assert capped(NamedCause("resonance", parameters, std, 0.6), Policy()).probability == 0.6
 
 
 def test_a_frequency_that_is_known_makes_no_mode_certain():
     """What a torque ripple left, named a mode: gain 0.17 ± 0.80, but a frequency of 24.5 ± 9.8 Hz, at P 0.997."""
     mode = NamedCause("resonance", {"gain": 0.17, "frequency_hz": 24.5}, {"gain": 0.80, "frequency_hz": 9.8}, 0.997)
-    assert capped(mode, {"frequency_hz": 24.5}).probability == 0.9
+    assert capped(mode, Policy(), {"frequency_hz": 24.5}).probability == 0.9
 
 
 def test_causes_that_explain_in_part_say_so_everywhere():

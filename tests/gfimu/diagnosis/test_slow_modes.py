@@ -1,17 +1,18 @@
 """Slow noise as coarse readings see it: modes against dense covariances, and what it does to an offset."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from gfimu.diagnosis.stretches import make_segments
+from core_cases import lively, part_of, small_twin, stretches_of
 from numpy.testing import assert_allclose
 
-from gfimu.diagnosis.data.rounding import rounded_likelihood
-from gfimu.diagnosis.data.run import prepare_run
+from gfimu.diagnosis.data.rounding import Steps, rounded_likelihood
+from gfimu.diagnosis.fit.learn import starting_point
+from gfimu.diagnosis.fit.posterior import condition
 from gfimu.diagnosis.terms.coloured_noise import CosineBasis, NoiseLevels, likeliest_flicker
 from gfimu.diagnosis.terms.slow_modes import SlowModes, WeighedModes, WeighedPowers
-from gfimu.geometry.array import AccelerometerArray
-from sim.campaign import Measurement, measure
-from sim.twin import Twin
+from sim.effects import make_effect
 
 PERIOD = 0.01
 WHITE, FLICKER = 0.03, 0.005
@@ -97,27 +98,29 @@ def test_slow_noise_and_what_it_takes_are_those_of_the_dense_covariance(walk):
     assert modes.explained(values)[1] == 0.0
 
 
-@pytest.mark.parametrize("coarse", [False, True])
-def test_the_drive_in_the_modes_is_its_jacobian_in_them(coarse):
-    twin = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
-    rng = np.random.default_rng(3)
-    (segment,) = make_segments(twin, [prepare_run(measure(rng, twin, [], Measurement(duration=6.0)), twin)])
-    segment.prepare_weights()
-    if coarse:
-        weight = rng.uniform(0.1, 1.0, segment.weight_mask.shape)
-        segment.modes = WeighedModes(segment.basis, segment.levels, weight)
-    line = segment.linearise([])
-    modes, weights = segment.modes, segment.inverse_variance
-    count = len(weights)
-    dense = [line.jacobian.channel(column).toarray() for column in range(count)]
-    taken = sum(
-        weights[c] * (modes.of(dense[c].T, c) * modes.share[:, c]) @ modes.of(dense[c].T, c).T for c in range(count)
-    )
-    assert_allclose(line.slow.rows.T @ line.slow.rows, taken, atol=1e-6 * np.abs(taken).max())
-    damped = rng.standard_normal((count, 4, len(modes.share)))
-    expected = sum(weights[c] * modes.of(dense[c].T, c) @ damped[c].T for c in range(count))
-    assert_allclose(line.slow.through(damped, weights), expected, atol=1e-9 * np.abs(expected).max())
-    assert_allclose(line.slow.of(5), modes.of(dense[5].T, 5), atol=1e-9)
+@pytest.mark.parametrize("step", [0.0, 0.3])
+def test_the_drive_in_the_modes_is_its_jacobian_in_them(step):
+    """Of readings finer than the noise, whose observations share the modes, and of coarse ones."""
+    rounding = [make_effect("coarse_resolution", {"step_m_s2": step})] if step else []
+    (whole,) = stretches_of(small_twin(), rounding, seed=3, duration=6.0, motion=lively())
+    stretch = replace(part_of(whole, 250), steps=Steps(channels=step))
+    white = stretch.first_levels.white
+    noise = NoiseLevels(white, np.append(np.full(len(white) - 1, 0.03), 0.0))
+    drive = starting_point([stretch], 0.1).drives[0]
+    posterior = condition(stretch, drive, [], noise)
+    modes, weights = posterior.observed.modes, posterior.observed.weights
+    assert isinstance(modes, WeighedModes) == (step > 0.0)
+    unit = np.eye(posterior.jacobian.size)
+    dense = np.stack([posterior.jacobian.times(one) for one in unit], axis=-1)  # (n, c + 1, m)
+    each = [modes.of(dense[:, c].T, c) for c in range(len(weights))]
+    for c, expected in enumerate(each):
+        assert_allclose(posterior.jacobian_modes[c], expected, atol=1e-9 * np.abs(expected).max())
+    taken = sum(weights[c] * (one * modes.share[:, c]) @ one.T for c, one in enumerate(each))
+    white_only = np.einsum("ncm,c,nck->mk", dense, weights, dense)
+    precision = drive.add_precision(np.zeros_like(taken))
+    information = np.tril(posterior.root) @ np.tril(posterior.root).T
+    assert np.abs(taken).max() > 1e-3 * np.abs(white_only).max()
+    assert_allclose(information, precision + white_only - taken, atol=2e-6 * np.abs(taken).max())
 
 
 def bias_instability(rng, basis, channels):

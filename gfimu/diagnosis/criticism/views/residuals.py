@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import dct
 
-from gfimu.diagnosis.criticism.dependence import CHANCE, Dependence, Fingerprint, dependences, fingerprint, listed
-from gfimu.diagnosis.criticism.residual_spectrum import ResidualSpectrum, order_spectrum, time_spectrum
-from gfimu.diagnosis.criticism.whiteness import cumulative_periodogram, ljung_box, standardise, whitening_gain
+from gfimu.diagnosis.criticism.views.dependence import CHANCE, Dependence, Fingerprint, dependences, fingerprint, listed
+from gfimu.diagnosis.criticism.views.residual_spectrum import ResidualSpectrum, order_spectrum, time_spectrum
+from gfimu.diagnosis.criticism.views.whiteness import cumulative_periodogram, ljung_box, standardise, whitening_gain
 from gfimu.diagnosis.verdict.verdict import RunView
 
 __all__ = ["ResidualSize", "ResidualViews", "Whiteness", "residual_views"]

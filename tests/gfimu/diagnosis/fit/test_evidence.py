@@ -6,7 +6,7 @@ from scipy.integrate import quad
 from scipy.special import logsumexp
 from scipy.stats import multivariate_normal, norm
 
-from gfimu.diagnosis.evidence import _SCALE_WEIGHTS, SCALES, log_evidence, log_evidence_each
+from gfimu.diagnosis.fit.evidence import _SCALE_WEIGHTS, SCALES, log_evidence, log_evidence_each
 
 
 def test_the_weights_of_the_scales_are_a_prior():

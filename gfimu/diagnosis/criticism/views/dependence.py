@@ -166,7 +166,7 @@ def dependences(
     channels : sequence of str
         Names of the c channels.
     gain : ndarray, shape (n, c)
-        What whitens each cosine coefficient (`gfimu.diagnosis.criticism.whiteness.whitening_gain`).
+        What whitens each cosine coefficient (`gfimu.diagnosis.criticism.views.whiteness.whitening_gain`).
     before, after : ndarray, shape (n, c)
         Residuals, m/s²; zero where invalid.
     """

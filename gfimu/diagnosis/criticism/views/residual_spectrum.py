@@ -15,7 +15,7 @@ from scipy.fft import rfft
 from scipy.signal import welch
 from scipy.stats import gamma
 
-from gfimu.diagnosis.criticism.dependence import CHANCE, listed
+from gfimu.diagnosis.criticism.views.dependence import CHANCE, listed
 from gfimu.diagnosis.terms.coloured_noise import CosineBasis
 from gfimu.diagnosis.verdict.verdict import RunView
 
