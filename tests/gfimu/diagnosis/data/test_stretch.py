@@ -32,9 +32,7 @@ def test_what_counts(stretch):
     reference_valid = np.arange(len(stretch.run.t)) % 2 == 0
     readings = stretch.run.readings.copy()
     readings[3, 1] = np.nan
-    one = replace(
-        stretch, run=replace(stretch.run, readings=readings, valid=valid, reference_valid=reference_valid)
-    )
+    one = replace(stretch, run=replace(stretch.run, readings=readings, valid=valid, reference_valid=reference_valid))
     assert one.mask.shape == (400, 7)
     assert not one.mask[3, 1]
     assert one.observations == 400 * 6 - 1 + 200
@@ -133,6 +131,8 @@ def test_after_a_gap_of_the_reference_the_angle_is_lost(twin):
 
 
 def test_true_times_of_readings(twin, stretch):
-    skewed = stretch.times([make_effect("channel_skew", {"per_chip_s": 0.01}), make_effect("tacho_latency", {"delay_s": 0.2})])
+    skewed = stretch.times(
+        [make_effect("channel_skew", {"per_chip_s": 0.01}), make_effect("tacho_latency", {"delay_s": 0.2})]
+    )
     assert_allclose(skewed[:, 2] - stretch.run.t, 0.02)
     assert_allclose(stretch.run.t - skewed[:, -1], 0.2)

@@ -25,18 +25,13 @@ def _measured(seed):
 
 @pytest.fixture(scope="module")
 def stretches():
-    return tuple(
-        replace(part_of(_measured(seed), 100), index=k)
-        for k, seed in enumerate((1, 2))
-    )
+    return tuple(replace(part_of(_measured(seed), 100), index=k) for k, seed in enumerate((1, 2)))
 
 
 @pytest.fixture(scope="module")
 def point(stretches):
     start = starting_point(stretches, 0.1)
-    drives = tuple(
-        replace(one, roughness=np.full(one.spline.intervals, 200.0), angle_std=0.02) for one in start.drives
-    )
+    drives = tuple(replace(one, roughness=np.full(one.spline.intervals, 200.0), angle_std=0.02) for one in start.drives)
     levels = tuple(NoiseLevels(one.white, np.append(np.full(6, 0.04), 0.0)) for one in start.levels)
     return Point((TILT,), drives, levels)
 
@@ -45,9 +40,7 @@ def dense_of(stretches, point, which, columns, prior=None):
     effects = [cause.effect(stretches[which].model.array, which) for cause in point.causes]
     levels = point.levels[which]
     modes = len(stretches[which].basis.corrections(levels))
-    return dense_gaussian(
-        stretches[which], point.drives[which], effects, levels, columns, modes=modes, prior=prior
-    )
+    return dense_gaussian(stretches[which], point.drives[which], effects, levels, columns, modes=modes, prior=prior)
 
 
 def test_stretches_add_up(stretches, point):
@@ -83,16 +76,16 @@ def test_a_residue_that_is_integrated_out_equals_the_dense_gaussian(stretches, p
         for one, at in zip(stretches, linearise(stretches, point).posteriors, strict=True)
     ]
     count = residues[0].shape[2]
-    whole = [
-        dense_of(stretches, point, k, np.concatenate([residues[k], columns[k]], axis=2)) for k in range(2)
-    ]
+    whole = [dense_of(stretches, point, k, np.concatenate([residues[k], columns[k]], axis=2)) for k in range(2)]
     gram, score = sum(one.gram for one in whole), sum(one.score for one in whole)
     inner = np.eye(count) + gram[:count, :count]
     gain = np.linalg.solve(inner, gram[:count, count:])
     best = np.linalg.solve(inner, score[:count])
     expected = gram[count:, count:] - gram[count:, :count] @ gain
     assert_allclose(linear.gram, expected, rtol=1e-3, atol=1e-4 * expected.max())
-    assert_allclose(linear.score, score[count:] - gram[count:, :count] @ best, rtol=1e-3, atol=1e-3 * np.sqrt(expected.max()))
+    assert_allclose(
+        linear.score, score[count:] - gram[count:, :count] @ best, rtol=1e-3, atol=1e-3 * np.sqrt(expected.max())
+    )
     assert_allclose(linear.residue, best, atol=2e-3)
     objective = sum(one.objective for one in whole) - float(score[:count] @ best)
     assert linear.objective == pytest.approx(objective, rel=1e-4)

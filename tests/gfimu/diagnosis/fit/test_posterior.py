@@ -196,9 +196,7 @@ def test_scores_of_coarse_readings_are_slopes_of_their_probability(coarse):
     columns = random_columns(coarse)
     _, score = seen.products(Columns.of(columns, seen.weight))
     for k in range(columns.shape[2]):
-        up, down = (
-            rounded_misfit(coarse, seen.prediction + size * columns[:, :, k], levels) for size in (1e-4, -1e-4)
-        )
+        up, down = (rounded_misfit(coarse, seen.prediction + size * columns[:, :, k], levels) for size in (1e-4, -1e-4))
         assert score[k] == pytest.approx(-0.25 * (up - down) / 1e-4, rel=1e-4, abs=1e-3)
 
 
@@ -211,7 +209,14 @@ def test_coarse_readings_equal_a_dense_gaussian_of_their_weights(coarse, kind):
     seen, columns = posterior.observed, random_columns(coarse)
     gram, score, _ = posterior.products(Columns.of(columns, seen.weight))
     truth = dense_gaussian(
-        coarse, drive, EFFECTS_THERE, levels, columns, modes=64, residual=seen.residual / seen.weight, weight=seen.weight
+        coarse,
+        drive,
+        EFFECTS_THERE,
+        levels,
+        columns,
+        modes=64,
+        residual=seen.residual / seen.weight,
+        weight=seen.weight,
     )
     scale = np.sqrt(np.diag(truth.gram))
     tolerance = 1e-3 if kind == "white" else 0.03  # modes with a share below 0.05 are left out
