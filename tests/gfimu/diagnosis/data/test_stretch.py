@@ -6,9 +6,9 @@ from dataclasses import FrozenInstanceError, replace
 
 import numpy as np
 import pytest
+from core_cases import lively, small_twin, stretches_of
 from numpy.testing import assert_allclose
 
-from core_cases import lively, small_twin, stretches_of
 from gfimu.diagnosis.data.run import prepare_run
 from gfimu.diagnosis.data.stretch import RunUp, make_stretches
 from gfimu.diagnosis.terms.drive import Drive

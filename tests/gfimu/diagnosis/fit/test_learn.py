@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from core_cases import cause_of, lively, small_twin, stretches_of
 from numpy.testing import assert_allclose
 
-from core_cases import cause_of, lively, small_twin, stretches_of
 from gfimu.diagnosis.criticism.slow_noise import walk_strength
 from gfimu.diagnosis.fit.learn import learn_noise, learn_roughness, starting_point
 from gfimu.diagnosis.policy import Policy

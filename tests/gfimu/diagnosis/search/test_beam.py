@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from core_cases import cause_of, lively, small_twin, stretches_of
 from numpy.testing import assert_allclose
 
-from core_cases import cause_of, lively, small_twin, stretches_of
 from gfimu.diagnosis.fit.evidence import SCALES, log_evidence
 from gfimu.diagnosis.fit.learn import starting_point
 from gfimu.diagnosis.policy import Policy

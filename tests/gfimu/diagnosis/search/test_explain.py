@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from core_cases import cause_of, lively, small_twin, stretches_of
 from numpy.testing import assert_allclose
 from scipy.interpolate import CubicSpline
 from scipy.signal import lfilter
 
-from core_cases import cause_of, lively, small_twin, stretches_of
 from gfimu.diagnosis.fit.learn import starting_point
 from gfimu.diagnosis.fit.posterior import condition
 from gfimu.diagnosis.policy import Policy

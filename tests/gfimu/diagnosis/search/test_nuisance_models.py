@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-
 from core_cases import small_twin, stretches_of
+
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.nuisance_models import understand
 from sim.effects import EFFECTS, make_effect

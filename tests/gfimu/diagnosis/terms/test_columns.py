@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from core_cases import dense
 from numpy.testing import assert_allclose, assert_array_equal
 
-from core_cases import dense
 from gfimu.diagnosis.terms.columns import Columns
 
 

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from core_cases import cause_of, dense, lively, small_twin, stretches_of
 from numpy.testing import assert_allclose
 
-from core_cases import cause_of, dense, lively, small_twin, stretches_of
 from gfimu.diagnosis.fit.learn import starting_point
 from gfimu.diagnosis.terms.cause import Cause, effects_of, mixing_of
 from gfimu.diagnosis.terms.library import cause_columns, family_columns

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
 from core_cases import cause_of, lively, small_twin
+
 from gfimu.diagnosis.criticism.series_tests import LackOfFit
 from gfimu.diagnosis.data.prepared_runs import PreparedRuns
 from gfimu.diagnosis.data.stretch import make_stretches
