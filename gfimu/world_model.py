@@ -37,8 +37,8 @@ __all__ = [
     "WorldModel",
     "bound_of",
     "is_of_one_recording",
-    "memory_of",
     "is_of_wiring",
+    "memory_of",
     "shapes_to_screen",
 ]
 

@@ -176,7 +176,7 @@ def _without_residue(whole: Linear, count: int, explained: float) -> Linear:
 def energy_of(stretches: Sequence[Stretch], point: Point) -> float:
     """Return misfit and prior energy of a point, its drives held, a residue at its best."""
 
-    def one(stretch: Stretch, drive: Drive, levels: NoiseLevels, residue: Columns | None):  # noqa: ANN202
+    def one(stretch: Stretch, drive: Drive, levels: NoiseLevels, residue: Columns | None):
         effects = effects_of(point.causes, stretch.model.array, stretch.index)
         if residue is None:
             return energy(stretch, drive, effects, levels), None

@@ -1,0 +1,85 @@
+"""Sets of hypotheses on the normal equations of a screening."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from core_cases import cause_of, lively, small_twin, stretches_of
+from numpy.testing import assert_allclose
+
+from gfimu.diagnosis.fit.evidence import SCALES, log_evidence
+from gfimu.diagnosis.fit.learn import starting_point
+from gfimu.diagnosis.policy import Policy
+from gfimu.diagnosis.search.beam import Blocks, leading_sets
+from gfimu.diagnosis.search.screening import screen
+
+TWIN = small_twin()
+TRUTH = cause_of("table_tilt", TWIN.array, [1.0, -0.5])
+
+
+@pytest.fixture(scope="module")
+def blocks():
+    stretches = stretches_of(TWIN, [TRUTH.effect(TWIN.array, 0)], duration=6.0, motion=lively())
+    return Blocks(screen(stretches, starting_point(stretches, 0.1)), Policy())
+
+
+def block_of(blocks, members):
+    """G, b and signs of a set, cause by cause."""
+    screening = blocks.screening
+    mixing, positive = np.zeros((len(screening.score), 0)), []
+    for number in members:
+        hypothesis = screening.hypotheses[number]
+        mine = np.zeros((len(screening.score), hypothesis.cause.mixing.shape[1]))
+        mine[hypothesis.signature.columns] = hypothesis.cause.mixing
+        mixing, positive = np.hstack([mixing, mine]), [*positive, *hypothesis.positive]
+    return mixing.T @ screening.gram @ mixing, mixing.T @ screening.score, np.array(positive)
+
+
+@pytest.mark.parametrize("members", [(0,), (3,), (0, 40), (5, 60, 110)])
+def test_log_odds_are_the_evidence_of_the_block(blocks, members):
+    prior = sum(blocks.hypotheses[k].cause.log_prior for k in members)
+    prior += Policy().extra_cause * (len(members) - 1)
+    expected = log_evidence(*block_of(blocks, members)) + prior
+    assert blocks.log_odds(members) == pytest.approx(expected, rel=1e-9, abs=1e-6)
+
+
+def test_log_odds_of_every_hypothesis_alone(blocks):
+    each = blocks.log_odds_each()
+    for number in range(0, len(each), 7):
+        assert each[number] == pytest.approx(blocks.log_odds((number,)), rel=1e-6, abs=1e-5)
+
+
+def test_log_odds_beside_a_set_have_its_sizes_integrated_out(blocks):
+    members = (int(np.argmax(blocks.log_odds_each())),)
+    each = blocks.log_odds_each(members)
+    count = len(block_of(blocks, members)[1])
+    for number in range(0, len(each), 11):
+        gram, score, positive = block_of(blocks, (*members, number))
+        inner = np.linalg.inv(gram[:count, :count] + np.eye(count) / SCALES[-1] ** 2)
+        rest = gram[count:, count:] - gram[count:, :count] @ inner @ gram[:count, count:]
+        right = score[count:] - gram[count:, :count] @ inner @ score[:count]
+        expected = log_evidence(rest, right, positive[count:]) + blocks.hypotheses[number].cause.log_prior
+        assert each[number] == pytest.approx(expected, rel=1e-4, abs=0.05)
+
+
+def test_leading_sets_are_the_best_of_each_set_of_names(blocks):
+    sets = leading_sets(blocks, 2, Policy())
+    names = [frozenset(blocks.hypotheses[k].cause.name for k in one.members) for one in sets]
+    assert len(set(names)) == len(names) <= 2 * Policy().beam
+    assert all(len(name) == len(one.members) for name, one in zip(names, sets, strict=True))  # no effect twice
+    assert [one.log_odds for one in sets] == sorted((one.log_odds for one in sets), reverse=True)
+    assert all("table_tilt" in name for name in names[:3])
+    alone = blocks.log_odds_each()
+    for name, one in zip(names, sets, strict=True):
+        if len(name) == 1:
+            mine = [k for k, h in enumerate(blocks.hypotheses) if h.cause.name in name]
+            assert one.log_odds == pytest.approx(alone[mine].max())
+
+
+def test_causes_are_at_their_linear_estimates(blocks):
+    (number,) = next(one.members for one in leading_sets(blocks, 1, Policy()) if len(one.members) == 1)
+    (cause,) = blocks.causes((number,))
+    gram, score, _ = block_of(blocks, (number,))
+    assert_allclose(cause.coordinates, np.linalg.solve(gram + np.eye(len(score)) / SCALES[-1] ** 2, score), rtol=1e-6)
+    assert cause.name == "table_tilt"
+    assert_allclose(cause.coordinates, TRUTH.coordinates, atol=0.1)
