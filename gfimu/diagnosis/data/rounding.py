@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import log_ndtr, ndtr
 
-__all__ = ["COARSE", "Steps", "WorkingResidual", "common_step", "rounded_likelihood", "rounding_noise"]
+__all__ = ["COARSE", "NO_STEPS", "Steps", "WorkingResidual", "common_step", "rounded_likelihood", "rounding_noise"]
 
 COARSE = 1.5
 """Steps per standard deviation of the noise from which rounding is no longer like noise."""
@@ -122,6 +122,10 @@ class Steps:
             return cls(), noise
         before = max(np.sqrt(max(noise**2 - step**2 / 12.0, 0.0)), _LEAST_NOISE * step)
         return (cls(reference=step), float(before)) if step > COARSE * before else (cls(), noise)
+
+
+NO_STEPS = Steps()
+"""Observations whose steps are finer than their noise."""
 
 
 def common_step(values: NDArray[np.float64]) -> float | None:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
-from gfimu.diagnosis.data.rounding import COARSE, Steps
+from gfimu.diagnosis.data.rounding import COARSE, NO_STEPS, Steps
 from gfimu.diagnosis.data.run import Run, difference_noise, smooth_rate
 from gfimu.diagnosis.terms.coloured_noise import CosineBasis, NoiseLevels
 from gfimu.diagnosis.terms.spline import JoinedSpin, ScaledSpin
@@ -77,7 +77,7 @@ class Stretch:
     index: int
     start: float
     known: tuple[Effect, ...] = ()
-    steps: Steps = Steps()
+    steps: Steps = NO_STEPS
     start_angle: float = 0.0
     start_angle_std: float = 1e-4
     stretches: int = 1

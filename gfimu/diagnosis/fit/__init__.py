@@ -1,1 +1,1 @@
-"""TODO"""
+"""Fit: linearise, integrate out the nuisance parameters, step, learn."""

@@ -23,6 +23,7 @@ from gfimu.diagnosis.terms.residue import Residue
 
 __all__ = ["Linear", "Point", "energy_of", "linearise", "of_causes", "with_residue"]
 
+_Products = tuple[NDArray[np.float64], NDArray[np.float64]]
 ColumnsOf = Callable[[Stretch, Posterior], Columns]
 
 
@@ -159,7 +160,7 @@ def _without_residue(whole: Linear, count: int, explained: float) -> Linear:
     inner = whole.gram[:count, :count] + np.eye(count)
     root = np.linalg.cholesky(inner)
     solved = np.linalg.solve(inner, np.column_stack([whole.score[:count], whole.gram[:count, count:]]))
-    best, gain = solved[:, 0], solved[:, 1:]
+    best, gain = np.asarray(solved[:, 0], dtype=np.float64), solved[:, 1:]
     return Linear(
         whole.gram[count:, count:] - whole.gram[count:, :count] @ gain,
         whole.score[count:] - whole.gram[count:, :count] @ best,
@@ -176,13 +177,13 @@ def _without_residue(whole: Linear, count: int, explained: float) -> Linear:
 def energy_of(stretches: Sequence[Stretch], point: Point) -> float:
     """Return misfit and prior energy of a point, its drives held, a residue at its best."""
 
-    def one(stretch: Stretch, drive: Drive, levels: NoiseLevels, residue: Columns | None):
+    def one(stretch: Stretch, drive: Drive, levels: NoiseLevels, residue: Columns | None) -> tuple[float, _Products]:
         effects = effects_of(point.causes, stretch.model.array, stretch.index)
         if residue is None:
-            return energy(stretch, drive, effects, levels), None
+            return energy(stretch, drive, effects, levels), (np.zeros((0, 0)), np.zeros(0))
         prediction = stretch.predict(effects, drive.spin)
         if not np.isfinite(prediction).all():
-            return np.inf, None
+            return np.inf, (np.zeros((0, 0)), np.zeros(0))
         seen = observe(stretch, prediction, levels)
         return seen.misfit + drive.energy(), seen.products(residue)
 

@@ -1,1 +1,1 @@
-"""TODO"""
+"""Terms: everything unknown, how it shows in the observations, and its prior."""

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.diagnosis.data.rounding import Steps
+from gfimu.diagnosis.data.rounding import NO_STEPS, Steps
 from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.terms.coloured_noise import NoiseLevels
 from gfimu.diagnosis.terms.columns import Columns
@@ -47,7 +47,7 @@ class Observed:
     lacking: float
     modes: SlowModes
     levels: NoiseLevels
-    steps: Steps = Steps()
+    steps: Steps = NO_STEPS
 
     @cached_property
     def weights(self) -> NDArray[np.float64]:

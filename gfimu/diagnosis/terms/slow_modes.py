@@ -55,6 +55,7 @@ class SlowModes:
 
     @cached_property
     def cosines(self) -> NDArray[np.float64]:
+        """The cosines, shape (n, K)."""
         return self._basis.matrix(len(self.share))  # (n, K)
 
     def of(self, values: NDArray[np.float64], column: int) -> NDArray[np.float64]:
@@ -93,6 +94,7 @@ class WeighedModes(SlowModes):
 
     @cached_property
     def cosines(self) -> NDArray[np.float64]:
+        """The cosines, shape (n, K)."""
         return self._basis.matrix(self._count)
 
     @cached_property
