@@ -75,7 +75,7 @@ class AngleSpline:
         return row
 
     def rows(self, t: NDArray[np.float64], order: int) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-        """Return the first coefficient (n,) at each time, and what angle or derivative takes of five from it, (n, 5)."""
+        """Return the first coefficient (n,) at each time and what angle or derivative takes of five, (n, 5)."""
         first, passed = self.interval(t)
         pieces = _pieces()
         for _ in range(order):
