@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -77,7 +77,7 @@ class Stretch:
     index: int
     start: float
     known: tuple[Effect, ...] = ()
-    steps: Steps = Steps()
+    steps: Steps = field(default_factory=Steps)
     start_angle: float = 0.0
     start_angle_std: float = 1e-4
     stretches: int = 1

@@ -154,8 +154,8 @@ def _many(functions: int) -> str:
 def _residue_sentence(scale: float) -> str:
     times = "what" if scale == 1.0 else f"{scale:g} times what"
     return (
-        f"The twin's calibration is a little off everywhere, by {times} a good calibration leaves of bias, gain, axes and "
-        "position; no single cause stands behind that, and the extended twin has the corrections."
+        f"The twin's calibration is a little off everywhere, by {times} a good calibration leaves of bias, gain, axes "
+        "and position; no single cause stands behind that, and the extended twin has the corrections."
     )
 
 

@@ -157,7 +157,7 @@ def _near(sets: Sets, best: Fit) -> list[Fit]:
 
 
 def explained(sets: Sets, best: Fit, fits: int, screening: Screening | None = None) -> Explanation:
-    """Return the best of some sets with what it is compared with, and a screening about it, taken where there is none."""
+    """Return the best of some sets with what it is compared with, and a screening about it, made where missing."""
     without = {
         cause.name: sets.found[best.key - {cause.key}] for cause in best.causes if best.key - {cause.key} in sets.found
     }
@@ -187,7 +187,7 @@ def _under(sets: Sets, base: Point, some: Sequence[Fit]) -> Sets:
 
 
 def _fit_leaders(sets: Sets, screening: Screening, about: Fit, *, near: bool) -> None:
-    """Fit the sets that lead in a linear world; ``near`` the best, where that world is the true one, only close ones."""
+    """Fit the sets that lead in a linear world; ``near`` the best, where that world is true, only close ones."""
     policy = sets.policy
     blocks = Blocks(screening, policy)
     most = min(max(2, len(about.causes) + 1), policy.most_causes)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -77,7 +78,7 @@ def _models(stretches: Sequence[Stretch], plain: Explanation, policy: Policy) ->
     if Residue.is_possible(first) and not any(s.steps.channels for s in stretches):
         residues = list(policy.residue_odds)
     for scale, odds in residues:
-        found.append((f"calibration residue × {scale:g}", lambda p, s=scale: with_residue(stretches, p, s), odds))
+        found.append((f"calibration residue × {scale:g}", partial(with_residue, stretches, scale=scale), odds))
     if first.first_levels.walk == 0.0:
         found.append(("random walk", lambda p: _walking(stretches, p, policy), policy.walk_odds))
         for scale, odds in residues[:1]:

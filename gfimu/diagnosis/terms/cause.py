@@ -71,7 +71,7 @@ class Cause:
         """Shape parameters that a fit may move."""
         if self.held:
             return ()
-        whole = getattr(self.family, "whole", frozenset())
+        whole: frozenset[str] = getattr(self.family, "whole", frozenset())
         return tuple(key for key in self.shape if key not in whole)
 
     @property

@@ -35,7 +35,7 @@ class Columns:
     @classmethod
     def of(cls, values: NDArray[np.float64], mask: NDArray[np.float64]) -> Columns:
         """Take columns (n, c, P), weighed by sample (n, c)."""
-        there = values.any(axis=0)  # (c, P)
+        there = np.asarray(values.any(axis=0))  # (c, P)
         places = tuple(np.flatnonzero(mine) for mine in there)
         parts = tuple(np.ascontiguousarray(values[:, c, at] * mask[:, [c]]) for c, at in enumerate(places))
         return cls(values.shape[2], places, parts)

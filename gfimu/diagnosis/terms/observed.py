@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -47,7 +47,7 @@ class Observed:
     lacking: float
     modes: SlowModes
     levels: NoiseLevels
-    steps: Steps = Steps()
+    steps: Steps = field(default_factory=Steps)
 
     @cached_property
     def weights(self) -> NDArray[np.float64]:

@@ -55,7 +55,8 @@ class SlowModes:
 
     @cached_property
     def cosines(self) -> NDArray[np.float64]:
-        return self._basis.matrix(len(self.share))  # (n, K)
+        """C, shape (n, K)."""
+        return self._basis.matrix(len(self.share))
 
     def of(self, values: NDArray[np.float64], column: int) -> NDArray[np.float64]:
         """Return what each mode has of rows (p, n) of one observation, shape (p, K)."""
@@ -93,6 +94,7 @@ class WeighedModes(SlowModes):
 
     @cached_property
     def cosines(self) -> NDArray[np.float64]:
+        """C, shape (n, K)."""
         return self._basis.matrix(self._count)
 
     @cached_property

@@ -74,7 +74,7 @@ class AngleSpline:
         return row
 
     def rows(self, t: NDArray[np.float64], order: int) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-        """Return the first coefficient (n,) at each time, and what the angle, or a derivative, takes of five, (n, 5)."""
+        """Return the first coefficient (n,) at each time, and what angle or derivative takes of five, (n, 5)."""
         first, passed = self.interval(t)
         pieces = _pieces()
         for _ in range(order):
@@ -87,7 +87,7 @@ class AngleSpline:
 
     def through(self, spin: Spin) -> NDArray[np.float64]:
         """Return the coefficients (m,) of the spline that a motion is closest to, sampled twice an interval."""
-        t = self.start + 0.5 * self.spacing * (np.arange(2 * self.intervals) + 0.5)
+        t = np.asarray(self.start + 0.5 * self.spacing * (np.arange(2 * self.intervals) + 0.5), dtype=np.float64)
         first, passed = self.interval(t)
         values = np.vander(passed, DEGREE + 1, increasing=True) @ _pieces()  # (n, 5)
         normal, right = np.zeros((DEGREE + 1, self.size)), np.zeros(self.size)
