@@ -170,8 +170,11 @@ def _without_residue(whole: Linear, count: int, explained: float) -> Linear:
         tuple(own + way[:, :count] @ best for own, way in zip(whole.drive_steps, whole.responses, strict=True)),
         tuple(way[:, count:] - way[:, :count] @ gain for way in whole.responses),
         whole.posteriors,
-        best,
+        np.asarray(best, dtype=np.float64),
     )
+
+
+_Products = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 
 def energy_of(stretches: Sequence[Stretch], point: Point) -> float:
@@ -192,7 +195,7 @@ def energy_of(stretches: Sequence[Stretch], point: Point) -> float:
     total = float(sum(row[0] for row in rows))
     if not np.isfinite(total):
         return np.inf
-    return total - _taken([row[1] for row in rows]) if point.residue is not None else total
+    return total - _taken([row[1] for row in rows if row[1] is not None]) if point.residue is not None else total
 
 
 def _explained(residue: Residue, posteriors: Sequence[Posterior]) -> float:
