@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -143,7 +144,7 @@ def dense_gaussian(
 ) -> DenseGaussian:
     """Integrate out drive, slow noise and some columns by the covariance of all observations.
 
-    The drive is no spline here: a fourth derivative N(0, ρ²) in each interval, and a free polynomial of the third order.
+    The drive is no spline here: a fourth derivative N(0, ρ²) in each interval, and a free cubic polynomial.
 
     Parameters
     ----------
@@ -175,9 +176,7 @@ def dense_gaussian(
 
     h, begin = drive.spline.spacing, drive.spline.start
     edges = begin + h * np.arange(drive.spline.intervals + 1)
-    bends = np.stack(
-        [flat(response(stretch, drive, effects, a, b, 4)) for a, b in zip(edges[:-1], edges[1:], strict=True)], axis=1
-    )
+    bends = np.stack([flat(response(stretch, drive, effects, a, b, 4)) for a, b in pairwise(edges)], axis=1)
     poly = np.stack([flat(response(stretch, drive, effects, begin, np.inf, p)) for p in range(4)], axis=1)
     right, unknown = flat(off), flat(columns)
     if np.isfinite(drive.angle_std):  # one more observation: the angle at first
