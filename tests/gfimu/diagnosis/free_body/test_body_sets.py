@@ -78,4 +78,4 @@ def test_a_verdict_asks_no_more_of_a_fit_than_a_free_body_has():
     compared: Comparison[BodyFit] = Comparison(best, nothing, {"gyro_latency": nothing}, (rival,), sets.screening)
     assert probabilities(compared, Policy())["gyro_latency"] == Policy().most_certain
     assert conflicting(compared, Policy()) == []
-    assert [one.causes for one in rival_list(compared, Policy())] == [("chip_delay",), ("nothing",)]
+    assert [one.effects for one in rival_list(compared, Policy())] == [("chip_delay",), ("nothing",)]
