@@ -174,9 +174,6 @@ def _without_residue(whole: Linear, count: int, explained: float) -> Linear:
     )
 
 
-_Products = tuple[NDArray[np.float64], NDArray[np.float64]]
-
-
 def energy_of(stretches: Sequence[Stretch], point: Point) -> float:
     """Return misfit and prior energy of a point, its drives held, a residue at its best."""
 
