@@ -88,9 +88,10 @@ def reference_ignored(patch):
         kept = target.observe
 
         def blind(stretch, prediction, levels, kept=kept):
-            prediction = prediction.copy()
-            prediction[:, -1] = stretch.measured[:, -1]
-            return kept(stretch, prediction, levels)
+            seen = kept(stretch, prediction, levels)
+            residual, weight = seen.residual.copy(), seen.weight.copy()
+            residual[:, -1] = weight[:, -1] = 0.0
+            return replace(seen, residual=residual, weight=weight)
 
         patch.setattr(target, "observe", blind)
 
