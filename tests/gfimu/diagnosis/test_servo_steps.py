@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gfimu.diagnosis import diagnose
-from gfimu.diagnosis.data.prepared_runs import PreparedRuns
+from gfimu.diagnosis.diagnose import prepare
 from gfimu.geometry.array import AccelerometerArray
 from sim.campaign import Measurement, measure
 from sim.effects import make_effect
@@ -68,7 +68,7 @@ def test_knots_are_set_by_the_arms_about_the_axis():
     recording = measure(rng, mounted(0.0), (), Measurement(duration=DURATION), motion=ServoSteps(rng))
     knots = []
     for twin in (mounted(0.0), mounted(0.5)):
-        (segment,), _ = PreparedRuns.build([recording], twin, ["run"]).segments(twin)
+        (segment,), _ = prepare([recording], twin, ["run"]).segments(twin)
         assert segment.sharpen_by_reference()
         knots.append(segment.spline.size)
     assert knots[1] > knots[0]

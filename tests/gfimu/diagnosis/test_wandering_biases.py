@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from gfimu.diagnosis import diagnose
-from gfimu.diagnosis.data.prepared_runs import PreparedRuns
 from gfimu.diagnosis.data.stretch import make_stretches
+from gfimu.diagnosis.diagnose import prepare
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.nuisance_models import understand
 from sim.study.cases import Case
@@ -19,7 +19,7 @@ from sim.study.outcome import draw_world
 )
 def test_the_biases_walk_where_a_walk_is_hidden_and_nowhere_else(effects, walks):
     world = draw_world(Case("walks", 91001, effects, 1000.0, duration=40.0))
-    prepared = PreparedRuns.build([world.recording], world.twin, ["run"])
+    prepared = prepare([world.recording], world.twin, ["run"])
     found = understand(make_stretches(world.twin, prepared.runs, prepared.effects), Policy())
     assert (found.walk is not None) == walks
 

@@ -8,8 +8,8 @@ from functools import cache
 
 import numpy as np
 
-from gfimu.diagnosis.data.prepared_runs import PreparedRuns
 from gfimu.diagnosis.data.stretch import Stretch, make_stretches
+from gfimu.diagnosis.diagnose import prepare
 from gfimu.diagnosis.fit.gauss_newton import Fit, fit
 from gfimu.diagnosis.fit.learn import learn_noise, learn_roughness, starting_point
 from gfimu.diagnosis.policy import Policy
@@ -60,7 +60,7 @@ def cause(name: str, place: str = "", shape: Mapping[str, float] | None = None) 
 
 def fitted(*runs: Recording, causes: Sequence[Cause] = (), exact: bool = False) -> tuple[tuple[Stretch, ...], Fit]:
     """The stretches of runs and a fit of causes, noise and roughness learnt."""
-    prepared = PreparedRuns.build(runs, twin(), [f"run {number}" for number in range(len(runs))])
+    prepared = prepare(runs, twin(), [f"run {number}" for number in range(len(runs))])
     stretches = make_stretches(twin(), prepared.runs, prepared.effects)
     point = learn_roughness(stretches, replace(starting_point(stretches, POLICY.knots), causes=tuple(causes)), 2)
     first = fit(stretches, point, POLICY)

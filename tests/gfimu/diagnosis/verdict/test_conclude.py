@@ -9,8 +9,8 @@ import pytest
 from core_cases import cause_of, lively, small_twin
 
 from gfimu.diagnosis.criticism.series_tests import LackOfFit
-from gfimu.diagnosis.data.prepared_runs import PreparedRuns
 from gfimu.diagnosis.data.stretch import make_stretches
+from gfimu.diagnosis.diagnose import prepare
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.explain import explain
 from gfimu.diagnosis.search.nuisance_models import Understanding
@@ -28,7 +28,7 @@ NOTHING_LEFT = LackOfFit(-np.inf, "", {})
 def prepared():
     rng = np.random.default_rng(1)
     recording = measure(rng, TWIN, [HIDDEN.effect(TWIN.array, 0)], Measurement(8.0, 50.0), motion=lively())
-    return PreparedRuns.build([recording], TWIN, ["run"])
+    return prepare([recording], TWIN, ["run"])
 
 
 @pytest.fixture(scope="module")
