@@ -108,7 +108,8 @@ def _start(
     best = max(one.best.log_posterior for one in known)
     tried: list[Fit] = []
     for one in known:
-        for base in (one.best, one.nothing) if one.best.causes else (one.best,):
+        # A slow cause may stand for a random walk: it shows where that is left out.
+        for base in (one.best, one.nothing, *one.without.values()) if one.best.causes else (one.best,):
             point = admit(base.point)
             if point is None:
                 continue
