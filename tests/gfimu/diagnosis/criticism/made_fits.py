@@ -65,7 +65,7 @@ def fitted(*runs: Recording, causes: Sequence[Cause] = (), exact: bool = False) 
     point = learn_roughness(stretches, replace(starting_point(stretches, POLICY.knots), causes=tuple(causes)), 2)
     first = fit(stretches, point, POLICY)
     point = learn_noise(stretches, learn_roughness(stretches, first.point))
-    return stretches, fit(stretches, point, POLICY, exact=exact)
+    return stretches, fit(stretches, replace(point, exact=exact), POLICY)
 
 
 @cache
