@@ -16,7 +16,7 @@ from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.beam import Blocks, leading_sets
 from gfimu.diagnosis.search.comparison import Comparison
 from gfimu.diagnosis.search.screening import Screening, screen
-from gfimu.diagnosis.terms.cause import Cause
+from gfimu.diagnosis.terms.cause import Cause, effects_of
 from gfimu.diagnosis.terms.drive import Drive
 from gfimu.world_model import memory_of
 
@@ -145,7 +145,8 @@ def _relearned(stretches: Sequence[Stretch], best: Fit, policy: Policy, *, sharp
 
     The roughness that was learnt without a cause has taken in what that does; each round gives some of it back.
     """
-    found, point = best, best.point
+    point = best.point
+    found = replace(best, point=_reaching(stretches, best.point))
     for _ in range(policy.rounds):
         before = found
         point = learn_roughness(stretches, found.point, policy.learnings)
@@ -157,7 +158,16 @@ def _relearned(stretches: Sequence[Stretch], best: Fit, policy: Policy, *, sharp
         found = fit(stretches, point, policy)
         if found.log_posterior - before.log_posterior < policy.steady:
             break
-    return replace(point, drives=found.point.drives) if found is not best else point
+    return replace(point, drives=found.point.drives) if found.point is not best.point and best.causes else point
+
+
+def _reaching(stretches: Sequence[Stretch], point: Point) -> Point:
+    """Return the point with drives that reach as far as its causes ask for: a slow clock, late chips."""
+    drives = []
+    for stretch, drive in zip(stretches, point.drives, strict=True):
+        times = stretch.times(effects_of(point.causes, stretch.model.array, stretch.index))
+        drives.append(drive.covering(times))
+    return replace(point, drives=tuple(drives))
 
 
 def _near(sets: Sets, best: Fit) -> list[Fit]:
