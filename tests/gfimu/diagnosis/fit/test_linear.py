@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from core_cases import cause_of, dense, dense_gaussian, lively, part_of, small_twin, stretches_of
-from gfimu.diagnosis.coloured_noise import NoiseLevels
+from gfimu.diagnosis.terms.coloured_noise import NoiseLevels
 from numpy.testing import assert_allclose
 
 from gfimu.diagnosis.fit.learn import starting_point

@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from gfimu.diagnosis import parallel
+from gfimu.diagnosis.fit import parallel
 from gfimu.diagnosis.fit.parallel import each_apart, over_segments
 
 
