@@ -64,6 +64,9 @@ class Comparison(Generic[F]):
         Other sets, best first, under the same nuisance parameters.
     screening : Screening
         The last one, about the best set.
+    elsewhere : tuple of FittedSet
+        The best set under each other model of the nuisance parameters, its log posterior less what that model needs
+        more than this one.
     """
 
     best: F
@@ -71,3 +74,4 @@ class Comparison(Generic[F]):
     without: dict[str, F]
     rivals: tuple[F, ...]
     screening: Screening
+    elsewhere: tuple[F, ...] = ()

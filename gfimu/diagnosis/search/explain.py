@@ -188,7 +188,7 @@ def explained(sets: Sets, best: Fit, fits: int, screening: Screening | None = No
     rivals = tuple(one for one in sets.ranked() if one.causes and one.key != best.key)
     nothing = _nothing(sets)
     about = screening if screening is not None else screen(sets.stretches, best.point)
-    return Explanation(best, nothing, without, rivals, about, tuple(sets.stretches), fits)
+    return Explanation(best, nothing, without, rivals, about, stretches=tuple(sets.stretches), fits=fits)
 
 
 def _nothing(sets: Sets) -> Fit:
@@ -237,7 +237,7 @@ def reduced(explanation: Explanation, name: str, policy: Policy) -> Explanation:
         if name not in one.names:
             sets.found[one.key] = one
     sets.found = {key: one for key, one in sets.found.items() if one.key <= explanation.best.key}
-    return explained(sets, prune(sets), explanation.fits)
+    return replace(explained(sets, prune(sets), explanation.fits), elsewhere=explanation.elsewhere)
 
 
 def exactly(explanation: Explanation, policy: Policy) -> Explanation:

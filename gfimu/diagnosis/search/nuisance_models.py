@@ -11,8 +11,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
-import numpy as np
-
 from gfimu.diagnosis.criticism.slow_noise import Walk, walk_strength
 from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.fit.gauss_newton import Fit
@@ -41,7 +39,7 @@ class Understanding:
     residue : float
         Size of the residue of the calibration in units of its tolerances; 0 where it has none.
     log_odds : float
-        For this model over the next.
+        That this model needs over white noise and bias instability alone.
     """
 
     explanation: Explanation
@@ -63,9 +61,12 @@ def understand(stretches: Sequence[Stretch], policy: Policy, report: Report | No
         if start is not None:
             found.append(_understood(stretches, explain(stretches, policy, start=start), policy, odds))
     found.sort(key=lambda one: one.explanation.best.log_posterior - one.log_odds, reverse=True)
-    values = [one.explanation.best.log_posterior - one.log_odds for one in found]
-    odds = values[0] - values[1] if len(values) > 1 else np.inf
-    return replace(found[0], explanation=exactly(found[0].explanation, policy), log_odds=odds)
+    best, elsewhere = found[0], []
+    for other in found[1:]:
+        fitted = other.explanation.best
+        more = other.log_odds - best.log_odds
+        elsewhere.append(replace(fitted, log_posterior=fitted.log_posterior - more))
+    return replace(best, explanation=replace(exactly(best.explanation, policy), elsewhere=tuple(elsewhere)))
 
 
 _Admit = Callable[[Point], Point | None]

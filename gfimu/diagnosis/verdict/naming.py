@@ -33,9 +33,9 @@ __all__ = [
 
 
 def probabilities(explanation: Comparison[F], policy: Policy) -> dict[str, float]:
-    """Return the probability of each effect to be among the causes, over all sets that were fitted."""
+    """Return the probability of each effect to be among the causes, over all sets and models that were fitted."""
     every = (explanation.nothing, *explanation.without.values(), *explanation.rivals, explanation.best)
-    fits = list({one.key: one for one in every}.values())
+    fits = [*{one.key: one for one in every}.values(), *explanation.elsewhere]
     weight = softmax(np.array([one.log_posterior for one in fits]) / policy.temperature)
     names = frozenset().union(*(one.names for one in fits))
     summed = {name: sum(w for w, one in zip(weight, fits, strict=True) if name in one.names) for name in names}
@@ -169,6 +169,7 @@ def name_cause(
     parameters, std = cause_parameters(cause, array)
     same = mimics(explanation, cause, policy) if fit is explanation.best else []
     without = explanation.without.get(cause.name)
+    why = _sentence(cause, array, share) + _or_other_nuisances(explanation, cause, policy)
     named = NamedCause(
         cause.name,
         parameters,
@@ -177,10 +178,21 @@ def name_cause(
         cause.place,
         tuple(same),
         str(cause.family.separated_by) if same else "",
-        _sentence(cause, array, share),
+        why,
         0.0 if without is None else float(fit.log_posterior - without.log_posterior),
     )
     return capped(named, policy, cause.shape)
+
+
+def _or_other_nuisances(explanation: Comparison[F], cause: Cause, policy: Policy) -> str:
+    """Say so where other nuisance parameters, small errors of all numbers or slow noise, would do as well."""
+    near = explanation.best.log_posterior - policy.ambiguous
+    if not any(cause.name not in other.names and other.log_posterior > near for other in explanation.elsewhere):
+        return ""
+    return (
+        "; small errors of all numbers of the calibration, or biases that drift, would do as well: calibrate the unit "
+        "anew"
+    )
 
 
 def capped(cause: NamedCause, policy: Policy, shape: Container[str] = ()) -> NamedCause:
