@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.fit.evidence import SCALES, inverse, log_evidence
 from gfimu.diagnosis.fit.linear import Linear, Point, energy_of, linearise, of_causes
+from gfimu.diagnosis.fit.posterior import remembers_long
 from gfimu.diagnosis.policy import Policy
-from gfimu.diagnosis.terms.cause import Cause
+from gfimu.diagnosis.terms.cause import Cause, effects_of
 from gfimu.diagnosis.terms.jacobian import Jacobian
 from gfimu.geometry.array import AccelerometerArray
 
@@ -95,6 +96,22 @@ def fit(stretches: Sequence[Stretch], start: Point, policy: Policy) -> Fit:
     """
     array = stretches[0].model.array
     point = replace(start, causes=tuple(cause.moved(np.zeros(cause.unknowns), array) for cause in start.causes))
+    point, linear, done = _descend(stretches, replace(point, exact=start.exact and _is_long(stretches, point)), policy)
+    if not point.exact and _is_long(stretches, point):
+        point, linear, more = _descend(stretches, replace(point, exact=True), policy)
+        done += more
+    found = _judged(stretches, point, linear, done)
+    return replace(found, log_posterior=found.log_evidence + log_prior(point.causes, policy))
+
+
+def _is_long(stretches: Sequence[Stretch], point: Point) -> bool:
+    """Tell whether a cause remembers the drive for so long that the cheap derivative leaves it out."""
+    return any(remembers_long(effects_of(point.causes, one.model.array, one.index)) for one in stretches[:1])
+
+
+def _descend(stretches: Sequence[Stretch], point: Point, policy: Policy) -> tuple[Point, Linear, int]:
+    """Take Gauss-Newton steps until they promise no more; returns point, linearisation there and number of steps."""
+    array = stretches[0].model.array
     now = _energy(stretches, point)
     linear = linearise(stretches, point, of_causes(point))
     done = 0
@@ -115,8 +132,7 @@ def fit(stretches: Sequence[Stretch], start: Point, policy: Policy) -> Fit:
         linear = linearise(stretches, point, of_causes(point), jacobians=kept)
         if stalled:
             break
-    found = _judged(stretches, point, linear, done)
-    return replace(found, log_posterior=found.log_evidence + log_prior(point.causes, policy))
+    return point, linear, done
 
 
 def _dear(linear: Linear) -> tuple[Jacobian | None, ...]:
@@ -178,7 +194,8 @@ def _moved(point: Point, linear: Linear, share: float, step: NDArray[np.float64]
 
 def _judged(stretches: Sequence[Stretch], point: Point, linear: Linear, steps: int) -> Fit:
     """Return the fit at a point: covariances, and Laplace's evidence relative to no sizes."""
-    volume = linear.log_volume + linear.log_noise
+    free = linearise(stretches, replace(point, exact=False)) if point.exact else linear
+    volume = free.log_volume + linear.log_noise
     # A step that a derivative without memory promises may not come true: what counts is what the simulation leaves.
     linear = replace(linear, objective=linear.energy)
     array, causes = stretches[0].model.array, point.causes

@@ -30,7 +30,7 @@ from gfimu.diagnosis.terms.observed import Observed, observe
 from gfimu.diagnosis.terms.slow_modes import SlowModes, WeighedModes
 from gfimu.world_model import Effect, memory_of
 
-__all__ = ["Posterior", "condition", "energy", "posterior_of"]
+__all__ = ["Posterior", "condition", "energy", "posterior_of", "remembers_long"]
 
 _RIDGE = 1e-12  # numerical: of the diagonal, where rounding leaves the normal equations not positive
 _LONG_MEMORY = 0.5  # numerical: s of memory that the derivative follows only where it must
@@ -175,6 +175,11 @@ def _cholesky(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
     if failed:
         raise np.linalg.LinAlgError("the normal equations of the drive are not positive definite")
     return np.asarray(root)
+
+
+def remembers_long(effects: Sequence[Effect]) -> bool:
+    """Tell whether an effect remembers the drive for so long that the derivative leaves it out unless it is exact."""
+    return any(memory_of(effect) > _LONG_MEMORY for effect in effects)
 
 
 def _jacobian(stretch: Stretch, drive: Drive, effects: Sequence[Effect], seen: Observed, *, exact: bool) -> Jacobian:
