@@ -31,6 +31,8 @@ class Policy:
         Of screening and learning.
     steps : int
         Gauss–Newton steps of a fit.
+    starts : int
+        Further optima over the shapes of an effect from which the best set is fitted: modes at other frequencies.
     settled : float
         Nats that a step must promise to be taken.
     least_share : float
@@ -121,6 +123,7 @@ class Policy:
     temperature: float = 1.2
     ambiguous: float = 2.0
     rivals: int = 4
+    starts: int = 3
     least_share: float = 0.5
     gate_stds: float = 2.0
     worse: float = 1.01

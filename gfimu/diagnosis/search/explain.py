@@ -57,7 +57,7 @@ class Sets:
         def one(point: Point) -> Fit | None:
             try:
                 point = replace(point, levels=self.base.levels, residue=self.base.residue)
-                return fit(self.stretches, point, self.policy)
+                return self._own_roughness(fit(self.stretches, point, self.policy))
             except (np.linalg.LinAlgError, ValueError):
                 return None
 
@@ -67,6 +67,23 @@ class Sets:
             if found is not None:
                 self.found[key] = found
         return [self.found.get(_key(point.causes)) for point in points]
+
+    def _own_roughness(self, found: Fit) -> Fit:
+        """Learn the roughness of the drives anew where a mode may have made it: that favours what came before."""
+        if not found.point.exact:
+            return found
+        point = learn_roughness(self.stretches, found.point)
+        again = fit(self.stretches, replace(point, residue=self.base.residue), self.policy)
+        return max(found, again, key=_posterior)
+
+    def refit(self, points: Sequence[Point]) -> None:
+        """Fit sets again from other starts, and keep what is more probable."""
+        for point in points:
+            other = Sets(self.stretches, self.base, self.policy)
+            (again,) = other.fit([point])
+            self.count += other.count
+            if again is not None and again.log_posterior > self.found[again.key].log_posterior:
+                self.found[again.key] = again
 
     @property
     def best(self) -> Fit:
@@ -118,6 +135,7 @@ def explain(
         before = sets.best
         screening = screen(stretches, before.point)
         _fit_leaders(sets, screening, before, near=number > 0)
+        _fit_other_shapes(sets, prune(sets))
         best = prune(sets)
         fits += sets.count
         if number > 0 and best.key in seen:
@@ -226,6 +244,25 @@ def _fit_leaders(sets: Sets, screening: Screening, about: Fit, *, near: bool) ->
         drives = tuple(drive.moved(move) for drive, move in zip(about.point.drives, moves, strict=True))
         points.append(replace(about.point, causes=causes, drives=drives))
     sets.fit(points)
+
+
+def _fit_other_shapes(sets: Sets, best: Fit) -> None:
+    """Fit the best set also from other shapes of its effects that look likely: a shape may have many optima."""
+    for cause in best.causes:
+        others = tuple(other for other in best.causes if other is not cause)
+        rest = sets.fit([replace(best.point, causes=others)])[0] if cause.free_shape else None
+        if rest is None:
+            continue
+        screening = screen(sets.stretches, rest.point, only=cause.name)
+        blocks = Blocks(screening, sets.policy)
+        members = [blocks.nearest(other) for other in rest.causes]
+        points = []
+        for number in blocks.optima(cause, members)[: sets.policy.starts]:
+            causes = blocks.causes((*members, number))
+            moves = screening.drive_moves((*members, number), causes)
+            drives = tuple(drive.moved(move) for drive, move in zip(rest.point.drives, moves, strict=True))
+            points.append(replace(rest.point, causes=causes, drives=drives))
+        sets.refit(points)
 
 
 def reduced(explanation: Explanation, name: str, policy: Policy) -> Explanation:

@@ -87,13 +87,13 @@ class Screening:
         return [response @ move for response in self.responses]
 
 
-def screen(stretches: Sequence[Stretch], point: Point) -> Screening:
-    """Linearise the whole library about a point."""
+def screen(stretches: Sequence[Stretch], point: Point, *, only: str = "") -> Screening:
+    """Linearise the whole library, or ``only`` one effect besides those of the point, about a point."""
     array, causes = stretches[0].model.array, point.causes
     runs = len({stretch.index for stretch in stretches})
 
     first = linearise(stretches, replace(point, residue=None))
-    signatures, count = _plan(stretches, first.posteriors, causes, runs)
+    signatures, count = _plan(stretches, first.posteriors, causes, runs, only)
 
     def columns(stretch: Stretch, at: Posterior) -> Columns:
         parts = [family_columns(stretch, at.observed, at.drive, causes, s.family, s.shape) for s in signatures]
@@ -118,7 +118,7 @@ def columns_of_run(signature: Signature, array: AccelerometerArray, run: int) ->
 
 
 def _plan(
-    stretches: Sequence[Stretch], posteriors: Sequence[Posterior], causes: Sequence[Cause], runs: int
+    stretches: Sequence[Stretch], posteriors: Sequence[Posterior], causes: Sequence[Cause], runs: int, only: str
 ) -> tuple[list[Signature], int]:
     """List the signatures to compute; returns them and the number of their columns."""
     model = stretches[0].model
@@ -134,6 +134,7 @@ def _plan(
         count = len(family.sizes(model.array))
         if (
             not count
+            or (only and name != only and name not in present)
             or (getattr(family, "needs_temperature", False) and not warm)
             or (still and family.place in _OF_MOTION)
         ):
