@@ -15,7 +15,7 @@ from gfimu.diagnosis.fit.parallel import over_segments
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.terms.coloured_noise import NoiseLevels, estimate_flicker, likeliest_flicker, white_level
 from gfimu.diagnosis.terms.drive import Drive
-from gfimu.diagnosis.terms.slow_modes import WeighedPowers
+from gfimu.diagnosis.terms.slow_modes import WeighedModes, WeighedPowers
 from gfimu.world_model import WorldModel
 
 __all__ = ["FOLLOWED", "learn_noise", "learn_roughness", "predicted_by_reference", "sharpened", "starting_point"]
@@ -133,5 +133,7 @@ def _left(stretch: Stretch, point: Point, linear: Linear, place: int) -> _Left:
     level = level / np.sqrt(np.maximum(stretch.mask.mean(axis=0), _LEAST_VALID))
     if stretch.steps.coarse:
         error = np.where(stretch.mask, stretch.measured - seen.prediction, np.nan)
+        if isinstance(seen.modes, WeighedModes):
+            error = error - seen.modes.slow_noise(residual)
         level = stretch.steps.noise_before(error, seen.levels.white, level)
     return _Left(residual, seen.weight, cosines, level)
