@@ -31,6 +31,7 @@ __all__ = ["Fit", "fit", "log_prior"]
 _SHARES = (1.0, 0.3, 0.08)  # numerical: of a step that goes uphill
 _SHAPE_STEP = 0.3  # numerical: most that a shape moves in a step
 _SHAPE_PRIOR = 0.7  # numerical: standard deviation of that step
+_KEPT = 0.5  # numerical: share of its promise that a step must gain for a derivative to serve another one
 _NARROW = 10  # numerical: width of a derivative that is cheap to take anew
 
 
@@ -127,7 +128,7 @@ def _descend(stretches: Sequence[Stretch], point: Point, policy: Policy) -> tupl
         else:
             break
         stalled = now - there < policy.settled
-        kept = _dear(linear) if done % 2 == 0 else None
+        kept = _dear(linear) if now - there > _KEPT * promise else None
         point, now = trial, there
         linear = linearise(stretches, point, of_causes(point), jacobians=kept)
         if stalled:
@@ -136,7 +137,7 @@ def _descend(stretches: Sequence[Stretch], point: Point, policy: Policy) -> tupl
 
 
 def _dear(linear: Linear) -> tuple[Jacobian | None, ...]:
-    """Return the derivatives by drives that are dear to take anew: they serve two steps."""
+    """Return the derivatives by drives that are dear to take anew: they serve as long as they keep their promise."""
     each = (one.jacobian for one in linear.posteriors)
     return tuple(jacobian if jacobian.predictions > _NARROW else None for jacobian in each)
 

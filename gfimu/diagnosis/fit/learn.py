@@ -15,6 +15,7 @@ from gfimu.diagnosis.fit.parallel import over_segments
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.terms.coloured_noise import NoiseLevels, estimate_flicker, likeliest_flicker, white_level
 from gfimu.diagnosis.terms.drive import Drive
+from gfimu.diagnosis.terms.jacobian import Jacobian
 from gfimu.diagnosis.terms.slow_modes import WeighedModes, WeighedPowers
 from gfimu.world_model import WorldModel
 
@@ -53,8 +54,10 @@ def predicted_by_reference(model: WorldModel, run: Run) -> NDArray[np.float64]:
 
 def learn_roughness(stretches: Sequence[Stretch], point: Point, rounds: int = 1) -> Point:
     """Return the point with the roughness that its drives show under its causes."""
+    jacobians: Sequence[Jacobian | None] | None = None
     for _ in range(rounds):
-        linear = linearise(stretches, point)
+        linear = linearise(stretches, point, jacobians=jacobians)
+        jacobians = [one.jacobian for one in linear.posteriors]
         drives = tuple(
             drive.moved(step).relearned(one.covariance)
             for drive, step, one in zip(point.drives, linear.drive_steps, linear.posteriors, strict=True)
