@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gfimu.diagnosis.criticism.gate import impossible_sizes, judge, measurable
+from gfimu.diagnosis.criticism.gain import Gain
 from gfimu.diagnosis.criticism.holdout import Holdout, gate_gains, held_out_gain, other_recordings, split
 from gfimu.diagnosis.criticism.lack_of_fit import LackOfFit, lack_of_fit
 from gfimu.diagnosis.criticism.surrogate import surrogates
@@ -22,9 +22,10 @@ from gfimu.diagnosis.search.explain import Explanation, reduced
 from gfimu.diagnosis.search.long_run import understand_any_length
 from gfimu.diagnosis.search.nuisance_models import Understanding
 from gfimu.diagnosis.verdict.conclude import Described, conclude, is_dominant, is_unknown, named_causes
+from gfimu.diagnosis.verdict.gate import impossible_sizes, judge, measurable
 from gfimu.diagnosis.verdict.naming import conflicting
 from gfimu.diagnosis.verdict.sample_notes import with_sample_notes
-from gfimu.diagnosis.verdict.verdict import Diagnosis, Gain
+from gfimu.diagnosis.verdict.verdict import Diagnosis
 from gfimu.errors import InputError
 from gfimu.recording import Recording
 from gfimu.recording.carried_array import warn_of_other_array

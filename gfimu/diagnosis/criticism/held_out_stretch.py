@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 from scipy.stats import chi2
 
+from gfimu.diagnosis.criticism.gain import Gain
+from gfimu.diagnosis.data.cosine_basis import NoiseLevels
 from gfimu.diagnosis.data.run import smooth_rate
 from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.fit.gauss_newton import fit
@@ -17,10 +19,8 @@ from gfimu.diagnosis.fit.learn import FOLLOWED
 from gfimu.diagnosis.fit.linear import Point
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.terms.cause import Cause, effects_of
-from gfimu.diagnosis.terms.coloured_noise import NoiseLevels
 from gfimu.diagnosis.terms.drive import Drive
 from gfimu.diagnosis.terms.observed import observe
-from gfimu.diagnosis.verdict.verdict import Gain
 from gfimu.world_model import is_of_one_recording
 
 __all__ = ["Measured", "gain_of", "measure"]

@@ -13,7 +13,9 @@ from itertools import pairwise
 
 import numpy as np
 
+from gfimu.diagnosis.criticism.gain import Gain
 from gfimu.diagnosis.criticism.held_out_stretch import Measured, gain_of, measure
+from gfimu.diagnosis.data.cosine_basis import NoiseLevels
 from gfimu.diagnosis.data.stretch import RunUp, Stretch
 from gfimu.diagnosis.fit.evidence import SCALES, inverse, likeliest_scale
 from gfimu.diagnosis.fit.gauss_newton import Fit, fit
@@ -22,9 +24,7 @@ from gfimu.diagnosis.fit.linear import Point, linearise, with_residue
 from gfimu.diagnosis.fit.parallel import each_apart, over_segments
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.terms.cause import Cause, effects_of
-from gfimu.diagnosis.terms.coloured_noise import NoiseLevels
 from gfimu.diagnosis.terms.drive import MARGIN, Drive
-from gfimu.diagnosis.verdict.verdict import Gain
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.world_model import Effect
 

@@ -22,13 +22,13 @@ from gfimu.diagnosis.criticism.generic import (
     motion_of,
     series_products,
 )
-from gfimu.diagnosis.criticism.observed_at import observed_at
 from gfimu.diagnosis.criticism.reading_curve import reading_curve
 from gfimu.diagnosis.criticism.series_tests import LackOfFit, changing_noise, jumps, lines
 from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.fit.evidence import log_evidence, log_evidence_each
 from gfimu.diagnosis.fit.gauss_newton import Fit
 from gfimu.diagnosis.fit.linear import Point
+from gfimu.diagnosis.fit.observed_at import observed_at
 from gfimu.diagnosis.fit.parallel import over_segments
 from gfimu.diagnosis.fit.posterior import Posterior
 from gfimu.diagnosis.policy import Policy

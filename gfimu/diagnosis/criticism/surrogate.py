@@ -21,12 +21,12 @@ from gfimu.diagnosis.criticism.generic import (
     motion_of,
     series_products,
 )
-from gfimu.diagnosis.criticism.observed_at import observed_at
 from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.fit.evidence import log_evidence, log_evidence_each
 from gfimu.diagnosis.fit.gauss_newton import Fit, fit
 from gfimu.diagnosis.fit.learn import learn_noise
 from gfimu.diagnosis.fit.linear import Point
+from gfimu.diagnosis.fit.observed_at import observed_at
 from gfimu.diagnosis.fit.posterior import Posterior
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.terms.cause import Cause

@@ -13,11 +13,10 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.diagnosis.data.frozen import frozen_stretches, told_frozen
 from gfimu.diagnosis.data.rails import Rail, find_rails, on_rails, rail_parameters, rail_sentence
 from gfimu.diagnosis.data.rounding import common_step
 from gfimu.diagnosis.data.run import Run, difference_noise
-from gfimu.diagnosis.data.spikes import channel_spikes
+from gfimu.diagnosis.data.samples import channel_spikes, frozen_stretches, told_frozen
 from gfimu.world_model import Effect, WorldModel
 
 __all__ = ["IntegrityReport", "check_integrity"]

@@ -8,12 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gfimu.diagnosis.data.cosine_basis import NoiseLevels
 from gfimu.diagnosis.data.run import Run
 from gfimu.diagnosis.data.stretch import Stretch, make_stretches
 from gfimu.diagnosis.fit.linear import Linear, Point, linearise
 from gfimu.diagnosis.fit.parallel import over_segments
 from gfimu.diagnosis.policy import Policy
-from gfimu.diagnosis.terms.coloured_noise import NoiseLevels, estimate_flicker, likeliest_flicker, white_level
+from gfimu.diagnosis.terms.coloured_noise import estimate_flicker, likeliest_flicker, white_level
 from gfimu.diagnosis.terms.drive import Drive
 from gfimu.diagnosis.terms.slow_modes import WeighedPowers
 from gfimu.world_model import WorldModel

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gfimu.diagnosis.criticism.gain import Gain
 from gfimu.diagnosis.free_body.explain import Sets, learn_noise
 from gfimu.diagnosis.free_body.screening import BodyScreening, coordinates_of, of_families, screen
 from gfimu.diagnosis.free_body.segment import BodySegment
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.terms.cause import Cause, effects_of
-from gfimu.diagnosis.verdict.verdict import Gain
 from gfimu.world_model import Effect
 
 __all__ = ["BodyHoldout", "gate_gains", "held_out_gain", "other_recording", "stretches"]

@@ -19,7 +19,7 @@ from scipy.ndimage import uniform_filter1d
 from gfimu.diagnosis.criticism.views.dependence import Dependence, Fingerprint
 from gfimu.diagnosis.criticism.views.residual_spectrum import ResidualSpectrum
 from gfimu.diagnosis.criticism.views.residuals import ResidualSize, Whiteness
-from gfimu.diagnosis.verdict.verdict import RunView
+from gfimu.diagnosis.criticism.views.run_view import RunView
 
 __all__ = [
     "before_after_figure",

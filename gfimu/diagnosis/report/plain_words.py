@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gfimu.diagnosis.verdict.verdict import Diagnosis, NamedCause, RunView
+from gfimu.diagnosis.criticism.views.run_view import RunView
+from gfimu.diagnosis.verdict.verdict import Diagnosis, NamedCause
 from gfimu.units import NAME, NUMBER, RATIO, STANDARD_GRAVITY, key_name
 
 __all__ = [

@@ -89,7 +89,6 @@ class Blocks:
             self.hypotheses[number].cause.at(part) for number, part in zip(members, np.split(mean, ends), strict=True)
         )
 
-
     def nearest(self, cause: Cause) -> int:
         """Return the hypothesis nearest to a cause: the same effect and place, the most similar shape."""
         same = [number for number, one in enumerate(self.hypotheses) if one.cause.key == cause.key]

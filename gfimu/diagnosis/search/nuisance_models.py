@@ -11,14 +11,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
-from gfimu.diagnosis.criticism.slow_noise import Walk, walk_strength
+from gfimu.diagnosis.data.cosine_basis import NoiseLevels
 from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.fit.gauss_newton import Fit
 from gfimu.diagnosis.fit.learn import learn_noise
 from gfimu.diagnosis.fit.linear import Point, linearise, with_residue
+from gfimu.diagnosis.fit.random_walk import Walk, walk_strength
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.explain import Explanation, Sets, exactly, explain, prune
-from gfimu.diagnosis.terms.coloured_noise import NoiseLevels
 from gfimu.diagnosis.terms.residue import Residue
 
 __all__ = ["Understanding", "understand"]

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
-from gfimu.diagnosis.terms.coloured_noise import CosineBasis, NoiseLevels
+from gfimu.diagnosis.data.cosine_basis import CosineBasis, NoiseLevels
 
 __all__ = ["SlowModes", "WeighedModes", "WeighedPowers"]
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.fft import dct
 from scipy.stats import f as f_distribution
 
-from gfimu.diagnosis.verdict.verdict import RunView
+from gfimu.diagnosis.criticism.views.run_view import RunView
 
 __all__ = ["CHANCE", "Dependence", "Fingerprint", "Quantity", "dependences", "fingerprint", "listed", "quantities"]
 

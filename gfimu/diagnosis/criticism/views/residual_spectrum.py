@@ -16,8 +16,8 @@ from scipy.signal import welch
 from scipy.stats import gamma
 
 from gfimu.diagnosis.criticism.views.dependence import CHANCE, listed
-from gfimu.diagnosis.terms.coloured_noise import CosineBasis
-from gfimu.diagnosis.verdict.verdict import RunView
+from gfimu.diagnosis.criticism.views.run_view import RunView
+from gfimu.diagnosis.data.cosine_basis import CosineBasis
 
 __all__ = ["ResidualSpectrum", "SpectralLine", "order_spectrum", "time_spectrum"]
 

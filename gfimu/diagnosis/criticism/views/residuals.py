@@ -15,8 +15,8 @@ from scipy.fft import dct
 
 from gfimu.diagnosis.criticism.views.dependence import CHANCE, Dependence, Fingerprint, dependences, fingerprint, listed
 from gfimu.diagnosis.criticism.views.residual_spectrum import ResidualSpectrum, order_spectrum, time_spectrum
+from gfimu.diagnosis.criticism.views.run_view import RunView
 from gfimu.diagnosis.criticism.views.whiteness import cumulative_periodogram, ljung_box, standardise, whitening_gain
-from gfimu.diagnosis.verdict.verdict import RunView
 
 __all__ = ["ResidualSize", "ResidualViews", "Whiteness", "residual_views"]
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.fft import idct, rfft
 from scipy.stats import chi2, kstwobign
 
-from gfimu.diagnosis.terms.coloured_noise import CosineBasis
+from gfimu.diagnosis.data.cosine_basis import CosineBasis
 
 __all__ = ["cumulative_periodogram", "ljung_box", "standardise", "whitening_gain"]
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from core_cases import cause_of, lively, small_twin, stretches_of
-from gfimu.diagnosis.terms.coloured_noise import NoiseLevels
 
+from gfimu.diagnosis.data.cosine_basis import NoiseLevels
 from gfimu.diagnosis.fit.gauss_newton import fit, log_prior
 from gfimu.diagnosis.fit.learn import learn_roughness, starting_point
 from gfimu.diagnosis.fit.linear import energy_of

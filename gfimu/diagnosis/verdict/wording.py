@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gfimu.diagnosis.verdict.verdict import IN_PART, Gain, NamedCause, Residual, Unexplained
+from gfimu.diagnosis.criticism.gain import Gain
+from gfimu.diagnosis.verdict.verdict import IN_PART, NamedCause, Residual, Unexplained
 from gfimu.units import STANDARD_GRAVITY
 
 __all__ = ["verdict_sentences"]

@@ -10,8 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gfimu.diagnosis.criticism.gain import Gain
 from gfimu.diagnosis.policy import Policy
-from gfimu.diagnosis.verdict.verdict import Gain, NamedCause, Residual
+from gfimu.diagnosis.verdict.verdict import NamedCause, Residual
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.world_model import EffectFamily, bound_of
 

@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gfimu.diagnosis.criticism.gate import impossible_sizes, judge, measurable
+from gfimu.diagnosis.criticism.gain import Gain
 from gfimu.diagnosis.policy import Policy
-from gfimu.diagnosis.report.wording import verdict_sentences
-from gfimu.diagnosis.verdict.verdict import Gain, NamedCause, Residual, Unexplained
+from gfimu.diagnosis.verdict.gate import impossible_sizes, judge, measurable
+from gfimu.diagnosis.verdict.verdict import NamedCause, Residual, Unexplained
+from gfimu.diagnosis.verdict.wording import verdict_sentences
 from gfimu.geometry.array import AccelerometerArray
 from sim.effects import EFFECTS
 from sim.twin import Twin
