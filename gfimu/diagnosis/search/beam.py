@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -120,7 +121,7 @@ def leading_sets(blocks: Blocks, most: int, policy: Policy) -> list[Candidate]:
     """Return the most probable sets of up to ``most`` effects in a linear world, one per set of names, best first."""
     alone = blocks.log_odds_each()
     every = [Candidate(float(alone[number]), (int(number),)) for number in np.argsort(-alone)]
-    front = _distinct(every, blocks.hypotheses, _FRONT)
+    front = list(islice(_distinct(every, blocks.hypotheses), _FRONT))
     names = [h.cause.name for h in blocks.hypotheses]
     for _ in range(1, most):
         grown: dict[tuple[int, ...], Candidate] = {}
@@ -133,10 +134,10 @@ def leading_sets(blocks: Blocks, most: int, policy: Policy) -> list[Candidate]:
                     grown[members] = Candidate(blocks.log_odds(members), members)
         larger = sorted(grown.values(), key=lambda one: -one.log_odds)
         every += larger
-        front = _distinct(larger, blocks.hypotheses, policy.beam)
+        front = list(islice(_distinct(larger, blocks.hypotheses), policy.beam))
     every.sort(key=lambda one: -one.log_odds)
-    worth = [one for one in _distinct(every, blocks.hypotheses, 4 * policy.beam) if _is_worth(blocks, one, policy)]
-    return worth[: policy.beam]
+    worth = (one for one in _distinct(every, blocks.hypotheses) if _is_worth(blocks, one, policy))
+    return list(islice(worth, policy.beam))
 
 
 def _is_worth(blocks: Blocks, candidate: Candidate, policy: Policy) -> bool:
@@ -146,14 +147,11 @@ def _is_worth(blocks: Blocks, candidate: Candidate, policy: Policy) -> bool:
     return all(candidate.log_odds - blocks.log_odds(rest) >= policy.worth_a_search for rest in rests)
 
 
-def _distinct(candidates: Sequence[Candidate], hypotheses: Sequence[Hypothesis], count: int) -> list[Candidate]:
+def _distinct(candidates: Iterable[Candidate], hypotheses: Sequence[Hypothesis]) -> Iterator[Candidate]:
+    """Return the first candidate of every set of names."""
     seen: set[frozenset[str]] = set()
-    kept = []
     for candidate in candidates:
         names = frozenset(hypotheses[number].cause.name for number in candidate.members)
         if names not in seen:
             seen.add(names)
-            kept.append(candidate)
-            if len(kept) == count:
-                break
-    return kept
+            yield candidate
