@@ -173,7 +173,7 @@ class _Diagnosis:
             best = explanation.best
             gains = gate_gains(best, explanation.without, pairs, self._policy, other_recording=self._kept is not None)
             worst = min(gains, key=gains.__getitem__)
-            if gains[worst] >= self._policy.least_gain:
+            if gains[worst] >= self._policy.ambiguous:
                 break
             withdrawn.append(worst)
             explanation = reduced(explanation, worst, self._policy)
@@ -214,7 +214,7 @@ class _Diagnosis:
                 alone = self._gain(explanation, carried) if carried is not None else Gain()
                 samples = sum(len(run.t) for run in self._kept.runs)
                 better = gain.log_likelihood_per_sample - float(np.nan_to_num(alone.log_likelihood_per_sample))
-                carried, gain = (whole, gain) if better * samples > self._policy.least_gain else (carried, alone)
+                carried, gain = (whole, gain) if better * samples > self._policy.ambiguous else (carried, alone)
             elif carried is not None and gain.share_in_any_recording <= 0.0:
                 carried = None
             if gain.log_likelihood_per_sample > 0.0:

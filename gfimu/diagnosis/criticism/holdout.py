@@ -19,7 +19,7 @@ from gfimu.diagnosis.data.cosine_basis import NoiseLevels
 from gfimu.diagnosis.data.stretch import RunUp, Stretch
 from gfimu.diagnosis.fit.evidence import SCALES, inverse, likeliest_scale
 from gfimu.diagnosis.fit.gauss_newton import Fit, fit
-from gfimu.diagnosis.fit.learn import learn_roughness, starting_point
+from gfimu.diagnosis.fit.learn import LEARNINGS, learn_roughness, starting_point
 from gfimu.diagnosis.fit.linear import Point, linearise, with_residue
 from gfimu.diagnosis.fit.parallel import each_apart, over_segments
 from gfimu.diagnosis.policy import Policy
@@ -153,7 +153,7 @@ def other_recordings(
     residue = 0.0 if first.residue is None else first.residue.scale
     part = Part(test, drives, (first.levels[0],) * len(test))
     near = fit(test, part.point(found.causes, residue), policy).point
-    part = replace(part, drives=learn_roughness(test, near, policy.learnings).drives)
+    part = replace(part, drives=learn_roughness(test, near, LEARNINGS).drives)
     return [Holdout(Part(tuple(stretches), first.drives, first.levels), part, residue)]
 
 

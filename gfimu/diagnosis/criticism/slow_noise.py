@@ -42,7 +42,7 @@ class LoudestChannel:
 
     def stands_out(self, policy: Policy) -> bool:
         """Tell whether it surely has more slow noise than the other channels."""
-        return self.ratio > policy.loud_ratio and self.log_odds > policy.loud_odds
+        return self.ratio > policy.loud_ratio and self.log_odds > policy.ambiguous
 
 
 def loudest_channel(stretches: Sequence[Stretch], point: Point, policy: Policy = Policy()) -> LoudestChannel:
@@ -58,7 +58,7 @@ def loudest_channel(stretches: Sequence[Stretch], point: Point, policy: Policy =
     point : Point
         A fit with the noise that was learnt from it.
     policy : Policy
-        Thresholds ``loud_ratio`` and ``loud_odds``.
+        Thresholds ``loud_ratio`` and ``ambiguous``.
     """
     channels = stretches[0].model.array.channels
     alive = np.any([stretch.mask[:, :-1].any(axis=0) for stretch in stretches], axis=0)
@@ -95,7 +95,7 @@ def white_factor(
     levels : sequence of NoiseLevels
         Noise of every stretch.
     policy : Policy
-        Thresholds ``white_ratio`` and ``white_ratio_least``.
+        Thresholds ``white_ratio`` and ``noise_accuracy``.
 
     Returns
     -------
@@ -114,11 +114,11 @@ def white_factor(
         factors.append(analogue / np.maximum(expected.analogue, _LEAST_ANALOGUE))
     counts = _counts(stretches)
     ratio, factor_each = (np.sqrt(np.average(np.square(one), axis=0, weights=counts)) for one in (ratios, factors))
-    if np.median(ratio) < policy.white_ratio or ratio.min() < policy.white_ratio_least:
+    if np.median(ratio) < policy.white_ratio or ratio.min() < np.sqrt(policy.white_ratio):
         return None
     factor = float(np.median(factor_each))
     samples = sum(len(stretch.run.t) for stretch in stretches)
-    return factor, factor * float(1.0 / np.sqrt(samples * len(ratio) / 4.0) + policy.white_accuracy)
+    return factor, factor * float(1.0 / np.sqrt(samples * len(ratio) / 4.0) + policy.noise_accuracy)
 
 
 def _counts(stretches: Sequence[Stretch]) -> list[int]:

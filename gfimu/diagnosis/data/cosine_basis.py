@@ -13,11 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import dct, idct
 
-__all__ = ["CosineBasis", "NoiseLevels"]
+__all__ = ["WEAKEST_CORRECTION", "CosineBasis", "NoiseLevels"]
 
-_TIMES = 0.25 * 3.2 ** np.arange(7)
-_TOP_FREQUENCY = 2.5
-_WEAKEST_CORRECTION = 0.05
+_TIMES = 0.25 * 3.2 ** np.arange(7)  # numerical: s, time constants of the sum that is 1/f from 0.6 mHz to 0.6 Hz
+_TOP_FREQUENCY = 2.5  # numerical: Hz, above which bias instability is below any white noise
+WEAKEST_CORRECTION = 0.05
+"""Numerical: share of slow noise in a mode below which it is white."""
 
 
 @dataclass(frozen=True)
@@ -104,7 +105,7 @@ class CosineBasis:
         """Return 1 − σ²/S_k per mode and channel, shape (K, c + 1), cut where it no longer matters."""
         white = levels.white**2
         share = 1.0 - white / (white + self.variances(levels, len(self.frequency)))
-        strong = np.flatnonzero((share > _WEAKEST_CORRECTION).any(axis=1))
+        strong = np.flatnonzero((share > WEAKEST_CORRECTION).any(axis=1))
         return share[: int(strong[-1]) + 1 if len(strong) else 1]
 
     def whitened(self, residual: NDArray[np.float64], levels: NoiseLevels) -> NDArray[np.float64]:

@@ -38,7 +38,6 @@ _NEAR = 30.0  # standard deviations, within which probabilities don't underflow
 _FAR = 1e4  # standard deviations
 _LEAST_NOISE = 0.03  # of a reference's step: finer edges would tell more than the steps of real parts keep to
 _NOISE_FACTORS = np.geomspace(0.5, 6.0, 26)
-_ROOT_TWO_PI = np.sqrt(2 * np.pi)
 _MOST_CHANGES = 0.1  # to and fro, of the samples; where there are more the noise shows between the steps
 _ONE_CHANGE = 0.5  # of the usual time from one value to the next, within which there and back is one change
 _LEAST_CHANGES = 4
@@ -176,13 +175,13 @@ def rounded_likelihood(
     if lower.max(initial=0.0) < _NEAR:
         probability = ndtr(-lower) - ndtr(-upper)
         log_p = np.log(probability)
-        density_upper = np.exp(-0.5 * upper**2) / (_ROOT_TWO_PI * probability)
-        density_lower = np.exp(-0.5 * lower**2) / (_ROOT_TWO_PI * probability)
+        density_upper = np.exp(-0.5 * upper**2) / (np.sqrt(2 * np.pi) * probability)
+        density_lower = np.exp(-0.5 * lower**2) / (np.sqrt(2 * np.pi) * probability)
     else:
         log_outer, log_inner = log_ndtr(-upper), log_ndtr(-lower)
         log_p = log_inner + np.log1p(-np.exp(log_outer - log_inner))
-        density_upper = np.exp(-0.5 * upper**2 - log_p) / _ROOT_TWO_PI
-        density_lower = np.exp(-0.5 * lower**2 - log_p) / _ROOT_TWO_PI
+        density_upper = np.exp(-0.5 * upper**2 - log_p) / np.sqrt(2 * np.pi)
+        density_lower = np.exp(-0.5 * lower**2 - log_p) / np.sqrt(2 * np.pi)
     beyond = true_lower - lower
     score = density_lower - density_upper + beyond  # σ d log p/dx
     curvature = (score - beyond) ** 2 - (lower * density_lower - upper * density_upper)  # −σ² d² log p/dx²

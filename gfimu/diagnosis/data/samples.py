@@ -10,11 +10,11 @@ from scipy.ndimage import median_filter
 from scipy.special import ndtr
 
 from gfimu.diagnosis.data.run import Run, difference_noise
+from gfimu.diagnosis.policy import Policy
 
 __all__ = ["channel_spikes", "frozen_stretches", "reference_spikes", "told_frozen"]
 
 _LONGEST_EQUAL = 40
-_CHANCE = 1e-3  # that a run without a frozen channel has such a stretch
 _LEAST_NOISE = 0.1  # of a step: with less no run is long enough to tell
 _SPIKE = 8.0  # noise
 _ROUGH = 6.0  # how much neighbours usually differ there
@@ -52,7 +52,7 @@ def frozen_stretches(
     # In the middle of a step that is coarse beside the noise a channel at rest may well read the same for long.
     spread = np.maximum(noise, _LEAST_NOISE * quantum)
     same = np.log(2.0 * ndtr(0.5 * quantum / spread) - 1.0)  # (c,), of one reading more
-    least = np.maximum((np.log(_CHANCE) - np.log(run.readings.size)) / same, _LONGEST_EQUAL)
+    least = np.maximum((np.log(Policy.chance) - np.log(run.readings.size)) / same, _LONGEST_EQUAL)
     for channel in range(run.readings.shape[1]):
         mine = run.readings[:, channel]
         changes = quietest if np.isnan(usual[channel]) else usual[channel]

@@ -19,10 +19,23 @@ from gfimu.diagnosis.terms.drive import Drive
 from gfimu.diagnosis.terms.slow_modes import WeighedPowers
 from gfimu.world_model import WorldModel
 
-__all__ = ["FOLLOWED", "learn_noise", "learn_roughness", "predicted_by_reference", "sharpened", "starting_point"]
+__all__ = [
+    "FOLLOWED",
+    "LEARNINGS",
+    "learn_noise",
+    "learn_roughness",
+    "predicted_by_reference",
+    "sharpened",
+    "starting_point",
+]
 
 FOLLOWED = 0.6
-"""Over the spacing of the knots, Hz: what is faster the drive does not follow."""
+"""Over the spacing of the knots, Hz: what is faster the drive does not follow.
+
+Numerical: just beyond the Nyquist frequency of the knots, 0.5 over their spacing.
+"""
+LEARNINGS = 3
+"""Numerical: rounds of the fixed point of the roughness."""
 _LEAST_VALID = 0.01  # numerical: share of the samples that count
 _REFERENCE_ROUNDS = 5  # numerical: to the roughness of a drive from its reference alone
 
@@ -70,7 +83,7 @@ def sharpened(stretches: Sequence[Stretch], point: Point, policy: Policy) -> Poi
     Where the fit is poor the drive would be bent to what no drive did: then the knots stay.
     """
     now = linearise(stretches, point)
-    if now.objective > policy.fair * sum(stretch.observations for stretch in stretches):
+    if now.objective > policy.white_ratio**2 * sum(stretch.observations for stretch in stretches):
         return point
     drives = []
     for stretch, drive, step in zip(stretches, point.drives, now.drive_steps, strict=True):

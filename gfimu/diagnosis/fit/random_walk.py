@@ -43,7 +43,7 @@ class Walk:
 
     def is_likely(self, policy: Policy) -> bool:
         """Tell whether the residual shows it, equally in all channels."""
-        return self.log_odds > policy.walk_odds and self.unequal < policy.unequal_walk
+        return self.log_odds > policy.lack_odds and self.unequal < policy.unequal_walk
 
 
 def walk_strength(stretches: Sequence[Stretch], point: Point, policy: Policy = Policy()) -> Walk:

@@ -87,7 +87,7 @@ def diagnose_body(
     while explanation.best.causes:
         gains = gate_gains(explanation.best.causes, pairs, policy)
         worst = min(gains, key=lambda name: gains[name])
-        if gains[worst] >= policy.least_gain:
+        if gains[worst] >= policy.ambiguous:
             break
         withdrawn.append(worst)
         explanation = reduced(segments, explanation.best.causes, fixed, worst, policy)

@@ -15,11 +15,11 @@ from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.screening import Hypothesis, Screening
 from gfimu.diagnosis.terms.cause import Cause
 
-__all__ = ["Blocks", "Candidate", "leading_sets"]
+__all__ = ["STARTS", "Blocks", "Candidate", "leading_sets"]
 
 _FRONT, _PARTNERS = 8, 30  # numerical: sets that are grown, and how many of the best partners of each are scored
-
 _ALIKE = 0.3  # numerical: shapes nearer than that, as a logarithm or in rad, belong to one optimum
+STARTS = 3  # numerical: optima over the shapes of an effect from which the best set is fitted again
 
 
 @dataclass(frozen=True)

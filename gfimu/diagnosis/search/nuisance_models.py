@@ -82,14 +82,14 @@ def _models(stretches: Sequence[Stretch], plain: Explanation, policy: Policy) ->
     for scale, odds in residues:
         found.append((f"calibration residue × {scale:g}", partial(with_residue, stretches, scale=scale), odds))
     if first.first_levels.walk == 0.0:
-        found.append(("random walk", lambda p: _walking(stretches, p, policy), policy.walk_odds))
+        found.append(("random walk", lambda p: _walking(stretches, p, policy), policy.lack_odds))
         for scale, odds in residues[:1]:
 
             def both(point: Point, scale: float = scale) -> Point | None:
                 walking = _walking(stretches, point, policy)
                 return None if walking is None else with_residue(stretches, walking, scale)
 
-            found.append(("random walk and calibration residue", both, policy.walk_odds + odds))
+            found.append(("random walk and calibration residue", both, policy.lack_odds + odds))
     return found
 
 
@@ -114,7 +114,7 @@ def _start(
             point = admit(base.point)
             if point is None:
                 continue
-            if base.log_posterior + _promise(stretches, base.point, point) < best + odds - policy.hopeless:
+            if base.log_posterior + _promise(stretches, base.point, point) < best + odds - 2.0 * policy.close:
                 continue
             sets = Sets(stretches, point, policy)
             if sets.fit([point])[0] is not None:

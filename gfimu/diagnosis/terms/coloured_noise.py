@@ -6,13 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.diagnosis.data.cosine_basis import CosineBasis
+from gfimu.diagnosis.policy import Policy
 
 __all__ = ["estimate_flicker", "likeliest_flicker", "white_level"]
 
-_FLICKER_GRID = 9.80665e-3 * np.geomspace(0.02, 3.0, 22)
-_FLICKER_PRIOR = 9.80665e-3 * 0.2
-_FLICKER_PRIOR_SPREAD = np.log(3.3)
-_CHANNEL_SPREAD = np.log(2.0)
+_FLICKER_GRID = 9.80665e-3 * np.geomspace(0.02, 3.0, 22)  # numerical: grid of bias instability, m/s²
 
 
 def white_level(coefficients: NDArray[np.float64], slowest: float, period: float) -> NDArray[np.float64]:
@@ -74,11 +72,11 @@ def likeliest_flicker(
         spectrum = white**2 + (shape * level**2 + fixed)
         likelihood[row] = -0.5 * np.sum(np.log(spectrum) + power / spectrum, axis=0)
     grid = np.log(_FLICKER_GRID)
-    tie = -0.5 * ((grid[:, None] - grid[None, :]) / _CHANNEL_SPREAD) ** 2  # channel level against common level
+    tie = -0.5 * ((grid[:, None] - grid[None, :]) / Policy.channel_spread) ** 2  # channel level against common level
     joint = likelihood[:, None, :] + tie[:, :, None]  # (channel level, common level, c)
     top = joint.max(axis=0)
     common = (top + np.log(np.exp(joint - top).mean(axis=0))).sum(axis=1)
-    common += -0.5 * ((grid - np.log(_FLICKER_PRIOR)) / _FLICKER_PRIOR_SPREAD) ** 2
+    common += -0.5 * ((grid - np.log(Policy.usual_flicker)) / Policy.flicker_spread) ** 2
     best = int(np.argmax(common))
     weight = joint[:, best, :] - joint[:, best, :].max(axis=0)
     weight = np.exp(weight) / np.exp(weight).sum(axis=0)

@@ -16,8 +16,8 @@ from gfimu.world_model import Spin, SpinState
 __all__ = ["DEGREE", "AngleSpline", "SplineSpin"]
 
 DEGREE = 4
-"""Of the spline of the angle: its fourth derivative, which the prior acts on, is constant between knots."""
-_REMEMBERED = 8  # time axes whose states a motion keeps
+"""Numerical: of the spline of the angle. Its fourth derivative, which the prior acts on, is constant between knots."""
+_REMEMBERED = 8  # numerical: time axes whose states a motion keeps
 
 
 @dataclass(frozen=True)

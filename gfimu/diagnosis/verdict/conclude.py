@@ -123,7 +123,7 @@ def _widened(explanation: Explanation, fit: Fit, named: NamedCause, cause: Cause
     explains that it may leave: a share ε of it is what an error of √ε of a parameter leaves.
     """
     observations = sum(stretch.observations for stretch in explanation.stretches)
-    beyond = fit.objective - observations - policy.beyond_chance * np.sqrt(2.0 * observations)
+    beyond = fit.objective - observations - policy.excess_stds * np.sqrt(2.0 * observations)
     beyond = max(beyond, 0.0)
     share = beyond / (beyond + max(explanation.nothing.objective - fit.objective, 1.0))
     rough = np.sqrt(share + cause.family.inexactness) if cause.family.inexactness > 0.0 else 0.0

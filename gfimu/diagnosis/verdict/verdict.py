@@ -12,13 +12,13 @@ import numpy as np
 
 from gfimu.diagnosis.criticism.gain import Gain
 from gfimu.diagnosis.criticism.views.run_view import RunView
+from gfimu.diagnosis.policy import Policy
 from gfimu.files.atomic_file import write_text
 from gfimu.short_repr import joined
 from gfimu.world_model import WorldModel
 
 __all__ = [
     "FORMAT_VERSION",
-    "IN_PART",
     "Diagnosis",
     "NamedCause",
     "Residual",
@@ -26,9 +26,7 @@ __all__ = [
     "Unexplained",
 ]
 
-FORMAT_VERSION = 1
-IN_PART = 0.9
-"""Share of the held-out excess below which causes explain in part."""
+FORMAT_VERSION = 1  # numerical: of verdict.json, no threshold
 
 
 @dataclass(frozen=True)
@@ -208,7 +206,7 @@ class Diagnosis:
     @property
     def in_part(self) -> bool:
         """Whether the causes stand but leave more than a tenth of the excess on held-out data."""
-        return self.verdict == "explained" and self.gain.share_of_excess_removed < IN_PART
+        return self.verdict == "explained" and self.gain.share_of_excess_removed < 1.0 - Policy.small
 
     def __repr__(self) -> str:
         causes = ", ".join(f"{cause.effect} {100 * cause.probability:.3g} %" for cause in self.causes)

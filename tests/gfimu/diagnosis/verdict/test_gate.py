@@ -126,4 +126,4 @@ def test_the_thresholds_are_those_of_the_policy():
     assert judge(half, FITS, CAUSES, replace(Policy(), least_share=0.7)).withdrawn
     rising = replace(FITS, rms_after=0.12)
     assert judge(GOOD, rising, CAUSES).withdrawn
-    assert not judge(GOOD, rising, CAUSES, replace(Policy(), worse=1.2)).withdrawn
+    assert not judge(GOOD, rising, CAUSES, replace(Policy(), noise_accuracy=0.2)).withdrawn
