@@ -55,7 +55,7 @@ def test_a_walk_of_three_channels_is_none_of_all():
 
     stretches, fit = fitted(recorded(7, drift))
     found = walk_strength(stretches, fit.point)
-    assert found.log_odds > POLICY.walk_odds
+    assert found.log_odds > POLICY.lack_odds
     assert found.unequal > POLICY.unequal_walk
     assert not found.is_likely(POLICY)
 
