@@ -240,70 +240,11 @@ ROOMS = {
     "gfimu.recording": {"gfimu.files", "gfimu.geometry", "gfimu.parts", "gfimu.rate.integration"},
     "gfimu.motion": {"gfimu.files", "gfimu.geometry", "gfimu.parts", "gfimu.rate", "gfimu.recording"},
     "gfimu.position_drift": {"gfimu.geometry", "gfimu.motion", "gfimu.rate.integration"},
-    # The rooms of the diagnosis, each of which may import those above it; an exception to that has a comment.
-    "gfimu.diagnosis.data": {
-        "gfimu.diagnosis.terms.coloured_noise",  # a stretch has the basis of cosines of its slow noise
-        "gfimu.diagnosis.terms.spline",  # a stretch knows the angle of its reference as a spline
-        "gfimu.recording",
-        "gfimu.world_model",
-    },
-    "gfimu.diagnosis.terms": {"gfimu.diagnosis.data", "gfimu.geometry.array", "gfimu.world_model"},
-    "gfimu.diagnosis.fit": {
-        "gfimu.diagnosis.data",
-        "gfimu.diagnosis.policy",
-        "gfimu.diagnosis.terms",
-        "gfimu.geometry.array",
-        "gfimu.world_model",
-    },
-    "gfimu.diagnosis.search": {
-        "gfimu.diagnosis.criticism.slow_noise",  # how strong a random walk is that another model starts with
-        "gfimu.diagnosis.data",
-        "gfimu.diagnosis.fit",
-        "gfimu.diagnosis.policy",
-        "gfimu.diagnosis.terms",
-        "gfimu.geometry.array",
-        "gfimu.world_model",
-    },
-    "gfimu.diagnosis.criticism": {
-        "gfimu.diagnosis.data",
-        "gfimu.diagnosis.fit",
-        "gfimu.diagnosis.policy",
-        "gfimu.diagnosis.terms",
-        "gfimu.diagnosis.verdict.verdict",  # the classes of the result: what the gate judges, what the views show
-        "gfimu.generic_basis",
-        "gfimu.geometry.array",
-        "gfimu.world_model",
-    },
-    "gfimu.diagnosis.verdict": {
-        "gfimu.diagnosis.criticism",
-        "gfimu.diagnosis.data",
-        "gfimu.diagnosis.fit",
-        "gfimu.diagnosis.policy",
-        "gfimu.diagnosis.report.wording",  # the verdict holds its sentences
-        "gfimu.diagnosis.search",
-        "gfimu.diagnosis.terms",
-        "gfimu.geometry.array",
-        "gfimu.world_model",
-    },
-    "gfimu.diagnosis.report": {
-        "gfimu.diagnosis.criticism.views",
-        "gfimu.diagnosis.verdict",
-        "gfimu.recording",
-        "gfimu.visual",
-    },
-    "gfimu.diagnosis.design": {
-        "gfimu.diagnosis.data",
-        "gfimu.diagnosis.fit",
-        "gfimu.diagnosis.policy",
-        "gfimu.diagnosis.search.screening",
-        "gfimu.diagnosis.terms",
-        "gfimu.world_model",
-    },
 }
 """Folders, and what of this project each may import besides itself and the common modules."""
 
 MOST_FILES = 12
-"""In one folder of `ROOMS`."""
+"""In one folder of a room."""
 
 
 def room_imports(room: str) -> set[str]:
@@ -324,129 +265,45 @@ def test_rooms_import_from_the_rooms_they_name_only(room):
     assert {name for name in ROOMS[room] if not any(inside(one, name) for one in imported)} == set()
 
 
-UPWARDS = {
-    ("data", "terms.coloured_noise"),
-    ("data", "terms.spline"),
-    ("search", "criticism.slow_noise"),
-    ("criticism", "verdict.verdict"),
-    ("verdict", "report.wording"),
-}
-"""Rooms of the diagnosis that import a module of a room below theirs in `ROOMS`; why is said there."""
+DIAGNOSIS = ("data", "terms", "fit", "search", "criticism", "verdict", "report", "design")
+"""Rooms of the diagnosis from the lowest floor up: each imports itself and those before it."""
+
+BESIDE = {"gfimu.diagnosis.policy", "gfimu.generic_basis", "gfimu.geometry.array", "gfimu.world_model"}
+"""What every room of the diagnosis may import besides."""
+
+OUTSIDE = {"data": {"gfimu.recording"}, "report": {"gfimu.recording", "gfimu.visual"}}
+"""What of this project a single room of the diagnosis may import besides."""
 
 
-def test_rooms_of_the_diagnosis_import_those_above_them_only():
-    rooms = [room for room in ROOMS if inside(room, "gfimu.diagnosis")]
-    found = {
-        (room.removeprefix("gfimu.diagnosis."), name.removeprefix("gfimu.diagnosis."))
-        for place, room in enumerate(rooms)
-        for name in room_imports(room)
-        if inside(name, *rooms[place + 1 :])
-    }
-    assert found == UPWARDS
+@pytest.mark.parametrize("room", DIAGNOSIS)
+def test_arrows_of_the_diagnosis_go_down(room):
+    below = [f"gfimu.diagnosis.{one}" for one in DIAGNOSIS[: DIAGNOSIS.index(room)]]
+    outside = OUTSIDE.get(room, set())
+    imported = room_imports(f"gfimu.diagnosis.{room}")
+    assert {name for name in imported if not inside(name, *below, *BESIDE, *outside)} == set()
+    assert {name for name in outside if not any(inside(one, name) for one in imported)} == set()
 
 
-@pytest.mark.parametrize("room", ROOMS)
+@pytest.mark.parametrize("room", [*ROOMS, *(f"gfimu.diagnosis.{one}" for one in DIAGNOSIS)])
 def test_rooms_have_few_files(room):
     assert 1 < len([file for file in FILES.values() if file.parent == FILES[room].parent]) <= MOST_FILES
 
 
-CORE = (
-    "gfimu.diagnosis.data",
-    "gfimu.diagnosis.terms",
-    "gfimu.diagnosis.fit",
-    "gfimu.diagnosis.search",
-    "gfimu.diagnosis.criticism",
-    "gfimu.diagnosis.verdict",
-    "gfimu.diagnosis.report",
-)
-"""Rooms of the diagnosis from the lowest floor up: each may import those before it."""
-
-BESIDE_ROOMS = {
-    "gfimu.diagnosis.coloured_noise",
-    "gfimu.diagnosis.parallel",
-    "gfimu.diagnosis.policy",
-    "gfimu.diagnosis.slow_modes",
-    "gfimu.generic_basis",
-    "gfimu.geometry.array",
-    "gfimu.recording",
-    "gfimu.world_model",
-}
-"""What every room of the diagnosis may import besides."""
-
-ONLY = {
-    "gfimu.diagnosis.report": {
-        "gfimu.diagnosis.criticism",  # the figures measure what they show
-        "gfimu.diagnosis.verdict",
-        "gfimu.visual",
-    },
-    "gfimu.diagnosis.design": {"gfimu.diagnosis.data", "gfimu.diagnosis.terms", "gfimu.diagnosis.fit"},
-}
-"""Rooms that may import some of those below them only."""
-
-UPWARD = {
-    # To be removed: arrows against the order of the rooms, and to modules of the former engine.
-    "gfimu.diagnosis.data": {
-        "gfimu.diagnosis.drive",  # smooth_rate: to move into data
-        "gfimu.diagnosis.segment",  # former engine
-        "gfimu.diagnosis.stretches",  # former engine
-        "gfimu.diagnosis.terms.spline",  # JoinedSpin, ScaledSpin
-    },
-    "gfimu.diagnosis.search": {"gfimu.diagnosis.criticism.slow_noise"},  # walk_strength: an estimate, to move into fit
-    "gfimu.diagnosis.criticism": {
-        "gfimu.diagnosis.drive",  # smooth_rate
-        "gfimu.diagnosis.verdict.verdict",  # RunView, Gain: records, to move below criticism
-    },
-    "gfimu.diagnosis.verdict": {"gfimu.diagnosis.report.wording"},  # the sentences: to move into verdict
-    "gfimu.diagnosis.report": {"gfimu.diagnosis.calibration_residue"},  # former engine
-    "gfimu.diagnosis.design": {  # former engine
-        "gfimu.diagnosis.causes",
-        "gfimu.diagnosis.drive",
-        "gfimu.diagnosis.evidence",
-        "gfimu.diagnosis.segment",
-        "gfimu.diagnosis.signatures",
-        "gfimu.diagnosis.stretches",
-    },
-}
-"""Exceptions of today, each of which must still be used."""
-
-CROWDED = {"gfimu.diagnosis.criticism": 15}
-"""Rooms with more than `MOST_FILES` files today; to be removed."""
+def test_the_report_sees_the_verdict_and_its_views_only():
+    below = {"gfimu.diagnosis.verdict", "gfimu.diagnosis.criticism.views", *BESIDE}
+    assert not [
+        name
+        for name in room_imports("gfimu.diagnosis.report")
+        if inside(name, "gfimu.diagnosis") and not inside(name, *below)
+    ]
 
 
-@pytest.mark.parametrize("room", [*CORE, "gfimu.diagnosis.design"])
-def test_arrows_of_the_diagnosis_go_down(room):
-    below = ONLY.get(room) or set(CORE[: CORE.index(room)])
-    imported = room_imports(room)
-    allowed = below | BESIDE_ROOMS | UPWARD.get(room, set())
-    assert {name for name in imported if not inside(name, *allowed)} == set()
-    assert UPWARD.get(room, set()) - imported == set(), "exceptions that are needed no more: remove them"
-
-
-@pytest.mark.parametrize("room", [*CORE, "gfimu.diagnosis.design"])
-def test_rooms_of_the_diagnosis_have_few_files(room):
-    count = len([file for file in FILES.values() if file.parent == FILES[room].parent])
-    assert 1 < count <= CROWDED.get(room, MOST_FILES)
-    assert room not in CROWDED or count > MOST_FILES, "an exception that is needed no more: remove it"
-
-
-THRESHOLD_ROOMS = ("gfimu.diagnosis.search", "gfimu.diagnosis.criticism", "gfimu.diagnosis.verdict")
+THRESHOLD_ROOMS = tuple(f"gfimu.diagnosis.{room}" for room in ("terms", "fit", "search", "criticism", "verdict"))
 
 OUTSIDE_POLICY = {
-    # To be removed: tuned numbers to move into `Policy`, or to be marked "numerical".
-    "gfimu.diagnosis.search.screening": {"_FREEST"},
-    "gfimu.diagnosis.criticism.dependence": {
-        *("CHANCE", "HIGHEST_ORDER", "_BINS", "_FEWEST_IN_BIN", "_FEWEST_SAMPLES", "_MATTERS", "_TURNED"),
-    },
-    "gfimu.diagnosis.criticism.generic": {"UNIT"},
-    "gfimu.diagnosis.criticism.residual_spectrum": {
-        *("HIGHEST_ORDER", "_CELLS_PER_TURN", "_FEWEST_CYCLES", "_FEWEST_TURNS", "_LONGEST_WINDOW", "_LOUD"),
-        *("_NARROW", "_NEIGHBOURS", "_ORDER_CONCENTRATED", "_SLOWEST_ORDER", "_TONE_CONCENTRATED", "_WIDE"),
-    },
-    "gfimu.diagnosis.criticism.residuals": {"_CORRELATED", "_LARGER"},
-    "gfimu.diagnosis.criticism.series_tests": {"_NORMAL_MEDIAN"},  # a constant of the normal distribution
-    "gfimu.diagnosis.criticism.whiteness": {"_LAGS"},
-    "gfimu.diagnosis.verdict.verdict": {"FORMAT_VERSION", "IN_PART"},
+    "gfimu.diagnosis.terms.drive": {"FIRST_ROUGHNESS", "LEAST_ROUGHNESS", "MARGIN", "ROUGH_FOR"},  # the drive's prior
 }
+"""Tuned numbers that are not in `Policy`."""
 
 
 def numeric_constants(source: str) -> set[str]:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gfimu.diagnosis.criticism.gate import impossible_sizes, judge, measurable
+from gfimu.diagnosis.criticism.gain import Gain
 from gfimu.diagnosis.criticism.holdout import Holdout, gate_gains, held_out_gain, other_recordings, split
 from gfimu.diagnosis.criticism.lack_of_fit import LackOfFit, lack_of_fit
 from gfimu.diagnosis.criticism.surrogate import surrogates
@@ -22,9 +22,10 @@ from gfimu.diagnosis.search.explain import Explanation, reduced
 from gfimu.diagnosis.search.long_run import understand_any_length
 from gfimu.diagnosis.search.nuisance_models import Understanding
 from gfimu.diagnosis.verdict.conclude import Described, conclude, is_dominant, is_unknown, named_causes
+from gfimu.diagnosis.verdict.gate import impossible_sizes, judge, measurable
 from gfimu.diagnosis.verdict.naming import conflicting
 from gfimu.diagnosis.verdict.sample_notes import with_sample_notes
-from gfimu.diagnosis.verdict.verdict import Diagnosis, Gain
+from gfimu.diagnosis.verdict.verdict import Diagnosis
 from gfimu.errors import InputError
 from gfimu.recording import Recording
 from gfimu.recording.carried_array import warn_of_other_array
@@ -172,7 +173,7 @@ class _Diagnosis:
             best = explanation.best
             gains = gate_gains(best, explanation.without, pairs, self._policy, other_recording=self._kept is not None)
             worst = min(gains, key=gains.__getitem__)
-            if gains[worst] >= self._policy.least_gain:
+            if gains[worst] >= self._policy.ambiguous:
                 break
             withdrawn.append(worst)
             explanation = reduced(explanation, worst, self._policy)
@@ -213,7 +214,7 @@ class _Diagnosis:
                 alone = self._gain(explanation, carried) if carried is not None else Gain()
                 samples = sum(len(run.t) for run in self._kept.runs)
                 better = gain.log_likelihood_per_sample - float(np.nan_to_num(alone.log_likelihood_per_sample))
-                carried, gain = (whole, gain) if better * samples > self._policy.least_gain else (carried, alone)
+                carried, gain = (whole, gain) if better * samples > self._policy.ambiguous else (carried, alone)
             elif carried is not None and gain.share_in_any_recording <= 0.0:
                 carried = None
             if gain.log_likelihood_per_sample > 0.0:

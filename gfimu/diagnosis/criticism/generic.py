@@ -18,12 +18,27 @@ from gfimu.diagnosis.terms.library import cause_columns
 from gfimu.generic_basis import Motion
 from gfimu.world_model import BasisUnits, SpinState
 
-__all__ = ["REFERENCE", "UNIT", "basis_units", "functions_at", "judges_reference", "motion_of", "series_products"]
+__all__ = [
+    "LEAST_INFORMATION",
+    "REFERENCE",
+    "UNIT",
+    "basis_units",
+    "functions_at",
+    "judges_reference",
+    "motion_of",
+    "series_products",
+]
 
 REFERENCE = "the reference"
 """What the tachometer, encoder or command is called beside the channels."""
 UNIT = 0.03
-"""What a function of order one is worth in the evidence, m/s² (of the reference rad/s or rad): usual white noise."""
+"""What a function of order one is worth in the evidence, m/s² (of the reference rad/s or rad): usual white noise.
+
+Numerical: the evidence averages over scales of a hundredth to thirty of it.
+"""
+
+LEAST_INFORMATION = 1e-9
+"""Numerical: of a function that is usable at all."""
 
 ValuesOf = Callable[[Stretch, Posterior], NDArray[np.float64]]
 

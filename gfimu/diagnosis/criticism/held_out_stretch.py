@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 from scipy.stats import chi2
 
+from gfimu.diagnosis.criticism.gain import Gain
+from gfimu.diagnosis.data.cosine_basis import NoiseLevels
 from gfimu.diagnosis.data.run import smooth_rate
 from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.fit.gauss_newton import fit
@@ -17,10 +19,8 @@ from gfimu.diagnosis.fit.learn import FOLLOWED
 from gfimu.diagnosis.fit.linear import Point
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.terms.cause import Cause, effects_of
-from gfimu.diagnosis.terms.coloured_noise import NoiseLevels
 from gfimu.diagnosis.terms.drive import Drive
 from gfimu.diagnosis.terms.observed import observe
-from gfimu.diagnosis.verdict.verdict import Gain
 from gfimu.world_model import is_of_one_recording
 
 __all__ = ["Measured", "gain_of", "measure"]
@@ -132,7 +132,7 @@ def gain_of(measured: Sequence[Measured], policy: Policy, *, label: str) -> Gain
     floor, fitted = (float(sum(getattr(one, name) for one in measured)) for name in ("floor", "fitted"))
     error = float(np.sqrt(sum(one.floor_variance for one in measured)))
     # A misfit of the fitted part within the error of the floor is noise whose learnt level is too low.
-    floor += float(np.clip(fitted - floor, 0.0, policy.floor_slack * error))
+    floor += float(np.clip(fitted - floor, 0.0, policy.noise_stds * error))
     share, std = _share(before - floor, after - floor, error, floor, policy)
     blocks = np.concatenate([one.blocks for one in measured])
     rms = np.sqrt(np.sum([one.squares for one in measured], axis=0) / samples)
@@ -195,7 +195,7 @@ def _floor(stretch: Stretch, drive: Drive, white: NDArray[np.float64], policy: P
     The white noise is that of the fast half, which the drive does not follow; squares are clipped, so that a line does
     not count as noise.
     """
-    count, limit = len(white), policy.clipped
+    count, limit = len(white), policy.noise_stds**2
     first = min(int(2 * count * stretch.run.sample_period * FOLLOWED / drive.spline.spacing), count // 2)
     power = stretch.basis.transform(white)[first:] ** 2 / stretch.mask.mean(axis=0).clip(_LEAST_VALID)
     expectation = chi2.cdf(limit, 3) + limit * chi2.sf(limit, 1)  # of a squared standard normal, clipped
@@ -210,7 +210,7 @@ def _share(before: float, after: float, error: float, floor: float, policy: Poli
 
     ``error`` is the standard error of the floor, which both excesses share.
     """
-    if before < max(policy.significant_excess * error, policy.least_excess * floor):
+    if before < max(policy.excess_stds * error, policy.noise_accuracy * floor):
         return float("nan"), float("nan")
     share = 1.0 - max(after, 0.0) / before
     # Beside the floor, the noise correlates with what there is to remove and with what remains.

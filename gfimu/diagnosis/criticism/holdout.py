@@ -13,18 +13,18 @@ from itertools import pairwise
 
 import numpy as np
 
+from gfimu.diagnosis.criticism.gain import Gain
 from gfimu.diagnosis.criticism.held_out_stretch import Measured, gain_of, measure
+from gfimu.diagnosis.data.cosine_basis import NoiseLevels
 from gfimu.diagnosis.data.stretch import RunUp, Stretch
 from gfimu.diagnosis.fit.evidence import SCALES, inverse, likeliest_scale
 from gfimu.diagnosis.fit.gauss_newton import Fit, fit
-from gfimu.diagnosis.fit.learn import learn_roughness, starting_point
+from gfimu.diagnosis.fit.learn import LEARNINGS, learn_roughness, starting_point
 from gfimu.diagnosis.fit.linear import Point, linearise, with_residue
 from gfimu.diagnosis.fit.parallel import each_apart, over_segments
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.terms.cause import Cause, effects_of
-from gfimu.diagnosis.terms.coloured_noise import NoiseLevels
 from gfimu.diagnosis.terms.drive import MARGIN, Drive
-from gfimu.diagnosis.verdict.verdict import Gain
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.world_model import Effect
 
@@ -153,7 +153,7 @@ def other_recordings(
     residue = 0.0 if first.residue is None else first.residue.scale
     part = Part(test, drives, (first.levels[0],) * len(test))
     near = fit(test, part.point(found.causes, residue), policy).point
-    part = replace(part, drives=learn_roughness(test, near, policy.learnings).drives)
+    part = replace(part, drives=learn_roughness(test, near, LEARNINGS).drives)
     return [Holdout(Part(tuple(stretches), first.drives, first.levels), part, residue)]
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.diagnosis.criticism.generic import (
+    LEAST_INFORMATION,
     REFERENCE,
     UNIT,
     basis_units,
@@ -22,13 +23,13 @@ from gfimu.diagnosis.criticism.generic import (
     motion_of,
     series_products,
 )
-from gfimu.diagnosis.criticism.observed_at import observed_at
 from gfimu.diagnosis.criticism.reading_curve import reading_curve
 from gfimu.diagnosis.criticism.series_tests import LackOfFit, changing_noise, jumps, lines
 from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.fit.evidence import log_evidence, log_evidence_each
 from gfimu.diagnosis.fit.gauss_newton import Fit
 from gfimu.diagnosis.fit.linear import Point
+from gfimu.diagnosis.fit.observed_at import observed_at
 from gfimu.diagnosis.fit.parallel import over_segments
 from gfimu.diagnosis.fit.posterior import Posterior
 from gfimu.diagnosis.policy import Policy
@@ -43,7 +44,6 @@ JERK = "jerk"
 """Derivative of the angular acceleration, beside the functions of `gfimu.generic_basis`."""
 _NAMES = (*FUNCTIONS, JERK)
 _LEAST_RMS = np.array([1e-6] * len(FUNCTIONS) + [1e-12])  # numerical: of a function that is not constant
-_LEAST_INFORMATION = 1e-9  # numerical
 _RIDGE = 1e-2  # numerical: of the coefficients that are reported
 _LEAST_COEFFICIENT = 1e-3  # numerical: in units of UNIT
 
@@ -72,8 +72,7 @@ def lack_of_fit(
     smooth : bool
         Whether smooth functions are tested too, which takes the most time.
     policy : Policy
-        Thresholds ``every_channel``, ``every_function``, ``steady_noise``, ``spikes``, ``spike_share`` and
-        ``spike_odds``.
+        Thresholds ``ambiguous``, ``steady``, ``sizeable``, ``spikes``, ``spike_share`` and ``lack_odds``.
     """
     candidates = [dependence_unexplained(stretches, fit.point, policy)] if smooth else []
     if smooth:
@@ -90,7 +89,7 @@ def lack_of_fit(
         candidates.append(changing_noise(stretches, seen, states, policy))
     if spikes > max(policy.spikes, policy.spike_share * sum(one.mask.size for one in stretches)):
         text = f"{spikes} isolated samples far off their neighbours"
-        candidates.append(LackOfFit(policy.spike_odds * spikes, text, {}))
+        candidates.append(LackOfFit(policy.lack_odds * spikes, text, {}))
     return max(candidates, key=lambda found: found.log_odds)
 
 
@@ -111,7 +110,7 @@ def dependence_unexplained(stretches: Sequence[Stretch], point: Point, policy: P
     total = count * len(series)
     gram, score = gram[:total, :total], score[:total]
     information = np.maximum(gram.diagonal(), 0.0)
-    usable = information > _LEAST_INFORMATION
+    usable = information > LEAST_INFORMATION
     if series[-1] == REFERENCE and _has_memory(stretches, point):
         usable[(len(series) - 1) * count + _NAMES.index(JERK)] = False
     places = np.flatnonzero(usable)
@@ -131,7 +130,7 @@ def dependence_unexplained(stretches: Sequence[Stretch], point: Point, policy: P
     for number, function in enumerate(_NAMES):
         some = places[(places % count == number) & (places < len(channels) * count)]
         value = odds_of(some, count)
-        if value > found.log_odds + policy.every_channel:
+        if value > found.log_odds + policy.ambiguous:
             strength = np.abs(score[some]) / np.sqrt(information[some])
             strongest = ", ".join(channels[place // count] for place in some[np.argsort(-strength)[:4]])
             text = f"several channels (strongest {strongest}) depend on {function}"
@@ -139,7 +138,7 @@ def dependence_unexplained(stretches: Sequence[Stretch], point: Point, policy: P
     for number, name in enumerate(series):
         some = places[places // count == number]
         value = odds_of(some, len(series))
-        if value > found.log_odds + policy.every_function:
+        if value > found.log_odds + policy.steady:
             top = _NAMES[int(some[np.argmax(single[some])]) % count]
             text = f"{name} depends on the motion or time in a way nothing in the library has (strongest: {top})"
             found, chosen = LackOfFit(value, text, {}), some

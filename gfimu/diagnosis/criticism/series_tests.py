@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gammaln
-from scipy.stats import chi2
+from scipy.stats import chi2, norm
 
 from gfimu.diagnosis.criticism.generic import REFERENCE, judges_reference
 from gfimu.diagnosis.data.stretch import Stretch
@@ -21,7 +21,6 @@ __all__ = ["LackOfFit", "changing_noise", "jumps", "lines"]
 
 _SLOWEST_LINE = 1.0  # numerical: Hz; below it slow noise and the drive are free
 _LEAST_LINE_LEVEL = 0.7  # numerical: white noise in its own units has a level of 1
-_NORMAL_MEDIAN = 0.6745  # of |x|, x ~ N(0, 1)
 _WIDTHS = (1.0, 2.0)  # numerical: s, of the means that are compared at a jump
 _FEWEST_WIDTHS = 12  # numerical: in a stretch, for the usual size of such differences
 _FEWEST_IN_MEAN = 20  # numerical: samples
@@ -120,7 +119,7 @@ def jumps(stretch: Stretch, seen: Observed) -> LackOfFit:
         change = _steps(residual, mask, size)
         if not np.isfinite(change).any(axis=0).all():
             continue
-        usual = np.maximum(np.nanmedian(np.abs(change), axis=0) / _NORMAL_MEDIAN, np.sqrt(2.0 / size))
+        usual = np.maximum(np.nanmedian(np.abs(change), axis=0) / norm.ppf(0.75), np.sqrt(2.0 / size))
         # A channel's own median has few independent values: half of its weight is the other channels'.
         usual = np.sqrt(usual * np.maximum(usual, np.median(usual)))
         power = np.nan_to_num((change / usual) ** 2)
@@ -160,7 +159,7 @@ def changing_noise(
     states : sequence of SpinState
         The table's motion at their samples.
     policy : Policy
-        Threshold ``steady_noise``.
+        Threshold ``sizeable``.
     """
     best = _NOTHING
     for stretch, mine, state in zip(stretches, seen, states, strict=True):
@@ -179,7 +178,7 @@ def changing_noise(
                 continue
             means = np.array([power[part].sum() for part in parts]) / counts
             spread = means / means.mean()
-            if np.ptp(spread) <= policy.steady_noise:
+            if np.ptp(spread) <= policy.sizeable:
                 continue
             # The mean square of second differences of white noise has about n/1.8 degrees of freedom per channel.
             statistic = float(np.sum(counts / 1.8 / 2 * (spread - 1) ** 2))

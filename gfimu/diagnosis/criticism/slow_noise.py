@@ -1,7 +1,4 @@
-"""Noise that is more than the parts should have: a random walk of the biases, one loud channel, more white noise.
-
-Slow noise is judged by the Whittle likelihood of the squared sizes of slow cosines in the residual of a fit.
-"""
+"""Noise that is more than the parts should have: one loud channel, more white noise."""
 
 from __future__ import annotations
 
@@ -9,45 +6,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.stats import chi2
 
-from gfimu.diagnosis.criticism.observed_at import observed_at
+from gfimu.diagnosis.data.cosine_basis import NoiseLevels
 from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.fit.linear import Point
+from gfimu.diagnosis.fit.observed_at import observed_at
+from gfimu.diagnosis.fit.random_walk import slow_powers, whittle
 from gfimu.diagnosis.policy import Policy
-from gfimu.diagnosis.terms.coloured_noise import NoiseLevels, likeliest_flicker
-from gfimu.diagnosis.terms.observed import Observed
-from gfimu.diagnosis.terms.slow_modes import WeighedPowers
 
-__all__ = ["LoudestChannel", "Walk", "loudest_channel", "walk_strength", "white_factor"]
+__all__ = ["LoudestChannel", "loudest_channel", "white_factor"]
 
-_STRENGTHS = np.geomspace(2e-3, 0.5, 28)  # numerical: grid of a random walk's strength, m/s² per √s
 _LEAST_ANALOGUE = 1e-6  # numerical: m/s²
-
-
-@dataclass(frozen=True)
-class Walk:
-    """A random walk of the biases, equally strong in all channels.
-
-    Parameters
-    ----------
-    strength, std : float
-        Strength and its standard deviation, m/s² per √s.
-    log_odds : float
-        Compared with bias instability alone, of at most `Policy.largest_flicker`.
-    unequal : float
-        Minus the log of the chance that channels of equal strength differ as much as these.
-    """
-
-    strength: float
-    std: float
-    log_odds: float
-    unequal: float
-
-    def is_likely(self, policy: Policy) -> bool:
-        """Tell whether the residual shows it, equally in all channels."""
-        return self.log_odds > policy.walk_odds and self.unequal < policy.unequal_walk
 
 
 @dataclass(frozen=True)
@@ -73,7 +42,7 @@ class LoudestChannel:
 
     def stands_out(self, policy: Policy) -> bool:
         """Tell whether it surely has more slow noise than the other channels."""
-        return self.ratio > policy.loud_ratio and self.log_odds > policy.loud_odds
+        return self.ratio > policy.loud_ratio and self.log_odds > policy.ambiguous
 
 
 def loudest_channel(stretches: Sequence[Stretch], point: Point, policy: Policy = Policy()) -> LoudestChannel:
@@ -89,7 +58,7 @@ def loudest_channel(stretches: Sequence[Stretch], point: Point, policy: Policy =
     point : Point
         A fit with the noise that was learnt from it.
     policy : Policy
-        Thresholds ``loud_ratio`` and ``loud_odds``.
+        Thresholds ``loud_ratio`` and ``ambiguous``.
     """
     channels = stretches[0].model.array.channels
     alive = np.any([stretch.mask[:, :-1].any(axis=0) for stretch in stretches], axis=0)
@@ -104,45 +73,14 @@ def loudest_channel(stretches: Sequence[Stretch], point: Point, policy: Policy =
         return LoudestChannel(channels[channel], level, ratio, 0.0)
     odds = 0.0
     for stretch, seen in zip(stretches, observed_at(stretches, point), strict=True):
-        slow = _slow_powers(stretch, seen)
+        slow = slow_powers(stretch, seen)
         power, flicker, walk = (
             np.broadcast_to(one, slow.power.shape)[:, [channel]] for one in (slow.power, slow.flicker, slow.walk)
         )
         besides = seen.levels.white[channel] ** 2 + walk * seen.levels.walk**2
-        own, allowed = (_whittle(power, besides + flicker * size**2) for size in (level, policy.loud_ratio * usual))
+        own, allowed = (whittle(power, besides + flicker * size**2) for size in (level, policy.loud_ratio * usual))
         odds += float(own[0] - allowed[0])
     return LoudestChannel(channels[channel], level, ratio, odds)
-
-
-def walk_strength(stretches: Sequence[Stretch], point: Point, policy: Policy = Policy()) -> Walk:
-    """Estimate a random walk, common to all channels, from the residual at a point.
-
-    It is the whole random walk that the residual shows, whatever part of it the noise of the point has already.
-
-    Parameters
-    ----------
-    stretches : sequence of Stretch
-        The data.
-    point : Point
-        A fit.
-    policy : Policy
-        Thresholds ``largest_flicker``, ``least_walk`` and ``walk_to_drive``.
-    """
-    totals = np.zeros((len(_STRENGTHS), stretches[0].model.array.n_channels))
-    without = 0.0
-    for stretch, seen in zip(stretches, observed_at(stretches, point), strict=True):
-        slow, white = _slow_powers(stretch, seen), seen.levels.white[:-1]
-        without += float(_likelihood(slow, white, 0.0, policy).sum())
-        totals += np.array([_likelihood(slow, white, strength, policy) for strength in _STRENGTHS])
-    common = totals.sum(axis=1)
-    best = int(np.argmax(common))
-    weight = np.exp(common - common[best])
-    mean = float(weight @ _STRENGTHS / weight.sum())
-    std = float(np.sqrt(weight @ (_STRENGTHS - mean) ** 2 / weight.sum()))
-    apart = 2.0 * float(totals.max(axis=0).sum() - common[best])
-    unequal = -float(chi2.logsf(apart, totals.shape[1] - 1))
-    odds = float(common[best] - without) if mean > policy.least_walk else 0.0
-    return Walk(mean, float(np.hypot(std, policy.walk_to_drive * mean)), odds, unequal)
 
 
 def white_factor(
@@ -157,7 +95,7 @@ def white_factor(
     levels : sequence of NoiseLevels
         Noise of every stretch.
     policy : Policy
-        Thresholds ``white_ratio`` and ``white_ratio_least``.
+        Thresholds ``white_ratio`` and ``noise_accuracy``.
 
     Returns
     -------
@@ -176,35 +114,12 @@ def white_factor(
         factors.append(analogue / np.maximum(expected.analogue, _LEAST_ANALOGUE))
     counts = _counts(stretches)
     ratio, factor_each = (np.sqrt(np.average(np.square(one), axis=0, weights=counts)) for one in (ratios, factors))
-    if np.median(ratio) < policy.white_ratio or ratio.min() < policy.white_ratio_least:
+    if np.median(ratio) < policy.white_ratio or ratio.min() < np.sqrt(policy.white_ratio):
         return None
     factor = float(np.median(factor_each))
     samples = sum(len(stretch.run.t) for stretch in stretches)
-    return factor, factor * float(1.0 / np.sqrt(samples * len(ratio) / 4.0) + policy.white_accuracy)
+    return factor, factor * float(1.0 / np.sqrt(samples * len(ratio) / 4.0) + policy.noise_accuracy)
 
 
 def _counts(stretches: Sequence[Stretch]) -> list[int]:
     return [len(stretch.run.t) for stretch in stretches]
-
-
-def _slow_powers(stretch: Stretch, seen: Observed) -> WeighedPowers:
-    """Return squared sizes of the slow modes in the channels' residuals, and their variances per unit slow noise."""
-    basis, residual = stretch.basis, seen.residual[:, :-1]
-    if stretch.steps.channels:
-        return WeighedPowers.of(basis, residual, seen.weight[:, :-1])
-    power = basis.transform(residual)[1 : len(basis.frequency)] ** 2  # (K, c)
-    return WeighedPowers(power, basis.flicker_spectrum[1:, None], basis.walk_spectrum[1:, None])
-
-
-def _likelihood(
-    slow: WeighedPowers, white: NDArray[np.float64], strength: float, policy: Policy
-) -> NDArray[np.float64]:
-    """Return the log likelihood (c,) of a random walk beside white noise (c,) and the likeliest bias instability."""
-    walk = slow.walk * strength**2
-    flicker = np.minimum(likeliest_flicker(slow.power, white, slow.flicker, walk), policy.largest_flicker)
-    return _whittle(slow.power, white**2 + slow.flicker * flicker**2 + walk)
-
-
-def _whittle(power: NDArray[np.float64], spectrum: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the Whittle log likelihood of squared cosine coefficients (K, c) per channel."""
-    return np.asarray(-0.5 * np.sum(np.log(spectrum) + power / spectrum, axis=0))

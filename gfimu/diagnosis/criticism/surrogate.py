@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.diagnosis.criticism.generic import (
+    LEAST_INFORMATION,
     UNIT,
     basis_units,
     functions_at,
@@ -21,12 +22,12 @@ from gfimu.diagnosis.criticism.generic import (
     motion_of,
     series_products,
 )
-from gfimu.diagnosis.criticism.observed_at import observed_at
 from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.fit.evidence import log_evidence, log_evidence_each
 from gfimu.diagnosis.fit.gauss_newton import Fit, fit
 from gfimu.diagnosis.fit.learn import learn_noise
 from gfimu.diagnosis.fit.linear import Point
+from gfimu.diagnosis.fit.observed_at import observed_at
 from gfimu.diagnosis.fit.posterior import Posterior
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.terms.cause import Cause
@@ -42,7 +43,6 @@ _LINES = 3  # numerical: strongest lines that are offered, in time and in angle
 _HIGHEST_ORDER = 48  # numerical: cycles per revolution
 _FEWEST_CYCLES = 10  # numerical: of a tone in a run; the slow functions follow what is slower
 _PADDED = 8  # numerical: zero padding of a periodogram
-_LEAST_INFORMATION = 1e-9  # numerical
 
 
 @dataclass(frozen=True)
@@ -97,8 +97,7 @@ def surrogates(
     nothing : Fit
         No cause.
     policy : Policy
-        Thresholds of fits, and ``most_terms``, ``terms_per_round``, ``term_odds``, ``comparable``, ``nearly_all``,
-        ``least_described`` and ``most_searched``.
+        Thresholds of fits, and ``beam``, ``extra_odds``, ``small``, ``dominant`` and ``most_searched``.
     hints : sequence of str
         Functions of `gfimu.generic_basis` to look at besides its own.
     """
@@ -138,7 +137,7 @@ def _ever_richer(
     terms: list[_Term] = []
     found: list[Surrogate] = []
     for _ in range(_ROUNDS):
-        more = _strongest(stretches, present.point, terms, policy, units, hints)[: policy.most_terms - len(terms)]
+        more = _strongest(stretches, present.point, terms, policy, units, hints)
         if not more:
             break
         kept = {term: cause for term, cause in zip(terms, present.causes, strict=True) if not term.is_in(more)}
@@ -147,7 +146,7 @@ def _ever_richer(
         point = replace(present.point, causes=causes)
         richer = fit(stretches, point, replace(policy, steps=_STEPS))
         unexplained = max(present.objective - observations, 0.0)
-        if not present.objective - richer.objective > policy.least_described * unexplained:
+        if not present.objective - richer.objective > policy.dominant * unexplained:
             break
         present = _settled(stretches, richer.point, policy)
         found.append(Surrogate(present))
@@ -186,7 +185,7 @@ def _strongest(
     gram, score = series_products(stretches, point, values_of)
     count, channels = len(names), stretches[0].model.array.n_channels
     reference = judges_reference(stretches) and not stretches[0].is_angle
-    usable = gram.diagonal() > _LEAST_INFORMATION
+    usable = gram.diagonal() > LEAST_INFORMATION
     usable[channels * count :] &= [reference and name != OF_READING and not is_of_time(name) for name in names]
     for term in taken:
         usable[[place * count + names.index(term.function) for place in term.series if term.function in names]] = False
@@ -205,7 +204,7 @@ def _greedy(
     count, usable = len(names), usable.copy()
     chosen: list[_Term] = []
     first = 0.0
-    for _ in range(policy.terms_per_round):
+    for _ in range(policy.beam):
         single = log_evidence_each(np.maximum(gram.diagonal(), 0.0), score, np.zeros(len(score), dtype=bool))
         single = np.where(usable, single - np.log(len(score)), -np.inf)
         odds, best = float(single.max()), [int(np.argmax(single))]
@@ -213,10 +212,10 @@ def _greedy(
             places = np.arange(channels) * count + function
             if usable[places].any():
                 value = log_evidence(gram[np.ix_(places, places)], score[places]) - np.log(count)
-                if value > odds and policy.nearly_all * value > single.max():
+                if value > odds and (1.0 - policy.small) * value > single.max():
                     odds, best = value, places.tolist()
         first = max(first, odds)
-        if odds < max(policy.term_odds, policy.comparable * first):
+        if odds < max(policy.extra_odds, policy.small * first):
             break
         chosen.append(_Term(names[best[0] % count], tuple(place // count for place in best)))
         gain = np.linalg.solve(gram[np.ix_(best, best)] + np.eye(len(best)), gram[best])

@@ -13,11 +13,10 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.diagnosis.data.frozen import frozen_stretches, told_frozen
-from gfimu.diagnosis.data.rails import Rail, find_rails, on_rails, rail_parameters, rail_sentence
+from gfimu.diagnosis.data.rails import GARBAGE, PILE, Rail, find_rails, on_rails, rail_parameters, rail_sentence
 from gfimu.diagnosis.data.rounding import common_step
 from gfimu.diagnosis.data.run import Run, difference_noise
-from gfimu.diagnosis.data.spikes import channel_spikes
+from gfimu.diagnosis.data.samples import channel_spikes, frozen_stretches, told_frozen
 from gfimu.world_model import Effect, WorldModel
 
 __all__ = ["IntegrityReport", "check_integrity"]
@@ -28,10 +27,9 @@ _FITTING = 0.6  # of the power of the readings
 _SIGNIFICANT_RMS = 12.0
 _VARIED_RMS, _NOISE = 3.0, 1.5  # of a slow table, noise; power of white noise and some bias instability
 _MANY = 3  # inverted channels that are more likely than exchanged ones
-_PILE = 30
 _CAUGHT = 0.8  # of the samples that should be beyond a limit
 _SURELY_MISSING = 15.0  # samples above the largest value of several channels, of which none is there
-_ONE_CHIP, _GARBAGE = 3, 5  # channels, and samples of each, that may read more than a limit
+_ONE_CHIP = 3  # channels that may read more than a limit
 _OF_RANGE = 0.97  # of the configured range: clipping there is no fault
 _DIFFERENT = 0.6  # share of values above which steps are finer than what is seen
 
@@ -179,14 +177,14 @@ def _clipping(
             clear = max(1.5 * sigma, 0.5 * quantum + sigma)
             beyond = sign * prediction[run.valid[:, channel], channel] > top + clear
             # Nothing beyond it is read though it should be, even where a plateau is just below.
-            caught = sigma > 0.5 * quantum and (beyond & at_top).sum() > max(_CAUGHT * beyond.sum(), _PILE)
+            caught = sigma > 0.5 * quantum and (beyond & at_top).sum() > max(_CAUGHT * beyond.sum(), PILE)
             if sigma > 0.5 * quantum:
                 lacking.append((top, _missing_above(int(at_top.sum()), int(below.sum()), noise / quantum)))
             if at_top.sum() < 8 or not (caught or at_top.sum() > 3 * below.sum() + 4):
                 continue
             if caught or (beyond & at_top).sum() > 0.5 * at_top.sum():
                 levels.append(top)
-            elif at_top.sum() >= _PILE and sigma > 0.5 * quantum:
+            elif at_top.sum() >= PILE and sigma > 0.5 * quantum:
                 piles.append(top)  # a steady signal at the limit: its noise would go beyond
     levels = levels or (piles if len(piles) > 1 else []) or _cut_off(lacking, float(steps.min()))
     if not levels:
@@ -195,7 +193,7 @@ def _clipping(
     close = np.abs(np.array(levels) - limit) < 1.5 * float(steps.min())
     beyond_it = np.abs(np.where(run.valid, run.readings, 0.0)) > limit + np.maximum(0.6 * steps, 4.0 * white)
     # One chip in another range may read more, and single samples may be garbage.
-    contradicted = np.sum(beyond_it.sum(axis=0) > _GARBAGE) > _ONE_CHIP
+    contradicted = np.sum(beyond_it.sum(axis=0) > GARBAGE) > _ONE_CHIP
     return limit if close.sum() >= max(1, len(levels) // 2) and not contradicted else None
 
 
@@ -212,7 +210,7 @@ def _own_rails(
         return rails
     other = any(abs(abs(rail.level) - limit) > 1.5 * steps[rail.channel] for rail in rails)
     beyond = np.abs(np.where(run.valid, run.readings, 0.0)) > limit + np.maximum(0.6 * steps, 4.0 * white)
-    return rails if other or (beyond.sum(axis=0) > _GARBAGE).any() else []
+    return rails if other or (beyond.sum(axis=0) > GARBAGE).any() else []
 
 
 def _cut_off(lacking: Sequence[tuple[float, float]], step: float) -> list[float]:

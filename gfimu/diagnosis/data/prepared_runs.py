@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from gfimu.diagnosis.data.integrity import IntegrityReport, check_integrity
 from gfimu.diagnosis.data.plausibility import refuse_implausible
 from gfimu.diagnosis.data.run import Run, prepare_run
-from gfimu.diagnosis.data.spikes import reference_spikes
+from gfimu.diagnosis.data.samples import reference_spikes
 from gfimu.recording import Recording
 from gfimu.world_model import Effect, WorldModel
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
-from gfimu.diagnosis.data.temperature import between_steps
+from gfimu.diagnosis.data.rounding import between_steps
 from gfimu.diagnosis.data.time_grid import time_grid
 from gfimu.errors import InputError
 from gfimu.recording import Recording

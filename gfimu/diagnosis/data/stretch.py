@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
+from gfimu.diagnosis.data.cosine_basis import CosineBasis, NoiseLevels
 from gfimu.diagnosis.data.rounding import COARSE, NO_STEPS, Steps
 from gfimu.diagnosis.data.run import Run, difference_noise, smooth_rate
-from gfimu.diagnosis.terms.coloured_noise import CosineBasis, NoiseLevels
-from gfimu.diagnosis.terms.spline import JoinedSpin, ScaledSpin
+from gfimu.diagnosis.data.spins import JoinedSpin, ScaledSpin
 from gfimu.world_model import Effect, Spin, WorldModel, is_of_wiring
 
 __all__ = ["RunUp", "Stretch", "make_stretches"]

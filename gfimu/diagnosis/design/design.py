@@ -40,7 +40,6 @@ _SEARCH_RATE = 50.0
 _INSEPARABLE = 1e-5
 _STARTS = 12
 _SHARE_OF_RANGE = 0.9
-_UPRIGHT = np.zeros(3)
 
 Report = Callable[[float, str], None]
 
@@ -98,7 +97,7 @@ def design(
     allowed = _within_range(model, limits)
     bench = _Bench(model, effects, recorded, allowed, sample_rate)
     plain = plain_profile(allowed)
-    upright = _Plan(bench, [_UPRIGHT])
+    upright = _Plan(bench, [np.zeros(3)])
     before = upright.final(None if recorded else plain)
 
     points = starting_points(rng, _STARTS)
@@ -116,7 +115,7 @@ def design(
         after = upright.final(profile)
     if mountings and (inseparable or after.least_nats < SEPARATED):
         # The same profile upright and turned, unless an upright recording is at hand.
-        first = [] if recorded else [_UPRIGHT]
+        first = [] if recorded else [np.zeros(3)]
         plans = {name: _Plan(bench, [*first, np.array(turn)]) for name, turn in mountings.items()}
         best = [point for _, point in sorted(ranked, key=lambda pair: -pair[0])[:2]]
         tested = {

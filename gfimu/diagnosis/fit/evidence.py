@@ -20,10 +20,11 @@ __all__ = ["SCALES", "inverse", "likeliest_scale", "log_evidence", "log_evidence
 SCALES = (0.01, 0.03, 0.08, 0.2, 0.45, 1.0, 2.2, 5.0, 12.0, 30.0)
 """Scales k of the prior: a fraction of the usual size up to a gross error.
 
-Close to each other: with twelve coordinates a prior three times too wide costs eight nats, and a rival that happens to
-have a narrower one would win.
+Numerical: nodes of a sum over it. Close to each other: with twelve coordinates a prior three times too wide costs
+eight nats, and a rival that happens to have a narrower one would win.
 """
-_LEAST_POWER = 1e-13
+_LEAST_POWER = 1e-13  # numerical
+# Numerical: weights of that sum, even in the logarithm from a thirtieth to twice the usual size, less beyond.
 _SCALE_WEIGHTS = np.log(np.array([0.07, 0.13, 0.14, 0.14, 0.14, 0.13, 0.10, 0.07, 0.05, 0.03]))
 
 

@@ -26,8 +26,9 @@ from gfimu.diagnosis.terms.cause import Cause, effects_of
 from gfimu.diagnosis.terms.jacobian import Jacobian
 from gfimu.geometry.array import AccelerometerArray
 
-__all__ = ["Fit", "fit", "log_prior"]
+__all__ = ["SETTLED", "Fit", "fit", "log_prior"]
 
+SETTLED = 0.3  # numerical: nats that a step must promise to be taken
 _SHARES = (1.0, 0.3, 0.08)  # numerical: of a step that goes uphill
 _SHAPE_STEP = 0.3  # numerical: most that a shape moves in a step
 _SHAPE_PRIOR = 0.7  # numerical: standard deviation of that step
@@ -118,16 +119,16 @@ def _descend(stretches: Sequence[Stretch], point: Point, policy: Policy) -> tupl
     done = 0
     for done in range(policy.steps):
         step, promise = _step(point.causes, linear)
-        if promise < policy.settled:
+        if promise < SETTLED:
             break
         for share in _SHARES:
             trial = _moved(point, linear, share, step, array)
             there = _energy(stretches, trial)
-            if there <= now + policy.settled:
+            if there <= now + SETTLED:
                 break
         else:
             break
-        stalled = now - there < policy.settled
+        stalled = now - there < SETTLED
         kept = _dear(linear) if now - there > _KEPT * promise else None
         point, now = trial, there
         linear = linearise(stretches, point, of_causes(point), jacobians=kept)

@@ -8,21 +8,35 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gfimu.diagnosis.data.cosine_basis import NoiseLevels
 from gfimu.diagnosis.data.run import Run
 from gfimu.diagnosis.data.stretch import Stretch, make_stretches
 from gfimu.diagnosis.fit.linear import Linear, Point, linearise
 from gfimu.diagnosis.fit.parallel import over_segments
 from gfimu.diagnosis.policy import Policy
-from gfimu.diagnosis.terms.coloured_noise import NoiseLevels, estimate_flicker, likeliest_flicker, white_level
+from gfimu.diagnosis.terms.coloured_noise import estimate_flicker, likeliest_flicker, white_level
 from gfimu.diagnosis.terms.drive import Drive
 from gfimu.diagnosis.terms.jacobian import Jacobian
 from gfimu.diagnosis.terms.slow_modes import WeighedModes, WeighedPowers
 from gfimu.world_model import WorldModel
 
-__all__ = ["FOLLOWED", "learn_noise", "learn_roughness", "predicted_by_reference", "sharpened", "starting_point"]
+__all__ = [
+    "FOLLOWED",
+    "LEARNINGS",
+    "learn_noise",
+    "learn_roughness",
+    "predicted_by_reference",
+    "sharpened",
+    "starting_point",
+]
 
 FOLLOWED = 0.6
-"""Over the spacing of the knots, Hz: what is faster the drive does not follow."""
+"""Over the spacing of the knots, Hz: what is faster the drive does not follow.
+
+Numerical: just beyond the Nyquist frequency of the knots, 0.5 over their spacing.
+"""
+LEARNINGS = 3
+"""Numerical: rounds of the fixed point of the roughness."""
 _LEAST_VALID = 0.01  # numerical: share of the samples that count
 _REFERENCE_ROUNDS = 5  # numerical: to the roughness of a drive from its reference alone
 
@@ -72,7 +86,7 @@ def sharpened(stretches: Sequence[Stretch], point: Point, policy: Policy) -> Poi
     Where the fit is poor the drive would be bent to what no drive did: then the knots stay.
     """
     now = linearise(stretches, point)
-    if now.objective > policy.fair * sum(stretch.observations for stretch in stretches):
+    if now.objective > policy.white_ratio**2 * sum(stretch.observations for stretch in stretches):
         return point
     drives = []
     for stretch, drive, step in zip(stretches, point.drives, now.drive_steps, strict=True):

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from gfimu.diagnosis.criticism.gate import impossible_sizes, judge
+from gfimu.diagnosis.criticism.gain import Gain
 from gfimu.diagnosis.criticism.lack_of_fit import LackOfFit
+from gfimu.diagnosis.criticism.views.run_view import RunView
 from gfimu.diagnosis.data.integrity import check_integrity
 from gfimu.diagnosis.data.run import Run
 from gfimu.diagnosis.free_body.explain import BodyFit, explain, reduced
@@ -26,9 +27,9 @@ from gfimu.diagnosis.free_body.run import BodyRun, prepare_body_run
 from gfimu.diagnosis.free_body.segment import BodySegment
 from gfimu.diagnosis.free_body.undetermined import undetermined, undetermined_sentence
 from gfimu.diagnosis.policy import Policy
-from gfimu.diagnosis.report.wording import verdict_sentences
 from gfimu.diagnosis.search.comparison import Comparison
 from gfimu.diagnosis.terms.cause import Cause, effects_of
+from gfimu.diagnosis.verdict.gate import impossible_sizes, judge
 from gfimu.diagnosis.verdict.naming import (
     channel_share,
     conflicting,
@@ -39,7 +40,8 @@ from gfimu.diagnosis.verdict.naming import (
     rival_list,
 )
 from gfimu.diagnosis.verdict.sample_notes import with_sample_notes
-from gfimu.diagnosis.verdict.verdict import Diagnosis, Gain, NamedCause, Residual, RunView, Unexplained
+from gfimu.diagnosis.verdict.verdict import Diagnosis, NamedCause, Residual, Unexplained
+from gfimu.diagnosis.verdict.wording import verdict_sentences
 from gfimu.errors import InputError
 from gfimu.motion.attitude import from_rotation, integrate_attitude, to_rotation
 from gfimu.recording import Recording
@@ -85,7 +87,7 @@ def diagnose_body(
     while explanation.best.causes:
         gains = gate_gains(explanation.best.causes, pairs, policy)
         worst = min(gains, key=lambda name: gains[name])
-        if gains[worst] >= policy.least_gain:
+        if gains[worst] >= policy.ambiguous:
             break
         withdrawn.append(worst)
         explanation = reduced(segments, explanation.best.causes, fixed, worst, policy)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.diagnosis.fit.evidence import SCALES
+from gfimu.diagnosis.fit.gauss_newton import SETTLED
 from gfimu.diagnosis.free_body.screening import BodyScreening, Known, plan_signatures, screen, signature_columns
 from gfimu.diagnosis.free_body.segment import BodySegment
 from gfimu.diagnosis.free_body.undetermined import LEAST_INFORMATION, determined
@@ -218,7 +219,7 @@ def explain(
         moved = (screening.objective - fit.objective) / screening.misfit
         base = (screening, causes)
         same = set(chosen) == set(members)
-        if same and stable and moved < policy.settled * max(len(causes), 1):
+        if same and stable and moved < SETTLED * max(len(causes), 1):
             break
         causes = fit.causes
         if same or number in {1, 3}:

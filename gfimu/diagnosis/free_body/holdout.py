@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gfimu.diagnosis.criticism.gain import Gain
 from gfimu.diagnosis.free_body.explain import Sets, learn_noise
 from gfimu.diagnosis.free_body.screening import BodyScreening, coordinates_of, of_families, screen
 from gfimu.diagnosis.free_body.segment import BodySegment
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.terms.cause import Cause, effects_of
-from gfimu.diagnosis.verdict.verdict import Gain
 from gfimu.world_model import Effect
 
 __all__ = ["BodyHoldout", "gate_gains", "held_out_gain", "other_recording", "stretches"]
@@ -124,10 +124,10 @@ def held_out_gain(
             whole = len(change) // _BLOCK * _BLOCK
             gains.append(change[:whole].reshape(-1, _BLOCK).mean(axis=1) if whole else change)
     excess = before - floor
-    share = 1.0 - max(after - floor, 0.0) / excess if excess > policy.least_excess * floor else float("nan")
+    share = 1.0 - max(after - floor, 0.0) / excess if excess > policy.noise_accuracy * floor else float("nan")
     likelihood = np.concatenate(gains)
     over = misfits - rows_counted
-    over_noise = 1.0 - max(over[1], 0.0) / over[0] if over[0] > policy.least_excess * rows_counted else float("nan")
+    over_noise = 1.0 - max(over[1], 0.0) / over[0] if over[0] > policy.noise_accuracy * rows_counted else float("nan")
     gain = Gain(
         label,
         float(np.sqrt(before / samples)),

@@ -105,7 +105,7 @@ def _strongest(
     size = score[top] / (diagonal[top] + 1e-2) * _UNIT
     one = LackOfFit(float(each[top]), f"channel {channels[top]} depends on {name}", {f"{channels[top]}: {name}": size})
     every = float(log_evidence(gram + 1e-9 * np.eye(len(score)), score)) - np.log(looks[1])
-    if every <= one.log_odds + policy.every_channel:
+    if every <= one.log_odds + policy.ambiguous:
         return one
     values = np.linalg.solve(gram + 1e-2 * np.eye(len(score)), score) * _UNIT
     strong = [channels[c] for c in np.argsort(-np.abs(score / np.sqrt(diagonal)))[:4]]

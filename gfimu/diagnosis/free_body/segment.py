@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_solve, solve_triangular
 
+from gfimu.diagnosis.data.cosine_basis import CosineBasis
 from gfimu.diagnosis.free_body.noise import (
     BodyNoise,
     Projection,
@@ -24,7 +25,6 @@ from gfimu.diagnosis.free_body.noise import (
     white_from_rows,
 )
 from gfimu.diagnosis.free_body.run import BodyRun
-from gfimu.diagnosis.terms.coloured_noise import CosineBasis
 from gfimu.motion.body_drive import BodyDrive
 from gfimu.world_model import BodyModel, Effect
 

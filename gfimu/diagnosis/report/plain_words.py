@@ -8,7 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gfimu.diagnosis.verdict.verdict import Diagnosis, NamedCause, RunView
+from gfimu.diagnosis.criticism.views.run_view import RunView
+from gfimu.diagnosis.policy import Policy
+from gfimu.diagnosis.verdict.verdict import Diagnosis, NamedCause
 from gfimu.units import NAME, NUMBER, RATIO, STANDARD_GRAVITY, key_name
 
 __all__ = [
@@ -26,7 +28,6 @@ __all__ = [
 ]
 
 _OF_A_CALIBRATION = frozenset({"bias", "scale_factor", "misalignment", "cross_axis"})
-_SIGNIFICANT = 2.0
 _THOUSANDTHS = ("rad", "m", "s")
 _NOISE_UNITS = {
     "bias_instability_m_s2": "m/s²",
@@ -186,7 +187,7 @@ def parameter_texts(cause: NamedCause, units: Mapping[str, str]) -> list[Paramet
         std = cause.std.get(key)
         if value == 0 and not std:
             continue
-        certain = std is None or not math.isfinite(std) or abs(value) > _SIGNIFICANT * std
+        certain = std is None or not math.isfinite(std) or abs(value) > Policy.stds * std
         texts.append(ParameterText(name, _with_std(value, std, unit), _familiar(value, std, unit), certain))
     return texts
 

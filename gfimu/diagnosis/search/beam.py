@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,11 +15,11 @@ from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.screening import Hypothesis, Screening
 from gfimu.diagnosis.terms.cause import Cause
 
-__all__ = ["Blocks", "Candidate", "leading_sets"]
+__all__ = ["STARTS", "Blocks", "Candidate", "leading_sets"]
 
 _FRONT, _PARTNERS = 8, 30  # numerical: sets that are grown, and how many of the best partners of each are scored
-
 _ALIKE = 0.3  # numerical: shapes nearer than that, as a logarithm or in rad, belong to one optimum
+STARTS = 3  # numerical: optima over the shapes of an effect from which the best set is fitted again
 
 
 @dataclass(frozen=True)
@@ -89,7 +90,6 @@ class Blocks:
             self.hypotheses[number].cause.at(part) for number, part in zip(members, np.split(mean, ends), strict=True)
         )
 
-
     def nearest(self, cause: Cause) -> int:
         """Return the hypothesis nearest to a cause: the same effect and place, the most similar shape."""
         same = [number for number, one in enumerate(self.hypotheses) if one.cause.key == cause.key]
@@ -121,7 +121,7 @@ def leading_sets(blocks: Blocks, most: int, policy: Policy) -> list[Candidate]:
     """Return the most probable sets of up to ``most`` effects in a linear world, one per set of names, best first."""
     alone = blocks.log_odds_each()
     every = [Candidate(float(alone[number]), (int(number),)) for number in np.argsort(-alone)]
-    front = _distinct(every, blocks.hypotheses, _FRONT)
+    front = list(islice(_distinct(every, blocks.hypotheses), _FRONT))
     names = [h.cause.name for h in blocks.hypotheses]
     for _ in range(1, most):
         grown: dict[tuple[int, ...], Candidate] = {}
@@ -134,10 +134,10 @@ def leading_sets(blocks: Blocks, most: int, policy: Policy) -> list[Candidate]:
                     grown[members] = Candidate(blocks.log_odds(members), members)
         larger = sorted(grown.values(), key=lambda one: -one.log_odds)
         every += larger
-        front = _distinct(larger, blocks.hypotheses, policy.beam)
+        front = list(islice(_distinct(larger, blocks.hypotheses), policy.beam))
     every.sort(key=lambda one: -one.log_odds)
-    worth = [one for one in _distinct(every, blocks.hypotheses, 4 * policy.beam) if _is_worth(blocks, one, policy)]
-    return worth[: policy.beam]
+    worth = (one for one in _distinct(every, blocks.hypotheses) if _is_worth(blocks, one, policy))
+    return list(islice(worth, policy.beam))
 
 
 def _is_worth(blocks: Blocks, candidate: Candidate, policy: Policy) -> bool:
@@ -147,14 +147,11 @@ def _is_worth(blocks: Blocks, candidate: Candidate, policy: Policy) -> bool:
     return all(candidate.log_odds - blocks.log_odds(rest) >= policy.worth_a_search for rest in rests)
 
 
-def _distinct(candidates: Sequence[Candidate], hypotheses: Sequence[Hypothesis], count: int) -> list[Candidate]:
+def _distinct(candidates: Iterable[Candidate], hypotheses: Sequence[Hypothesis]) -> Iterator[Candidate]:
+    """Return the first candidate of every set of names."""
     seen: set[frozenset[str]] = set()
-    kept = []
     for candidate in candidates:
         names = frozenset(hypotheses[number].cause.name for number in candidate.members)
         if names not in seen:
             seen.add(names)
-            kept.append(candidate)
-            if len(kept) == count:
-                break
-    return kept
+            yield candidate

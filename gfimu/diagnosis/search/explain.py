@@ -9,11 +9,11 @@ import numpy as np
 
 from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.fit.gauss_newton import Fit, fit
-from gfimu.diagnosis.fit.learn import learn_noise, learn_roughness, sharpened, starting_point
+from gfimu.diagnosis.fit.learn import LEARNINGS, learn_noise, learn_roughness, sharpened, starting_point
 from gfimu.diagnosis.fit.linear import Point, with_residue
 from gfimu.diagnosis.fit.parallel import each_apart
 from gfimu.diagnosis.policy import Policy
-from gfimu.diagnosis.search.beam import Blocks, leading_sets
+from gfimu.diagnosis.search.beam import STARTS, Blocks, leading_sets
 from gfimu.diagnosis.search.comparison import Comparison
 from gfimu.diagnosis.search.screening import Screening, screen
 from gfimu.diagnosis.terms.cause import Cause, effects_of
@@ -154,7 +154,7 @@ def _started(stretches: Sequence[Stretch], reference: Point, policy: Policy) -> 
     nothing = sets.fit([sets.base])[0]
     if nothing is None:
         raise np.linalg.LinAlgError("the reference determines no drive")
-    point = sharpened(stretches, learn_roughness(stretches, nothing.point, policy.learnings), policy)
+    point = sharpened(stretches, learn_roughness(stretches, nothing.point, LEARNINGS), policy)
     return _under(sets, point, [nothing])
 
 
@@ -167,7 +167,7 @@ def _relearned(stretches: Sequence[Stretch], best: Fit, policy: Policy, *, sharp
     found = replace(best, point=_reaching(stretches, best.point))
     for _ in range(policy.rounds):
         before = found
-        point = learn_roughness(stretches, found.point, policy.learnings)
+        point = learn_roughness(stretches, found.point, LEARNINGS)
         point = learn_noise(stretches, sharpened(stretches, point, policy) if sharpen else point)
         if point.residue is not None:
             point = with_residue(stretches, point, point.residue.scale)
@@ -195,7 +195,7 @@ def _near(sets: Sets, best: Fit) -> list[Fit]:
         for one in sets.ranked()
         if one.log_posterior > best.log_posterior - sets.policy.close and not one.key > best.key
     ]
-    return [best, _nothing(sets), *close[: sets.policy.rivals + 1]]
+    return [best, _nothing(sets), *close[: sets.policy.beam - 1]]
 
 
 def explained(sets: Sets, best: Fit, fits: int, screening: Screening | None = None) -> Explanation:
@@ -257,7 +257,7 @@ def _fit_other_shapes(sets: Sets, best: Fit) -> None:
         blocks = Blocks(screening, sets.policy)
         members = [blocks.nearest(other) for other in rest.causes]
         points = []
-        for number in blocks.optima(cause, members)[: sets.policy.starts]:
+        for number in blocks.optima(cause, members)[:STARTS]:
             causes = blocks.causes((*members, number))
             moves = screening.drive_moves((*members, number), causes)
             drives = tuple(drive.moved(move) for drive, move in zip(rest.point.drives, moves, strict=True))

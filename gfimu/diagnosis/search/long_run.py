@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from gfimu.diagnosis.data.stretch import Stretch
-from gfimu.diagnosis.fit.learn import learn_noise, learn_roughness, starting_point
+from gfimu.diagnosis.fit.learn import LEARNINGS, learn_noise, learn_roughness, starting_point
 from gfimu.diagnosis.fit.linear import Point, with_residue
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.explain import Sets, explained, prune
@@ -52,14 +52,14 @@ def understand_any_length(stretches: Sequence[Stretch], policy: Policy, report: 
     for place, drive in zip(chosen, best.point.drives, strict=True):
         drives[place] = drive
     point = _with_residue(stretches, Point(best.causes, tuple(drives), levels), part.residue)
-    point = learn_roughness(stretches, point, policy.learnings)
+    point = learn_roughness(stretches, point, LEARNINGS)
     sets = Sets(stretches, point, policy)
     found = sets.fit([point])[0]
     if found is None:
         raise np.linalg.LinAlgError("the stretches left out determine no drive")
     point = _with_residue(stretches, learn_noise(stretches, found.point), part.residue)
     sets = Sets(stretches, point, policy)
-    rivals = [one.causes for one in part.explanation.rivals[: policy.rivals]]
+    rivals = [one.causes for one in part.explanation.rivals[: policy.beam - 1]]
     report(0.8, "compare")
     sets.fit([point, *(replace(point, causes=causes) for causes in rivals)])
     return replace(part, explanation=explained(sets, prune(sets), 0))

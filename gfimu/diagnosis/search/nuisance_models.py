@@ -11,14 +11,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
-from gfimu.diagnosis.criticism.slow_noise import Walk, walk_strength
+from gfimu.diagnosis.data.cosine_basis import NoiseLevels
 from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.fit.gauss_newton import Fit
 from gfimu.diagnosis.fit.learn import learn_noise
 from gfimu.diagnosis.fit.linear import Point, linearise, with_residue
+from gfimu.diagnosis.fit.random_walk import Walk, walk_strength
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.explain import Explanation, Sets, exactly, explain, prune
-from gfimu.diagnosis.terms.coloured_noise import NoiseLevels
 from gfimu.diagnosis.terms.residue import Residue
 
 __all__ = ["Understanding", "understand"]
@@ -85,14 +85,14 @@ def _models(stretches: Sequence[Stretch], plain: Explanation, policy: Policy) ->
     for scale, odds in residues:
         found.append((f"calibration residue × {scale:g}", partial(with_residue, stretches, scale=scale), odds))
     if first.first_levels.walk == 0.0:
-        found.append(("random walk", lambda p: _walking(stretches, p, policy), policy.walk_odds))
+        found.append(("random walk", lambda p: _walking(stretches, p, policy), policy.lack_odds))
         for scale, odds in residues[:1]:
 
             def both(point: Point, scale: float = scale) -> Point | None:
                 walking = _walking(stretches, point, policy)
                 return None if walking is None else with_residue(stretches, walking, scale)
 
-            found.append(("random walk and calibration residue", both, policy.walk_odds + odds))
+            found.append(("random walk and calibration residue", both, policy.lack_odds + odds))
     return found
 
 
@@ -117,7 +117,7 @@ def _start(
             point = admit(base.point)
             if point is None:
                 continue
-            if base.log_posterior + _promise(stretches, base.point, point) < best + odds - policy.hopeless:
+            if base.log_posterior + _promise(stretches, base.point, point) < best + odds - 2.0 * policy.close:
                 continue
             sets = Sets(stretches, point, policy)
             if sets.fit([point])[0] is not None:

@@ -20,7 +20,6 @@ from gfimu.world_model import EffectFamily, Whitened, shapes_to_screen
 __all__ = ["Hypothesis", "Screening", "Signature", "columns_of_run", "hypotheses_of", "screen"]
 
 _OF_MOTION = frozenset({"motion", "timing", "reference"})  # a table at rest shows nothing of these
-_FREEST = 0.5  # prior share of the freest place; the others share the rest
 
 
 @dataclass(frozen=True)
@@ -170,8 +169,8 @@ def hypotheses_of(signatures: Sequence[Signature], array: AccelerometerArray, ru
         patterns = signature.family.patterns(array)
         anew = len(signature.columns) > len(signature.family.sizes(array))
         for number, pattern in enumerate(patterns):
-            share = _FREEST if number == 0 else (1.0 - _FREEST) / (len(patterns) - 1)
-            share = 1.0 if len(patterns) == 1 else share
+            # The freest place is as probable as all others together, which are equally so.
+            share = 1.0 / (min(len(patterns), 2) * (1 if number == 0 else len(patterns) - 1))
             prior = float(np.log(share / (families * signature.looks)))
             mixing = mixing_of(pattern, runs) if anew else pattern.mixing
             cause = Cause(signature.family, pattern.name, mixing, signature.shape, np.zeros(mixing.shape[1]), prior)

@@ -18,14 +18,13 @@ from gfimu.diagnosis.terms.spline import DEGREE, AngleSpline, SplineSpin
 
 __all__ = ["Drive"]
 
-KNOT_SPACING = 0.05  # s
 MARGIN = 0.4  # s beyond the samples: late chips and fast clocks ask for the motion there
 FIRST_ROUGHNESS = 3e3  # rad/s⁴
 ROUGH_FOR = 0.3  # s over which a drive is about as rough
 LEAST_ROUGHNESS = 30.0  # rad/s⁴
 _LEAST_KNOWN = 0.02  # numerical: least mean γ
 _ON_A_KNOT = 1e-6  # numerical: knot intervals
-_STENCIL = np.array([1.0, -4.0, 6.0, -4.0, 1.0])
+_STENCIL = np.array([1.0, -4.0, 6.0, -4.0, 1.0])  # numerical: fourth difference
 
 
 @dataclass(frozen=True)

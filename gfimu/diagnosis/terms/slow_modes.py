@@ -20,13 +20,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
-from gfimu.diagnosis.terms.coloured_noise import CosineBasis, NoiseLevels
+from gfimu.diagnosis.data.cosine_basis import WEAKEST_CORRECTION, CosineBasis, NoiseLevels
 
 __all__ = ["SlowModes", "WeighedModes", "WeighedPowers"]
 
-_WEAKEST = 0.05
-_MOST_COSINES = 128
-_NO_POWER = 1e-12
+_MOST_COSINES = 128  # numerical: products of more cost more than the modes are worth
+_NO_POWER = 1e-12  # numerical
 
 
 class SlowModes:
@@ -115,7 +114,7 @@ class WeighedModes(SlowModes):
         for gram, root in zip(self._gram, self._root.T, strict=True):
             power, vectors = np.linalg.eigh(gram)
             power, vectors = np.maximum(power[::-1], 0.0), vectors[:, ::-1]
-            told = power > _WEAKEST * (1.0 + power)
+            told = power > WEAKEST_CORRECTION * (1.0 + power)
             found.append((power[told], root[:, None] * vectors[:, told] / np.sqrt(power[told])))
         return found
 

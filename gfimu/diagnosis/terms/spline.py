@@ -10,22 +10,14 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import BSpline
 from scipy.linalg import solveh_banded
 
+from gfimu.diagnosis.data.spins import State
 from gfimu.world_model import Spin, SpinState
 
-__all__ = ["DEGREE", "AngleSpline", "JoinedSpin", "ScaledSpin", "State"]
+__all__ = ["DEGREE", "AngleSpline", "SplineSpin"]
 
 DEGREE = 4
-"""Of the spline of the angle: its fourth derivative, which the prior acts on, is constant between knots."""
-_REMEMBERED = 8  # time axes whose states a motion keeps
-
-
-@dataclass(frozen=True)
-class State:
-    """Angle (rad), rate (rad/s) and angular acceleration (rad/s²), each of shape (n,)."""
-
-    angle: NDArray[np.float64]
-    rate: NDArray[np.float64]
-    acceleration: NDArray[np.float64]
+"""Numerical: of the spline of the angle. Its fourth derivative, which the prior acts on, is constant between knots."""
+_REMEMBERED = 8  # numerical: time axes whose states a motion keeps
 
 
 @dataclass(frozen=True)
@@ -163,33 +155,3 @@ class SplineSpin:
         acceleration = (2.0 * c2 + u * (6.0 * c3 + u * (12.0 * c4))) / h**2
         beyond = times - np.clip(times, self.spline.start, self.spline.stop)
         return State(angle + rate * beyond, rate, acceleration)
-
-
-class ScaledSpin:
-    """A motion over the gain of the reference that it was read by."""
-
-    def __init__(self, spin: Spin, gain: float) -> None:
-        self._spin, self._gain = spin, gain
-
-    def at(self, t: ArrayLike) -> SpinState:
-        """Return the state at times (n,), s."""
-        state = self._spin.at(t)
-        return State(state.angle / self._gain, state.rate / self._gain, state.acceleration / self._gain)
-
-
-class JoinedSpin:
-    """One motion up to a time, s, and another from there on."""
-
-    def __init__(self, before: Spin, after: Spin, at: float) -> None:
-        self._before, self._after, self._at = before, after, at
-
-    def at(self, t: ArrayLike) -> SpinState:
-        """Return the state at times (n,), s."""
-        times = np.asarray(t, dtype=float)
-        late, early = self._after.at(times), self._before.at(times)
-        after = times > self._at
-        return State(
-            np.where(after, late.angle, early.angle),
-            np.where(after, late.rate, early.rate),
-            np.where(after, late.acceleration, early.acceleration),
-        )

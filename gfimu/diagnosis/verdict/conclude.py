@@ -10,15 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import expit
 
+from gfimu.diagnosis.criticism.gain import Gain
 from gfimu.diagnosis.criticism.lack_of_fit import LackOfFit
 from gfimu.diagnosis.criticism.slow_noise import LoudestChannel, loudest_channel, white_factor
+from gfimu.diagnosis.criticism.views.run_view import RunView
 from gfimu.diagnosis.data.prepared_runs import PreparedRuns
 from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.fit.gauss_newton import Fit
 from gfimu.diagnosis.fit.learn import starting_point
 from gfimu.diagnosis.fit.linear import linearise
 from gfimu.diagnosis.policy import Policy
-from gfimu.diagnosis.report.wording import verdict_sentences
 from gfimu.diagnosis.search.explain import Explanation
 from gfimu.diagnosis.search.nuisance_models import Understanding
 from gfimu.diagnosis.terms.cause import Cause, effects_of
@@ -33,7 +34,8 @@ from gfimu.diagnosis.verdict.naming import (
     probabilities,
     rival_list,
 )
-from gfimu.diagnosis.verdict.verdict import Diagnosis, Gain, NamedCause, Residual, RunView, Unexplained
+from gfimu.diagnosis.verdict.verdict import Diagnosis, NamedCause, Residual, Unexplained
+from gfimu.diagnosis.verdict.wording import verdict_sentences
 from gfimu.world_model import Effect, Spin, WorldModel
 
 __all__ = ["Described", "conclude", "is_dominant", "is_unknown", "named_causes"]
@@ -121,7 +123,7 @@ def _widened(explanation: Explanation, fit: Fit, named: NamedCause, cause: Cause
     explains that it may leave: a share ε of it is what an error of √ε of a parameter leaves.
     """
     observations = sum(stretch.observations for stretch in explanation.stretches)
-    beyond = fit.objective - observations - policy.beyond_chance * np.sqrt(2.0 * observations)
+    beyond = fit.objective - observations - policy.excess_stds * np.sqrt(2.0 * observations)
     beyond = max(beyond, 0.0)
     share = beyond / (beyond + max(explanation.nothing.objective - fit.objective, 1.0))
     rough = np.sqrt(share + cause.family.inexactness) if cause.family.inexactness > 0.0 else 0.0

@@ -204,9 +204,9 @@ def capped(cause: NamedCause, policy: Policy, shape: Container[str] = ()) -> Nam
     """
     numbers = [key for key, std in cause.std.items() if std > 0.0 and not key.startswith(("phase", "direction"))]
     judged = [key for key in numbers if key not in shape] or numbers
-    if not judged or any(abs(float(cause.parameters[key])) > policy.seen * cause.std[key] for key in judged):
+    if not judged or any(abs(float(cause.parameters[key])) > policy.stds * cause.std[key] for key in judged):
         return cause
-    return replace(cause, probability=min(cause.probability, policy.unseen_at_most))
+    return replace(cause, probability=min(cause.probability, 1.0 - policy.small))
 
 
 def contested(

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.linalg import block_diag, cho_factor, cho_solve
 
+from gfimu.diagnosis.data.cosine_basis import NoiseLevels
 from gfimu.diagnosis.data.run import prepare_run
+from gfimu.diagnosis.data.spins import State
 from gfimu.diagnosis.data.stretch import Stretch, make_stretches
 from gfimu.diagnosis.terms.cause import Cause
-from gfimu.diagnosis.terms.coloured_noise import NoiseLevels
 from gfimu.diagnosis.terms.columns import Columns
 from gfimu.diagnosis.terms.drive import Drive
-from gfimu.diagnosis.terms.spline import State
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.world_model import Effect, Spin
 from sim.campaign import Measurement, measure

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from gfimu.diagnosis import diagnose
-from gfimu.diagnosis.criticism.observed_at import observed_at
 from gfimu.diagnosis.criticism.series_tests import lines
 from gfimu.diagnosis.data.stretch import make_stretches
 from gfimu.diagnosis.diagnose import prepare
 from gfimu.diagnosis.fit.learn import starting_point
+from gfimu.diagnosis.fit.observed_at import observed_at
 from gfimu.diagnosis.policy import Policy
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording

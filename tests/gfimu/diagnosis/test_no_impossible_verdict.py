@@ -11,9 +11,9 @@ from gfimu.diagnosis import diagnose
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.report.page import report_html
 from gfimu.diagnosis.report.plain_words import headline
-from gfimu.diagnosis.report.wording import verdict_sentences
 from gfimu.diagnosis.verdict.naming import capped
 from gfimu.diagnosis.verdict.verdict import NamedCause
+from gfimu.diagnosis.verdict.wording import verdict_sentences
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
 from sim.campaign import Measurement, measure, random_profile

@@ -11,12 +11,13 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d
 
+from gfimu.diagnosis.criticism.gain import Gain
 from gfimu.diagnosis.diagnose import diagnose
 from gfimu.diagnosis.free_body.diagnose import _refuted
 from gfimu.diagnosis.free_body.noise import Projection
 from gfimu.diagnosis.free_body.run import prepare_body_run
 from gfimu.diagnosis.free_body.segment import BodySegment
-from gfimu.diagnosis.verdict.verdict import Gain, NamedCause, Residual
+from gfimu.diagnosis.verdict.verdict import NamedCause, Residual
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray, Chip
 from gfimu.motion.body_drive import BodyDrive

@@ -15,18 +15,14 @@ from numpy.typing import NDArray
 from scipy.fft import dct
 from scipy.stats import f as f_distribution
 
-from gfimu.diagnosis.verdict.verdict import RunView
+from gfimu.diagnosis.criticism.views.run_view import RunView
+from gfimu.diagnosis.policy import Policy
 
-__all__ = ["CHANCE", "Dependence", "Fingerprint", "Quantity", "dependences", "fingerprint", "listed", "quantities"]
+__all__ = ["Dependence", "Fingerprint", "Quantity", "dependences", "fingerprint", "listed", "quantities"]
 
-CHANCE = 1e-3
-"""Probability that one view of a faultless residual speaks up by chance, all its looks together."""
-HIGHEST_ORDER = 12
-_MATTERS = 0.25
-_BINS = 40
-_FEWEST_IN_BIN = 5
-_FEWEST_SAMPLES = 50
-_TURNED = 2 * np.pi
+_HIGHEST_ORDER = 12  # numerical: cycles per revolution that are looked at
+_BINS, _FEWEST_IN_BIN = 40, 5  # numerical: of a plot, and samples in each
+_FEWEST_SAMPLES = 50  # numerical: for a regression
 
 
 @dataclass(frozen=True)
@@ -141,9 +137,9 @@ def quantities(run: RunView) -> list[Quantity]:
     if run.temperature is not None:
         warm = run.temperature
         found.append(Quantity("the temperature", "T", "°C", "temperature", (warm - warm.mean(),), warm))
-    if np.ptp(run.angle) >= _TURNED:
+    if np.ptp(run.angle) >= 2 * np.pi:
         turn = np.mod(run.angle, 2 * np.pi)
-        for order in range(1, HIGHEST_ORDER + 1):
+        for order in range(1, _HIGHEST_ORDER + 1):
             name = f"the table's angle, {_times(order)} per revolution"
             waves = (np.cos(order * run.angle), np.sin(order * run.angle))
             found.append(Quantity(name, "θ", "rad", "angle", waves, turn))
@@ -328,8 +324,8 @@ class _Regressions:
 
 def _sentence(quantity: Quantity, channels: Sequence[str], old: _Regression, new: _Regression, looks: int) -> str:
     """One sentence where a dependence is more than chance and a fair share of what is wrong; else empty."""
-    strong = (old.p_value < CHANCE / looks) & (old.share > _MATTERS)
-    still = new.p_value < CHANCE / looks
+    strong = (old.p_value < Policy.chance / looks) & (old.share > Policy.sizeable)
+    still = new.p_value < Policy.chance / looks
     names = [channels[k] for k in np.argsort(-old.amplitude) if strong[k]]
     after = (
         f"after: {new.amplitude[still].max():.2g} m/s² left in {_names(channels, still, new)}" if still.any() else ""

@@ -15,22 +15,20 @@ from scipy.fft import rfft
 from scipy.signal import welch
 from scipy.stats import gamma
 
-from gfimu.diagnosis.criticism.views.dependence import CHANCE, listed
-from gfimu.diagnosis.terms.coloured_noise import CosineBasis
-from gfimu.diagnosis.verdict.verdict import RunView
+from gfimu.diagnosis.criticism.views.dependence import listed
+from gfimu.diagnosis.criticism.views.run_view import RunView
+from gfimu.diagnosis.data.cosine_basis import CosineBasis
+from gfimu.diagnosis.policy import Policy
 
 __all__ = ["ResidualSpectrum", "SpectralLine", "order_spectrum", "time_spectrum"]
 
-HIGHEST_ORDER = 16.0
-_CELLS_PER_TURN = 64
-_FEWEST_TURNS = 3.0
-_NEIGHBOURS = 50
-_NARROW, _WIDE = 2, 16
-_TONE_CONCENTRATED, _ORDER_CONCENTRATED = 0.6, 0.4
-_FEWEST_CYCLES = 12
-_SLOWEST_ORDER = 0.9
-_LONGEST_WINDOW = 2048
-_LOUD = 0.3
+_CELLS_PER_TURN = 64  # numerical: four cells in a cycle of the highest order
+_FEWEST_TURNS = 3.0  # numerical: two cycles per revolution are then well apart
+_SLOWEST_ORDER, _HIGHEST_ORDER = 0.9, 16.0  # numerical: cycles per revolution that are looked at
+_FEWEST_CYCLES = 12  # numerical: of a tone in a run
+_NEIGHBOURS = 50  # numerical: frequencies whose median is the level of the noise
+_NARROW, _WIDE = 2, 16  # numerical: frequencies on either side that a line and a hump are
+_LONGEST_WINDOW = 2048  # numerical: samples of a periodogram that is averaged
 
 
 @dataclass(frozen=True)
@@ -44,7 +42,7 @@ class SpectralLine:
     @property
     def significant(self) -> bool:
         """Whether chance explains it less than once in a thousand such spectra."""
-        return self.p_value < CHANCE
+        return self.p_value < Policy.chance
 
 
 @dataclass(frozen=True)
@@ -118,9 +116,7 @@ def time_spectrum(
     noise = np.sqrt(2 * period * (np.mean(run.white[alive] ** 2) + slow))
     scale = 2.0 / np.sqrt(n) * run.white
     lines = [
-        _strongest_line(
-            np.abs(rfft(one, axis=0)) / np.sqrt(n), 1 / (n * period), scale, _TONE_CONCENTRATED, _FEWEST_CYCLES
-        )
+        _strongest_line(np.abs(rfft(one, axis=0)) / np.sqrt(n), 1 / (n * period), scale, _FEWEST_CYCLES)
         for one in standard
     ]
     return ResidualSpectrum(
@@ -159,7 +155,7 @@ def order_spectrum(
     weight = np.abs(run.rate)[:, None] * run.valid  # (n, c)
     total_weight = np.maximum(weight.sum(axis=0), 1e-300)
     orders = np.arange(cells // 2 + 1) * (_CELLS_PER_TURN / cells)
-    shown = (orders >= 2.0 / turns) & (orders <= HIGHEST_ORDER)
+    shown = (orders >= 2.0 / turns) & (orders <= _HIGHEST_ORDER)
     alive = run.valid.any(axis=0)
 
     def spectrum(series: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -173,7 +169,7 @@ def order_spectrum(
     spread = np.sqrt(np.maximum(np.sum(weight**2, axis=0), 1e-300))
     first = int(np.searchsorted(orders[shown], _SLOWEST_ORDER))
     noise_scale = scale * spread * run.white
-    lines = [_strongest_line(spectrum(one) / spread, 1.0, noise_scale, _ORDER_CONCENTRATED, first) for one in standard]
+    lines = [_strongest_line(spectrum(one) / spread, 1.0, noise_scale, first) for one in standard]
     placed = [
         None if line is None else SpectralLine(float(orders[shown][round(line.place)]), line.amplitude, line.p_value)
         for line in lines
@@ -199,7 +195,7 @@ def order_spectrum(
 
 
 def _strongest_line(
-    magnitude: NDArray[np.float64], step: float, scale: NDArray[np.float64], concentrated: float, first: int
+    magnitude: NDArray[np.float64], step: float, scale: NDArray[np.float64], first: int
 ) -> SpectralLine | None:
     """Return the strongest peak above its neighbourhood of magnitudes (m, c) of unit noise."""
     m = len(magnitude)
@@ -211,8 +207,8 @@ def _strongest_line(
     top = int(np.argmax(total))
     excess = np.maximum(power.sum(axis=1) - power.shape[1], 0.0)
     near, wide = (excess[max(top - width, 0) : top + width + 1].sum() for width in (_NARROW, _WIDE))
-    if near < concentrated * wide:
-        return None  # a hump, not a line
+    if near < wide - near:
+        return None  # a hump, not a line: most of its power is farther off
     chance = float(gamma.sf(total[top], power.shape[1]))
     amplitude = magnitude[top] * scale
     return SpectralLine(top * step, amplitude, min(1.0, chance * m))
@@ -231,7 +227,7 @@ def _neighbourhood(power: NDArray[np.float64]) -> NDArray[np.float64]:
 def _sentence(form: str, what: str, channels: Sequence[str], lines: Sequence[SpectralLine | None]) -> str:
     before, after = lines
     if before is not None and before.significant:
-        loud = np.flatnonzero(before.amplitude > _LOUD * before.amplitude.max())
+        loud = np.flatnonzero(before.amplitude > Policy.sizeable * before.amplitude.max())
         names = [channels[k] for k in loud[np.argsort(-before.amplitude[loud])]]
         where = "all channels" if len(names) == len(channels) else listed(names)
         left = _left(form, after)

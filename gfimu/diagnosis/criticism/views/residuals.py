@@ -13,15 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import dct
 
-from gfimu.diagnosis.criticism.views.dependence import CHANCE, Dependence, Fingerprint, dependences, fingerprint, listed
+from gfimu.diagnosis.criticism.views.dependence import Dependence, Fingerprint, dependences, fingerprint, listed
 from gfimu.diagnosis.criticism.views.residual_spectrum import ResidualSpectrum, order_spectrum, time_spectrum
+from gfimu.diagnosis.criticism.views.run_view import RunView
 from gfimu.diagnosis.criticism.views.whiteness import cumulative_periodogram, ljung_box, standardise, whitening_gain
-from gfimu.diagnosis.verdict.verdict import RunView
+from gfimu.diagnosis.policy import Policy
 
 __all__ = ["ResidualSize", "ResidualViews", "Whiteness", "residual_views"]
-
-_LARGER = 1.1
-_CORRELATED = 0.05
 
 
 @dataclass(frozen=True)
@@ -159,7 +157,7 @@ def _size(
     count[count == 0] = np.nan
     old, new = (np.sqrt(np.sum(one**2, axis=0) / count) for one in (before, after))
     floor = np.hypot(run.white, bias_instability)
-    large = np.flatnonzero(old > _LARGER * floor)
+    large = np.flatnonzero(old > (1.0 + Policy.small) * floor)
     if not large.size:
         return ResidualSize(channels, old, new, floor, "")
     ratio = old / floor
@@ -182,8 +180,8 @@ def _whiteness(
     new_periodogram, new_cumulative = cumulative_periodogram(after)
     looks = 2 * len(channels)
     frequency = np.arange(1, len(old_cumulative) + 1) / (len(before) * period)
-    coloured = (np.minimum(old_p, old_periodogram) < CHANCE / looks) & (np.abs(old_rho) > _CORRELATED)
-    still = (np.minimum(new_p, new_periodogram) < CHANCE / looks) & (np.abs(new_rho) > _CORRELATED)
+    coloured = (np.minimum(old_p, old_periodogram) < Policy.chance / looks) & (np.abs(old_rho) > Policy.dominant)
+    still = (np.minimum(new_p, new_periodogram) < Policy.chance / looks) & (np.abs(new_rho) > Policy.dominant)
     sentence = ""
     if coloured.any() or still.any():
         parts = []

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from scipy.fft import idct, rfft
 from scipy.stats import chi2, kstwobign
 
-from gfimu.diagnosis.terms.coloured_noise import CosineBasis
+from gfimu.diagnosis.data.cosine_basis import CosineBasis
 
 __all__ = ["cumulative_periodogram", "ljung_box", "standardise", "whitening_gain"]
 
-_LAGS = 20
+_LAGS = 20  # numerical: correlations that are tested
 
 
 def whitening_gain(n: int, period: float, white: NDArray[np.float64], bias_instability: float) -> NDArray[np.float64]:

@@ -7,6 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from gfimu.diagnosis.criticism.holdout import gate_gains, held_out_gain, other_recordings, split
+from gfimu.diagnosis.data.cosine_basis import NoiseLevels
 from gfimu.diagnosis.data.run import prepare_run
 from gfimu.diagnosis.data.stretch import make_stretches
 from gfimu.diagnosis.fit.gauss_newton import fit
@@ -14,7 +15,6 @@ from gfimu.diagnosis.fit.learn import learn_roughness, starting_point
 from gfimu.diagnosis.fit.linear import with_residue
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.terms.cause import Cause
-from gfimu.diagnosis.terms.coloured_noise import NoiseLevels
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
 from sim.campaign import Measurement, measure, random_profile

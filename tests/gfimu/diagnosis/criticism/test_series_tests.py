@@ -9,9 +9,9 @@ import pytest
 from made_fits import DURATION, channel, fitted, quiet, recorded
 
 from gfimu.diagnosis.criticism.generic import motion_of
-from gfimu.diagnosis.criticism.observed_at import observed_at
 from gfimu.diagnosis.criticism.series_tests import changing_noise, jumps, lines
 from gfimu.diagnosis.data.rounding import Steps
+from gfimu.diagnosis.fit.observed_at import observed_at
 
 LIKELY = 10.0
 

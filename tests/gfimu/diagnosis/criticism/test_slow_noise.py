@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from made_fits import POLICY, channel, fitted, quiet, recorded, twin
 
-from gfimu.diagnosis.criticism.observed_at import observed_at
-from gfimu.diagnosis.criticism.slow_noise import loudest_channel, walk_strength, white_factor
+from gfimu.diagnosis.criticism.slow_noise import loudest_channel, white_factor
 from gfimu.diagnosis.fit.linear import energy_of, with_residue
+from gfimu.diagnosis.fit.observed_at import observed_at
+from gfimu.diagnosis.fit.random_walk import walk_strength
 from sim.campaign import bias_instability
 from sim.effects import make_effect
 from sim.study.outcome import calibration_residue
@@ -54,7 +55,7 @@ def test_a_walk_of_three_channels_is_none_of_all():
 
     stretches, fit = fitted(recorded(7, drift))
     found = walk_strength(stretches, fit.point)
-    assert found.log_odds > POLICY.walk_odds
+    assert found.log_odds > POLICY.lack_odds
     assert found.unequal > POLICY.unequal_walk
     assert not found.is_likely(POLICY)
 

@@ -76,9 +76,17 @@ def test_a_block_predicts_what_the_whole_run_does_there(twin, stretch):
     assert np.abs(block.predict(lag, lively())[:5] - whole[200:205]).max() > 0.05
     block = replace(block, run_up=RunUp(before.t, before.temperature, lively()))
     assert_allclose(block.predict(lag, lively()), whole[200:], atol=1e-9)
-    # And what it remembers is the drive of before, whatever the block's own is.
-    still = Drive.still(after.t, 4.0, 0.1, 0.0, 1e-3).spin
-    assert np.abs(block.predict(lag, still)[0] - replace(block, run_up=None).predict(lag, still)[0]).max() > 0.05
+    # And what it remembers is the drive of before, whatever the block's own is: the state of the lag, which decays.
+    still = Drive.still(after.t, float(after.t[0]), 0.1, 0.0, 1e-3).spin
+    remembered = block.predict(lag, still) - replace(block, run_up=None).predict(lag, still)
+    decay = np.exp(-stretch.run.sample_period / 0.3)
+    state = whole[199] - block.predict(lag, still)[-1]  # beyond what the table at rest reads
+    step = np.abs(stretch.predict([], lively())[199] - block.predict(lag, still)[-1]).max()
+    assert np.abs(state[:-1]).max() > 0.02
+    # How the readings pass from the last sample of before to rest, no sample shows: by at most the whole step.
+    assert_allclose(remembered[0, :-1], decay * state[:-1], atol=step * (1.0 - decay))
+    # The cubic through the samples rings after that step, by a factor √3 − 2 from sample to sample.
+    assert_allclose(remembered[11:40], decay * remembered[10:39], atol=step * (2.0 - np.sqrt(3.0)) ** 10)
 
 
 def test_noise_to_begin_with(twin, stretch):

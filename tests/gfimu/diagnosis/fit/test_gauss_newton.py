@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from core_cases import cause_of, lively, small_twin, stretches_of
-from gfimu.diagnosis.terms.coloured_noise import NoiseLevels
 
-from gfimu.diagnosis.fit.gauss_newton import fit, log_prior
+from gfimu.diagnosis.data.cosine_basis import NoiseLevels
+from gfimu.diagnosis.fit.gauss_newton import SETTLED, fit, log_prior
 from gfimu.diagnosis.fit.learn import learn_roughness, starting_point
 from gfimu.diagnosis.fit.linear import energy_of
 from gfimu.diagnosis.policy import Policy
@@ -58,7 +58,7 @@ def test_what_is_there_is_more_probable_and_what_is_not_is_less():
     there = fit(stretches, replace(point, causes=(hidden.at(np.zeros(2)),)), POLICY)
     assert there.log_evidence > nothing.log_evidence + 100.0
     both = fit(stretches, replace(there.point, causes=(*there.causes, cause_of("scale_factor", ARRAY))), POLICY)
-    assert both.objective <= there.objective + POLICY.settled
+    assert both.objective <= there.objective + SETTLED
     assert both.log_evidence < there.log_evidence
     assert both.names == {"table_tilt", "scale_factor"}
 

@@ -9,8 +9,8 @@ import pytest
 from core_cases import cause_of, lively, small_twin, stretches_of
 from numpy.testing import assert_allclose
 
-from gfimu.diagnosis.criticism.slow_noise import walk_strength
 from gfimu.diagnosis.fit.learn import learn_noise, learn_roughness, starting_point
+from gfimu.diagnosis.fit.random_walk import walk_strength
 from gfimu.diagnosis.policy import Policy
 from sim.effects import make_effect
 

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from core_cases import cause_of, dense, dense_gaussian, lively, part_of, small_twin, stretches_of
-from gfimu.diagnosis.terms.coloured_noise import NoiseLevels
 from numpy.testing import assert_allclose
 from scipy.special import ndtr
 
+from gfimu.diagnosis.data.cosine_basis import NoiseLevels
 from gfimu.diagnosis.data.rounding import Steps
 from gfimu.diagnosis.fit.learn import starting_point
 from gfimu.diagnosis.fit.posterior import condition, energy

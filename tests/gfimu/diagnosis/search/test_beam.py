@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import combinations
+
 import numpy as np
 import pytest
 from core_cases import cause_of, lively, small_twin, stretches_of
@@ -62,18 +64,35 @@ def test_log_odds_beside_a_set_have_its_sizes_integrated_out(blocks):
         assert each[number] == pytest.approx(expected, rel=1e-4, abs=0.05)
 
 
-def test_leading_sets_are_the_best_of_each_set_of_names(blocks):
-    sets = leading_sets(blocks, 2, Policy())
-    names = [frozenset(blocks.hypotheses[k].cause.name for k in one.members) for one in sets]
-    assert len(set(names)) == len(names) <= 2 * Policy().beam
-    assert all(len(name) == len(one.members) for name, one in zip(names, sets, strict=True))  # no effect twice
-    assert [one.log_odds for one in sets] == sorted((one.log_odds for one in sets), reverse=True)
-    assert all("table_tilt" in name for name in names[:3])
-    alone = blocks.log_odds_each()
-    for name, one in zip(names, sets, strict=True):
-        if len(name) == 1:
-            mine = [k for k, h in enumerate(blocks.hypotheses) if h.cause.name in name]
-            assert one.log_odds == pytest.approx(alone[mine].max())
+def best_of_each_set_of_names(blocks):
+    """Log odds and members of the best set of each one or two names, best first, by looking at all of them."""
+    names = [h.cause.name for h in blocks.hypotheses]
+    every = [(k,) for k in range(len(names))]
+    every += [(i, j) for i, j in combinations(range(len(names)), 2) if names[i] != names[j]]
+    found = {}
+    for odds, members in sorted(((blocks.log_odds(one), one) for one in every), reverse=True):
+        found.setdefault(frozenset(names[k] for k in members), (odds, members))
+    return list(found.values())
+
+
+def test_leading_sets_are_the_best_of_each_set_of_names_whose_members_all_add_something(blocks):
+    policy = Policy()
+    sets = leading_sets(blocks, 2, policy)
+
+    def adds(members):
+        rests = [tuple(k for k in members if k != member) for member in members] if len(members) > 1 else []
+        return min((blocks.log_odds(members) - blocks.log_odds(rest) for rest in rests), default=np.inf)
+
+    every = best_of_each_set_of_names(blocks)
+    worth = [(odds, members) for odds, members in every if adds(members) >= policy.worth_a_search][: policy.beam]
+    assert [one.members for one in sets] == [members for _, members in worth]
+    assert_allclose([one.log_odds for one in sets], [odds for odds, _ in worth])
+    # With one cause in the data nothing adds to it, and many more sets than are fitted hold it and something idle.
+    (tilt,) = sets[0].members
+    assert blocks.hypotheses[tilt].cause.name == "table_tilt"
+    assert len(sets) == policy.beam
+    idle = [members for _, members in every if tilt in members and adds(members) < policy.worth_a_search]
+    assert len(idle) > 3 * policy.beam
 
 
 def test_causes_are_at_their_linear_estimates(blocks):

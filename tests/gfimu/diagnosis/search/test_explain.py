@@ -9,11 +9,11 @@ from numpy.testing import assert_allclose
 from scipy.interpolate import CubicSpline
 from scipy.signal import lfilter
 
+from gfimu.diagnosis.data.spins import State
 from gfimu.diagnosis.fit.learn import starting_point
 from gfimu.diagnosis.fit.posterior import condition
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.explain import explain, reduced
-from gfimu.diagnosis.terms.spline import State
 from gfimu.geometry.array import AccelerometerArray
 from sim.effects import EFFECTS
 from sim.effects.base import Effect, Size

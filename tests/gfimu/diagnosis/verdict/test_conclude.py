@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from core_cases import cause_of, lively, small_twin
 
+from gfimu.diagnosis.criticism.gain import Gain
 from gfimu.diagnosis.criticism.series_tests import LackOfFit
 from gfimu.diagnosis.data.stretch import make_stretches
 from gfimu.diagnosis.diagnose import prepare
@@ -15,7 +16,6 @@ from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.explain import explain
 from gfimu.diagnosis.search.nuisance_models import Understanding
 from gfimu.diagnosis.verdict.conclude import conclude, is_dominant, is_unknown, named_causes
-from gfimu.diagnosis.verdict.verdict import Gain
 from sim.campaign import Measurement, measure
 
 TWIN = small_twin()

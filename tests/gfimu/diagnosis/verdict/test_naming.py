@@ -87,13 +87,13 @@ def test_what_does_not_stand_out_is_no_surer_than_that():
     seen = NamedCause("bias", {"a_m_s2": 0.3, "b_m_s2": 0.01}, {"a_m_s2": 0.1, "b_m_s2": 0.1}, 0.99)
     assert capped(seen, POLICY) is seen
     unseen = replace(seen, parameters={"a_m_s2": 0.15, "b_m_s2": -0.15})
-    assert capped(unseen, POLICY).probability == POLICY.unseen_at_most
+    assert capped(unseen, POLICY).probability == 1.0 - POLICY.small
     # A shape is never near zero and a phase is compared with nothing.
     mode = NamedCause("resonance", {"gain": 0.1, "frequency_hz": 8.0}, {"gain": 0.1, "frequency_hz": 0.1}, 0.99)
     assert capped(mode, POLICY).probability == 0.99
-    assert capped(mode, POLICY, {"frequency_hz"}).probability == POLICY.unseen_at_most
+    assert capped(mode, POLICY, {"frequency_hz"}).probability == 1.0 - POLICY.small
     turn = NamedCause("cogging", {"amplitude": 0.1, "phase_rad": 3.0}, {"amplitude": 0.1, "phase_rad": 0.1}, 0.99)
-    assert capped(turn, POLICY).probability == POLICY.unseen_at_most
+    assert capped(turn, POLICY).probability == 1.0 - POLICY.small
     assert capped(replace(unseen, std={}), POLICY).probability == 0.99
     assert capped(replace(unseen, probability=0.4), POLICY).probability == 0.4
 

@@ -6,14 +6,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gfimu.diagnosis.verdict.verdict import IN_PART, Gain, NamedCause, Residual, Unexplained
+from gfimu.diagnosis.criticism.gain import Gain
+from gfimu.diagnosis.policy import Policy
+from gfimu.diagnosis.verdict.verdict import NamedCause, Residual, Unexplained
 from gfimu.units import STANDARD_GRAVITY
 
-__all__ = ["verdict_sentences"]
+__all__ = ["SAME_SHARE", "verdict_sentences"]
 
-_FAR_BELOW = 0.25  # of the excess: less on unseen data than on the fitted ones by more is told
-_SAME_SHARE = 5e-3
-_INEXACT = 1.1  # of the noise, from which what is left is told
+SAME_SHARE = 5e-3  # numerical: half of the last digit of a share in words
 
 
 def verdict_sentences(
@@ -63,7 +63,7 @@ def verdict_sentences(
     if unexplained.significant and verdict != "unknown":
         words.append(f"Something is left that nothing in the library explains: {unexplained.signature}.")
     over = residual.rms_after / max(residual.noise_floor, 1e-12)
-    if verdict == "explained" and not unexplained.significant and over > _INEXACT:
+    if verdict == "explained" and not unexplained.significant and over > 1.0 + Policy.small:
         words.append(
             f"What is left is {over:.2f} times the noise{f' ({rest})' if rest else ''}: "
             "little against what is explained, and ± holds it."
@@ -85,7 +85,7 @@ def verdict_sentences(
 def _anywhere(gain: Gain) -> str:
     """Return the share without what belongs to the clock of one recording, where that is another one."""
     share = gain.share_in_any_recording
-    if not np.isfinite(share) or abs(share - gain.share_of_excess_removed) < _SAME_SHARE:
+    if not np.isfinite(share) or abs(share - gain.share_of_excess_removed) < SAME_SHARE:
         return ""
     return f"; without terms of absolute time, as in any other recording, {max(share, 0.0):.1%}"
 
@@ -97,7 +97,7 @@ def _far_below(residual: Residual, gain: Gain) -> list[str]:
         return []
     fitted = min(1.0 - max(left, 0.0) / excess, 1.0)
     share = gain.share_of_excess_removed
-    if share + 2.0 * float(np.nan_to_num(gain.share_std)) > fitted - _FAR_BELOW:
+    if share + 2.0 * float(np.nan_to_num(gain.share_std)) > fitted - Policy.sizeable:
         return []
     told = (
         f"On the fitted data {fitted:.0%} of it is gone: so much more than on unseen data that the sizes may belong to "
@@ -112,7 +112,7 @@ def _headline(verdict: str, causes: Sequence[NamedCause], unexplained: Unexplain
         return "No single thing is wrong with the simulation."
     if verdict == "nothing_found":
         return "The simulation agrees with the measurement: nothing was found beyond the sensors' own noise."
-    if verdict == "explained" and gain.share_of_excess_removed < IN_PART:
+    if verdict == "explained" and gain.share_of_excess_removed < 1.0 - Policy.small:
         return (
             f"The simulation is wrong in part because of {names}: {gain.share_of_excess_removed:.0%} of the excess is "
             "gone on data the fit never saw."

@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from gfimu.diagnosis.data.cosine_basis import NoiseLevels
 from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.fit.linear import Point
 from gfimu.diagnosis.fit.parallel import over_segments
 from gfimu.diagnosis.terms.cause import effects_of
-from gfimu.diagnosis.terms.coloured_noise import NoiseLevels
 from gfimu.diagnosis.terms.drive import Drive
 from gfimu.diagnosis.terms.observed import Observed, observe
 

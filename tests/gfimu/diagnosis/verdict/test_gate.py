@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gfimu.diagnosis.criticism.gate import impossible_sizes, judge, measurable
+from gfimu.diagnosis.criticism.gain import Gain
 from gfimu.diagnosis.policy import Policy
-from gfimu.diagnosis.report.wording import verdict_sentences
-from gfimu.diagnosis.verdict.verdict import Gain, NamedCause, Residual, Unexplained
+from gfimu.diagnosis.verdict.gate import impossible_sizes, judge, measurable
+from gfimu.diagnosis.verdict.verdict import NamedCause, Residual, Unexplained
+from gfimu.diagnosis.verdict.wording import verdict_sentences
 from gfimu.geometry.array import AccelerometerArray
 from sim.effects import EFFECTS
 from sim.twin import Twin
@@ -125,4 +126,4 @@ def test_the_thresholds_are_those_of_the_policy():
     assert judge(half, FITS, CAUSES, replace(Policy(), least_share=0.7)).withdrawn
     rising = replace(FITS, rms_after=0.12)
     assert judge(GOOD, rising, CAUSES).withdrawn
-    assert not judge(GOOD, rising, CAUSES, replace(Policy(), worse=1.2)).withdrawn
+    assert not judge(GOOD, rising, CAUSES, replace(Policy(), noise_accuracy=0.2)).withdrawn

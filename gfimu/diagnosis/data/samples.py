@@ -1,4 +1,4 @@
-"""Frozen channels: stretches in which one holds a value that it should not."""
+"""Samples that are wrong: channels that hold one value, and isolated values far off their neighbours."""
 
 from __future__ import annotations
 
@@ -6,15 +6,19 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import median_filter
 from scipy.special import ndtr
 
-from gfimu.diagnosis.data.run import Run
+from gfimu.diagnosis.data.run import Run, difference_noise
+from gfimu.diagnosis.policy import Policy
 
-__all__ = ["frozen_stretches", "told_frozen"]
+__all__ = ["channel_spikes", "frozen_stretches", "reference_spikes", "told_frozen"]
 
 _LONGEST_EQUAL = 40
-_CHANCE = 1e-3  # that a run without a frozen channel has such a stretch
 _LEAST_NOISE = 0.1  # of a step: with less no run is long enough to tell
+_SPIKE = 8.0  # noise
+_ROUGH = 6.0  # how much neighbours usually differ there
+_NEIGHBOURS, _AROUND = 5, 9
 
 
 def frozen_stretches(
@@ -48,7 +52,7 @@ def frozen_stretches(
     # In the middle of a step that is coarse beside the noise a channel at rest may well read the same for long.
     spread = np.maximum(noise, _LEAST_NOISE * quantum)
     same = np.log(2.0 * ndtr(0.5 * quantum / spread) - 1.0)  # (c,), of one reading more
-    least = np.maximum((np.log(_CHANCE) - np.log(run.readings.size)) / same, _LONGEST_EQUAL)
+    least = np.maximum((np.log(Policy.chance) - np.log(run.readings.size)) / same, _LONGEST_EQUAL)
     for channel in range(run.readings.shape[1]):
         mine = run.readings[:, channel]
         changes = quietest if np.isnan(usual[channel]) else usual[channel]
@@ -89,3 +93,45 @@ def told_frozen(
         "stop_s": float(run.t[min(stop, len(run.t) - 1)]),
     }
     return parameters, text
+
+
+def channel_spikes(run: Run, white: NDArray[np.float64], quantum: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Mark isolated readings, shape (n, c), far off the median of their five neighbours.
+
+    Parameters
+    ----------
+    run : Run
+        The run.
+    white, quantum : ndarray, shape (c,)
+        White noise and step of each channel, m/s².
+    """
+    readings = run.readings.copy()
+    for column, valid in zip(readings.T, run.valid.T, strict=True):
+        if valid.any():  # a gap is no neighbour
+            column[~valid] = np.interp(run.t[~valid], run.t[valid], column[valid])
+    smooth = median_filter(readings, size=(_NEIGHBOURS, 1), mode="nearest")
+    jump = np.abs(readings - smooth)
+    differences = np.abs(np.diff(readings, axis=0, prepend=readings[:1]))
+    rough = median_filter(differences, size=(_AROUND, 1), mode="nearest")
+    return run.valid & (jump > _SPIKE * np.maximum(white, 0.5 * quantum) + _ROUGH * rough)
+
+
+def reference_spikes(run: Run) -> NDArray[np.bool_]:
+    """Mark isolated values, shape (n,), of the reference: a pulse too many or too few, or interference."""
+    known = np.flatnonzero(run.reference_valid)
+    found = np.zeros(len(run.t), dtype=bool)
+    while len(known) > _AROUND:  # several close to each other hide among themselves
+        values = run.reference[known]
+        differences = np.abs(np.diff(values, prepend=values[:1]))
+        if not differences.any():
+            break
+        # A coarse reference differs by a step or not at all; the least difference of a fine one is below its noise.
+        noise = max(difference_noise(values), float(differences[differences > 0.0].min()))
+        rough = median_filter(differences, size=_AROUND, mode="mirror")
+        jump = np.abs(values - median_filter(values, size=_NEIGHBOURS, mode="mirror"))
+        wrong = jump > _SPIKE * noise + _ROUGH * rough
+        if not wrong.any():
+            break
+        found[known[wrong]] = True
+        known = known[~wrong]
+    return found

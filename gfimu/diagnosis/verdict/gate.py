@@ -10,8 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gfimu.diagnosis.criticism.gain import Gain
 from gfimu.diagnosis.policy import Policy
-from gfimu.diagnosis.verdict.verdict import Gain, NamedCause, Residual
+from gfimu.diagnosis.verdict.verdict import NamedCause, Residual
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.world_model import EffectFamily, bound_of
 
@@ -57,7 +58,7 @@ def judge(gain: Gain, residual: Residual, causes: Sequence[NamedCause], policy: 
     if figure:
         return Judgement(True, f"{_found(causes)} do not predict data the fit never saw: {figure}")
     before, after = residual.rms_before, residual.rms_after
-    if after > max(policy.worse * before, policy.near_noise * residual.noise_floor):
+    if after > max((1.0 + policy.noise_accuracy) * before, (1.0 + policy.small) * residual.noise_floor):
         worse = f"the prediction error rises from {before:.3g} to {after:.3g} m/s²"
         return Judgement(True, f"{_found(causes)} make the simulation worse: {worse}")
     return Judgement()
@@ -75,17 +76,17 @@ def measurable(gain: Gain) -> Gain:
 def _held_out_figure(gain: Gain, policy: Policy) -> str:
     """Return the held-out figure that withdraws causes, in words, or nothing."""
     share = gain.share_of_excess_removed
-    upper = share + policy.gate_stds * float(np.nan_to_num(gain.share_std))
+    upper = share + policy.stds * float(np.nan_to_num(gain.share_std))
     rises = f"the error there rises from {gain.rms_before:.3g} to {gain.rms_after:.3g} m/s²"
-    if upper < policy.least_share and share < 0.0 and gain.rms_after > policy.worse * gain.rms_before:
+    if upper < policy.least_share and share < 0.0 and gain.rms_after > (1.0 + policy.noise_accuracy) * gain.rms_before:
         return rises
     if upper < policy.least_share:
         return f"{100 * max(share, 0.0):.0f} % of the excess removed"
     likelihood, std = gain.log_likelihood_per_sample, float(np.nan_to_num(gain.log_likelihood_std))
     # What is measured in other units must not overrule a share that is well above one half.
-    if likelihood + policy.gate_stds * std < 0.0 and not share >= policy.least_share:
+    if likelihood + policy.stds * std < 0.0 and not share >= policy.least_share:
         return f"log-likelihood per sample {likelihood:+.3g} ± {std:.2g}"
-    return rises if np.isnan(share) and gain.rms_after > policy.near_noise * gain.rms_before else ""
+    return rises if np.isnan(share) and gain.rms_after > (1.0 + policy.small) * gain.rms_before else ""
 
 
 def impossible_sizes(
