@@ -117,7 +117,7 @@ def _descend(stretches: Sequence[Stretch], point: Point, policy: Policy) -> tupl
     now = _energy(stretches, point)
     linear = linearise(stretches, point, of_causes(point))
     done = 0
-    for done in range(policy.steps):
+    for _ in range(policy.steps):
         step, promise = _step(point.causes, linear)
         if promise < SETTLED:
             break
@@ -130,7 +130,7 @@ def _descend(stretches: Sequence[Stretch], point: Point, policy: Policy) -> tupl
             break
         stalled = now - there < SETTLED
         kept = _dear(linear) if now - there > _KEPT * promise else None
-        point, now = trial, there
+        point, now, done = trial, there, done + 1
         linear = linearise(stretches, point, of_causes(point), jacobians=kept)
         if stalled:
             break
