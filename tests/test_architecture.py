@@ -298,6 +298,14 @@ def test_the_report_sees_the_verdict_and_its_views_only():
     ]
 
 
+def test_every_module_of_the_diagnosis_has_a_test_that_imports_it():
+    tests = (ROOT / "tests" / "gfimu" / "diagnosis").rglob("test_*.py")
+    imported = set().union(*(modules_imported(file.read_text(encoding="utf-8")) for file in tests))
+    rooms = [f"gfimu.diagnosis.{room}" for room in DIAGNOSIS]
+    modules = {module for module, file in FILES.items() if inside(module, *rooms) and file.name != "__init__.py"}
+    assert modules - imported == set()
+
+
 THRESHOLD_ROOMS = tuple(f"gfimu.diagnosis.{room}" for room in ("terms", "fit", "search", "criticism", "verdict"))
 
 OUTSIDE_POLICY = {
