@@ -16,7 +16,6 @@ from gfimu.diagnosis.data.stretch import make_stretches
 from gfimu.diagnosis.fit.gauss_newton import Fit
 from gfimu.diagnosis.fit.learn import predicted_by_reference
 from gfimu.diagnosis.fit.parallel import one_blas_thread
-from gfimu.diagnosis.free_body.diagnose import diagnose_body
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.explain import Explanation, reduced
 from gfimu.diagnosis.search.long_run import understand_any_length

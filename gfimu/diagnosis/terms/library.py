@@ -55,7 +55,7 @@ def cause_columns(stretch: Stretch, seen: Observed, drive: Drive, causes: Sequen
     """Return the derivative by each coordinate of a set of causes and by their free shapes, cause by cause."""
     array = stretch.model.array
     present = effects_of(causes, array, stretch.index)
-    found = [Columns.none(len(seen.weights), len(stretch.run.t))]
+    found = [Columns.none(len(seen.weights), len(seen.prediction))]
     for number, cause in enumerate(causes):
         count = len(cause.coordinates)
         step = _step(cause, stretch)
