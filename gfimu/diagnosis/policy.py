@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from gfimu.units import STANDARD_GRAVITY
 
@@ -105,6 +105,9 @@ class Policy:
     body_spike_share : float
         Share of isolated bad samples of a free body beyond which they are no faults: it moves faster than the samples
         follow.
+    least_information, body_information : float
+        Information of the data over that of the prior below which a combination of sizes stays at zero: that of all
+        chips of a free body passes for its specific force.
     """
 
     beam: int = 6
@@ -173,3 +176,15 @@ class Policy:
     body_rounds: int = 12
     body_dominant: float = 0.1
     body_spike_share: float = 2e-3
+    least_information: float = 0.0
+    body_information: float = 0.5
+
+    def of_body(self) -> Policy:
+        """Return the thresholds for a free body."""
+        return replace(
+            self,
+            most_causes=self.body_causes,
+            rounds=self.body_rounds,
+            dominant=self.body_dominant,
+            least_information=self.body_information,
+        )

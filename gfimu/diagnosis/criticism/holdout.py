@@ -14,10 +14,11 @@ from itertools import pairwise
 import numpy as np
 
 from gfimu.diagnosis.criticism.held_out_stretch import Measured, gain_of, measure
+from gfimu.diagnosis.data.body.stretch import BodyStretch
 from gfimu.diagnosis.data.stretch import RunUp, Stretch
 from gfimu.diagnosis.fit.evidence import SCALES, inverse, likeliest_scale
 from gfimu.diagnosis.fit.gauss_newton import Fit, fit
-from gfimu.diagnosis.fit.learn import learn_roughness, starting_point
+from gfimu.diagnosis.fit.learn import learn_noise, learn_roughness, starting_point
 from gfimu.diagnosis.fit.linear import Point, linearise, with_residue
 from gfimu.diagnosis.fit.parallel import each_apart, over_segments
 from gfimu.diagnosis.policy import Policy
@@ -96,6 +97,11 @@ def split(stretches: Sequence[Stretch], found: Fit, policy: Policy, *, duration:
     duration : float, optional
         About how long a block is, s; infinite for halves. By default `Policy.block_duration`.
     """
+    residue = 0.0 if found.point.residue is None else found.point.residue.scale
+    if isinstance(stretches[0], BodyStretch):
+        halves = zip(*(stretch.halves() for stretch in stretches), strict=True)
+        odd, even = (Part(half, found.point.drives, found.point.levels) for half in halves)
+        return [Holdout(odd, even, residue), Holdout(even, odd, residue)]
     length = policy.block_duration if duration is None else duration
     parts: list[list[tuple[Stretch, Drive, NoiseLevels]]] = [[], []]
     for stretch, drive, levels in zip(stretches, found.point.drives, found.point.levels, strict=True):
@@ -105,7 +111,6 @@ def split(stretches: Sequence[Stretch], found: Fit, policy: Policy, *, duration:
         for place, (start, stop) in enumerate(pairwise(edges)):
             parts[place % 2].append((*_block(stretch, drive, effects, start, stop, policy), levels))
     odd, even = (Part(*zip(*part, strict=True)) for part in parts)
-    residue = 0.0 if found.point.residue is None else found.point.residue.scale
     return [Holdout(odd, even, residue), Holdout(even, odd, residue)]
 
 
@@ -143,6 +148,9 @@ def other_recordings(
     """
     test = tuple(replace(stretch, index=0) for stretch in held_out)
     first = found.point
+    if isinstance(test[0], BodyStretch):  # its noise is that of its own motion
+        own = learn_noise(test, replace(starting_point(test, policy.knots), causes=found.causes))
+        return [Holdout(Part(tuple(stretches), first.drives, first.levels), Part(test, own.drives, own.levels))]
     drives = starting_point(test, first.drives[0].spline.spacing).drives
 
     def reaching(stretch: Stretch, drive: Drive) -> Drive:

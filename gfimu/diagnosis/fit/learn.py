@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gfimu.diagnosis.data.body.stretch import BodyStretch
 from gfimu.diagnosis.data.run import Run
 from gfimu.diagnosis.data.stretch import Stretch, make_stretches
 from gfimu.diagnosis.fit.linear import Linear, Point, linearise
@@ -15,6 +16,8 @@ from gfimu.diagnosis.fit.parallel import over_segments
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.terms.coloured_noise import NoiseLevels, estimate_flicker, likeliest_flicker, white_level
 from gfimu.diagnosis.terms.drive import Drive
+from gfimu.diagnosis.terms.hand.drive import HandDrive
+from gfimu.diagnosis.terms.hand.learning import first_noise, learnt_noise
 from gfimu.diagnosis.terms.slow_modes import WeighedPowers
 from gfimu.world_model import WorldModel
 
@@ -27,7 +30,13 @@ _REFERENCE_ROUNDS = 5  # numerical: to the roughness of a drive from its referen
 
 
 def starting_point(stretches: Sequence[Stretch], spacing: float) -> Point:
-    """Return the drives that the references alone give, and the noise of the data sheet."""
+    """Return the drives that the references alone give, and the noise of the data sheet.
+
+    Of a free body the noise is learnt at once: how much the motion adds to it no data sheet says.
+    """
+    if isinstance(stretches[0], BodyStretch):
+        hands = tuple(HandDrive.of(stretch) for stretch in stretches)
+        return learn_noise(stretches, Point((), hands, tuple(first_noise(stretch) for stretch in stretches)))
     drives = tuple(over_segments(lambda stretch: _by_reference(stretch, spacing), stretches))
     return Point((), drives, tuple(stretch.first_levels for stretch in stretches))
 
@@ -53,7 +62,7 @@ def predicted_by_reference(model: WorldModel, run: Run) -> NDArray[np.float64]:
 
 def learn_roughness(stretches: Sequence[Stretch], point: Point, rounds: int = 1) -> Point:
     """Return the point with the roughness that its drives show under its causes."""
-    for _ in range(rounds):
+    for _ in range(rounds if point.drives[0].is_learnt else 0):
         linear = linearise(stretches, point)
         drives = tuple(
             drive.moved(step).relearned(one.covariance)
@@ -68,6 +77,8 @@ def sharpened(stretches: Sequence[Stretch], point: Point, policy: Policy) -> Poi
 
     Where the fit is poor the drive would be bent to what no drive did: then the knots stay.
     """
+    if not point.drives[0].is_learnt:
+        return point
     now = linearise(stretches, point)
     if now.objective > policy.fair * sum(stretch.observations for stretch in stretches):
         return point
@@ -83,6 +94,10 @@ def sharpened(stretches: Sequence[Stretch], point: Point, policy: Policy) -> Poi
 
 def learn_noise(stretches: Sequence[Stretch], point: Point) -> Point:
     """Return the point with the noise that its causes and drives leave, each run's stretches together."""
+    if isinstance(stretches[0], BodyStretch):
+        rows = (stretches, point.drives, point.levels)
+        levels = over_segments(lambda s, drive, one: learnt_noise(s, drive, point.causes, one), *rows)
+        return replace(point, levels=tuple(levels))
     linear = linearise(stretches, point)
     lefts = [_left(stretch, point, linear, place) for place, stretch in enumerate(stretches)]
     levels = list(point.levels)

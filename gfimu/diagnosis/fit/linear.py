@@ -133,7 +133,7 @@ def linearise(
         parts = [] if residue is None else [residue]
         parts += [] if columns_of is None else [columns_of(stretch, posterior)]
         if not parts:
-            return posterior, np.zeros((0, 0)), np.zeros(0), np.zeros((len(drive.coefficients), 0))
+            return posterior, np.zeros((0, 0)), np.zeros(0), np.zeros((len(posterior.step), 0))
         gram, score, across = posterior.products(Columns.together(parts))
         return posterior, gram, score, posterior.response(across) if follow else across[:, :0]
 

@@ -25,6 +25,8 @@ from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.terms.coloured_noise import NoiseLevels
 from gfimu.diagnosis.terms.columns import Columns
 from gfimu.diagnosis.terms.drive import Drive
+from gfimu.diagnosis.terms.hand.drive import HandDrive
+from gfimu.diagnosis.terms.hand.posterior import condition_hand
 from gfimu.diagnosis.terms.jacobian import Jacobian, Reach, differentiate, measured_reach
 from gfimu.diagnosis.terms.observed import Observed, observe
 from gfimu.diagnosis.terms.slow_modes import SlowModes, WeighedModes
@@ -40,6 +42,11 @@ _LEAST_SHARE = 1e-6  # numerical: of a channel's slow noise in a mode, below whi
 
 def energy(stretch: Stretch, drive: Drive, effects: Sequence[Effect], levels: NoiseLevels) -> float:
     """Return misfit and prior energy at a drive that is held."""
+    if isinstance(drive, HandDrive):
+        try:
+            return condition_hand(stretch, drive, effects, levels).energy
+        except np.linalg.LinAlgError:
+            return np.inf
     prediction = stretch.predict(effects, drive.spin)
     if not np.isfinite(prediction).all():
         return np.inf
@@ -144,6 +151,8 @@ def condition(
     numpy.linalg.LinAlgError
         If data and prior do not determine a drive, as after a step to where the prediction overflows.
     """
+    if isinstance(drive, HandDrive):
+        return condition_hand(stretch, drive, effects, levels, jacobian)
     prediction = stretch.predict(effects, drive.spin)
     seen = observe(stretch, prediction, levels)
     if jacobian is None:

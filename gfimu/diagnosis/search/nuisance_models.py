@@ -14,6 +14,7 @@ from functools import partial
 import numpy as np
 
 from gfimu.diagnosis.criticism.slow_noise import Walk, walk_strength
+from gfimu.diagnosis.data.body.stretch import BodyStretch
 from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.fit.gauss_newton import Fit
 from gfimu.diagnosis.fit.learn import learn_noise
@@ -74,6 +75,8 @@ _Admit = Callable[[Point], Point | None]
 def _models(stretches: Sequence[Stretch], plain: Explanation, policy: Policy) -> list[tuple[str, _Admit, float]]:
     """Return the alternatives: name, what admits it at a point, and the log odds that it needs."""
     first = stretches[0]
+    if isinstance(first, BodyStretch):  # its slow noise takes what walks; a residue would need the force of many poses
+        return []
     found: list[tuple[str, _Admit, float]] = []
     residues: list[tuple[float, float]] = []
     if Residue.is_possible(first) and not any(s.steps.channels for s in stretches):

@@ -12,6 +12,8 @@ from scipy.special import expit
 
 from gfimu.diagnosis.criticism.lack_of_fit import LackOfFit
 from gfimu.diagnosis.criticism.slow_noise import LoudestChannel, loudest_channel, white_factor
+from gfimu.diagnosis.data.body.run import BodyRun
+from gfimu.diagnosis.data.body.stretch import BodyStretch
 from gfimu.diagnosis.data.prepared_runs import PreparedRuns
 from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.fit.gauss_newton import Fit
@@ -23,6 +25,7 @@ from gfimu.diagnosis.search.explain import Explanation
 from gfimu.diagnosis.search.nuisance_models import Understanding
 from gfimu.diagnosis.terms.cause import Cause, effects_of
 from gfimu.diagnosis.terms.spline import AngleSpline
+from gfimu.diagnosis.verdict.body_view import body_noise_floor, body_view
 from gfimu.diagnosis.verdict.naming import (
     capped,
     channel_share,
@@ -33,6 +36,7 @@ from gfimu.diagnosis.verdict.naming import (
     probabilities,
     rival_list,
 )
+from gfimu.diagnosis.verdict.undetermined import undetermined, undetermined_sentence
 from gfimu.diagnosis.verdict.verdict import Diagnosis, Gain, NamedCause, Residual, RunView, Unexplained
 from gfimu.world_model import Effect, Spin, WorldModel
 
@@ -78,6 +82,7 @@ def stands_out(explanation: Explanation, left: LackOfFit, policy: Policy) -> boo
 def is_dominant(explanation: Explanation, left: LackOfFit, policy: Policy) -> bool:
     """Tell whether the lack of fit weighs too much against what the causes explain for these to be believed."""
     large = left.instead or 2.0 * left.log_odds > policy.dominant * removed(explanation)
+    large = large and not (left.of_noise and explanation.best.causes)
     return large and stands_out(explanation, left, policy)
 
 
@@ -106,12 +111,18 @@ def named_causes(explanation: Explanation, fit: Fit, policy: Policy) -> list[Nam
     for cause in fit.causes:
         others = [other for other in fit.causes if other is not cause]
         change = (whole - stretch.predict(effects_of(others, array, stretch.index), spin)) * stretch.mask
-        share = channel_share(change[:, :-1], array.channels)
+        share = channel_share(_seen(stretch, change[:, :-1]), array.channels)
         entry = name_cause(explanation, fit, cause, likely, array, share, policy)
         why = entry.why + _other_runs(cause, stretch, runs)
         entry = replace(entry, why=why, std=_widened(explanation, fit, entry, cause, policy))
         entries.append((float(sum(value**2 for value in share.values())), capped(entry, policy, cause.shape)))
     return [entry for _, entry in sorted(entries, key=lambda pair: -pair[0])]
+
+
+def _seen(stretch: Stretch, change: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return what is seen of a change (n, c): of a free body not what passes for its specific force."""
+    axes = stretch.model.array.axes
+    return change - (change @ np.linalg.pinv(axes).T) @ axes.T if isinstance(stretch, BodyStretch) else change
 
 
 def _widened(explanation: Explanation, fit: Fit, named: NamedCause, cause: Cause, policy: Policy) -> dict[str, float]:
@@ -211,7 +222,9 @@ def conclude(
         0 if described is None else described.left_out,
     )
     levels = believed.point.levels[0]
-    residual = Residual.of_views(runs, array.channels, _noise_floor(runs, first, believed))
+    body = isinstance(first, BodyStretch)
+    floor = body_noise_floor(first, levels) if body else _noise_floor(runs, first, believed)
+    residual = Residual.of_views(runs, array.channels, floor)
     extends = not unknown or (described is not None and described.carried is not None)
     extension = effects_of(believed.causes, array, 0) if extends else []
     twin = model.extended([*_library_effects(model, found), *_residue(explanation), *extension])
@@ -224,6 +237,9 @@ def conclude(
         "reference_white": float(levels.white[-1]),
         "calibration_residue": understanding.residue,
     }
+    if body:
+        noise |= {"disagreement_s": levels.agitation, "gyro_bias_rad_s": float(np.linalg.norm(first.run.gyro_bias))}
+        del noise["reference_white"]
     words = verdict_sentences(
         verdict,
         causes,
@@ -238,7 +254,10 @@ def conclude(
         rest=left.signature if left.log_odds > policy.lack_odds else "",
     )
     others_told = rival_list(explanation, policy)
-    return Diagnosis(verdict, causes, residual, gain, unexplained, others_told, twin, runs, words, noise)
+    open_ones = undetermined(explanation.screening, array, policy.least_information)
+    words = (*words, undetermined_sentence(open_ones)) if open_ones else words
+    listed = tuple(one.to_dict() for one in open_ones)
+    return Diagnosis(verdict, causes, residual, gain, unexplained, others_told, twin, runs, words, noise, listed)
 
 
 def _believed(explanation: Explanation, described: Described | None, *, unknown: bool) -> Fit:
@@ -273,7 +292,8 @@ def _noise_causes(understanding: Understanding, policy: Policy) -> list[NamedCau
                 log_odds=walk.log_odds,
             )
         )
-    excess = white_factor(stretches, understanding.explanation.best.point.levels)
+    body = isinstance(stretches[0], BodyStretch)  # whose channels' noise can't be told apart well
+    excess = None if body else white_factor(stretches, understanding.explanation.best.point.levels)
     if excess is not None and "noise" in families:
         factor, std = excess
         why = f"the white noise of all channels is {factor:.2f} times the data sheet's"
@@ -312,6 +332,10 @@ def _views(prepared: PreparedRuns, stretches: Sequence[Stretch], believed: Fit) 
 
 def _view(prepared: PreparedRuns, number: int, stretches: Sequence[Stretch], believed: Fit) -> RunView:
     run = prepared.runs[number]
+    if isinstance(run, BodyRun):
+        given = tuple(replace(stretch, known=()) for stretch in stretches)
+        plain = linearise(given, replace(believed.point, causes=())).posteriors[number]
+        return body_view(plain, linearise(stretches, believed.point).posteriors[number])
     before, after, states = [], [], []
     for stretch, drive in zip(stretches, believed.point.drives, strict=True):
         if stretch.index != number:

@@ -57,7 +57,8 @@ class BodyNoise(NoiseLevels):
     @classmethod
     def of(cls, white: NDArray[np.float64], flicker: float, acceleration: float = 0.0) -> BodyNoise:
         """Return white noise (c,) and the bias instability of all channels, m/s²."""
-        return cls(np.append(white, np.inf), np.append(np.full(len(white), flicker), 0.0), 0.0, 0.0, acceleration)
+        slow = np.append(np.full(len(white), flicker), 0.0)
+        return cls(np.append(white, np.inf), slow, acceleration=acceleration)
 
     @property
     def typical(self) -> float:
@@ -69,6 +70,10 @@ class BodyNoise(NoiseLevels):
         """Bias instability of every channel, rms, m/s²."""
         return float(self.flicker[0])
 
+    def with_instability(self, level: float) -> BodyNoise:
+        """Return the noise with another bias instability, rms, m/s²."""
+        return replace(self, flicker=np.append(np.full(len(self.white) - 1, level), 0.0))
+
     def common(self, change: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the factor by which the variance grows, shape (n,), for changes of the readings (n,), m/s³."""
         return 1.0 + (self.agitation * change / self.typical) ** 2
@@ -79,11 +84,16 @@ class BodyNoise(NoiseLevels):
 
 
 class Projection:
-    """Whitened combinations of the channels that the specific force can't move.
+    """Derivative by specific force and angular acceleration, the same at all samples.
+
+    Whitened combinations of the channels that the specific force can't move.
 
     The first three feel the angular acceleration with ``strength`` (per rad/s²), the others don't. ``sensed`` (c, 3) is
     what the channels read per specific force, where gains and cross-axis effects make that other than the axes.
     """
+
+    predictions = 4
+    """How many predictions it takes."""
 
     def __init__(
         self, array: AccelerometerArray, white: NDArray[np.float64], sensed: NDArray[np.float64] | None = None

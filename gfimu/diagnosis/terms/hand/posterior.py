@@ -36,6 +36,8 @@ _UNTRUE = 0.1  # share of the angular acceleration that may be out of scale wher
 _AVERAGING = 1.5  # sample periods: how long chips or gyro may average
 _FORCE_STEPS = 6  # numerical
 _FORCE_DONE = 0.02  # numerical: of the white noise
+_BLOCK_S, _MOST_BLOCKS = 0.5, 128  # numerical: block of time, s, of the test of the noise
+_SEEN = 1e-9  # numerical: of the strongest direction
 _TAKEN = 6  # combinations of the channels that the drive takes
 
 
@@ -165,7 +167,7 @@ class HandPosterior:
             weight = self.observed.weights[c]
             gram[np.ix_(at, at)] += weight * (part.T @ part)
             score[at] += weight * (part.T @ self.observed.residual[:, c])
-        lost, rest = taken[:_TAKEN].reshape(-1, columns.count), taken[_TAKEN]
+        lost, rest = np.concatenate(taken[:_TAKEN]), taken[_TAKEN]
         right = self._taken_of_residual
         gram += rest.T @ rest - lost.T @ lost
         score += rest.T @ right[_TAKEN] - lost.T @ right[:_TAKEN].ravel()
@@ -207,7 +209,7 @@ class HandPosterior:
         rest = np.flatnonzero(self.stretch.resting)
         mixed = self._rest_of_weighed[rest, :, None] * cosines[rest, None, :]  # (rest, c, K)
         out += np.tensordot(mixed, taken[_TAKEN][rest], axes=(0, 0))
-        return np.asarray(out.reshape(-1, out.shape[2]))
+        return np.concatenate(out)
 
     @cached_property
     def slow_score(self) -> NDArray[np.float64]:
@@ -269,15 +271,46 @@ class HandPosterior:
         """Most probable slow noise (c · K) and errors of the motion, in units of their prior."""
         return np.asarray(cho_solve((self._nuisances[0], True), self._nuisances[1]))
 
+    # -- the residual of every sample ------------------------------------------------------------------------------
+
+    @cached_property
+    def without_motion(self) -> NDArray[np.float64]:
+        """Residual less the angular acceleration that the gyro's samples don't hold, shape (n, c), m/s².
+
+        That takes no part in the normal equations: estimated from the same readings, it would explain itself by longer
+        arms.
+        """
+        stretch, strength = self.stretch, self.jacobian.strength
+        prior = self.levels.lost(stretch.change_in_motion)[:, None]
+        common = self.levels.common(stretch.change_in_motion)[:, None]
+        rows = self.residual @ self.jacobian.rows[:3].T  # (n, 3)
+        lost = (rows * prior * strength / (common + prior * strength**2)) @ self.jacobian.turn
+        change = np.where(stretch.use[:, None], lost, 0.0) @ stretch.model.array.regression_matrix[:, :3].T
+        return np.where(stretch.run.valid, self._with_best_force(self.residual - change), 0.0)
+
+    @cached_property
+    def without_errors(self) -> NDArray[np.float64]:
+        """Residual less the most probable errors of the motion, shape (n, c), m/s²."""
+        sizes = self.nuisance_sizes[-len(self.motion_errors) :]
+        change = sum((size * one for size, one in zip(sizes, self.motion_errors, strict=True)), 0.0 * self.residual)
+        return np.asarray(self.residual - self._with_best_force(change))
+
+    def _with_best_force(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.asarray(values - (values @ self.jacobian.to_force.T) @ self.stretch.model.array.axes.T)
+
     # -- what a fit asks for ----------------------------------------------------------------------------------------
+
+    @cached_property
+    def squares(self) -> NDArray[np.float64]:
+        """Whitened squares of each group, the drive eliminated, shape (m,)."""
+        right = self._taken_of_residual
+        power = self.observed.residual**2 @ self.observed.weights
+        return np.asarray(power + right[_TAKEN] ** 2 - np.sum(right[:_TAKEN] ** 2, axis=0))
 
     @cached_property
     def objective(self) -> float:
         """Sum of squares, drive and nuisance parameters eliminated, over the misfit of the noise."""
-        seen, right = self.observed, self._taken_of_residual
-        power = float(seen.weights[:-1] @ np.sum(seen.residual[:, :-1] ** 2, axis=0))
-        power += float(np.sum(right[_TAKEN] ** 2) - np.sum(right[:_TAKEN] ** 2))
-        return (power - float(self._forward @ self._forward)) / self.levels.misfit
+        return (float(self.squares.sum()) - float(self._forward @ self._forward)) / self.levels.misfit
 
     @property
     def energy(self) -> float:
@@ -300,10 +333,47 @@ class HandPosterior:
         """Of parameters of the drive's prior, of which it has none."""
         return np.zeros((0, 0))
 
-    @property
+    @cached_property
     def whitened(self) -> NDArray[np.float64]:
-        """Residuals of the groups, of which the library of a free body takes no shapes, shape (m, c + 1)."""
-        return self.observed.residual * self.observed.weights
+        """Residual less drive and nuisances, (m, c + 1): its product with any column is that column's score."""
+        seen, split = self.observed, self.slow_score.size
+        drift, motion = self.nuisance_sizes[:split], self.nuisance_sizes[split:]
+        taken_away = self._cosines @ drift.reshape(-1, self._cosines.shape[1]).T + self.motion.times(motion)[:, :-1]
+        left = seen.residual[:, :-1] - taken_away
+        rest = self._taken_of_residual[_TAKEN] - np.sum(self._rest_of_weighed * taken_away, axis=1)
+        out = left * seen.weights[:-1] - ((left @ self._mix.T) * self._share.T**2) @ self._mix
+        out += self._rest_of_weighed * rest[:, None]
+        return np.column_stack([out, np.zeros(len(out))])
+
+    def slow_beside(self, columns: Columns) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return G and b of slow noise, the drive eliminated and columns projected out."""
+        both = Columns.together([self.motion, columns])
+        taken = self._taken(both)
+        inner, right = self._driveless(both, taken)
+        inner[np.diag_indices_from(inner)] += 1e-9 * (1.0 + inner.diagonal().max())  # numerical
+        cross = self.slow_cross(both, taken)
+        gain = np.linalg.solve(inner, np.column_stack([cross.T, right]))
+        return self.slow_gram() - cross @ gain[:, :-1], self.slow_score - cross @ gain[:, -1]
+
+    def misfit(self, columns: Columns) -> float:
+        """Return how much more than white noise the residual scatters along columns; at least 1.
+
+        Block by block of time the products of columns and residual have the variance that white noise gives them, were
+        the noise all that is left. Vibration that the chips do not share, or filters unlike, leave more: every block
+        then weighs for one observation, whatever the number of its samples (the information-matrix test of White,
+        Econometrica 50, 1982, in the directions of the columns).
+        """
+        strength, turn = np.linalg.eigh(self._driveless(columns, self._taken(columns))[0])
+        seen = strength > _SEEN * max(strength[-1], 1e-300) if len(strength) else np.zeros(0, dtype=bool)
+        if not seen.any():
+            return 1.0
+        products = np.zeros((len(self._weight), columns.count))
+        for c, (at, part) in enumerate(zip(columns.places, columns.parts, strict=True)):
+            products[:, at] += part * self.whitened[:, [c]]
+        length = max(int(_BLOCK_S / self.stretch.run.sample_period), len(products) // _MOST_BLOCKS, 1)
+        scores = np.add.reduceat(products, np.arange(0, len(products), length), axis=0)  # (blocks, k)
+        scatter = np.sum((scores @ turn[:, seen]) ** 2 / strength[seen])
+        return max(float(scatter) / int(seen.sum()), 1.0)
 
     def products(self, columns: Columns) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Return G (P, P), b (P,) and how the specific force follows columns, shape (3 m, P)."""
@@ -323,13 +393,13 @@ class HandPosterior:
         over = 1.0 / np.where(self._weight > 0.0, self._weight, np.inf)
         for c, (at, part) in enumerate(zip(columns.places[:-1], columns.parts[:-1], strict=True)):
             out[:, :, at] += self.jacobian.to_force[:, c, None] * (part * over[:, None])[:, None, :]
-        return out.reshape(-1, columns.count)
+        return out.reshape(3 * len(out), columns.count)
 
     def response(self, across: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return how the drive follows each unknown, shape (3 n, P)."""
         sizes = np.diff(np.append(self.stretch.starts, len(self.stretch.run.t)))
-        each = -across.reshape(len(sizes), 3, -1)
-        return np.repeat(each, sizes, axis=0).reshape(3 * len(self.stretch.run.t), -1)
+        each = -across.reshape(len(sizes), 3, across.shape[1])
+        return np.concatenate(np.repeat(each, sizes, axis=0))
 
 
 def condition_hand(
