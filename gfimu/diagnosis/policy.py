@@ -108,6 +108,9 @@ class Policy:
     least_information, body_information : float
         Information of the data over that of the prior below which a combination of sizes stays at zero: that of all
         chips of a free body passes for its specific force.
+    nested : bool
+        Whether a set may have an effect beside one that can do all that it does (``contained_in``): on a free body
+        both together mean nothing.
     """
 
     beam: int = 6
@@ -178,6 +181,7 @@ class Policy:
     body_spike_share: float = 2e-3
     least_information: float = 0.0
     body_information: float = 0.5
+    nested: bool = True
 
     def of_body(self) -> Policy:
         """Return the thresholds for a free body."""
@@ -187,4 +191,5 @@ class Policy:
             rounds=self.body_rounds,
             dominant=self.body_dominant,
             least_information=self.body_information,
+            nested=False,
         )

@@ -97,7 +97,7 @@ def measure(
     """
     array, index = extended.model.array, extended.index
     if isinstance(extended, BodyStretch):
-        return _measured_body(nominal, extended, effects_of(causes, array, index), drive, levels)
+        return _measured_body(nominal, extended, effects_of(causes, array, index), drive, levels, unexplained)
 
     def beside(some: Sequence[Cause]) -> Stretch:
         return replace(extended, known=(*extended.known, *effects_of(some, array, index)))
@@ -129,7 +129,12 @@ def measure(
 
 
 def _measured_body(
-    nominal: BodyStretch, extended: BodyStretch, effects: Sequence[Effect], drive: HandDrive, levels: BodyNoise
+    nominal: BodyStretch,
+    extended: BodyStretch,
+    effects: Sequence[Effect],
+    drive: HandDrive,
+    levels: BodyNoise,
+    unexplained: float,
 ) -> Measured:
     """Measure effects on a free body, whose motion between them is marginalised before and after alike."""
     plain = replace(levels, misfit=1.0)
@@ -143,7 +148,7 @@ def _measured_body(
         carried=after.objective,
         floor=float(extended.observations),
         floor_variance=2.0 * extended.observations,
-        fitted=float(extended.observations),
+        fitted=unexplained * levels.misfit * extended.observations,
         squares=(float(np.sum(before.without_motion[use] ** 2)), float(np.sum(after.without_motion[use] ** 2))),
         samples=int(use.sum()),
         rows=int(extended.counted.sum()),

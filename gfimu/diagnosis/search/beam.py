@@ -101,7 +101,9 @@ def leading_sets(blocks: Blocks, most: int, policy: Policy) -> list[Candidate]:
             added = blocks.log_odds_each(candidate.members)
             for number in np.argsort(-added)[:_PARTNERS]:
                 members = tuple(sorted((*candidate.members, int(number))))
-                if names[number] not in taken and members not in grown:
+                if names[number] in taken or (not policy.nested and _nested(blocks.hypotheses, members)):
+                    continue
+                if members not in grown:
                     grown[members] = Candidate(blocks.log_odds(members), members)
         larger = sorted(grown.values(), key=lambda one: -one.log_odds)
         every += larger
@@ -109,6 +111,13 @@ def leading_sets(blocks: Blocks, most: int, policy: Policy) -> list[Candidate]:
     every.sort(key=lambda one: -one.log_odds)
     worth = [one for one in _distinct(every, blocks.hypotheses, 4 * policy.beam) if _is_worth(blocks, one, policy)]
     return worth[: policy.beam]
+
+
+def _nested(hypotheses: Sequence[Hypothesis], members: Sequence[int]) -> bool:
+    """Tell whether one effect of a set can do all that another does: both together mean nothing."""
+    families = [hypotheses[number].cause.family for number in members]
+    names = {str(family.name) for family in families}
+    return any(names & getattr(family, "contained_in", frozenset()) for family in families)
 
 
 def _is_worth(blocks: Blocks, candidate: Candidate, policy: Policy) -> bool:
