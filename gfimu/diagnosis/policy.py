@@ -111,6 +111,9 @@ class Policy:
     nested : bool
         Whether a set may have an effect beside one that can do all that it does (``contained_in``): on a free body
         both together mean nothing.
+    grown, body_grown : int
+        Best effects by which the present set, and the set without each of its causes, is grown beside the sets that
+        lead in a linear world: with many causes those are far from the point, and what they promise comes true less.
     """
 
     beam: int = 6
@@ -182,6 +185,8 @@ class Policy:
     least_information: float = 0.0
     body_information: float = 0.5
     nested: bool = True
+    grown: int = 0
+    body_grown: int = 3
 
     def of_body(self) -> Policy:
         """Return the thresholds for a free body."""
@@ -192,4 +197,5 @@ class Policy:
             dominant=self.body_dominant,
             least_information=self.body_information,
             nested=False,
+            grown=self.body_grown,
         )

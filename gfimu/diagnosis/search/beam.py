@@ -14,7 +14,7 @@ from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.screening import Hypothesis, Screening
 from gfimu.diagnosis.terms.cause import Cause
 
-__all__ = ["Blocks", "Candidate", "leading_sets"]
+__all__ = ["Blocks", "Candidate", "grown_sets", "leading_sets"]
 
 _FRONT, _PARTNERS = 8, 30  # numerical: sets that are grown, and how many of the best partners of each are scored
 
@@ -111,6 +111,20 @@ def leading_sets(blocks: Blocks, most: int, policy: Policy) -> list[Candidate]:
     every.sort(key=lambda one: -one.log_odds)
     worth = [one for one in _distinct(every, blocks.hypotheses, 4 * policy.beam) if _is_worth(blocks, one, policy)]
     return worth[: policy.beam]
+
+
+def grown_sets(blocks: Blocks, members: tuple[int, ...], count: int, policy: Policy) -> list[Candidate]:
+    """Return a set with each of the effects that add most to it, each at its best place and shape, best first."""
+    names = [h.cause.name for h in blocks.hypotheses]
+    found: dict[str, Candidate] = {}
+    for number in np.argsort(-blocks.log_odds_each(members)):
+        grown = tuple(sorted((*members, int(number))))
+        taken = {names[member] for member in members}
+        if names[number] not in taken and (policy.nested or not _nested(blocks.hypotheses, grown)):
+            found.setdefault(names[number], Candidate(blocks.log_odds(grown), grown))
+        if len(found) == count:
+            break
+    return list(found.values())
 
 
 def _nested(hypotheses: Sequence[Hypothesis], members: Sequence[int]) -> bool:

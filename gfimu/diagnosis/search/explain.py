@@ -13,7 +13,7 @@ from gfimu.diagnosis.fit.learn import learn_noise, learn_roughness, sharpened, s
 from gfimu.diagnosis.fit.linear import Point, with_residue
 from gfimu.diagnosis.fit.parallel import each_apart
 from gfimu.diagnosis.policy import Policy
-from gfimu.diagnosis.search.beam import Blocks, leading_sets
+from gfimu.diagnosis.search.beam import Blocks, grown_sets, leading_sets
 from gfimu.diagnosis.search.comparison import Comparison
 from gfimu.diagnosis.search.screening import Screening, screen
 from gfimu.diagnosis.terms.cause import Cause, effects_of
@@ -220,12 +220,22 @@ def _fit_leaders(sets: Sets, screening: Screening, about: Fit, *, near: bool) ->
     least = -policy.worth_a_search  # less than nothing, by more than a linear form may err
     if near and candidates:
         least = max(least, candidates[0].log_odds - policy.close)
-    for candidate in (one for one in candidates if one.log_odds >= least):
+    leaders = [one for one in candidates if one.log_odds >= least]
+    for members in _about(blocks, about.causes) if policy.grown else ():
+        leaders += grown_sets(blocks, members, policy.grown, policy)
+    for candidate in leaders:
         causes = blocks.causes(candidate.members)
         moves = screening.drive_moves(candidate.members, causes)
         drives = tuple(drive.moved(move) for drive, move in zip(about.point.drives, moves, strict=True))
         points.append(replace(about.point, causes=causes, drives=drives))
     sets.fit(points)
+
+
+def _about(blocks: Blocks, causes: Sequence[Cause]) -> list[tuple[int, ...]]:
+    """Return the hypotheses that a set of causes is, and those of the set without each of them."""
+    places = {h.cause.key: number for number, h in reversed(list(enumerate(blocks.hypotheses)))}
+    whole = tuple(sorted(places[cause.key] for cause in causes))
+    return [whole, *(tuple(m for m in whole if m != member) for member in whole)] if whole else []
 
 
 def reduced(explanation: Explanation, name: str, policy: Policy) -> Explanation:
