@@ -111,6 +111,9 @@ class Policy:
     nested : bool
         Whether a set may have an effect beside one that can do all that it does (``contained_in``): on a free body
         both together mean nothing.
+    coincide : bool
+        Whether several causes that miss part of the held-out excess are taken for a coincidence beside a lack of fit:
+        real hands leave more than the share ``dominant`` beside what is right.
     grown, body_grown : int
         Best effects by which the present set, and the set without each of its causes, is grown beside the sets that
         lead in a linear world: with many causes those are far from the point, and what they promise comes true less.
@@ -185,6 +188,7 @@ class Policy:
     least_information: float = 0.0
     body_information: float = 0.5
     nested: bool = True
+    coincide: bool = True
     grown: int = 0
     body_grown: int = 3
 
@@ -197,5 +201,6 @@ class Policy:
             dominant=self.body_dominant,
             least_information=self.body_information,
             nested=False,
+            coincide=False,
             grown=self.body_grown,
         )

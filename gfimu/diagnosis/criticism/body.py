@@ -45,7 +45,7 @@ def motion_noise(stretches: Sequence[BodyStretch], levels: Sequence[BodyNoise], 
             f"the angular acceleration differs from what the gyro's samples say by {typical:.2g} rad/s² rms in motion"
         )
         surrogate[_LOST] = noise.acceleration_slope
-    return LackOfFit(noise.log_odds, "; ".join(parts), surrogate, of_noise=True)
+    return LackOfFit(-np.inf, "; ".join(parts), surrogate, noise_odds=noise.log_odds)
 
 
 def body_functions(stretch: BodyStretch, drive: HandDrive) -> dict[str, NDArray[np.float64]]:

@@ -105,12 +105,12 @@ def _of_body(
     tones = [tone(one, policy) for one in linearise(stretches, point).posteriors]
     found = max([*candidates, *tones], key=lambda one: one.log_odds)
     noise = motion_noise(stretches, point.levels, policy)
-    if noise.log_odds <= policy.lack_odds:
+    if noise.noise_odds <= policy.lack_odds:
         return found
     if found.log_odds <= policy.lack_odds:
-        return noise
-    signature = f"{found.signature}; {noise.signature}"
-    return replace(found, signature=signature, surrogate={**found.surrogate, **noise.surrogate})
+        return replace(noise, log_odds=found.log_odds)
+    signature, surrogate = f"{found.signature}; {noise.signature}", {**found.surrogate, **noise.surrogate}
+    return replace(found, signature=signature, surrogate=surrogate, noise_odds=noise.noise_odds)
 
 
 def dependence_unexplained(stretches: Sequence[Stretch], point: Point, policy: Policy = Policy()) -> LackOfFit:

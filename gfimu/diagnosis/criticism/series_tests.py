@@ -48,8 +48,8 @@ class LackOfFit:
         Functions (`gfimu.generic_basis`) beyond the usual ones that may describe it.
     dependence : str
         The function that it follows, where it follows one.
-    of_noise : bool
-        Whether it is of the noise, which speaks against no cause.
+    noise_odds : float
+        Log odds of noise that grows with the motion, which speaks against no cause.
     """
 
     log_odds: float
@@ -58,7 +58,7 @@ class LackOfFit:
     instead: bool = False
     hints: tuple[str, ...] = ()
     dependence: str = ""
-    of_noise: bool = False
+    noise_odds: float = -np.inf
 
 
 _NOTHING = LackOfFit(-np.inf, "", {})

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
 from gfimu.diagnosis.fit.evidence import SCALES, inverse, log_evidence, log_evidence_each, posterior
+from gfimu.diagnosis.fit.gauss_newton import determined
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.screening import Hypothesis, Screening
 from gfimu.diagnosis.terms.cause import Cause
@@ -81,6 +82,9 @@ class Blocks:
         """Return a set at its linear estimates."""
         gram, score, positive = self.system(members)
         mean, _ = posterior(gram, score, SCALES[-1])
+        if self._policy.least_information:  # what is not determined stays at zero
+            _, turn, seen = determined(gram, self._policy.least_information)
+            mean = turn[:, seen] @ (turn[:, seen].T @ mean)
         mean = np.where(positive, np.maximum(mean, 1e-3), mean)
         ends = np.cumsum([len(self.hypotheses[number].positive) for number in members])[:-1]
         return tuple(

@@ -118,7 +118,8 @@ def explain(
         before = sets.best
         screening = screen(stretches, before.point)
         _fit_leaders(sets, screening, before, near=number > 0)
-        best = prune(sets)
+        # While a set still grows its noise is that of the largest: a smaller one would pass for more noise.
+        best = sets.best if policy.grown and sets.best.key not in seen else prune(sets)
         fits += sets.count
         if number > 0 and best.key in seen:
             break

@@ -74,6 +74,11 @@ def removed(explanation: Explanation) -> float:
 
 def stands_out(explanation: Explanation, left: LackOfFit, policy: Policy) -> bool:
     """Tell whether a lack of fit is no chance, nor the inexactness that every model has."""
+    return left.noise_odds > policy.lack_odds or _depends(explanation, left, policy)
+
+
+def _depends(explanation: Explanation, left: LackOfFit, policy: Policy) -> bool:
+    """Tell the same of all but noise that grows with the motion, which speaks against no cause."""
     if left.instead or _is_full(explanation, policy):
         return left.log_odds > policy.lack_odds
     return left.log_odds > max(policy.lack_odds, policy.inexactness * removed(explanation))
@@ -81,17 +86,18 @@ def stands_out(explanation: Explanation, left: LackOfFit, policy: Policy) -> boo
 
 def is_dominant(explanation: Explanation, left: LackOfFit, policy: Policy) -> bool:
     """Tell whether the lack of fit weighs too much against what the causes explain for these to be believed."""
+    if not explanation.best.causes:
+        return stands_out(explanation, left, policy)
     large = left.instead or 2.0 * left.log_odds > policy.dominant * removed(explanation)
-    large = large and not (left.of_noise and explanation.best.causes)
-    return large and stands_out(explanation, left, policy)
+    return large and _depends(explanation, left, policy)
 
 
 def is_unknown(explanation: Explanation, left: LackOfFit, gain: Gain, policy: Policy) -> bool:
     """Tell whether the causes are not to be believed, their gain on held-out data being known."""
     # Several causes that together still miss something, and a share of held-out data, coincide by chance.
-    missed = len(explanation.best.causes) > 1 and gain.share_of_excess_removed < 1.0 - policy.dominant
+    missed = policy.coincide and len(explanation.best.causes) > 1 and gain.share_of_excess_removed < 1.0 - policy.dominant
     doubtful = missed or _is_full(explanation, policy) or is_dominant(explanation, left, policy)
-    return doubtful and stands_out(explanation, left, policy)
+    return doubtful and (_depends(explanation, left, policy) or not explanation.best.causes)
 
 
 def _is_full(explanation: Explanation, policy: Policy) -> bool:
@@ -216,7 +222,7 @@ def conclude(
     unexplained = Unexplained(
         unknown or apart or loudest.stands_out(policy),
         "; ".join(part for part in (refuted, shown, _loud(loudest, policy)) if part),
-        left.log_odds,
+        max(left.log_odds, left.noise_odds),
         left.surrogate if described is None else _coefficients(described.whole.causes, first),
         described is not None and described.carried is not None,
         0 if described is None else described.left_out,

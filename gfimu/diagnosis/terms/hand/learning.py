@@ -35,9 +35,11 @@ def learnt_noise(stretch: BodyStretch, drive: HandDrive, causes: Sequence[Cause]
     fast = _fast_noise(stretch, found.residual)
     about = condition_hand(stretch, found.drive, effects, replace(fast, flicker=levels.flicker))
     # What a pose decides must not pass for slow noise before its cause is found.
-    level = _instability(replace(about, levels=about.levels.with_instability(1.0)), _of_pose(about, causes))
+    pose = _of_pose(about, causes)
+    level = _instability(replace(about, levels=about.levels.with_instability(1.0)), pose)
     about = replace(about, levels=fast.with_instability(level))
-    return replace(about.levels, misfit=about.misfit(cause_columns(stretch, about.observed, about.drive, causes)))
+    named = cause_columns(stretch, about.observed, about.drive, causes)
+    return replace(about.levels, misfit=about.misfit(named, pose))
 
 
 def _fast_noise(stretch: BodyStretch, residual: NDArray[np.float64]) -> BodyNoise:

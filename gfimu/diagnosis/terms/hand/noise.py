@@ -24,6 +24,7 @@ _FLOOR_GRID = np.concatenate([[0.0], np.geomspace(1e-2, 3e2, 19)])
 _RATIO_SPREAD, _MODEL_ERROR = 0.5, 0.02
 _WORTH = 30.0
 _QUIET = 0.34
+_LEAST_POWER = 1e-9  # numerical: of the loudest row, below which a row is rounding errors
 _FEWEST_QUIET = 200
 
 
@@ -132,14 +133,14 @@ def white_from_rows(
         quiet = both
     second = np.diff(projected, 2, axis=0)[quiet]
     power = (np.median(np.abs(second), axis=0) / 0.6745) ** 2 / 6.0
-    alive = power > 0
+    alive = power > _LEAST_POWER * power.max(initial=0.0)
     mixing = projector[np.ix_(alive, alive)] ** 2 * expected[alive] ** 2
     scale = power[alive].sum() / mixing.sum()
     error = power[alive] * (np.sqrt(3.0 / max(int(quiet.sum()), 1)) + _MODEL_ERROR)
     count = len(error)
     design = np.vstack([scale * mixing / error[:, None], np.eye(count) / _RATIO_SPREAD])
     ratio, _ = nnls(design, np.concatenate([power[alive] / error, np.ones(count) / _RATIO_SPREAD]))
-    found = np.zeros(len(power))
+    found = scale * expected**2  # what no row shows is as loud as the rest
     found[alive] = ratio * scale * expected[alive] ** 2
     return np.sqrt(np.maximum(found, 0.04 * np.median(found[alive])))
 

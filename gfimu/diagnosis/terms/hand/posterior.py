@@ -333,12 +333,21 @@ class HandPosterior:
         """Of parameters of the drive's prior, of which it has none."""
         return np.zeros((0, 0))
 
-    @cached_property
+    @property
     def whitened(self) -> NDArray[np.float64]:
         """Residual less drive and nuisances, (m, c + 1): its product with any column is that column's score."""
+        return self._whitened_beside(Columns.none(len(self.levels.white), len(self._weight)))
+
+    def _whitened_beside(self, columns: Columns) -> NDArray[np.float64]:
+        """Return the same less the best fit of columns as well."""
         seen, split = self.observed, self.slow_score.size
-        drift, motion = self.nuisance_sizes[:split], self.nuisance_sizes[split:]
-        taken_away = self._cosines @ drift.reshape(-1, self._cosines.shape[1]).T + self.motion.times(motion)[:, :-1]
+        gram, score, cross = self._beside(columns)
+        gram[np.diag_indices_from(gram)] += 1e-9 * (1.0 + gram.diagonal().max(initial=0.0))  # numerical
+        sizes = np.linalg.solve(gram, score)
+        nuisances = cho_solve((self._nuisances[0], True), self._nuisances[1] - cross @ sizes)
+        drift, motion = nuisances[:split], nuisances[split:]
+        taken_away = self._cosines @ drift.reshape(-1, self._cosines.shape[1]).T
+        taken_away += (self.motion.times(motion) + columns.times(sizes))[:, :-1]
         left = seen.residual[:, :-1] - taken_away
         rest = self._taken_of_residual[_TAKEN] - np.sum(self._rest_of_weighed * taken_away, axis=1)
         out = left * seen.weights[:-1] - ((left @ self._mix.T) * self._share.T**2) @ self._mix
@@ -355,8 +364,10 @@ class HandPosterior:
         gain = np.linalg.solve(inner, np.column_stack([cross.T, right]))
         return self.slow_gram() - cross @ gain[:, :-1], self.slow_score - cross @ gain[:, -1]
 
-    def misfit(self, columns: Columns) -> float:
+    def misfit(self, columns: Columns, beside: Columns) -> float:
         """Return how much more than white noise the residual scatters along columns; at least 1.
+
+        The residual is that beside the best fit of other columns, which may yet prove to be causes.
 
         Block by block of time the products of columns and residual have the variance that white noise gives them, were
         the noise all that is left. Vibration that the chips do not share, or filters unlike, leave more: every block
@@ -367,9 +378,9 @@ class HandPosterior:
         seen = strength > _SEEN * max(strength[-1], 1e-300) if len(strength) else np.zeros(0, dtype=bool)
         if not seen.any():
             return 1.0
-        products = np.zeros((len(self._weight), columns.count))
+        products, left = np.zeros((len(self._weight), columns.count)), self._whitened_beside(beside)
         for c, (at, part) in enumerate(zip(columns.places, columns.parts, strict=True)):
-            products[:, at] += part * self.whitened[:, [c]]
+            products[:, at] += part * left[:, [c]]
         length = max(int(_BLOCK_S / self.stretch.run.sample_period), len(products) // _MOST_BLOCKS, 1)
         scores = np.add.reduceat(products, np.arange(0, len(products), length), axis=0)  # (blocks, k)
         scatter = np.sum((scores @ turn[:, seen]) ** 2 / strength[seen])
@@ -377,15 +388,19 @@ class HandPosterior:
 
     def products(self, columns: Columns) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Return G (P, P), b (P,) and how the specific force follows columns, shape (3 m, P)."""
-        count, misfit = self.motion.count, self.levels.misfit
+        gram, score, _ = self._beside(columns)
+        return gram / self.levels.misfit, score / self.levels.misfit, self._force_of(columns)
+
+    def _beside(self, columns: Columns) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Return G, b and the products of the nuisances with columns."""
+        count = self.motion.count
         both = Columns.together([self.motion, columns])
         taken = self._taken(both)
         gram, score = self._driveless(both, taken)
         cross = np.vstack([self.slow_cross(both, taken)[:, count:], gram[:count, count:]])
         eliminated = solve_triangular(self._nuisances[0], cross, lower=True, check_finite=False)
         gram = gram[count:, count:] - eliminated.T @ eliminated
-        score = score[count:] - eliminated.T @ self._forward
-        return gram / misfit, score / misfit, self._force_of(columns)
+        return gram, score[count:] - eliminated.T @ self._forward, cross
 
     def _force_of(self, columns: Columns) -> NDArray[np.float64]:
         """Return the specific force that columns stand for, m/s², shape (3 m, P)."""
