@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,8 +75,8 @@ def measure(
     nominal: Stretch,
     extended: Stretch,
     causes: Sequence[Cause],
-    drive: Drive,
-    levels: NoiseLevels,
+    drive: Any,
+    levels: Any,
     unexplained: float,
     policy: Policy,
 ) -> Measured:
@@ -96,7 +97,7 @@ def measure(
         Thresholds.
     """
     array, index = extended.model.array, extended.index
-    if isinstance(extended, BodyStretch):
+    if isinstance(extended, BodyStretch) and isinstance(nominal, BodyStretch):
         return _measured_body(nominal, extended, effects_of(causes, array, index), drive, levels, unexplained)
 
     def beside(some: Sequence[Cause]) -> Stretch:

@@ -99,7 +99,8 @@ def split(stretches: Sequence[Stretch], found: Fit, policy: Policy, *, duration:
     """
     residue = 0.0 if found.point.residue is None else found.point.residue.scale
     if isinstance(stretches[0], BodyStretch):
-        halves = zip(*(stretch.halves() for stretch in stretches), strict=True)
+        bodies = [stretch for stretch in stretches if isinstance(stretch, BodyStretch)]
+        halves = zip(*(stretch.halves() for stretch in bodies), strict=True)
         odd, even = (Part(half, found.point.drives, found.point.levels) for half in halves)
         return [Holdout(odd, even, residue), Holdout(even, odd, residue)]
     length = policy.block_duration if duration is None else duration

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -98,9 +99,7 @@ def lack_of_fit(
     return max(candidates, key=lambda found: found.log_odds)
 
 
-def _of_body(
-    stretches: Sequence[BodyStretch], point: Point, candidates: Sequence[LackOfFit], policy: Policy
-) -> LackOfFit:
+def _of_body(stretches: Sequence[Any], point: Point, candidates: Sequence[LackOfFit], policy: Policy) -> LackOfFit:
     """Return the strongest of a dependence and a tone, and beside it the noise that grows with the motion."""
     tones = [tone(one, policy) for one in linearise(stretches, point).posteriors]
     found = max([*candidates, *tones], key=lambda one: one.log_odds)
@@ -178,13 +177,13 @@ def _products(
     if isinstance(stretches[0], BodyStretch):
         names = tuple(body_functions(stretches[0], point.drives[0]))
 
-        def functions(stretch: Stretch, drive: Drive) -> NDArray[np.float64]:
+        def functions(stretch: Any, drive: Any) -> NDArray[np.float64]:
             return np.column_stack([*body_functions(stretch, drive).values()])
 
     else:
         names, units = _NAMES, basis_units(stretches, point)
 
-        def functions(stretch: Stretch, drive: Drive) -> NDArray[np.float64]:
+        def functions(stretch: Any, drive: Any) -> NDArray[np.float64]:
             return _functions(stretch, point, drive, units)
 
     sums, squares, samples = np.zeros(len(names)), np.zeros(len(names)), 0

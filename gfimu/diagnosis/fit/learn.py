@@ -35,8 +35,9 @@ def starting_point(stretches: Sequence[Stretch], spacing: float) -> Point:
     Of a free body the noise is learnt at once: how much the motion adds to it no data sheet says.
     """
     if isinstance(stretches[0], BodyStretch):
-        hands = tuple(HandDrive.of(stretch) for stretch in stretches)
-        return learn_noise(stretches, Point((), hands, tuple(first_noise(stretch) for stretch in stretches)))
+        bodies = [one for one in stretches if isinstance(one, BodyStretch)]
+        hands = tuple(HandDrive.of(one) for one in bodies)
+        return learn_noise(stretches, Point((), hands, tuple(first_noise(one) for one in bodies)))
     drives = tuple(over_segments(lambda stretch: _by_reference(stretch, spacing), stretches))
     return Point((), drives, tuple(stretch.first_levels for stretch in stretches))
 
@@ -96,8 +97,8 @@ def learn_noise(stretches: Sequence[Stretch], point: Point) -> Point:
     """Return the point with the noise that its causes and drives leave, each run's stretches together."""
     if isinstance(stretches[0], BodyStretch):
         rows = (stretches, point.drives, point.levels)
-        levels = over_segments(lambda s, drive, one: learnt_noise(s, drive, point.causes, one), *rows)
-        return replace(point, levels=tuple(levels))
+        learnt = over_segments(lambda s, drive, one: learnt_noise(s, drive, point.causes, one), *rows)
+        return replace(point, levels=tuple(learnt))
     linear = linearise(stretches, point)
     lefts = [_left(stretch, point, linear, place) for place, stretch in enumerate(stretches)]
     levels = list(point.levels)

@@ -15,14 +15,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lapack, solve_triangular
 from scipy.linalg.blas import dsyrk
 
+from gfimu.diagnosis.data.body.stretch import BodyStretch
 from gfimu.diagnosis.data.stretch import Stretch
-from gfimu.diagnosis.terms.coloured_noise import NoiseLevels
 from gfimu.diagnosis.terms.columns import Columns
 from gfimu.diagnosis.terms.drive import Drive
 from gfimu.diagnosis.terms.hand.drive import HandDrive
@@ -40,9 +41,9 @@ _MOST_INTERVALS = 100  # numerical: knot intervals of memory
 _LEAST_SHARE = 1e-6  # numerical: of a channel's slow noise in a mode, below which the mode is left out
 
 
-def energy(stretch: Stretch, drive: Drive, effects: Sequence[Effect], levels: NoiseLevels) -> float:
+def energy(stretch: Stretch, drive: Any, effects: Sequence[Effect], levels: Any) -> float:
     """Return misfit and prior energy at a drive that is held."""
-    if isinstance(drive, HandDrive):
+    if isinstance(drive, HandDrive) and isinstance(stretch, BodyStretch):
         try:
             return condition_hand(stretch, drive, effects, levels).energy
         except np.linalg.LinAlgError:
@@ -136,14 +137,14 @@ class Posterior:
 
 
 def condition(
-    stretch: Stretch,
-    drive: Drive,
+    stretch: Any,
+    drive: Any,
     effects: Sequence[Effect],
-    levels: NoiseLevels,
+    levels: Any,
     *,
-    jacobian: Jacobian | None = None,
+    jacobian: Any = None,
     exact: bool = False,
-) -> Posterior:
+) -> Any:
     """Linearise a stretch about a drive and effects, and integrate out drive and slow noise.
 
     Raises

@@ -95,7 +95,9 @@ def is_dominant(explanation: Explanation, left: LackOfFit, policy: Policy) -> bo
 def is_unknown(explanation: Explanation, left: LackOfFit, gain: Gain, policy: Policy) -> bool:
     """Tell whether the causes are not to be believed, their gain on held-out data being known."""
     # Several causes that together still miss something, and a share of held-out data, coincide by chance.
-    missed = policy.coincide and len(explanation.best.causes) > 1 and gain.share_of_excess_removed < 1.0 - policy.dominant
+    missed = (
+        policy.coincide and len(explanation.best.causes) > 1 and gain.share_of_excess_removed < 1.0 - policy.dominant
+    )
     doubtful = missed or _is_full(explanation, policy) or is_dominant(explanation, left, policy)
     return doubtful and (_depends(explanation, left, policy) or not explanation.best.causes)
 
@@ -228,8 +230,7 @@ def conclude(
         0 if described is None else described.left_out,
     )
     levels = believed.point.levels[0]
-    body = isinstance(first, BodyStretch)
-    floor = body_noise_floor(first, levels) if body else _noise_floor(runs, first, believed)
+    floor = body_noise_floor(first, levels) if isinstance(first, BodyStretch) else _noise_floor(runs, first, believed)
     residual = Residual.of_views(runs, array.channels, floor)
     extends = not unknown or (described is not None and described.carried is not None)
     extension = effects_of(believed.causes, array, 0) if extends else []
@@ -243,7 +244,7 @@ def conclude(
         "reference_white": float(levels.white[-1]),
         "calibration_residue": understanding.residue,
     }
-    if body:
+    if isinstance(first, BodyStretch):
         noise |= {"disagreement_s": levels.agitation, "gyro_bias_rad_s": float(np.linalg.norm(first.run.gyro_bias))}
         del noise["reference_white"]
     words = verdict_sentences(

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.diagnosis.data.body.run import BodyRun, prepare_body_run
+from gfimu.diagnosis.data.body.run import prepare_body_run
 from gfimu.diagnosis.data.body.stretch import BodyStretch
 from gfimu.diagnosis.data.integrity import check_integrity
 from gfimu.diagnosis.data.prepared_runs import PreparedRuns

@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
 from gfimu.diagnosis.data.body.run import BodyRun
+from gfimu.diagnosis.data.run import Run
 from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.terms.coloured_noise import CosineBasis
 from gfimu.motion.body_drive import BodyDrive
-from gfimu.world_model import BodyModel, Effect, is_of_wiring
+from gfimu.world_model import BodyModel, Effect, WorldModel, is_of_wiring
 
 __all__ = ["BodyStretch", "make_body_stretches"]
 
@@ -156,10 +157,11 @@ class BodyStretch(Stretch):
 
 
 def make_body_stretches(
-    model: BodyModel, runs: Sequence[BodyRun], known: Sequence[Sequence[Effect]]
+    model: WorldModel, runs: Sequence[Run], known: Sequence[Sequence[Effect]]
 ) -> tuple[BodyStretch, ...]:
     """Return one stretch for each run; ``known`` holds the faults found in each."""
     return tuple(
         BodyStretch(model, run, index, float(run.t[0]), tuple(fault for fault in faults if is_of_wiring(fault)))
         for index, (run, faults) in enumerate(zip(runs, known, strict=True))
+        if isinstance(model, BodyModel) and isinstance(run, BodyRun)
     )

@@ -343,7 +343,7 @@ class HandPosterior:
         seen, split = self.observed, self.slow_score.size
         gram, score, cross = self._beside(columns)
         gram[np.diag_indices_from(gram)] += 1e-9 * (1.0 + gram.diagonal().max(initial=0.0))  # numerical
-        sizes = np.linalg.solve(gram, score)
+        sizes = np.asarray(np.linalg.solve(gram, score), dtype=np.float64)
         nuisances = cho_solve((self._nuisances[0], True), self._nuisances[1] - cross @ sizes)
         drift, motion = nuisances[:split], nuisances[split:]
         taken_away = self._cosines @ drift.reshape(-1, self._cosines.shape[1]).T
