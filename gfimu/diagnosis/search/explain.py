@@ -14,7 +14,6 @@ from gfimu.diagnosis.fit.linear import Point, with_residue
 from gfimu.diagnosis.fit.parallel import each_apart
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.beam import Blocks, grown_sets, leading_sets
-from gfimu.diagnosis.search.comparison import Comparison
 from gfimu.diagnosis.search.screening import Screening, screen
 from gfimu.diagnosis.terms.cause import Cause, effects_of
 from gfimu.diagnosis.terms.drive import Drive
@@ -27,17 +26,30 @@ _Key = frozenset[tuple[str, str]]
 
 
 @dataclass(frozen=True)
-class Explanation(Comparison[Fit]):
-    """What a search ended with.
+class Explanation:
+    """What a search ended with: the most probable set of causes and what it is compared with.
 
     Parameters
     ----------
-    best, nothing, without, rivals, screening
-        As `Comparison` has them.
+    best : Fit
+        The most probable set.
+    nothing : Fit
+        No cause at all, under the same nuisance parameters.
+    without : dict of str to Fit
+        The best fit without each cause.
+    rivals : tuple of Fit
+        Other sets, best first, under the same nuisance parameters.
+    screening : Screening
+        The last one, about the best set.
     stretches : tuple of Stretch
         The data.
     """
 
+    best: Fit
+    nothing: Fit
+    without: dict[str, Fit]
+    rivals: tuple[Fit, ...]
+    screening: Screening
     stretches: tuple[Stretch, ...] = ()
     fits: int = 0
     by_reference: tuple[Drive, ...] = ()
