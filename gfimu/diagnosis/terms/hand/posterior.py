@@ -364,7 +364,7 @@ class HandPosterior:
         gain = np.linalg.solve(inner, np.column_stack([cross.T, right]))
         return self.slow_gram() - cross @ gain[:, :-1], self.slow_score - cross @ gain[:, -1]
 
-    def misfit(self, columns: Columns, beside: Columns) -> float:
+    def misfit(self, columns: Columns, beside: Columns | None = None) -> float:
         """Return how much more than white noise the residual scatters along columns; at least 1.
 
         The residual is that beside the best fit of other columns, which may yet prove to be causes.
@@ -378,7 +378,10 @@ class HandPosterior:
         seen = strength > _SEEN * max(strength[-1], 1e-300) if len(strength) else np.zeros(0, dtype=bool)
         if not seen.any():
             return 1.0
-        products, left = np.zeros((len(self._weight), columns.count)), self._whitened_beside(beside)
+        products, left = (
+            np.zeros((len(self._weight), columns.count)),
+            self.whitened if beside is None else self._whitened_beside(beside),
+        )
         for c, (at, part) in enumerate(zip(columns.places, columns.parts, strict=True)):
             products[:, at] += part * left[:, [c]]
         length = max(int(_BLOCK_S / self.stretch.run.sample_period), len(products) // _MOST_BLOCKS, 1)
