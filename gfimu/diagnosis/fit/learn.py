@@ -34,7 +34,7 @@ def starting_point(stretches: Sequence[Stretch], spacing: float) -> Point:
 
     Of a free body the noise is learnt at once: how much the motion adds to it no data sheet says.
     """
-    if isinstance(stretches[0], BodyStretch):
+    if stretches and isinstance(stretches[0], BodyStretch):
         bodies = [one for one in stretches if isinstance(one, BodyStretch)]
         hands = tuple(HandDrive.of(one) for one in bodies)
         return learn_noise(stretches, Point((), hands, tuple(first_noise(one) for one in bodies)))
@@ -63,7 +63,7 @@ def predicted_by_reference(model: WorldModel, run: Run) -> NDArray[np.float64]:
 
 def learn_roughness(stretches: Sequence[Stretch], point: Point, rounds: int = 1) -> Point:
     """Return the point with the roughness that its drives show under its causes."""
-    for _ in range(rounds if point.drives[0].is_learnt else 0):
+    for _ in range(rounds if all(drive.is_learnt for drive in point.drives) else 0):
         linear = linearise(stretches, point)
         drives = tuple(
             drive.moved(step).relearned(one.covariance)
@@ -78,7 +78,7 @@ def sharpened(stretches: Sequence[Stretch], point: Point, policy: Policy) -> Poi
 
     Where the fit is poor the drive would be bent to what no drive did: then the knots stay.
     """
-    if not point.drives[0].is_learnt:
+    if not all(drive.is_learnt for drive in point.drives):
         return point
     now = linearise(stretches, point)
     if now.objective > policy.fair * sum(stretch.observations for stretch in stretches):
@@ -95,7 +95,7 @@ def sharpened(stretches: Sequence[Stretch], point: Point, policy: Policy) -> Poi
 
 def learn_noise(stretches: Sequence[Stretch], point: Point) -> Point:
     """Return the point with the noise that its causes and drives leave, each run's stretches together."""
-    if isinstance(stretches[0], BodyStretch):
+    if stretches and isinstance(stretches[0], BodyStretch):
         rows = (stretches, point.drives, point.levels)
         learnt = over_segments(lambda s, drive, one: learnt_noise(s, drive, point.causes, one), *rows)
         return replace(point, levels=tuple(learnt))
