@@ -11,12 +11,13 @@ from gfimu.diagnosis.criticism.gain import Gain
 from gfimu.diagnosis.criticism.holdout import Holdout, gate_gains, held_out_gain, other_recordings, split
 from gfimu.diagnosis.criticism.lack_of_fit import LackOfFit, lack_of_fit
 from gfimu.diagnosis.criticism.surrogate import surrogates
+from gfimu.diagnosis.data.body.prepared import prepare_bodies
+from gfimu.diagnosis.data.body.stretch import BodyStretch, make_body_stretches
 from gfimu.diagnosis.data.prepared_runs import PreparedRuns
-from gfimu.diagnosis.data.stretch import make_stretches
+from gfimu.diagnosis.data.stretch import Stretch, make_stretches
 from gfimu.diagnosis.fit.gauss_newton import Fit
 from gfimu.diagnosis.fit.learn import predicted_by_reference
 from gfimu.diagnosis.fit.parallel import one_blas_thread
-from gfimu.diagnosis.free_body.diagnose import diagnose_body
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.explain import Explanation, reduced
 from gfimu.diagnosis.search.long_run import understand_any_length
@@ -80,19 +81,28 @@ def diagnose(
     for recording, label in zip((*recordings, *held_out), (*labels, *held_labels), strict=True):
         warn_of_other_array(recording.metadata, model.array, label)
     with one_blas_thread():
+        settings = policy or Policy()
         if model.drive_source == "gyro":
-            settings = policy or Policy()
-            return diagnose_body(recordings, model, held_out=held_out, names=labels, report=tell, policy=settings)
+            settings = settings.of_body()
         tell(0.02, "read")
-        prepared = prepare(recordings, model, labels)
-        kept = prepare(held_out, model, held_labels) if held_out else None
-        found = _Diagnosis(prepared, kept, model, policy or Policy(), tell).verdict()
+        prepared = prepare(recordings, model, labels, settings)
+        kept = prepare(held_out, model, held_labels, settings) if held_out else None
+        found = _Diagnosis(prepared, kept, model, settings, tell).verdict()
         return with_sample_notes(found, prepared.runs)
 
 
-def prepare(recordings: Sequence[Recording], model: WorldModel, names: Sequence[str]) -> PreparedRuns:
-    """Read recordings of a table and find the faults of their samples."""
+def prepare(
+    recordings: Sequence[Recording], model: WorldModel, names: Sequence[str], policy: Policy = Policy()
+) -> PreparedRuns:
+    """Read recordings of a table or of a free body and find the faults of their samples."""
+    if model.drive_source == "gyro":
+        return prepare_bodies(recordings, model, names, spike_share=policy.body_spike_share)
     return PreparedRuns.build(recordings, model, names, predicted_by_reference)
+
+
+def _stretches(model: WorldModel, prepared: PreparedRuns) -> tuple[Stretch, ...]:
+    make = make_body_stretches if model.drive_source == "gyro" else make_stretches
+    return make(model, prepared.runs, prepared.effects)
 
 
 class _Diagnosis:
@@ -118,7 +128,7 @@ class _Diagnosis:
     def verdict(self) -> Diagnosis:
         """Return the verdict."""
         policy, tell = self._policy, self._report
-        stretches = make_stretches(self._model, self._prepared.runs, self._prepared.effects)
+        stretches = _stretches(self._model, self._prepared)
         understanding = understand_any_length(stretches, policy, lambda share, text: tell(0.05 + 0.8 * share, text))
         tell(0.88, "lack of fit")
         left = self._left(understanding.explanation)
@@ -139,7 +149,7 @@ class _Diagnosis:
                 self._prepared, understanding, left, Gain(), policy, withdrawn=withdrawn, refuted=refuted, unknown=True
             )
         fitted = understanding.explanation.best.names
-        refuted = judge(gain, found.residual, [one for one in found.causes if one.effect in fitted]).why
+        refuted = judge(gain, found.residual, [one for one in found.causes if one.effect in fitted], policy).why
         if refuted:
             return self._described(understanding, left, withdrawn, refuted)
         told = measurable(gain)
@@ -160,7 +170,7 @@ class _Diagnosis:
         """Pair fitted and held-out data: other recordings where given, blocks of the runs otherwise."""
         if self._kept is None:
             return split(explanation.stretches, fit, self._policy, duration=duration)
-        stretches = make_stretches(self._model, self._kept.runs, self._kept.effects)
+        stretches = _stretches(self._model, self._kept)
         return other_recordings(explanation.stretches, fit, stretches, self._policy)
 
     def _gated(self, understanding: Understanding) -> tuple[Understanding, list[str]]:
@@ -203,7 +213,8 @@ class _Diagnosis:
         Terms of absolute time have the phase of one recording: only another one can confirm them.
         """
         explanation, described, gain = understanding.explanation, None, Gain()
-        found = surrogates(explanation.stretches, explanation.nothing, self._policy, left.hints)
+        body = isinstance(explanation.stretches[0], BodyStretch)  # its motion has no functions to describe it by
+        found = [] if body else surrogates(explanation.stretches, explanation.nothing, self._policy, left.hints)
         # The richest that predicts; if that was too rich, the poorest.
         for one in [*found[-1:], *found[:-1][:1]]:
             whole = one.fit

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -125,6 +125,18 @@ class Policy:
         hidden in the runs ``faint`` of `sim.study` the most likely.
     most_certain : float
         Largest probability that is reported [1]. Set by `sim.study`: of causes surer than this, 3 of 1000 were wrong.
+    least_information, body_information : float
+        Information of the data over that of the prior below which a combination of sizes stays at zero: that of all
+        chips of a free body passes for its specific force.
+    nested : bool
+        Whether a set may have an effect beside one that can do all that it does (``contained_in``): on a free body
+        both together mean nothing.
+    coincide : bool
+        Whether several causes that miss part of the held-out excess are taken for a coincidence beside a lack of fit:
+        real hands leave more than the share ``dominant`` beside what is right.
+    grown, body_grown : int
+        Best effects by which the present set, and the set without each of its causes, is grown beside the sets that
+        lead in a linear world: with many causes those are far from the point, and what they promise comes true less.
     """
 
     beam: int = 6
@@ -167,6 +179,12 @@ class Policy:
     block_angle_std: float = 5e-3
     temperature: float = 1.2
     most_certain: float = 0.997
+    least_information: float = 0.0
+    body_information: float = 0.5
+    nested: bool = True
+    coincide: bool = True
+    grown: int = 0
+    body_grown: int = 3
 
     @property
     def ambiguous(self) -> float:
@@ -197,3 +215,16 @@ class Policy:
     def body_dominant(self) -> float:
         """As ``dominant``, of a free body: real hands, wheels and belts leave up to a tenth beside what is right."""
         return self.small
+
+    def of_body(self) -> Policy:
+        """Return the thresholds for a free body."""
+        return replace(
+            self,
+            most_causes=self.body_causes,
+            rounds=self.body_rounds,
+            dominant=self.body_dominant,
+            least_information=self.body_information,
+            nested=False,
+            coincide=False,
+            grown=self.body_grown,
+        )

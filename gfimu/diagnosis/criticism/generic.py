@@ -48,7 +48,7 @@ def judges_reference(stretches: Sequence[Stretch]) -> bool:
 
     A command is followed as well as the motor can, and errors of coarse steps do not average out.
     """
-    return all(one.model.drive_source != "command" and not one.steps.reference for one in stretches)
+    return all(one.model.drive_source not in ("command", "gyro") and not one.steps.reference for one in stretches)
 
 
 def basis_units(stretches: Sequence[Stretch], point: Point) -> BasisUnits:

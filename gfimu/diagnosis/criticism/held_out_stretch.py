@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,20 +12,25 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.stats import chi2
 
 from gfimu.diagnosis.criticism.gain import Gain
+from gfimu.diagnosis.data.body.stretch import BodyStretch
 from gfimu.diagnosis.data.cosine_basis import NoiseLevels
 from gfimu.diagnosis.data.run import smooth_rate
 from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.fit.gauss_newton import fit
 from gfimu.diagnosis.fit.learn import FOLLOWED
 from gfimu.diagnosis.fit.linear import Point
+from gfimu.diagnosis.fit.posterior import condition
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.terms.cause import Cause, effects_of
 from gfimu.diagnosis.terms.drive import Drive
+from gfimu.diagnosis.terms.hand.drive import HandDrive
+from gfimu.diagnosis.terms.hand.noise import BodyNoise
 from gfimu.diagnosis.terms.observed import observe
-from gfimu.world_model import is_of_one_recording
+from gfimu.world_model import Effect, is_of_one_recording
 
 __all__ = ["Measured", "gain_of", "measure"]
 
+_BLOCK = 40  # numerical: groups of samples of a free body whose gain counts as one value
 _LEAST_VALID = 1e-3  # numerical: share of the samples that count
 
 
@@ -69,8 +75,8 @@ def measure(
     nominal: Stretch,
     extended: Stretch,
     causes: Sequence[Cause],
-    drive: Drive,
-    levels: NoiseLevels,
+    drive: Any,
+    levels: Any,
     unexplained: float,
     policy: Policy,
 ) -> Measured:
@@ -91,6 +97,8 @@ def measure(
         Thresholds.
     """
     array, index = extended.model.array, extended.index
+    if isinstance(extended, BodyStretch) and isinstance(nominal, BodyStretch):
+        return _measured_body(nominal, extended, effects_of(causes, array, index), drive, levels, unexplained)
 
     def beside(some: Sequence[Cause]) -> Stretch:
         return replace(extended, known=(*extended.known, *effects_of(some, array, index)))
@@ -118,6 +126,36 @@ def measure(
         blocks=_seconds(0.5 * np.sum(before.white**2 - after.white**2, axis=1), extended),
         rates=rates,
         drifts=drifts,
+    )
+
+
+def _measured_body(
+    nominal: BodyStretch,
+    extended: BodyStretch,
+    effects: Sequence[Effect],
+    drive: HandDrive,
+    levels: BodyNoise,
+    unexplained: float,
+) -> Measured:
+    """Measure effects on a free body, whose motion between them is marginalised before and after alike."""
+    plain = replace(levels, misfit=1.0)
+    before, after = condition(nominal, drive, (), plain), condition(extended, drive, effects, plain)
+    use = extended.counted[:, None] & extended.run.valid
+    gains = (0.5 * (before.squares - after.squares) / np.maximum(extended.count, 1))[extended.on]
+    whole = len(gains) // _BLOCK * _BLOCK
+    return Measured(
+        before=before.objective,
+        after=after.objective,
+        carried=after.objective,
+        floor=float(extended.observations),
+        floor_variance=2.0 * extended.observations,
+        fitted=unexplained * levels.misfit * extended.observations,
+        squares=(float(np.sum(before.without_motion[use] ** 2)), float(np.sum(after.without_motion[use] ** 2))),
+        samples=int(use.sum()),
+        rows=int(extended.counted.sum()),
+        blocks=gains[:whole].reshape(-1, _BLOCK).mean(axis=1) if whole else gains,
+        rates=(np.nan, np.nan),
+        drifts=(np.nan, np.nan),
     )
 
 

@@ -15,12 +15,13 @@ import numpy as np
 
 from gfimu.diagnosis.criticism.gain import Gain
 from gfimu.diagnosis.criticism.held_out_stretch import Measured, gain_of, measure
+from gfimu.diagnosis.data.body.stretch import BodyStretch
 from gfimu.diagnosis.data.cosine_basis import NoiseLevels
 from gfimu.diagnosis.data.stretch import RunUp, Stretch
 from gfimu.diagnosis.fit.evidence import SCALES, inverse, likeliest_scale
 from gfimu.diagnosis.fit.gauss_newton import Fit, fit
-from gfimu.diagnosis.fit.learn import LEARNINGS, learn_roughness, starting_point
-from gfimu.diagnosis.fit.linear import Point, linearise, with_residue
+from gfimu.diagnosis.fit.learn import LEARNINGS, learn_noise, learn_roughness, starting_point
+from gfimu.diagnosis.fit.linear import Point, energy_of, linearise, with_residue
 from gfimu.diagnosis.fit.parallel import each_apart, over_segments
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.terms.cause import Cause, effects_of
@@ -96,6 +97,12 @@ def split(stretches: Sequence[Stretch], found: Fit, policy: Policy, *, duration:
     duration : float, optional
         About how long a block is, s; infinite for halves. By default `Policy.block_duration`.
     """
+    residue = 0.0 if found.point.residue is None else found.point.residue.scale
+    if isinstance(stretches[0], BodyStretch):
+        bodies = [stretch for stretch in stretches if isinstance(stretch, BodyStretch)]
+        halves = zip(*(stretch.halves() for stretch in bodies), strict=True)
+        odd, even = (Part(half, found.point.drives, found.point.levels) for half in halves)
+        return [Holdout(odd, even, residue), Holdout(even, odd, residue)]
     length = policy.block_duration if duration is None else duration
     parts: list[list[tuple[Stretch, Drive, NoiseLevels]]] = [[], []]
     for stretch, drive, levels in zip(stretches, found.point.drives, found.point.levels, strict=True):
@@ -105,7 +112,6 @@ def split(stretches: Sequence[Stretch], found: Fit, policy: Policy, *, duration:
         for place, (start, stop) in enumerate(pairwise(edges)):
             parts[place % 2].append((*_block(stretch, drive, effects, start, stop, policy), levels))
     odd, even = (Part(*zip(*part, strict=True)) for part in parts)
-    residue = 0.0 if found.point.residue is None else found.point.residue.scale
     return [Holdout(odd, even, residue), Holdout(even, odd, residue)]
 
 
@@ -143,6 +149,9 @@ def other_recordings(
     """
     test = tuple(replace(stretch, index=0) for stretch in held_out)
     first = found.point
+    if isinstance(test[0], BodyStretch):  # its noise is that of its own motion
+        own = learn_noise(test, replace(starting_point(test, policy.knots), causes=found.causes))
+        return [Holdout(Part(tuple(stretches), first.drives, first.levels), Part(test, own.drives, own.levels))]
     drives = starting_point(test, first.drives[0].spline.spacing).drives
 
     def reaching(stretch: Stretch, drive: Drive) -> Drive:
@@ -192,12 +201,29 @@ def gate_gains(
     fits = [found, *without.values()]
     gains = []
     for pair in pairs:
+        if isinstance(pair.test.stretches[0], BodyStretch):
+            gains.append(_squares_removed(pair, fits, policy))
+            continue
         part = _evidence_of(pair.train, fits, pair.residue, policy)
         joint = [one.log_evidence for one in fits]
         if other_recording:
             joint = _evidence_of(pair.train + pair.test, fits, pair.residue, policy)
         gains.append([(joint[0] - whole) - (part[0] - trained) for whole, trained in zip(joint, part, strict=True)])
     return dict(zip(without, np.mean(gains, axis=0)[1:].tolist(), strict=True))
+
+
+def _squares_removed(pair: Holdout, fits: Sequence[Fit], policy: Policy) -> list[float]:
+    """Return by what each set of causes, fitted to one part of free bodies, predicts the other worse than the first.
+
+    Slow noise is free in each part: that a constant of the one is that of the other too speaks for a bias.
+    """
+
+    def one(causes: Sequence[Cause]) -> float:
+        trained = fit(pair.train.stretches, pair.train.point(causes, 0.0), policy)
+        return 0.5 * energy_of(pair.test.stretches, pair.test.point(trained.causes, 0.0))
+
+    energies = each_apart(one, [other.causes for other in fits])
+    return [other - energies[0] for other in energies]
 
 
 def _evidence_of(part: Part, fits: Sequence[Fit], residue: float, policy: Policy) -> list[float]:

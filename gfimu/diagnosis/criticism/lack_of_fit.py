@@ -9,10 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gfimu.diagnosis.criticism.body import body_functions, motion_noise, tone
 from gfimu.diagnosis.criticism.generic import (
     LEAST_INFORMATION,
     REFERENCE,
@@ -25,10 +27,11 @@ from gfimu.diagnosis.criticism.generic import (
 )
 from gfimu.diagnosis.criticism.reading_curve import reading_curve
 from gfimu.diagnosis.criticism.series_tests import LackOfFit, changing_noise, jumps, lines
+from gfimu.diagnosis.data.body.stretch import BodyStretch
 from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.fit.evidence import log_evidence, log_evidence_each
 from gfimu.diagnosis.fit.gauss_newton import Fit
-from gfimu.diagnosis.fit.linear import Point
+from gfimu.diagnosis.fit.linear import Point, linearise
 from gfimu.diagnosis.fit.observed_at import observed_at
 from gfimu.diagnosis.fit.parallel import over_segments
 from gfimu.diagnosis.fit.posterior import Posterior
@@ -43,7 +46,8 @@ __all__ = ["JERK", "LackOfFit", "dependence_unexplained", "lack_of_fit"]
 JERK = "jerk"
 """Derivative of the angular acceleration, beside the functions of `gfimu.generic_basis`."""
 _NAMES = (*FUNCTIONS, JERK)
-_LEAST_RMS = np.array([1e-6] * len(FUNCTIONS) + [1e-12])  # numerical: of a function that is not constant
+_LEAST_RMS, _LEAST_JERK = 1e-6, 1e-12  # numerical: of a function that is not constant
+_LEAST_INFORMATION = 1e-9  # numerical
 _RIDGE = 1e-2  # numerical: of the coefficients that are reported
 _LEAST_COEFFICIENT = 1e-3  # numerical: in units of UNIT
 
@@ -75,6 +79,8 @@ def lack_of_fit(
         Thresholds ``ambiguous``, ``steady``, ``sizeable``, ``spikes``, ``spike_share`` and ``lack_odds``.
     """
     candidates = [dependence_unexplained(stretches, fit.point, policy)] if smooth else []
+    if isinstance(stretches[0], BodyStretch):
+        return _of_body(stretches, fit.point, candidates, policy)
     if smooth:
         candidates.append(reading_curve(stretches, fit, policy))
     seen = observed_at(stretches, fit.point)
@@ -93,6 +99,19 @@ def lack_of_fit(
     return max(candidates, key=lambda found: found.log_odds)
 
 
+def _of_body(stretches: Sequence[Any], point: Point, candidates: Sequence[LackOfFit], policy: Policy) -> LackOfFit:
+    """Return the strongest of a dependence and a tone, and beside it the noise that grows with the motion."""
+    tones = [tone(one, policy) for one in linearise(stretches, point).posteriors]
+    found = max([*candidates, *tones], key=lambda one: one.log_odds)
+    noise = motion_noise(stretches, point.levels, policy)
+    if noise.noise_odds <= policy.lack_odds:
+        return found
+    if found.log_odds <= policy.lack_odds:
+        return replace(noise, log_odds=found.log_odds)
+    signature, surrogate = f"{found.signature}; {noise.signature}", {**found.surrogate, **noise.surrogate}
+    return replace(found, signature=signature, surrogate=surrogate, noise_odds=noise.noise_odds)
+
+
 def dependence_unexplained(stretches: Sequence[Stretch], point: Point, policy: Policy = Policy()) -> LackOfFit:
     """Score every function on every channel and the reference, each on all channels, and all on each series.
 
@@ -102,17 +121,17 @@ def dependence_unexplained(stretches: Sequence[Stretch], point: Point, policy: P
     only the exact derivative reaches (`Point.exact`).
     """
     channels = stretches[0].model.array.channels
-    gram, score = _products(stretches, point)
+    names, gram, score = _products(stretches, point)
     series = [f"channel {name}" for name in channels]
     if judges_reference(stretches):
         series.append(REFERENCE)
-    count = len(_NAMES)
+    count = len(names)
     total = count * len(series)
     gram, score = gram[:total, :total], score[:total]
     information = np.maximum(gram.diagonal(), 0.0)
     usable = information > LEAST_INFORMATION
     if series[-1] == REFERENCE and _has_memory(stretches, point):
-        usable[(len(series) - 1) * count + _NAMES.index(JERK)] = False
+        usable[(len(series) - 1) * count + names.index(JERK)] = False
     places = np.flatnonzero(usable)
     if not len(places):
         return LackOfFit(-np.inf, "", {})
@@ -124,10 +143,10 @@ def dependence_unexplained(stretches: Sequence[Stretch], point: Point, policy: P
     signs = np.zeros(len(places), dtype=bool)
     single[places] = log_evidence_each(information[places], score[places], signs) - np.log(total)
     best = int(np.argmax(single))
-    function = _NAMES[best % count]
+    function = names[best % count]
     found = LackOfFit(float(single[best]), f"{series[best // count]} depends on {function}", {}, dependence=function)
     chosen = np.array([best])
-    for number, function in enumerate(_NAMES):
+    for number, function in enumerate(names):
         some = places[(places % count == number) & (places < len(channels) * count)]
         value = odds_of(some, count)
         if value > found.log_odds + policy.ambiguous:
@@ -139,33 +158,47 @@ def dependence_unexplained(stretches: Sequence[Stretch], point: Point, policy: P
         some = places[places // count == number]
         value = odds_of(some, len(series))
         if value > found.log_odds + policy.steady:
-            top = _NAMES[int(some[np.argmax(single[some])]) % count]
+            top = names[int(some[np.argmax(single[some])]) % count]
             text = f"{name} depends on the motion or time in a way nothing in the library has (strongest: {top})"
             found, chosen = LackOfFit(value, text, {}), some
     values = np.linalg.solve(gram[np.ix_(chosen, chosen)] + _RIDGE * np.eye(len(chosen)), score[chosen])
     surrogate = {
-        f"{series[place // count].removeprefix('channel ')}: {_NAMES[place % count]}": float(value * UNIT)
+        f"{series[place // count].removeprefix('channel ')}: {names[place % count]}": float(value * UNIT)
         for place, value in zip(chosen, values, strict=True)
         if abs(value) > _LEAST_COEFFICIENT
     }
     return replace(found, surrogate=surrogate)
 
 
-def _products(stretches: Sequence[Stretch], point: Point) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return G and b of all functions, of unit rms over all stretches, on each series."""
-    units = basis_units(stretches, point)
-    sums, squares, samples = np.zeros(len(_NAMES)), np.zeros(len(_NAMES)), 0
+def _products(
+    stretches: Sequence[Stretch], point: Point
+) -> tuple[tuple[str, ...], NDArray[np.float64], NDArray[np.float64]]:
+    """Return the names of all functions, and G and b of them, of unit rms over all stretches, on each series."""
+    if isinstance(stretches[0], BodyStretch):
+        names = tuple(body_functions(stretches[0], point.drives[0]))
+
+        def functions(stretch: Any, drive: Any) -> NDArray[np.float64]:
+            return np.column_stack([*body_functions(stretch, drive).values()])
+
+    else:
+        names, units = _NAMES, basis_units(stretches, point)
+
+        def functions(stretch: Any, drive: Any) -> NDArray[np.float64]:
+            return _functions(stretch, point, drive, units)
+
+    sums, squares, samples = np.zeros(len(names)), np.zeros(len(names)), 0
     for stretch, drive in zip(stretches, point.drives, strict=True):
-        values = _functions(stretch, point, drive, units)
+        values = functions(stretch, drive)
         sums, squares, samples = sums + values.sum(axis=0), squares + np.sum(values**2, axis=0), samples + len(values)
     mean = sums / samples
     rms = np.sqrt(np.maximum(squares / samples - mean**2, 0.0))
-    scale = UNIT / np.maximum(rms, _LEAST_RMS) * (rms > _LEAST_RMS)
+    least = np.array([_LEAST_RMS if name != JERK else _LEAST_JERK for name in names])
+    scale = UNIT / np.maximum(rms, least) * (rms > least)
 
     def values_of(stretch: Stretch, at: Posterior) -> NDArray[np.float64]:
-        return np.asarray((_functions(stretch, point, at.drive, units) - mean) * scale)
+        return np.asarray((functions(stretch, at.drive) - mean) * scale)
 
-    return series_products(stretches, point, values_of)
+    return names, *series_products(stretches, point, values_of)
 
 
 def _functions(stretch: Stretch, point: Point, drive: Drive, units: BasisUnits) -> NDArray[np.float64]:

@@ -47,6 +47,8 @@ class LackOfFit:
         Functions (`gfimu.generic_basis`) beyond the usual ones that may describe it.
     dependence : str
         The function that it follows, where it follows one.
+    noise_odds : float
+        Log odds of noise that grows with the motion, which speaks against no cause.
     """
 
     log_odds: float
@@ -55,6 +57,7 @@ class LackOfFit:
     instead: bool = False
     hints: tuple[str, ...] = ()
     dependence: str = ""
+    noise_odds: float = -np.inf
 
 
 _NOTHING = LackOfFit(-np.inf, "", {})

@@ -30,6 +30,8 @@ _SCALE_WEIGHTS = np.log(np.array([0.07, 0.13, 0.14, 0.14, 0.14, 0.13, 0.10, 0.07
 
 def inverse(information: NDArray[np.float64]) -> NDArray[np.float64]:
     """Invert an information matrix (k, k); directions that the data and the prior leave open get a wide variance."""
+    if not len(information):
+        return information
     size = 1.0 / np.sqrt(np.maximum(information.diagonal(), 1e-300))
     power, vectors = np.linalg.eigh(information * np.outer(size, size))
     power = np.maximum(power, _LEAST_POWER * max(float(power[-1]), 1.0))

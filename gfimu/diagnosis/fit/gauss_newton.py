@@ -26,7 +26,7 @@ from gfimu.diagnosis.terms.cause import Cause, effects_of
 from gfimu.diagnosis.terms.jacobian import Jacobian
 from gfimu.geometry.array import AccelerometerArray
 
-__all__ = ["SETTLED", "Fit", "fit", "log_prior"]
+__all__ = ["SETTLED", "Fit", "determined", "fit", "log_prior"]
 
 SETTLED = 0.3  # numerical: nats that a step must promise to be taken
 _SHARES = (1.0, 0.3, 0.08)  # numerical: of a step that goes uphill
@@ -102,7 +102,7 @@ def fit(stretches: Sequence[Stretch], start: Point, policy: Policy) -> Fit:
     if not point.exact and _is_long(stretches, point):
         point, linear, more = _descend(stretches, replace(point, exact=True), policy)
         done += more
-    found = _judged(stretches, point, linear, done)
+    found = _judged(stretches, point, linear, done, policy.least_information)
     return replace(found, log_posterior=found.log_evidence + log_prior(point.causes, policy))
 
 
@@ -118,8 +118,8 @@ def _descend(stretches: Sequence[Stretch], point: Point, policy: Policy) -> tupl
     linear = linearise(stretches, point, of_causes(point))
     done = 0
     for _ in range(policy.steps):
-        step, promise = _step(point.causes, linear)
-        if promise < SETTLED:
+        step, promise = _step(point.causes, linear, policy.least_information)
+        if promise < SETTLED and (done or not policy.least_information):
             break
         for share in _SHARES:
             trial = _moved(point, linear, share, step, array)
@@ -169,8 +169,28 @@ def _precision(causes: Sequence[Cause]) -> NDArray[np.float64]:
     return precision
 
 
-def _step(causes: Sequence[Cause], linear: Linear) -> tuple[NDArray[np.float64], float]:
-    """Return the step of the unknowns, and what it promises together with that of the drives."""
+def determined(
+    gram: NDArray[np.float64], least: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
+    """Return eigenvalues (k,) and eigenvectors (k, k) of G in units of the prior, and which the data determine."""
+    strength, turn = np.linalg.eigh(gram)
+    return strength, turn, strength > least
+
+
+def _split(causes: Sequence[Cause], linear: Linear, least: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return directions of the unknowns that the data determine, and of the sizes that they don't, each (P, k)."""
+    sizes, shapes = _layout(causes)
+    _, turn, seen = determined(linear.gram[np.ix_(sizes, sizes)], least)
+    whole = np.zeros((len(sizes) + len(shapes), len(sizes)))
+    whole[sizes] = turn
+    return np.hstack([whole[:, seen], np.eye(len(whole))[:, shapes]]), whole[:, ~seen]
+
+
+def _step(causes: Sequence[Cause], linear: Linear, least: float) -> tuple[NDArray[np.float64], float]:
+    """Return the step of the unknowns, and what it promises together with that of the drives.
+
+    Combinations of sizes with less information than ``least`` go to zero, where there is such a threshold.
+    """
     promise = linear.energy - linear.objective
     if not causes:
         return np.zeros(0), promise
@@ -178,7 +198,14 @@ def _step(causes: Sequence[Cause], linear: Linear) -> tuple[NDArray[np.float64],
     pull = np.zeros(len(linear.score))
     pull[sizes] = -np.concatenate([cause.coordinates for cause in causes]) / SCALES[-1] ** 2
     right = linear.score + pull
-    step = inverse(linear.gram + np.diag(_precision(causes))) @ right
+    information = linear.gram + np.diag(_precision(causes))
+    if least:
+        known, unknown = _split(causes, linear, least)
+        away = np.zeros(len(right))
+        away[sizes] = -np.concatenate([cause.coordinates for cause in causes])
+        step = known @ (inverse(known.T @ information @ known) @ (known.T @ right)) + unknown @ (unknown.T @ away)
+    else:
+        step = inverse(information) @ right
     step[shapes] = np.clip(step[shapes], -_SHAPE_STEP, _SHAPE_STEP)
     return step, promise + float(step @ right)
 
@@ -194,7 +221,7 @@ def _moved(point: Point, linear: Linear, share: float, step: NDArray[np.float64]
     return replace(point, causes=causes, drives=drives)
 
 
-def _judged(stretches: Sequence[Stretch], point: Point, linear: Linear, steps: int) -> Fit:
+def _judged(stretches: Sequence[Stretch], point: Point, linear: Linear, steps: int, least: float) -> Fit:
     """Return the fit at a point: covariances, and Laplace's evidence relative to no sizes."""
     volume = linear.log_volume + linear.log_noise
     # A step that a derivative without memory promises may not come true: what counts is what the simulation leaves.
@@ -212,7 +239,12 @@ def _judged(stretches: Sequence[Stretch], point: Point, linear: Linear, steps: i
     positive = np.concatenate([cause.positive(array) for cause in causes])
     total = score + gram @ z
     evidence = volume - 0.5 * nothing + log_evidence(gram, total, positive)
-    covariance = inverse(linear.gram + np.diag(_precision(causes)))
+    information = linear.gram + np.diag(_precision(causes))
+    if least:  # what is not determined has the spread of its prior
+        known, unknown = _split(causes, linear, least)
+        covariance = known @ inverse(known.T @ information @ known) @ known.T + unknown @ unknown.T
+    else:
+        covariance = inverse(information)
     ends = np.cumsum([cause.unknowns for cause in causes])
     done = []
     for cause, mine in zip(causes, np.split(np.arange(ends[-1]), ends[:-1]), strict=True):

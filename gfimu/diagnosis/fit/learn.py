@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gfimu.diagnosis.data.body.stretch import BodyStretch
 from gfimu.diagnosis.data.cosine_basis import NoiseLevels
 from gfimu.diagnosis.data.run import Run
 from gfimu.diagnosis.data.stretch import Stretch, make_stretches
@@ -16,6 +17,8 @@ from gfimu.diagnosis.fit.parallel import over_segments
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.terms.coloured_noise import estimate_flicker, likeliest_flicker, white_level
 from gfimu.diagnosis.terms.drive import Drive
+from gfimu.diagnosis.terms.hand.drive import HandDrive
+from gfimu.diagnosis.terms.hand.learning import first_noise, learnt_noise
 from gfimu.diagnosis.terms.jacobian import Jacobian
 from gfimu.diagnosis.terms.slow_modes import WeighedModes, WeighedPowers
 from gfimu.world_model import WorldModel
@@ -42,7 +45,14 @@ _REFERENCE_ROUNDS = 5  # numerical: to the roughness of a drive from its referen
 
 
 def starting_point(stretches: Sequence[Stretch], spacing: float) -> Point:
-    """Return the drives that the references alone give, and the noise of the data sheet."""
+    """Return the drives that the references alone give, and the noise of the data sheet.
+
+    Of a free body the noise is learnt at once: how much the motion adds to it no data sheet says.
+    """
+    if stretches and isinstance(stretches[0], BodyStretch):
+        bodies = [one for one in stretches if isinstance(one, BodyStretch)]
+        hands = tuple(HandDrive.of(one) for one in bodies)
+        return learn_noise(stretches, Point((), hands, tuple(first_noise(one) for one in bodies)))
     drives = tuple(over_segments(lambda stretch: _by_reference(stretch, spacing), stretches))
     return Point((), drives, tuple(stretch.first_levels for stretch in stretches))
 
@@ -69,7 +79,7 @@ def predicted_by_reference(model: WorldModel, run: Run) -> NDArray[np.float64]:
 def learn_roughness(stretches: Sequence[Stretch], point: Point, rounds: int = 1) -> Point:
     """Return the point with the roughness that its drives show under its causes."""
     jacobians: Sequence[Jacobian | None] | None = None
-    for _ in range(rounds):
+    for _ in range(rounds if all(drive.is_learnt for drive in point.drives) else 0):
         linear = linearise(stretches, point, jacobians=jacobians)
         jacobians = [one.jacobian for one in linear.posteriors]
         drives = tuple(
@@ -85,6 +95,8 @@ def sharpened(stretches: Sequence[Stretch], point: Point, policy: Policy) -> Poi
 
     Where the fit is poor the drive would be bent to what no drive did: then the knots stay.
     """
+    if not all(drive.is_learnt for drive in point.drives):
+        return point
     now = linearise(stretches, point)
     if now.objective > policy.white_ratio**2 * sum(stretch.observations for stretch in stretches):
         return point
@@ -100,6 +112,10 @@ def sharpened(stretches: Sequence[Stretch], point: Point, policy: Policy) -> Poi
 
 def learn_noise(stretches: Sequence[Stretch], point: Point) -> Point:
     """Return the point with the noise that its causes and drives leave, each run's stretches together."""
+    if stretches and isinstance(stretches[0], BodyStretch):
+        rows = (stretches, point.drives, point.levels)
+        learnt = over_segments(lambda s, drive, one: learnt_noise(s, drive, point.causes, one), *rows)
+        return replace(point, levels=tuple(learnt))
     linear = linearise(stretches, point)
     lefts = [_left(stretch, point, linear, place) for place, stretch in enumerate(stretches)]
     levels = list(point.levels)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,8 +48,8 @@ class Point:
     """
 
     causes: tuple[Cause, ...]
-    drives: tuple[Drive, ...]
-    levels: tuple[NoiseLevels, ...]
+    drives: tuple[Any, ...]  # each a `Drive`, or a `HandDrive` of a free body
+    levels: tuple[Any, ...]
     residue: Residue | None = None
     exact: bool = False
 
@@ -84,7 +85,7 @@ class Linear:
     log_volume: float
     drive_steps: tuple[NDArray[np.float64], ...]
     responses: tuple[NDArray[np.float64], ...]
-    posteriors: tuple[Posterior, ...]
+    posteriors: tuple[Any, ...]  # each a `Posterior`, or a `HandPosterior` of a free body
     residue: NDArray[np.float64]
 
     @cached_property
@@ -133,7 +134,7 @@ def linearise(
         parts = [] if residue is None else [residue]
         parts += [] if columns_of is None else [columns_of(stretch, posterior)]
         if not parts:
-            return posterior, np.zeros((0, 0)), np.zeros(0), np.zeros((len(drive.coefficients), 0))
+            return posterior, np.zeros((0, 0)), np.zeros(0), np.zeros((len(posterior.step), 0))
         gram, score, across = posterior.products(Columns.together(parts))
         return posterior, gram, score, posterior.response(across) if follow else across[:, :0]
 

@@ -15,16 +15,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lapack, solve_triangular
 from scipy.linalg.blas import dsyrk
 
-from gfimu.diagnosis.data.cosine_basis import NoiseLevels
+from gfimu.diagnosis.data.body.stretch import BodyStretch
 from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.terms.columns import Columns
 from gfimu.diagnosis.terms.drive import Drive
+from gfimu.diagnosis.terms.hand.drive import HandDrive
+from gfimu.diagnosis.terms.hand.posterior import condition_hand
 from gfimu.diagnosis.terms.jacobian import Jacobian, Reach, differentiate, measured_reach
 from gfimu.diagnosis.terms.observed import Observed, observe
 from gfimu.diagnosis.terms.slow_modes import SlowModes, WeighedModes
@@ -38,8 +41,13 @@ _MOST_INTERVALS = 100  # numerical: knot intervals of memory
 _LEAST_SHARE = 1e-6  # numerical: of a channel's slow noise in a mode, below which the mode is left out
 
 
-def energy(stretch: Stretch, drive: Drive, effects: Sequence[Effect], levels: NoiseLevels) -> float:
+def energy(stretch: Stretch, drive: Any, effects: Sequence[Effect], levels: Any) -> float:
     """Return misfit and prior energy at a drive that is held."""
+    if isinstance(drive, HandDrive) and isinstance(stretch, BodyStretch):
+        try:
+            return condition_hand(stretch, drive, effects, levels).energy
+        except np.linalg.LinAlgError:
+            return np.inf
     prediction = stretch.predict(effects, drive.spin)
     if not np.isfinite(prediction).all():
         return np.inf
@@ -129,14 +137,14 @@ class Posterior:
 
 
 def condition(
-    stretch: Stretch,
-    drive: Drive,
+    stretch: Any,
+    drive: Any,
     effects: Sequence[Effect],
-    levels: NoiseLevels,
+    levels: Any,
     *,
-    jacobian: Jacobian | None = None,
+    jacobian: Any = None,
     exact: bool = False,
-) -> Posterior:
+) -> Any:
     """Linearise a stretch about a drive and effects, and integrate out drive and slow noise.
 
     Raises
@@ -144,6 +152,8 @@ def condition(
     numpy.linalg.LinAlgError
         If data and prior do not determine a drive, as after a step to where the prediction overflows.
     """
+    if isinstance(drive, HandDrive):
+        return condition_hand(stretch, drive, effects, levels, jacobian)
     prediction = stretch.predict(effects, drive.spin)
     seen = observe(stretch, prediction, levels)
     if jacobian is None:

@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
 from gfimu.diagnosis.fit.evidence import SCALES, inverse, log_evidence, log_evidence_each, posterior
+from gfimu.diagnosis.fit.gauss_newton import determined
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.screening import Hypothesis, Screening
 from gfimu.diagnosis.terms.cause import Cause
 
-__all__ = ["STARTS", "Blocks", "Candidate", "leading_sets"]
+__all__ = ["STARTS", "Blocks", "Candidate", "grown_sets", "leading_sets"]
 
 _FRONT, _PARTNERS = 8, 30  # numerical: sets that are grown, and how many of the best partners of each are scored
 _ALIKE = 0.3  # numerical: shapes nearer than that, as a logarithm or in rad, belong to one optimum
@@ -84,6 +85,9 @@ class Blocks:
         """Return a set at its linear estimates."""
         gram, score, positive = self.system(members)
         mean, _ = posterior(gram, score, SCALES[-1])
+        if self._policy.least_information:  # what is not determined stays at zero
+            _, turn, seen = determined(gram, self._policy.least_information)
+            mean = turn[:, seen] @ (turn[:, seen].T @ mean)
         mean = np.where(positive, np.maximum(mean, 1e-3), mean)
         ends = np.cumsum([len(self.hypotheses[number].positive) for number in members])[:-1]
         return tuple(
@@ -130,7 +134,9 @@ def leading_sets(blocks: Blocks, most: int, policy: Policy) -> list[Candidate]:
             added = blocks.log_odds_each(candidate.members)
             for number in np.argsort(-added)[:_PARTNERS]:
                 members = tuple(sorted((*candidate.members, int(number))))
-                if names[number] not in taken and members not in grown:
+                if names[number] in taken or (not policy.nested and _nested(blocks.hypotheses, members)):
+                    continue
+                if members not in grown:
                     grown[members] = Candidate(blocks.log_odds(members), members)
         larger = sorted(grown.values(), key=lambda one: -one.log_odds)
         every += larger
@@ -138,6 +144,27 @@ def leading_sets(blocks: Blocks, most: int, policy: Policy) -> list[Candidate]:
     every.sort(key=lambda one: -one.log_odds)
     worth = (one for one in _distinct(every, blocks.hypotheses) if _is_worth(blocks, one, policy))
     return list(islice(worth, policy.beam))
+
+
+def grown_sets(blocks: Blocks, members: tuple[int, ...], count: int, policy: Policy) -> list[Candidate]:
+    """Return a set with each of the effects that add most to it, each at its best place and shape, best first."""
+    names = [h.cause.name for h in blocks.hypotheses]
+    found: dict[str, Candidate] = {}
+    for number in np.argsort(-blocks.log_odds_each(members)):
+        grown = tuple(sorted((*members, int(number))))
+        taken = {names[member] for member in members}
+        if names[number] not in taken and (policy.nested or not _nested(blocks.hypotheses, grown)):
+            found.setdefault(names[number], Candidate(blocks.log_odds(grown), grown))
+        if len(found) == count:
+            break
+    return list(found.values())
+
+
+def _nested(hypotheses: Sequence[Hypothesis], members: Sequence[int]) -> bool:
+    """Tell whether one effect of a set can do all that another does: both together mean nothing."""
+    families = [hypotheses[number].cause.family for number in members]
+    names = {str(family.name) for family in families}
+    return any(names & getattr(family, "contained_in", frozenset()) for family in families)
 
 
 def _is_worth(blocks: Blocks, candidate: Candidate, policy: Policy) -> bool:

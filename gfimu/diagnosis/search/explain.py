@@ -13,8 +13,7 @@ from gfimu.diagnosis.fit.learn import LEARNINGS, learn_noise, learn_roughness, s
 from gfimu.diagnosis.fit.linear import Point, with_residue
 from gfimu.diagnosis.fit.parallel import each_apart
 from gfimu.diagnosis.policy import Policy
-from gfimu.diagnosis.search.beam import STARTS, Blocks, leading_sets
-from gfimu.diagnosis.search.comparison import Comparison
+from gfimu.diagnosis.search.beam import STARTS, Blocks, grown_sets, leading_sets
 from gfimu.diagnosis.search.screening import Screening, screen
 from gfimu.diagnosis.terms.cause import Cause, effects_of
 from gfimu.diagnosis.terms.drive import Drive
@@ -27,20 +26,37 @@ _Key = frozenset[tuple[str, str]]
 
 
 @dataclass(frozen=True)
-class Explanation(Comparison[Fit]):
-    """What a search ended with.
+class Explanation:
+    """What a search ended with: the most probable set of causes and what it is compared with.
 
     Parameters
     ----------
-    best, nothing, without, rivals, screening
-        As `Comparison` has them.
+    best : Fit
+        The most probable set.
+    nothing : Fit
+        No cause at all, under the same nuisance parameters.
+    without : dict of str to Fit
+        The best fit without each cause.
+    rivals : tuple of Fit
+        Other sets, best first, under the same nuisance parameters.
+    screening : Screening
+        The last one, about the best set.
     stretches : tuple of Stretch
         The data.
+    elsewhere : tuple of Fit
+        The best set under each other model of the nuisance parameters, its log posterior less what that model needs
+        more than this one.
     """
 
+    best: Fit
+    nothing: Fit
+    without: dict[str, Fit]
+    rivals: tuple[Fit, ...]
+    screening: Screening
     stretches: tuple[Stretch, ...] = ()
     fits: int = 0
     by_reference: tuple[Drive, ...] = ()
+    elsewhere: tuple[Fit, ...] = ()
 
 
 class Sets:
@@ -136,7 +152,8 @@ def explain(
         screening = screen(stretches, before.point)
         _fit_leaders(sets, screening, before, near=number > 0)
         _fit_other_shapes(sets, prune(sets))
-        best = prune(sets)
+        # While a set still grows its noise is that of the largest: a smaller one would pass for more noise.
+        best = sets.best if policy.grown and sets.best.key not in seen else prune(sets)
         fits += sets.count
         if number > 0 and best.key in seen:
             break
@@ -238,7 +255,10 @@ def _fit_leaders(sets: Sets, screening: Screening, about: Fit, *, near: bool) ->
     least = -policy.worth_a_search  # less than nothing, by more than a linear form may err
     if near and candidates:
         least = max(least, candidates[0].log_odds - policy.close)
-    for candidate in (one for one in candidates if one.log_odds >= least):
+    leaders = [one for one in candidates if one.log_odds >= least]
+    for members in _about(blocks, about.causes) if policy.grown else ():
+        leaders += grown_sets(blocks, members, policy.grown, policy)
+    for candidate in leaders:
         causes = blocks.causes(candidate.members)
         moves = screening.drive_moves(candidate.members, causes)
         drives = tuple(drive.moved(move) for drive, move in zip(about.point.drives, moves, strict=True))
@@ -263,6 +283,13 @@ def _fit_other_shapes(sets: Sets, best: Fit) -> None:
             drives = tuple(drive.moved(move) for drive, move in zip(rest.point.drives, moves, strict=True))
             points.append(replace(rest.point, causes=causes, drives=drives))
         sets.refit(points)
+
+
+def _about(blocks: Blocks, causes: Sequence[Cause]) -> list[tuple[int, ...]]:
+    """Return the hypotheses that a set of causes is, and those of the set without each of them."""
+    places = {h.cause.key: number for number, h in reversed(list(enumerate(blocks.hypotheses)))}
+    whole = tuple(sorted(places[cause.key] for cause in causes))
+    return [whole, *(tuple(m for m in whole if m != member) for member in whole)] if whole else []
 
 
 def reduced(explanation: Explanation, name: str, policy: Policy) -> Explanation:

@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
+from gfimu.diagnosis.data.body.stretch import BodyStretch
 from gfimu.diagnosis.data.cosine_basis import NoiseLevels
 from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.fit.gauss_newton import Fit
@@ -78,6 +79,8 @@ _Admit = Callable[[Point], Point | None]
 def _models(stretches: Sequence[Stretch], plain: Explanation, policy: Policy) -> list[tuple[str, _Admit, float]]:
     """Return the alternatives: name, what admits it at a point, and the log odds that it needs."""
     first = stretches[0]
+    if isinstance(first, BodyStretch):  # its slow noise takes what walks; a residue would need the force of many poses
+        return []
     found: list[tuple[str, _Admit, float]] = []
     residues: list[tuple[float, float]] = []
     if Residue.is_possible(first) and not any(s.steps.channels for s in stretches):

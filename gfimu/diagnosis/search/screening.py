@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gfimu.diagnosis.data.body.stretch import BodyStretch
 from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.fit.linear import Point, linearise
 from gfimu.diagnosis.fit.posterior import Posterior
@@ -126,7 +127,8 @@ def _plan(
     warm = any(s.run.temperature is not None for s in stretches)
     still = all(s.at_rest for s in stretches)
     present = {cause.name: cause for cause in causes}
-    left = [_whitened(s, p, causes) for s, p in zip(stretches, posteriors, strict=True)]
+    body = isinstance(stretches[0], BodyStretch)
+    left = [] if body else [_whitened(s, p, causes) for s, p in zip(stretches, posteriors, strict=True)]
     signatures: list[Signature] = []
     columns = 0
     for name, family in model.families().items():

@@ -124,6 +124,11 @@ class Drive:
         roughness = np.interp(centres, mine, self.roughness)
         return replace(self, spline=spline, coefficients=spline.through(self.spin), roughness=roughness)
 
+    @property
+    def is_learnt(self) -> bool:
+        """Whether its prior has parameters to learn."""
+        return True
+
     # -- prior ---------------------------------------------------------------------------------------------------
 
     def energy(self) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,22 +11,40 @@ from numpy.typing import NDArray
 from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.terms.cause import Cause, effects_of
 from gfimu.diagnosis.terms.columns import Columns
-from gfimu.diagnosis.terms.drive import Drive
-from gfimu.diagnosis.terms.observed import Observed
 from gfimu.diagnosis.terms.reach import behind_wiring, disjoint
 from gfimu.world_model import Effect, EffectFamily
 
-__all__ = ["cause_columns", "family_columns"]
+__all__ = ["Nuisance", "Seen", "cause_columns", "family_columns"]
 
 _SHAPE_STEP = 1e-5  # numerical: a tone of a thousand cycles must not turn by a sensible part of a cycle
 _NOT_SMOOTH = 0.01  # numerical: step of an effect, in units of its prior, beyond which its derivative is one-sided
 _ON_ITS_SIDE = 0.05  # numerical: of the present size, the step of such an effect
 
 
+class Seen(Protocol):
+    """A prediction with the weights of its observations: of a table `Observed`, of a free body its own."""
+
+    @property
+    def prediction(self) -> NDArray[np.float64]: ...  # noqa: D102
+    @property
+    def weight(self) -> NDArray[np.float64]: ...  # noqa: D102
+    @property
+    def weights(self) -> NDArray[np.float64]: ...  # noqa: D102
+
+
+class Nuisance(Protocol):
+    """A drive that is integrated out, of a table or of a free body: what a fit and the search ask of it."""
+
+    @property
+    def spin(self) -> Any: ...  # noqa: D102
+    @property
+    def is_learnt(self) -> bool: ...  # noqa: D102
+
+
 def family_columns(
     stretch: Stretch,
-    seen: Observed,
-    drive: Drive,
+    seen: Seen,
+    drive: Nuisance,
     causes: Sequence[Cause],
     family: EffectFamily,
     shape: Mapping[str, float],
@@ -51,11 +70,11 @@ def family_columns(
     return _differences(stretch, seen, drive, changed, 1.0 / steps, reach)
 
 
-def cause_columns(stretch: Stretch, seen: Observed, drive: Drive, causes: Sequence[Cause]) -> Columns:
+def cause_columns(stretch: Stretch, seen: Seen, drive: Nuisance, causes: Sequence[Cause]) -> Columns:
     """Return the derivative by each coordinate of a set of causes and by their free shapes, cause by cause."""
     array = stretch.model.array
     present = effects_of(causes, array, stretch.index)
-    found = [Columns.none(len(seen.weights), len(stretch.run.t))]
+    found = [Columns.none(len(seen.weights), len(seen.prediction))]
     for number, cause in enumerate(causes):
         count = len(cause.coordinates)
         step = _step(cause, stretch)
@@ -89,8 +108,8 @@ def _step(cause: Cause, stretch: Stretch) -> float:
 
 def _differences(
     stretch: Stretch,
-    seen: Observed,
-    drive: Drive,
+    seen: Seen,
+    drive: Nuisance,
     changed: Callable[[Sequence[int]], list[Effect]],
     scale: NDArray[np.float64],
     reach: NDArray[np.bool_] | None,

@@ -14,6 +14,8 @@ from gfimu.diagnosis.criticism.gain import Gain
 from gfimu.diagnosis.criticism.lack_of_fit import LackOfFit
 from gfimu.diagnosis.criticism.slow_noise import LoudestChannel, loudest_channel, white_factor
 from gfimu.diagnosis.criticism.views.run_view import RunView
+from gfimu.diagnosis.data.body.run import BodyRun
+from gfimu.diagnosis.data.body.stretch import BodyStretch
 from gfimu.diagnosis.data.prepared_runs import PreparedRuns
 from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.fit.gauss_newton import Fit
@@ -25,6 +27,7 @@ from gfimu.diagnosis.search.explain import Explanation
 from gfimu.diagnosis.search.nuisance_models import Understanding
 from gfimu.diagnosis.terms.cause import Cause, effects_of
 from gfimu.diagnosis.terms.spline import AngleSpline
+from gfimu.diagnosis.verdict.body_view import body_noise_floor, body_view
 from gfimu.diagnosis.verdict.naming import (
     capped,
     channel_share,
@@ -35,6 +38,7 @@ from gfimu.diagnosis.verdict.naming import (
     probabilities,
     rival_list,
 )
+from gfimu.diagnosis.verdict.undetermined import undetermined, undetermined_sentence
 from gfimu.diagnosis.verdict.verdict import Diagnosis, NamedCause, Residual, Unexplained
 from gfimu.diagnosis.verdict.wording import verdict_sentences
 from gfimu.world_model import Effect, Spin, WorldModel
@@ -73,6 +77,11 @@ def removed(explanation: Explanation) -> float:
 
 def stands_out(explanation: Explanation, left: LackOfFit, policy: Policy) -> bool:
     """Tell whether a lack of fit is no chance, nor the inexactness that every model has."""
+    return left.noise_odds > policy.lack_odds or _depends(explanation, left, policy)
+
+
+def _depends(explanation: Explanation, left: LackOfFit, policy: Policy) -> bool:
+    """Tell the same of all but noise that grows with the motion, which speaks against no cause."""
     if left.instead or _is_full(explanation, policy):
         return left.log_odds > policy.lack_odds
     return left.log_odds > max(policy.lack_odds, policy.inexactness * removed(explanation))
@@ -80,16 +89,20 @@ def stands_out(explanation: Explanation, left: LackOfFit, policy: Policy) -> boo
 
 def is_dominant(explanation: Explanation, left: LackOfFit, policy: Policy) -> bool:
     """Tell whether the lack of fit weighs too much against what the causes explain for these to be believed."""
+    if not explanation.best.causes:
+        return stands_out(explanation, left, policy)
     large = left.instead or 2.0 * left.log_odds > policy.dominant * removed(explanation)
-    return large and stands_out(explanation, left, policy)
+    return large and _depends(explanation, left, policy)
 
 
 def is_unknown(explanation: Explanation, left: LackOfFit, gain: Gain, policy: Policy) -> bool:
     """Tell whether the causes are not to be believed, their gain on held-out data being known."""
     # Several causes that together still miss something, and a share of held-out data, coincide by chance.
-    missed = len(explanation.best.causes) > 1 and gain.share_of_excess_removed < 1.0 - policy.dominant
+    missed = (
+        policy.coincide and len(explanation.best.causes) > 1 and gain.share_of_excess_removed < 1.0 - policy.dominant
+    )
     doubtful = missed or _is_full(explanation, policy) or is_dominant(explanation, left, policy)
-    return doubtful and stands_out(explanation, left, policy)
+    return doubtful and (_depends(explanation, left, policy) or not explanation.best.causes)
 
 
 def _is_full(explanation: Explanation, policy: Policy) -> bool:
@@ -109,12 +122,18 @@ def named_causes(explanation: Explanation, fit: Fit, policy: Policy) -> list[Nam
     for cause in fit.causes:
         others = [other for other in fit.causes if other is not cause]
         change = (whole - stretch.predict(effects_of(others, array, stretch.index), spin)) * stretch.mask
-        share = channel_share(change[:, :-1], array.channels)
+        share = channel_share(_seen(stretch, change[:, :-1]), array.channels)
         entry = name_cause(explanation, fit, cause, likely, array, share, policy)
         why = entry.why + _other_runs(cause, stretch, runs)
         entry = replace(entry, why=why, std=_widened(explanation, fit, entry, cause, policy))
         entries.append((float(sum(value**2 for value in share.values())), capped(entry, policy, cause.shape)))
     return [entry for _, entry in sorted(entries, key=lambda pair: -pair[0])]
+
+
+def _seen(stretch: Stretch, change: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return what is seen of a change (n, c): of a free body not what passes for its specific force."""
+    axes = stretch.model.array.axes
+    return change - (change @ np.linalg.pinv(axes).T) @ axes.T if isinstance(stretch, BodyStretch) else change
 
 
 def _widened(explanation: Explanation, fit: Fit, named: NamedCause, cause: Cause, policy: Policy) -> dict[str, float]:
@@ -209,13 +228,14 @@ def conclude(
     unexplained = Unexplained(
         unknown or apart or loudest.stands_out(policy),
         "; ".join(part for part in (refuted, shown, _loud(loudest, policy)) if part),
-        left.log_odds,
+        max(left.log_odds, left.noise_odds),
         left.surrogate if described is None else _coefficients(described.whole.causes, first),
         described is not None and described.carried is not None,
         0 if described is None else described.left_out,
     )
     levels = believed.point.levels[0]
-    residual = Residual.of_views(runs, array.channels, _noise_floor(runs, first, believed))
+    floor = body_noise_floor(first, levels) if isinstance(first, BodyStretch) else _noise_floor(runs, first, believed)
+    residual = Residual.of_views(runs, array.channels, floor)
     extends = not unknown or (described is not None and described.carried is not None)
     extension = effects_of(believed.causes, array, 0) if extends else []
     twin = model.extended([*_library_effects(model, found), *_residue(explanation), *extension])
@@ -228,6 +248,9 @@ def conclude(
         "reference_white": float(levels.white[-1]),
         "calibration_residue": understanding.residue,
     }
+    if isinstance(first, BodyStretch):
+        noise |= {"disagreement_s": levels.agitation, "gyro_bias_rad_s": float(np.linalg.norm(first.run.gyro_bias))}
+        del noise["reference_white"]
     words = verdict_sentences(
         verdict,
         causes,
@@ -242,7 +265,10 @@ def conclude(
         rest=left.signature if left.log_odds > policy.lack_odds else "",
     )
     others_told = rival_list(explanation, policy)
-    return Diagnosis(verdict, causes, residual, gain, unexplained, others_told, twin, runs, words, noise)
+    open_ones = undetermined(explanation.screening, array, policy.least_information)
+    words = (*words, undetermined_sentence(open_ones)) if open_ones else words
+    listed = tuple(one.to_dict() for one in open_ones)
+    return Diagnosis(verdict, causes, residual, gain, unexplained, others_told, twin, runs, words, noise, listed)
 
 
 def _believed(explanation: Explanation, described: Described | None, *, unknown: bool) -> Fit:
@@ -276,7 +302,8 @@ def _noise_causes(walk: Walk | None, understanding: Understanding, policy: Polic
                 log_odds=walk.log_odds,
             )
         )
-    excess = white_factor(stretches, understanding.explanation.best.point.levels)
+    body = isinstance(stretches[0], BodyStretch)  # whose channels' noise can't be told apart well
+    excess = None if body else white_factor(stretches, understanding.explanation.best.point.levels)
     if excess is not None and "noise" in families:
         factor, std = excess
         why = f"the white noise of all channels is {factor:.2f} times the data sheet's"
@@ -315,6 +342,10 @@ def _views(prepared: PreparedRuns, stretches: Sequence[Stretch], believed: Fit) 
 
 def _view(prepared: PreparedRuns, number: int, stretches: Sequence[Stretch], believed: Fit) -> RunView:
     run = prepared.runs[number]
+    if isinstance(run, BodyRun):
+        given = tuple(replace(stretch, known=()) for stretch in stretches)
+        plain = linearise(given, replace(believed.point, causes=())).posteriors[number]
+        return body_view(plain, linearise(stretches, believed.point).posteriors[number])
     before, after, states = [], [], []
     for stretch, drive in zip(stretches, believed.point.drives, strict=True):
         if stretch.index != number:

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from scipy.special import softmax
 from scipy.stats import chi2
 
+from gfimu.diagnosis.fit.gauss_newton import Fit
 from gfimu.diagnosis.policy import Policy
-from gfimu.diagnosis.search.comparison import Comparison, F, FittedSet
+from gfimu.diagnosis.search.explain import Explanation
 from gfimu.diagnosis.terms.cause import Cause
 from gfimu.diagnosis.verdict.verdict import NamedCause, Rival
 from gfimu.geometry.array import AccelerometerArray
@@ -32,7 +33,7 @@ __all__ = [
 ]
 
 
-def probabilities(explanation: Comparison[F], policy: Policy) -> dict[str, float]:
+def probabilities(explanation: Explanation, policy: Policy) -> dict[str, float]:
     """Return the probability of each effect to be among the causes, over all sets and models that were fitted."""
     every = (explanation.nothing, *explanation.without.values(), *explanation.rivals, explanation.best)
     fits = [*{one.key: one for one in every}.values(), *explanation.elsewhere]
@@ -69,7 +70,7 @@ def _unwrapped(key: str, value: float, near: float) -> float:
     return near + float(np.angle(np.exp(1j * (value - near)))) if key == "phase_rad" else value
 
 
-def mimics(explanation: Comparison[F], cause: Cause, policy: Policy) -> list[str]:
+def mimics(explanation: Explanation, cause: Cause, policy: Policy) -> list[str]:
     """Return effects that could stand for a cause in these data, however unlikely they are.
 
     An effect is confounded with another where hardly any of the other's energy remains after the best fit by it (twice
@@ -96,7 +97,7 @@ def mimics(explanation: Comparison[F], cause: Cause, policy: Policy) -> list[str
     return list(found)
 
 
-def conflicting(explanation: Comparison[F], policy: Policy) -> list[F]:
+def conflicting(explanation: Explanation, policy: Policy) -> list[Fit]:
     """Return rival sets that the data can't tell from the best one."""
     best = explanation.best
     return [
@@ -109,7 +110,7 @@ def conflicting(explanation: Comparison[F], policy: Policy) -> list[F]:
     ]
 
 
-def rival_list(explanation: Comparison[F], policy: Policy) -> tuple[Rival, ...]:
+def rival_list(explanation: Explanation, policy: Policy) -> tuple[Rival, ...]:
     """Return the other explanations and why they lost."""
     best, rivals = explanation.best, []
     for one in [*explanation.rivals[: policy.beam], *([explanation.nothing] if best.causes else [])]:
@@ -139,8 +140,8 @@ def fault_causes(effects: Iterable[Effect], why: Mapping[str, str], policy: Poli
 
 
 def name_cause(
-    explanation: Comparison[F],
-    fit: F,
+    explanation: Explanation,
+    fit: Fit,
     cause: Cause,
     likely: Mapping[str, float],
     array: AccelerometerArray,
@@ -151,9 +152,9 @@ def name_cause(
 
     Parameters
     ----------
-    explanation : Comparison
+    explanation : Explanation
         What the search ended with.
-    fit : FittedSet
+    fit : Fit
         The set that the cause belongs to: the best one or a rival.
     cause : Cause
         The cause.
@@ -184,7 +185,7 @@ def name_cause(
     return capped(named, policy, cause.shape)
 
 
-def _or_other_nuisances(explanation: Comparison[F], cause: Cause, policy: Policy) -> str:
+def _or_other_nuisances(explanation: Explanation, cause: Cause, policy: Policy) -> str:
     """Say so where other nuisance parameters, small errors of all numbers or slow noise, would do as well."""
     near = explanation.best.log_posterior - policy.ambiguous
     if not any(cause.name not in other.names and other.log_posterior > near for other in explanation.elsewhere):
@@ -210,7 +211,7 @@ def capped(cause: NamedCause, policy: Policy, shape: Container[str] = ()) -> Nam
 
 
 def contested(
-    named: Sequence[NamedCause], fits: Sequence[FittedSet], families: Mapping[str, EffectFamily]
+    named: Sequence[NamedCause], fits: Sequence[Fit], families: Mapping[str, EffectFamily]
 ) -> tuple[NamedCause, ...]:
     """Let each cause that may be another list the others; ``fits`` are the sets that the data can't tell apart."""
     shared = frozenset.intersection(*(fit.names for fit in fits))

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation, binary_erosion, uniform_filter1d
 
+from gfimu.diagnosis.data.body.gyro import smooth_gyro
 from gfimu.diagnosis.data.run import GYRO_COLUMNS, Run, possible_values, prepare_run
 from gfimu.diagnosis.data.time_grid import time_grid
-from gfimu.diagnosis.free_body.gyro import smooth_gyro
 from gfimu.recording import Recording
 from gfimu.world_model import WorldModel
 
@@ -23,14 +23,12 @@ _LOUDER = 2.0
 _BESIDE_A_GAP = 2  # samples beside a missing gyro value that its interpolation spoils
 
 
-@dataclass(frozen=True)
-class BodyRun:
-    """One recording of a free body.
+@dataclass(frozen=True, kw_only=True)
+class BodyRun(Run):
+    """One recording of a free body; its reference is the magnitude of the gyro, rad/s.
 
     Parameters
     ----------
-    run : Run
-        Channels on a uniform grid; its reference is the magnitude of the gyro, rad/s.
     gyro : ndarray, shape (n, 3)
         Gyro less its reading at rest, rad/s; interpolated where it has no value.
     rate : ndarray, shape (n, 3)
@@ -45,7 +43,6 @@ class BodyRun:
         Samples at rest, where the magnitude of the specific force is gravity's.
     """
 
-    run: Run
     gyro: NDArray[np.float64]
     rate: NDArray[np.float64]
     acceleration_error: float
@@ -75,7 +72,15 @@ def prepare_body_run(recording: Recording, model: WorldModel, *, name: str = "ru
     rest = _rest(run, gyro, model.expected_noise(1.0 / run.sample_period).white) & valid
     bias = gyro[rest].mean(axis=0) if rest.any() else np.zeros(3)
     smooth = smooth_gyro(gyro - bias, missing, run.sample_period)
-    return BodyRun(run, gyro - bias, smooth.rate, smooth.acceleration_error, valid, bias, rest)
+    return BodyRun(
+        **{field.name: getattr(run, field.name) for field in fields(run)},
+        gyro=gyro - bias,
+        rate=smooth.rate,
+        acceleration_error=smooth.acceleration_error,
+        gyro_valid=valid,
+        gyro_bias=bias,
+        rest=rest,
+    )
 
 
 def _rest(run: Run, gyro: NDArray[np.float64], white: NDArray[np.float64]) -> NDArray[np.bool_]:

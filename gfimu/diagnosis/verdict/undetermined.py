@@ -14,13 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import qr
 
+from gfimu.diagnosis.fit.gauss_newton import determined
 from gfimu.diagnosis.search.screening import Screening, Signature
 from gfimu.geometry.array import AccelerometerArray
 
-__all__ = ["LEAST_INFORMATION", "Undetermined", "determined", "undetermined", "undetermined_sentence"]
+__all__ = ["Undetermined", "undetermined", "undetermined_sentence"]
 
-LEAST_INFORMATION = 0.5
-"""Information of the data over that of the prior below which a combination stays at zero."""
 _LEAST_WEIGHT = 0.1  # of the largest in a combination
 _ALIKE = 0.15  # by which weights of sizes that move alike may differ
 _LISTED = 3  # combinations in a sentence
@@ -57,27 +56,21 @@ class Undetermined:
         return {"effect": self.effect, "combination": dict(self.combination), "text": self.text}
 
 
-def determined(
-    gram: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
-    """Return eigenvalues (k,) and eigenvectors (k, k) of G in units of the prior, and which the data determine."""
-    strength, turn = np.linalg.eigh(gram)
-    return strength, turn, strength > LEAST_INFORMATION
-
-
-def undetermined(screening: Screening, array: AccelerometerArray) -> tuple[Undetermined, ...]:
-    """Return the combinations of the sizes of each effect without a shape that the data can't determine."""
+def undetermined(screening: Screening, array: AccelerometerArray, least: float) -> tuple[Undetermined, ...]:
+    """Return the combinations of the sizes of each effect without a shape that have less information than ``least``."""
     found: list[Undetermined] = []
-    for signature in screening.signatures:
+    for signature in screening.signatures if least else ():
         if not signature.shape:
-            found += _of_effect(signature, screening.gram, array)
+            found += _of_effect(signature, screening.gram, array, least)
     return tuple(found)
 
 
-def _of_effect(signature: Signature, gram: NDArray[np.float64], array: AccelerometerArray) -> list[Undetermined]:
+def _of_effect(
+    signature: Signature, gram: NDArray[np.float64], array: AccelerometerArray, least: float
+) -> list[Undetermined]:
     sizes = signature.family.sizes(array)
     mine = gram[np.ix_(signature.columns, signature.columns)]
-    _, turn, seen = determined(mine)
+    _, turn, seen = determined(mine, least)
     basis = turn[:, ~seen].T  # (d, k)
     if not len(basis):
         return []

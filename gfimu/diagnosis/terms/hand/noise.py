@@ -7,16 +7,16 @@ acceleration does what it likes. Both are in proportion to d, the rate of change
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import uniform_filter1d
 from scipy.optimize import nnls
 
+from gfimu.diagnosis.data.cosine_basis import NoiseLevels
 from gfimu.geometry.array import AccelerometerArray
 
-__all__ = ["BodyNoise", "Projection", "change_of_readings", "learn_motion_noise", "white_from_rows"]
+__all__ = ["BodyNoise", "Projection", "learn_motion_noise", "white_from_rows"]
 
 _AGITATION_GRID = np.concatenate([[0.0], np.geomspace(2e-5, 2e-2, 31)])
 _SLOPE_GRID = np.concatenate([[0.0], np.geomspace(1e-3, 3.0, 22)])
@@ -24,48 +24,77 @@ _FLOOR_GRID = np.concatenate([[0.0], np.geomspace(1e-2, 3e2, 19)])
 _RATIO_SPREAD, _MODEL_ERROR = 0.5, 0.02
 _WORTH = 30.0
 _QUIET = 0.34
+_LEAST_POWER = 1e-9  # numerical: of the loudest row, below which a row is rounding errors
 _FEWEST_QUIET = 200
 
 
 @dataclass(frozen=True)
-class BodyNoise:
-    """Noise of a run.
+class BodyNoise(NoiseLevels):
+    """Noise of a run: white and slow noise as `NoiseLevels` has them, and what grows with the motion.
+
+    The last entry, that of a reference, is infinite, as is that of a channel without data.
 
     Parameters
     ----------
-    white : ndarray, shape (c,)
-        White noise per channel, m/s²; infinite for a channel without data.
     agitation : float
         Disagreement of the channels per rate of change of their readings, s.
     acceleration : float
         Error of the angular acceleration that the gyro gives, rad/s².
     acceleration_slope : float
         The part of it per rate of change of the readings, rad/s² per m/s³.
-    flicker : float
-        Rms of the bias instability, m/s².
     log_odds : float
         Log likelihood that the terms in proportion to d gain.
+    misfit : float
+        How much more than such noise the residual scatters along the columns of causes; log likelihoods are divided by
+        it.
     """
 
-    white: NDArray[np.float64]
     agitation: float = 0.0
     acceleration: float = 0.0
     acceleration_slope: float = 0.0
-    flicker: float = 0.0
     log_odds: float = 0.0
+    misfit: float = 1.0
+
+    @classmethod
+    def of(cls, white: NDArray[np.float64], flicker: float, acceleration: float = 0.0) -> BodyNoise:
+        """Return white noise (c,) and the bias instability of all channels, m/s²."""
+        slow = np.append(np.full(len(white), flicker), 0.0)
+        return cls(np.append(white, np.inf), slow, acceleration=acceleration)
 
     @property
     def typical(self) -> float:
         """Typical white noise, m/s²."""
         return float(np.median(self.white[np.isfinite(self.white)]))
 
+    @property
+    def instability(self) -> float:
+        """Bias instability of every channel, rms, m/s²."""
+        return float(self.flicker[0])
+
+    def with_instability(self, level: float) -> BodyNoise:
+        """Return the noise with another bias instability, rms, m/s²."""
+        return replace(self, flicker=np.append(np.full(len(self.white) - 1, level), 0.0))
+
+    def common(self, change: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the factor by which the variance grows, shape (n,), for changes of the readings (n,), m/s³."""
+        return 1.0 + (self.agitation * change / self.typical) ** 2
+
+    def lost(self, change: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the variance of the angular acceleration that the gyro's samples don't hold, shape (n,)."""
+        return self.acceleration**2 + (self.acceleration_slope * change) ** 2
+
 
 class Projection:
-    """Whitened combinations of the channels that the specific force can't move.
+    """Derivative by specific force and angular acceleration, the same at all samples.
+
+    Whitened combinations of the channels that the specific force can't move.
 
     The first three feel the angular acceleration with ``strength`` (per rad/s²), the others don't. ``sensed`` (c, 3) is
     what the channels read per specific force, where gains and cross-axis effects make that other than the axes.
     """
+
+    predictions = 4
+    """How many predictions it takes."""
 
     def __init__(
         self, array: AccelerometerArray, white: NDArray[np.float64], sensed: NDArray[np.float64] | None = None
@@ -76,6 +105,7 @@ class Projection:
         free = basis[:, 3:]  # (c, c − 3)
         arms = array.regression_matrix[:, :3] * self.inverse[:, None]
         left, strength, turn = np.linalg.svd(free.T @ arms, full_matrices=True)
+        self.force_rows = basis[:, :3].T * self.inverse  # (3, c): what the specific force takes
         self.rows = (free @ left).T * self.inverse  # (c − 3, c): residual (m/s²) to rows
         self.strength = strength  # (3,)
         self.turn = turn  # (3, 3): rows i feels strength_i · turn_i · α
@@ -83,23 +113,6 @@ class Projection:
         # Gains near −1 leave no specific force to be sensed.
         self.force_covariance = np.linalg.pinv(axes.T @ axes, hermitian=True)
         self.alive = np.flatnonzero(np.linalg.norm(self.rows, axis=1) > 0)
-
-    def variance(self, noise: BodyNoise, change: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the variance of every row, shape (n, c − 3), for changes of the readings (n,), m/s³."""
-        common = 1.0 + (noise.agitation * change / noise.typical) ** 2
-        out = np.repeat(common[:, None], len(self.rows), axis=1)
-        lost = noise.acceleration**2 + (noise.acceleration_slope * change) ** 2
-        out[:, :3] += np.outer(lost, self.strength**2)
-        return out
-
-
-def change_of_readings(readings: NDArray[np.float64], period: float, white: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return how fast the readings change, shape (n,), m/s³: rms over the channels, noise taken off."""
-    alive = np.isfinite(white)
-    step = np.zeros_like(readings[:, alive])
-    step[1:-1] = readings[2:, alive] - readings[:-2, alive]
-    power = np.mean(step**2, axis=1) - 2 * np.mean(white[alive] ** 2)
-    return np.asarray(np.sqrt(np.maximum(uniform_filter1d(power, 5), 0.0)) / (2 * period))
 
 
 def white_from_rows(
@@ -120,14 +133,14 @@ def white_from_rows(
         quiet = both
     second = np.diff(projected, 2, axis=0)[quiet]
     power = (np.median(np.abs(second), axis=0) / 0.6745) ** 2 / 6.0
-    alive = power > 0
+    alive = power > _LEAST_POWER * power.max(initial=0.0)
     mixing = projector[np.ix_(alive, alive)] ** 2 * expected[alive] ** 2
     scale = power[alive].sum() / mixing.sum()
     error = power[alive] * (np.sqrt(3.0 / max(int(quiet.sum()), 1)) + _MODEL_ERROR)
     count = len(error)
     design = np.vstack([scale * mixing / error[:, None], np.eye(count) / _RATIO_SPREAD])
     ratio, _ = nnls(design, np.concatenate([power[alive] / error, np.ones(count) / _RATIO_SPREAD]))
-    found = np.zeros(len(power))
+    found = scale * expected**2  # what no row shows is as loud as the rest
     found[alive] = ratio * scale * expected[alive] ** 2
     return np.sqrt(np.maximum(found, 0.04 * np.median(found[alive])))
 
@@ -148,7 +161,8 @@ def learn_motion_noise(
     both = use[2:] & use[1:-1] & use[:-2]
     second = np.diff(rows, 2, axis=0)[both] / np.sqrt(6.0)
     d = change[1:-1][both]
-    typical = BodyNoise(white).typical
+    first = BodyNoise.of(white, 0.0)
+    typical = first.typical
     free = np.setdiff1d(projection.alive, np.arange(3))
     power, count = np.sum(second[:, free] ** 2, axis=1), len(free)
     # Neighbouring second differences share samples: about half of them are news.
@@ -177,11 +191,11 @@ def learn_motion_noise(
     if table.max() - table[still, 0] < _WORTH:
         floor_place, slope_place = np.intp(still), np.intp(0)
     gain += float(table[floor_place, slope_place] - table[still, 0])
-    return BodyNoise(
-        white,
-        agitation,
-        float(floors[floor_place]),
-        float(_SLOPE_GRID[slope_place]),
+    return replace(
+        first,
+        agitation=agitation,
+        acceleration=float(floors[floor_place]),
+        acceleration_slope=float(_SLOPE_GRID[slope_place]),
         log_odds=gain if agitation or slope_place else 0.0,
     )
 
