@@ -35,7 +35,7 @@ from gfimu.diagnosis.verdict.naming import (
     rival_list,
 )
 from gfimu.diagnosis.verdict.verdict import Diagnosis, NamedCause, Residual, Unexplained
-from gfimu.diagnosis.verdict.wording import verdict_sentences
+from gfimu.diagnosis.verdict.wording import Notes, verdict_sentences
 from gfimu.world_model import Effect, Spin, WorldModel
 
 __all__ = ["Described", "conclude", "is_dominant", "is_unknown", "named_causes"]
@@ -226,19 +226,14 @@ def conclude(
         "reference_white": float(levels.white[-1]),
         "calibration_residue": understanding.residue,
     }
-    words = verdict_sentences(
-        verdict,
-        causes,
-        residual,
-        gain,
-        unexplained,
-        list(withdrawn),
+    notes = Notes(
         residue=understanding.residue,
         unreferenced=sum(run.unreferenced for run in prepared.runs),
         terms=len(believed.causes) if unknown and extends else 0,
         loudest=(loudest.name, loudest.level, loudest.ratio),
         rest=left.signature if left.log_odds > policy.lack_odds else "",
     )
+    words = verdict_sentences(verdict, causes, residual, gain, unexplained, withdrawn, notes)
     others_told = rival_list(explanation, policy)
     return Diagnosis(verdict, causes, residual, gain, unexplained, others_told, twin, runs, words, noise)
 
