@@ -271,7 +271,13 @@ DIAGNOSIS = ("data", "terms", "fit", "search", "criticism", "verdict", "report",
 BESIDE = {"gfimu.diagnosis.policy", "gfimu.generic_basis", "gfimu.geometry.array", "gfimu.world_model"}
 """What every room of the diagnosis may import besides."""
 
-OUTSIDE = {"data": {"gfimu.recording"}, "report": {"gfimu.recording", "gfimu.visual"}}
+OUTSIDE = {
+    "data": {"gfimu.recording", "gfimu.motion.body_drive"},
+    "terms": {"gfimu.motion.body_drive"},
+    "criticism": {"gfimu.geometry.kinematics"},
+    "verdict": {"gfimu.motion.attitude"},
+    "report": {"gfimu.recording", "gfimu.visual"},
+}
 """What of this project a single room of the diagnosis may import besides."""
 
 

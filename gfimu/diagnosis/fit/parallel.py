@@ -8,7 +8,7 @@ import pickle
 import signal
 import sys
 import warnings
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager
 from functools import cache
@@ -58,27 +58,14 @@ def each_apart(work: Callable[[Item], Result], items: Sequence[Item]) -> list[Re
     processes: list[_Apart] = []
     busy: list[Connection] = []
     try:
-        for _ in range(workers):
-            try:
-                process = _Apart(work, items)
-            except OSError:  # no more processes, or no memory for one
-                break
+        for process in _split_off(work, items, workers):
             processes.append(process)
             process.pipe.send(next(todo))
             busy.append(process.pipe)
         while busy:
             for pipe in wait(busy):
                 assert isinstance(pipe, Connection)
-                try:
-                    number, result, error = pipe.recv()
-                except EOFError:
-                    raise RuntimeError(
-                        "a process of the diagnosis ended without an answer; is there memory enough?"
-                    ) from None
-                if isinstance(error, _UnsendableError):
-                    result = work(items[number])
-                elif error is not None:
-                    raise error
+                number, result = _answer(pipe, work, items)
                 results[number] = result
                 following = next(todo, None)
                 pipe.send(following)
@@ -88,6 +75,29 @@ def each_apart(work: Callable[[Item], Result], items: Sequence[Item]) -> list[Re
         for process in processes:
             process.end()
     return [results[number] if number in results else work(item) for number, item in enumerate(items)]
+
+
+def _split_off(work: Callable[[Item], Result], items: Sequence[Item], most: int) -> Iterator[_Apart]:
+    """Start processes, as many as the system allows."""
+    for _ in range(most):
+        try:
+            process = _Apart(work, items)
+        except OSError:  # no more processes, or no memory for one
+            return
+        yield process
+
+
+def _answer(pipe: Connection, work: Callable[[Item], Result], items: Sequence[Item]) -> tuple[int, Result]:
+    """Return the number and the result of what a process has done; computed here where it can't be sent."""
+    try:
+        number, result, error = pipe.recv()
+    except EOFError:
+        raise RuntimeError("a process of the diagnosis ended without an answer; is there memory enough?") from None
+    if isinstance(error, _UnsendableError):
+        return number, work(items[number])
+    if error is not None:
+        raise error
+    return number, result
 
 
 def _on_threads(work: Callable[[Item], Result], items: Sequence[Item], workers: int) -> list[Result]:

@@ -40,7 +40,7 @@ from gfimu.diagnosis.verdict.naming import (
 )
 from gfimu.diagnosis.verdict.undetermined import undetermined, undetermined_sentence
 from gfimu.diagnosis.verdict.verdict import Diagnosis, NamedCause, Residual, Unexplained
-from gfimu.diagnosis.verdict.wording import verdict_sentences
+from gfimu.diagnosis.verdict.wording import Notes, verdict_sentences
 from gfimu.world_model import Effect, Spin, WorldModel
 
 __all__ = ["Described", "conclude", "is_dominant", "is_unknown", "named_causes"]
@@ -251,19 +251,14 @@ def conclude(
     if isinstance(first, BodyStretch):
         noise |= {"disagreement_s": levels.agitation, "gyro_bias_rad_s": float(np.linalg.norm(first.run.gyro_bias))}
         del noise["reference_white"]
-    words = verdict_sentences(
-        verdict,
-        causes,
-        residual,
-        gain,
-        unexplained,
-        list(withdrawn),
+    notes = Notes(
         residue=understanding.residue,
         unreferenced=sum(run.unreferenced for run in prepared.runs),
         terms=len(believed.causes) if unknown and extends else 0,
         loudest=(loudest.name, loudest.level, loudest.ratio),
         rest=left.signature if left.log_odds > policy.lack_odds else "",
     )
+    words = verdict_sentences(verdict, causes, residual, gain, unexplained, withdrawn, notes)
     others_told = rival_list(explanation, policy)
     open_ones = undetermined(explanation.screening, array, policy.least_information)
     words = (*words, undetermined_sentence(open_ones)) if open_ones else words

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,9 +12,34 @@ from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.verdict.verdict import NamedCause, Residual, Unexplained
 from gfimu.units import STANDARD_GRAVITY
 
-__all__ = ["SAME_SHARE", "verdict_sentences"]
+__all__ = ["SAME_SHARE", "Notes", "verdict_sentences"]
 
 SAME_SHARE = 5e-3  # numerical: half of the last digit of a share in words
+
+
+@dataclass(frozen=True)
+class Notes:
+    """What sentences hold besides the verdict.
+
+    Parameters
+    ----------
+    residue : float
+        Size of a calibration residue, in units of what a good calibration leaves; 0 where there is none.
+    unreferenced : float
+        Time without a reference, s.
+    terms : int, optional
+        Number of terms that describe an unknown, where it was tried.
+    loudest : tuple of (str, float, float), optional
+        Channel with the largest slow noise, its level, m/s², and that over the median of the others.
+    rest : str
+        What the strongest of the lack of fit looks like.
+    """
+
+    residue: float = 0.0
+    unreferenced: float = 0.0
+    terms: int | None = None
+    loudest: tuple[str, float, float] | None = None
+    rest: str = ""
 
 
 def verdict_sentences(
@@ -23,63 +49,81 @@ def verdict_sentences(
     gain: Gain,
     unexplained: Unexplained,
     withdrawn: Sequence[str],
-    *,
-    residue: float = 0.0,
-    unreferenced: float = 0.0,
-    terms: int | None = None,
-    loudest: tuple[str, float, float] | None = None,
-    rest: str = "",
+    notes: Notes = Notes(),
 ) -> tuple[str, ...]:
-    """Return the verdict in sentences, the most important first.
-
-    ``residue`` is the size of a calibration residue, in units of what a good calibration leaves, where there is one;
-    ``unreferenced`` the time without a reference, s; ``terms`` the number of terms that describe an unknown, where it
-    was tried; ``loudest`` the channel with the largest slow noise, its level, m/s², and that over the median of the
-    others; ``rest`` what the strongest of what is left looks like.
-    """
-    words = [_headline(verdict, causes, unexplained, residue, gain)]
+    """Return the verdict in sentences, the most important first; ``withdrawn`` are causes that did not predict."""
+    words = [_headline(verdict, causes, unexplained, notes.residue, gain)]
     words += [f"{cause.effect}: {cause.why}." for cause in causes if cause.why]
-    for cause in causes:
-        if cause.not_distinguishable_from and verdict != "ambiguous":
-            words.append(
-                f"{', '.join(cause.not_distinguishable_from)} could imitate {cause.effect} in this data but would need "
-                f"a coincidence; {cause.would_be_separated_by} would settle it."
-            )
-    if verdict == "unknown" and terms is not None:
-        words.append(_surrogate_sentence(terms, unexplained.left_out))
-    if causes or terms:
+    words += _coincidences(verdict, causes)
+    if verdict == "unknown" and notes.terms is not None:
+        words.append(_surrogate_sentence(notes.terms, unexplained.left_out))
+    if causes or notes.terms:
         words.append(
             f"The residual falls from {residual.rms_before:.3g} to {residual.rms_after:.3g} m/s²; "
             f"the noise alone is {residual.noise_floor:.3g} m/s²."
         )
-    if gain.held_out and np.isfinite(gain.share_of_excess_removed):
+    words += _held_out(residual, gain)
+    words += _left_over(verdict, residual, unexplained, notes.rest)
+    words += _noted(notes)
+    words += [f"{name} was withdrawn: it did not predict held-out data." for name in withdrawn]
+    return tuple(words)
+
+
+def _coincidences(verdict: str, causes: Sequence[NamedCause]) -> list[str]:
+    """Say which effects could stand for a cause; an ambiguous verdict says it of all."""
+    return [
+        f"{', '.join(cause.not_distinguishable_from)} could imitate {cause.effect} in this data but would need "
+        f"a coincidence; {cause.would_be_separated_by} would settle it."
+        for cause in causes
+        if cause.not_distinguishable_from and verdict != "ambiguous"
+    ]
+
+
+def _held_out(residual: Residual, gain: Gain) -> list[str]:
+    """Say what the causes are worth on held-out data."""
+    if not gain.held_out:
+        return []
+    words = []
+    if np.isfinite(gain.share_of_excess_removed):
         words.append(
             f"On data the fit never saw ({gain.held_out}), {gain.share_of_excess_removed:.1%} of the excess is gone"
             f"{_anywhere(gain)}."
         )
         words += _far_below(residual, gain)
-    if gain.held_out and np.isnan(gain.rms_after):
+    if np.isnan(gain.rms_after):
         words.append(f"On data the fit never saw ({gain.held_out}) the gain is within the noise and can't be measured.")
-    if unexplained.significant and verdict != "unknown":
-        words.append(f"Something is left that nothing in the library explains: {unexplained.signature}.")
+    return words
+
+
+def _left_over(verdict: str, residual: Residual, unexplained: Unexplained, rest: str) -> list[str]:
+    """Say what the causes leave; an unknown verdict says it at first."""
+    if unexplained.significant:
+        told = f"Something is left that nothing in the library explains: {unexplained.signature}."
+        return [] if verdict == "unknown" else [told]
     over = residual.rms_after / max(residual.noise_floor, 1e-12)
-    if verdict == "explained" and not unexplained.significant and over > 1.0 + Policy.small:
-        words.append(
-            f"What is left is {over:.2f} times the noise{f' ({rest})' if rest else ''}: "
-            "little against what is explained, and ± holds it."
-        )
-    if loudest is not None and loudest[1] > 0.0:
-        name, level, ratio = loudest
+    if verdict != "explained" or over <= 1.0 + Policy.small:
+        return []
+    told = (
+        f"What is left is {over:.2f} times the noise{f' ({rest})' if rest else ''}: "
+        "little against what is explained, and ± holds it."
+    )
+    return [told]
+
+
+def _noted(notes: Notes) -> list[str]:
+    """Say what is known of the noise, the calibration and the reference."""
+    words = []
+    if notes.loudest is not None and notes.loudest[1] > 0.0:
+        name, level, ratio = notes.loudest
         words.append(
             f"The largest slow noise is that of channel {name}: {level / STANDARD_GRAVITY * 1e3:.2f} mg, "
             f"{ratio:.1f} times the median of the other channels."
         )
-    if residue > 0.0:
-        words.append(_residue_sentence(residue))
-    if unreferenced > 0.0:
-        words.append(f"{unreferenced:.1f} s are left out, as the reference is missing there.")
-    words += [f"{name} was withdrawn: it did not predict held-out data." for name in withdrawn]
-    return tuple(words)
+    if notes.residue > 0.0:
+        words.append(_residue_sentence(notes.residue))
+    if notes.unreferenced > 0.0:
+        words.append(f"{notes.unreferenced:.1f} s are left out, as the reference is missing there.")
+    return words
 
 
 def _anywhere(gain: Gain) -> str:
