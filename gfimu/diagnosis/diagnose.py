@@ -191,7 +191,8 @@ class _Diagnosis:
 
     def _gain(self, explanation: Explanation, fit: Fit) -> Gain:
         """Measure what all that was found is worth on data the fit never saw."""
-        if not fit.causes and not any(stretch.known for stretch in explanation.stretches):
+        found = fit.causes or fit.point.residue or any(stretch.known for stretch in explanation.stretches)
+        if not found:
             return Gain()
         label = "blocks of the recording, odd and even from each other" if self._kept is None else "another recording"
         return held_out_gain(fit.causes, self._pairs(explanation, fit), self._policy, label=label)
