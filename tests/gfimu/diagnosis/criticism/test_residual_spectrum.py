@@ -18,8 +18,8 @@ RATE = 6.0 + 2.0 * np.sin(0.5 * T)
 ANGLE = np.cumsum(RATE) * PERIOD
 
 
-def spectra(residual):
-    view = made_view(RATE, residual)
+def spectra(residual, rate=RATE):
+    view = made_view(rate, residual)
     gain = whitening_gain(N, PERIOD, view.white, 0.0)
     both = tuple(view.measured - one for one in (view.before, view.after))
     standard = tuple(standardise(dct(one, type=2, norm="ortho", axis=0) * gain) for one in both)
@@ -52,6 +52,14 @@ def test_a_ripple_of_the_angle_is_one_order_though_the_rate_swings():
     assert line.amplitude[0] == pytest.approx(0.05, rel=0.1)
     assert "3 cycles per revolution" in in_angle.sentence
     assert in_time.line_before is None or not in_time.line_before.significant  # smeared over frequencies
+
+
+def test_a_table_at_rest_adds_nothing_to_an_order():
+    rate = np.where(np.arange(N) < N // 2, RATE, 0.0)
+    angle = np.cumsum(rate) * PERIOD
+    _, in_angle = spectra(on_first(0.05 * np.cos(3.0 * angle)), rate)
+    assert in_angle.line_before.place == pytest.approx(3.0, abs=1e-9)
+    assert in_angle.line_before.amplitude[0] == pytest.approx(0.05, rel=0.15)  # half of the noise's samples are lost
 
 
 def test_noise_has_no_line_and_its_level():
