@@ -137,6 +137,11 @@ class Policy:
     grown, body_grown : int
         Best effects by which the present set, and the set without each of its causes, is grown beside the sets that
         lead in a linear world: with many causes those are far from the point, and what they promise comes true less.
+    halvings : int
+        How often knot intervals of a drive may be halved.
+    blur : float
+        Standard deviations of all observations of a sample together from which what a drive misses of an angular
+        acceleration is worth closer knots.
     """
 
     beam: int = 6
@@ -166,6 +171,8 @@ class Policy:
     chance: float = 1e-3
     spikes: float = 3.0
     spike_share: float = 1e-4
+    halvings: int = 5
+    blur: float = 0.5
     body_spike_share: float = 2e-3
     stds: float = 2.0
     noise_stds: float = 3.0

@@ -20,7 +20,7 @@ from gfimu.diagnosis.data.cosine_basis import NoiseLevels
 from gfimu.diagnosis.data.stretch import RunUp, Stretch
 from gfimu.diagnosis.fit.evidence import SCALES, inverse, likeliest_scale
 from gfimu.diagnosis.fit.gauss_newton import Fit, fit
-from gfimu.diagnosis.fit.learn import LEARNINGS, learn_noise, learn_roughness, starting_point
+from gfimu.diagnosis.fit.learn import LEARNINGS, learn_noise, learn_roughness, sharpened, starting_point
 from gfimu.diagnosis.fit.linear import Point, energy_of, linearise, with_residue
 from gfimu.diagnosis.fit.parallel import each_apart, over_segments
 from gfimu.diagnosis.policy import Policy
@@ -134,7 +134,7 @@ def other_recordings(
     """Pair the fitted data with other recordings.
 
     These have the noise of the fitted ones, the sizes of the first run where each run has its own, and drives whose
-    roughness is learnt beside the causes: they are no less free than those that were fitted.
+    roughness and knots are learnt beside the causes: they are no less free than those that were fitted.
 
     Parameters
     ----------
@@ -162,7 +162,8 @@ def other_recordings(
     residue = 0.0 if first.residue is None else first.residue.scale
     part = Part(test, drives, (first.levels[0],) * len(test))
     near = fit(test, part.point(found.causes, residue), policy).point
-    part = replace(part, drives=learn_roughness(test, near, LEARNINGS).drives)
+    near = sharpened(test, learn_roughness(test, near, LEARNINGS), policy)
+    part = replace(part, drives=near.drives)
     return [Holdout(Part(tuple(stretches), first.drives, first.levels), part, residue)]
 
 

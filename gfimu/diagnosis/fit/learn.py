@@ -14,6 +14,7 @@ from gfimu.diagnosis.data.run import Run
 from gfimu.diagnosis.data.stretch import Stretch, make_stretches
 from gfimu.diagnosis.fit.linear import Linear, Point, linearise
 from gfimu.diagnosis.fit.parallel import over_segments
+from gfimu.diagnosis.fit.posterior import Posterior
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.terms.coloured_noise import estimate_flicker, likeliest_flicker, white_level
 from gfimu.diagnosis.terms.drive import Drive
@@ -21,6 +22,7 @@ from gfimu.diagnosis.terms.hand.drive import HandDrive
 from gfimu.diagnosis.terms.hand.learning import first_noise, learnt_noise
 from gfimu.diagnosis.terms.jacobian import Jacobian
 from gfimu.diagnosis.terms.slow_modes import WeighedModes, WeighedPowers
+from gfimu.diagnosis.terms.spline import PushedSpin
 from gfimu.world_model import WorldModel
 
 __all__ = [
@@ -41,6 +43,7 @@ Numerical: just beyond the Nyquist frequency of the knots, 0.5 over their spacin
 LEARNINGS = 3
 """Numerical: rounds of the fixed point of the roughness."""
 _LEAST_VALID = 0.01  # numerical: share of the samples that count
+_LEAST_WIDTH = 0.4  # numerical: sample periods of a knot interval that is cut
 _REFERENCE_ROUNDS = 5  # numerical: to the roughness of a drive from its reference alone
 
 
@@ -91,23 +94,65 @@ def learn_roughness(stretches: Sequence[Stretch], point: Point, rounds: int = 1)
 
 
 def sharpened(stretches: Sequence[Stretch], point: Point, policy: Policy) -> Point:
-    """Return the point with knots twice as close where that makes the data far more probable; else the point.
+    """Return the point with knots closer where a drive bends sharply and that makes the data far more probable.
 
-    Where the fit is poor the drive would be bent to what no drive did: then the knots stay.
+    Closer knots take away most of what corners leave, and little of what something else does. Where the fit is poor and
+    stays so, the drive would be bent to what no drive did: then the knots stay.
     """
     if not all(drive.is_learnt for drive in point.drives):
         return point
+    observations = sum(stretch.observations for stretch in stretches)
     now = linearise(stretches, point)
-    if now.objective > policy.white_ratio**2 * sum(stretch.observations for stretch in stretches):
-        return point
-    drives = []
-    for stretch, drive, step in zip(stretches, point.drives, now.drive_steps, strict=True):
-        half = 0.5 * drive.spline.spacing
-        drives.append(drive.moved(step).on(half) if half >= stretch.run.sample_period else drive.moved(step))
-    closer = replace(point, drives=tuple(drives))
-    there = linearise(stretches, closer)
-    gained = there.log_volume - 0.5 * there.objective - (now.log_volume - 0.5 * now.objective)
-    return closer if gained > policy.knot_odds else point
+    drives = [drive.moved(step) for drive, step in zip(point.drives, now.drive_steps, strict=True)]
+    acuities = [_acuity(*one) for one in zip(stretches, drives, point.levels, strict=True)]
+    best = [_log_evidence(one) for one in now.posteriors]
+    gaining = np.ones(len(drives), dtype=bool)
+    found, excess = point, now.objective / observations - 1.0
+    for _ in range(policy.halvings):
+        cuts = [
+            drive.cut(_is_blurred(drive, stretch, levels, acuity, policy) & again)
+            for drive, stretch, levels, acuity, again in zip(
+                drives, stretches, point.levels, acuities, gaining, strict=True
+            )
+        ]
+        gaining = np.array([cut.spline != drive.spline for cut, drive in zip(cuts, drives, strict=True)])
+        if not gaining.any():
+            break
+        closer = learn_roughness(stretches, replace(point, drives=tuple(cuts)))
+        there = linearise(stretches, closer)
+        for place in np.flatnonzero(gaining):
+            value = _log_evidence(there.posteriors[place])
+            gaining[place] = value - best[place] > policy.knot_odds
+            if gaining[place]:
+                drives[place], best[place] = closer.drives[place].moved(there.drive_steps[place]), value
+        left = there.objective / observations - 1.0
+        if not gaining.any() or left > max(policy.white_ratio**2 - 1.0, 0.5 * excess):
+            break
+        found, excess = replace(point, drives=tuple(drives)), left
+    return found if excess < policy.white_ratio**2 - 1.0 else point
+
+
+def _log_evidence(posterior: Posterior) -> float:
+    return posterior.log_volume - 0.5 * posterior.objective
+
+
+def _is_blurred(
+    drive: Drive, stretch: Stretch, levels: NoiseLevels, acuity: float, policy: Policy
+) -> NDArray[np.bool_]:
+    """Tell in which intervals (k,) of a drive the observations show what its spline misses."""
+    missed, widths = drive.missed, drive.spline.widths
+    # It goes to and fro once per interval.
+    misread = missed * (widths / (2.0 * np.pi)) ** (2 if stretch.is_angle else 1)
+    seen = np.hypot(missed * acuity, misread / stretch.steps.reference_noise(float(levels.white[-1])))
+    return (seen > policy.blur) & (widths > _LEAST_WIDTH * stretch.run.sample_period)
+
+
+def _acuity(stretch: Stretch, drive: Drive, levels: NoiseLevels) -> float:
+    """Return how far a unit of angular acceleration moves all channels together, standard deviations per rad/s²."""
+    unit = 1.0  # rad/s²
+    change = stretch.predict((), PushedSpin(drive.spin, unit)) - stretch.predict((), drive.spin)
+    power = np.square(np.where(stretch.mask, change, 0.0)[:, :-1] / levels.white[:-1]).sum(axis=1)
+    return float(np.sqrt(np.median(power)))
 
 
 def learn_noise(stretches: Sequence[Stretch], point: Point) -> Point:

@@ -206,7 +206,9 @@ def _jacobian(stretch: Stretch, drive: Drive, effects: Sequence[Effect], seen: O
 
     reach = measured_reach(predict, drive.spline, drive.coefficients, base, stretch.run.t)
     if exact and longest > 0.0:
-        reach = Reach(min(max(reach.before, int(longest / drive.spline.spacing)), _MOST_INTERVALS), reach.after)
+        spline = drive.spline
+        longest = min(longest, _MOST_INTERVALS * spline.spacing)
+        reach = Reach(max(reach.before, int(longest / spline.finest)), reach.after)
     return differentiate(predict, drive.spline, drive.coefficients, base, seen.weight, stretch.run.t, reach)
 
 

@@ -1,8 +1,8 @@
 """The drive of a table as a nuisance parameter: a spline of its angle with a prior of how it may bend.
 
-The fourth derivative of the angle in knot interval i is N(0, ρ_i²). The roughness ρ is learnt by MacKay's fixed point
-(Neural Computation 4, 1992, eq. 2.19): ρ² = Σ d² / Σ γ over some neighbouring intervals, with γ the share of each
-number that the data determine.
+The fourth derivative d of the angle is white noise: in a knot interval of width w it is N(0, ρ²), with ρ²w much the
+same in neighbouring intervals. The roughness ρ is learnt by MacKay's fixed point (Neural Computation 4, 1992,
+eq. 2.19): ρ²w = Σ d²w / Σ γ over some neighbouring intervals, with γ the share of each number that the data determine.
 """
 
 from __future__ import annotations
@@ -20,11 +20,10 @@ __all__ = ["Drive"]
 
 MARGIN = 0.4  # s beyond the samples: late chips and fast clocks ask for the motion there
 FIRST_ROUGHNESS = 3e3  # rad/s⁴
-ROUGH_FOR = 0.3  # s over which a drive is about as rough
+ROUGH_FOR = 0.3  # s over which a drive is about as rough, where its knots are far apart; of as many intervals elsewhere
 LEAST_ROUGHNESS = 30.0  # rad/s⁴
 _LEAST_KNOWN = 0.02  # numerical: least mean γ
 _ON_A_KNOT = 1e-6  # numerical: knot intervals
-_STENCIL = np.array([1.0, -4.0, 6.0, -4.0, 1.0])  # numerical: fourth difference
 
 
 @dataclass(frozen=True)
@@ -76,8 +75,9 @@ class Drive:
         after = max(int(np.ceil((float(times.max()) - self.spline.stop) / h)), 0)
         if not (before or after):
             return self
-        spline = AngleSpline(self.spline.start - before * h, h, self.spline.intervals + before + after)
         pad = (before, after)
+        halvings = (0,) * before + self.spline.halvings + (0,) * after if self.spline.halvings else ()
+        spline = AngleSpline(self.spline.start - before * h, h, self.spline.intervals + before + after, halvings)
         first, last = (self.coefficients[1] - self.coefficients[0], self.coefficients[-1] - self.coefficients[-2])
         coefficients = np.pad(self.coefficients, pad)
         coefficients[:before] = self.coefficients[0] - first * np.arange(before, 0, -1)
@@ -102,13 +102,18 @@ class Drive:
         angle_std : float
             Standard deviation of the angle there, rad, where the whole has one.
         """
-        h = self.spline.spacing
-        first, last = (
-            np.clip(np.array([start, stop]) - self.spline.start, 0.0, self.spline.stop - self.spline.start) / h
-        )
-        low, high = int(np.floor(first + _ON_A_KNOT)), int(np.ceil(last - _ON_A_KNOT))
+        spline = self.spline
+        (low, high), (begun, passed) = spline.interval(np.clip(np.array([start, stop]), spline.start, spline.stop))
+        low += int(begun > 1.0 - _ON_A_KNOT)
+        high += int(passed > _ON_A_KNOT)
+        # The functions at the ends are those of the whole where the knots about these are as far apart as beyond.
+        while low and (spline.widths[max(low - DEGREE, 0) : low + 1] < spline.spacing).any():
+            low -= 1
+        while high < spline.intervals and (spline.widths[high - 1 : high + DEGREE] < spline.spacing).any():
+            high += 1
+        halvings = spline.halvings[low:high]
         return Drive(
-            AngleSpline(self.spline.start + low * h, h, high - low),
+            AngleSpline(float(spline.knots[low]), spline.spacing, int(high - low), halvings if any(halvings) else ()),
             self.coefficients[low : high + DEGREE],
             self.roughness[low:high],
             float(self.spin.at(np.array([since])).angle[0]),
@@ -116,18 +121,32 @@ class Drive:
             since,
         )
 
-    def on(self, spacing: float) -> Drive:
-        """Return the drive with other distances of the knots, s."""
-        spline = AngleSpline.over(self.spline.start, self.spline.stop, spacing)
-        centres = spline.start + spline.spacing * (np.arange(spline.intervals) + 0.5)
-        mine = self.spline.start + self.spline.spacing * (np.arange(self.spline.intervals) + 0.5)
-        roughness = np.interp(centres, mine, self.roughness)
+    def cut(self, where: NDArray[np.bool_]) -> Drive:
+        """Return the drive with some of its knot intervals (k,) halved: the same motion, as rough.
+
+        The outermost intervals stay, so that the drive can be continued beyond them.
+        """
+        where = where.copy()
+        where[:DEGREE] = where[-DEGREE:] = False
+        spline = self.spline.cut(where)
+        roughness = np.repeat(self.roughness * np.where(where, np.sqrt(2.0), 1.0), 1 + where)
         return replace(self, spline=spline, coefficients=spline.through(self.spin), roughness=roughness)
 
     @property
     def is_learnt(self) -> bool:
         """Whether its prior has parameters to learn."""
         return True
+
+    @property
+    def missed(self) -> NDArray[np.float64]:
+        """What angular acceleration the spline may miss in each interval (k,), rad/s².
+
+        As far as the fourth derivative of the angle changes from one interval to the next, it changes within them too:
+        little in a swift sine, much at a corner of the acceleration.
+        """
+        change = np.square(np.diff(self.spline.bend(self.coefficients)))
+        ends = 0.5 * (np.append(change, 0.0) + np.insert(change, 0, 0.0))
+        return np.asarray(np.sqrt(ends) * self.spline.widths**2 / 16.0)
 
     # -- prior ---------------------------------------------------------------------------------------------------
 
@@ -138,9 +157,9 @@ class Drive:
 
     def pull(self) -> NDArray[np.float64]:
         """Return minus half the gradient of the energy, shape (m,)."""
-        bent = self.spline.bend(self.coefficients) / self.roughness**2 / self.spline.spacing**DEGREE
+        bent = self.spline.bend(self.coefficients) / self.roughness**2
         out = np.zeros(self.spline.size)
-        for place, weight in enumerate(_STENCIL):
+        for place, weight in enumerate(self.spline.stencil.T):
             out[place : place + len(bent)] -= weight * bent
         if np.isfinite(self.angle_std):
             out -= self.spline.angle_row(self.since) * (self._off() / self.angle_std)
@@ -148,11 +167,10 @@ class Drive:
 
     def add_precision(self, information: NDArray[np.float64]) -> NDArray[np.float64]:
         """Add the prior's precision to a matrix (m, m), in place."""
-        scale = 1.0 / (self.roughness * self.spline.spacing**DEGREE) ** 2
-        rows = np.arange(len(scale))
-        for i, one in enumerate(_STENCIL):
-            for j, other in enumerate(_STENCIL):
-                information[rows + i, rows + j] += one * other * scale
+        rows, scaled = np.arange(len(self.roughness)), self.spline.stencil.T / self.roughness
+        for i, one in enumerate(scaled):
+            for j, other in enumerate(scaled):
+                information[rows + i, rows + j] += one * other
         if np.isfinite(self.angle_std):
             row = self.spline.angle_row(self.since) / self.angle_std
             at = np.flatnonzero(row)
@@ -161,8 +179,12 @@ class Drive:
 
     @property
     def log_precision(self) -> float:
-        """Half the log determinant of the prior's precision, up to a constant."""
-        return -float(np.log(self.roughness * self.spline.spacing**DEGREE).sum())
+        """Half the log determinant of the prior's precision, where it has one.
+
+        It is flat in angle, rate, acceleration and jerk at the start. In these and the bends it is the same density on
+        all knots, so that evidences of different splines are comparable.
+        """
+        return self.spline.log_units - float(np.log(self.roughness).sum())
 
     def _off(self) -> float:
         if not np.isfinite(self.angle_std):
@@ -173,14 +195,18 @@ class Drive:
 
     def relearned(self, covariance: NDArray[np.float64]) -> Drive:
         """Return the drive with the roughness that it shows, given the covariance (m, m) of its coefficients."""
-        spread = np.diff(np.diff(covariance, DEGREE, axis=0), DEGREE, axis=1).diagonal()
-        return self._rougher(spread / self.spline.spacing ** (2 * DEGREE))
+        stencil, rows = self.spline.stencil, np.arange(self.spline.intervals)
+        spread = np.zeros(len(rows))
+        for i in range(DEGREE + 1):
+            for j in range(DEGREE + 1):
+                spread += stencil[:, i] * stencil[:, j] * covariance[rows + i, rows + j]
+        return self._rougher(spread)
 
     def _rougher(self, spread: NDArray[np.float64]) -> Drive:
         """Return the drive with the roughness that it shows, given the variance (k,) of the fourth derivative."""
-        window = max(round(ROUGH_FOR / self.spline.spacing), 1)
+        window, widths = max(round(ROUGH_FOR / self.spline.spacing), 1), self.spline.widths
         known = uniform_filter1d(np.clip(1.0 - spread / self.roughness**2, 0.0, 1.0), window, mode="nearest")
-        power = uniform_filter1d(self.spline.bend(self.coefficients) ** 2, window, mode="nearest")
+        power = uniform_filter1d(self.spline.bend(self.coefficients) ** 2 * widths, window, mode="nearest") / widths
         return replace(self, roughness=np.sqrt(power / np.maximum(known, _LEAST_KNOWN) + LEAST_ROUGHNESS**2))
 
     def by_reference(
@@ -210,7 +236,7 @@ class Drive:
                 np.add.at(data[j - i], first + i, rows[:, i] * weight * rows[:, j])
         drive = replace(self, coefficients=np.zeros(size))
         stencil = np.zeros((size, self.spline.intervals))
-        for place, one in enumerate(_STENCIL):
+        for place, one in enumerate(self.spline.stencil.T):
             stencil[np.arange(self.spline.intervals) + place, np.arange(self.spline.intervals)] = one
         for _ in range(rounds):
             bands = data + drive._precision_bands()
@@ -218,17 +244,17 @@ class Drive:
             drive = replace(drive, coefficients=np.zeros(size))
             coefficients = cho_solve_banded((root, True), right + drive.pull(), check_finite=False)
             spread = cho_solve_banded((root, True), stencil, check_finite=False)
-            spread = np.einsum("mk,mk->k", stencil, spread) / self.spline.spacing ** (2 * DEGREE)
+            spread = np.einsum("mk,mk->k", stencil, spread)
             drive = replace(drive, coefficients=coefficients)._rougher(spread)
         return drive
 
     def _precision_bands(self) -> NDArray[np.float64]:
         """Return the lower bands of the prior's precision, shape (5, m)."""
         bands = np.zeros((DEGREE + 1, self.spline.size))
-        scale = 1.0 / (self.roughness * self.spline.spacing**DEGREE) ** 2
-        for i, one in enumerate(_STENCIL):
+        scaled = self.spline.stencil.T / self.roughness
+        for i, one in enumerate(scaled):
             for j in range(i, DEGREE + 1):
-                bands[j - i, i : i + len(scale)] += one * _STENCIL[j] * scale
+                bands[j - i, i : i + len(self.roughness)] += one * scaled[j]
         if np.isfinite(self.angle_std):
             row = self.spline.angle_row(self.since) / self.angle_std
             for apart in range(DEGREE + 1):

@@ -29,14 +29,14 @@ _INTERVALS = 12  # numerical: knot intervals of a block of rows
 
 @dataclass(frozen=True)
 class Reach:
-    """Knot intervals before and after its spline support over which a coefficient acts."""
+    """Knot intervals, of the narrowest, before and after its spline support over which a coefficient acts."""
 
     before: int = 0
     after: int = 0
 
     @property
     def width(self) -> int:
-        """Number of coefficients that one sample depends on."""
+        """Number of coefficients that one sample depends on, where the knots are closest."""
         return DEGREE + 1 + self.before + self.after
 
 
@@ -140,8 +140,8 @@ def differentiate(
     reach : Reach
         Over how much more than its support a coefficient acts.
     """
-    width, (n, c) = reach.width, base.shape
-    first = spline.interval(t)[0] + reach.after + DEGREE + 1 - width  # first coefficient of each sample
+    first, width = _dependence(spline, t, reach)
+    n, c = base.shape
     values = np.zeros((width, n, c))
     rows = np.arange(n)
     for colour in range(width):
@@ -157,6 +157,15 @@ def differentiate(
     turn = turn[:, kept] if kept.any() else turn[:, -1:]
     parts = (flat @ turn).reshape(width, n, -1)  # (w, n, R)
     return Jacobian(spline.size, tuple(_blocks(parts, first, spline.size)), turn.T, width + 1)
+
+
+def _dependence(spline: AngleSpline, t: NDArray[np.float64], reach: Reach) -> tuple[NDArray[np.intp], int]:
+    """Return the first coefficient that each sample (n,) depends on, and on how many from there it does at most."""
+    if not spline.halvings:
+        return spline.interval(t)[0] - reach.before, reach.width
+    first = spline.interval(t - reach.before * spline.finest)[0]
+    last = spline.interval(t + reach.after * spline.finest)[0] + DEGREE
+    return first, int((last - first).max()) + 1
 
 
 def _blocks(
@@ -198,8 +207,9 @@ def measured_reach(
     moved[probes] += STEP
     response = np.abs(predict(moved) - base)
     size = (response / np.maximum(response.max(axis=0), 1e-300)).max(axis=1)  # (n,)
-    interval = spline.interval(t)[0]
+    interval, knots = spline.interval(t)[0], spline.knots
     before = after = 0
+    earlier = later = 0.0  # s
     for probe in probes:
         # A coefficient acts on intervals probe − DEGREE … probe of its support.
         mine = (interval >= probe - DEGREE - apart // 4) & (interval < probe + 3 * apart // 4)
@@ -208,4 +218,10 @@ def measured_reach(
         seen = interval[mine][size[mine] > _FORGOTTEN * size[mine].max()]
         before = max(before, int(seen.max()) - int(probe))
         after = max(after, int(probe) - DEGREE - int(seen.min()))
-    return Reach(before, after)
+        at = t[mine][size[mine] > _FORGOTTEN * size[mine].max()]
+        earlier = max(earlier, float(at[-1] - knots[min(probe + 1, spline.intervals)]))
+        later = max(later, float(knots[max(probe - DEGREE, 0)] - at[0]))
+    if not spline.halvings:
+        return Reach(before, after)
+    # Where knots are closer than samples, the ends of a response lie between these.
+    return Reach(int(earlier / spline.finest) + 1, int(later / spline.finest) + 1)

@@ -174,8 +174,7 @@ def dense_gaussian(
         """Put (n, c + 1, …) in the order of the covariance."""
         return np.concatenate([values[mask[:, c], c] for c in range(count)])
 
-    h, begin = drive.spline.spacing, drive.spline.start
-    edges = begin + h * np.arange(drive.spline.intervals + 1)
+    begin, edges = drive.spline.start, drive.spline.knots
     bends = np.stack([flat(response(stretch, drive, effects, a, b, 4)) for a, b in pairwise(edges)], axis=1)
     poly = np.stack([flat(response(stretch, drive, effects, begin, np.inf, p)) for p in range(4)], axis=1)
     right, unknown = flat(off), flat(columns)

@@ -11,16 +11,45 @@ from gfimu.diagnosis.data.spins import JoinedSpin, ScaledSpin, State
 from gfimu.diagnosis.terms.spline import DEGREE, AngleSpline
 
 SPLINE = AngleSpline(-0.3, 0.07, 40)
+UNEVEN = SPLINE.cut(np.arange(40) % 5 == 2).cut(np.arange(48) % 4 == 3)
 
 
 def reference(spline, coefficients):
-    knots = spline.start + spline.spacing * np.arange(-DEGREE, spline.intervals + DEGREE + 1)
-    return BSpline(knots, coefficients, DEGREE)
+    beyond = np.arange(1, DEGREE + 1)
+    before, after = spline.start - spline.widths[0] * beyond[::-1], spline.stop + spline.widths[-1] * beyond
+    return BSpline(np.concatenate([before, spline.knots, after]), coefficients, DEGREE)
 
 
 @pytest.fixture
 def coefficients():
     return np.cumsum(np.random.default_rng(3).standard_normal(SPLINE.size))
+
+
+def test_cut_intervals_are_halved():
+    spline = AngleSpline(1.0, 0.2, 10).cut(np.arange(10) == 4)
+    assert (spline.intervals, spline.size, spline.finest) == (11, 15, 0.1)
+    assert_allclose(spline.widths, [0.2] * 4 + [0.1] * 2 + [0.2] * 5)
+    assert spline.stop == pytest.approx(3.0)
+    place, passed = spline.interval(np.array([0.0, 1.85, 1.95, 2.1, 9.0]))
+    assert place.tolist() == [0, 4, 5, 6, 10]
+    assert_allclose(passed, [0.0, 0.5, 0.5, 0.5, 1.0])
+    assert AngleSpline(1.0, 0.2, 10).cut(np.zeros(10, dtype=bool)) == AngleSpline(1.0, 0.2, 10)
+
+
+def test_uneven_knots_are_those_of_the_b_spline():
+    coefficients = np.cumsum(np.random.default_rng(4).standard_normal(UNEVEN.size))
+    t = np.random.default_rng(1).uniform(UNEVEN.start, UNEVEN.stop, 300)
+    state, truth = UNEVEN.spin(coefficients).at(t), reference(UNEVEN, coefficients)
+    assert_allclose(state.angle, truth(t), atol=1e-12)
+    assert_allclose(state.rate, truth.derivative(1)(t), atol=1e-10)
+    assert_allclose(state.acceleration, truth.derivative(2)(t), atol=1e-7)
+    assert_allclose(UNEVEN.bend(coefficients), truth.derivative(DEGREE)(UNEVEN.centres), rtol=1e-9)
+    for order in range(3):
+        first, rows = UNEVEN.rows(t, order)
+        expected = truth.derivative(order)(t) if order else truth(t)
+        found = np.einsum("nf,nf->n", rows, coefficients[first[:, None] + np.arange(DEGREE + 1)])
+        assert_allclose(found, expected, atol=1e-7)
+    assert_allclose(UNEVEN.through(UNEVEN.spin(coefficients)), coefficients, atol=1e-6)
 
 
 def test_angle_rate_and_acceleration_are_those_of_the_b_spline(coefficients):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import astuple, replace
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from scipy.interpolate import BSpline
 
 from gfimu.diagnosis.terms.drive import FIRST_ROUGHNESS, LEAST_ROUGHNESS, MARGIN, Drive
-from gfimu.diagnosis.terms.spline import DEGREE, AngleSpline
+from gfimu.diagnosis.terms.spline import DEGREE, AngleSpline, State
 
 
 def made_drive(*, angle_std=1e-2, spacing=0.1, seed=1):
@@ -22,13 +22,18 @@ def made_drive(*, angle_std=1e-2, spacing=0.1, seed=1):
     return replace(drive, coefficients=0.01 * walk, roughness=roughness)
 
 
+def extended_knots(spline):
+    """The knots with those beyond the ends."""
+    beyond = np.arange(1, DEGREE + 1)
+    before, after = spline.start - spline.widths[0] * beyond[::-1], spline.stop + spline.widths[-1] * beyond
+    return np.concatenate([before, spline.knots, after])
+
+
 def dense_precision(drive):
     """The prior's precision by SciPy's fourth derivative and values."""
     spline = drive.spline
-    knots = spline.start + spline.spacing * np.arange(-DEGREE, spline.intervals + DEGREE + 1)
-    middles = spline.start + spline.spacing * (np.arange(spline.intervals) + 0.5)
-    unit = np.eye(spline.size)
-    bend = BSpline(knots, unit, DEGREE).derivative(DEGREE)(middles)  # (k, m)
+    knots, unit = extended_knots(spline), np.eye(spline.size)
+    bend = BSpline(knots, unit, DEGREE).derivative(DEGREE)(spline.centres)  # (k, m)
     row = BSpline(knots, unit, DEGREE)(drive.since)
     precision = bend.T @ np.diag(drive.roughness**-2.0) @ bend
     if np.isfinite(drive.angle_std):
@@ -36,9 +41,12 @@ def dense_precision(drive):
     return precision, bend, row
 
 
+@pytest.mark.parametrize("cut", [False, True])
 @pytest.mark.parametrize("angle_std", [1e-2, np.inf])
-def test_prior_equals_a_dense_matrix(angle_std):
+def test_prior_equals_a_dense_matrix(angle_std, cut):
     drive = made_drive(angle_std=angle_std)
+    if cut:
+        drive = drive.cut(np.arange(drive.spline.intervals) % 3 == 0)
     precision, bend, row = dense_precision(drive)
     x = drive.coefficients
     expected = float(np.sum((bend @ x / drive.roughness) ** 2))
@@ -53,14 +61,18 @@ def test_prior_equals_a_dense_matrix(angle_std):
     assert_allclose(drive.pull(), gradient, atol=1e-9 * np.abs(gradient).max())
 
 
-def test_log_precision_is_that_of_the_bends():
-    # The bends are independent: half the log determinant of their precision, times the Jacobian of the differences.
+@pytest.mark.parametrize("cuts", [0, 2])
+def test_log_precision_is_that_of_the_bends_and_of_the_start(cuts):
+    # A density in what the knots do not change: angle, rate, acceleration and jerk at the start, and the bends.
     drive = made_drive(angle_std=np.inf)
-    precision, _, _ = dense_precision(drive)
-    power = np.linalg.eigvalsh(precision)[DEGREE:]  # without the polynomials of the third order
-    differences = np.diff(np.eye(drive.spline.size), DEGREE, axis=0)
-    constant = 0.5 * np.linalg.slogdet(differences @ differences.T)[1]
-    assert drive.log_precision == pytest.approx(0.5 * np.log(power).sum() - constant, abs=1e-4)
+    for _ in range(cuts):
+        drive = drive.cut(np.random.default_rng(3).random(drive.spline.intervals) < 0.3)
+    spline = drive.spline
+    function = BSpline(extended_knots(spline), np.eye(spline.size), DEGREE)
+    start = [function(spline.start), *(function.derivative(order)(spline.start) for order in range(1, DEGREE))]
+    units = np.vstack([start, function.derivative(DEGREE)(spline.centres)])
+    expected = np.linalg.slogdet(units)[1] - np.log(drive.roughness).sum()
+    assert drive.log_precision == pytest.approx(expected, abs=1e-6)
 
 
 def test_at_rest_at_first():
@@ -103,17 +115,55 @@ def test_covering_reaches_farther_and_keeps_the_motion():
     assert early.spline.stop == pytest.approx(drive.spline.stop)
 
 
-def test_other_knots_keep_the_motion():
+def test_closer_knots_keep_the_motion_and_its_spectrum():
     drive = made_drive(spacing=0.2)
-    closer = drive.on(0.1)
-    t = np.linspace(0.0, 3.0, 200)
-    assert_allclose(closer.spin.at(t).angle, drive.spin.at(t).angle, atol=1e-6)
-    assert closer.spline.spacing == 0.1
-    assert closer.spline.stop >= drive.spline.stop
-    # Roughness is a density in time: it is taken over at the same times.
-    middle = closer.spline.start + 0.1 * (np.arange(closer.spline.intervals) + 0.5)
-    mine = drive.spline.start + 0.2 * (np.arange(drive.spline.intervals) + 0.5)
-    assert_allclose(closer.roughness, np.interp(middle, mine, drive.roughness))
+    where = np.arange(drive.spline.intervals) % 3 == 0
+    closer = drive.cut(where)
+    t = np.linspace(drive.spline.start, drive.spline.stop, 400)
+    for one, other in zip(astuple(closer.spin.at(t)), astuple(drive.spin.at(t)), strict=True):
+        assert_allclose(one, other, atol=1e-8 * np.abs(other).max())
+    inner = where[DEGREE:-DEGREE]
+    assert closer.spline.intervals == drive.spline.intervals + inner.sum()
+    assert_allclose(closer.spline.widths[[0, -1]], 0.2)  # the outermost stay: the drive can be continued
+    power = closer.roughness**2 * closer.spline.widths
+    at = drive.spline.interval(closer.spline.centres)[0]
+    assert_allclose(power, (drive.roughness**2 * drive.spline.widths)[at])
+
+
+def test_a_part_of_a_drive_with_uneven_knots():
+    drive = made_drive()
+    for _ in range(2):
+        middle = np.abs(drive.spline.centres - 1.0) < 0.15
+        drive = drive.cut(middle)
+    t = np.linspace(1.0, 2.1, 40)
+    part = drive.within(1.0, 2.1, 1.0, 5e-3)
+    assert_allclose(part.spin.at(t).acceleration, drive.spin.at(t).acceleration, atol=1e-9)
+    assert part.spline.halvings
+    assert part.spline.intervals < drive.spline.intervals
+    longer = part.covering(np.array([-3.0, 5.0]))
+    assert_allclose(longer.spin.at(t).acceleration, drive.spin.at(t).acceleration, atol=1e-9)
+
+
+def test_corners_are_missed_and_a_swift_sine_is_not():
+    spline = AngleSpline(0.0, 0.05, 200)
+
+    class Motion:
+        def __init__(self, jerk):
+            self.jerk = jerk
+
+        def at(self, t):
+            since = np.maximum(t - 5.02, 0.0)
+            return State(np.sin(7.0 * t) + self.jerk * since**3 / 6.0, t, t)
+
+    sine, corner = (
+        replace(Drive.still(np.array([0.4, 9.6]), 0.4, 0.05, 0.0, np.inf), spline=spline, coefficients=c)
+        for c in (spline.through(Motion(0.0)), spline.through(Motion(500.0)))
+    )
+    inner = (spline.centres > 1.0) & (spline.centres < 9.0)
+    assert sine.missed[inner].max() < 0.3
+    found = spline.centres[inner & (corner.missed > 0.3)]
+    assert 0 < len(found) < 20
+    assert np.abs(found - 5.02).max() < 0.5
 
 
 def test_a_part_has_the_motion_and_the_prior_of_the_whole():
