@@ -32,6 +32,7 @@ SETTLED = 0.3  # numerical: nats that a step must promise to be taken
 _SHARES = (1.0, 0.3, 0.08)  # numerical: of a step that goes uphill
 _SHAPE_STEP = 0.3  # numerical: most that a shape moves in a step
 _SHAPE_PRIOR = 0.7  # numerical: standard deviation of that step
+_KEPT = 0.5  # numerical: share of its promise that a step must gain for a derivative to serve another one
 _NARROW = 10  # numerical: width of a derivative that is cheap to take anew
 
 
@@ -116,7 +117,7 @@ def _descend(stretches: Sequence[Stretch], point: Point, policy: Policy) -> tupl
     now = _energy(stretches, point)
     linear = linearise(stretches, point, of_causes(point))
     done = 0
-    for done in range(policy.steps):
+    for _ in range(policy.steps):
         step, promise = _step(point.causes, linear)
         if promise < SETTLED:
             break
@@ -128,8 +129,8 @@ def _descend(stretches: Sequence[Stretch], point: Point, policy: Policy) -> tupl
         else:
             break
         stalled = now - there < SETTLED
-        kept = _dear(linear) if done % 2 == 0 else None
-        point, now = trial, there
+        kept = _dear(linear) if now - there > _KEPT * promise else None
+        point, now, done = trial, there, done + 1
         linear = linearise(stretches, point, of_causes(point), jacobians=kept)
         if stalled:
             break
@@ -137,7 +138,7 @@ def _descend(stretches: Sequence[Stretch], point: Point, policy: Policy) -> tupl
 
 
 def _dear(linear: Linear) -> tuple[Jacobian | None, ...]:
-    """Return the derivatives by drives that are dear to take anew: they serve two steps."""
+    """Return the derivatives by drives that are dear to take anew: they serve as long as they keep their promise."""
     each = (one.jacobian for one in linear.posteriors)
     return tuple(jacobian if jacobian.predictions > _NARROW else None for jacobian in each)
 

@@ -16,7 +16,8 @@ from gfimu.diagnosis.fit.parallel import over_segments
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.terms.coloured_noise import estimate_flicker, likeliest_flicker, white_level
 from gfimu.diagnosis.terms.drive import Drive
-from gfimu.diagnosis.terms.slow_modes import WeighedPowers
+from gfimu.diagnosis.terms.jacobian import Jacobian
+from gfimu.diagnosis.terms.slow_modes import WeighedModes, WeighedPowers
 from gfimu.world_model import WorldModel
 
 __all__ = [
@@ -67,8 +68,10 @@ def predicted_by_reference(model: WorldModel, run: Run) -> NDArray[np.float64]:
 
 def learn_roughness(stretches: Sequence[Stretch], point: Point, rounds: int = 1) -> Point:
     """Return the point with the roughness that its drives show under its causes."""
+    jacobians: Sequence[Jacobian | None] | None = None
     for _ in range(rounds):
-        linear = linearise(stretches, point)
+        linear = linearise(stretches, point, jacobians=jacobians)
+        jacobians = [one.jacobian for one in linear.posteriors]
         drives = tuple(
             drive.moved(step).relearned(one.covariance)
             for drive, step, one in zip(point.drives, linear.drive_steps, linear.posteriors, strict=True)
@@ -147,5 +150,7 @@ def _left(stretch: Stretch, point: Point, linear: Linear, place: int) -> _Left:
     level = level / np.sqrt(np.maximum(stretch.mask.mean(axis=0), _LEAST_VALID))
     if stretch.steps.coarse:
         error = np.where(stretch.mask, stretch.measured - seen.prediction, np.nan)
+        if isinstance(seen.modes, WeighedModes):
+            error = error - seen.modes.slow_noise(residual)
         level = stretch.steps.noise_before(error, seen.levels.white, level)
     return _Left(residual, seen.weight, cosines, level)

@@ -59,7 +59,10 @@ def understand(stretches: Sequence[Stretch], policy: Policy, report: Report | No
         known = {one.explanation.best.key: one for one in found}
         start = _start(stretches, [known[key].explanation for key in known], admit, odds, policy)
         if start is not None:
-            found.append(_understood(stretches, explain(stretches, policy, start=start), policy, odds))
+            other = _understood(stretches, explain(stretches, policy, start=start), policy, odds)
+            # What looked like a random walk beside some causes may be no such thing beside the best of that model.
+            if other.walk is None or other.walk.is_likely(policy):
+                found.append(other)
     found.sort(key=lambda one: one.explanation.best.log_posterior - one.log_odds, reverse=True)
     best, elsewhere = found[0], []
     for other in found[1:]:

@@ -19,6 +19,7 @@ from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.fit.gauss_newton import Fit
 from gfimu.diagnosis.fit.learn import starting_point
 from gfimu.diagnosis.fit.linear import linearise
+from gfimu.diagnosis.fit.random_walk import Walk
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.explain import Explanation
 from gfimu.diagnosis.search.nuisance_models import Understanding
@@ -184,7 +185,8 @@ def conclude(
     model, array = first.model, first.model.array
     found = [
         *fault_causes((effect for effects in prepared.effects for effect in effects), prepared.why, policy),
-        *_noise_causes(understanding, policy),
+        # What has no name may look like a random walk: beside it none is claimed.
+        *_noise_causes(None if unknown else understanding.walk, understanding, policy),
     ]
     rivals = conflicting(explanation, policy)
     named = named_causes(explanation, explanation.best, policy)
@@ -254,11 +256,10 @@ def _loud(loudest: LoudestChannel, policy: Policy) -> str:
     )
 
 
-def _noise_causes(understanding: Understanding, policy: Policy) -> list[NamedCause]:
+def _noise_causes(walk: Walk | None, understanding: Understanding, policy: Policy) -> list[NamedCause]:
     """Return a random walk of the biases and excess noise as causes."""
     causes, stretches = [], understanding.explanation.stretches
     families = stretches[0].model.families()
-    walk = understanding.walk
     if walk is not None and "bias_random_walk" in families:
         causes.append(
             NamedCause(
