@@ -107,8 +107,6 @@ class Policy:
     body_spike_share : float
         Share of isolated bad samples of a free body beyond which they are no faults: it moves faster than the samples
         follow.
-    halvings : int
-        How often knot intervals of a drive may be halved.
     blur : float
         Standard deviations of all observations of a sample together from which what a drive misses of an angular
         acceleration is worth closer knots.
@@ -175,7 +173,6 @@ class Policy:
     least_gain: float = 2.0
     fair: float = 1.6
     knot_odds: float = 10.0
-    halvings: int = 5
     blur: float = 0.5
     hopeless: float = 40.0
     steady: float = 5.0

@@ -79,7 +79,7 @@ def sharpened(stretches: Sequence[Stretch], point: Point, policy: Policy) -> Poi
     best = [_log_evidence(one) for one in now.posteriors]
     gaining = np.ones(len(drives), dtype=bool)
     found, excess = point, now.objective / observations - 1.0
-    for _ in range(policy.halvings):
+    while True:
         cuts = [
             drive.cut(_is_blurred(drive, stretch, levels, acuity, policy) & again)
             for drive, stretch, levels, acuity, again in zip(

@@ -24,6 +24,7 @@ FIRST_ROUGHNESS = 3e3  # rad/s⁴
 ROUGH_FOR = 0.3  # s over which a drive is about as rough, where its knots are far apart; of as many intervals elsewhere
 LEAST_ROUGHNESS = 30.0  # rad/s⁴
 _LEAST_KNOWN = 0.02  # numerical: least mean γ
+_FASTEST = 300.0  # numerical: rad/s in each knot interval that no table reaches
 _ON_A_KNOT = 1e-6  # numerical: knot intervals
 
 
@@ -230,6 +231,11 @@ class Drive:
             np.add.at(right, first + i, rows[:, i] * weight * values)
             for j in range(i, DEGREE + 1):
                 np.add.at(data[j - i], first + i, rows[:, i] * weight * rows[:, j])
+        # Where the reference fails for long nothing but this bounds the motion.
+        first, rows = self.spline.rows(self.spline.centres, 1)
+        for i in range(DEGREE + 1):
+            for j in range(i, DEGREE + 1):
+                np.add.at(data[j - i], first + i, rows[:, i] * rows[:, j] / _FASTEST**2)
         drive = replace(self, coefficients=np.zeros(size))
         stencil = np.zeros((size, self.spline.intervals))
         for place, one in enumerate(self.spline.stencil.T):
