@@ -287,7 +287,10 @@ def _low_pass(readings: NDArray[np.float64], t: NDArray[np.float64], tau: float)
     """
     spline = CubicSpline(t, readings)
     steps = np.diff(t)[:, None]
-    slope, bend = spline(t, 1), spline(t, 2)
+    pieces = spline.c  # (4, n - 1, c), the highest power first
+    last = t[-1] - t[-2]
+    slope = np.vstack([pieces[2], (3.0 * last * pieces[0, -1:] + 2.0 * pieces[1, -1:]) * last + pieces[2, -1:]])
+    bend = np.vstack([2.0 * pieces[1], 6.0 * last * pieces[0, -1:] + 2.0 * pieces[1, -1:]])
     smooth = readings - tau * slope + tau**2 * bend
     jerk = tau**3 * np.diff(bend, axis=0) / steps  # constant over a piece
     decay = np.exp(-float(np.median(steps)) / tau)

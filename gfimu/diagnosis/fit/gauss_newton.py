@@ -26,7 +26,7 @@ from gfimu.diagnosis.terms.cause import Cause, effects_of
 from gfimu.diagnosis.terms.jacobian import Jacobian
 from gfimu.geometry.array import AccelerometerArray
 
-__all__ = ["SETTLED", "Fit", "determined", "fit", "log_prior"]
+__all__ = ["SETTLED", "Fit", "determined", "fit", "is_rough", "log_prior"]
 
 SETTLED = 0.3  # numerical: nats that a step must promise to be taken
 _SHARES = (1.0, 0.3, 0.08)  # numerical: of a step that goes uphill
@@ -79,7 +79,7 @@ class Fit:
         return frozenset(cause.key for cause in self.causes)
 
 
-def fit(stretches: Sequence[Stretch], start: Point, policy: Policy) -> Fit:
+def fit(stretches: Sequence[Stretch], start: Point, policy: Policy, *, closely: bool = True) -> Fit:
     """Fit drives, sizes and shapes of a set of causes under the noise and roughness of a point.
 
     Parameters
@@ -90,6 +90,8 @@ def fit(stretches: Sequence[Stretch], start: Point, policy: Policy) -> Fit:
         Where to start; its noise, roughness and residue are kept.
     policy : Policy
         Thresholds.
+    closely : bool
+        Whether the exact derivative follows the cheap one where a cause remembers the drive for long.
 
     Raises
     ------
@@ -99,11 +101,16 @@ def fit(stretches: Sequence[Stretch], start: Point, policy: Policy) -> Fit:
     array = stretches[0].model.array
     point = replace(start, causes=tuple(cause.moved(np.zeros(cause.unknowns), array) for cause in start.causes))
     point, linear, done = _descend(stretches, replace(point, exact=start.exact and _is_long(stretches, point)), policy)
-    if not point.exact and _is_long(stretches, point):
+    if closely and not point.exact and _is_long(stretches, point):
         point, linear, more = _descend(stretches, replace(point, exact=True), policy)
         done += more
     found = _judged(stretches, point, linear, done, policy.least_information)
     return replace(found, log_posterior=found.log_evidence + log_prior(point.causes, policy))
+
+
+def is_rough(stretches: Sequence[Stretch], found: Fit) -> bool:
+    """Tell whether a fit was made by a derivative that leaves out what a cause of it remembers."""
+    return not found.point.exact and _is_long(stretches, found.point)
 
 
 def _is_long(stretches: Sequence[Stretch], point: Point) -> bool:
@@ -223,7 +230,9 @@ def _moved(point: Point, linear: Linear, share: float, step: NDArray[np.float64]
 
 def _judged(stretches: Sequence[Stretch], point: Point, linear: Linear, steps: int, least: float) -> Fit:
     """Return the fit at a point: covariances, and Laplace's evidence relative to no sizes."""
-    volume = linear.log_volume + linear.log_noise
+    # Sets are compared by one kind of derivative: what a longer memory costs, of whatever effect, is left out of all.
+    free = linearise(stretches, replace(point, exact=False)) if point.exact else linear
+    volume = free.log_volume + free.log_noise
     # A step that a derivative without memory promises may not come true: what counts is what the simulation leaves.
     linear = replace(linear, objective=linear.energy)
     array, causes = stretches[0].model.array, point.causes

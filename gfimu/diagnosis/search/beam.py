@@ -14,12 +14,11 @@ from gfimu.diagnosis.fit.evidence import SCALES, inverse, log_evidence, log_evid
 from gfimu.diagnosis.fit.gauss_newton import determined
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.screening import Hypothesis, Screening
-from gfimu.diagnosis.terms.cause import Cause
+from gfimu.diagnosis.terms.cause import ALIKE, Cause
 
 __all__ = ["STARTS", "Blocks", "Candidate", "grown_sets", "leading_sets"]
 
 _FRONT, _PARTNERS = 8, 30  # numerical: sets that are grown, and how many of the best partners of each are scored
-_ALIKE = 0.3  # numerical: shapes nearer than that, as a logarithm or in rad, belong to one optimum
 STARTS = 3  # numerical: optima over the shapes of an effect from which the best set is fitted again
 
 
@@ -97,7 +96,7 @@ class Blocks:
     def nearest(self, cause: Cause) -> int:
         """Return the hypothesis nearest to a cause: the same effect and place, the most similar shape."""
         same = [number for number, one in enumerate(self.hypotheses) if one.cause.key == cause.key]
-        return min(same, key=lambda number: _apart(self.hypotheses[number].cause, cause))
+        return min(same, key=lambda number: self.hypotheses[number].cause.apart(cause))
 
     def optima(self, cause: Cause, rest: Sequence[int]) -> list[int]:
         """Return hypotheses of the effect and place of a cause that are optima over its shapes beside others.
@@ -108,17 +107,8 @@ class Blocks:
         same = [number for number, one in enumerate(self.hypotheses) if one.cause.key == cause.key]
         same.sort(key=lambda number: -odds[number])
         causes = [self.hypotheses[number].cause for number in same]
-        optimal = [all(_apart(mine, other) > _ALIKE for other in causes[:place]) for place, mine in enumerate(causes)]
+        optimal = [all(mine.apart(other) > ALIKE for other in causes[:place]) for place, mine in enumerate(causes)]
         return [number for number, is_optimum in zip(same, optimal, strict=True) if is_optimum]
-
-
-def _apart(one: Cause, other: Cause) -> float:
-    """Return how far the shapes of two causes are apart, in their natural coordinates."""
-    steps = [
-        one.shape[key] - other.shape[key] if key.endswith("_rad") else np.log(one.shape[key] / other.shape[key])
-        for key in one.free_shape
-    ]
-    return float(np.linalg.norm(steps))
 
 
 def leading_sets(blocks: Blocks, most: int, policy: Policy) -> list[Candidate]:

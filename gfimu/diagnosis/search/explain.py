@@ -8,14 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gfimu.diagnosis.data.stretch import Stretch
-from gfimu.diagnosis.fit.gauss_newton import Fit, fit
+from gfimu.diagnosis.fit.gauss_newton import Fit, fit, is_rough
 from gfimu.diagnosis.fit.learn import LEARNINGS, learn_noise, learn_roughness, sharpened, starting_point
 from gfimu.diagnosis.fit.linear import Point, with_residue
 from gfimu.diagnosis.fit.parallel import each_apart
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.beam import STARTS, Blocks, grown_sets, leading_sets
 from gfimu.diagnosis.search.screening import Screening, screen
-from gfimu.diagnosis.terms.cause import Cause, effects_of
+from gfimu.diagnosis.terms.cause import ALIKE, Cause, effects_of
 from gfimu.diagnosis.terms.drive import Drive
 from gfimu.world_model import memory_of
 
@@ -69,20 +69,30 @@ class Sets:
 
     def fit(self, points: Sequence[Point]) -> list[Fit | None]:
         """Fit the causes and drives of points under the base's noise; a point that can't be fitted gives None."""
-
-        def one(point: Point) -> Fit | None:
-            try:
-                point = replace(point, levels=self.base.levels, residue=self.base.residue)
-                return self._own_roughness(fit(self.stretches, point, self.policy))
-            except (np.linalg.LinAlgError, ValueError):
-                return None
-
         new = {_key(point.causes): point for point in points if _key(point.causes) not in self.found}
         self.count += len(new)
-        for key, found in zip(new, each_apart(one, list(new.values())), strict=True):
-            if found is not None:
-                self.found[key] = found
+        self._keep(each_apart(self._roughly, list(new.values())))
+        # What remembers the drive for long is dear to fit closely: the leader of its kind alone.
+        rough = [one for key in new if (one := self.found.get(key)) is not None and is_rough(self.stretches, one)]
+        self._keep([self._closely(max(rough, key=_posterior))] if rough else [])
         return [self.found.get(_key(point.causes)) for point in points]
+
+    def _keep(self, fits: Sequence[Fit | None]) -> None:
+        self.found |= {one.key: one for one in fits if one is not None}
+
+    def _roughly(self, point: Point) -> Fit | None:
+        """Fit with the derivative that the point has; unless that is exact, without what remembers for long."""
+        try:
+            point = replace(point, levels=self.base.levels, residue=self.base.residue)
+            return self._own_roughness(fit(self.stretches, point, self.policy, closely=False))
+        except (np.linalg.LinAlgError, ValueError):
+            return None
+
+    def _closely(self, found: Fit) -> Fit | None:
+        try:
+            return self._own_roughness(fit(self.stretches, found.point, self.policy))
+        except (np.linalg.LinAlgError, ValueError):
+            return None
 
     def _own_roughness(self, found: Fit) -> Fit:
         """Learn the roughness of the drives anew where a mode may have made it: that favours what came before."""
@@ -93,11 +103,13 @@ class Sets:
         return max(found, again, key=_posterior)
 
     def refit(self, points: Sequence[Point]) -> None:
-        """Fit sets again from other starts, and keep what is more probable."""
+        """Fit sets again from other starts, and keep what is more probable; a start that leads back is left there."""
         for point in points:
-            other = Sets(self.stretches, self.base, self.policy)
-            (again,) = other.fit([point])
-            self.count += other.count
+            rough = self._roughly(replace(point, exact=False))
+            if rough is None or _is_alike(rough, self.found[rough.key]):
+                continue
+            again = self._closely(rough) if is_rough(self.stretches, rough) else rough
+            self.count += 1
             if again is not None and again.log_posterior > self.found[again.key].log_posterior:
                 self.found[again.key] = again
 
@@ -113,6 +125,12 @@ class Sets:
 
 def _key(causes: Sequence[Cause]) -> _Key:
     return frozenset(cause.key for cause in causes)
+
+
+def _is_alike(one: Fit, other: Fit) -> bool:
+    """Tell whether two fits of a set ended at the same optimum over the shapes of its causes."""
+    mine = {cause.key: cause for cause in other.causes}
+    return all(cause.apart(mine[cause.key]) < ALIKE for cause in one.causes)
 
 
 def _posterior(found: Fit) -> float:
@@ -180,20 +198,31 @@ def _relearned(stretches: Sequence[Stretch], best: Fit, policy: Policy, *, sharp
 
     The roughness that was learnt without a cause has taken in what that does; each round gives some of it back.
     """
-    point = best.point
     found = replace(best, point=_reaching(stretches, best.point))
+    if not best.causes:  # what nothing leaves is learnt once: a cause may yet explain it
+        return _learnt(stretches, found.point, policy, sharpen=sharpen)
+    point = best.point
     for _ in range(policy.rounds):
         before = found
-        point = learn_roughness(stretches, found.point, LEARNINGS)
-        point = learn_noise(stretches, sharpened(stretches, point, policy) if sharpen else point)
-        if point.residue is not None:
-            point = with_residue(stretches, point, point.residue.scale)
-        if not best.causes:  # what nothing leaves is learnt once: a cause may yet explain it
-            break
+        point = _learnt(stretches, found.point, policy)
         found = fit(stretches, point, policy)
         if found.log_posterior - before.log_posterior < policy.steady:
-            break
-    return replace(point, drives=found.point.drives) if found.point is not best.point and best.causes else point
+            if not sharpen:
+                break
+            # Knots come last: what the roughness has yet to give back looks like corners of the drive.
+            sharpen = False
+            closer = sharpened(stretches, found.point, policy)
+            if closer is found.point:
+                break
+            found = fit(stretches, closer, policy)
+    return replace(point, drives=found.point.drives)
+
+
+def _learnt(stretches: Sequence[Stretch], point: Point, policy: Policy, *, sharpen: bool = False) -> Point:
+    """Return the point with roughness, knots if ``sharpen``, noise and residue as its causes and drives leave them."""
+    point = learn_roughness(stretches, point, LEARNINGS)
+    point = learn_noise(stretches, sharpened(stretches, point, policy) if sharpen else point)
+    return point if point.residue is None else with_residue(stretches, point, point.residue.scale)
 
 
 def _reaching(stretches: Sequence[Stretch], point: Point) -> Point:

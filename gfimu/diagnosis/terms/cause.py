@@ -13,7 +13,10 @@ from scipy.linalg import block_diag
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.world_model import Effect, EffectFamily, Pattern
 
-__all__ = ["SMALLEST_POSITIVE", "Cause", "effects_of", "mixing_of"]
+__all__ = ["ALIKE", "SMALLEST_POSITIVE", "Cause", "effects_of", "mixing_of"]
+
+ALIKE = 0.3
+"""Numerical: shapes nearer than that, as a logarithm or in rad, belong to one optimum."""
 
 SMALLEST_POSITIVE = 1e-6
 """Numerical: least coordinate of what can't be negative."""
@@ -123,6 +126,14 @@ class Cause:
         for key, by in zip(self.free_shape, step[count:], strict=True):
             shape[key] = self.shape_moved(key, float(by))
         return self.at(np.clip(self.coordinates + step[:count], low, high), shape)
+
+    def apart(self, other: Cause) -> float:
+        """Return how far the shapes of two causes are apart, in their natural coordinates."""
+        steps = [
+            self.shape[key] - other.shape[key] if key.endswith("_rad") else np.log(self.shape[key] / other.shape[key])
+            for key in self.free_shape
+        ]
+        return float(np.linalg.norm(steps))
 
     def shape_moved(self, key: str, step: float) -> float:
         """Return a shape parameter after a step in its natural coordinate: log, or linear for angles."""
