@@ -230,9 +230,7 @@ def _moved(point: Point, linear: Linear, share: float, step: NDArray[np.float64]
 
 def _judged(stretches: Sequence[Stretch], point: Point, linear: Linear, steps: int, least: float) -> Fit:
     """Return the fit at a point: covariances, and Laplace's evidence relative to no sizes."""
-    # Sets are compared by one kind of derivative: what a longer memory costs, of whatever effect, is left out of all.
-    free = linearise(stretches, replace(point, exact=False)) if point.exact else linear
-    volume = free.log_volume + free.log_noise
+    volume = linear.log_volume + linear.log_noise
     # A step that a derivative without memory promises may not come true: what counts is what the simulation leaves.
     linear = replace(linear, objective=linear.energy)
     array, causes = stretches[0].model.array, point.causes

@@ -73,7 +73,7 @@ class Sets:
         self.count += len(new)
         self._keep(each_apart(self._roughly, list(new.values())))
         # What remembers the drive for long is dear to fit closely: the leader of its kind alone.
-        rough = [one for key in new if (one := self.found.get(key)) is not None and is_rough(self.stretches, one)]
+        rough = [one for key in new if (one := self.found.get(key)) is not None and self._is_worth_it(one)]
         self._keep([self._closely(max(rough, key=_posterior))] if rough else [])
         return [self.found.get(_key(point.causes)) for point in points]
 
@@ -87,6 +87,19 @@ class Sets:
             return self._own_roughness(fit(self.stretches, point, self.policy, closely=False))
         except (np.linalg.LinAlgError, ValueError):
             return None
+
+    def _is_worth_it(self, found: Fit) -> bool:
+        """Tell whether a fit is rough, and leaves so little that details of what a mode remembers can matter."""
+        if not is_rough(self.stretches, found):
+            return False
+        nothing = self.found.get(frozenset())
+        allowed = self.policy.white_ratio**2 - 1.0
+        if nothing is not None:
+            allowed = max(allowed, self.policy.small * self._excess(nothing))
+        return self._excess(found) < allowed
+
+    def _excess(self, found: Fit) -> float:
+        return found.objective / sum(stretch.observations for stretch in self.stretches) - 1.0
 
     def _closely(self, found: Fit) -> Fit | None:
         try:
@@ -108,7 +121,7 @@ class Sets:
             rough = self._roughly(replace(point, exact=False))
             if rough is None or _is_alike(rough, self.found[rough.key]):
                 continue
-            again = self._closely(rough) if is_rough(self.stretches, rough) else rough
+            again = self._closely(rough) if self._is_worth_it(rough) else rough
             self.count += 1
             if again is not None and again.log_posterior > self.found[again.key].log_posterior:
                 self.found[again.key] = again
@@ -169,7 +182,9 @@ def explain(
         before = sets.best
         screening = screen(stretches, before.point)
         _fit_leaders(sets, screening, before, near=number > 0)
-        _fit_other_shapes(sets, prune(sets))
+        leader = prune(sets)
+        if leader.key not in seen:
+            _fit_other_shapes(sets, leader)
         # While a set still grows its noise is that of the largest: a smaller one would pass for more noise.
         best = sets.best if policy.grown and sets.best.key not in seen else prune(sets)
         fits += sets.count
@@ -205,7 +220,7 @@ def _relearned(stretches: Sequence[Stretch], best: Fit, policy: Policy, *, sharp
     for _ in range(policy.rounds):
         before = found
         point = _learnt(stretches, found.point, policy)
-        found = fit(stretches, point, policy)
+        found = fit(stretches, point, policy, closely=best.point.exact)
         if found.log_posterior - before.log_posterior < policy.steady:
             if not sharpen:
                 break
@@ -214,7 +229,7 @@ def _relearned(stretches: Sequence[Stretch], best: Fit, policy: Policy, *, sharp
             closer = sharpened(stretches, found.point, policy)
             if closer is found.point:
                 break
-            found = fit(stretches, closer, policy)
+            found = fit(stretches, closer, policy, closely=best.point.exact)
     return replace(point, drives=found.point.drives)
 
 
@@ -375,17 +390,25 @@ def _compared_as(found: Fit, other: Fit) -> Fit:
 
 
 def prune(sets: Sets) -> Fit:
-    """Return the most probable set, without causes that the data hardly ask for."""
+    """Return the most probable set, without causes that the data hardly ask for.
+
+    A cause whose model is known to be inexact leaves a share of what it explains: others must bring more than that.
+    """
     best = sets.best
     while best.causes:
-        rest = [
-            replace(best.point, causes=tuple(other for other in best.causes if other is not cause))
-            for cause in best.causes
-        ]
-        fewer = [one for one in sets.fit(rest) if one is not None]
-        top = max(fewer, key=_posterior, default=None)
-        needed = sets.policy.cause_odds if len(best.causes) == 1 else sets.policy.extra_odds
-        if top is None or best.log_posterior - top.log_posterior >= needed:
+        without = sets.fit([_less(best, cause) for cause in best.causes])
+        lost = np.array([np.inf if one is None else best.log_posterior - one.log_posterior for one in without])
+        weakest = int(np.argmin(lost))
+        needed = sets.policy.cause_odds
+        if len(best.causes) > 1:
+            left = [cause.family.inexactness * max(by, 0.0) for cause, by in zip(best.causes, lost, strict=True)]
+            needed = sets.policy.extra_odds + sum(part for place, part in enumerate(left) if place != weakest and part)
+        fewer = without[weakest]
+        if fewer is None or lost[weakest] >= needed:
             return best
-        best = top
+        best = fewer
     return best
+
+
+def _less(found: Fit, cause: Cause) -> Point:
+    return replace(found.point, causes=tuple(other for other in found.causes if other is not cause))

@@ -22,7 +22,8 @@ Predict = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 STEP = 1e-6
 """Numerical: finite difference of a coefficient of the angle, rad."""
 _FORGOTTEN = 3e-3  # numerical: share of a response's peak below which it counts as over
-_PROBES = 8  # numerical: coefficients at which the memory is measured
+_PROBES = 8  # numerical: coefficients at which the memory is measured at once
+_SHIFTS = 4  # numerical: how often, each time at others
 _LEAST_SHARE = 1e-11  # numerical: power of a combination of observations that is second order in the step
 _INTERVALS = 12  # numerical: knot intervals of a block of rows
 
@@ -202,25 +203,26 @@ def measured_reach(
     A memory longer than the distance of the moved coefficients has to be declared by what has it.
     """
     apart = spline.size // _PROBES
-    probes = np.arange(apart // 2, spline.size, apart)[:_PROBES]
-    moved = coefficients.copy()
-    moved[probes] += STEP
-    response = np.abs(predict(moved) - base)
-    size = (response / np.maximum(response.max(axis=0), 1e-300)).max(axis=1)  # (n,)
     interval, knots = spline.interval(t)[0], spline.knots
     before = after = 0
     earlier = later = 0.0  # s
-    for probe in probes:
-        # A coefficient acts on intervals probe − DEGREE … probe of its support.
-        mine = (interval >= probe - DEGREE - apart // 4) & (interval < probe + 3 * apart // 4)
-        if not (mine.any() and size[mine].max() > 0.0):
-            continue
-        seen = interval[mine][size[mine] > _FORGOTTEN * size[mine].max()]
-        before = max(before, int(seen.max()) - int(probe))
-        after = max(after, int(probe) - DEGREE - int(seen.min()))
-        at = t[mine][size[mine] > _FORGOTTEN * size[mine].max()]
-        earlier = max(earlier, float(at[-1] - knots[min(probe + 1, spline.intervals)]))
-        later = max(later, float(knots[max(probe - DEGREE, 0)] - at[0]))
+    for shift in range(_SHIFTS):
+        probes = np.arange((2 * shift + 1) * apart // (2 * _SHIFTS), spline.size, apart)[:_PROBES]
+        moved = coefficients.copy()
+        moved[probes] += STEP
+        response = np.abs(predict(moved) - base)
+        size = (response / np.maximum(response.max(axis=0), 1e-300)).max(axis=1)  # (n,)
+        for probe in probes:
+            # A coefficient acts on intervals probe − DEGREE … probe of its support.
+            mine = (interval >= probe - DEGREE - apart // 4) & (interval < probe + 3 * apart // 4)
+            if not (mine.any() and size[mine].max() > 0.0):
+                continue
+            acts = size[mine] > _FORGOTTEN * size[mine].max()
+            seen, at = interval[mine][acts], t[mine][acts]
+            before = max(before, int(seen.max()) - int(probe))
+            after = max(after, int(probe) - DEGREE - int(seen.min()))
+            earlier = max(earlier, float(at[-1] - knots[min(probe + 1, spline.intervals)]))
+            later = max(later, float(knots[max(probe - DEGREE, 0)] - at[0]))
     if not spline.halvings:
         return Reach(before, after)
     # Where knots are closer than samples, the ends of a response lie between these.
