@@ -101,6 +101,8 @@ class Effect(ABC):
     """True where it shows only in recordings with a temperature."""
     tolerance: ClassVar[float] = 0.0
     """Standard deviation of each size that a good calibration leaves, in the unit of the sizes."""
+    level_error: ClassVar[float] = 0.0
+    """Standard deviation to which a level of a reading is found at best, in units of the reading's white noise."""
     of_one_recording: ClassVar[bool] = False
     """True where its phase is that of a clock no other recording shares: it does not predict another one."""
     of_wiring: ClassVar[bool] = False

@@ -334,6 +334,7 @@ class Hysteresis(Effect):
     place = "sensing"
     separated_by = "slow reversals of the rate"
     shape_limits: ClassVar = {"width_m_s2": (1e-3, 20.0)}
+    level_error = 0.2  # of the white noise of a reading: half-widths of ten narrow plays were off by that, rms
     inexactness = 0.01  # a play remembers the extremes of a motion that is only estimated
     other_units: ClassVar = {"width_m_s2": "m/s²"}
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -169,16 +170,44 @@ def explain(
     """
     tell = report or (lambda share, text: None)
     tell(0.05, "drive")
-    first: tuple[Drive, ...] = ()
-    if start is None:
-        reference = starting_point(stretches, policy.knots)
-        sets, first = _started(stretches, reference, policy), reference.drives
-    else:
+    if start is not None:
         sets = Sets(stretches, start, policy)
         sets.fit([start, replace(start, causes=())])
+        return _searched(sets, partial(_tell_part, tell, 0, 1))
+    reference = starting_point(stretches, policy.knots)
+    starts = _started(stretches, reference, policy)
+    found = []
+    for number, sets in enumerate(starts):
+        found.append(_searched(sets, partial(_tell_part, tell, number, len(starts))))
+    best = max(found, key=lambda one: one.best.log_posterior)
+    return replace(best, fits=sum(one.fits for one in found), by_reference=reference.drives)
+
+
+def _tell_part(tell: Report, number: int, count: int, share: float) -> None:
+    tell(0.1 + 0.8 * (number + share) / count, "search")
+
+
+def _started(stretches: Sequence[Stretch], reference: Point, policy: Policy) -> list[Sets]:
+    """Return sets under the roughness that channels and reference show without a cause; the noise not yet.
+
+    Where the drive bends sharply there are two: with closer knots, which can follow a cause that moves the table, and
+    with those of the reference.
+    """
+    sets = Sets(stretches, reference, policy)
+    nothing = sets.fit([sets.base])[0]
+    if nothing is None:
+        raise np.linalg.LinAlgError("the reference determines no drive")
+    point = learn_roughness(stretches, nothing.point, LEARNINGS)
+    closer = sharpened(stretches, point, policy)
+    return [_under(sets, one, [nothing]) for one in ((point,) if closer is point else (closer, point))]
+
+
+def _searched(sets: Sets, tell: Callable[[float], None]) -> Explanation:
+    """Screen, fit the leaders and learn the nuisances, until the most probable set repeats itself."""
+    stretches, policy = sets.stretches, sets.policy
     fits, seen = 0, set()
     for number in range(policy.rounds):
-        tell(0.1 + 0.8 * number / policy.rounds, f"search {number + 1}")
+        tell(number / policy.rounds)
         before = sets.best
         screening = screen(stretches, before.point)
         _fit_leaders(sets, screening, before, near=number > 0)
@@ -194,18 +223,7 @@ def explain(
         learnt = _relearned(stretches, best, policy, sharpen=best.key != before.key)
         sets = _under(sets, learnt, _near(sets, best))
     best = prune(sets)
-    found = explained(sets, best, fits + sets.count, screening if best.key == before.key else None)
-    return replace(found, by_reference=first)
-
-
-def _started(stretches: Sequence[Stretch], reference: Point, policy: Policy) -> Sets:
-    """Return sets under the roughness that channels and reference show without a cause; the noise not yet."""
-    sets = Sets(stretches, reference, policy)
-    nothing = sets.fit([sets.base])[0]
-    if nothing is None:
-        raise np.linalg.LinAlgError("the reference determines no drive")
-    point = sharpened(stretches, learn_roughness(stretches, nothing.point, LEARNINGS), policy)
-    return _under(sets, point, [nothing])
+    return explained(sets, best, fits + sets.count, screening if best.key == before.key else None)
 
 
 def _relearned(stretches: Sequence[Stretch], best: Fit, policy: Policy, *, sharpen: bool) -> Point:

@@ -111,7 +111,7 @@ def _is_full(explanation: Explanation, policy: Policy) -> bool:
     return len(causes) >= policy.most_causes and all(cause.family.inexactness == 0.0 for cause in causes)
 
 
-def named_causes(explanation: Explanation, fit: Fit, policy: Policy) -> list[NamedCause]:
+def named_causes(explanation: Explanation, fit: Fit, policy: Policy, left: LackOfFit | None = None) -> list[NamedCause]:
     """Return the causes of a fit as the verdict names them, the largest contribution first."""
     stretch, array = explanation.stretches[0], explanation.stretches[0].model.array
     spin = fit.point.drives[0].spin
@@ -125,7 +125,7 @@ def named_causes(explanation: Explanation, fit: Fit, policy: Policy) -> list[Nam
         share = channel_share(_seen(stretch, change[:, :-1]), array.channels)
         entry = name_cause(explanation, fit, cause, likely, array, share, policy)
         why = entry.why + _other_runs(cause, stretch, runs)
-        entry = replace(entry, why=why, std=_widened(explanation, fit, entry, cause, policy))
+        entry = replace(entry, why=why, std=_widened(explanation, fit, entry, cause, policy, left))
         entries.append((float(sum(value**2 for value in share.values())), capped(entry, policy, cause.shape)))
     return [entry for _, entry in sorted(entries, key=lambda pair: -pair[0])]
 
@@ -136,20 +136,31 @@ def _seen(stretch: Stretch, change: NDArray[np.float64]) -> NDArray[np.float64]:
     return change - (change @ np.linalg.pinv(axes).T) @ axes.T if isinstance(stretch, BodyStretch) else change
 
 
-def _widened(explanation: Explanation, fit: Fit, named: NamedCause, cause: Cause, policy: Policy) -> dict[str, float]:
+def _widened(
+    explanation: Explanation, fit: Fit, named: NamedCause, cause: Cause, policy: Policy, left: LackOfFit | None
+) -> dict[str, float]:
     """Widen standard deviations where a cause does not fit to the noise.
 
     All by the root of the misfit over the noise; where the model of the effect is a rough one, by the share of what it
-    explains that it may leave: a share ε of it is what an error of √ε of a parameter leaves.
+    explains that it may leave: a share ε of it is what an error of √ε of a parameter leaves. What is left is what all
+    squares together show, or the lack of fit, which sees less. A level of a reading is not found better than the
+    reading that gets there.
     """
     observations = sum(stretch.observations for stretch in explanation.stretches)
     beyond = fit.objective - observations - policy.excess_stds * np.sqrt(2.0 * observations)
     beyond = max(beyond, 0.0)
-    share = beyond / (beyond + max(explanation.nothing.objective - fit.objective, 1.0))
+    unexplained = 2.0 * left.log_odds if left is not None and left.log_odds > policy.lack_odds else 0.0
+    unexplained = max(beyond, unexplained)
+    share = unexplained / (unexplained + max(explanation.nothing.objective - fit.objective, 1.0))
     rough = np.sqrt(share + cause.family.inexactness) if cause.family.inexactness > 0.0 else 0.0
     values = {key: 1.0 if key in _TURNS else float(named.parameters.get(key, 0.0)) for key in named.std}
     wider = np.sqrt(1.0 + beyond / observations)
-    return {key: float(np.hypot(std * wider, rough * values[key])) for key, std in named.std.items()}
+    white = float(np.median(fit.point.levels[0].white[:-1])) if cause.family.inexactness > 0.0 else 0.0
+    level = getattr(cause.family, "level_error", 0.0) * white
+    return {
+        key: float(np.linalg.norm([std * wider, rough * values[key], level if key in cause.free_shape else 0.0]))
+        for key, std in named.std.items()
+    }
 
 
 def _other_runs(cause: Cause, stretch: Stretch, runs: int) -> str:
@@ -208,7 +219,7 @@ def conclude(
         *_noise_causes(None if unknown else understanding.walk, understanding, policy),
     ]
     rivals = conflicting(explanation, policy)
-    named = named_causes(explanation, explanation.best, policy)
+    named = named_causes(explanation, explanation.best, policy, left)
     believed = _believed(explanation, described, unknown=unknown)
     loudest = loudest_channel(explanation.stretches, believed.point, policy)
     apart = stands_out(explanation, left, policy)
