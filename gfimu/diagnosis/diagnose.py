@@ -229,7 +229,8 @@ class _Diagnosis:
                 carried, gain = (whole, gain) if better * samples > self._policy.ambiguous else (carried, alone)
             elif carried is not None and gain.share_in_any_recording <= 0.0:
                 carried = None
-            if gain.log_likelihood_per_sample > 0.0:
+            # Less than a tenth of the excess describes nothing.
+            if gain.log_likelihood_per_sample > 0.0 and not gain.share_of_excess_removed < self._policy.small:
                 described = Described(whole, carried)
                 break
             gain = Gain()
