@@ -19,13 +19,11 @@ from gfimu.motion.body_drive import BodyDrive
 from gfimu.parts.files import part_table
 from gfimu.short_repr import short_repr
 from gfimu.units import STANDARD_GRAVITY
-from gfimu.world_model import BasisUnits, BodyModel, EffectFamily, ExpectedNoise, Mode, Play, Ripple, Spin
+from gfimu.world_model import BasisUnits, BodyModel, EffectFamily, ExpectedNoise, Spin
 from gfimu.world_model import Effect as AnyEffect
 from sim import forward
 from sim.body import body_channels
 from sim.effects import BODY_EFFECTS, EFFECTS, ENCODER_EFFECTS, Effect, apply_effects, make_effect
-from sim.effects.mechanical import Cogging, Resonance
-from sim.effects.sensing import Hysteresis
 from sim.effects.unknown import UnknownTerm
 from sim.world import World
 
@@ -252,33 +250,6 @@ class Twin:
         """Return the true time that each chip's reading and, last, the reference belong to, shape (n, k + 1)."""
         world = self.world(effects)
         return np.column_stack([world.chip_times(t), t - world.tacho_delay])
-
-    def sensing_lag(self, effects: Sequence[AnyEffect] = ()) -> float:
-        """Return the time constant of the sensing chain's first-order lag, s."""
-        return float(sum(e.value("time_constant_s") for e in self._effects_with(effects) if e.name == "sensor_lag"))
-
-    def play(self, effects: Sequence[AnyEffect] = ()) -> Play | None:
-        """Return what holds a share of the readings, of several the largest; None where nothing does."""
-        plays = [effect for effect in self._effects_with(effects) if isinstance(effect, Hysteresis) and effect.share]
-        if not plays:
-            return None
-        largest = max(plays, key=lambda play: play.share)
-        own = tuple(effect for effect in self.effects if not isinstance(effect, Hysteresis))
-        others = [effect for effect in effects if not isinstance(effect, Hysteresis)]
-        return Play(largest.share, largest.value("lost_m_s2"), replace(self, effects=own), others, largest.last_moved)
-
-    def ripple(self, effects: Sequence[AnyEffect] = ()) -> Ripple | None:
-        """Return what the table ripples by once effects are added; None where nothing does, or several things do."""
-        ripples = [effect for effect in self._effects_with(effects) if isinstance(effect, Cogging)]
-        if len(ripples) != 1:
-            return None
-        own = tuple(effect for effect in self.effects if not isinstance(effect, Cogging))
-        others = [effect for effect in effects if not isinstance(effect, Cogging)]
-        return Ripple(ripples[0].steepness, replace(self, effects=own), others, ripples[0].rippled)
-
-    def modes(self, effects: Sequence[AnyEffect] = ()) -> tuple[Mode, ...]:
-        """Return what rings between the table and the cube once effects are added."""
-        return tuple(effect.mode for effect in self._effects_with(effects) if isinstance(effect, Resonance))
 
     def reference_gain(self, effects: Sequence[AnyEffect] = ()) -> float:
         """Return what the reference reads per unit of motion once effects are added, relative to the twin's own."""

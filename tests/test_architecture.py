@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import gfimu
-from gfimu.world_model import BodyModel, ModelWithModes, ModelWithPlay, ModelWithRipple
+from gfimu.world_model import BodyModel
 from sim.twin import Twin
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -139,9 +139,8 @@ def test_no_cast_makes_a_twin_a_world_model():
 
 def test_a_twin_is_a_world_model_without_any():
     """`sim/twin.py` lets the type checker prove it; ``Any`` in a signature would make that proof empty."""
-    protocols = (BodyModel, ModelWithModes, ModelWithPlay, ModelWithRipple)
-    methods = {name for protocol in protocols for name in dir(protocol) if not name.startswith("_")}
-    assert {"predict", "predict_body", "families", "play", "ripple", "modes", "extended"} <= methods
+    methods = {name for name in dir(BodyModel) if not name.startswith("_")}
+    assert {"predict", "predict_body", "families", "extended"} <= methods
     untyped = [
         name
         for name in methods

@@ -87,9 +87,6 @@ class Policy:
         Isolated bad samples that happen in any recording [count]. By choice.
     spike_share : float
         Share of all samples that they may be where that is more [1]. By choice.
-    body_spike_share : float
-        Share of isolated bad samples of a free body beyond which they are no faults [1]. By choice: it moves faster
-        than the samples follow.
     stds : float
         Standard errors beyond which a figure counts: held-out gains, sizes over their uncertainty [1]. By choice: one
         in twenty by chance.
@@ -99,7 +96,9 @@ class Policy:
     excess_stds : float
         Standard errors of the squares of noise from which a misfit is in excess [1]. By choice.
     least_share : float
-        Share of the held-out excess below which causes are withdrawn [1]. By choice: they miss more than they explain.
+        Share that is too little [1]: of the held-out excess, below which causes are withdrawn; of the prior's
+        information that the data of a free body add, below which a combination of sizes stays at zero. By choice: more
+        is missed than explained, or the prior says more than the data.
     sizeable : float
         Share that is worth a sentence, or a change of the noise [1]: of the range of the noise power over six parts of
         the samples, of a residual that follows a quantity, of the gain that unseen data lack. Set beyond what the
@@ -107,7 +106,8 @@ class Policy:
     small : float
         Share that is a small one [1]: of the log odds of a round's best term, of the excess of causes that explain it
         whole, of an rms beyond the noise, of the probability of a cause that no size of it shows, of the misfit beside
-        right causes of a free body. By choice: a tenth.
+        right causes of a free body, of the scale of an angular acceleration that a gyro hardly follows, of the largest
+        weight in a combination of sizes. By choice: a tenth.
     dominant : float
         Share of what causes explain from which a lack of fit refutes them, and below which a round of terms, or a
         correlation, is negligible [1]. Set by the right causes of simulated runs, which leave less.
@@ -125,23 +125,10 @@ class Policy:
         hidden in the runs ``faint`` of `sim.study` the most likely.
     most_certain : float
         Largest probability that is reported [1]. Set by `sim.study`: of causes surer than this, 3 of 1000 were wrong.
-    least_information, body_information : float
-        Information of the data over that of the prior below which a combination of sizes stays at zero: that of all
-        chips of a free body passes for its specific force.
-    nested : bool
-        Whether a set may have an effect beside one that can do all that it does (``contained_in``): on a free body
-        both together mean nothing.
-    coincide : bool
-        Whether several causes that miss part of the held-out excess are taken for a coincidence beside a lack of fit:
-        real hands leave more than the share ``dominant`` beside what is right.
-    grown, body_grown : int
-        Best effects by which the present set, and the set without each of its causes, is grown beside the sets that
-        lead in a linear world: with many causes those are far from the point, and what they promise comes true less.
-    halvings : int
-        How often knot intervals of a drive may be halved.
-    blur : float
-        Standard deviations of all observations of a sample together from which what a drive misses of an angular
-        acceleration is worth closer knots.
+    free_body : bool
+        Whether the thresholds are those of a free body, whose drive nothing is known of [1]. Set by `of_body`. What all
+        its chips share then passes for specific force; an effect means nothing beside one that can do all it does; sets
+        have many causes, so that they grow from the present one; and causes that miss a little are no coincidence.
     """
 
     beam: int = 6
@@ -171,9 +158,6 @@ class Policy:
     chance: float = 1e-3
     spikes: float = 3.0
     spike_share: float = 1e-4
-    halvings: int = 5
-    blur: float = 0.5
-    body_spike_share: float = 2e-3
     stds: float = 2.0
     noise_stds: float = 3.0
     excess_stds: float = 4.0
@@ -186,12 +170,7 @@ class Policy:
     block_angle_std: float = 5e-3
     temperature: float = 1.2
     most_certain: float = 0.997
-    least_information: float = 0.0
-    body_information: float = 0.5
-    nested: bool = True
-    coincide: bool = True
-    grown: int = 0
-    body_grown: int = 3
+    free_body: bool = False
 
     @property
     def ambiguous(self) -> float:
@@ -223,6 +202,21 @@ class Policy:
         """As ``dominant``, of a free body: real hands, wheels and belts leave up to a tenth beside what is right."""
         return self.small
 
+    @property
+    def body_spike_share(self) -> float:
+        """Share of isolated bad samples of a free body beyond which they are no faults: samples lag behind a hand."""
+        return 20.0 * self.spike_share
+
+    @property
+    def least_information(self) -> float:
+        """Information over the prior's below which a combination of sizes stays at zero; on a table none."""
+        return self.least_share if self.free_body else 0.0
+
+    @property
+    def motion_odds(self) -> float:
+        """Log odds that noise which grows with the motion needs: thrice a lack of fit, as loud samples gather."""
+        return 3.0 * self.lack_odds
+
     def of_body(self) -> Policy:
         """Return the thresholds for a free body."""
         return replace(
@@ -230,8 +224,5 @@ class Policy:
             most_causes=self.body_causes,
             rounds=self.body_rounds,
             dominant=self.body_dominant,
-            least_information=self.body_information,
-            nested=False,
-            coincide=False,
-            grown=self.body_grown,
+            free_body=True,
         )

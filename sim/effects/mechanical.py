@@ -11,10 +11,9 @@ from scipy.spatial.transform import Rotation
 
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.units import NUMBER, RATIO
-from gfimu.world_model import Mode
 from sim.effects.base import LARGEST_TURN, Effect, Pattern, Size, chip_patterns
 from sim.effects.scans import mode_shapes, order_shapes, per_acceleration
-from sim.effects.table_dynamics import SERVO_STIFFNESS, RippledSpin, TwistingSpin
+from sim.effects.table_dynamics import Mode, RippledSpin, TwistingSpin
 from sim.motion import SpinMotion
 from sim.world import Nod, World
 
@@ -317,11 +316,6 @@ class Cogging(Effect):
         """Return the units of the contract's keys, amplitude and phase instead of the sizes."""
         return dict(cls.other_units)
 
-    @property
-    def steepness(self) -> float:
-        """Most that its torque changes with the angle, relative to the servo's."""
-        return abs(self.value("amplitude_rad_s2")) * self.value("order", 1.0) / SERVO_STIFFNESS
-
     def rippled(self, motion: SpinMotion, t: NDArray[np.float64]) -> RippledSpin:
         """Return the table's motion under a command over times (n,), s."""
         return RippledSpin(motion, t, self.value("amplitude_rad_s2"), self.value("order", 1.0), self.value("phase_rad"))
@@ -377,6 +371,6 @@ class Resonance(Effect):
         mode = self.mode
 
         def step(motion: SpinMotion, t: NDArray[np.float64]) -> SpinMotion:
-            return TwistingSpin(motion, t, mode.gain, mode.natural, mode.damping)
+            return TwistingSpin(motion, t, mode)
 
         return world.changed(mount_steps=(*world.mount_steps, step))

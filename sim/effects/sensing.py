@@ -311,21 +311,6 @@ def _play(readings: NDArray[np.float64], width: float) -> NDArray[np.float64]:
     return out
 
 
-@njit(cache=True)
-def _last_moved(readings: NDArray[np.float64], width: float) -> NDArray[np.intp]:
-    """Return the sample at which the play of half-width ``width`` was last moved, for every column."""
-    out = np.zeros(readings.shape, dtype=np.intp)
-    for column in range(readings.shape[1]):
-        state = readings[0, column]
-        moved = 0
-        for row in range(readings.shape[0]):
-            low, high = readings[row, column] - width, readings[row, column] + width
-            if state < low or state > high:
-                state, moved = min(max(state, low), high), row
-            out[row, column] = moved
-    return out
-
-
 class Hysteresis(Effect):
     """Play in the reading: it follows the specific force only after the play is taken up."""
 
@@ -365,10 +350,6 @@ class Hysteresis(Effect):
     def share(self) -> float:
         """Share of a reading that the play holds."""
         return self.value("lost_m_s2") / self._width
-
-    def last_moved(self, readings: NDArray[np.float64]) -> NDArray[np.intp]:
-        """Return the sample (n, c) at which the play of each reading (n, c) before it was last moved."""
-        return _last_moved(np.ascontiguousarray(readings), self._width)
 
 
 class GainDrift(Effect):

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
-from gfimu.diagnosis.criticism.series_tests import LackOfFit
+from gfimu.diagnosis.criticism.series_tests import SLOWEST_LINE, LackOfFit
 from gfimu.diagnosis.data.body.stretch import BodyStretch
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.terms.hand.drive import HandDrive
@@ -19,7 +19,6 @@ from gfimu.geometry.kinematics import omega_products
 __all__ = ["body_functions", "motion_noise", "tone"]
 
 _STEPS = 8  # numerical: parts of a run at whose edges a step is looked for
-_LOWEST_TONE = 1.0  # numerical: Hz; below it slow noise and the motion are free
 _WINDOW = 1024  # numerical: samples in which an oscillator that is not steady is a line
 _NEIGHBOURS = 41  # numerical: frequencies about a line that give its background
 _DISAGREE = "every channel: disagreement per rate of change of the reading, s"
@@ -74,7 +73,7 @@ def tone(at: HandPosterior, policy: Policy) -> LackOfFit:
         pieces = left[: count * length].reshape(count, length, -1)
         power = np.abs(np.fft.rfft(pieces - pieces.mean(axis=1, keepdims=True), axis=1)) ** 2 / length
         frequency = np.fft.rfftfreq(length, stretch.run.sample_period)
-        high = frequency >= max(_LOWEST_TONE, 8.0 / (length * stretch.run.sample_period))
+        high = frequency >= max(SLOWEST_LINE, 8.0 / (length * stretch.run.sample_period))
         power = power[:, high]
         level = np.maximum(np.median(power, axis=1, keepdims=True) / np.log(2.0), 1e-12)
         # A line stands out of its neighbourhood; a motion that is not fully followed raises whole bands.

@@ -47,7 +47,6 @@ JERK = "jerk"
 """Derivative of the angular acceleration, beside the functions of `gfimu.generic_basis`."""
 _NAMES = (*FUNCTIONS, JERK)
 _LEAST_RMS, _LEAST_JERK = 1e-6, 1e-12  # numerical: of a function that is not constant
-_LEAST_INFORMATION = 1e-9  # numerical
 _RIDGE = 1e-2  # numerical: of the coefficients that are reported
 _LEAST_COEFFICIENT = 1e-3  # numerical: in units of UNIT
 

@@ -17,9 +17,9 @@ from gfimu.diagnosis.terms.observed import Observed
 from gfimu.generic_basis import step_at
 from gfimu.world_model import SpinState
 
-__all__ = ["LackOfFit", "changing_noise", "jumps", "lines"]
+__all__ = ["SLOWEST_LINE", "LackOfFit", "changing_noise", "jumps", "lines"]
 
-_SLOWEST_LINE = 1.0  # numerical: Hz; below it slow noise and the drive are free
+SLOWEST_LINE = 1.0  # numerical: Hz; below it slow noise and the drive are free
 _LEAST_LINE_LEVEL = 0.7  # numerical: white noise in its own units has a level of 1
 _WIDTHS = (1.0, 2.0)  # numerical: s, of the means that are compared at a jump
 _FEWEST_WIDTHS = 12  # numerical: in a stretch, for the usual size of such differences
@@ -82,8 +82,8 @@ def lines(stretch: Stretch, seen: Observed) -> LackOfFit:
     n = len(whitened)
     power = np.abs(np.fft.rfft(whitened, 2 * n, axis=0)) ** 2 / n
     frequency = np.fft.rfftfreq(2 * n, stretch.run.sample_period)
-    power[frequency < max(_SLOWEST_LINE, 4.0 / stretch.run.duration)] = 0.0
-    level = np.median(power[frequency >= _SLOWEST_LINE], axis=0) / np.log(2.0)
+    power[frequency < max(SLOWEST_LINE, 4.0 / stretch.run.duration)] = 0.0
+    level = np.median(power[frequency >= SLOWEST_LINE], axis=0) / np.log(2.0)
     power = power / np.maximum(level, _LEAST_LINE_LEVEL)
     place, number = np.unravel_index(int(np.argmax(power)), power.shape)
     one = float(power[place, number]) - float(np.log(n * power.shape[1]))

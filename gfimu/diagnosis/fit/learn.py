@@ -44,6 +44,8 @@ LEARNINGS = 3
 """Numerical: rounds of the fixed point of the roughness."""
 _LEAST_VALID = 0.01  # numerical: share of the samples that count
 _LEAST_WIDTH = 0.4  # numerical: sample periods of a knot interval that is cut
+_HALVINGS = 5  # numerical: of a knot interval
+_BLUR = 0.5  # numerical: standard deviations that a drive misses in an interval that is worth a try
 _REFERENCE_ROUNDS = 5  # numerical: to the roughness of a drive from its reference alone
 
 
@@ -108,9 +110,9 @@ def sharpened(stretches: Sequence[Stretch], point: Point, policy: Policy) -> Poi
     best = [_log_evidence(one) for one in now.posteriors]
     gaining = np.ones(len(drives), dtype=bool)
     found, excess = point, now.objective / observations - 1.0
-    for _ in range(policy.halvings):
+    for _ in range(_HALVINGS):
         cuts = [
-            drive.cut(_is_blurred(drive, stretch, levels, acuity, policy) & again)
+            drive.cut(_is_blurred(drive, stretch, levels, acuity) & again)
             for drive, stretch, levels, acuity, again in zip(
                 drives, stretches, point.levels, acuities, gaining, strict=True
             )
@@ -136,15 +138,13 @@ def _log_evidence(posterior: Posterior) -> float:
     return posterior.log_volume - 0.5 * posterior.objective
 
 
-def _is_blurred(
-    drive: Drive, stretch: Stretch, levels: NoiseLevels, acuity: float, policy: Policy
-) -> NDArray[np.bool_]:
+def _is_blurred(drive: Drive, stretch: Stretch, levels: NoiseLevels, acuity: float) -> NDArray[np.bool_]:
     """Tell in which intervals (k,) of a drive the observations show what its spline misses."""
     missed, widths = drive.missed, drive.spline.widths
     # It goes to and fro once per interval.
     misread = missed * (widths / (2.0 * np.pi)) ** (2 if stretch.is_angle else 1)
     seen = np.hypot(missed * acuity, misread / stretch.steps.reference_noise(float(levels.white[-1])))
-    return (seen > policy.blur) & (widths > _LEAST_WIDTH * stretch.run.sample_period)
+    return (seen > _BLUR) & (widths > _LEAST_WIDTH * stretch.run.sample_period)
 
 
 def _acuity(stretch: Stretch, drive: Drive, levels: NoiseLevels) -> float:

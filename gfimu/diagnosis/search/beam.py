@@ -18,6 +18,7 @@ from gfimu.diagnosis.terms.cause import ALIKE, Cause
 
 __all__ = ["STARTS", "Blocks", "Candidate", "grown_sets", "leading_sets"]
 
+_GROWN = 3  # numerical: best effects by which a set is grown
 _FRONT, _PARTNERS = 8, 30  # numerical: sets that are grown, and how many of the best partners of each are scored
 STARTS = 3  # numerical: optima over the shapes of an effect from which the best set is fitted again
 
@@ -124,7 +125,7 @@ def leading_sets(blocks: Blocks, most: int, policy: Policy) -> list[Candidate]:
             added = blocks.log_odds_each(candidate.members)
             for number in np.argsort(-added)[:_PARTNERS]:
                 members = tuple(sorted((*candidate.members, int(number))))
-                if names[number] in taken or (not policy.nested and _nested(blocks.hypotheses, members)):
+                if names[number] in taken or (policy.free_body and _nested(blocks.hypotheses, members)):
                     continue
                 if members not in grown:
                     grown[members] = Candidate(blocks.log_odds(members), members)
@@ -136,16 +137,16 @@ def leading_sets(blocks: Blocks, most: int, policy: Policy) -> list[Candidate]:
     return list(islice(worth, policy.beam))
 
 
-def grown_sets(blocks: Blocks, members: tuple[int, ...], count: int, policy: Policy) -> list[Candidate]:
+def grown_sets(blocks: Blocks, members: tuple[int, ...], policy: Policy) -> list[Candidate]:
     """Return a set with each of the effects that add most to it, each at its best place and shape, best first."""
     names = [h.cause.name for h in blocks.hypotheses]
     found: dict[str, Candidate] = {}
     for number in np.argsort(-blocks.log_odds_each(members)):
         grown = tuple(sorted((*members, int(number))))
         taken = {names[member] for member in members}
-        if names[number] not in taken and (policy.nested or not _nested(blocks.hypotheses, grown)):
+        if names[number] not in taken and not (policy.free_body and _nested(blocks.hypotheses, grown)):
             found.setdefault(names[number], Candidate(blocks.log_odds(grown), grown))
-        if len(found) == count:
+        if len(found) == _GROWN:
             break
     return list(found.values())
 

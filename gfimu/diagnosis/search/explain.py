@@ -215,7 +215,7 @@ def _searched(sets: Sets, tell: Callable[[float], None]) -> Explanation:
         if leader.key not in seen:
             _fit_other_shapes(sets, leader)
         # While a set still grows its noise is that of the largest: a smaller one would pass for more noise.
-        best = sets.best if policy.grown and sets.best.key not in seen else prune(sets)
+        best = sets.best if policy.free_body and sets.best.key not in seen else prune(sets)
         fits += sets.count
         if number > 0 and best.key in seen:
             break
@@ -318,8 +318,9 @@ def _fit_leaders(sets: Sets, screening: Screening, about: Fit, *, near: bool) ->
     if near and candidates:
         least = max(least, candidates[0].log_odds - policy.close)
     leaders = [one for one in candidates if one.log_odds >= least]
-    for members in _about(blocks, about.causes) if policy.grown else ():
-        leaders += grown_sets(blocks, members, policy.grown, policy)
+    # With many causes the leaders are far from the point, and what they promise comes true less.
+    for members in _about(blocks, about.causes) if policy.free_body else ():
+        leaders += grown_sets(blocks, members, policy)
     for candidate in leaders:
         causes = blocks.causes(candidate.members)
         moves = screening.drive_moves(candidate.members, causes)

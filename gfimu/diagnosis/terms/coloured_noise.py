@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from gfimu.diagnosis.data.cosine_basis import CosineBasis
 from gfimu.diagnosis.policy import Policy
 
-__all__ = ["estimate_flicker", "likeliest_flicker", "white_level"]
+__all__ = ["FLICKER_GRID", "estimate_flicker", "likeliest_flicker", "white_level"]
 
-_FLICKER_GRID = 9.80665e-3 * np.geomspace(0.02, 3.0, 22)  # numerical: grid of bias instability, m/s²
+FLICKER_GRID = 9.80665e-3 * np.geomspace(0.02, 3.0, 22)  # numerical: grid of bias instability, m/s²
 
 
 def white_level(coefficients: NDArray[np.float64], slowest: float, period: float) -> NDArray[np.float64]:
@@ -67,11 +67,11 @@ def likeliest_flicker(
     fixed : ndarray, shape (K, c) or (K, 1), or float
         Variances that they have besides.
     """
-    likelihood = np.empty((len(_FLICKER_GRID), power.shape[1]))
-    for row, level in enumerate(_FLICKER_GRID):
+    likelihood = np.empty((len(FLICKER_GRID), power.shape[1]))
+    for row, level in enumerate(FLICKER_GRID):
         spectrum = white**2 + (shape * level**2 + fixed)
         likelihood[row] = -0.5 * np.sum(np.log(spectrum) + power / spectrum, axis=0)
-    grid = np.log(_FLICKER_GRID)
+    grid = np.log(FLICKER_GRID)
     tie = -0.5 * ((grid[:, None] - grid[None, :]) / Policy.channel_spread) ** 2  # channel level against common level
     joint = likelihood[:, None, :] + tie[:, :, None]  # (channel level, common level, c)
     top = joint.max(axis=0)
@@ -80,4 +80,4 @@ def likeliest_flicker(
     best = int(np.argmax(common))
     weight = joint[:, best, :] - joint[:, best, :].max(axis=0)
     weight = np.exp(weight) / np.exp(weight).sum(axis=0)
-    return np.asarray(np.sqrt(weight.T @ _FLICKER_GRID**2))
+    return np.asarray(np.sqrt(weight.T @ FLICKER_GRID**2))

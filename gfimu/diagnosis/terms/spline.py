@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from math import factorial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,8 +19,6 @@ DEGREE = 4
 """Numerical: of the spline of the angle. Its fourth derivative, which the prior acts on, is constant between knots."""
 _REMEMBERED = 8  # numerical: time axes whose states a motion keeps
 _ROUNDS = 4  # numerical: to a spline through a motion
-_STENCIL = np.array([1.0, -4.0, 6.0, -4.0, 1.0])
-_FACTORIALS = np.array([1.0, 1.0, 2.0, 6.0, 24.0])
 
 
 @dataclass(frozen=True)
@@ -135,8 +134,8 @@ class AngleSpline:
     def stencil(self) -> NDArray[np.float64]:
         """What the fourth derivative of the angle in each interval takes of five coefficients, (k, 5)."""
         if not self.halvings:
-            return np.tile(_STENCIL / self.spacing**DEGREE, (self.intervals, 1))
-        return np.asarray(_FACTORIALS[DEGREE] * self.pieces[:, DEGREE] / self.widths[:, None] ** DEGREE)
+            return np.tile(np.diff(np.eye(DEGREE + 1), DEGREE, axis=0) / self.spacing**DEGREE, (self.intervals, 1))
+        return np.asarray(factorial(DEGREE) * self.pieces[:, DEGREE] / self.widths[:, None] ** DEGREE)
 
     def bend(self, coefficients: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the fourth derivative of the angle in each interval (k,), rad/s⁴, of coefficients (m,)."""
@@ -153,7 +152,7 @@ class AngleSpline:
         coefficients and mean the same whatever the knots: in these a prior can be compared between splines.
         """
         first = (self.pieces if not self.halvings else self.pieces[0])[:DEGREE, :DEGREE]
-        begin = first * (_FACTORIALS[:DEGREE] / self.widths[0] ** np.arange(DEGREE))[:, None]
+        begin = first * np.array([[factorial(order) / self.widths[0] ** order] for order in range(DEGREE)])
         return float(np.log(self.stencil[:, -1]).sum() + np.linalg.slogdet(begin)[1])
 
     def through(self, spin: Spin) -> NDArray[np.float64]:

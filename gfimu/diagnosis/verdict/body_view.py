@@ -14,7 +14,7 @@ from gfimu.motion.attitude import from_rotation, integrate_attitude, to_rotation
 
 __all__ = ["body_noise_floor", "body_view"]
 
-_SLOW_SHARE = 0.6  # of bias instability that a run shows about its mean
+_SLOW_SHARE = 0.6  # numerical: of bias instability, about the mean of a run of a minute, by its spectrum
 
 
 def body_view(before: HandPosterior, after: HandPosterior) -> RunView:

@@ -97,9 +97,12 @@ def is_dominant(explanation: Explanation, left: LackOfFit, policy: Policy) -> bo
 
 def is_unknown(explanation: Explanation, left: LackOfFit, gain: Gain, policy: Policy) -> bool:
     """Tell whether the causes are not to be believed, their gain on held-out data being known."""
-    # Several causes that together still miss something, and a share of held-out data, coincide by chance.
+    # Several causes that together still miss something, and a share of held-out data, coincide by chance. Real hands
+    # leave more beside what is right.
     missed = (
-        policy.coincide and len(explanation.best.causes) > 1 and gain.share_of_excess_removed < 1.0 - policy.dominant
+        not policy.free_body
+        and len(explanation.best.causes) > 1
+        and gain.share_of_excess_removed < 1.0 - policy.dominant
     )
     doubtful = missed or _is_full(explanation, policy) or is_dominant(explanation, left, policy)
     return doubtful and (_depends(explanation, left, policy) or not explanation.best.causes)

@@ -15,14 +15,14 @@ from numpy.typing import NDArray
 from scipy.linalg import qr
 
 from gfimu.diagnosis.fit.gauss_newton import determined
+from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.screening import Screening, Signature
 from gfimu.geometry.array import AccelerometerArray
 
 __all__ = ["Undetermined", "undetermined", "undetermined_sentence"]
 
-_LEAST_WEIGHT = 0.1  # of the largest in a combination
-_ALIKE = 0.15  # by which weights of sizes that move alike may differ
-_LISTED = 3  # combinations in a sentence
+_ALIKE = 0.15  # numerical: by which weights may differ that one word is enough for
+_LISTED = 3  # numerical: combinations in a sentence
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ def _of_effect(
     plain *= [size.prior_std for size in sizes]
     out = []
     for row in plain / plain[np.arange(len(plain)), np.argmax(np.abs(plain), axis=1)][:, None]:
-        keep = np.abs(row) > _LEAST_WEIGHT
+        keep = np.abs(row) > Policy.small
         combination = {size.key: round(float(w), 3) for size, w, on in zip(sizes, row, keep, strict=True) if on}
         out.append(Undetermined(str(signature.family.name), combination))
     return out

@@ -9,7 +9,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from gfimu.diagnosis.criticism.gate import impossible_sizes, judge
 from scipy.ndimage import gaussian_filter1d
 
 from gfimu.diagnosis.criticism.gain import Gain
@@ -20,6 +19,7 @@ from gfimu.diagnosis.terms.hand.drive import HandDrive
 from gfimu.diagnosis.terms.hand.learning import first_noise
 from gfimu.diagnosis.terms.hand.noise import Projection
 from gfimu.diagnosis.terms.hand.posterior import condition_hand
+from gfimu.diagnosis.verdict.gate import impossible_sizes, judge
 from gfimu.diagnosis.verdict.verdict import NamedCause, Residual
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray, Chip

@@ -14,8 +14,13 @@ from gfimu.diagnosis.data.time_grid import time_grid
 from gfimu.recording import Recording
 from gfimu.world_model import WorldModel
 
-__all__ = ["BodyRun", "prepare_body_run"]
+__all__ = ["AVERAGING", "REST_FLOOR", "BodyRun", "prepare_body_run"]
 
+REST_FLOOR = 5e-3
+"""What rest may leave in the magnitude of the specific force, m/s²."""
+AVERAGING = 1.5
+"""How long chips or gyro may average, sample periods."""
+_BIAS_STD = (0.005, 0.1)  # rad/s: of the gyro's bias after a rest, without one
 _REST_WINDOW_S = 0.4
 _SHORTEST_REST_S = 1.0
 _TURNING = 0.2  # rad/s: faster is no rest, whatever the gyro's bias
@@ -49,6 +54,11 @@ class BodyRun(Run):
     gyro_valid: NDArray[np.bool_]
     gyro_bias: NDArray[np.float64]
     rest: NDArray[np.bool_]
+
+    @property
+    def gyro_bias_std(self) -> float:
+        """How uncertain the bias of the gyro is, rad/s."""
+        return _BIAS_STD[0 if self.rest.any() else 1]
 
 
 def prepare_body_run(recording: Recording, model: WorldModel, *, name: str = "run") -> BodyRun:

@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.diagnosis.data.body.stretch import BodyStretch
+from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.terms.cause import Cause, effects_of
+from gfimu.diagnosis.terms.coloured_noise import FLICKER_GRID
 from gfimu.diagnosis.terms.columns import Columns
 from gfimu.diagnosis.terms.hand.drive import HandDrive
 from gfimu.diagnosis.terms.hand.noise import BodyNoise, Projection, learn_motion_noise, white_from_rows
@@ -18,14 +20,11 @@ from gfimu.diagnosis.terms.library import cause_columns, family_columns
 
 __all__ = ["first_noise", "learnt_noise"]
 
-_FLICKER_GRID = 9.80665e-3 * np.geomspace(0.02, 3.0, 22)
-_FLICKER_PRIOR, _FLICKER_SPREAD = 9.80665e-3 * 0.2, np.log(3.3)
-
 
 def first_noise(stretch: BodyStretch) -> BodyNoise:
     """Return the noise to begin with: the data sheet's."""
     white = np.where(stretch.alive, stretch.model.expected_noise(1.0 / stretch.run.sample_period).white, np.inf)
-    return BodyNoise.of(white, _FLICKER_PRIOR / 4, stretch.run.acceleration_error)
+    return BodyNoise.of(white, Policy.usual_flicker / 4, stretch.run.acceleration_error)
 
 
 def learnt_noise(stretch: BodyStretch, drive: HandDrive, causes: Sequence[Cause], levels: BodyNoise) -> BodyNoise:
@@ -71,7 +70,7 @@ def _instability(at: HandPosterior, columns: Columns) -> float:
     likelihood = [
         0.5 * np.sum(level**2 * power / (1 + level**2 * values))
         - 0.5 * np.sum(np.log1p(level**2 * values))
-        - 0.5 * ((np.log(level) - np.log(_FLICKER_PRIOR)) / _FLICKER_SPREAD) ** 2
-        for level in _FLICKER_GRID
+        - 0.5 * ((np.log(level) - np.log(Policy.usual_flicker)) / Policy.flicker_spread) ** 2
+        for level in FLICKER_GRID
     ]
-    return float(_FLICKER_GRID[int(np.argmax(likelihood))])
+    return float(FLICKER_GRID[int(np.argmax(likelihood))])

@@ -14,18 +14,17 @@ from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from gfimu.diagnosis.data.cosine_basis import NoiseLevels
+from gfimu.diagnosis.policy import Policy
 from gfimu.geometry.array import AccelerometerArray
 
 __all__ = ["BodyNoise", "Projection", "learn_motion_noise", "white_from_rows"]
 
-_AGITATION_GRID = np.concatenate([[0.0], np.geomspace(2e-5, 2e-2, 31)])
-_SLOPE_GRID = np.concatenate([[0.0], np.geomspace(1e-3, 3.0, 22)])
-_FLOOR_GRID = np.concatenate([[0.0], np.geomspace(1e-2, 3e2, 19)])
-_RATIO_SPREAD, _MODEL_ERROR = 0.5, 0.02
-_WORTH = 30.0
-_QUIET = 0.34
+_AGITATION_GRID = np.concatenate([[0.0], np.geomspace(2e-5, 2e-2, 31)])  # numerical: s
+_SLOPE_GRID = np.concatenate([[0.0], np.geomspace(1e-3, 3.0, 22)])  # numerical: rad/s² per m/s³
+_FLOOR_GRID = np.concatenate([[0.0], np.geomspace(1e-2, 3e2, 19)])  # numerical: rad/s²
+_RATIO_SPREAD = 0.5  # numerical: holds ratios of channels that few combinations hardly tell apart
+_QUIET, _FEWEST_QUIET = 0.34, 200  # numerical: share of the samples that change least, and how many they have to be
 _LEAST_POWER = 1e-9  # numerical: of the loudest row, below which a row is rounding errors
-_FEWEST_QUIET = 200
 
 
 @dataclass(frozen=True)
@@ -136,7 +135,9 @@ def white_from_rows(
     alive = power > _LEAST_POWER * power.max(initial=0.0)
     mixing = projector[np.ix_(alive, alive)] ** 2 * expected[alive] ** 2
     scale = power[alive].sum() / mixing.sum()
-    error = power[alive] * (np.sqrt(3.0 / max(int(quiet.sum()), 1)) + _MODEL_ERROR)
+    error = power[alive] * (
+        np.sqrt(3.0 / max(int(quiet.sum()), 1)) + 2.0 * Policy.noise_accuracy
+    )  # of a power, twice that of a level
     count = len(error)
     design = np.vstack([scale * mixing / error[:, None], np.eye(count) / _RATIO_SPREAD])
     ratio, _ = nnls(design, np.concatenate([power[alive] / error, np.ones(count) / _RATIO_SPREAD]))
@@ -166,9 +167,10 @@ def learn_motion_noise(
     free = np.setdiff1d(projection.alive, np.arange(3))
     power, count = np.sum(second[:, free] ** 2, axis=1), len(free)
     # Neighbouring second differences share samples: about half of them are news.
+    worth = Policy().motion_odds
     values = [_likelihood(power, count, 1.0 + (tau * d / typical) ** 2) / 2 for tau in _AGITATION_GRID]
     best = int(np.argmax(values))
-    if values[best] - values[0] < _WORTH:
+    if values[best] - values[0] < worth:
         best = 0
     agitation, gain = float(_AGITATION_GRID[best]), values[best] - values[0]
     common = 1.0 + (agitation * d / typical) ** 2
@@ -188,7 +190,7 @@ def learn_motion_noise(
     )
     still = int(np.argmax(table[:, 0]))
     floor_place, slope_place = np.unravel_index(int(np.argmax(table)), table.shape)
-    if table.max() - table[still, 0] < _WORTH:
+    if table.max() - table[still, 0] < worth:
         floor_place, slope_place = np.intp(still), np.intp(0)
     gain += float(table[floor_place, slope_place] - table[still, 0])
     return replace(

@@ -21,7 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_solve, solve_triangular
 
+from gfimu.diagnosis.data.body.run import AVERAGING, REST_FLOOR
 from gfimu.diagnosis.data.body.stretch import BodyStretch
+from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.terms.columns import Columns
 from gfimu.diagnosis.terms.hand.drive import HandDrive
 from gfimu.diagnosis.terms.hand.noise import BodyNoise, Projection
@@ -30,15 +32,11 @@ from gfimu.world_model import Effect
 
 __all__ = ["HandPosterior", "condition_hand"]
 
-_REST_FLOOR = 5e-3  # m/s²: what "at rest" may leave in the magnitude of the specific force
-_GYRO_BIAS = (0.005, 0.1)  # rad/s: uncertain after a rest, without one
-_UNTRUE = 0.1  # share of the angular acceleration that may be out of scale where the gyro misses much of it
-_AVERAGING = 1.5  # sample periods: how long chips or gyro may average
 _FORCE_STEPS = 6  # numerical
 _FORCE_DONE = 0.02  # numerical: of the white noise
 _BLOCK_S, _MOST_BLOCKS = 0.5, 128  # numerical: block of time, s, of the test of the noise
 _SEEN = 1e-9  # numerical: of the strongest direction
-_TAKEN = 6  # combinations of the channels that the drive takes
+_TAKEN = 6  # numerical: combinations of the channels that the drive takes
 
 
 @dataclass(frozen=True)
@@ -132,7 +130,7 @@ class HandPosterior:
         up = force / np.maximum(size, 1e-9)[:, None]
         count = np.maximum(self.stretch.count, 1)
         spread = np.einsum("mi,ij,mj->m", up, self.jacobian.force_covariance, up) / count
-        weight = np.where(self.stretch.resting, 1.0 / np.sqrt(spread + _REST_FLOOR**2), 0.0)
+        weight = np.where(self.stretch.resting, 1.0 / np.sqrt(spread + REST_FLOOR**2), 0.0)
         # The specific force takes back what a change of the prediction along gravity would add.
         row = (up @ self.jacobian.to_force) * -weight[:, None]
         return row, (self.stretch.model.local_gravity - size) * weight
@@ -223,7 +221,7 @@ class HandPosterior:
         """What errors of the motion change in the prediction, in units of their prior, each (n, c), m/s²."""
         stretch, spin = self.stretch, self.drive.spin
         base = stretch.channels(self.effects, spin)
-        prior = _GYRO_BIAS[0 if stretch.run.rest.any() else 1]
+        prior = stretch.run.gyro_bias_std
         changes = []
         for axis in range(3):
             moved = spin.rate.copy()
@@ -232,12 +230,12 @@ class HandPosterior:
         # A mean over a time τ adds τ²/24 of the second derivative; whether chips or gyro average is unknown.
         rigid = stretch.channels(self.effects, spin.with_force(np.zeros_like(spin.force)))
         bend = np.zeros_like(rigid)
-        bend[1:-1] = _AVERAGING**2 / 24.0 * np.diff(rigid, 2, axis=0)
+        bend[1:-1] = AVERAGING**2 / 24.0 * np.diff(rigid, 2, axis=0)
         changes.append(bend)
         if self.levels.acceleration_slope > 0:
             # Where its samples miss much of the angular acceleration, what they hold need not be to scale either.
             arms = stretch.model.array.regression_matrix
-            changes += [_UNTRUE * np.outer(spin.acceleration[:, axis], arms[:, axis]) for axis in range(3)]
+            changes += [Policy.small * np.outer(spin.acceleration[:, axis], arms[:, axis]) for axis in range(3)]
         return changes
 
     @cached_property
