@@ -77,5 +77,4 @@ def numbers(file: Path) -> int:
 def test_the_diagnosis_has_few_numbers():
     """Of those that stand in the modules most are numerical, or describe how a file of samples goes wrong."""
     assert len(FIELDS) <= 40
-    outside = sum(numbers(file) for file in FOLDER.rglob("*.py") if "free_body" not in file.parts)
-    assert outside <= 191
+    assert sum(numbers(file) for file in FOLDER.rglob("*.py")) <= 234  # 389 before there was a policy
