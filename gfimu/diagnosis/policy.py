@@ -43,7 +43,8 @@ class Policy:
     knots : float
         Distance of the knots of a drive at first [s]. By choice: knots are halved where a drive shows more.
     knot_odds : float
-        Log odds that knots twice as close need [nats]. By choice: they double the time of each fit.
+        Log odds that knots twice as close need [nats]. By choice: those of a cause (``cause_odds``), as causes of
+        timing would else take what knots are not yet worth.
     steady : float
         Log odds that more of the same needs: another round of learning, all functions on a series instead of one
         [nats]. By choice: more than noise gains by it.
@@ -140,7 +141,7 @@ class Policy:
     rounds: int = 6
     steps: int = 10
     knots: float = 0.05
-    knot_odds: float = 100.0
+    knot_odds: float = 4.0
     steady: float = 5.0
     worth_a_search: float = 3.0
     residue_odds: tuple[tuple[float, float], ...] = ((1.0, 3.0), (3.0, 7.0))

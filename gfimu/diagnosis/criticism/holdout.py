@@ -107,9 +107,8 @@ def split(stretches: Sequence[Stretch], found: Fit, policy: Policy, *, duration:
     parts: list[list[tuple[Stretch, Drive, NoiseLevels]]] = [[], []]
     for stretch, drive, levels in zip(stretches, found.point.drives, found.point.levels, strict=True):
         effects = effects_of(found.causes, stretch.model.array, stretch.index)
-        pairs = max(1, round(stretch.run.duration / (2 * length)))
-        edges = np.linspace(0, len(stretch.run.t), 2 * pairs + 1).astype(int).tolist()
-        for place, (start, stop) in enumerate(pairwise(edges)):
+        pairs = max(1, round(float(np.ptp(stretch.run.t[stretch.counted])) / (2 * length)))
+        for place, (start, stop) in enumerate(pairwise(stretch.parts(2 * pairs))):
             parts[place % 2].append((*_block(stretch, drive, effects, start, stop, policy), levels))
     odd, even = (Part(*zip(*part, strict=True)) for part in parts)
     return [Holdout(odd, even, residue), Holdout(even, odd, residue)]
@@ -121,9 +120,9 @@ def _block(
     """Cut the samples from ``start`` up to ``stop`` out of a stretch, and their drive out of its drive."""
     run, before = whole.run.rows(start, stop), whole.run.rows(0, start)
     bare = replace(whole, run=run)
-    times = np.append(bare.times(effects), run.t)
+    times = np.append(bare.counted_times(effects), run.t[bare.counted])
     std = policy.block_angle_std
-    mine = drive.within(float(times.min()) - MARGIN, float(times.max()) + MARGIN, float(run.t[0]), std)
+    mine = drive.within(float(times.min()) - MARGIN, float(times.max()) + MARGIN, bare.since, std)
     run_up = RunUp(before.t, before.temperature, drive.spin) if start else None
     return replace(bare, start_angle=mine.angle, start_angle_std=std, run_up=run_up), mine
 
@@ -155,7 +154,7 @@ def other_recordings(
     drives = starting_point(test, first.drives[0].spline.spacing).drives
 
     def reaching(stretch: Stretch, drive: Drive) -> Drive:
-        times = stretch.times(effects_of(found.causes, stretch.model.array, 0))
+        times = stretch.counted_times(effects_of(found.causes, stretch.model.array, 0))
         return drive.covering(np.array([float(times.min()) - MARGIN, float(times.max()) + MARGIN]))
 
     drives = tuple(over_segments(reaching, test, drives))

@@ -89,6 +89,12 @@ class Stretch:
         return np.column_stack([self.run.valid, self.run.reference_valid])
 
     @cached_property
+    def counted(self) -> NDArray[np.bool_]:
+        """In which samples (n,) anything counts; all where nothing does."""
+        counted = np.asarray(self.mask.any(axis=1))
+        return counted if counted.any() else ~counted
+
+    @cached_property
     def observations(self) -> int:
         """How many observations count."""
         return int(self.mask.sum())
@@ -175,6 +181,25 @@ class Stretch:
         """Return all true times that readings belong to, s."""
         return self.model.sample_times(self.run.t, [*self.known, *effects])
 
+    def counted_times(self, effects: Sequence[Effect] = ()) -> NDArray[np.float64]:
+        """Return the true times of the samples in which anything counts, s: beyond them no motion is known."""
+        return self.times(effects)[self.counted]
+
+    @property
+    def since(self) -> float:
+        """Time of the first sample in which anything counts, s."""
+        return float(self.run.t[int(np.argmax(self.counted))])
+
+    def parts(self, count: int) -> list[int]:
+        """Return the edges of parts in which as many samples count; what is left out at the ends is with the outermost.
+
+        Parameters
+        ----------
+        count : int
+            How many parts.
+        """
+        return _parts(self.counted, 0, len(self.counted), count)
+
     def of_reference(self) -> Stretch:
         """Return the stretch with the reference alone."""
         return replace(self, run=replace(self.run, valid=np.zeros_like(self.run.valid)))
@@ -193,11 +218,16 @@ def make_stretches(model: WorldModel, runs: Sequence[Run], known: Sequence[Seque
         steps, _ = Steps.of_reference(run.reference[run.reference_valid], noise)
         steps = replace(steps, channels=_coarse_step(model, run, faults))
         acting = tuple(fault for fault in faults if is_of_wiring(fault))
+        counted = run.valid.any(axis=1) | run.reference_valid
+        # Before the reference comes for the first time nothing is known: that is no stretch of its own.
+        resumed = [place for place in run.resumed if counted[:place].any()]
         pieces: list[tuple[int, int, bool]] = []
-        for first, end in pairwise([0, *run.resumed, len(run.t)]):
-            count = max(1, round((end - first) * run.sample_period / _DURATION))
-            edges = np.linspace(first, end, count + 1).astype(int).tolist()
-            pieces += [(start, stop, first > 0) for start, stop in pairwise(edges)]
+        for first, end in pairwise([0, *resumed, len(run.t)]):
+            known = np.flatnonzero(counted[first:end])
+            duration = (np.ptp(known) + 1 if len(known) else end - first) * run.sample_period
+            edges = _parts(counted, first, end, max(1, round(duration / _DURATION)))
+            lost = first > 0 or len(resumed) < len(run.resumed)
+            pieces += [(start, stop, lost) for start, stop in pairwise(edges)]
         for start, stop, lost in pieces:
             drift = noise * np.sqrt(run.sample_period * (run.t[start] - run.t[0]))
             stretches.append(
@@ -214,6 +244,14 @@ def make_stretches(model: WorldModel, runs: Sequence[Run], known: Sequence[Seque
                 )
             )
     return tuple(stretches)
+
+
+def _parts(counted: NDArray[np.bool_], first: int, end: int, count: int) -> list[int]:
+    """Return the edges of equal parts of the samples from the first to the last that count, in a span of samples."""
+    known = first + np.flatnonzero(counted[first:end])
+    low, high = (int(known[0]), int(known[-1]) + 1) if len(known) else (first, end)
+    edges = np.linspace(low, high, count + 1).astype(int).tolist()
+    return [first, *edges[1:-1], end]
 
 
 def _coarse_step(model: WorldModel, run: Run, faults: Sequence[Effect]) -> float:

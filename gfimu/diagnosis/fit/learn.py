@@ -64,13 +64,13 @@ def starting_point(stretches: Sequence[Stretch], spacing: float) -> Point:
 
 def _by_reference(stretch: Stretch, spacing: float) -> Drive:
     knots = max(spacing, stretch.run.sample_period)
-    times = stretch.times()
+    times, seen = stretch.counted_times(), stretch.counted
     std = np.inf if stretch.is_angle else stretch.start_angle_std
-    drive = Drive.still(times, float(stretch.run.t[0]), knots, stretch.start_angle, std)
+    drive = Drive.still(times, stretch.since, knots, stretch.start_angle, std)
     noise = stretch.steps.reference_noise(float(stretch.first_levels.white[-1]))
     weights = np.where(stretch.run.reference_valid, noise, np.inf)
     order = 0 if stretch.is_angle else 1
-    return drive.by_reference(times[:, -1], stretch.run.reference, weights, order, _REFERENCE_ROUNDS)
+    return drive.by_reference(times[:, -1], stretch.run.reference[seen], weights[seen], order, _REFERENCE_ROUNDS)
 
 
 def predicted_by_reference(model: WorldModel, run: Run) -> NDArray[np.float64]:

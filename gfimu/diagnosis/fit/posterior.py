@@ -204,12 +204,19 @@ def _jacobian(stretch: Stretch, drive: Drive, effects: Sequence[Effect], seen: O
     def predict(coefficients: NDArray[np.float64]) -> NDArray[np.float64]:
         return stretch.predict(present, drive.spline.spin(coefficients))
 
-    reach = measured_reach(predict, drive.spline, drive.coefficients, base, stretch.run.t)
+    rows, chips = stretch.counted, np.append(stretch.model.array.chip_of_channel, -1)
+
+    def counted(coefficients: NDArray[np.float64]) -> NDArray[np.float64]:
+        return predict(coefficients)[rows]
+
+    now, t = drive.coefficients, stretch.run.t
+    times = stretch.counted_times(present)[:, chips]
+    reach = measured_reach(counted, drive.spline, now, base[rows], t[rows], times)
     if exact and longest > 0.0:
         spline = drive.spline
         longest = min(longest, _MOST_INTERVALS * spline.spacing)
         reach = Reach(max(reach.before, int(longest / spline.finest)), reach.after)
-    return differentiate(predict, drive.spline, drive.coefficients, base, seen.weight, stretch.run.t, reach)
+    return differentiate(predict, drive.spline, now, base, seen.weight, t, reach)
 
 
 def _slow_rows(

@@ -262,7 +262,7 @@ def _reaching(stretches: Sequence[Stretch], point: Point) -> Point:
     """Return the point with drives that reach as far as its causes ask for: a slow clock, late chips."""
     drives = []
     for stretch, drive in zip(stretches, point.drives, strict=True):
-        times = stretch.times(effects_of(point.causes, stretch.model.array, stretch.index))
+        times = stretch.counted_times(effects_of(point.causes, stretch.model.array, stretch.index))
         drives.append(drive.covering(times))
     return replace(point, drives=tuple(drives))
 

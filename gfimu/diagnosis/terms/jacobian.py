@@ -197,13 +197,16 @@ def measured_reach(
     coefficients: NDArray[np.float64],
     base: NDArray[np.float64],
     t: NDArray[np.float64],
+    times: NDArray[np.float64],
 ) -> Reach:
     """Measure over how many intervals before and after its support a coefficient acts, by a few moved at once.
 
-    A memory longer than the distance of the moved coefficients has to be declared by what has it.
+    Readings belong to other times than those they are told at, ``times`` (n, c), as far as clocks and delays say: a
+    slow clock shows at its end a motion that is many intervals ahead. What is measured is the memory beyond that. One
+    longer than the distance of the moved coefficients has to be declared by what has it.
     """
     apart = spline.size // _PROBES
-    interval, knots = spline.interval(t)[0], spline.knots
+    interval, knots = spline.interval(times)[0], spline.knots
     before = after = 0
     earlier = later = 0.0  # s
     for shift in range(_SHIFTS):
@@ -211,19 +214,22 @@ def measured_reach(
         moved = coefficients.copy()
         moved[probes] += STEP
         response = np.abs(predict(moved) - base)
-        size = (response / np.maximum(response.max(axis=0), 1e-300)).max(axis=1)  # (n,)
+        size = response / np.maximum(response.max(axis=0), 1e-300)  # (n, c)
         for probe in probes:
             # A coefficient acts on intervals probe − DEGREE … probe of its support.
             mine = (interval >= probe - DEGREE - apart // 4) & (interval < probe + 3 * apart // 4)
-            if not (mine.any() and size[mine].max() > 0.0):
+            largest = size[mine].max(initial=0.0)
+            if largest == 0.0:
                 continue
-            acts = size[mine] > _FORGOTTEN * size[mine].max()
-            seen, at = interval[mine][acts], t[mine][acts]
-            before = max(before, int(seen.max()) - int(probe))
-            after = max(after, int(probe) - DEGREE - int(seen.min()))
-            earlier = max(earlier, float(at[-1] - knots[min(probe + 1, spline.intervals)]))
-            later = max(later, float(knots[max(probe - DEGREE, 0)] - at[0]))
+            mine &= size > _FORGOTTEN * largest
+            before = max(before, int(interval[mine].max()) - int(probe))
+            after = max(after, int(probe) - DEGREE - int(interval[mine].min()))
+            earlier = max(earlier, float(times[mine].max() - knots[min(probe + 1, spline.intervals)]))
+            later = max(later, float(knots[max(probe - DEGREE, 0)] - times[mine].min()))
     if not spline.halvings:
-        return Reach(before, after)
+        ahead = interval - spline.interval(t)[0][:, None]
+        return Reach(before + max(-int(ahead.min()), 0), after + max(int(ahead.max()), 0))
+    earlier += max(float((t[:, None] - times).max()), 0.0)
+    later += max(float((times - t[:, None]).max()), 0.0)
     # Where knots are closer than samples, the ends of a response lie between these.
     return Reach(int(earlier / spline.finest) + 1, int(later / spline.finest) + 1)

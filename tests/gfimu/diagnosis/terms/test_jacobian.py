@@ -85,6 +85,13 @@ def test_derivative_of_every_effect(twin, stretch, drive, name):
     assert error < TOLERANCES.get(name, USUAL)
 
 
+@pytest.mark.parametrize("ratio", [-0.09, 0.09])
+def test_derivative_where_a_clock_is_far_off(twin, stretch, drive, ratio):
+    effect = make_effect("clock_error", {"ratio": ratio})
+    error, _ = error_of(stretch, drive.covering(stretch.times([effect])), [effect], exact=False)
+    assert error < USUAL
+
+
 def test_effects_without_a_noise_free_form_change_no_prediction(twin, stretch, drive):
     bare = stretch.predict([], drive.spin)
     for name in ("noise", "bias_random_walk"):
@@ -97,7 +104,8 @@ def reach_of(stretch, drive, effects):
     def predict(coefficients):
         return stretch.predict(effects, drive.spline.spin(coefficients))
 
-    return measured_reach(predict, drive.spline, drive.coefficients, base, stretch.run.t)
+    times = stretch.times(effects)[:, [*stretch.model.array.chip_of_channel, -1]]
+    return measured_reach(predict, drive.spline, drive.coefficients, base, stretch.run.t, times)
 
 
 @pytest.mark.parametrize(
@@ -107,6 +115,7 @@ def reach_of(stretch, drive, effects):
         ("channel_skew", {"per_chip_s": 0.06}, (0, 3)),  # the last chip 0.18 s after the stamp
         ("tacho_latency", {"delay_s": 0.15}, (3, 0)),
         ("clock_error", {"ratio": 0.05}, (5, 0)),  # 0.29 s behind at the end
+        ("clock_error", {"ratio": -0.09}, (0, 9)),  # 0.59 s ahead at the end
         ("cogging", {"amplitude_rad_s2": 3.0, "order": 4.0, "phase_rad": 0.3}, (8, 0)),  # a servo of 1 Hz
     ],
 )
