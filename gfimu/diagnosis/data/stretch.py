@@ -223,8 +223,8 @@ def make_stretches(model: WorldModel, runs: Sequence[Run], known: Sequence[Seque
         resumed = [place for place in run.resumed if counted[:place].any()]
         pieces: list[tuple[int, int, bool]] = []
         for first, end in pairwise([0, *resumed, len(run.t)]):
-            known = np.flatnonzero(counted[first:end])
-            duration = (np.ptp(known) + 1 if len(known) else end - first) * run.sample_period
+            there = np.flatnonzero(counted[first:end])
+            duration = (np.ptp(there) + 1 if len(there) else end - first) * run.sample_period
             edges = _parts(counted, first, end, max(1, round(duration / _DURATION)))
             lost = first > 0 or len(resumed) < len(run.resumed)
             pieces += [(start, stop, lost) for start, stop in pairwise(edges)]

@@ -11,6 +11,7 @@ from numpy.testing import assert_allclose
 
 from gfimu.diagnosis.data.run import prepare_run
 from gfimu.diagnosis.data.stretch import RunUp, make_stretches
+from gfimu.diagnosis.fit.learn import starting_point
 from gfimu.diagnosis.terms.drive import Drive
 from sim.campaign import Measurement, measure
 from sim.effects import make_effect
@@ -136,6 +137,21 @@ def test_after_a_gap_of_the_reference_the_angle_is_lost(twin):
     first, second = make_stretches(twin, [replace(run, resumed=(300,))], [[]])
     assert (len(first.run.t), len(second.run.t)) == (300, 300)
     assert second.start_angle_std > 1.0 > first.start_angle_std
+
+
+def test_what_comes_before_the_reference_is_no_stretch_of_its_own(twin):
+    rng = np.random.default_rng(3)
+    run = prepare_run(measure(rng, twin, [], Measurement(12.0, 50.0), motion=lively()), twin)
+    late = np.arange(len(run.t)) >= 200
+    run = replace(run, valid=run.valid & late[:, None], reference_valid=run.reference_valid & late, resumed=(200,))
+    [only] = make_stretches(twin, [run], [[]])
+    assert len(only.run.t) == 600
+    assert only.since == run.t[200]
+    assert only.counted_times().min() >= run.t[200]
+    assert only.start_angle_std > 1.0
+    assert only.parts(2) == [0, 400, 600]
+    [drive] = starting_point([only], 0.1).drives
+    assert drive.spline.start > run.t[100]
 
 
 def test_true_times_of_readings(twin, stretch):
