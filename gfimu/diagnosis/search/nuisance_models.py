@@ -144,7 +144,6 @@ def _understood(stretches: Sequence[Stretch], explanation: Explanation, policy: 
     point = explanation.best.point
     walk = None
     if point.levels[0].walk > 0.0 and stretches[0].first_levels.walk == 0.0:
-        bare = replace(point, levels=tuple(NoiseLevels(one.white, one.flicker) for one in point.levels))
-        walk = walk_strength(stretches, bare, policy)
+        walk = walk_strength(stretches, point, policy)
     residue = 0.0 if point.residue is None else point.residue.scale
     return Understanding(explanation, walk, residue, odds)
