@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from core_cases import cause_of, lively, small_twin, stretches_of
@@ -13,10 +15,11 @@ from gfimu.diagnosis.data.spins import State
 from gfimu.diagnosis.fit.learn import starting_point
 from gfimu.diagnosis.fit.posterior import condition
 from gfimu.diagnosis.policy import Policy
-from gfimu.diagnosis.search.explain import explain, reduced
+from gfimu.diagnosis.search.explain import Sets, explain, prune, reduced
 from gfimu.geometry.array import AccelerometerArray
 from sim.effects import EFFECTS
 from sim.effects.base import Effect, Size
+from sim.motion import SplineSpin
 from sim.twin import Twin
 
 TWIN = small_twin()
@@ -135,3 +138,27 @@ def test_nothing_is_found_in_noise(seed):
     found = explain(stretches_of(TWIN, seed=seed, duration=8.0), Policy())
     assert found.best.causes == ()
     assert found.best is found.nothing or found.best.key == found.nothing.key
+
+
+@pytest.mark.parametrize(("name", "share"), [("cogging", 0.02), ("hysteresis", 0.01), ("table_tilt", 0.0)])
+def test_a_further_cause_must_bring_more_than_an_inexact_one_leaves(tilted, name, share):
+    """A set of two whose second brings a little less, and a little more, than the share of the first."""
+    policy, explained = Policy(), 10_000.0
+    strong, weak = cause_of(name, TWIN.array), cause_of("mount_tilt", TWIN.array)
+    assert strong.family.inexactness == share
+    for beyond, kept in ((-1.0, {name}), (1.0, {name, "mount_tilt"})):
+        worth = policy.extra_odds + share * (explained + beyond) + beyond
+        sets = Sets(tilted.stretches, tilted.best.point, policy)
+        for causes, value in (((strong, weak), explained + worth), ((strong,), explained), ((weak,), worth), ((), 0.0)):
+            one = replace(tilted.best, point=replace(tilted.best.point, causes=causes), log_posterior=value)
+            sets.found[one.key] = one
+        assert prune(sets).names == kept
+
+
+def test_a_cause_that_bends_the_drive_is_found_though_knots_could_follow(monkeypatch):
+    """Closer knots follow a strong ripple of the torque, too: which is more probable, their evidences say."""
+    hidden = cause_of("cogging", TWIN.array, [30.0, 10.0], order=5.0)
+    motion = SplineSpin(CubicSpline(np.arange(-2.0, 14.0, 0.5), 4.0 + np.sin(np.arange(-2.0, 14.0, 0.5))))
+    stretches = stretches_of(TWIN, [hidden.effect(TWIN.array, 0)], duration=10.0, motion=motion)
+    found = explain(stretches, Policy())
+    assert found.best.names == {"cogging"}

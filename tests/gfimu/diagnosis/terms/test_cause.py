@@ -84,3 +84,14 @@ def test_the_reach_of_coordinates_is_that_of_their_sizes():
     family = EFFECTS["bias"]
     one = np.eye(ARRAY.n_channels)[:, [2]]
     assert np.flatnonzero(Cause(family, "", one, {}, np.ones(1)).reach(ARRAY)[0]).tolist() == [2]
+
+
+def test_shapes_are_apart_by_ratios_and_angles():
+    mode = cause_of("resonance", ARRAY, frequency_hz=8.0, damping_ratio=0.02)
+    other = replace(mode, shape={"frequency_hz": 8.0 * np.exp(0.3), "damping_ratio": 0.02 * np.exp(-0.4)})
+    assert mode.apart(other) == pytest.approx(0.5)
+    assert other.apart(mode) == pytest.approx(0.5)
+    assert mode.apart(mode) == 0.0
+    nod = cause_of("axis_wobble", ARRAY, direction_rad=0.2)
+    assert nod.apart(replace(nod, shape={"direction_rad": -0.1})) == pytest.approx(0.3)
+    assert cause_of("table_tilt", ARRAY).apart(cause_of("table_tilt", ARRAY)) == 0.0

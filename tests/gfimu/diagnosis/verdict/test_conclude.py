@@ -91,6 +91,39 @@ def test_misfit_beyond_the_noise_widens_standard_deviations(understanding):
         assert 1.5 * std < wider.std[key] < 2.1 * std
 
 
+def test_a_lack_of_fit_widens_what_a_rough_model_says(understanding):
+    """A share ε of what a rough model explains is what an error of √ε of its size leaves."""
+    explanation = understanding.explanation
+    cogging = replace(cause_of("cogging", TWIN.array, [1.0, 0.0], order=3.0), covariance=1e-8 * np.eye(2))
+    observations = float(sum(one.observations for one in explanation.stretches))
+    removed = explanation.nothing.objective - observations
+    point = replace(explanation.best.point, causes=(cogging,))
+    fit = replace(explanation.best, point=point, objective=observations)
+    rough = replace(explanation, best=fit)
+    (usual,) = named_causes(rough, fit, POLICY)
+    (wider,) = named_causes(rough, fit, POLICY, LackOfFit(0.05 * removed, "", {}))
+    key, ratio = "amplitude_rad_s2", 0.1 / 1.1  # of what is left to all that there is
+    assert usual.std[key] == pytest.approx(np.sqrt(0.02) * usual.parameters[key], rel=0.01)
+    assert wider.std[key] == pytest.approx(np.sqrt(0.02 + ratio) * usual.parameters[key], rel=0.01)
+    (same,) = named_causes(explanation, explanation.best, POLICY, LackOfFit(0.05 * removed, "", {}))
+    assert same.std == named_causes(explanation, explanation.best, POLICY)[0].std
+
+
+def test_a_level_is_found_no_better_than_the_reading_that_gets_there(understanding):
+    explanation = understanding.explanation
+    play = replace(
+        cause_of("hysteresis", TWIN.array, [1.0], width_m_s2=0.01),
+        covariance=1e-8 * np.eye(1),
+        shape_std={"width_m_s2": 1e-6},
+    )
+    observations = float(sum(one.observations for one in explanation.stretches))
+    point = replace(explanation.best.point, causes=(play,))
+    fit = replace(explanation.best, point=point, objective=observations)
+    (named,) = named_causes(replace(explanation, best=fit), fit, POLICY)
+    white = float(np.median(fit.point.levels[0].white[:-1]))
+    assert named.std["width_m_s2"] == pytest.approx(np.hypot(0.2 * white, 0.1 * 0.01), rel=1e-3)
+
+
 def test_when_causes_are_believed(understanding):
     explanation = understanding.explanation
     removed = explanation.nothing.objective - explanation.best.objective
