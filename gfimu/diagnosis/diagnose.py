@@ -158,9 +158,14 @@ class _Diagnosis:
         return conclude(self._prepared, understanding, left, told, policy, withdrawn=withdrawn)
 
     def _apart_from_the_rest(self, understanding: Understanding) -> tuple[Understanding, LackOfFit]:
-        """Drop causes that explain less than what no cause explains: they would be made of it."""
+        """Drop causes that explain less than what no cause explains: they would be made of it.
+
+        Real hands leave more than some right causes of a free body explain.
+        """
         explanation = understanding.explanation
         left = self._left(explanation)
+        if self._policy.free_body:
+            return understanding, left
         while len(explanation.best.causes) > 1 and left.log_odds > self._policy.lack_odds:
             best = explanation.best
             lost = {name: best.log_posterior - fewer.log_posterior for name, fewer in explanation.without.items()}
