@@ -1,1 +1,0 @@
-"""Views of the residuals of a verdict: spectra, dependences, whiteness."""

@@ -1,1 +1,0 @@
-"""Data of a free body: its run with the gyro, and the stretch that a diagnosis explains."""

@@ -1,1 +1,0 @@
-"""Fit: linearise, integrate out the nuisance parameters, step, learn."""

@@ -1,1 +1,0 @@
-"""Terms: everything unknown, how it shows in the observations, and its prior."""
