@@ -131,7 +131,7 @@ class _Diagnosis:
         stretches = _stretches(self._model, self._prepared)
         understanding = understand_any_length(stretches, policy, lambda share, text: tell(0.05 + 0.8 * share, text))
         tell(0.88, "lack of fit")
-        left = self._left(understanding.explanation)
+        understanding, left = self._apart_from_the_rest(understanding)
         withdrawn: list[str] = []
         gain = Gain()
         if not is_dominant(understanding.explanation, left, policy):
@@ -156,6 +156,20 @@ class _Diagnosis:
         if told is gain:
             return found
         return conclude(self._prepared, understanding, left, told, policy, withdrawn=withdrawn)
+
+    def _apart_from_the_rest(self, understanding: Understanding) -> tuple[Understanding, LackOfFit]:
+        """Drop causes that explain less than what no cause explains: they would be made of it."""
+        explanation = understanding.explanation
+        left = self._left(explanation)
+        while len(explanation.best.causes) > 1 and left.log_odds > self._policy.lack_odds:
+            best = explanation.best
+            lost = {name: best.log_posterior - fewer.log_posterior for name, fewer in explanation.without.items()}
+            weakest = min(lost, key=lost.__getitem__)
+            if lost[weakest] >= left.log_odds:
+                break
+            explanation = reduced(explanation, weakest, self._policy)
+            left = self._left(explanation)
+        return replace(understanding, explanation=explanation), left
 
     def _left(self, explanation: Explanation) -> LackOfFit:
         return lack_of_fit(

@@ -184,6 +184,11 @@ class Policy:
         return 2.0 * self.worth_a_search
 
     @property
+    def usual_excess(self) -> float:
+        """Squares that a fit may leave over those of noise, less one, where the noise is not yet learnt."""
+        return self.white_ratio**2 - 1.0
+
+    @property
     def unequal_walk(self) -> float:
         """Minus the log of the chance at which channels differ too much for a random walk: that of two tests."""
         return -2.0 * float(np.log(self.chance))

@@ -128,10 +128,10 @@ def sharpened(stretches: Sequence[Stretch], point: Point, policy: Policy) -> Poi
             if gaining[place]:
                 drives[place], best[place] = closer.drives[place].moved(there.drive_steps[place]), value
         left = there.objective / observations - 1.0
-        if not gaining.any() or left > max(policy.white_ratio**2 - 1.0, 0.5 * excess):
+        if not gaining.any() or left > max(policy.usual_excess, 0.5 * excess):
             break
         found, excess = replace(point, drives=tuple(drives)), left
-    return found if excess < policy.white_ratio**2 - 1.0 else point
+    return found if excess < policy.usual_excess else point
 
 
 def _log_evidence(posterior: Posterior) -> float:

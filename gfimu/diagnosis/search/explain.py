@@ -20,7 +20,7 @@ from gfimu.diagnosis.terms.cause import ALIKE, Cause, effects_of
 from gfimu.diagnosis.terms.drive import Drive
 from gfimu.world_model import memory_of
 
-__all__ = ["Explanation", "Sets", "exactly", "explain", "explained", "prune", "reduced"]
+__all__ = ["Explanation", "Sets", "exactly", "excess", "explain", "explained", "hardly_eases", "prune", "reduced"]
 
 Report = Callable[[float, str], None]
 _Key = frozenset[tuple[str, str]]
@@ -94,13 +94,10 @@ class Sets:
         if not is_rough(self.stretches, found):
             return False
         nothing = self.found.get(frozenset())
-        allowed = self.policy.white_ratio**2 - 1.0
+        allowed = self.policy.usual_excess
         if nothing is not None:
-            allowed = max(allowed, self.policy.small * self._excess(nothing))
-        return self._excess(found) < allowed
-
-    def _excess(self, found: Fit) -> float:
-        return found.objective / sum(stretch.observations for stretch in self.stretches) - 1.0
+            allowed = max(allowed, self.policy.small * excess(self.stretches, nothing))
+        return excess(self.stretches, found) < allowed
 
     def _closely(self, found: Fit) -> Fit | None:
         try:
@@ -117,15 +114,15 @@ class Sets:
         return max(found, again, key=_posterior)
 
     def refit(self, points: Sequence[Point]) -> None:
-        """Fit sets again from other starts, and keep what is more probable; a start that leads back is left there."""
-        for point in points:
-            rough = self._roughly(replace(point, exact=False))
-            if rough is None or _is_alike(rough, self.found[rough.key]):
-                continue
-            again = self._closely(rough) if self._is_worth_it(rough) else rough
-            self.count += 1
-            if again is not None and again.log_posterior > self.found[again.key].log_posterior:
-                self.found[again.key] = again
+        """Fit a set again from other starts, and keep what is more probable; a start that leads back is left there."""
+        again = each_apart(self._roughly, [replace(point, exact=False) for point in points])
+        fits = [one for one in again if one is not None and not _is_alike(one, self.found[one.key])]
+        self.count += len(fits)
+        rough = [one for one in fits if self._is_worth_it(one)]
+        closely = self._closely(max(rough, key=_posterior)) if rough else None
+        for one in (*fits, closely):
+            if one is not None and one.log_posterior > self.found[one.key].log_posterior:
+                self.found[one.key] = one
 
     @property
     def best(self) -> Fit:
@@ -135,6 +132,20 @@ class Sets:
     def ranked(self) -> list[Fit]:
         """All, most probable first."""
         return sorted(self.found.values(), key=_posterior, reverse=True)
+
+
+def excess(stretches: Sequence[Stretch], found: Fit) -> float:
+    """Return the squares that a fit leaves, over those that noise leaves, less one."""
+    return found.objective / sum(stretch.observations for stretch in stretches) - 1.0
+
+
+def hardly_eases(stretches: Sequence[Stretch], before: Fit, after: Fit, policy: Policy) -> bool:
+    """Tell whether a fit leaves far more than noise, and hardly less than another: more of the same leads nowhere.
+
+    Of a body in the hand every cause may be a small share of what real chips disagree about.
+    """
+    left = excess(stretches, after)
+    return not policy.free_body and left > max(policy.usual_excess, (1.0 - policy.small) * excess(stretches, before))
 
 
 def _key(causes: Sequence[Cause]) -> _Key:
@@ -217,7 +228,7 @@ def _searched(sets: Sets, tell: Callable[[float], None]) -> Explanation:
         # While a set still grows its noise is that of the largest: a smaller one would pass for more noise.
         best = sets.best if policy.free_body and sets.best.key not in seen else prune(sets)
         fits += sets.count
-        if number > 0 and best.key in seen:
+        if number > 0 and (best.key in seen or hardly_eases(stretches, before, best, policy)):
             break
         seen.add(best.key)
         learnt = _relearned(stretches, best, policy, sharpen=best.key != before.key)

@@ -11,6 +11,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
+import numpy as np
+
 from gfimu.diagnosis.data.body.stretch import BodyStretch
 from gfimu.diagnosis.data.cosine_basis import NoiseLevels
 from gfimu.diagnosis.data.stretch import Stretch
@@ -19,7 +21,7 @@ from gfimu.diagnosis.fit.learn import learn_noise
 from gfimu.diagnosis.fit.linear import Point, linearise, with_residue
 from gfimu.diagnosis.fit.random_walk import Walk, walk_strength
 from gfimu.diagnosis.policy import Policy
-from gfimu.diagnosis.search.explain import Explanation, Sets, exactly, explain, prune
+from gfimu.diagnosis.search.explain import Explanation, Sets, exactly, explain, hardly_eases, prune
 from gfimu.diagnosis.terms.residue import Residue
 
 __all__ = ["Understanding", "understand"]
@@ -88,14 +90,16 @@ def _models(stretches: Sequence[Stretch], plain: Explanation, policy: Policy) ->
     for scale, odds in residues:
         found.append((f"calibration residue × {scale:g}", partial(with_residue, stretches, scale=scale), odds))
     if first.first_levels.walk == 0.0:
-        found.append(("random walk", lambda p: _walking(stretches, p, policy), policy.lack_odds))
+        # One effect of the library; what it has to bring beside the same causes, `Walk.is_likely` asks.
+        walks = float(np.log(len(first.model.families())))
+        found.append(("random walk", lambda p: _walking(stretches, p, policy), walks))
         for scale, odds in residues[:1]:
 
             def both(point: Point, scale: float = scale) -> Point | None:
                 walking = _walking(stretches, point, policy)
                 return None if walking is None else with_residue(stretches, walking, scale)
 
-            found.append(("random walk and calibration residue", both, policy.lack_odds + odds))
+            found.append(("random walk and calibration residue", both, walks + odds))
     return found
 
 
@@ -112,7 +116,8 @@ def _start(
     stretches: Sequence[Stretch], known: Sequence[Explanation], admit: _Admit, odds: float, policy: Policy
 ) -> Point | None:
     """Return where a search under another model starts, if that may beat what is known."""
-    best = max(one.best.log_posterior for one in known)
+    leader = max((one.best for one in known), key=lambda one: one.log_posterior)
+    best = leader.log_posterior
     tried: list[Fit] = []
     for one in known:
         # A slow cause may stand for a random walk: it shows where that is left out.
@@ -128,7 +133,7 @@ def _start(
     leading = max(tried, key=lambda one: one.log_posterior, default=None)
     if leading is None or leading.log_posterior < best + odds - policy.worth_a_search:
         return None
-    return leading.point
+    return None if hardly_eases(stretches, leader, leading, policy) else leading.point
 
 
 def _promise(stretches: Sequence[Stretch], before: Point, after: Point) -> float:
