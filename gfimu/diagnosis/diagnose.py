@@ -220,34 +220,36 @@ class _Diagnosis:
         ]
         return found[0] if all(found) else ""
 
-    def _described(
-        self, understanding: Understanding, left: LackOfFit, withdrawn: Sequence[str], refuted: str
-    ) -> Diagnosis:
-        """Return the verdict unknown, with a description that predicts data its fit never saw, where there is one.
+    def _describing(self, explanation: Explanation, whole: Fit) -> tuple[Described, Gain]:
+        """Return a description with what it is worth on held-out data, and which of its terms the twin gets.
 
         Terms of absolute time have the phase of one recording: only another one can confirm them.
         """
+        gain = self._gain(explanation, whole)
+        kept = tuple(cause for cause in whole.causes if not is_of_one_recording(cause.family))
+        carried = replace(whole, point=replace(whole.point, causes=kept)) if kept else None
+        if len(kept) < len(whole.causes) and self._kept is not None:
+            alone = self._gain(explanation, carried) if carried is not None else Gain()
+            samples = sum(len(run.t) for run in self._kept.runs)
+            better = gain.log_likelihood_per_sample - float(np.nan_to_num(alone.log_likelihood_per_sample))
+            carried, gain = (whole, gain) if better * samples > self._policy.ambiguous else (carried, alone)
+        elif carried is not None and gain.share_in_any_recording <= 0.0:
+            carried = None
+        return Described(whole, carried), gain
+
+    def _described(
+        self, understanding: Understanding, left: LackOfFit, withdrawn: Sequence[str], refuted: str
+    ) -> Diagnosis:
+        """Return the verdict unknown, with the description that predicts best what its fit never saw, if one does."""
         explanation, described, gain = understanding.explanation, None, Gain()
         body = isinstance(explanation.stretches[0], BodyStretch)  # its motion has no functions to describe it by
         found = [] if body else surrogates(explanation.stretches, explanation.nothing, self._policy, left.hints)
-        # The richest that predicts; if that was too rich, the poorest.
-        for one in [*found[-1:], *found[:-1][:1]]:
-            whole = one.fit
-            gain = self._gain(explanation, whole)
-            kept = tuple(cause for cause in whole.causes if not is_of_one_recording(cause.family))
-            carried = replace(whole, point=replace(whole.point, causes=kept)) if kept else None
-            if len(kept) < len(whole.causes) and self._kept is not None:
-                alone = self._gain(explanation, carried) if carried is not None else Gain()
-                samples = sum(len(run.t) for run in self._kept.runs)
-                better = gain.log_likelihood_per_sample - float(np.nan_to_num(alone.log_likelihood_per_sample))
-                carried, gain = (whole, gain) if better * samples > self._policy.ambiguous else (carried, alone)
-            elif carried is not None and gain.share_in_any_recording <= 0.0:
-                carried = None
+        for one in found:
+            tried, worth = self._describing(explanation, one.fit)
+            better = worth.log_likelihood_per_sample > float(np.nan_to_num(gain.log_likelihood_per_sample))
             # Less than a tenth of the excess describes nothing.
-            if gain.log_likelihood_per_sample > 0.0 and not gain.share_of_excess_removed < self._policy.small:
-                described = Described(whole, carried)
-                break
-            gain = Gain()
+            if better and not worth.share_of_excess_removed < self._policy.small:
+                described, gain = tried, worth
         return conclude(
             self._prepared,
             understanding,

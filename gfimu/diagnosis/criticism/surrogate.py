@@ -101,11 +101,11 @@ def surrogates(
     hints : sequence of str
         Functions of `gfimu.generic_basis` to look at besides its own.
     """
-    units = basis_units(stretches, nothing.point)
+    point = _without_walk(stretches, nothing.point)
+    units = basis_units(stretches, point)
     chosen = _spread([stretch.index for stretch in stretches], policy.most_searched)
     if len(chosen) == len(stretches):
-        return _ever_richer(stretches, nothing.point, policy, units, hints)
-    point = nothing.point
+        return _ever_richer(stretches, point, policy, units, hints)
     residue = point.residue
     some = replace(
         point,
@@ -116,6 +116,15 @@ def surrogates(
     found = _ever_richer([stretches[place] for place in chosen], some, policy, units, hints)
     ends = found if len(found) < 3 else [found[0], found[-1]]
     return [Surrogate(_settled(stretches, replace(point, causes=one.terms), policy)) for one in ends]
+
+
+def _without_walk(stretches: Sequence[Stretch], point: Point) -> Point:
+    """Return a point whose biases walk as the twin says only: what has no name may look like a random walk."""
+    own = tuple(stretch.first_levels.walk for stretch in stretches)
+    if all(one.walk == walk for one, walk in zip(point.levels, own, strict=True)):
+        return point
+    levels = tuple(replace(one, walk=walk) for one, walk in zip(point.levels, own, strict=True))
+    return learn_noise(stretches, replace(point, levels=levels))
 
 
 def _spread(runs: Sequence[int], most: int) -> list[int]:
