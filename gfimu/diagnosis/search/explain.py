@@ -13,6 +13,7 @@ from gfimu.diagnosis.fit.gauss_newton import Fit, fit, is_rough
 from gfimu.diagnosis.fit.learn import LEARNINGS, learn_noise, learn_roughness, sharpened, starting_point
 from gfimu.diagnosis.fit.linear import Point, with_residue
 from gfimu.diagnosis.fit.parallel import each_apart
+from gfimu.diagnosis.fit.posterior import remembers_long
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.beam import STARTS, Blocks, grown_sets, leading_sets
 from gfimu.diagnosis.search.screening import Screening, screen
@@ -90,8 +91,16 @@ class Sets:
             return None
 
     def _is_worth_it(self, found: Fit) -> bool:
-        """Tell whether a fit is rough, and leaves so little that details of what a mode remembers can matter."""
+        """Tell whether a fit is rough, and details of what a mode remembers can matter.
+
+        They can't where the mode eases little of what is left without it, nor where far more than noise is left.
+        """
         if not is_rough(self.stretches, found):
+            return False
+        array = self.stretches[0].model.array
+        short = [cause for cause in found.causes if not remembers_long(effects_of([cause], array, 0))]
+        without = self.found.get(_key(short))
+        if without is not None and hardly_eases(self.stretches, without, found, self.policy):
             return False
         nothing = self.found.get(frozenset())
         allowed = self.policy.usual_excess

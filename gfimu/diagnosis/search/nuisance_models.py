@@ -60,9 +60,10 @@ def understand(stretches: Sequence[Stretch], policy: Policy, report: Report | No
     for name, admit, odds in _models(stretches, found[0].explanation, policy):
         tell(0.6, name)
         known = {one.explanation.best.key: one for one in found}
-        start = _start(stretches, [known[key].explanation for key in known], admit, odds, policy)
+        needed = odds + _left_by_inexactness(found[0].explanation)
+        start = _start(stretches, [known[key].explanation for key in known], admit, needed, policy)
         if start is not None:
-            other = _understood(stretches, explain(stretches, policy, start=start), policy, odds)
+            other = _understood(stretches, explain(stretches, policy, start=start), policy, needed)
             # What looked like a random walk beside some causes may be no such thing beside the best of that model.
             if other.walk is None or other.walk.is_likely(policy):
                 found.append(other)
@@ -73,6 +74,13 @@ def understand(stretches: Sequence[Stretch], policy: Policy, report: Report | No
         more = other.log_odds - best.log_odds
         elsewhere.append(replace(fitted, log_posterior=fitted.log_posterior - more))
     return replace(best, explanation=replace(exactly(best.explanation, policy), elsewhere=tuple(elsewhere)))
+
+
+def _left_by_inexactness(plain: Explanation) -> float:
+    """Return the log odds of what causes leave whose models are rough: other nuisance parameters would take it."""
+    best = plain.best
+    lost = {name: best.log_posterior - fewer.log_posterior for name, fewer in plain.without.items()}
+    return sum(cause.family.inexactness * max(lost.get(cause.name, 0.0), 0.0) for cause in best.causes)
 
 
 _Admit = Callable[[Point], Point | None]
