@@ -134,7 +134,7 @@ MUTANTS = [
     (reference_ignored, "single-tacho_scale-300-campaign-116"),
     (everything_is_explained, "outside-tone_on_one_channel-600-independent-402"),
     (samples_unchecked, "single-sign_flip-1500-campaign-132"),
-    (trained_on_what_is_held_out, "outside-cogging-600-campaign-426"),
+    (trained_on_what_is_held_out, "outside-axis_wobble-600-independent-421"),
 ]
 
 
