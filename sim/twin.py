@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -29,6 +30,7 @@ from sim.world import World
 
 __all__ = ["Twin"]
 
+_REMEMBERED = 16  # numerical: worlds that a twin keeps
 _SOURCES = ("tacho", "angle", "command", "gyro")
 
 
@@ -172,6 +174,24 @@ class Twin:
         )
         return apply_effects(nominal, self._effects_with(effects))
 
+    def _placed(
+        self, effects: Sequence[AnyEffect], mounting: NDArray[np.float64] | None, start: float | None
+    ) -> tuple[World, forward.TableGeometry]:
+        """Return the world with some effects and its geometry: a derivative asks hundreds of times for the same."""
+        key = (*(id(effect) for effect in effects), None if mounting is None else mounting.tobytes(), start)
+        known = self._recent.get(key)
+        if known is None:
+            world = self.world(effects, mounting, start)
+            known = (tuple(effects), world, forward.table_geometry(world))  # the effects keep their identity
+            if len(self._recent) >= _REMEMBERED:
+                self._recent.clear()
+            self._recent[key] = known
+        return known[1], known[2]
+
+    @cached_property
+    def _recent(self) -> dict[tuple[Any, ...], tuple[Any, World, forward.TableGeometry]]:
+        return {}
+
     @property
     def local_gravity(self) -> float:
         """Magnitude of the specific force at rest, m/s²."""
@@ -206,12 +226,12 @@ class Twin:
         Wiring, ranges and clipping are applied to the prediction; noise, quantisation, frozen and lost samples are
         not, as they have no noise-free form.
         """
-        world = self.world(effects, mounting, start)
+        world, geometry = self._placed(effects, mounting, start)
         if world.motion_steps:  # once for the channels and the reference
             for step in world.motion_steps:
                 spin = step(spin, t)
             world = world.changed(motion_steps=())
-        readings = forward.channels(world, spin, t, temperature)
+        readings = forward.channels(world, spin, t, temperature, geometry)
         if world.data_steps:
             readings = self._digital(readings, self._effects_with(effects), world, t)
         if self.drive_source == "angle":

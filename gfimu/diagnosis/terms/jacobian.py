@@ -77,7 +77,8 @@ class Jacobian:
         """Return J_cᵀ v of values (n, P) of one observation, shape (m, P)."""
         out = np.zeros((self.size, values.shape[1]))
         for rows, at, block in self.blocks:
-            out[at] += np.tensordot(self.loading[:, c], block, axes=1).T @ values[rows]
+            mixed = self.loading[:, c, None, None] * values[rows]  # (R, rows, P)
+            out[at] += block.reshape(-1, block.shape[2]).T @ mixed.reshape(-1, mixed.shape[2])
         return out
 
     def correlate(self, combined: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -215,17 +216,20 @@ def measured_reach(
         moved[probes] += STEP
         response = np.abs(predict(moved) - base)
         size = response / np.maximum(response.max(axis=0), 1e-300)  # (n, c)
-        for probe in probes:
-            # A coefficient acts on intervals probe − DEGREE … probe of its support.
-            mine = (interval >= probe - DEGREE - apart // 4) & (interval < probe + 3 * apart // 4)
-            largest = size[mine].max(initial=0.0)
-            if largest == 0.0:
-                continue
-            mine &= size > _FORGOTTEN * largest
-            before = max(before, int(interval[mine].max()) - int(probe))
-            after = max(after, int(probe) - DEGREE - int(interval[mine].min()))
-            earlier = max(earlier, float(times[mine].max() - knots[min(probe + 1, spline.intervals)]))
-            later = max(later, float(knots[max(probe - DEGREE, 0)] - times[mine].min()))
+        # A coefficient acts on intervals probe − DEGREE … probe of its support; each reading is nearest to one probe.
+        nearest = (interval - (probes[0] - DEGREE - apart // 4)) // apart
+        among = (nearest >= 0) & (nearest < len(probes))
+        nearest, size, since, at = nearest[among], size[among], interval[among], times[among]
+        largest = np.zeros(len(probes))
+        np.maximum.at(largest, nearest, size)
+        mine = size > _FORGOTTEN * largest[nearest]
+        if not mine.any():
+            continue
+        probe, since, at = probes[nearest[mine]], since[mine], at[mine]
+        before = max(before, int((since - probe).max()))
+        after = max(after, int((probe - DEGREE - since).max()))
+        earlier = max(earlier, float((at - knots[np.minimum(probe + 1, spline.intervals)]).max()))
+        later = max(later, float((knots[np.maximum(probe - DEGREE, 0)] - at).max()))
     if not spline.halvings:
         ahead = interval - spline.interval(t)[0][:, None]
         return Reach(before + max(-int(ahead.min()), 0), after + max(int(ahead.max()), 0))

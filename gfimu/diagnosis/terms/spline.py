@@ -92,6 +92,22 @@ class AngleSpline:
         first = self._on_finest[np.minimum(place.astype(np.intp), len(self._on_finest) - 1)]
         return first, (place - self._begin[first]) / self._steps[first]
 
+    def places(self, t: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+        """Return ``interval(t)``, kept for times that are asked for again."""
+        key = (t.size, float(t.flat[0]), float(t.flat[-1])) if t.size else (0, 0.0, 0.0)
+        known = self._asked.get(key)
+        if known is None or not np.array_equal(known[0], t):
+            if len(self._asked) >= _REMEMBERED:
+                self._asked.clear()
+            known = self._asked[key] = (t, *self.interval(t))
+        return known[1], known[2]
+
+    @cached_property
+    def _asked(
+        self,
+    ) -> dict[tuple[int, float, float], tuple[NDArray[np.float64], NDArray[np.intp], NDArray[np.float64]]]:
+        return {}
+
     @cached_property
     def _steps(self) -> NDArray[np.intp]:
         """Width of every interval (k,) in units of the narrowest."""
@@ -237,7 +253,7 @@ class SplineSpin:
         return state
 
     def _at(self, times: NDArray[np.float64]) -> State:
-        first, u = self.spline.interval(times)
+        first, u = self.spline.places(times)
         h = self.spline.widths[first] if self.spline.halvings else self.spline.spacing
         c0, c1, c2, c3, c4 = (powers[first] for powers in self._polynomials)
         rate = (c1 + u * (2.0 * c2 + u * (3.0 * c3 + u * (4.0 * c4)))) / h
