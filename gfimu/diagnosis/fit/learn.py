@@ -155,13 +155,25 @@ def _acuity(stretch: Stretch, drive: Drive, levels: NoiseLevels) -> float:
     return float(np.sqrt(np.median(power)))
 
 
-def learn_noise(stretches: Sequence[Stretch], point: Point) -> Point:
-    """Return the point with the noise that its causes and drives leave, each run's stretches together."""
+def learn_noise(
+    stretches: Sequence[Stretch], point: Point, jacobians: Sequence[Jacobian | None] | None = None
+) -> Point:
+    """Return the point with the noise that its causes and drives leave, each run's stretches together.
+
+    Parameters
+    ----------
+    stretches : sequence of Stretch
+        The data.
+    point : Point
+        Where.
+    jacobians : sequence of Jacobian, optional
+        Derivatives by the drives, where they are at hand.
+    """
     if stretches and isinstance(stretches[0], BodyStretch):
         rows = (stretches, point.drives, point.levels)
         learnt = over_segments(lambda s, drive, one: learnt_noise(s, drive, point.causes, one), *rows)
         return replace(point, levels=tuple(learnt))
-    linear = linearise(stretches, point)
+    linear = linearise(stretches, point, jacobians=jacobians)
     lefts = [_left(stretch, point, linear, place) for place, stretch in enumerate(stretches)]
     levels = list(point.levels)
     for run in {stretch.index for stretch in stretches}:

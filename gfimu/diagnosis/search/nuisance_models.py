@@ -22,6 +22,7 @@ from gfimu.diagnosis.fit.linear import Point, linearise, with_residue
 from gfimu.diagnosis.fit.random_walk import Walk, walk_strength
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.explain import Explanation, Sets, exactly, explain, hardly_eases, prune
+from gfimu.diagnosis.terms.jacobian import Jacobian
 from gfimu.diagnosis.terms.residue import Residue
 
 __all__ = ["Understanding", "understand"]
@@ -57,11 +58,12 @@ def understand(stretches: Sequence[Stretch], policy: Policy, report: Report | No
     found = [
         _understood(stretches, explain(stretches, policy, report=lambda s, text: tell(0.6 * s, text)), policy, 0.0)
     ]
+    derivatives = _Derivatives(stretches)
     for name, admit, odds in _models(stretches, found[0].explanation, policy):
         tell(0.6, name)
         known = {one.explanation.best.key: one for one in found}
         needed = odds + _left_by_inexactness(found[0].explanation)
-        start = _start(stretches, [known[key].explanation for key in known], admit, needed, policy)
+        start = _start(stretches, [known[key].explanation for key in known], admit, needed, policy, derivatives)
         if start is not None:
             other = _understood(stretches, explain(stretches, policy, start=start), policy, needed)
             # What looked like a random walk beside some causes may be no such thing beside the best of that model.
@@ -83,7 +85,8 @@ def _left_by_inexactness(plain: Explanation) -> float:
     return sum(cause.family.inexactness * max(lost.get(cause.name, 0.0), 0.0) for cause in best.causes)
 
 
-_Admit = Callable[[Point], Point | None]
+_Taken = Sequence[Jacobian] | None
+_Admit = Callable[[Point, _Taken], Point | None]
 
 
 def _models(stretches: Sequence[Stretch], plain: Explanation, policy: Policy) -> list[tuple[str, _Admit, float]]:
@@ -96,32 +99,59 @@ def _models(stretches: Sequence[Stretch], plain: Explanation, policy: Policy) ->
     if Residue.is_possible(first) and not any(s.steps.channels for s in stretches):
         residues = list(policy.residue_odds)
     for scale, odds in residues:
-        found.append((f"calibration residue × {scale:g}", partial(with_residue, stretches, scale=scale), odds))
+        admit = partial(_with_residue, stretches, scale=scale)
+        found.append((f"calibration residue × {scale:g}", admit, odds))
     if first.first_levels.walk == 0.0:
         # One effect of the library; what it has to bring beside the same causes, `Walk.is_likely` asks.
         walks = float(np.log(len(first.model.families())))
-        found.append(("random walk", lambda p: _walking(stretches, p, policy), walks))
+        found.append(("random walk", partial(_walking, stretches, policy=policy), walks))
         for scale, odds in residues[:1]:
 
-            def both(point: Point, scale: float = scale) -> Point | None:
-                walking = _walking(stretches, point, policy)
+            def both(point: Point, taken: _Taken, scale: float = scale) -> Point | None:
+                walking = _walking(stretches, point, taken, policy)
                 return None if walking is None else with_residue(stretches, walking, scale)
 
             found.append(("random walk and calibration residue", both, walks + odds))
     return found
 
 
-def _walking(stretches: Sequence[Stretch], point: Point, policy: Policy) -> Point | None:
+def _with_residue(stretches: Sequence[Stretch], point: Point, _: _Taken, scale: float) -> Point:
+    return with_residue(stretches, point, scale)
+
+
+def _walking(stretches: Sequence[Stretch], point: Point, taken: _Taken, policy: Policy) -> Point | None:
     """Return the point with biases that walk as its residuals do, if they do, and the bias instability beside that."""
     walk = walk_strength(stretches, point, policy)
     if not walk.is_likely(policy):
         return None
     levels = tuple(NoiseLevels(one.white, one.flicker, walk.strength) for one in point.levels)
-    return learn_noise(stretches, replace(point, levels=levels))
+    return learn_noise(stretches, replace(point, levels=levels), taken)
+
+
+class _Derivatives:
+    """Derivatives by the drives at points of fits, each taken once for all models."""
+
+    def __init__(self, stretches: Sequence[Stretch]) -> None:
+        self._stretches = stretches
+        self._taken: dict[int, tuple[Point, list[Jacobian]]] = {}
+
+    def at(self, point: Point) -> list[Jacobian] | None:
+        """Return the derivatives at a point; None where they depend on the noise, over coarse steps."""
+        if any(stretch.steps.channels for stretch in self._stretches):
+            return None
+        if id(point) not in self._taken:  # the point is kept beside them, so that its identity lasts
+            linear = linearise(self._stretches, point, responses=False)
+            self._taken[id(point)] = point, [one.jacobian for one in linear.posteriors]
+        return self._taken[id(point)][1]
 
 
 def _start(
-    stretches: Sequence[Stretch], known: Sequence[Explanation], admit: _Admit, odds: float, policy: Policy
+    stretches: Sequence[Stretch],
+    known: Sequence[Explanation],
+    admit: _Admit,
+    odds: float,
+    policy: Policy,
+    derivatives: _Derivatives,
 ) -> Point | None:
     """Return where a search under another model starts, if that may beat what is known."""
     leader = max((one.best for one in known), key=lambda one: one.log_posterior)
@@ -130,10 +160,11 @@ def _start(
     for one in known:
         # A slow cause may stand for a random walk: it shows where that is left out.
         for base in (one.best, one.nothing, *one.without.values()) if one.best.causes else (one.best,):
-            point = admit(base.point)
+            taken = derivatives.at(base.point)
+            point = admit(base.point, taken)
             if point is None:
                 continue
-            if base.log_posterior + _promise(stretches, base.point, point) < best + odds - 2.0 * policy.close:
+            if base.log_posterior + _promise(stretches, base.point, point, taken) < best + odds - 2.0 * policy.close:
                 continue
             sets = Sets(stretches, point, policy)
             if sets.fit([point])[0] is not None:
@@ -144,11 +175,11 @@ def _start(
     return None if hardly_eases(stretches, leader, leading, policy) else leading.point
 
 
-def _promise(stretches: Sequence[Stretch], before: Point, after: Point) -> float:
+def _promise(stretches: Sequence[Stretch], before: Point, after: Point, taken: _Taken) -> float:
     """Return what another model of the nuisance parameters brings in a linear world, nats."""
     values = []
     for point in (before, after):
-        linear = linearise(stretches, point)
+        linear = linearise(stretches, point, jacobians=taken)
         values.append(linear.log_volume + linear.log_noise - 0.5 * linear.objective)
     return values[1] - values[0]
 

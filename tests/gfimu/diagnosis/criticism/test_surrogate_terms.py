@@ -44,6 +44,15 @@ def test_noise_is_not_described():
     assert not surrogates(*quiet(), POLICY)
 
 
+def test_what_looked_like_a_random_walk_is_described_without_one():
+    stretches, nothing = fitted(recorded(3, pickup))
+    levels = tuple(replace(one, walk=0.1) for one in nothing.point.levels)
+    walking = replace(nothing, point=replace(nothing.point, levels=levels))
+    for found in surrogates(stretches, walking, POLICY):
+        assert {one.walk for one in found.fit.point.levels} == {0.0}
+        assert [term.place for term in found.terms] == ["2 per revolution × rate (cosine)"]
+
+
 def test_a_function_of_one_channel_is_all_there_is():
     stretches, nothing, found = described(3, pickup)
     [term] = found.terms

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from gfimu.diagnosis.data.spins import State
 from gfimu.diagnosis.fit.learn import starting_point
 from gfimu.diagnosis.fit.posterior import condition
 from gfimu.diagnosis.policy import Policy
-from gfimu.diagnosis.search.explain import Sets, explain, prune, reduced
+from gfimu.diagnosis.search.explain import Sets, excess, explain, hardly_eases, prune, reduced
 from gfimu.geometry.array import AccelerometerArray
 from sim.effects import EFFECTS
 from sim.effects.base import Effect, Size
@@ -162,3 +163,15 @@ def test_a_cause_that_bends_the_drive_is_found_though_knots_could_follow(monkeyp
     stretches = stretches_of(TWIN, [hidden.effect(TWIN.array, 0)], duration=10.0, motion=motion)
     found = explain(stretches, Policy())
     assert found.best.names == {"cogging"}
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "free_body", "hardly"),
+    [(10.0, 9.6, False, True), (10.0, 5.0, False, False), (1.3, 1.29, False, False), (10.0, 9.6, True, False)],
+    ids=["a little less of much", "half", "near the noise", "a body in the hand"],
+)
+def test_more_of_the_same_leads_nowhere_where_much_is_left_and_hardly_less(before, after, free_body, hardly):
+    stretches = [SimpleNamespace(observations=600), SimpleNamespace(observations=400)]
+    fits = [SimpleNamespace(objective=1000.0 * value) for value in (before, after)]
+    assert excess(stretches, fits[1]) == pytest.approx(after - 1.0)
+    assert hardly_eases(stretches, *fits, replace(Policy(), free_body=free_body)) == hardly

@@ -132,3 +132,12 @@ def test_joined_motions_change_at_the_time_they_name(coefficients):
     for key in ("angle", "rate", "acceleration"):
         expected = np.where(t > 1.0, getattr(other.at(t), key), getattr(one.at(t), key))
         assert_allclose(getattr(both, key), expected)
+
+
+@pytest.mark.parametrize("spline", [SPLINE, UNEVEN])
+def test_places_that_are_asked_for_again_are_those_of_their_own_times(spline):
+    inner = np.linspace(0.0, 1.0, 50)
+    for times in (inner, inner.copy(), np.concatenate([inner[:1], inner[:-2] ** 2, inner[-1:]]), inner[:0]):
+        for told, right in zip(spline.places(times), spline.interval(times), strict=True):
+            assert_allclose(told, right)
+    assert spline.places(inner)[0] is spline.places(inner.copy())[0]
