@@ -10,13 +10,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import chain
 
 import numpy as np
 
 from gfimu.diagnosis.data.body.stretch import BodyStretch
 from gfimu.diagnosis.data.cosine_basis import NoiseLevels
 from gfimu.diagnosis.data.stretch import Stretch
-from gfimu.diagnosis.fit.gauss_newton import Fit
 from gfimu.diagnosis.fit.learn import learn_noise
 from gfimu.diagnosis.fit.linear import Point, linearise, with_residue
 from gfimu.diagnosis.fit.random_walk import Walk, walk_strength
@@ -58,24 +58,34 @@ def understand(stretches: Sequence[Stretch], policy: Policy, report: Report | No
     found = [
         _understood(stretches, explain(stretches, policy, report=lambda s, text: tell(0.6 * s, text)), policy, 0.0)
     ]
-    derivatives = _Derivatives(stretches)
-    for name, admit, odds in _models(stretches, found[0].explanation, policy):
-        tell(0.6, name)
-        known = {one.explanation.best.key: one for one in found}
-        needed = odds + _left_by_inexactness(found[0].explanation)
-        start = _start(stretches, [known[key].explanation for key in known], admit, needed, policy, derivatives)
+    plain, derivatives = found[0].explanation, _Derivatives(stretches)
+    rough = _left_by_inexactness(plain)
+    offered = [(_offers(stretches, plain, model, derivatives), model) for model in _models(stretches, plain, policy)]
+    # The most promising first: what it finds leaves the others little to search for.
+    for offers, model in sorted(offered, key=lambda pair: _most(pair[0]) - pair[1].odds, reverse=True):
+        tell(0.6, model.name)
+        odds = model.odds + rough
+        others = {one.explanation.best.key: one.explanation for one in found[1:]}
+        beside = [_offers(stretches, one, model, derivatives) for key, one in others.items() if key != plain.best.key]
+        start = _start(stretches, [*offers, *chain(*beside)], _leader(found), odds, policy)
         if start is not None:
-            other = _understood(stretches, explain(stretches, policy, start=start), policy, needed)
+            other = _understood(stretches, explain(stretches, policy, start=start), policy, odds)
             # What looked like a random walk beside some causes may be no such thing beside the best of that model.
             if other.walk is None or other.walk.is_likely(policy):
                 found.append(other)
-    found.sort(key=lambda one: one.explanation.best.log_posterior - one.log_odds, reverse=True)
-    best, elsewhere = found[0], []
-    for other in found[1:]:
+    best, elsewhere = _leader(found), []
+    for other in found:
+        if other is best:
+            continue
         fitted = other.explanation.best
         more = other.log_odds - best.log_odds
         elsewhere.append(replace(fitted, log_posterior=fitted.log_posterior - more))
     return replace(best, explanation=replace(exactly(best.explanation, policy), elsewhere=tuple(elsewhere)))
+
+
+def _leader(found: Sequence[Understanding]) -> Understanding:
+    """Return the most probable, the prior of its model included."""
+    return max(found, key=lambda one: one.explanation.best.log_posterior - one.log_odds)
 
 
 def _left_by_inexactness(plain: Explanation) -> float:
@@ -86,32 +96,48 @@ def _left_by_inexactness(plain: Explanation) -> float:
 
 
 _Taken = Sequence[Jacobian] | None
-_Admit = Callable[[Point, _Taken], Point | None]
 
 
-def _models(stretches: Sequence[Stretch], plain: Explanation, policy: Policy) -> list[tuple[str, _Admit, float]]:
-    """Return the alternatives: name, what admits it at a point, and the log odds that it needs."""
+@dataclass(frozen=True)
+class _Model:
+    """A model of the nuisance parameters: what admits it at a point, if it is there, and the log odds that it needs."""
+
+    name: str
+    admit: Callable[[Point, _Taken], Point | None]
+    odds: float
+
+
+@dataclass(frozen=True)
+class _Offer:
+    """A point under another model of the nuisance parameters, and the log posterior that it has in a linear world."""
+
+    worth: float
+    point: Point
+
+
+def _models(stretches: Sequence[Stretch], plain: Explanation, policy: Policy) -> list[_Model]:
+    """Return the alternatives to white noise and bias instability alone."""
     first = stretches[0]
     if isinstance(first, BodyStretch):  # its slow noise takes what walks; a residue would need the force of many poses
         return []
-    found: list[tuple[str, _Admit, float]] = []
+    found: list[_Model] = []
     residues: list[tuple[float, float]] = []
     if Residue.is_possible(first) and not any(s.steps.channels for s in stretches):
         residues = list(policy.residue_odds)
     for scale, odds in residues:
         admit = partial(_with_residue, stretches, scale=scale)
-        found.append((f"calibration residue × {scale:g}", admit, odds))
+        found.append(_Model(f"calibration residue × {scale:g}", admit, odds))
     if first.first_levels.walk == 0.0:
         # One effect of the library; what it has to bring beside the same causes, `Walk.is_likely` asks.
         walks = float(np.log(len(first.model.families())))
-        found.append(("random walk", partial(_walking, stretches, policy=policy), walks))
+        found.append(_Model("random walk", partial(_walking, stretches, policy=policy), walks))
         for scale, odds in residues[:1]:
 
             def both(point: Point, taken: _Taken, scale: float = scale) -> Point | None:
                 walking = _walking(stretches, point, taken, policy)
                 return None if walking is None else with_residue(stretches, walking, scale)
 
-            found.append(("random walk and calibration residue", both, walks + odds))
+            found.append(_Model("random walk and calibration residue", both, walks + odds))
     return found
 
 
@@ -145,34 +171,41 @@ class _Derivatives:
         return self._taken[id(point)][1]
 
 
+def _offers(stretches: Sequence[Stretch], known: Explanation, model: _Model, derivatives: _Derivatives) -> list[_Offer]:
+    """Return what a model offers beside the causes of an explanation and beside fewer.
+
+    A slow cause may stand for a random walk: it shows where that is left out.
+    """
+    found: list[_Offer] = []
+    for base in (known.best, known.nothing, *known.without.values()) if known.best.causes else (known.best,):
+        taken = derivatives.at(base.point)
+        point = model.admit(base.point, taken)
+        if point is not None:
+            found.append(_Offer(base.log_posterior + _promise(stretches, base.point, point, taken), point))
+    return found
+
+
+def _most(offers: Sequence[_Offer]) -> float:
+    return max((one.worth for one in offers), default=-np.inf)
+
+
 def _start(
-    stretches: Sequence[Stretch],
-    known: Sequence[Explanation],
-    admit: _Admit,
-    odds: float,
-    policy: Policy,
-    derivatives: _Derivatives,
+    stretches: Sequence[Stretch], offers: Sequence[_Offer], leader: Understanding, odds: float, policy: Policy
 ) -> Point | None:
-    """Return where a search under another model starts, if that may beat what is known."""
-    leader = max((one.best for one in known), key=lambda one: one.log_posterior)
-    best = leader.log_posterior
-    tried: list[Fit] = []
-    for one in known:
-        # A slow cause may stand for a random walk: it shows where that is left out.
-        for base in (one.best, one.nothing, *one.without.values()) if one.best.causes else (one.best,):
-            taken = derivatives.at(base.point)
-            point = admit(base.point, taken)
-            if point is None:
-                continue
-            if base.log_posterior + _promise(stretches, base.point, point, taken) < best + odds - 2.0 * policy.close:
-                continue
-            sets = Sets(stretches, point, policy)
-            if sets.fit([point])[0] is not None:
-                tried.append(prune(sets))
-    leading = max(tried, key=lambda one: one.log_posterior, default=None)
-    if leading is None or leading.log_posterior < best + odds - policy.worth_a_search:
+    """Return where a search under another model starts, if that may beat the leader of those that are known."""
+    known, leading = leader.explanation.best, None
+    best = known.log_posterior - leader.log_odds + odds
+    for offer in sorted(offers, key=lambda one: one.worth, reverse=True):
+        reached = best if leading is None else max(best, leading.log_posterior)
+        if offer.worth < reached - 2.0 * policy.close:
+            break
+        sets = Sets(stretches, offer.point, policy)
+        if sets.fit([offer.point])[0] is not None:
+            tried = prune(sets)
+            leading = tried if leading is None or tried.log_posterior > leading.log_posterior else leading
+    if leading is None or leading.log_posterior < best - policy.worth_a_search:
         return None
-    return None if hardly_eases(stretches, leader, leading, policy) else leading.point
+    return None if hardly_eases(stretches, known, leading, policy) else leading.point
 
 
 def _promise(stretches: Sequence[Stretch], before: Point, after: Point, taken: _Taken) -> float:

@@ -64,21 +64,7 @@ def test_a_mode_beside_a_residue_is_named_alone():
     found = diagnose([world.recording], world.twin)
     assert [cause.effect for cause in found.causes] == ["resonance"]
     ((_, truth),) = world.truth
-    told = found.causes[0].parameters
-    # What the readings show of a mode well below its frequency.
-    assert told["gain"] / told["frequency_hz"] ** 2 == pytest.approx(
-        truth["gain"] / truth["frequency_hz"] ** 2, rel=0.1
-    )
-
-
-@pytest.mark.xfail(
-    strict=True, reason="modes of 5.3 to 6.2 Hz are as probable beside a drive that may ring itself: its ± is too small"
-)
-def test_a_mode_beside_a_residue_has_its_frequency():
-    world = draw_world(Case("reduced", 701, ("resonance",), 1500.0, residue=True, duration=14.0))
-    found = diagnose([world.recording], world.twin)
-    assert [cause.effect for cause in found.causes] == ["resonance"]
-    ((_, truth),) = world.truth
+    # Its ± is too small: a drive that follows how the mode decays is not fitted beside a residue.
     assert found.causes[0].parameters["frequency_hz"] == pytest.approx(truth["frequency_hz"], rel=0.02)
 
 
