@@ -6,7 +6,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
+from gfimu.diagnosis.criticism.coincidence.bound_numbers import coincidences
 from gfimu.diagnosis.criticism.gain import Gain
 from gfimu.diagnosis.criticism.holdout import Holdout, gate_gains, held_out_gain, other_recordings, split
 from gfimu.diagnosis.criticism.lack_of_fit import LackOfFit, lack_of_fit
@@ -143,6 +145,9 @@ class _Diagnosis:
         if is_unknown(understanding.explanation, left, gain, policy):
             return self._described(understanding, left, withdrawn, "")
         found = conclude(self._prepared, understanding, left, gain, policy, withdrawn=withdrawn)
+        refuted = self._coincidence(understanding.explanation)
+        if refuted:
+            return self._described(understanding, left, withdrawn, refuted)
         refuted = self._impossible(understanding.explanation)
         if refuted:  # a twin with such sizes leaves nothing that is worth a description
             return conclude(
@@ -210,6 +215,15 @@ class _Diagnosis:
             return Gain()
         label = "blocks of the recording, odd and even from each other" if self._kept is None else "another recording"
         return held_out_gain(fit.causes, self._pairs(explanation, fit), self._policy, label=label)
+
+    def _coincidence(self, explanation: Explanation) -> str:
+        """Return what binds the numbers of the causes that nothing should bind; empty where nothing does."""
+        first = explanation.stretches[0]
+        if isinstance(first, BodyStretch):  # its motion has no arms that all recordings share
+            return ""
+        mounting = Rotation.from_rotvec(first.run.mounting).as_matrix()
+        found = coincidences(explanation.best, self._model.array, mounting)
+        return found[0].sentence if found and found[0].log_odds > self._policy.steady else ""
 
     def _impossible(self, explanation: Explanation) -> str:
         """Return the signature where every set that the data can't tell apart holds a size beyond physics."""
