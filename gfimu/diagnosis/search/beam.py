@@ -132,9 +132,25 @@ def leading_sets(blocks: Blocks, most: int, policy: Policy) -> list[Candidate]:
         larger = sorted(grown.values(), key=lambda one: -one.log_odds)
         every += larger
         front = list(islice(_distinct(larger, blocks.hypotheses), policy.beam))
+    every += _exchanged(blocks, max(every, key=lambda one: one.log_odds).members, policy)
     every.sort(key=lambda one: -one.log_odds)
     worth = (one for one in _distinct(every, blocks.hypotheses) if _is_worth(blocks, one, policy))
     return list(islice(worth, policy.beam))
+
+
+def _exchanged(blocks: Blocks, members: tuple[int, ...], policy: Policy) -> list[Candidate]:
+    """Return a set with one member exchanged for others: what grew one by one may have taken the wrong one first."""
+    found = []
+    for member in members if len(members) > 1 else ():
+        rest = tuple(other for other in members if other != member)
+        taken = {blocks.hypotheses[number].cause.name for number in rest}
+        for number in np.argsort(-blocks.log_odds_each(rest))[:_PARTNERS]:
+            other = tuple(sorted((*rest, int(number))))
+            if blocks.hypotheses[number].cause.name in taken:
+                continue
+            if not (policy.free_body and _nested(blocks.hypotheses, other)):
+                found.append(Candidate(blocks.log_odds(other), other))
+    return found
 
 
 def grown_sets(blocks: Blocks, members: tuple[int, ...], policy: Policy) -> list[Candidate]:

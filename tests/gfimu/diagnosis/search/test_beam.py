@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -14,8 +15,9 @@ from gfimu.diagnosis.fit.learn import starting_point
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.beam import Blocks, leading_sets
 from gfimu.diagnosis.search.screening import screen
+from sim.effects import make_effect
 
-TWIN = small_twin()
+TWIN, CUBE = small_twin(), small_twin("cube12")
 TRUTH = cause_of("table_tilt", TWIN.array, [1.0, -0.5])
 
 
@@ -102,3 +104,20 @@ def test_causes_are_at_their_linear_estimates(blocks):
     assert_allclose(cause.coordinates, np.linalg.solve(gram + np.eye(len(score)) / SCALES[-1] ** 2, score), rtol=1e-6)
     assert cause.name == "table_tilt"
     assert_allclose(cause.coordinates, TRUTH.coordinates, atol=0.1)
+
+
+def test_no_exchange_of_a_member_betters_the_leader():
+    """Greedy growth takes a set of offsets for gravity, as long as nothing stands beside it."""
+    effects = [cause_of("gravity", CUBE.array, [4.0]), cause_of("table_tilt", CUBE.array, [1.0, -0.5])]
+    worlds = [one.effect(CUBE.array, 0) for one in effects]
+    crossed = make_effect("cross_axis", {"a33_from_a31": -0.1, "a33_from_a32": -0.08}, CUBE.array)
+    stretches = stretches_of(CUBE, [*worlds, crossed], duration=6.0, motion=lively())
+    policy = replace(Policy(), beam=2)
+    blocks = Blocks(screen(stretches, starting_point(stretches, 0.1)), policy)
+    leader = leading_sets(blocks, 3, policy)[0]
+    for member in leader.members:
+        rest = [other for other in leader.members if other != member]
+        taken = {blocks.hypotheses[other].cause.name for other in rest}
+        for number, hypothesis in enumerate(blocks.hypotheses):
+            if hypothesis.cause.name not in taken:
+                assert blocks.log_odds(sorted((*rest, number))) <= leader.log_odds + 1e-6
