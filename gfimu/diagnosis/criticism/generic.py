@@ -19,6 +19,7 @@ from gfimu.generic_basis import Motion
 from gfimu.world_model import BasisUnits, SpinState
 
 __all__ = [
+    "FEWEST_CYCLES",
     "LEAST_INFORMATION",
     "REFERENCE",
     "UNIT",
@@ -37,6 +38,8 @@ UNIT = 0.03
 Numerical: the evidence averages over scales of a hundredth to thirty of it.
 """
 
+FEWEST_CYCLES = 10
+"""Numerical: of a tone in a run; slow functions follow what is slower."""
 LEAST_INFORMATION = 1e-9
 """Numerical: of a function that is usable at all."""
 

@@ -18,7 +18,14 @@ from itertools import combinations, pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.diagnosis.criticism.coincidence.patterns import Pattern, channel_patterns, chip_patterns, distinct
+from gfimu.diagnosis.criticism.coincidence.patterns import (
+    NOTHING,
+    SPARE,
+    Pattern,
+    channel_patterns,
+    chip_patterns,
+    distinct,
+)
 from gfimu.diagnosis.fit.evidence import inverse, log_evidence
 from gfimu.diagnosis.fit.gauss_newton import Fit
 from gfimu.diagnosis.terms.cause import Cause
@@ -27,10 +34,6 @@ from gfimu.geometry.array import AccelerometerArray
 __all__ = ["Coincidence", "coincidences"]
 
 _SCATTERS = (0.003, 0.01, 0.03, 0.1)  # numerical: ε, nodes of an average over it
-_FEWEST = 4  # numerical: numbers that can be on a pattern
-_TRIES = 3  # numerical: ways in which two causes may be bound to each other
-_FREE_RATIO = 3.0  # numerical: nats that a ratio costs which is fitted
-_ON_IT = 1e-6  # numerical: share of a pattern that the coordinates of a cause can't reach
 
 
 @dataclass(frozen=True)
@@ -100,7 +103,7 @@ def _on_a_pattern(
     """Return the most likely pattern of the numbers of one cause; None where there is none to try."""
     count = len(cause.coordinates)
     tried: list[tuple[float, Pattern]] = []
-    for pattern in _patterns(cause, array, mounting) if count >= _FEWEST else ():
+    for pattern in _patterns(cause, array, mounting):
         columns = _in_coordinates(cause, pattern)
         if columns is None:
             continue
@@ -139,7 +142,7 @@ def _in_coordinates(cause: Cause, pattern: Pattern) -> NDArray[np.float64] | Non
     """Return a pattern of the sizes as one of the coordinates; None where these can't be on it, or always are."""
     columns = np.linalg.lstsq(cause.mixing, pattern.columns, rcond=None)[0]
     missed = np.linalg.norm(cause.mixing @ columns - pattern.columns)
-    if missed > _ON_IT * np.linalg.norm(pattern.columns) or len(columns) < columns.shape[1] + 2:
+    if missed > NOTHING * np.linalg.norm(pattern.columns) or len(columns) < columns.shape[1] + SPARE:
         return None
     return np.asarray(columns)
 
@@ -148,7 +151,7 @@ def _are_of_a_kind(one: Cause, other: Cause) -> bool:
     """Tell whether two causes have the same numbers: one for each of the same channels or chips."""
     return (
         one.mixing.shape == other.mixing.shape
-        and len(one.coordinates) >= _FEWEST
+        and len(one.coordinates) > SPARE
         and bool(np.allclose(one.mixing, other.mixing))
     )
 
@@ -165,9 +168,9 @@ def _bound(
         same = sizes[0][0].prior_std / sizes[1][0].prior_std
         ways |= {"equal": (same, 0.0), "opposite": (-same, 0.0)}
     weight = inverse(first.covariance + second.covariance)
-    across = float(first.coordinates @ weight @ second.coordinates)
-    ratio = across / max(float(first.coordinates @ weight @ first.coordinates), 1e-300)
-    ways["proportional"] = (ratio, _FREE_RATIO)
+    information = float(first.coordinates @ weight @ first.coordinates)  # of a ratio
+    ratio = float(first.coordinates @ weight @ second.coordinates) / max(information, 1e-300)
+    ways["proportional"] = (ratio, 0.5 * float(np.log1p(information * ratio**2)))  # what is fitted pays for its volume
     tried = []
     for name, (factor, cost) in ways.items():
         values = []
@@ -176,7 +179,7 @@ def _bound(
             turn[its, mine] = factor * np.eye(count)
             turn[its, its] = scatter * max(abs(factor), 1e-3) * np.eye(count)
             values.append(_evidence(fit, turn))
-        tried.append((_average(values) - free - cost - float(np.log(_TRIES)), name))
+        tried.append((_average(values) - free - cost - float(np.log(len(ways))), name))
     odds, name = max(tried)
     return Coincidence(odds, (first.name, second.name), f"each other ({name})", 2 * count, count)
 

@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 
 from gfimu.geometry.array import AccelerometerArray
 
-__all__ = ["Pattern", "channel_patterns", "chip_patterns", "distinct"]
+__all__ = ["NOTHING", "SPARE", "Pattern", "channel_patterns", "chip_patterns", "distinct"]
 
-_LEAST_ARM = 1e-6  # numerical, m
-_ZERO = 1e-9  # numerical: share of the largest entry
-_SAME = 1e-4  # numerical: squared sine between what two patterns span
-_SPARE = 2  # numerical: numbers that a pattern must have more than it has free ones
+NOTHING = 1e-6
+"""Numerical: share of a pattern, or of a metre, that is rounding."""
+SPARE = 2
+"""Numerical: numbers that a pattern must have more than it has free ones."""
 
 
 @dataclass(frozen=True)
@@ -117,11 +117,11 @@ def distinct(patterns: Sequence[Pattern], prior: NDArray[np.float64]) -> list[Pa
         columns = columns[:, np.linalg.norm(columns, axis=0) > 0.0]
         if not columns.shape[1]:
             continue
-        used = int((np.abs(columns) > _ZERO * np.abs(columns).max()).any(axis=1).sum())
+        used = int((np.abs(columns) > NOTHING * np.abs(columns).max()).any(axis=1).sum())
         left, power, _ = np.linalg.svd(columns / np.linalg.norm(columns, axis=0), full_matrices=False)
-        if used < columns.shape[1] + _SPARE or power[-1] < np.sqrt(_SAME) * power[0]:
+        if used < columns.shape[1] + SPARE or power[-1] < NOTHING * power[0]:
             continue
-        if any(span.shape == left.shape and np.sum((span.T @ left) ** 2) > left.shape[1] - _SAME for span in spans):
+        if any(span.shape == left.shape and np.sum((span.T @ left) ** 2) > left.shape[1] - NOTHING for span in spans):
             continue
         spans.append(left)
         kept.append(Pattern(one.name, columns / np.linalg.norm(columns, axis=0) * np.sqrt(used)))
@@ -159,4 +159,4 @@ def _axis_of_channel(array: AccelerometerArray) -> NDArray[np.intp]:
 
 
 def _inverse(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.divide(1.0, values, out=np.zeros_like(values), where=np.abs(values) > _LEAST_ARM)
+    return np.divide(1.0, values, out=np.zeros_like(values), where=np.abs(values) > NOTHING)
