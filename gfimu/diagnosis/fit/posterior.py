@@ -213,9 +213,8 @@ def _jacobian(stretch: Stretch, drive: Drive, effects: Sequence[Effect], seen: O
     times = stretch.counted_times(present)[:, chips]
     reach = measured_reach(counted, drive.spline, now, base[rows], t[rows], times)
     if exact and longest > 0.0:
-        spline = drive.spline
-        longest = min(longest, _MOST_INTERVALS * spline.spacing)
-        reach = Reach(max(reach.before, int(longest / spline.finest)), reach.after)
+        remembered = min(int(longest / drive.spline.finest), _MOST_INTERVALS)
+        reach = Reach(max(reach.before, remembered), reach.after)
     return differentiate(predict, drive.spline, now, base, seen.weight, t, reach)
 
 
