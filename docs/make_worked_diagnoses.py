@@ -17,7 +17,7 @@ mpl.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
-from gfimu.diagnosis.criticism.residuals import residual_views
+from gfimu.diagnosis.criticism.views.residuals import residual_views
 from gfimu.diagnosis.diagnose import diagnose
 from gfimu.diagnosis.verdict.verdict import Diagnosis
 from gfimu.recording.mimu4444 import read_mimu4444

@@ -6,7 +6,7 @@ Estimation and diagnosis know no more of a simulation than this. `sim.twin.Twin`
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
@@ -22,20 +22,17 @@ __all__ = [
     "Effect",
     "EffectFamily",
     "ExpectedNoise",
-    "Mode",
-    "ModelWithModes",
-    "ModelWithPlay",
-    "ModelWithRipple",
     "Pattern",
-    "Play",
-    "Ripple",
-    "RippledMotion",
     "Size",
     "Spin",
     "SpinState",
+    "Whitened",
     "WorldModel",
     "bound_of",
     "is_of_one_recording",
+    "is_of_wiring",
+    "memory_of",
+    "shapes_to_screen",
 ]
 
 
@@ -114,8 +111,26 @@ def is_of_one_recording(family: EffectFamily) -> bool:
     return bool(getattr(family, "of_one_recording", False))
 
 
+def is_of_wiring(effect: Effect) -> bool:
+    """Tell whether a fault of the samples changes a prediction without noise; others need not say so."""
+    return bool(getattr(effect, "of_wiring", False))
+
+
+def memory_of(effect: Effect) -> float:
+    """Return how long a reading depends on the drive before it by an effect, s; others need not say so."""
+    return float(getattr(effect, "memory_s", 0.0))
+
+
 class EffectFamily(Protocol):
-    """A kind of effect: its coordinates, places, shapes and how to build one."""
+    """A kind of effect: its coordinates, places, shapes and how to build one.
+
+    What else it may know of itself is optional: ``whole`` (shape parameters that are whole numbers), ``shape_limits``
+    (least and largest value by shape parameter), ``needs_temperature``, ``tolerance`` (what a good calibration leaves
+    of each size), ``of_one_recording``, ``of_wiring`` (`is_of_wiring`), ``of_pose`` (it depends on the specific force
+    alone), ``contained_in`` (effects that can do all that it does), ``level_error`` (to which
+    a level of a reading is found at best, in units of its white noise), ``memory_s`` and, of a fault of the samples,
+    ``channel_order`` of an effect, and ``scan`` (`shapes_to_screen`).
+    """
 
     @property
     def name(self) -> str: ...  # noqa: D102
@@ -161,6 +176,22 @@ class EffectFamily(Protocol):
         ...
 
 
+def shapes_to_screen(
+    family: EffectFamily, left: Sequence[Whitened], duration: float, sample_rate: float
+) -> tuple[Sequence[Mapping[str, float]], float]:
+    """Return the shapes of a kind of effect to screen, and how many independent ones they were chosen from.
+
+    A family with a method ``scan(left, duration, sample_rate)`` looks for them in what a fit leaves; of others it is
+    the whole grid.
+    """
+    scan = getattr(family, "scan", None)
+    if scan is not None:
+        shapes, looks = scan(left, duration, sample_rate)
+        return shapes, float(looks)
+    grid = family.shapes(duration, sample_rate)
+    return grid, float(len(grid))
+
+
 @dataclass(frozen=True)
 class ExpectedNoise:
     """Noise that the world model expects of its sensors.
@@ -196,98 +227,28 @@ class BasisUnits:
 
 
 @dataclass(frozen=True)
-class Play:
-    """What holds a share of every reading until the specific force has taken up a play.
+class Whitened:
+    """What a stretch leaves unexplained, whitened: its product with any column is that column's score.
 
     Parameters
     ----------
-    share : float
-        Share of a reading that is held.
-    lost : float
-        Most that a reading is off by it, m/s².
-    model : WorldModel
-        The simulation without the play.
-    effects : sequence of Effect
-        The effects that were added, without the play.
-    sources : callable
-        From the readings (n, c) without the play, the sample (n, c) at which what is held of each was last moved.
+    residual : ndarray, shape (n, c + 1)
+        W times the residual, drive at its best; the reference last.
+    weights : ndarray, shape (c + 1,)
+        One over the white variance of each observation.
+    t : ndarray, shape (n,)
+        Sample times, s.
+    state : SpinState
+        The table's motion there.
+    array : AccelerometerArray
+        The array.
     """
 
-    share: float
-    lost: float
-    model: WorldModel
-    effects: Sequence[Effect]
-    sources: Callable[[NDArray[np.float64]], NDArray[np.intp]]
-
-
-class RippledMotion(Protocol):
-    """Motion of a table whose drive ripples, which depends on all that was commanded before."""
-
-    @property
-    def grid(self) -> NDArray[np.float64]:
-        """Times at which it is computed, s, shape (g,)."""
-        ...
-
-    def at(self, t: ArrayLike) -> SpinState:
-        """Return the state at times (n,), s."""
-        ...
-
-    def derivative(
-        self,
-        first: NDArray[np.intp],
-        angle: NDArray[np.float64],
-        rate: NDArray[np.float64],
-        size: int,
-        t: NDArray[np.float64],
-    ) -> tuple[NDArray[np.float64], NDArray[np.intp], NDArray[np.intp]]:
-        """Differentiate what the ripple adds at times ``t`` by the ``size`` coefficients of the command.
-
-        Given are, at each time of the grid, the first coefficient that matters (g,) and what angle and rate take from
-        it and those after it (g, p); returned are the derivatives of angle, rate and acceleration (3, e), coefficient
-        by coefficient, the time of each (e,) and where each coefficient's end (m + 1,).
-        """
-        ...
-
-
-@dataclass(frozen=True)
-class Ripple:
-    """A ripple of the drive's torque that is locked to the table's angle.
-
-    Parameters
-    ----------
-    steepness : float
-        Most that its torque changes with the angle, relative to what takes it back.
-    model : WorldModel
-        The simulation without the ripple.
-    effects : sequence of Effect
-        The effects that were added, without the ripple.
-    motion : callable
-        From the commanded motion and the times (n,), s, of the recording, the table's motion.
-    """
-
-    steepness: float
-    model: WorldModel
-    effects: Sequence[Effect]
-    motion: Callable[[Spin, NDArray[np.float64]], RippledMotion]
-
-
-@dataclass(frozen=True)
-class Mode:
-    """A mode between table and array that the table's angular acceleration α rings: φ'' + 2ζω₀φ' + ω₀²φ = −α.
-
-    Parameters
-    ----------
-    gain : float
-        Share of the twist φ that the array takes part in.
-    natural : float
-        ω₀, rad/s.
-    damping : float
-        ζ.
-    """
-
-    gain: float
-    natural: float
-    damping: float
+    residual: NDArray[np.float64]
+    weights: NDArray[np.float64]
+    t: NDArray[np.float64]
+    state: SpinState
+    array: AccelerometerArray
 
 
 class WorldModel(Protocol):
@@ -333,10 +294,6 @@ class WorldModel(Protocol):
         """Return the true time that each chip's reading and, last, the reference belong to, shape (n, k + 1)."""
         ...
 
-    def sensing_lag(self, effects: Sequence[Effect] = ()) -> float:
-        """Return the time constant of the sensing chain's first-order lag, s; zero where it has none."""
-        ...
-
     def reference_gain(self, effects: Sequence[Effect] = ()) -> float:
         """Return what the reference reads per unit of motion once effects are added, relative to without them."""
         ...
@@ -373,31 +330,4 @@ class BodyModel(WorldModel, Protocol):
         start: float | None = None,
     ) -> NDArray[np.float64]:
         """Predict noise-free channels (n, c), m/s², from gyro and specific force."""
-        ...
-
-
-@runtime_checkable
-class ModelWithPlay(Protocol):
-    """A `WorldModel` some of whose effects hold readings; others need not say so."""
-
-    def play(self, effects: Sequence[Effect] = ()) -> Play | None:
-        """Return what holds a share of the readings once effects are added; None where nothing does."""
-        ...
-
-
-@runtime_checkable
-class ModelWithRipple(Protocol):
-    """A `WorldModel` whose table may ripple with its angle; others need not say so."""
-
-    def ripple(self, effects: Sequence[Effect] = ()) -> Ripple | None:
-        """Return what the table ripples by once effects are added; None where nothing does, or several things do."""
-        ...
-
-
-@runtime_checkable
-class ModelWithModes(Protocol):
-    """A `WorldModel` in which something may ring between the table and the array; others need not say so."""
-
-    def modes(self, effects: Sequence[Effect] = ()) -> Sequence[Mode]:
-        """Return what rings once effects are added."""
         ...

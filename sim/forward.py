@@ -42,11 +42,14 @@ class TableGeometry:
         r × θ: reading per angular acceleration, m.
     centripetal : ndarray, shape (c, 6)
         Reading per product of the angular rate, m (`gfimu.geometry.array.OMEGA_PRODUCTS`).
+    up : ndarray, shape (3,)
+        The world's up in the frame of the tilted axis.
     """
 
     axes: NDArray[np.float64]
     tangential: NDArray[np.float64]
     centripetal: NDArray[np.float64]
+    up: NDArray[np.float64]
 
 
 def table_geometry(world: World) -> TableGeometry:
@@ -56,7 +59,8 @@ def table_geometry(world: World) -> TableGeometry:
         world.cube_offset + world.array.chip_positions @ mount.T,
         [chip.axes @ mount.T for chip in world.array.chips],
     )
-    return TableGeometry(moved.axes, moved.regression_matrix[:, :3], moved.centripetal_matrix)
+    up = Rotation.from_rotvec(world.axis_rotvec).as_matrix()[2]
+    return TableGeometry(moved.axes, moved.regression_matrix[:, :3], moved.centripetal_matrix, up)
 
 
 def rigid_readings(world: World, spin: SpinState, geometry: TableGeometry | None = None) -> NDArray[np.float64]:
@@ -79,16 +83,16 @@ def rigid_readings(world: World, spin: SpinState, geometry: TableGeometry | None
     placed = table_geometry(world) if geometry is None else geometry
     theta, rate, acceleration = spin.angle, spin.rate, spin.acceleration
     cos, sin = np.cos(theta), np.sin(theta)
-    up = Rotation.from_rotvec(world.axis_rotvec).as_matrix().T[:, 2]  # world's up in the tilted axis frame
     stretch = 1.0 + world.stretch * rate**2 if world.stretch else 1.0
     if not world.nod:
+        x, y, z = placed.up
         gravity = world.gravity * np.stack(
-            [cos * up[0] + sin * up[1], cos * up[1] - sin * up[0], np.full_like(cos, up[2])], axis=-1
+            [cos * x + sin * y, cos * y - sin * x, np.full_like(cos, z)], axis=-1
         )  # (n, 3)
         spun = np.outer(acceleration * stretch, placed.tangential[:, 2])
         spun += np.outer(rate**2 * stretch, placed.centripetal[:, 2])
         return gravity @ placed.axes.T + spun
-    return _nodding_readings(world, spin, placed, up, stretch)
+    return _nodding_readings(world, spin, placed, stretch)
 
 
 def nodding_motion(nod: Nod, spin: SpinState) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
@@ -105,11 +109,11 @@ def nodding_motion(nod: Nod, spin: SpinState) -> tuple[NDArray[np.float64], NDAr
 
 
 def _nodding_readings(
-    world: World, spin: SpinState, placed: TableGeometry, up: NDArray[np.float64], stretch: NDArray[np.float64] | float
+    world: World, spin: SpinState, placed: TableGeometry, stretch: NDArray[np.float64] | float
 ) -> NDArray[np.float64]:
     """Return the readings when the axis nods: the angular rate has parts across the axis."""
     lean, omega, alpha = nodding_motion(world.nod, spin)
-    gravity = world.gravity * Rotation.from_rotvec(lean).inv().apply(up)
+    gravity = world.gravity * Rotation.from_rotvec(lean).inv().apply(placed.up)
     turn = Rotation.from_rotvec(np.outer(spin.angle, [0.0, 0.0, 1.0])).inv()
     omega, alpha, gravity = turn.apply(omega), turn.apply(alpha), turn.apply(gravity)
     x, y, z = omega.T
@@ -139,7 +143,11 @@ def growing_arms(
 
 
 def channels(
-    world: World, motion: SpinMotion, t: NDArray[np.float64], temperature: NDArray[np.float64] | None = None
+    world: World,
+    motion: SpinMotion,
+    t: NDArray[np.float64],
+    temperature: NDArray[np.float64] | None = None,
+    geometry: TableGeometry | None = None,
 ) -> NDArray[np.float64]:
     """Noise-free analogue readings of a world at board times.
 
@@ -153,6 +161,8 @@ def channels(
         Time on the board's clock, s.
     temperature : ndarray, shape (n,), optional
         Board temperature, °C.
+    geometry : TableGeometry, optional
+        ``table_geometry(world)`` where it is at hand.
 
     Returns
     -------
@@ -161,7 +171,7 @@ def channels(
     """
     for step in (*world.motion_steps, *world.mount_steps):
         motion = step(motion, t)
-    geometry = table_geometry(world)
+    geometry = table_geometry(world) if geometry is None else geometry
     true_times = t / (1.0 + world.clock_ratio)
     spin = motion.at(true_times)
     if world.chip_delay is None:
@@ -170,7 +180,9 @@ def channels(
         readings = np.empty((len(t), world.array.n_channels))
         for chip, times in enumerate(world.chip_times(t).T):
             mine = world.array.chip_of_channel == chip
-            part = TableGeometry(geometry.axes[mine], geometry.tangential[mine], geometry.centripetal[mine])
+            part = TableGeometry(
+                geometry.axes[mine], geometry.tangential[mine], geometry.centripetal[mine], geometry.up
+            )
             readings[:, mine] = rigid_readings(world, motion.at(times), part) + growing_arms(world, motion, times, part)
     warm = np.full(len(t), world.temperature) if temperature is None else temperature
     return world.sense(readings, SampleContext(t, spin, warm))

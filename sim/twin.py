@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,18 +20,17 @@ from gfimu.motion.body_drive import BodyDrive
 from gfimu.parts.files import part_table
 from gfimu.short_repr import short_repr
 from gfimu.units import STANDARD_GRAVITY
-from gfimu.world_model import BasisUnits, BodyModel, EffectFamily, ExpectedNoise, Mode, Play, Ripple, Spin
+from gfimu.world_model import BasisUnits, BodyModel, EffectFamily, ExpectedNoise, Spin
 from gfimu.world_model import Effect as AnyEffect
 from sim import forward
 from sim.body import body_channels
 from sim.effects import BODY_EFFECTS, EFFECTS, ENCODER_EFFECTS, Effect, apply_effects, make_effect
-from sim.effects.mechanical import Cogging, Resonance
-from sim.effects.sensing import Hysteresis
 from sim.effects.unknown import UnknownTerm
 from sim.world import World
 
 __all__ = ["Twin"]
 
+_REMEMBERED = 16  # numerical: worlds that a twin keeps
 _SOURCES = ("tacho", "angle", "command", "gyro")
 
 
@@ -174,6 +174,24 @@ class Twin:
         )
         return apply_effects(nominal, self._effects_with(effects))
 
+    def _placed(
+        self, effects: Sequence[AnyEffect], mounting: NDArray[np.float64] | None, start: float | None
+    ) -> tuple[World, forward.TableGeometry]:
+        """Return the world with some effects and its geometry: a derivative asks hundreds of times for the same."""
+        key = (*(id(effect) for effect in effects), None if mounting is None else mounting.tobytes(), start)
+        known = self._recent.get(key)
+        if known is None:
+            world = self.world(effects, mounting, start)
+            known = (tuple(effects), world, forward.table_geometry(world))  # the effects keep their identity
+            if len(self._recent) >= _REMEMBERED:
+                self._recent.clear()
+            self._recent[key] = known
+        return known[1], known[2]
+
+    @cached_property
+    def _recent(self) -> dict[tuple[Any, ...], tuple[Any, World, forward.TableGeometry]]:
+        return {}
+
     @property
     def local_gravity(self) -> float:
         """Magnitude of the specific force at rest, m/s²."""
@@ -208,12 +226,12 @@ class Twin:
         Wiring, ranges and clipping are applied to the prediction; noise, quantisation, frozen and lost samples are
         not, as they have no noise-free form.
         """
-        world = self.world(effects, mounting, start)
+        world, geometry = self._placed(effects, mounting, start)
         if world.motion_steps:  # once for the channels and the reference
             for step in world.motion_steps:
                 spin = step(spin, t)
             world = world.changed(motion_steps=())
-        readings = forward.channels(world, spin, t, temperature)
+        readings = forward.channels(world, spin, t, temperature, geometry)
         if world.data_steps:
             readings = self._digital(readings, self._effects_with(effects), world, t)
         if self.drive_source == "angle":
@@ -252,33 +270,6 @@ class Twin:
         """Return the true time that each chip's reading and, last, the reference belong to, shape (n, k + 1)."""
         world = self.world(effects)
         return np.column_stack([world.chip_times(t), t - world.tacho_delay])
-
-    def sensing_lag(self, effects: Sequence[AnyEffect] = ()) -> float:
-        """Return the time constant of the sensing chain's first-order lag, s."""
-        return float(sum(e.value("time_constant_s") for e in self._effects_with(effects) if e.name == "sensor_lag"))
-
-    def play(self, effects: Sequence[AnyEffect] = ()) -> Play | None:
-        """Return what holds a share of the readings, of several the largest; None where nothing does."""
-        plays = [effect for effect in self._effects_with(effects) if isinstance(effect, Hysteresis) and effect.share]
-        if not plays:
-            return None
-        largest = max(plays, key=lambda play: play.share)
-        own = tuple(effect for effect in self.effects if not isinstance(effect, Hysteresis))
-        others = [effect for effect in effects if not isinstance(effect, Hysteresis)]
-        return Play(largest.share, largest.value("lost_m_s2"), replace(self, effects=own), others, largest.last_moved)
-
-    def ripple(self, effects: Sequence[AnyEffect] = ()) -> Ripple | None:
-        """Return what the table ripples by once effects are added; None where nothing does, or several things do."""
-        ripples = [effect for effect in self._effects_with(effects) if isinstance(effect, Cogging)]
-        if len(ripples) != 1:
-            return None
-        own = tuple(effect for effect in self.effects if not isinstance(effect, Cogging))
-        others = [effect for effect in effects if not isinstance(effect, Cogging)]
-        return Ripple(ripples[0].steepness, replace(self, effects=own), others, ripples[0].rippled)
-
-    def modes(self, effects: Sequence[AnyEffect] = ()) -> tuple[Mode, ...]:
-        """Return what rings between the table and the cube once effects are added."""
-        return tuple(effect.mode for effect in self._effects_with(effects) if isinstance(effect, Resonance))
 
     def reference_gain(self, effects: Sequence[AnyEffect] = ()) -> float:
         """Return what the reference reads per unit of motion once effects are added, relative to the twin's own."""

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import gfimu
-from gfimu.world_model import BodyModel, ModelWithModes, ModelWithPlay, ModelWithRipple
+from gfimu.world_model import BodyModel
 from sim.twin import Twin
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -139,9 +139,8 @@ def test_no_cast_makes_a_twin_a_world_model():
 
 def test_a_twin_is_a_world_model_without_any():
     """`sim/twin.py` lets the type checker prove it; ``Any`` in a signature would make that proof empty."""
-    protocols = (BodyModel, ModelWithModes, ModelWithPlay, ModelWithRipple)
-    methods = {name for protocol in protocols for name in dir(protocol) if not name.startswith("_")}
-    assert {"predict", "predict_body", "families", "play", "ripple", "modes", "extended"} <= methods
+    methods = {name for name in dir(BodyModel) if not name.startswith("_")}
+    assert {"predict", "predict_body", "families", "extended"} <= methods
     untyped = [
         name
         for name in methods
@@ -240,37 +239,11 @@ ROOMS = {
     "gfimu.recording": {"gfimu.files", "gfimu.geometry", "gfimu.parts", "gfimu.rate.integration"},
     "gfimu.motion": {"gfimu.files", "gfimu.geometry", "gfimu.parts", "gfimu.rate", "gfimu.recording"},
     "gfimu.position_drift": {"gfimu.geometry", "gfimu.motion", "gfimu.rate.integration"},
-    "gfimu.diagnosis.data": {
-        "gfimu.world_model",
-        "gfimu.diagnosis.segment",
-        "gfimu.diagnosis.stretches",
-        "gfimu.recording",
-    },
-    "gfimu.diagnosis.criticism": {"gfimu.diagnosis.coloured_noise", "gfimu.diagnosis.verdict"},
-    "gfimu.diagnosis.verdict": {"gfimu.world_model", "gfimu.diagnosis.data.run"},
-    "gfimu.diagnosis.report": {
-        "gfimu.diagnosis.calibration_residue",
-        "gfimu.diagnosis.criticism",
-        "gfimu.diagnosis.verdict",
-        "gfimu.recording",
-        "gfimu.visual",
-    },
-    "gfimu.diagnosis.design": {
-        "gfimu.diagnosis.causes",
-        "gfimu.diagnosis.coloured_noise",
-        "gfimu.diagnosis.data.run",
-        "gfimu.diagnosis.drive",
-        "gfimu.diagnosis.evidence",
-        "gfimu.world_model",
-        "gfimu.diagnosis.segment",
-        "gfimu.diagnosis.signatures",
-        "gfimu.diagnosis.stretches",
-    },
 }
 """Folders, and what of this project each may import besides itself and the common modules."""
 
 MOST_FILES = 12
-"""In one folder of `ROOMS`."""
+"""In one folder of a room."""
 
 
 def room_imports(room: str) -> set[str]:
@@ -291,9 +264,114 @@ def test_rooms_import_from_the_rooms_they_name_only(room):
     assert {name for name in ROOMS[room] if not any(inside(one, name) for one in imported)} == set()
 
 
-@pytest.mark.parametrize("room", ROOMS)
+DIAGNOSIS = ("data", "terms", "fit", "search", "criticism", "verdict", "report", "design")
+"""Rooms of the diagnosis from the lowest floor up: each imports itself and those before it."""
+
+BESIDE = {"gfimu.diagnosis.policy", "gfimu.generic_basis", "gfimu.geometry.array", "gfimu.world_model"}
+"""What every room of the diagnosis may import besides."""
+
+OUTSIDE = {
+    "data": {"gfimu.recording", "gfimu.motion.body_drive"},
+    "terms": {"gfimu.motion.body_drive"},
+    "criticism": {"gfimu.geometry.kinematics"},
+    "verdict": {"gfimu.motion.attitude"},
+    "report": {"gfimu.recording", "gfimu.visual"},
+}
+"""What of this project a single room of the diagnosis may import besides."""
+
+
+@pytest.mark.parametrize("room", DIAGNOSIS)
+def test_arrows_of_the_diagnosis_go_down(room):
+    below = [f"gfimu.diagnosis.{one}" for one in DIAGNOSIS[: DIAGNOSIS.index(room)]]
+    outside = OUTSIDE.get(room, set())
+    imported = room_imports(f"gfimu.diagnosis.{room}")
+    assert {name for name in imported if not inside(name, *below, *BESIDE, *outside)} == set()
+    assert {name for name in outside if not any(inside(one, name) for one in imported)} == set()
+
+
+@pytest.mark.parametrize("room", [*ROOMS, *(f"gfimu.diagnosis.{one}" for one in DIAGNOSIS)])
 def test_rooms_have_few_files(room):
     assert 1 < len([file for file in FILES.values() if file.parent == FILES[room].parent]) <= MOST_FILES
+
+
+def test_the_report_sees_the_verdict_and_its_views_only():
+    below = {"gfimu.diagnosis.verdict", "gfimu.diagnosis.criticism.views", *BESIDE}
+    assert not [
+        name
+        for name in room_imports("gfimu.diagnosis.report")
+        if inside(name, "gfimu.diagnosis") and not inside(name, *below)
+    ]
+
+
+def test_every_module_of_the_diagnosis_has_a_test_that_imports_it():
+    tests = (ROOT / "tests" / "gfimu" / "diagnosis").rglob("test_*.py")
+    imported = set().union(*(modules_imported(file.read_text(encoding="utf-8")) for file in tests))
+    rooms = [f"gfimu.diagnosis.{room}" for room in DIAGNOSIS]
+    modules = {module for module, file in FILES.items() if inside(module, *rooms) and file.name != "__init__.py"}
+    assert modules - imported == set()
+
+
+THRESHOLD_ROOMS = tuple(f"gfimu.diagnosis.{room}" for room in ("terms", "fit", "search", "criticism", "verdict"))
+
+OUTSIDE_POLICY = {
+    "gfimu.diagnosis.terms.drive": {"FIRST_ROUGHNESS", "LEAST_ROUGHNESS", "MARGIN", "ROUGH_FOR"},  # the drive's prior
+}
+"""Tuned numbers that are not in `Policy`."""
+
+
+def numeric_constants(source: str) -> set[str]:
+    """Return the module constants with a number in them that nothing near them calls numerical.
+
+    Near is a comment on their lines, the comment block above and the string below.
+    """
+    lines, body, found = source.splitlines(), ast.parse(source).body, set()
+    for place, node in enumerate(body):
+        if not isinstance(node, ast.Assign | ast.AnnAssign) or node.value is None:
+            continue
+        targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+        names = {one.id for target in targets for one in ast.walk(target) if isinstance(one, ast.Name)}
+        numbers = [
+            one
+            for one in ast.walk(node.value)
+            if isinstance(one, ast.Constant) and isinstance(one.value, int | float) and not isinstance(one.value, bool)
+        ]
+        if not numbers or names <= {"__all__"}:
+            continue
+        first, last = node.lineno - 1, node.end_lineno
+        while first > 0 and lines[first - 1].startswith("#"):
+            first -= 1
+        after = body[place + 1] if place + 1 < len(body) else None
+        if isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant) and isinstance(after.value.value, str):
+            last = after.end_lineno
+        if "numerical" not in "\n".join(lines[first:last]).lower():
+            found |= names
+    return found
+
+
+def test_thresholds_of_the_diagnosis_are_in_its_policy():
+    found = {
+        module: names
+        for module, file in FILES.items()
+        if inside(module, *THRESHOLD_ROOMS) and (names := numeric_constants(file.read_text(encoding="utf-8")))
+    }
+    assert found == OUTSIDE_POLICY
+
+
+def test_the_reader_of_constants_sees_every_form():
+    source = """
+__all__ = ["A"]
+NAME = "text"
+A = 3.0
+B, C = 1, 2  # numerical
+D: float = 4.0
+# numerical: of a block
+E = (1.0, 2.0)
+F = 5.0
+'''Numerical: a step.'''
+G = True
+H = -1.0 * A
+"""
+    assert numeric_constants(source) == {"A", "D", "H"}
 
 
 FORMER = {

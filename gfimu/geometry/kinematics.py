@@ -275,7 +275,7 @@ def joint_form(array: AccelerometerArray, readings: ArrayLike) -> JointEstimate:
     Raises
     ------
     GeometryError
-        If α or p can't be separated from the products of ω.
+        If α or p can't be told from the products of ω.
     """
     rows = _reading_matrix(array, readings)
     inverse, seen = _joint_inverse(array)

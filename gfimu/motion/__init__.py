@@ -1,1 +1,1 @@
-"""Motion of the body: estimation, attitude, navigation, biases estimated from a rest at the start."""
+"""Motion of the body: estimation, attitude, navigation, what a rest at the start tells of the biases."""

@@ -93,11 +93,33 @@ class Effect(ABC):
     """Unit of each parameter that is no size, by key; `gfimu.units.RATIO`, ``NUMBER`` or ``NAME`` where it has none."""
     starts: ClassVar[tuple[float, ...]] = ()
     """Values in units of the prior to start from where a large size is far from linear; none by default."""
+    whole: ClassVar[frozenset[str]] = frozenset()
+    """Shape parameters that are whole numbers, chosen from a grid and not refined."""
+    shape_limits: ClassVar[Mapping[str, tuple[float, float]]] = {}
+    """Least and largest value of shape parameters."""
+    needs_temperature: ClassVar[bool] = False
+    """True where it shows only in recordings with a temperature."""
+    tolerance: ClassVar[float] = 0.0
+    """Standard deviation of each size that a good calibration leaves, in the unit of the sizes."""
+    level_error: ClassVar[float] = 0.0
+    """Standard deviation to which a level of a reading is found at best, in units of the reading's white noise."""
     of_one_recording: ClassVar[bool] = False
     """True where its phase is that of a clock no other recording shares: it does not predict another one."""
+    of_wiring: ClassVar[bool] = False
+    """True for a fault of the samples that changes a prediction without noise: it carries readings elsewhere or scales
+    them."""
+    of_pose: ClassVar[bool] = False
+    """True where it depends on the specific force alone: while a body rests it is constant, as slow noise nearly is."""
+    contained_in: ClassVar[frozenset[str]] = frozenset()
+    """Effects that can do all that it does: beside one of them it has no size of its own."""
 
     def __init__(self, parameters: Mapping[str, Any]) -> None:
         self.parameters: dict[str, Any] = dict(parameters)
+
+    @property
+    def memory_s(self) -> float:
+        """How long a reading depends on the drive before it, s, where that is longer than a probe can measure."""
+        return 0.0
 
     @classmethod
     @abstractmethod

@@ -40,6 +40,10 @@ class _Discrete(Effect):
         value = self.parameters.get(key, [])
         return [value] if isinstance(value, str) else [str(item) for item in value]
 
+    def channel_order(self, array: AccelerometerArray) -> NDArray[np.intp]:
+        """Return the sensor that each channel of the recording holds, shape (c,)."""
+        return np.arange(array.n_channels)
+
 
 class Noise(_Discrete):
     """More white noise than the part should have."""
@@ -120,6 +124,7 @@ class WrongRange(_Discrete):
 
     name = "wrong_range"
     summary = "a chip is configured for another range: its readings are off by a power of two"
+    of_wiring = True
     other_units: ClassVar = {"chip": NAME, "factor": NUMBER}
 
     def apply(self, world: World) -> World:
@@ -137,16 +142,22 @@ class AxisSwap(_Discrete):
 
     name = "axis_swap"
     summary = "channels are exchanged by wiring"
+    of_wiring = True
     other_units: ClassVar = {"channels": NAME}
 
-    def apply(self, world: World) -> World:
-        """Exchange the two channels, or the two of each pair where several follow each other."""
+    def channel_order(self, array: AccelerometerArray) -> NDArray[np.intp]:
+        """Return the sensor that each channel of the recording holds, shape (c,)."""
         names = self.names("channels")
         if not names or len(names) % 2 or len(set(names)) < len(names):
             raise InputError("effect 'axis_swap': channels must hold two channel names, or pairs of different ones")
-        places = [world.array.index(name) for name in names]
-        order = np.arange(world.array.n_channels)
+        places = [array.index(name) for name in names]
+        order = np.arange(array.n_channels)
         order[places[::2]], order[places[1::2]] = places[1::2], places[::2]
+        return order
+
+    def apply(self, world: World) -> World:
+        """Exchange the two channels, or the two of each pair where several follow each other."""
+        order = self.channel_order(world.array)
         return _with_data_step(world, lambda t, readings, rng: readings[:, order])
 
 
@@ -155,6 +166,7 @@ class SignFlip(_Discrete):
 
     name = "sign_flip"
     summary = "a channel is inverted"
+    of_wiring = True
     other_units: ClassVar = {"channel": NAME}
 
     def apply(self, world: World) -> World:

@@ -11,9 +11,9 @@ from scipy.spatial.transform import Rotation
 
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.units import NUMBER, RATIO
-from gfimu.world_model import Mode
 from sim.effects.base import LARGEST_TURN, Effect, Pattern, Size, chip_patterns
-from sim.effects.table_dynamics import SERVO_STIFFNESS, RippledSpin, TwistingSpin
+from sim.effects.scans import mode_shapes, order_shapes, per_acceleration
+from sim.effects.table_dynamics import Mode, RippledSpin, TwistingSpin
 from sim.motion import SpinMotion
 from sim.world import Nod, World
 
@@ -41,7 +41,9 @@ class Misalignment(Effect):
 
     name = "misalignment"
     summary = "a chip's sensing axes are turned against the body"
+    tolerance = float(np.deg2rad(0.02))
     place = "geometry"
+    contained_in = frozenset({"cross_axis"})
     separated_by = "the cube remounted on its side, or static poses on several sides"
 
     @classmethod
@@ -77,6 +79,7 @@ class SensorPosition(Effect):
 
     name = "sensor_position"
     summary = "a chip is not where the drawing says"
+    tolerance = 5e-5  # m
     place = "geometry"
     separated_by = "the cube remounted on its side: an eccentric mounting changes with it, a chip's place does not"
 
@@ -243,6 +246,7 @@ class CentrifugalFlex(Effect):
     place = "geometry"
     separated_by = "the cube remounted on its side, and several high speeds"
     other_units: ClassVar = {"moving_arms": NUMBER}
+    whole = frozenset({"moving_arms"})
 
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
@@ -264,6 +268,10 @@ class CentrifugalFlex(Effect):
         return world.changed(stretch=world.stretch + self.value("stretch_s2_rad2"), moving_arms=moving)
 
 
+_CHANCE = 0.2
+"""Log evidence that a mode gains by chance, nats per second of data: measured with nothing hidden, and a third more."""
+
+
 class Cogging(Effect):
     """Torque ripple locked to the table's angle."""
 
@@ -272,6 +280,7 @@ class Cogging(Effect):
     place = "motion"
     separated_by = "slow steady rotation at two speeds"
     other_units: ClassVar = {"amplitude_rad_s2": "rad/s²", "order": NUMBER, "phase_rad": "rad"}
+    whole = frozenset({"order"})
     inexactness = 0.02  # motor, friction and speed loop of a table are not as simple as this servo
 
     @classmethod
@@ -283,6 +292,11 @@ class Cogging(Effect):
     def shapes(cls, duration: float, sample_rate: float) -> tuple[dict[str, float], ...]:
         """Return one order; the scan over orders finds it."""
         return ({"order": 6.0},)
+
+    @classmethod
+    def scan(cls, left, duration, sample_rate):  # type: ignore[no-untyped-def]
+        """Return the strongest orders of an angular acceleration."""
+        return order_shapes(left, 4, per_acceleration)
 
     @classmethod
     def from_sizes(cls, array, values, shape) -> Effect:  # type: ignore[no-untyped-def]
@@ -302,11 +316,6 @@ class Cogging(Effect):
         """Return the units of the contract's keys, amplitude and phase instead of the sizes."""
         return dict(cls.other_units)
 
-    @property
-    def steepness(self) -> float:
-        """Most that its torque changes with the angle, relative to the servo's."""
-        return abs(self.value("amplitude_rad_s2")) * self.value("order", 1.0) / SERVO_STIFFNESS
-
     def rippled(self, motion: SpinMotion, t: NDArray[np.float64]) -> RippledSpin:
         """Return the table's motion under a command over times (n,), s."""
         return RippledSpin(motion, t, self.value("amplitude_rad_s2"), self.value("order", 1.0), self.value("phase_rad"))
@@ -324,6 +333,7 @@ class Resonance(Effect):
     place = "motion"
     separated_by = "fast ramps followed by rest, in which the mode rings down alone"
     other_units: ClassVar = {"frequency_hz": "Hz", "damping_ratio": RATIO}
+    shape_limits: ClassVar = {"damping_ratio": (1e-3, 0.3)}
 
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
@@ -337,6 +347,19 @@ class Resonance(Effect):
         frequencies = np.geomspace(2.0, max(top, 2.5), 16)
         return tuple({"frequency_hz": float(f), "damping_ratio": zeta} for f in frequencies for zeta in (0.02, 0.1))
 
+    @classmethod
+    def scan(cls, left, duration, sample_rate):  # type: ignore[no-untyped-def]
+        """Return the modes that follow the residual best, and the grid."""
+        shapes, looks = mode_shapes(left, 5)
+        # A mode bends the functions that the drive can follow and so fits noise as one parameter alone can't.
+        return (*shapes, *cls.shapes(duration, sample_rate)), looks * float(np.exp(_CHANCE * duration))
+
+    @property
+    def memory_s(self) -> float:
+        """Return how long it takes the mode to decay to a three-hundredth."""
+        mode = self.mode
+        return float(np.log(300.0) / (mode.damping * mode.natural))
+
     @property
     def mode(self) -> Mode:
         """Participation, natural frequency, rad/s, and damping ratio."""
@@ -348,6 +371,6 @@ class Resonance(Effect):
         mode = self.mode
 
         def step(motion: SpinMotion, t: NDArray[np.float64]) -> SpinMotion:
-            return TwistingSpin(motion, t, mode.gain, mode.natural, mode.damping)
+            return TwistingSpin(motion, t, mode)
 
         return world.changed(mount_steps=(*world.mount_steps, step))

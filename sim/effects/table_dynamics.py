@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
@@ -9,15 +11,13 @@ from scipy.signal import cont2discrete, lfilter
 
 from sim.motion import SpinMotion, SpinState
 
-__all__ = ["SERVO_STIFFNESS", "RippledSpin", "TwistingSpin"]
+__all__ = ["Mode", "RippledSpin", "TwistingSpin"]
 
 _FINE_STEP = 2e-3
 _SERVO = 2 * np.pi  # rad/s: a bandwidth of 1 Hz
 _SERVO_DAMPING = 0.7
-SERVO_STIFFNESS = _SERVO**2
-"""Angular acceleration with which the table's servo takes back an error of its angle, 1/s²."""
+_SERVO_STIFFNESS = _SERVO**2  # 1/s²: angular acceleration with which it takes back an error of the angle
 _DRAG = 2 * _SERVO_DAMPING * _SERVO
-_FORGOTTEN = 3e-3  # of an error of the servo, below which it is left out
 _REST_RATE = 0.3
 _SLOW_MODE = 90.0
 
@@ -46,16 +46,15 @@ class RippledSpin:
     def __init__(
         self, motion: SpinMotion, t: NDArray[np.float64], amplitude: float, order: float, phase: float
     ) -> None:
-        self._motion, self._amplitude, self._order, self._phase = motion, amplitude, float(order), phase
+        self._motion = motion
         step = 0.5 * _FINE_STEP
         self._grid = np.arange(t[0], t[-1] + 2 * step, step)
         spin = motion.at(self._grid)
         torque = amplitude * spin.rate**2 / (spin.rate**2 + _REST_RATE**2)
-        system = (np.array([[0.0, 1.0], [-SERVO_STIFFNESS, -_DRAG]]), np.array([[0.0], [1.0]]))
+        system = (np.array([[0.0, 1.0], [-_SERVO_STIFFNESS, -_DRAG]]), np.array([[0.0], [1.0]]))
         a, b, *_ = cont2discrete((*system, np.eye(2), np.zeros((2, 1))), step)
-        self._a, self._b = a, b[:, 0]
         self._angle, self._rate, self._acceleration = _servo_error(
-            torque, order * spin.angle + phase, self._order, a, self._b
+            torque, order * spin.angle + phase, float(order), a, b[:, 0]
         )
 
     def at(self, t: ArrayLike) -> SpinState:
@@ -63,98 +62,6 @@ class RippledSpin:
         return _added(
             self._motion, np.asarray(t, dtype=float), self._grid, (self._angle, self._rate, self._acceleration)
         )
-
-    @property
-    def grid(self) -> NDArray[np.float64]:
-        """Times at which the error of the servo is computed, s."""
-        return self._grid
-
-    def derivative(
-        self,
-        first: NDArray[np.intp],
-        angle: NDArray[np.float64],
-        rate: NDArray[np.float64],
-        size: int,
-        t: NDArray[np.float64],
-    ) -> tuple[NDArray[np.float64], NDArray[np.intp], NDArray[np.intp]]:
-        """Differentiate what the ripple adds to the motion by the coefficients of a spline that commands it.
-
-        The servo remembers the command for a second, longer where a strong ripple holds it, and where in its turn the
-        ripple is depends on the angle.
-
-        Parameters
-        ----------
-        first : ndarray, shape (g,)
-            First of the coefficients that matter at each time of the grid, which never falls.
-        angle, rate : ndarray, shape (g, p)
-            What angle and rate take from it and those after it.
-        size : int
-            Number m of coefficients.
-        t : ndarray, shape (n,)
-            Times, in order.
-
-        Returns
-        -------
-        values : ndarray, shape (3, e)
-            Derivative of angle, rate and acceleration, coefficient by coefficient.
-        rows, ends : ndarray, shape (e,) and (m + 1,)
-            Time of each value, and where each coefficient's values end.
-        """
-        spin = self._motion.at(self._grid)
-        square = spin.rate**2 + _REST_RATE**2
-        # The argument of the sine as `_servo_error` predicts it.
-        here = self._acceleration + SERVO_STIFFNESS * self._angle + _DRAG * self._rate
-        ahead = self._a[0, 0] * self._angle + self._a[0, 1] * self._rate + self._b[0] * here
-        argument = self._order * (spin.angle + np.concatenate([[0.0], ahead[:-1]])) + self._phase
-        steep = self._order * self._amplitude * spin.rate**2 / square * np.cos(argument)
-        driven = 2.0 * self._amplitude * spin.rate * (_REST_RATE / square) ** 2 * np.sin(argument)
-        last, step = len(self._grid) - 1, self._grid[1] - self._grid[0]
-        starts = np.searchsorted(first, np.arange(size) - angle.shape[1] + 1)
-        stops = np.minimum(np.searchsorted(first, np.arange(size), side="right"), last)
-        places = np.clip((t - self._grid[0]) / step, 0.0, float(last))
-        system = (first, angle, rate, steep, driven, self._a, self._b)
-        return _follow(starts, stops, *system, places)  # type: ignore[no-any-return]
-
-
-@njit(cache=True, nogil=True)
-def _follow(starts, stops, first, angle, rate, steep, driven, a, b, places):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """Differentiate `_servo_error` by each coefficient of the command, from its start until it is forgotten."""
-    out, rows = np.empty((3, 200 * len(starts))), np.empty(200 * len(starts), dtype=np.intp)
-    ends = np.zeros(len(starts) + 1, dtype=np.intp)
-    entry = 0
-    for column in range(len(starts)):
-        x, v, acceleration, here, most = 0.0, 0.0, 0.0, 0.0, 0.0
-        k = max(starts[column] - 1, 0)
-        sample = np.searchsorted(places, float(k))
-        last = len(first) - 1 if stops[column] > starts[column] else 0
-        while k < last:
-            free = a[0, 0] * x + a[0, 1] * v
-            there = steep[k + 1] * (free + b[0] * here)
-            place = column - first[k + 1]
-            if 0 <= place < angle.shape[1]:
-                there += steep[k + 1] * angle[k + 1, place] + driven[k + 1] * rate[k + 1, place]
-            mean = 0.5 * (here + there)
-            new_x, new_v = free + b[0] * mean, a[1, 0] * x + a[1, 1] * v + b[1] * mean
-            new_acceleration = there - SERVO_STIFFNESS * new_x - _DRAG * new_v
-            while sample < len(places) and places[sample] <= k + 1:
-                if entry == len(rows):
-                    out = np.concatenate((out, np.empty_like(out)), axis=1)
-                    rows = np.concatenate((rows, np.empty_like(rows)))
-                share = places[sample] - k
-                out[0, entry] = x + share * (new_x - x)
-                out[1, entry] = v + share * (new_v - v)
-                out[2, entry] = acceleration + share * (new_acceleration - acceleration)
-                rows[entry] = sample
-                sample += 1
-                entry += 1
-            x, v, acceleration, here = new_x, new_v, new_acceleration, there
-            k += 1
-            size = _SERVO * abs(x) + abs(v)
-            most = max(most, size)
-            if k >= stops[column] and size <= _FORGOTTEN * most:
-                break
-        ends[column + 1] = entry
-    return out[:, :entry].copy(), rows[:entry].copy(), ends
 
 
 @njit(cache=True, nogil=True)
@@ -172,8 +79,27 @@ def _servo_error(torque, turns, order, a, b):  # type: ignore[no-untyped-def]  #
         rate[k + 1] = a[1, 0] * angle[k] + a[1, 1] * rate[k] + b[1] * mean
         # What the mean moves the angle by beside the prediction is of the third order in the step.
         here = there
-        acceleration[k + 1] = here - SERVO_STIFFNESS * angle[k + 1] - _DRAG * rate[k + 1]
+        acceleration[k + 1] = here - _SERVO_STIFFNESS * angle[k + 1] - _DRAG * rate[k + 1]
     return angle, rate, acceleration
+
+
+@dataclass(frozen=True)
+class Mode:
+    """A mode between table and array that the table's angular acceleration α rings: φ'' + 2ζω₀φ' + ω₀²φ = −α.
+
+    Parameters
+    ----------
+    gain : float
+        Share of the twist φ that the array takes part in.
+    natural : float
+        ω₀, rad/s.
+    damping : float
+        ζ.
+    """
+
+    gain: float
+    natural: float
+    damping: float
 
 
 class TwistingSpin:
@@ -185,15 +111,12 @@ class TwistingSpin:
         Motion of the table.
     t : ndarray, shape (n,)
         Time span that will be asked for, s; the twist is steady before.
-    gain : float
-        Share of φ that the cube takes part in.
-    natural : float
-        ω₀, rad/s.
-    damping : float
-        ζ.
+    mode : Mode
+        The spring.
     """
 
-    def __init__(self, motion: SpinMotion, t: NDArray[np.float64], gain: float, natural: float, damping: float) -> None:
+    def __init__(self, motion: SpinMotion, t: NDArray[np.float64], mode: Mode) -> None:
+        gain, natural, damping = mode.gain, mode.natural, mode.damping
         self._motion = motion
         step = _FINE_STEP if natural < _SLOW_MODE else 0.5 * _FINE_STEP
         self._grid = np.arange(t[0], t[-1] + 2 * step, step)

@@ -11,6 +11,7 @@ from gfimu.geometry.array import AccelerometerArray
 from gfimu.units import NUMBER, RATIO
 from gfimu.world_model import SpinState
 from sim.effects.base import Effect, Size
+from sim.effects.scans import order_shapes, per_rate
 from sim.world import World
 
 __all__ = ["ChannelSkew", "ClockError", "TachoLatency", "TachoRipple", "TachoScale"]
@@ -22,6 +23,7 @@ class ChannelSkew(Effect):
     name = "channel_skew"
     summary = "chips are sampled one after another, not together"
     place = "timing"
+    contained_in = frozenset({"chip_delay"})
     separated_by = "fast changes of the rate"
     starts = (-200.0, -80.0, -30.0, -10.0, 10.0, 30.0, 80.0, 200.0)
 
@@ -99,6 +101,7 @@ class TachoRipple(Effect):
     name = "tacho_ripple"
     summary = "the reference itself is modulated once or n times per revolution"
     other_units: ClassVar = {"amplitude": RATIO, "order": NUMBER, "phase_rad": "rad"}
+    whole = frozenset({"order"})
     place = "reference"
     separated_by = "a second reference, or slow steady rotation in both directions"
 
@@ -111,6 +114,11 @@ class TachoRipple(Effect):
     def shapes(cls, duration: float, sample_rate: float) -> tuple[dict[str, float], ...]:
         """Return one order; the scan over orders finds it."""
         return ({"order": 1.0},)
+
+    @classmethod
+    def scan(cls, left, duration, sample_rate):  # type: ignore[no-untyped-def]
+        """Return the strongest orders of a ratio of the reference."""
+        return order_shapes(left, 3, per_rate)
 
     @classmethod
     def from_sizes(cls, array, values, shape) -> Effect:  # type: ignore[no-untyped-def]

@@ -7,17 +7,19 @@ not come by it; where it is less probable, the evidence prefers something else a
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from gfimu.diagnosis.causes import Cause
-from gfimu.diagnosis.data.prepared_runs import PreparedRuns
-from gfimu.diagnosis.explanation import Explanation
-from gfimu.diagnosis.fit import Fit
-from gfimu.diagnosis.long_run import explain_any_length
-from gfimu.diagnosis.parallel import one_blas_thread
-from gfimu.diagnosis.refinement import refine
+from gfimu.diagnosis.data.stretch import make_stretches
+from gfimu.diagnosis.diagnose import prepare
+from gfimu.diagnosis.fit.gauss_newton import Fit, fit
+from gfimu.diagnosis.fit.parallel import one_blas_thread
+from gfimu.diagnosis.policy import Policy
+from gfimu.diagnosis.search.explain import Explanation
+from gfimu.diagnosis.search.long_run import understand_any_length
+from gfimu.diagnosis.terms.cause import Cause
 from sim.effects import Effect, make_effect
 from sim.study.cases import Case
 from sim.study.outcome import HiddenWorld, draw_world
@@ -51,18 +53,19 @@ def blame_of(case: Case, source: str, outcome: Outcome) -> dict[str, Any]:
 
 def truth_over_found(world: HiddenWorld) -> float:
     """Return the log posterior of the truth less that of what the search finds, under the noise it ends with."""
+    policy = Policy()
     with one_blas_thread():
-        prepared = PreparedRuns.build([world.recording], world.twin, ["run"])
-        segments, fixed = prepared.segments(world.twin)
-        found = explain_any_length(segments, fixed, 1)
+        prepared = prepare([world.recording], world.twin, ["run"])
+        stretches = make_stretches(world.twin, prepared.runs, prepared.effects)
+        found = understand_any_length(stretches, policy, lambda share, text: None).explanation
         hidden = [_as_cause(make_effect(name, values), world, found) for name, values in world.truth]
-        return max(fit.log_posterior for fit in _fits(found, hidden)) - found.fit.log_posterior
+        return max(one.log_posterior for one in _fits(found, hidden, policy)) - found.best.log_posterior
 
 
-def _fits(found: Explanation, causes: Sequence[Cause]) -> list[Fit]:
+def _fits(found: Explanation, causes: Sequence[Cause], policy: Policy) -> list[Fit]:
     """Fit the truth from the drives of what was found and of nothing, which may be another basin."""
-    starts = [found.fit.drives, found.nothing.drives]
-    return [refine(found.segments, causes, found.fixed, drives=drives, iterations=10) for drives in starts]
+    points = [replace(one.point, causes=tuple(causes)) for one in (found.best, found.nothing)]
+    return [fit(found.stretches, point, policy) for point in points]
 
 
 def _as_cause(effect: Effect, world: HiddenWorld, found: Explanation) -> Cause:
@@ -76,11 +79,11 @@ def _as_cause(effect: Effect, world: HiddenWorld, found: Explanation) -> Cause:
             spanning.append((pattern, coordinates))
     pattern, coordinates = min(spanning, key=lambda pair: pair[0].mixing.shape[1])
     prior = _log_prior(found, family.name, pattern.name)
-    return Cause(family, pattern.name, pattern.mixing, effect.shape_values(), prior, coordinates=coordinates)
+    return Cause(family, pattern.name, pattern.mixing, effect.shape_values(), coordinates, prior)
 
 
 def _log_prior(found: Explanation, name: str, place: str) -> float:
     """Return the prior that the search gives an effect at a place."""
-    priors = {(one.name, one.pattern): one.log_prior for one in found.signatures.hypotheses}
-    known: Mapping[tuple[str, str], float] = {**priors, **{cause.key: cause.log_prior for cause in found.fit.causes}}
+    priors = {one.cause.key: one.cause.log_prior for one in found.screening.hypotheses}
+    known: Mapping[tuple[str, str], float] = {**priors, **{cause.key: cause.log_prior for cause in found.best.causes}}
     return known.get((name, place), min(priors.values()))

@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from gfimu.diagnosis.design.distinguishability import PlannedRun, energy_left, normal_equations, plan_contenders
+from gfimu.diagnosis.design.distinguishability import energy_left, normal_equations, plan_contenders
+from gfimu.diagnosis.design.planned_run import PlannedRun, planned
 from gfimu.diagnosis.verdict.verdict import Diagnosis, NamedCause
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
@@ -151,7 +152,7 @@ def _with_limits(
     signatures, (own, *others) = plan_contenders(
         twin, [hidden, *rivals], duration=setting.duration, sample_rate=setting.sample_rate
     )
-    gram, _ = normal_equations([run.segment(twin, 0)], signatures)
+    gram, _ = normal_equations(*planned(twin, [run]), signatures)
     size = own.directions[:, 0]
     left = np.sqrt(energy_left(gram, own, others))
     by_two = None

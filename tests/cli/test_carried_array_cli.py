@@ -128,7 +128,7 @@ def no_search(monkeypatch):
     def stop(*_, **__):
         raise GfimuError("stopped")
 
-    monkeypatch.setattr(importlib.import_module("gfimu.diagnosis.diagnose"), "_diagnose_table", stop)
+    monkeypatch.setattr(importlib.import_module("gfimu.diagnosis.diagnose"), "prepare", stop)
 
 
 @pytest.mark.usefixtures("no_search")

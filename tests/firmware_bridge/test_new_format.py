@@ -133,7 +133,7 @@ def test_a_board_without_commands_is_sent_none(tmp_path, monkeypatch):
 
 
 def test_a_dialogue_made_here_is_held(tmp_path):
-    """The recorder asks, reads the answer, starts the stream, and takes scale and rate from the identity."""
+    """The recorder asks, hears the answer, starts the stream, and takes scale and rate from the identity."""
     numbers = np.arange(400)
 
     def talk(board, line):

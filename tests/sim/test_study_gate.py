@@ -92,13 +92,13 @@ def test_the_search_is_to_blame_where_the_truth_is_more_probable_and_the_evidenc
     faint = blame_of(replace(_SHORT, size=2.0), "", missed)
     assert faint["blame"] == "evidence"
     assert faint["truth_over_found"] < 0
-    search = blame.explain_any_length
+    search = blame.understand_any_length
 
     def stopped(*arguments):
         found = search(*arguments)
-        return replace(found, fit=found.nothing)
+        return replace(found, explanation=replace(found.explanation, best=found.explanation.nothing))
 
-    monkeypatch.setattr(blame, "explain_any_length", stopped)
+    monkeypatch.setattr(blame, "understand_any_length", stopped)
     blind = blame_of(_SHORT, "", missed)
     assert blind["blame"] == "search"
     assert blind["truth_over_found"] > 100

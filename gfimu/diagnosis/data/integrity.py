@@ -13,12 +13,11 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.diagnosis.data.frozen import frozen_stretches, told_frozen
-from gfimu.diagnosis.data.rails import Rail, find_rails, on_rails, rail_parameters, rail_sentence
+from gfimu.diagnosis.data.rails import GARBAGE, PILE, Rail, find_rails, on_rails, rail_parameters, rail_sentence
 from gfimu.diagnosis.data.rounding import common_step
 from gfimu.diagnosis.data.run import Run, difference_noise
-from gfimu.diagnosis.data.spikes import channel_spikes
-from gfimu.world_model import Effect, WorldModel
+from gfimu.diagnosis.data.samples import channel_spikes, frozen_stretches, told_frozen
+from gfimu.world_model import Effect, ExpectedNoise, WorldModel
 
 __all__ = ["IntegrityReport", "check_integrity"]
 
@@ -28,12 +27,14 @@ _FITTING = 0.6  # of the power of the readings
 _SIGNIFICANT_RMS = 12.0
 _VARIED_RMS, _NOISE = 3.0, 1.5  # of a slow table, noise; power of white noise and some bias instability
 _MANY = 3  # inverted channels that are more likely than exchanged ones
-_PILE = 30
 _CAUGHT = 0.8  # of the samples that should be beyond a limit
 _SURELY_MISSING = 15.0  # samples above the largest value of several channels, of which none is there
-_ONE_CHIP, _GARBAGE = 3, 5  # channels, and samples of each, that may read more than a limit
+_ONE_CHIP = 3  # channels that may read more than a limit
 _OF_RANGE = 0.97  # of the configured range: clipping there is no fault
 _DIFFERENT = 0.6  # share of values above which steps are finer than what is seen
+
+_Fault = tuple[str, dict[str, object], str]
+"""Effect, its parameters, and a sentence."""
 
 _Option = tuple[float, str, dict[str, object], str, NDArray[np.float64]]
 """Misfit removed, effect, its parameters, a sentence, and the prediction with it."""
@@ -73,77 +74,129 @@ def check_integrity(model: WorldModel, run: Run, prediction: NDArray[np.float64]
     prediction : ndarray, shape (n, c)
         What the simulation predicts for the run, m/s².
     """
-    known = {effect.name for effect in model.effects}
-    library = model.families()
-    effects: list[Effect] = []
-    why: dict[str, str] = {}
+    known, library = {effect.name for effect in model.effects}, model.families()
+    step, expected = _resolution(run), model.expected_noise(1.0 / run.sample_period)
+    counts = _Counts(max(step or 0.0, expected.quantum), _range_factors(model.effects, model), expected)
+    wiring = _wiring(model, _alive(model, run, prediction, counts), prediction, expected.white, known)
+    rewired = [library[name](parameters) for name, parameters, _ in wiring if name in library]
+    prediction = _rewire(prediction, rewired, model)
+    counts = replace(counts, coarser=_range_factors([*model.effects, *rewired], model))
+    ends = _ends(model, run, prediction, counts)
+    clipped = _clipped(run, prediction, ends, counts)
+    faults = [*_lost(run), *_coarse(step, expected.quantum), *wiring]
+    faults += _saturation(run, clipped, ends, counts, model.array.channels)
+    run = replace(run, valid=run.valid & ~clipped)
+    limit = None if ends.rails else ends.limit
+    frozen = frozen_stretches(run, prediction, counts.quantum, limit, expected.analogue)
+    run = replace(run, valid=_without(run.valid, frozen))
+    if frozen:
+        faults.append(("stuck_channel", *told_frozen(run, frozen, model.array.channels)))
+    spikes = channel_spikes(run, counts.white, counts.steps)
+    run = replace(run, valid=run.valid & ~spikes)
+    found = [fault for fault in faults if fault[0] in library and fault[0] not in known]
+    effects = tuple(library[name](parameters) for name, parameters, _ in found)
+    return IntegrityReport(run, effects, {name: sentence for name, _, sentence in found}, int(spikes.sum()))
 
-    def add(name: str, parameters: dict[str, object], sentence: str) -> None:
-        if name in library:
-            effects.append(library[name](parameters))
-            why[name] = sentence
 
-    expected = model.expected_noise(1.0 / run.sample_period)
-    if run.lost and "dropped_frames" not in known:
-        add(
-            "dropped_frames",
-            {"share": run.lost / len(run.t), "count": int(run.lost), "longest_s": run.longest_gap},
-            f"{run.lost} of {len(run.t)} samples are missing; the longest gap is {run.longest_gap:.3f} s",
-        )
-    step = _resolution(run)
-    if step is not None and step > 1.5 * expected.quantum and "coarse_resolution" not in known:
-        add(
-            "coarse_resolution",
-            {"step_m_s2": step},
-            f"all readings are multiples of {step:.4g} m/s², not of {expected.quantum:.4g} m/s²",
-        )
-    quantum = max(step or 0.0, expected.quantum)
+@dataclass(frozen=True)
+class _Counts:
+    """Steps and noise of the channels, some of which may be ``coarser`` (c,) than expected by a factor."""
+
+    quantum: float
+    coarser: NDArray[np.float64]
+    expected: ExpectedNoise
+
+    @property
+    def steps(self) -> NDArray[np.float64]:
+        """One count of each channel, m/s²."""
+        return self.quantum * self.coarser
+
+    @property
+    def white(self) -> NDArray[np.float64]:
+        """White noise of each channel, m/s²."""
+        return np.asarray(self.expected.white * self.coarser)
+
+
+@dataclass(frozen=True)
+class _Ends:
+    """Where readings end: at one limit for all channels, m/s², or at rails of single ones."""
+
+    limit: float | None
+    rails: Sequence[Rail]
+
+
+def _lost(run: Run) -> list[_Fault]:
+    """Return the lost samples as a fault."""
+    if not run.lost:
+        return []
+    parameters: dict[str, object] = {
+        "share": run.lost / len(run.t),
+        "count": int(run.lost),
+        "longest_s": run.longest_gap,
+    }
+    text = f"{run.lost} of {len(run.t)} samples are missing; the longest gap is {run.longest_gap:.3f} s"
+    return [("dropped_frames", parameters, text)]
+
+
+def _coarse(step: float | None, quantum: float) -> list[_Fault]:
+    """Return a step that is coarser than expected as a fault."""
+    if step is None or step <= 1.5 * quantum:
+        return []
+    text = f"all readings are multiples of {step:.4g} m/s², not of {quantum:.4g} m/s²"
+    return [("coarse_resolution", {"step_m_s2": step}, text)]
+
+
+def _ends(model: WorldModel, run: Run, prediction: NDArray[np.float64], counts: _Counts) -> _Ends:
+    """Return where readings end: where the model says so, else where the run shows it."""
     clipped_at = [float(effect.parameters["limit_m_s2"]) for effect in model.effects if effect.name == "saturation"]
-    coarser = _range_factors(model.effects, model)
-    limit = min(clipped_at) if clipped_at else _clipping(run, prediction, quantum * coarser, expected.white * coarser)
-    rails = [] if clipped_at else _own_rails(run, prediction, limit, quantum * coarser, expected.white * coarser)
-    at_limit = np.abs(run.readings) >= (np.inf if limit is None or rails else limit - 0.6 * quantum)
-    at_limit |= on_rails(run, np.zeros_like(prediction), rails, quantum * coarser, np.zeros_like(coarser))
-    # Clipped or dead readings look like those of a chip in a wider range.
-    alive = run.valid & ~at_limit
-    for channel, start, stop in frozen_stretches(run, prediction, quantum, limit, expected.analogue):
-        alive[start:stop, channel] = False
-    wiring = _wiring(model, replace(run, valid=alive), prediction, expected.white, known)
-    for name, parameters, sentence in wiring:
-        add(name, parameters, sentence)
-    rewired = [effect for effect in effects if effect.name in {"axis_swap", "sign_flip", "wrong_range"}]
-    if rewired:
-        prediction = _rewire(prediction, rewired, model)
-    coarser = _range_factors([*model.effects, *rewired], model)
-    if not clipped_at:
-        limit = _clipping(run, prediction, quantum * coarser, expected.white * coarser)
-        rails = _own_rails(run, prediction, limit, quantum * coarser, expected.white * coarser)
-    if rails:
-        limit = None
-        clipped = on_rails(run, prediction, rails, quantum * coarser, _noise_seen(run, expected.white))
-        names = model.array.channels
-        if "saturation" not in known and min(abs(rail.level) for rail in rails) < _OF_RANGE * expected.full_scale:
-            left_out = int((clipped & run.valid).sum())
-            parameters = rail_parameters(run, rails, names, quantum * coarser)
-            add("saturation", parameters, rail_sentence(rails, names, left_out))
-        run = replace(run, valid=run.valid & ~clipped)
-    if limit is not None:
-        if "saturation" not in known and limit < _OF_RANGE * expected.full_scale:
-            add("saturation", {"limit_m_s2": limit}, f"readings pile up at ±{limit:.2f} m/s² and never exceed it")
-        # Just below the limit only those samples are whole whose noise points down.
-        near = np.abs(prediction) > limit - 4.0 * _noise_seen(run, expected.white)
-        clipped = (np.abs(run.readings) >= limit - 0.6 * quantum) | near
-        run = replace(run, valid=run.valid & ~clipped)
-    valid = run.valid.copy()
-    frozen = frozen_stretches(run, prediction, quantum, limit, expected.analogue)
+    if clipped_at:
+        return _Ends(min(clipped_at), ())
+    limit = _clipping(run, prediction, counts.steps, counts.white)
+    return _Ends(limit, _own_rails(run, prediction, limit, counts.steps, counts.white))
+
+
+def _alive(model: WorldModel, run: Run, prediction: NDArray[np.float64], counts: _Counts) -> Run:
+    """Return the run without clipped and dead readings, which look like those of a chip in a wider range."""
+    ends = _ends(model, run, prediction, counts)
+    limit = np.inf if ends.limit is None or ends.rails else ends.limit - 0.6 * counts.quantum
+    at_limit = np.abs(run.readings) >= limit
+    at_limit |= on_rails(run, np.zeros_like(prediction), ends.rails, counts.steps, np.zeros_like(counts.coarser))
+    frozen = frozen_stretches(run, prediction, counts.quantum, ends.limit, counts.expected.analogue)
+    return replace(run, valid=_without(run.valid & ~at_limit, frozen))
+
+
+def _without(valid: NDArray[np.bool_], frozen: Sequence[tuple[int, int, int]]) -> NDArray[np.bool_]:
+    """Return which readings count without (channel, start, stop)."""
+    valid = valid.copy()
     for channel, start, stop in frozen:
         valid[start:stop, channel] = False
-    if frozen and "stuck_channel" not in known:
-        add("stuck_channel", *told_frozen(run, frozen, model.array.channels))
-    run = replace(run, valid=valid)
-    spikes = channel_spikes(run, expected.white * coarser, quantum * coarser)
-    run = replace(run, valid=run.valid & ~spikes)
-    return IntegrityReport(run, tuple(effects), why, int(spikes.sum()))
+    return valid
+
+
+def _clipped(run: Run, prediction: NDArray[np.float64], ends: _Ends, counts: _Counts) -> NDArray[np.bool_]:
+    """Mark readings (n, c) at which a channel ends, or so near that noise is cut."""
+    noise = _noise_seen(run, counts.expected.white)
+    if ends.rails:
+        return on_rails(run, prediction, ends.rails, counts.steps, noise)
+    if ends.limit is None:
+        return np.zeros_like(run.valid)
+    # Just below the limit only those samples are whole whose noise points down.
+    near = np.abs(prediction) > ends.limit - 4.0 * noise
+    return np.asarray((np.abs(run.readings) >= ends.limit - 0.6 * counts.quantum) | near)
+
+
+def _saturation(
+    run: Run, clipped: NDArray[np.bool_], ends: _Ends, counts: _Counts, names: Sequence[str]
+) -> list[_Fault]:
+    """Return clipping below the configured range as a fault."""
+    levels = [abs(rail.level) for rail in ends.rails] or ([] if ends.limit is None else [ends.limit])
+    if not levels or min(levels) >= _OF_RANGE * counts.expected.full_scale:
+        return []
+    if ends.rails:
+        parameters = rail_parameters(run, ends.rails, names, counts.steps)
+        return [("saturation", parameters, rail_sentence(ends.rails, names, int((clipped & run.valid).sum())))]
+    text = f"readings pile up at ±{ends.limit:.2f} m/s² and never exceed it"
+    return [("saturation", {"limit_m_s2": ends.limit}, text)]
 
 
 def _resolution(run: Run) -> float | None:
@@ -179,14 +232,14 @@ def _clipping(
             clear = max(1.5 * sigma, 0.5 * quantum + sigma)
             beyond = sign * prediction[run.valid[:, channel], channel] > top + clear
             # Nothing beyond it is read though it should be, even where a plateau is just below.
-            caught = sigma > 0.5 * quantum and (beyond & at_top).sum() > max(_CAUGHT * beyond.sum(), _PILE)
+            caught = sigma > 0.5 * quantum and (beyond & at_top).sum() > max(_CAUGHT * beyond.sum(), PILE)
             if sigma > 0.5 * quantum:
                 lacking.append((top, _missing_above(int(at_top.sum()), int(below.sum()), noise / quantum)))
             if at_top.sum() < 8 or not (caught or at_top.sum() > 3 * below.sum() + 4):
                 continue
             if caught or (beyond & at_top).sum() > 0.5 * at_top.sum():
                 levels.append(top)
-            elif at_top.sum() >= _PILE and sigma > 0.5 * quantum:
+            elif at_top.sum() >= PILE and sigma > 0.5 * quantum:
                 piles.append(top)  # a steady signal at the limit: its noise would go beyond
     levels = levels or (piles if len(piles) > 1 else []) or _cut_off(lacking, float(steps.min()))
     if not levels:
@@ -195,7 +248,7 @@ def _clipping(
     close = np.abs(np.array(levels) - limit) < 1.5 * float(steps.min())
     beyond_it = np.abs(np.where(run.valid, run.readings, 0.0)) > limit + np.maximum(0.6 * steps, 4.0 * white)
     # One chip in another range may read more, and single samples may be garbage.
-    contradicted = np.sum(beyond_it.sum(axis=0) > _GARBAGE) > _ONE_CHIP
+    contradicted = np.sum(beyond_it.sum(axis=0) > GARBAGE) > _ONE_CHIP
     return limit if close.sum() >= max(1, len(levels) // 2) and not contradicted else None
 
 
@@ -212,7 +265,7 @@ def _own_rails(
         return rails
     other = any(abs(abs(rail.level) - limit) > 1.5 * steps[rail.channel] for rail in rails)
     beyond = np.abs(np.where(run.valid, run.readings, 0.0)) > limit + np.maximum(0.6 * steps, 4.0 * white)
-    return rails if other or (beyond.sum(axis=0) > _GARBAGE).any() else []
+    return rails if other or (beyond.sum(axis=0) > GARBAGE).any() else []
 
 
 def _cut_off(lacking: Sequence[tuple[float, float]], step: float) -> list[float]:
@@ -256,73 +309,21 @@ def _range_factors(effects: Sequence[Effect], model: WorldModel) -> NDArray[np.f
 
 def _wiring(
     model: WorldModel, run: Run, prediction: NDArray[np.float64], white: NDArray[np.float64], known: set[str]
-) -> list[tuple[str, dict[str, object], str]]:
+) -> list[_Fault]:
     """Find exchanged and inverted channels and chips in another range, the clearest first."""
     names = model.array.channels
-    found: list[tuple[str, dict[str, object], str]] = []
+    found: list[_Fault] = []
     prediction = prediction.copy()
-    chip_of = model.array.chip_of_channel
-    power = np.diag(_misfits(run, np.zeros_like(prediction), white))
     many = [] if "sign_flip" in known else _many_inverted(run, prediction, white)
     if many:
         found += [("sign_flip", {"channel": names[channel]}, "") for channel in many]
         prediction[:, many] *= -1.0
     for _ in range(4):
         misfit, inverted = _misfits(run, prediction, white), _misfits(run, -prediction, white)
-        own, flipped = np.diag(misfit), np.diag(inverted)
-        options: list[_Option] = []
-        for one, two in combinations(range(len(names)), 2):
-            before = own[one] + own[two]
-            after = misfit[one, two] + misfit[two, one]
-            # Exchanged channels may be inverted as well: neither shows without the other, so both are tried at once
-            # where inversion alone does not do; the inversion itself is found next.
-            signed = _signed(misfit, inverted, (one, two), (two, one))
-            if _clears(signed, _signed(misfit, inverted, (one, one), (two, two))):
-                after = signed
-            if before > 2 * _SIGNIFICANT_RMS**2 and after < (1 - _REMOVED) * before:
-                order = np.arange(len(names))
-                order[[one, two]] = order[[two, one]]
-                options.append(
-                    (
-                        float(before - after),
-                        "axis_swap",
-                        {"channels": [names[one], names[two]]},
-                        f"{names[one]} and {names[two]} read what the other should",
-                        prediction[:, order],
-                    )
-                )
+        options = _exchanged_channels(names, misfit, inverted, prediction)
         options += _exchanged_chips(model, misfit, prediction, max((option[0] for option in options), default=0.0))
-        for one in range(len(names)):
-            if _clears(flipped[one], own[one]) or _reads_negative(run, prediction[:, one], white[one], one):
-                sign = np.ones(len(names))
-                sign[one] = -1
-                options.append(
-                    (
-                        own[one] - flipped[one],
-                        "sign_flip",
-                        {"channel": names[one]},
-                        f"{names[one]} reads the negative of what it should",
-                        prediction * sign,
-                    )
-                )
-        for factor in _RANGE_FACTORS:
-            scaled = np.diag(_misfits(run, factor * prediction, white))
-            for number, chip in enumerate(model.array.chips):
-                mine = chip_of == number
-                after, before = float(scaled[mine].sum()), float(own[mine].sum())
-                # A prediction that is too large by far comes nearer by any factor.
-                limit = min((1 - _REMOVED) * before, _FITTING * float(power[mine].sum()))
-                if before > 2 * _SIGNIFICANT_RMS**2 and after < limit:
-                    gain = np.where(mine, factor, 1.0)
-                    options.append(
-                        (
-                            before - after,
-                            "wrong_range",
-                            {"chip": chip.name, "factor": factor},
-                            f"chip {chip.name} reads {factor:g} times what it should",
-                            prediction * gain,
-                        )
-                    )
+        options += _inverted_channels(names, run, misfit, inverted, prediction, white)
+        options += _other_ranges(model, run, np.diag(misfit), prediction, white)
         options = [option for option in options if option[1] not in known]
         if not options:
             break
@@ -330,6 +331,76 @@ def _wiring(
         found.append((name, parameters, sentence))
         known = known | {name} if name != "sign_flip" else known
     return _merged_flips(found)
+
+
+def _exchanged_channels(
+    names: Sequence[str],
+    misfit: NDArray[np.float64],
+    inverted: NDArray[np.float64],
+    prediction: NDArray[np.float64],
+) -> list[_Option]:
+    """Return the pairs of channels each of which reads what the other should; misfits (c, c) of each to each."""
+    own = np.diag(misfit)
+    options: list[_Option] = []
+    for one, two in combinations(range(len(names)), 2):
+        before = own[one] + own[two]
+        after = misfit[one, two] + misfit[two, one]
+        # Exchanged channels may be inverted as well: neither shows without the other, so both are tried at once where
+        # inversion alone does not do; the inversion itself is found next.
+        signed = _signed(misfit, inverted, (one, two), (two, one))
+        if _clears(signed, _signed(misfit, inverted, (one, one), (two, two))):
+            after = signed
+        if before > 2 * _SIGNIFICANT_RMS**2 and after < (1 - _REMOVED) * before:
+            order = np.arange(len(names))
+            order[[one, two]] = order[[two, one]]
+            told = f"{names[one]} and {names[two]} read what the other should"
+            swapped: dict[str, object] = {"channels": [names[one], names[two]]}
+            options.append((float(before - after), "axis_swap", swapped, told, prediction[:, order]))
+    return options
+
+
+def _inverted_channels(
+    names: Sequence[str],
+    run: Run,
+    misfit: NDArray[np.float64],
+    inverted: NDArray[np.float64],
+    prediction: NDArray[np.float64],
+    white: NDArray[np.float64],
+) -> list[_Option]:
+    """Return the channels that read the negative of what they should."""
+    own, flipped = np.diag(misfit), np.diag(inverted)
+    options: list[_Option] = []
+    for one, name in enumerate(names):
+        if _clears(flipped[one], own[one]) or _reads_negative(run, prediction[:, one], white[one], one):
+            sign = np.ones(len(names))
+            sign[one] = -1
+            told = f"{name} reads the negative of what it should"
+            options.append((own[one] - flipped[one], "sign_flip", {"channel": name}, told, prediction * sign))
+    return options
+
+
+def _other_ranges(
+    model: WorldModel,
+    run: Run,
+    own: NDArray[np.float64],
+    prediction: NDArray[np.float64],
+    white: NDArray[np.float64],
+) -> list[_Option]:
+    """Return the chips whose readings are those of another range; ``own`` is the misfit of each channel (c,)."""
+    power = np.diag(_misfits(run, np.zeros_like(prediction), white))
+    options: list[_Option] = []
+    for factor in _RANGE_FACTORS:
+        scaled = np.diag(_misfits(run, factor * prediction, white))
+        for number, chip in enumerate(model.array.chips):
+            mine = model.array.chip_of_channel == number
+            after, before = float(scaled[mine].sum()), float(own[mine].sum())
+            # A prediction that is too large by far comes nearer by any factor.
+            limit = min((1 - _REMOVED) * before, _FITTING * float(power[mine].sum()))
+            if before > 2 * _SIGNIFICANT_RMS**2 and after < limit:
+                found: dict[str, object] = {"chip": chip.name, "factor": factor}
+                told = f"chip {chip.name} reads {factor:g} times what it should"
+                options.append((before - after, "wrong_range", found, told, prediction * np.where(mine, factor, 1.0)))
+    return options
 
 
 def _exchanged_chips(

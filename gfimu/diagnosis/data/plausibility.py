@@ -27,8 +27,6 @@ _AT_REST = 0.05  # of the largest rate
 _FEWEST = 20
 _UNRELATED = 0.1  # correlation
 _KEPT = 3  # quarters of the channels
-_TURN = 2 * np.pi
-_REVERSED = -1.0
 
 _READINGS: Mapping[str, float] = {
     "g (name the columns a11_g, a12_g …)": 1.0 / STANDARD_GRAVITY,
@@ -38,15 +36,15 @@ _READINGS: Mapping[str, float] = {
 }
 """Units for which a reading of 1 m/s² may have been taken: how many there are in it."""
 _RATES: Mapping[str, float] = {
-    "is in rev/min": 60.0 / _TURN,
-    "is in deg/s": 360.0 / _TURN,
-    "is in rev/s": 1.0 / _TURN,
-    "has the opposite sign": _REVERSED,
+    "is in rev/min": 30.0 / np.pi,
+    "is in deg/s": 180.0 / np.pi,
+    "is in rev/s": 0.5 / np.pi,
+    "has the opposite sign": -1.0,
 }
 _ANGLES: Mapping[str, float] = {
-    "is in degrees": 360.0 / _TURN,
-    "is in turns": 1.0 / _TURN,
-    "has the opposite sign": _REVERSED,
+    "is in degrees": 180.0 / np.pi,
+    "is in turns": 0.5 / np.pi,
+    "has the opposite sign": -1.0,
 }
 _TURNED: Mapping[str, tuple[float, float, float]] = {
     "upright": (0.0, 0.0, 0.0),
@@ -88,7 +86,7 @@ def refuse_implausible(
     _refuse_unrelated(run, prediction, expected.white, column)
     scales = _ANGLES if model.drive_source == "angle" else _RATES
     if misfit.whole < _LARGE_RMS**2:
-        scales = {words: scale for words, scale in scales.items() if scale == _REVERSED}
+        scales = {words: scale for words, scale in scales.items() if scale < 0.0}
     references = [
         _Reading(f"column {column} {words}, by what the channels feel; mend it", other, predict(other), steady=False)
         for words, scale in scales.items()
@@ -96,7 +94,7 @@ def refuse_implausible(
     ]
     options = list(references)
     if model.drive_source != "angle":
-        reverse = references[list(scales.values()).index(_REVERSED)]
+        reverse = references[list(scales).index("has the opposite sign")]
         options += _signed_in_parts(run, prediction, reverse, expected.white, predict, column)
     if misfit.whole > _LARGE_RMS**2:
         options += _in_units([_Reading("", run, prediction), *references], expected.quantum)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,16 +11,14 @@ from numpy.typing import NDArray
 from gfimu.diagnosis.data.integrity import IntegrityReport, check_integrity
 from gfimu.diagnosis.data.plausibility import refuse_implausible
 from gfimu.diagnosis.data.run import Run, prepare_run
-from gfimu.diagnosis.data.spikes import reference_spikes
-from gfimu.diagnosis.segment import Segment
-from gfimu.diagnosis.stretches import make_segments
+from gfimu.diagnosis.data.samples import reference_spikes
 from gfimu.recording import Recording
 from gfimu.world_model import Effect, WorldModel
 
 __all__ = ["PreparedRuns"]
 
 _ROUNDING = ("coarse_resolution", "saturation")
-_WIRING = ("axis_swap", "sign_flip", "wrong_range")
+Predict = Callable[[WorldModel, Run], NDArray[np.float64]]
 
 
 @dataclass(frozen=True)
@@ -48,8 +46,22 @@ class PreparedRuns:
     rounded: bool
 
     @classmethod
-    def build(cls, recordings: Sequence[Recording], model: WorldModel, names: Sequence[str]) -> PreparedRuns:
-        """Read, check and label recordings (`prepare_run`, `check_integrity`)."""
+    def build(
+        cls, recordings: Sequence[Recording], model: WorldModel, names: Sequence[str], predict: Predict
+    ) -> PreparedRuns:
+        """Read, check and label recordings (`prepare_run`, `check_integrity`).
+
+        Parameters
+        ----------
+        recordings : sequence of Recording
+            The runs.
+        model : WorldModel
+            What the simulation believes.
+        names : sequence of str
+            Names of the runs, for people.
+        predict : callable
+            From a model and a run to the channels (n, c) that its reference alone predicts, m/s².
+        """
         runs, effects, spikes = [], [], 0
         why: dict[str, str] = {}
         for recording, name in zip(recordings, names, strict=True):
@@ -58,7 +70,7 @@ class PreparedRuns:
             run = replace(
                 run, reference=np.where(wrong, 0.0, run.reference), reference_valid=run.reference_valid & ~wrong
             )
-            checked = _check(model, run)
+            checked = _check(model, run, predict)
             runs.append(checked.run)
             effects.append(list(checked.effects))
             why = {**checked.why, **why}  # of the run whose numbers are told, the first
@@ -66,25 +78,8 @@ class PreparedRuns:
         rounded = any(effect.name in _ROUNDING for known in (model.effects, *effects) for effect in known)
         return cls(runs, effects, why, spikes, rounded)
 
-    def segments(self, model: WorldModel) -> tuple[list[Segment], list[list[Effect]]]:
-        """Return the segments and the effects known in each."""
-        segments = make_segments(model, self.runs)
-        for segment in segments:
-            for effect in self.effects[segment.index]:
-                if effect.name == "coarse_resolution":
-                    segment.round_to(float(effect.parameters["step_m_s2"]))
-        return segments, [_acting(self.effects[segment.index]) for segment in segments]
 
-
-def _check(model: WorldModel, run: Run) -> IntegrityReport:
-    def predict(other: Run) -> NDArray[np.float64]:
-        return np.concatenate([segment.predict([])[:, :-1] for segment in make_segments(model, [other])])
-
-    prediction = predict(run)
-    refuse_implausible(model, run, prediction, predict)
+def _check(model: WorldModel, run: Run, predict: Predict) -> IntegrityReport:
+    prediction = predict(model, run)
+    refuse_implausible(model, run, prediction, lambda other: predict(model, other))
     return check_integrity(model, run, prediction)
-
-
-def _acting(effects: Sequence[Effect]) -> list[Effect]:
-    """Return the faults that change a noise-free prediction."""
-    return [effect for effect in effects if effect.name in _WIRING]

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from gfimu.diagnosis.data.run import Run
 
-__all__ = ["Rail", "find_rails", "on_rails", "rail_parameters", "rail_sentence"]
+__all__ = ["GARBAGE", "PILE", "Rail", "find_rails", "on_rails", "rail_parameters", "rail_sentence"]
 
-_PILE = 30  # samples
+PILE = 30  # samples
 _WIDTH = 12  # counts above the pile in which single readings may lie: ten were seen on a real rail
 _BEYOND_PILE = 0.1  # of the samples of the pile: one in forty on a real rail
 _STEEP = 3.0  # times the counts just below it
@@ -27,7 +27,7 @@ _SLOPE = 0.1  # of the prediction, that readings on a rail follow at most
 _FOLLOWS = (0.5, 2.0)  # of the prediction, elsewhere
 _SCATTER = 6.0  # noise, or counts: a rail that scatters by more is none
 _ON_IT = 0.8  # of the readings that should be beyond a rail
-_GARBAGE = 5  # samples that may read anything
+GARBAGE = 5  # samples that may read anything
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ def find_rails(
     for channel, (step, sigma) in enumerate(zip(steps, white, strict=True)):
         valid = run.valid[:, channel]
         mine, expected = run.readings[valid, channel], prediction[valid, channel]
-        if len(mine) < 2 * _PILE or np.ptp(mine) < _MOVES * sigma:
+        if len(mine) < 2 * PILE or np.ptp(mine) < _MOVES * sigma:
             continue  # a channel that hardly moves reaches no rail
         for sign in (1, -1):
             one = _pile(sign * mine, sign * expected, step, sigma)
@@ -99,7 +99,7 @@ def _pinned(
             level, margin = rail.sign * rail.level, max(1.5 * steps[channel], 3.0 * rail.scatter)
             at = np.abs(mine - level) < margin
             clear = beyond > level + _CLEAR * white[channel] + steps[channel]
-            if len(mine) >= _PILE and at.mean() > 1.0 - _BEYOND_PILE and clear.mean() > _ON_IT:
+            if len(mine) >= PILE and at.mean() > 1.0 - _BEYOND_PILE and clear.mean() > _ON_IT:
                 found.append(Rail(channel, rail.sign, rail.level, rail.scatter))
                 break
     return found
@@ -113,7 +113,7 @@ def _pile(
     counts = np.bincount(below_top[below_top < 2 * _WIDTH], minlength=2 * _WIDTH)
     place = int(np.argmax(counts[: _WIDTH + 1]))
     pile, above, under = int(counts[place]), int(counts[:place].sum()), int(counts[place + 1 : place + 4].max())
-    if pile < _PILE or above > _BEYOND_PILE * pile or pile <= _STEEP * under + 4:
+    if pile < PILE or above > _BEYOND_PILE * pile or pile <= _STEEP * under + 4:
         return None
     level = float(mine[below_top == place].mean())
     on = below_top <= place
@@ -141,7 +141,7 @@ def _others_follow(
     for other in range(run.readings.shape[1]):
         valid = rows[run.valid[rows, other]]
         mine, expected = run.readings[valid, other], prediction[valid, other]
-        if other == channel or len(valid) < _PILE or np.ptp(expected) < _MOVES * white[other]:
+        if other == channel or len(valid) < PILE or np.ptp(expected) < _MOVES * white[other]:
             continue
         if _FOLLOWS[0] < _slope(expected, mine) < _FOLLOWS[1]:
             return True
@@ -152,10 +152,10 @@ def _flat(
     mine: NDArray[np.float64], expected: NDArray[np.float64], step: float, sigma: float
 ) -> tuple[tuple[float, float], NDArray[np.bool_]] | None:
     """Return the level at which readings stay while their prediction moves beyond, their scatter, and these rows."""
-    top = float(np.partition(mine, -_GARBAGE - 1)[-_GARBAGE - 1])
+    top = float(np.partition(mine, -GARBAGE - 1)[-GARBAGE - 1])
     clear = _CLEAR * (sigma + step)
     beyond = expected > top + clear
-    if beyond.sum() < _PILE:
+    if beyond.sum() < PILE:
         return None
     level = float(np.median(mine[beyond]))
     scatter = 1.4826 * float(np.median(np.abs(mine[beyond] - level)))
@@ -165,7 +165,7 @@ def _flat(
         scatter > _SCATTER * max(sigma, step)
         or top - level > _WIDTH * step + _SCATTER * sigma
         or within.mean() < _ON_IT
-        or under.sum() < _PILE
+        or under.sum() < PILE
         or np.ptp(expected[beyond]) < _SCATTER * max(scatter, sigma, step)
         or np.ptp(expected[under]) < _MOVES * sigma
     ):
@@ -213,7 +213,7 @@ def rail_parameters(
     each = {f"{channels[rail.channel]}_{sides[rail.sign]}_m_s2": rail.level for rail in rails}
     alike = all(abs(abs(rail.level) - limit) < 1.5 * steps[rail.channel] for rail in rails)
     beyond = np.abs(np.where(run.valid, run.readings, 0.0)) > limit + _WIDTH * steps
-    return {"limit_m_s2": limit, **({} if alike and beyond.sum(axis=0).max() <= _GARBAGE else each)}
+    return {"limit_m_s2": limit, **({} if alike and beyond.sum(axis=0).max() <= GARBAGE else each)}
 
 
 def rail_sentence(rails: Sequence[Rail], channels: Sequence[str], left_out: int) -> str:

@@ -15,9 +15,19 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 from scipy.special import log_ndtr, ndtr
 
-__all__ = ["COARSE", "Steps", "WorkingResidual", "common_step", "rounded_likelihood", "rounding_noise"]
+__all__ = [
+    "COARSE",
+    "NO_STEPS",
+    "Steps",
+    "WorkingResidual",
+    "between_steps",
+    "common_step",
+    "rounded_likelihood",
+    "rounding_noise",
+]
 
 COARSE = 1.5
 """Steps per standard deviation of the noise from which rounding is no longer like noise."""
@@ -28,7 +38,9 @@ _NEAR = 30.0  # standard deviations, within which probabilities don't underflow
 _FAR = 1e4  # standard deviations
 _LEAST_NOISE = 0.03  # of a reference's step: finer edges would tell more than the steps of real parts keep to
 _NOISE_FACTORS = np.geomspace(0.5, 6.0, 26)
-_ROOT_TWO_PI = np.sqrt(2 * np.pi)
+_MOST_CHANGES = 0.1  # to and fro, of the samples; where there are more the noise shows between the steps
+_ONE_CHANGE = 0.5  # of the usual time from one value to the next, within which there and back is one change
+_LEAST_CHANGES = 4
 
 
 @dataclass(frozen=True)
@@ -124,6 +136,10 @@ class Steps:
         return (cls(reference=step), float(before)) if step > COARSE * before else (cls(), noise)
 
 
+NO_STEPS = Steps()
+"""Observations whose steps are finer than their noise."""
+
+
 def common_step(values: NDArray[np.float64]) -> float | None:
     """Return the step that values (n,) are multiples of; None where there is none."""
     different = np.unique(values)
@@ -159,13 +175,13 @@ def rounded_likelihood(
     if lower.max(initial=0.0) < _NEAR:
         probability = ndtr(-lower) - ndtr(-upper)
         log_p = np.log(probability)
-        density_upper = np.exp(-0.5 * upper**2) / (_ROOT_TWO_PI * probability)
-        density_lower = np.exp(-0.5 * lower**2) / (_ROOT_TWO_PI * probability)
+        density_upper = np.exp(-0.5 * upper**2) / (np.sqrt(2 * np.pi) * probability)
+        density_lower = np.exp(-0.5 * lower**2) / (np.sqrt(2 * np.pi) * probability)
     else:
         log_outer, log_inner = log_ndtr(-upper), log_ndtr(-lower)
         log_p = log_inner + np.log1p(-np.exp(log_outer - log_inner))
-        density_upper = np.exp(-0.5 * upper**2 - log_p) / _ROOT_TWO_PI
-        density_lower = np.exp(-0.5 * lower**2 - log_p) / _ROOT_TWO_PI
+        density_upper = np.exp(-0.5 * upper**2 - log_p) / np.sqrt(2 * np.pi)
+        density_lower = np.exp(-0.5 * lower**2 - log_p) / np.sqrt(2 * np.pi)
     beyond = true_lower - lower
     score = density_lower - density_upper + beyond  # σ d log p/dx
     curvature = (score - beyond) ** 2 - (lower * density_lower - upper * density_upper)  # −σ² d² log p/dx²
@@ -187,3 +203,37 @@ def rounding_noise(error: NDArray[np.float64], quantum: float, sigma: NDArray[np
     """
     values = [np.nansum(rounded_likelihood(error, quantum, factor * sigma).deviance) for factor in _NOISE_FACTORS]
     return np.asarray(_NOISE_FACTORS[int(np.argmin(values))] * sigma)
+
+
+def between_steps(t: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return what passes through the steps of rounded readings of something slow; others are returned as they are.
+
+    Where a reading changes from one value to the next, what it rounds is half way between them. A board's temperature
+    in sixteenths of a degree would otherwise leave a strong dependence on it half a step off.
+
+    Parameters
+    ----------
+    t : ndarray, shape (n,)
+        Times, s.
+    values : ndarray, shape (n,)
+        Readings.
+    """
+    step = common_step(values)
+    after = np.flatnonzero(np.diff(values)) + 1
+    if step is None:
+        return values
+    back = np.count_nonzero(np.diff(np.sign(values[after] - values[after - 1])))
+    if back > _MOST_CHANGES * len(values):
+        return values
+    times, levels = 0.5 * (t[after - 1] + t[after]), 0.5 * (values[after - 1] + values[after])
+    onward = np.diff(levels) != 0.0
+    if onward.sum() < _LEAST_CHANGES:
+        return values
+    apart = np.diff(times)
+    change = np.concatenate([[0], np.cumsum(onward | (apart > _ONE_CHANGE * np.median(apart[onward])))])
+    count = np.bincount(change)
+    times, levels = np.bincount(change, times) / count, np.bincount(change, levels) / count
+    through = CubicSpline(times, levels, bc_type="natural")
+    inside = np.clip(t, times[0], times[-1])
+    straight_on = through(inside) + through(inside, 1) * (t - inside)
+    return np.asarray(np.clip(straight_on, values - 0.5 * step, values + 0.5 * step))

@@ -8,14 +8,23 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
 
-from gfimu.diagnosis.data.temperature import between_steps
+from gfimu.diagnosis.data.rounding import between_steps
 from gfimu.diagnosis.data.time_grid import time_grid
 from gfimu.errors import InputError
 from gfimu.recording import Recording
 from gfimu.world_model import WorldModel
 
-__all__ = ["GYRO_COLUMNS", "REFERENCE_COLUMNS", "Run", "difference_noise", "possible_values", "prepare_run"]
+__all__ = [
+    "GYRO_COLUMNS",
+    "REFERENCE_COLUMNS",
+    "Run",
+    "difference_noise",
+    "possible_values",
+    "prepare_run",
+    "smooth_rate",
+]
 
 GYRO_COLUMNS = ("gyro_x_rad_s", "gyro_y_rad_s", "gyro_z_rad_s")
 """Columns of the gyro that drives the twin of a free body."""
@@ -348,3 +357,14 @@ def difference_noise(reference: NDArray[np.float64]) -> float:
     if not len(third):
         return 0.0
     return 1.4826 * float(np.median(np.abs(third - np.median(third)))) / np.sqrt(20.0)
+
+
+def smooth_rate(run: Run, *, is_angle: bool, width: float = 0.1) -> NDArray[np.float64]:
+    """Smooth the reference to a rate over a width of time, s: for starting values only, shape (n,), rad/s."""
+    known = run.reference_valid
+    if not known.any():
+        return np.zeros(len(run.t))
+    rate = np.interp(run.t, run.t[known], run.reference[known])
+    if is_angle:  # before smoothing, which would bend a turning angle at the ends
+        rate = np.gradient(rate, run.sample_period)
+    return np.asarray(gaussian_filter1d(rate, max(width / run.sample_period / 2.0, 0.5), mode="nearest"))

@@ -20,10 +20,10 @@ from gfimu.diagnosis.design.distinguishability import (
     normal_equations,
     plan_contenders,
 )
+from gfimu.diagnosis.design.planned_run import planned, recorded_stretches
 from gfimu.diagnosis.design.profile_search import Limits, improve, plain_profile, profile_of, starting_points
 from gfimu.diagnosis.design.proposal import SEPARATED, Proposal, in_words, scenario_of
 from gfimu.diagnosis.design.table_profile import TableProfile
-from gfimu.diagnosis.stretches import make_segments
 from gfimu.errors import InputError
 from gfimu.world_model import Effect, WorldModel
 
@@ -40,7 +40,6 @@ _SEARCH_RATE = 50.0
 _INSEPARABLE = 1e-5
 _STARTS = 12
 _SHARE_OF_RANGE = 0.9
-_UPRIGHT = np.zeros(3)
 
 Report = Callable[[float, str], None]
 
@@ -98,7 +97,7 @@ def design(
     allowed = _within_range(model, limits)
     bench = _Bench(model, effects, recorded, allowed, sample_rate)
     plain = plain_profile(allowed)
-    upright = _Plan(bench, [_UPRIGHT])
+    upright = _Plan(bench, [np.zeros(3)])
     before = upright.final(None if recorded else plain)
 
     points = starting_points(rng, _STARTS)
@@ -116,7 +115,7 @@ def design(
         after = upright.final(profile)
     if mountings and (inseparable or after.least_nats < SEPARATED):
         # The same profile upright and turned, unless an upright recording is at hand.
-        first = [] if recorded else [_UPRIGHT]
+        first = [] if recorded else [np.zeros(3)]
         plans = {name: _Plan(bench, [*first, np.array(turn)]) for name, turn in mountings.items()}
         best = [point for _, point in sorted(ranked, key=lambda pair: -pair[0])[:2]]
         tested = {
@@ -173,8 +172,7 @@ class _Plan:
             runs=len(bench.recorded) + len(mountings),
         )
         # Recordings at hand are the same under every profile.
-        known = make_segments(bench.model, bench.recorded)
-        self._known = normal_equations(known, self._signatures)[0]
+        self._known = normal_equations(*recorded_stretches(bench.model, bench.recorded), self._signatures)[0]
 
     def table(self, profile: TableProfile | None, sample_rate: float | None = None) -> Distinguishability:
         """Return what a profile adds to the recordings at hand; None: those alone."""
@@ -183,11 +181,8 @@ class _Plan:
         if profile is not None:
             rate = bench.search_rate if sample_rate is None else sample_rate
             runs = [PlannedRun(profile, profile.duration, rate, mounting) for mounting in self.mountings]
-            segments = [
-                run.segment(bench.model, len(bench.recorded) + place, bench.sample_rate)
-                for place, run in enumerate(runs)
-            ]
-            gram = gram + normal_equations(segments, self._signatures)[0]
+            stretches = planned(bench.model, runs, first=len(bench.recorded), noise_rate=bench.sample_rate)
+            gram = gram + normal_equations(*stretches, self._signatures)[0]
         return distinguishability(gram, self._contenders)
 
     def final(self, profile: TableProfile | None) -> Distinguishability:

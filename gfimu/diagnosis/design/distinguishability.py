@@ -1,7 +1,8 @@
 """Distinguishability: how surely data of a given motion could tell one effect from another.
 
-With the normal equations G of the effects' signatures (noise whitened, drive marginalised; `gfimu.diagnosis.segment`),
-an effect of sizes z leaves, after the best explanation by a rival with sizes y, the residual energy
+With the normal equations G of the effects' signatures (noise whitened, drive marginalised;
+`gfimu.diagnosis.fit.posterior`), an effect of sizes z leaves, after the best explanation by a rival with sizes y, the
+residual energy
 
     E_ij = min_y  zᵀG_ii z − 2 zᵀG_ij y + yᵀG_jj y + |y|²/k²,        D_ij = E_ij / 2,
 
@@ -12,7 +13,7 @@ Frisk & Krysander (Automatica 49(6), 2013, eq. 17) for Gaussian noise. No data a
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -20,16 +21,18 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag
 from scipy.optimize import lsq_linear
 
-from gfimu.diagnosis.causes import Signature
-from gfimu.diagnosis.coloured_noise import NoiseLevels
 from gfimu.diagnosis.data.run import Run
-from gfimu.diagnosis.evidence import SCALES
-from gfimu.diagnosis.segment import Segment
-from gfimu.diagnosis.signatures import signature_columns
+from gfimu.diagnosis.data.stretch import Stretch
+from gfimu.diagnosis.design.planned_run import PlannedRun, planned, recorded_stretches
+from gfimu.diagnosis.fit.evidence import SCALES
+from gfimu.diagnosis.fit.linear import Point, linearise
+from gfimu.diagnosis.fit.posterior import Posterior
+from gfimu.diagnosis.search.screening import Signature, columns_of_run
+from gfimu.diagnosis.terms.columns import Columns
+from gfimu.diagnosis.terms.library import family_columns
 from gfimu.errors import InputError, unknown_name
 from gfimu.short_repr import short_repr
-from gfimu.units import STANDARD_GRAVITY
-from gfimu.world_model import Effect, EffectFamily, Spin, WorldModel
+from gfimu.world_model import Effect, EffectFamily, WorldModel
 
 __all__ = [
     "Contender",
@@ -44,61 +47,6 @@ __all__ = [
 ]
 
 _RIVAL_SHAPES = 5
-_WARMING, _WARMING_TIME = 3.0, 15.0  # K, s: a board after power-on
-
-
-@dataclass(frozen=True)
-class PlannedRun:
-    """A recording that does not exist yet.
-
-    Parameters
-    ----------
-    spin : Spin
-        Motion of the table.
-    duration : float
-        Length, s.
-    sample_rate : float
-        Samples per second, Hz.
-    mounting : ndarray, shape (3,)
-        Rotation vector by which the cube is turned from upright, rad.
-    reference_noise : float
-        White noise of the reference at 100 Hz, rad/s (rad for an encoder).
-    bias_instability : float
-        Rms of the 1/f noise of each channel, m/s².
-    """
-
-    spin: Spin
-    duration: float
-    sample_rate: float = 100.0
-    mounting: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
-    reference_noise: float = 0.02
-    bias_instability: float = 0.15e-3 * STANDARD_GRAVITY
-
-    def segment(self, model: WorldModel, index: int, noise_rate: float | None = None) -> Segment:
-        """Return the run as diagnosis would see it, without noise in it but with the weights of that noise.
-
-        Parameters
-        ----------
-        model : WorldModel
-            The simulation.
-        index : int
-            Number of the run.
-        noise_rate : float, optional
-            Sample rate of the real recording, Hz: a coarser time step than that keeps the noise's power density.
-        """
-        t = np.arange(round(self.duration * self.sample_rate)) / self.sample_rate
-        temperature = 25.0 + _WARMING * -np.expm1(-t / _WARMING_TIME)
-        channels, reference = model.predict(self.spin, t, temperature=temperature, mounting=self.mounting)
-        everywhere = np.ones(channels.shape, dtype=bool)
-        run = Run(
-            t, channels, everywhere, reference, everywhere[:, 0], temperature, self.mounting, 0, 1 / self.sample_rate
-        )
-        segment = Segment(model, run, index, 0.0)
-        real_rate = self.sample_rate if noise_rate is None else noise_rate
-        white = np.append(model.expected_noise(real_rate).white, self.reference_noise * np.sqrt(real_rate / 100.0))
-        flicker = np.append(np.full(channels.shape[1], self.bias_instability), 0.0)
-        segment.set_levels(NoiseLevels(white * np.sqrt(self.sample_rate / real_rate), flicker))
-        return segment
 
 
 @dataclass(frozen=True)
@@ -288,7 +236,7 @@ def plan_contenders(
         places = []
         for shape in (own, *grid):
             places.append(np.arange(columns, columns + len(sizes) * blocks))
-            signatures.append(Signature(family, shape, places[-1]))
+            signatures.append(Signature(family, shape, places[-1], 1.0))
             columns += len(sizes) * blocks
         if isinstance(request, str):
             direction = np.eye(len(sizes))
@@ -332,18 +280,21 @@ def _shapes(
 
 
 def normal_equations(
-    segments: Sequence[Segment], signatures: Sequence[Signature]
+    stretches: Sequence[Stretch], point: Point, signatures: Sequence[Signature]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return G (P, P) and b (P,) of signatures over all segments, the drive marginalised."""
+    """Return G (P, P) and b (P,) of signatures over all stretches, the drive marginalised."""
     count = 1 + max(int(signature.columns[-1]) for signature in signatures)
-    gram, score = np.zeros((count, count)), np.zeros(count)
-    for segment in segments:
-        segment.prepare_weights()
-        columns, numbers = signature_columns(segment, signatures, (), ())
-        part, part_score, _ = segment.whitened_products(segment.linearise(()), columns)
-        gram[np.ix_(numbers, numbers)] += part
-        score[numbers] += part_score
-    return 0.5 * (gram + gram.T), score
+    if not stretches:
+        return np.zeros((count, count)), np.zeros(count)
+    array = stretches[0].model.array
+
+    def columns(stretch: Stretch, at: Posterior) -> Columns:
+        parts = [family_columns(stretch, at.observed, at.drive, (), s.family, s.shape) for s in signatures]
+        numbers = np.concatenate([columns_of_run(s, array, stretch.index) for s in signatures])
+        return Columns.together(parts).among(numbers, count)
+
+    linear = linearise(stretches, point, columns)
+    return 0.5 * (linear.gram + linear.gram.T), linear.score
 
 
 def predict_distinguishability(
@@ -367,8 +318,7 @@ def predict_distinguishability(
         sample_rate=min(run.sample_rate for run in runs),
         runs=len(runs),
     )
-    segments = [run.segment(model, index) for index, run in enumerate(runs)]
-    return distinguishability(normal_equations(segments, signatures)[0], contenders)
+    return distinguishability(normal_equations(*planned(model, runs), signatures)[0], contenders)
 
 
 def gained_log_likelihood(
@@ -393,8 +343,7 @@ def gained_log_likelihood(
     signatures, contenders = plan_contenders(
         model, effects, duration=duration, sample_rate=1.0 / period, runs=len(runs)
     )
-    segments = [Segment(model, run, index, float(run.t[0])) for index, run in enumerate(runs)]
-    gram, score = normal_equations(segments, signatures)
+    gram, score = normal_equations(*recorded_stretches(model, runs), signatures)
     gains = []
     for contender in contenders:
         mine = contender.columns

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import PPoly
 
-from gfimu.diagnosis.drive import SplineState
+from gfimu.diagnosis.data.spins import State
 
 __all__ = ["PEAK_OF_RAMP", "Leg", "TableProfile"]
 
@@ -80,11 +80,11 @@ class TableProfile:
     def _angle(self) -> PPoly:
         return self._rate.antiderivative()
 
-    def at(self, t: ArrayLike) -> SplineState:
+    def at(self, t: ArrayLike) -> State:
         """Return angle (zero at time zero), rate and acceleration at times (n,), s."""
         times = np.asarray(t, dtype=float)
         angle: NDArray[np.float64] = self._angle(times) - self._angle(0.0)
-        return SplineState(angle, self._rate(times), self._rate.derivative()(times))
+        return State(angle, self._rate(times), self._rate.derivative()(times))
 
     def to_segments(self) -> list[dict[str, Any]]:
         """Return the entries of ``motion.segment`` in a scenario file."""

@@ -16,10 +16,11 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
-from gfimu.diagnosis.criticism.dependence import Dependence, Fingerprint
-from gfimu.diagnosis.criticism.residual_spectrum import ResidualSpectrum
-from gfimu.diagnosis.criticism.residuals import ResidualSize, Whiteness
-from gfimu.diagnosis.verdict.verdict import RunView
+from gfimu.diagnosis.criticism.views.dependence import Dependence, Fingerprint
+from gfimu.diagnosis.criticism.views.residual_spectrum import ResidualSpectrum
+from gfimu.diagnosis.criticism.views.residuals import ResidualSize, Whiteness
+from gfimu.diagnosis.criticism.views.run_view import RunView
+from gfimu.diagnosis.policy import Policy
 
 __all__ = [
     "before_after_figure",
@@ -36,7 +37,6 @@ _DIVERGING = "RdBu_r"
 _MOST_POINTS = 4000
 _MOST_FREQUENCIES = 1200
 _DPI = 110
-_CHANCE = 3.0
 _SMOOTH_S = 0.15
 _STYLE = {
     "font.family": "sans-serif",
@@ -167,9 +167,9 @@ def fingerprint_figure(fingerprint: Fingerprint) -> str:
     with mpl.rc_context(_STYLE):
         figure = Figure(figsize=(11.0, 0.24 * count + 1.2), layout="constrained")
         pair = figure.subplots(1, 2, sharey=True)
-        norm = SymLogNorm(linthresh=_CHANCE, vmin=-largest, vmax=largest)
+        norm = SymLogNorm(linthresh=Policy.noise_stds, vmin=-largest, vmax=largest)
         for axis, values, title in zip(pair, (fingerprint.before, fingerprint.after), ("before", "after"), strict=True):
-            shown = np.where(np.abs(values) < _CHANCE, 0.0, values)
+            shown = np.where(np.abs(values) < Policy.noise_stds, 0.0, values)
             axis.imshow(shown, cmap=_DIVERGING, norm=norm, aspect="auto", interpolation="nearest")
             axis.set_xticks(range(terms), fingerprint.terms, rotation=40, ha="right")
             axis.set_yticks(range(count), fingerprint.channels)

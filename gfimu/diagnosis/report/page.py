@@ -10,7 +10,7 @@ import numpy as np
 from jinja2 import Environment, FileSystemLoader, select_autoescape
 
 from gfimu import __version__
-from gfimu.diagnosis.criticism.residuals import ResidualViews, residual_views
+from gfimu.diagnosis.criticism.views.residuals import ResidualViews, residual_views
 from gfimu.diagnosis.report import figures
 from gfimu.diagnosis.report.plain_words import (
     gain_rows,
@@ -25,6 +25,7 @@ from gfimu.diagnosis.report.plain_words import (
     summary,
 )
 from gfimu.diagnosis.verdict.verdict import Diagnosis, NamedCause
+from gfimu.diagnosis.verdict.wording import SAME_SHARE
 from gfimu.files.atomic_file import write_text
 
 __all__ = ["report_html", "write_report"]
@@ -46,7 +47,6 @@ _VIEWS = (
 )
 _MOST_PARAMETERS = 14
 _MOST_RIVALS = 8
-_SAME_SHARE = 5e-3
 
 
 def write_report(path: str | Path, diagnosis: Diagnosis) -> None:
@@ -129,7 +129,7 @@ def _surrogate(diagnosis: Diagnosis) -> dict[str, Any]:
 def _share_in_any_recording(diagnosis: Diagnosis) -> str:
     """Return the share without terms of absolute time where that is another one."""
     here, anywhere = diagnosis.gain.share_of_excess_removed, diagnosis.gain.share_in_any_recording
-    return percent(anywhere) if np.isfinite(anywhere) and abs(here - anywhere) > _SAME_SHARE else ""
+    return percent(anywhere) if np.isfinite(anywhere) and abs(here - anywhere) > SAME_SHARE else ""
 
 
 def _figures_of_merit(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:

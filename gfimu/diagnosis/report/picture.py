@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from gfimu.diagnosis.criticism.views.run_view import RunView
 from gfimu.diagnosis.report.plain_words import headline, next_steps, parameter_texts, parameter_units, percent, story
-from gfimu.diagnosis.verdict.verdict import Diagnosis, RunView
+from gfimu.diagnosis.verdict.verdict import Diagnosis
 from gfimu.recording import Recording
 from gfimu.visual import KnownMotion, Line, Plot, write_comparison
 from gfimu.visual.colours import COMMAND, MEASURED, PREDICTED_AFTER, PREDICTED_BEFORE

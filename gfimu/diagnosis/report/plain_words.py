@@ -8,7 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gfimu.diagnosis.verdict.verdict import Diagnosis, NamedCause, RunView
+from gfimu.diagnosis.criticism.views.run_view import RunView
+from gfimu.diagnosis.policy import Policy
+from gfimu.diagnosis.verdict.verdict import Diagnosis, NamedCause
 from gfimu.units import NAME, NUMBER, RATIO, STANDARD_GRAVITY, key_name
 
 __all__ = [
@@ -26,7 +28,6 @@ __all__ = [
 ]
 
 _OF_A_CALIBRATION = frozenset({"bias", "scale_factor", "misalignment", "cross_axis"})
-_SIGNIFICANT = 2.0
 _THOUSANDTHS = ("rad", "m", "s")
 _NOISE_UNITS = {
     "bias_instability_m_s2": "m/s²",
@@ -110,7 +111,7 @@ def _words(diagnosis: Diagnosis, effect: str) -> str:
 
 def story(diagnosis: Diagnosis) -> str:
     """Return what was compared and how much the verdict improves it, for a reader who knows nothing of it."""
-    residual, gain = diagnosis.residual, diagnosis.gain
+    residual = diagnosis.residual
     count = len(diagnosis.twin.array.channels)
     before, after, floor = residual.rms_before, residual.rms_after, residual.noise_floor
     text = (
@@ -127,35 +128,53 @@ def story(diagnosis: Diagnosis) -> str:
         )
     if diagnosis.verdict == "nothing_found":
         return text + "No cause in the library, and no pattern of any other kind, predicts the data better than chance."
-    if diagnosis.causes:
-        what = (
-            "either of these" if diagnosis.verdict == "ambiguous" else "this" if len(diagnosis.causes) == 1 else "these"
-        )
-        text += f"With {what} put into the simulation it misses by {after:.3g} m/s²"
-        text += ", which is noise. " if after < 1.05 * floor else ". "
-    if diagnosis.unexplained.extends_twin:
-        text += f"With a description that has no name in the simulation it misses by {after:.3g} m/s². "
-    if math.isfinite(gain.share_of_excess_removed):
-        text += (
-            f"On data that the fit never saw ({gain.held_out}), {percent(gain.share_of_excess_removed)} of the error "
-            "beyond noise is gone. "
-        )
-        if diagnosis.unexplained.left_out and math.isfinite(gain.share_in_any_recording):
-            text += f"In any other recording it would be {percent(max(gain.share_in_any_recording, 0.0))}. "
-    left_out = diagnosis.unexplained.left_out
-    if left_out:
-        what = f"{_count(left_out)} terms" if left_out > 1 else "one term"
-        text += (
-            f"Of what describes it {what} of absolute time {'are' if left_out > 1 else 'is'} not in twin.toml: another "
-            "recording has other phases, and no second one confirms them. "
-        )
+    parts = [_put_in(diagnosis), _on_unseen_data(diagnosis), _of_absolute_time(diagnosis)]
     if diagnosis.unexplained.significant:
-        text += f"Left unexplained: {diagnosis.unexplained.signature}. "
+        parts.append(f"Left unexplained: {diagnosis.unexplained.signature}. ")
     level = float(diagnosis.noise.get("bias_instability_largest_m_s2", 0.0))
     if level > 0.0:
         name = diagnosis.noise["bias_instability_largest_channel"]
-        text += f"The largest slow noise is that of {name}, {level / STANDARD_GRAVITY * 1e3:.2g} mg. "
-    return text.strip()
+        parts.append(f"The largest slow noise is that of {name}, {level / STANDARD_GRAVITY * 1e3:.2g} mg. ")
+    return (text + "".join(parts)).strip()
+
+
+def _put_in(diagnosis: Diagnosis) -> str:
+    """Return what the causes, or a description without a name, make of the prediction error."""
+    text, after = "", diagnosis.residual.rms_after
+    if diagnosis.causes:
+        what = "this" if len(diagnosis.causes) == 1 else "these"
+        what = "either of these" if diagnosis.verdict == "ambiguous" else what
+        text += f"With {what} put into the simulation it misses by {after:.3g} m/s²"
+        text += ", which is noise. " if after < 1.05 * diagnosis.residual.noise_floor else ". "
+    if diagnosis.unexplained.extends_twin:
+        text += f"With a description that has no name in the simulation it misses by {after:.3g} m/s². "
+    return text
+
+
+def _on_unseen_data(diagnosis: Diagnosis) -> str:
+    """Return what of the error is gone on held-out data, where that could be measured."""
+    gain = diagnosis.gain
+    if not math.isfinite(gain.share_of_excess_removed):
+        return ""
+    text = (
+        f"On data that the fit never saw ({gain.held_out}), {percent(gain.share_of_excess_removed)} of the error "
+        "beyond noise is gone. "
+    )
+    if diagnosis.unexplained.left_out and math.isfinite(gain.share_in_any_recording):
+        text += f"In any other recording it would be {percent(max(gain.share_in_any_recording, 0.0))}. "
+    return text
+
+
+def _of_absolute_time(diagnosis: Diagnosis) -> str:
+    """Return which terms are not in the extended twin, as they belong to one recording."""
+    left_out = diagnosis.unexplained.left_out
+    if not left_out:
+        return ""
+    what = f"{_count(left_out)} terms" if left_out > 1 else "one term"
+    return (
+        f"Of what describes it {what} of absolute time {'are' if left_out > 1 else 'is'} not in twin.toml: another "
+        "recording has other phases, and no second one confirms them. "
+    )
 
 
 def _silent(diagnosis: Diagnosis, run: RunView) -> list[str]:
@@ -186,7 +205,7 @@ def parameter_texts(cause: NamedCause, units: Mapping[str, str]) -> list[Paramet
         std = cause.std.get(key)
         if value == 0 and not std:
             continue
-        certain = std is None or not math.isfinite(std) or abs(value) > _SIGNIFICANT * std
+        certain = std is None or not math.isfinite(std) or abs(value) > Policy.stds * std
         texts.append(ParameterText(name, _with_std(value, std, unit), _familiar(value, std, unit), certain))
     return texts
 
@@ -214,48 +233,61 @@ def gain_rows(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:
 
 def next_steps(diagnosis: Diagnosis) -> list[str]:
     """Return what to do next, most useful first."""
-    steps = []
-    remedies = dict.fromkeys(cause.would_be_separated_by for cause in diagnosis.causes if cause.would_be_separated_by)
-    match diagnosis.verdict:
-        case "nothing_found" if diagnosis.calibration_residue:
-            steps.append("Keep twin.toml, which has the corrections, or calibrate the unit again.")
-        case "nothing_found":
-            steps.append(
-                "Keep the simulation as it is. A longer run, with faster ramps in both directions, would show "
-                "smaller errors."
-            )
-        case "ambiguous":
-            steps += [f"To tell the candidates apart, record: {remedy}." for remedy in remedies]
-            steps.append("Give both recordings to one call of gfimu diagnose; it fits them together.")
-        case "unknown":
-            steps.append("Look at the residual views of the report for where the discrepancy sits.")
-            if diagnosis.unexplained.extends_twin:
-                steps.append("Until it has a name, simulate with twin.toml: its terms called unknown describe it.")
-            steps.append("Record another run with another motion: what stays is in the rig or the sensors.")
-        case _:
-            more = "no more than what is left unexplained" if diagnosis.unexplained.significant else "nothing"
-            steps.append(f"Confirm on another recording: gfimu diagnose OTHER --twin twin.toml should find {more}.")
-            steps.append("Correct the rig or calibrate it, or keep twin.toml as the simulation from now on.")
-    every = [cause.effect for cause in diagnosis.causes if cause.effect in _OF_A_CALIBRATION and "all" in cause.place]
-    if every:
-        steps.insert(
-            0,
-            f"If the unit is not calibrated, do that first: {_joined(every)} on all channels is what such a unit looks "
-            "like, and one run can't tell many wrong numbers from each other. Record static poses; then "
-            "gfimu calibrate twelve-position POSES --array ARRAY --out cal.json and "
-            "gfimu diagnose RUN --calibration cal.json.",
-        )
+    steps = [*_calibrate_first(diagnosis), *_by_verdict(diagnosis)]
     if diagnosis.verdict == "explained":
-        for cause in diagnosis.causes:
-            if cause.not_distinguishable_from:
-                others = _joined(list(cause.not_distinguishable_from), "or")
-                remedy = f" To be sure, record: {cause.would_be_separated_by}." if cause.would_be_separated_by else ""
-                steps.append(
-                    f"{cause.effect} is the simplest story; by a coincidence {others} could imitate it here.{remedy}"
-                )
+        steps += [_to_be_sure(cause) for cause in diagnosis.causes if cause.not_distinguishable_from]
     if not diagnosis.gain.held_out and diagnosis.verdict != "nothing_found":
         steps.append("Record a second run: with --held-out its gain is measured on data that the fit never saw.")
     return [step.strip() for step in steps]
+
+
+def _calibrate_first(diagnosis: Diagnosis) -> list[str]:
+    """Return the step for a unit that was never calibrated: much of it is a little wrong everywhere."""
+    every = [cause.effect for cause in diagnosis.causes if cause.effect in _OF_A_CALIBRATION and "all" in cause.place]
+    if not every:
+        return []
+    step = (
+        f"If the unit is not calibrated, do that first: {_joined(every)} on all channels is what such a unit looks "
+        "like, and one run can't tell many wrong numbers from each other. Record static poses; then "
+        "gfimu calibrate twelve-position POSES --array ARRAY --out cal.json and "
+        "gfimu diagnose RUN --calibration cal.json."
+    )
+    return [step]
+
+
+def _by_verdict(diagnosis: Diagnosis) -> list[str]:
+    """Return the steps that each verdict asks for."""
+    match diagnosis.verdict:
+        case "nothing_found" if diagnosis.calibration_residue:
+            return ["Keep twin.toml, which has the corrections, or calibrate the unit again."]
+        case "nothing_found":
+            step = (
+                "Keep the simulation as it is. A longer run, with faster ramps in both directions, would show "
+                "smaller errors."
+            )
+            return [step]
+        case "ambiguous":
+            remedies = dict.fromkeys(one.would_be_separated_by for one in diagnosis.causes if one.would_be_separated_by)
+            apart = [f"To tell the candidates apart, record: {remedy}." for remedy in remedies]
+            return [*apart, "Give both recordings to one call of gfimu diagnose; it fits them together."]
+        case "unknown":
+            steps = ["Look at the residual views of the report for where the discrepancy sits."]
+            if diagnosis.unexplained.extends_twin:
+                steps.append("Until it has a name, simulate with twin.toml: its terms called unknown describe it.")
+            return [*steps, "Record another run with another motion: what stays is in the rig or the sensors."]
+        case _:
+            more = "no more than what is left unexplained" if diagnosis.unexplained.significant else "nothing"
+            return [
+                f"Confirm on another recording: gfimu diagnose OTHER --twin twin.toml should find {more}.",
+                "Correct the rig or calibrate it, or keep twin.toml as the simulation from now on.",
+            ]
+
+
+def _to_be_sure(cause: NamedCause) -> str:
+    """Return the step that rules out a coincidence of other effects."""
+    others = _joined(list(cause.not_distinguishable_from), "or")
+    remedy = f" To be sure, record: {cause.would_be_separated_by}." if cause.would_be_separated_by else ""
+    return f"{cause.effect} is the simplest story; by a coincidence {others} could imitate it here.{remedy}"
 
 
 def percent(share: float) -> str:

@@ -9,27 +9,24 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gfimu.diagnosis.criticism.gain import Gain
+from gfimu.diagnosis.criticism.views.run_view import RunView
+from gfimu.diagnosis.policy import Policy
 from gfimu.files.atomic_file import write_text
-from gfimu.short_repr import joined, short_repr
+from gfimu.short_repr import joined
 from gfimu.world_model import WorldModel
 
 __all__ = [
     "FORMAT_VERSION",
-    "IN_PART",
     "Diagnosis",
-    "Gain",
     "NamedCause",
     "Residual",
     "Rival",
-    "RunView",
     "Unexplained",
 ]
 
-FORMAT_VERSION = 1
-IN_PART = 0.9
-"""Share of the held-out excess below which causes explain in part."""
+FORMAT_VERSION = 1  # numerical: of verdict.json, no threshold
 
 
 @dataclass(frozen=True)
@@ -137,46 +134,6 @@ class Residual:
 
 
 @dataclass(frozen=True)
-class Gain:
-    """What the extension is worth on data that the fit never saw.
-
-    Parameters
-    ----------
-    held_out : str
-        Which data, in words: another recording, or blocks of this one; empty where none could be held out.
-    rms_before, rms_after : float
-        Residual rms on them, m/s².
-    share_of_excess_removed : float
-        1 − (after² − floor²)/(before² − floor²), channels and reference together in units of their noise, each with
-        the drive that suits it best; NaN where there was no excess.
-    log_likelihood_per_sample, log_likelihood_std : float
-        Gain per sample and its standard error.
-    rate_rmse_before, rate_rmse_after : float
-        Rate of the array against the reference, rad/s.
-    drift_before, drift_after : float
-        Position drift of the held-out stretch, m.
-    share_std : float
-        Standard error of ``share_of_excess_removed`` by the noise; NaN where it was not estimated.
-    share_in_any_recording : float
-        The same share without terms of absolute time, which another recording has otherwise; NaN where nothing can
-        be said.
-    """
-
-    held_out: str = ""
-    rms_before: float = float("nan")
-    rms_after: float = float("nan")
-    share_of_excess_removed: float = float("nan")
-    log_likelihood_per_sample: float = float("nan")
-    log_likelihood_std: float = float("nan")
-    rate_rmse_before: float = float("nan")
-    rate_rmse_after: float = float("nan")
-    drift_before: float = float("nan")
-    drift_after: float = float("nan")
-    share_std: float = float("nan")
-    share_in_any_recording: float = float("nan")
-
-
-@dataclass(frozen=True)
 class Unexplained:
     """What is left and nothing in the library explains.
 
@@ -202,34 +159,6 @@ class Unexplained:
     surrogate: Mapping[str, float] = field(default_factory=dict)
     extends_twin: bool = False
     left_out: int = 0
-
-
-@dataclass(frozen=True)
-class RunView:
-    """A run as the report shows it; arrays of n samples and c channels.
-
-    ``rate``, ``acceleration``, ``angle`` are the drive's posterior mean with the causes in; ``before`` is what the
-    given twin predicts, ``after`` the extended one. ``white`` is the noise per channel. ``attitude``, shape (n, 4), is
-    the quaternion (w, x, y, z), body to world, of a free body, which has no ``angle``.
-    """
-
-    name: str
-    t: NDArray[np.float64]
-    measured: NDArray[np.float64]
-    valid: NDArray[np.bool_]
-    before: NDArray[np.float64]
-    after: NDArray[np.float64]
-    reference: NDArray[np.float64]
-    reference_before: NDArray[np.float64]
-    reference_after: NDArray[np.float64]
-    angle: NDArray[np.float64]
-    rate: NDArray[np.float64]
-    acceleration: NDArray[np.float64]
-    temperature: NDArray[np.float64] | None
-    white: NDArray[np.float64]
-    attitude: NDArray[np.float64] | None = None
-
-    __repr__ = short_repr
 
 
 @dataclass(frozen=True)
@@ -277,7 +206,7 @@ class Diagnosis:
     @property
     def in_part(self) -> bool:
         """Whether the causes stand but leave more than a tenth of the excess on held-out data."""
-        return self.verdict == "explained" and self.gain.share_of_excess_removed < IN_PART
+        return self.verdict == "explained" and self.gain.share_of_excess_removed < 1.0 - Policy.small
 
     def __repr__(self) -> str:
         causes = ", ".join(f"{cause.effect} {100 * cause.probability:.3g} %" for cause in self.causes)

@@ -6,7 +6,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from gfimu.diagnosis.verdict.verdict import Diagnosis, Gain, NamedCause, Residual, Rival, RunView, Unexplained
+from gfimu.diagnosis.criticism.gain import Gain
+from gfimu.diagnosis.criticism.views.run_view import RunView
+from gfimu.diagnosis.verdict.verdict import Diagnosis, NamedCause, Residual, Rival, Unexplained
 from sim.campaign import Measurement, measure, random_profile
 from sim.effects import Effect, make_effect
 from sim.twin import Twin

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
-from gfimu.diagnosis.diagnose import diagnose
-from gfimu.diagnosis.free_body.diagnose import diagnose_body
-from gfimu.diagnosis.free_body.run import prepare_body_run
-from gfimu.diagnosis.free_body.segment import BodySegment
+from gfimu.diagnosis.data.body.run import prepare_body_run
+from gfimu.diagnosis.data.body.stretch import make_body_stretches
+from gfimu.diagnosis.diagnose import diagnose, prepare
 from gfimu.diagnosis.report.picture import write_picture
+from gfimu.diagnosis.terms.hand.drive import HandDrive
 from gfimu.errors import InputError
 from gfimu.files.model_files import find_model, read_toml
 from gfimu.motion.attitude import to_rotation
@@ -119,7 +119,8 @@ def test_the_noise_of_the_gyro_in_a_slow_motion_is_no_cause(seed, array, rate):
 
 def test_what_drives_the_twin_is_the_gyro_smoothed():
     recording = tumble(seed=2, array="cube12", rate=3.0)
-    drive = BodySegment(twin("cube12"), prepare_body_run(recording, twin("cube12")), 0).drive
+    (stretch,) = make_body_stretches(twin("cube12"), [prepare_body_run(recording, twin("cube12"))], [[]])
+    drive = HandDrive.of(stretch).spin
     truth, gyro = (
         np.column_stack([values[name.format(axis)] for axis in "xyz"])
         for values, name in ((recording.extra, "truth_omega_{}_rad_s"), (recording.reference, "gyro_{}_rad_s"))
@@ -249,4 +250,4 @@ def test_a_recording_without_its_gyro_is_refused():
 def test_a_simulation_that_predicts_no_free_body_is_refused():
     model = SimpleNamespace(drive_source="gyro")
     with pytest.raises(InputError, match="the simulation predicts no free body"):
-        diagnose_body([], model, names=[], report=lambda share, text: None)
+        prepare([], model, [])

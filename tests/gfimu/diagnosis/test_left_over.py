@@ -1,4 +1,4 @@
-"""What the library does not have is told by its channel and its form, and is not taken for the nearest thing it has."""
+"""What the library lacks is reported by its channel and form, and is not taken for the nearest thing it has."""
 
 from __future__ import annotations
 
@@ -8,9 +8,12 @@ import numpy as np
 import pytest
 
 from gfimu.diagnosis import diagnose
-from gfimu.diagnosis.data.prepared_runs import PreparedRuns
-from gfimu.diagnosis.refinement import refine
-from gfimu.diagnosis.residual_tests import lines
+from gfimu.diagnosis.criticism.series_tests import lines
+from gfimu.diagnosis.data.stretch import make_stretches
+from gfimu.diagnosis.diagnose import prepare
+from gfimu.diagnosis.fit.learn import starting_point
+from gfimu.diagnosis.fit.observed_at import observed_at
+from gfimu.diagnosis.policy import Policy
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
 from gfimu.units import STANDARD_GRAVITY
@@ -78,15 +81,13 @@ def test_a_line_far_beyond_the_smallest_probability_has_finite_odds(twin):
     def ring(t, readings):
         readings += amplitude * np.sin(2 * np.pi * 11.0 * t)[:, None]
 
-    prepared = PreparedRuns.build([recorded(twin, 3, ring)], twin, ["run"])
-    segments, fixed = prepared.segments(twin)
-    for segment in segments:
-        segment.prepare_weights()
-    nothing = refine(segments, (), fixed, iterations=0)
-    found = lines(segments[0], fixed[0], fit=nothing, channels=twin.array.channels)
+    prepared = prepare([recorded(twin, 3, ring)], twin, ["run"])
+    stretches = make_stretches(twin, prepared.runs, prepared.effects)
+    point = starting_point(stretches, Policy().knots)
+    found = lines(stretches[0], observed_at(stretches, point)[0])
     # |Σ y e^{−iωt}|²/n of a tone is nA²/4, in units of the noise; what leaks from it raises the floor it stands on.
-    noise = segments[0].levels.white[:-1]
-    most = np.sum(len(segments[0].run.t) * amplitude**2 / 4 / noise**2)
+    noise = point.levels[0].white[:-1]
+    most = np.sum(len(stretches[0].run.t) * amplitude**2 / 4 / noise**2)
     assert 0.1 * most < found.log_odds < most
     assert "tone at 11.0" in found.signature
 

@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.testing import assert_array_equal
 
-from gfimu.diagnosis import diagnose, long_run, stretches, surrogate
+from gfimu.diagnosis import diagnose
+from gfimu.diagnosis.data import stretch
 from gfimu.diagnosis.data.run import prepare_run
-from gfimu.diagnosis.long_run import spread_over_runs
-from gfimu.diagnosis.nuisances import settle_noise
+from gfimu.diagnosis.policy import Policy
+from gfimu.diagnosis.search import long_run
+from gfimu.diagnosis.search.long_run import spread_over_runs, understand_any_length
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
 from sim.campaign import Measurement, measure, random_profile
 from sim.effects import make_effect
 from sim.twin import Twin
+
+FEW = Policy(most_searched=2)
 
 
 @pytest.mark.parametrize(
@@ -32,7 +35,20 @@ def test_stretches_are_spread_and_every_run_gives_one(runs, most, chosen):
 
 @pytest.fixture
 def short_stretches(monkeypatch):
-    monkeypatch.setattr(stretches, "SEGMENT_DURATION", 6.0)
+    monkeypatch.setattr(stretch, "_DURATION", 6.0)
+
+
+def counting(monkeypatch):
+    """Return a list that takes the number of stretches of every search."""
+    searched = []
+    understand = long_run.understand
+
+    def counted(some, *rest):
+        searched.append(len(some))
+        return understand(some, *rest)
+
+    monkeypatch.setattr(long_run, "understand", counted)
+    return searched
 
 
 def test_a_cause_found_in_part_is_measured_on_all(short_stretches, monkeypatch):
@@ -40,16 +56,8 @@ def test_a_cause_found_in_part_is_measured_on_all(short_stretches, monkeypatch):
     hidden = make_effect("table_tilt", {"x_rad": 2e-3, "y_rad": -1e-3})
     recording = measure(np.random.default_rng(11), twin, [hidden], Measurement(duration=30.0))
     whole = diagnose([recording], twin)
-    searched = []
-    explain = long_run.explain
-
-    def counted(segments, *rest, **keywords):
-        searched.append(len(segments))
-        return explain(segments, *rest, **keywords)
-
-    monkeypatch.setattr(long_run, "explain", counted)
-    monkeypatch.setattr(long_run, "MOST_SEARCHED", 2)
-    part = diagnose([recording], twin)
+    searched = counting(monkeypatch)
+    part = diagnose([recording], twin, policy=FEW)
     assert searched == [2]
     for found in (whole, part):
         assert [cause.effect for cause in found.causes] == ["table_tilt"]
@@ -59,46 +67,36 @@ def test_a_cause_found_in_part_is_measured_on_all(short_stretches, monkeypatch):
         assert other.parameters[key] == pytest.approx(one.parameters[key], abs=0.5 * std)
 
 
-def test_nothing_is_found_in_a_long_quiet_recording(short_stretches, monkeypatch):
+def test_nothing_is_found_in_a_long_quiet_recording(short_stretches):
     twin = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
-    monkeypatch.setattr(long_run, "MOST_SEARCHED", 2)
     recording = measure(np.random.default_rng(12), twin, [], Measurement(duration=30.0))
-    assert diagnose([recording], twin).verdict == "nothing_found"
+    assert diagnose([recording], twin, policy=FEW).verdict == "nothing_found"
 
 
-def test_what_has_no_name_is_described_on_some_stretches_and_fitted_to_all(short_stretches, monkeypatch):
+def test_what_has_no_name_is_described_on_some_stretches_and_fitted_to_all(short_stretches):
     twin = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
     rng = np.random.default_rng(13)
     motion = random_profile(rng, 30.0)
     run = measure(rng, twin, [], Measurement(duration=30.0), motion=motion)
     readings = run.readings.copy()
     readings[:, 4] += 0.004 * motion.at(run.t_s).rate ** 3
-    monkeypatch.setattr(long_run, "MOST_SEARCHED", 2)
-    monkeypatch.setattr(surrogate, "MOST_SEARCHED", 2)
-    found = diagnose([Recording.from_arrays(run.t_s, readings, twin.array, reference=run.reference)], twin)
+    recording = Recording.from_arrays(run.t_s, readings, twin.array, reference=run.reference)
+    found = diagnose([recording], twin, policy=FEW)
     assert found.verdict == "unknown"
     assert any(effect.name == "unknown" for effect in found.twin.effects)
     assert found.gain.share_of_excess_removed > 0.9
 
 
-def test_the_noise_of_a_long_recording_is_learnt_from_some_stretches_of_each_run(short_stretches, monkeypatch):
+def test_every_run_of_a_long_recording_has_the_noise_of_its_own_reference(short_stretches, monkeypatch):
     twin = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
     rng = np.random.default_rng(14)
     tachos = (0.02, 0.05)
     runs = [
         prepare_run(measure(rng, twin, [], Measurement(duration=30.0, tacho_noise=noise)), twin) for noise in tachos
     ]
-    segments = stretches.make_segments(twin, runs)
-    for segment in segments:
-        segment.prepare_weights()
-    fixed = [()] * len(segments)
-    monkeypatch.setattr(long_run, "MOST_SEARCHED", 4)
-    learnt = []
-    monkeypatch.setattr(
-        long_run, "settle_noise", lambda some, *rest: (learnt.append(len(some)), settle_noise(some, *rest))
-    )
-    long_run.settle_noise_of_any_length(segments, (), fixed)
-    assert learnt == [4]
-    for segment in segments:
-        assert segment.levels.white[-1] == pytest.approx(tachos[segment.index], rel=0.1)
-        assert_array_equal(segment.inverse_variance, 1.0 / segment.levels.white**2)
+    stretches = stretch.make_stretches(twin, runs, [[], []])
+    searched = counting(monkeypatch)
+    found = understand_any_length(stretches, Policy(most_searched=4), lambda share, text: None)
+    assert searched == [4]
+    for one, levels in zip(stretches, found.explanation.best.point.levels, strict=True):
+        assert levels.white[-1] == pytest.approx(tachos[one.index], rel=0.1)

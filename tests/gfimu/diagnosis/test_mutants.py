@@ -11,7 +11,7 @@ import pytest
 from hidden_cases import HiddenCase, group, hidden_cases
 from hidden_pins import LEAST_REMOVED, Pins, problems, removed_share
 
-from gfimu.diagnosis import diagnose, segment
+from gfimu.diagnosis import diagnose
 from sim.effects import EFFECTS
 from sim.study.cases import Case
 from sim.study.outcome import draw_world, outcome_of
@@ -83,21 +83,23 @@ def scaled(name, factor):
 
 
 def reference_ignored(patch):
-    kept = segment.Segment.residual
+    for module in ("posterior", "linear"):
+        target = sys.modules[f"gfimu.diagnosis.fit.{module}"]
+        kept = target.observe
 
-    def blind(self, *arguments):
-        residual = kept(self, *arguments).copy()
-        residual[:, -1] = 0.0
-        return residual
+        def blind(stretch, prediction, levels, kept=kept):
+            seen = kept(stretch, prediction, levels)
+            residual, weight = seen.residual.copy(), seen.weight.copy()
+            residual[:, -1] = weight[:, -1] = 0.0
+            return replace(seen, residual=residual, weight=weight)
 
-    patch.setattr(segment.Segment, "residual", blind)
+        patch.setattr(target, "observe", blind)
 
 
 def residuals_unjudged(patch):
     """Whatever is left, the best set of names is believed; only the gate may withdraw it."""
-    for module in (ENGINE, sys.modules["gfimu.diagnosis.conclusion"]):
-        patch.setattr(module, "is_unknown", lambda *_: False)
-        patch.setattr(module, "is_dominant", lambda *_: False)
+    patch.setattr(ENGINE, "is_unknown", lambda *_: False)
+    patch.setattr(ENGINE, "is_dominant", lambda *_: False)
 
 
 def everything_is_explained(patch):
@@ -115,13 +117,12 @@ def samples_unchecked(patch):
 
 
 def trained_on_what_is_held_out(patch):
-    kept = ENGINE.split_segments
+    kept = ENGINE.split
 
     def same(*arguments, **keywords):
-        pairs = kept(*arguments, **keywords)
-        return [replace(pair, train=pair.test, train_fixed=pair.test_fixed) for pair in pairs]
+        return [replace(pair, train=pair.test) for pair in kept(*arguments, **keywords)]
 
-    patch.setattr(ENGINE, "split_segments", same)
+    patch.setattr(ENGINE, "split", same)
 
 
 MUTANTS = [
@@ -133,7 +134,7 @@ MUTANTS = [
     (reference_ignored, "single-tacho_scale-300-campaign-116"),
     (everything_is_explained, "outside-tone_on_one_channel-600-independent-402"),
     (samples_unchecked, "single-sign_flip-1500-campaign-132"),
-    (trained_on_what_is_held_out, "outside-cogging-600-campaign-426"),
+    (trained_on_what_is_held_out, "outside-axis_wobble-600-independent-421"),
 ]
 
 

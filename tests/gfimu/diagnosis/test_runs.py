@@ -9,10 +9,13 @@ import pytest
 from numpy.testing import assert_allclose
 
 from gfimu.diagnosis import diagnose
+from gfimu.diagnosis.criticism.holdout import split
 from gfimu.diagnosis.data.integrity import check_integrity
 from gfimu.diagnosis.data.run import prepare_run
-from gfimu.diagnosis.holdout import split_segments
-from gfimu.diagnosis.stretches import make_segments
+from gfimu.diagnosis.data.stretch import make_stretches
+from gfimu.diagnosis.fit.gauss_newton import fit
+from gfimu.diagnosis.fit.learn import predicted_by_reference, starting_point
+from gfimu.diagnosis.policy import Policy
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
 from gfimu.units import STANDARD_GRAVITY
@@ -66,15 +69,15 @@ TIMED = {
 
 @pytest.mark.parametrize("name", TIMED)
 def test_a_stretch_keeps_the_time_origin_of_its_run(twin, quiet, name):
-    [segment] = make_segments(twin, [prepare_run(quiet, twin)])
-    segment.prepare_weights()
+    [stretch] = stretches = make_stretches(twin, [prepare_run(quiet, twin)], [[]])
     effect = make_effect(name, TIMED[name], twin.array)
-    whole = segment.predict([effect])
-    for pair in split_segments([segment], [[]]):
-        for block in pair.test:
-            rows = np.searchsorted(segment.run.t, block.run.t)
+    nothing = fit(stretches, starting_point(stretches, Policy().knots), Policy())
+    whole = stretch.predict([effect], nothing.point.drives[0].spin)
+    for pair in split(stretches, nothing, Policy()):
+        for block, drive in zip(pair.test.stretches, pair.test.drives, strict=True):
+            rows = np.searchsorted(stretch.run.t, block.run.t)
             # The block's own spline follows the run's to this much; a lost origin would show tens of times more.
-            assert_allclose(block.predict([effect]), whole[rows], atol=0.01)
+            assert_allclose(block.predict([effect], drive.spin), whole[rows], atol=0.01)
 
 
 def test_held_out_blocks_are_predicted_to_the_noise(twin):
@@ -89,8 +92,7 @@ def test_a_chip_at_twice_its_gain_is_not_taken_for_clipping(twin):
     motion = random_profile(rng, SETTING.duration)
     effect = make_effect("wrong_range", {"chip": "a3", "factor": 2.0}, twin.array)
     run = prepare_run(measure(rng, twin, [effect], SETTING, motion=motion), twin)
-    [segment] = make_segments(twin, [run])
-    checked = check_integrity(twin, run, segment.predict([])[:, :-1])
+    checked = check_integrity(twin, run, predicted_by_reference(twin, run))
     assert [found.name for found in checked.effects] == ["wrong_range"]
 
 
@@ -150,5 +152,5 @@ def test_clipping_is_seen_where_a_steady_signal_just_reaches_it(twin):
     )
     for recording, names in ((steady, []), (clipped, ["saturation"])):
         run = prepare_run(recording, twin)
-        prediction = np.concatenate([segment.predict([])[:, :-1] for segment in make_segments(twin, [run])])
-        assert [effect.name for effect in check_integrity(twin, run, prediction).effects] == names
+        checked = check_integrity(twin, run, predicted_by_reference(twin, run))
+        assert [effect.name for effect in checked.effects] == names

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from gfimu.diagnosis import diagnose
-from gfimu.diagnosis.data.prepared_runs import PreparedRuns
 from gfimu.geometry.array import AccelerometerArray
 from sim.campaign import Measurement, measure
 from sim.effects import make_effect
@@ -60,18 +59,6 @@ def test_corners_of_the_drive_are_no_lag(sample_rate, hidden):
     for cause in found.causes:
         for key, value in hidden[cause.effect].items():
             assert abs(cause.parameters[key] - value) < 4 * cause.std[key]
-
-
-def test_knots_are_set_by_the_arms_about_the_axis():
-    """Mounted off the axis, the same corner moves the channels more."""
-    rng = np.random.default_rng(5)
-    recording = measure(rng, mounted(0.0), (), Measurement(duration=DURATION), motion=ServoSteps(rng))
-    knots = []
-    for twin in (mounted(0.0), mounted(0.5)):
-        (segment,), _ = PreparedRuns.build([recording], twin, ["run"]).segments(twin)
-        assert segment.sharpen_by_reference()
-        knots.append(segment.spline.size)
-    assert knots[1] > knots[0]
 
 
 def test_a_recording_held_out_may_have_corners_too():

@@ -11,12 +11,16 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d
 
+from gfimu.diagnosis.criticism.gain import Gain
+from gfimu.diagnosis.data.body.run import prepare_body_run
+from gfimu.diagnosis.data.body.stretch import make_body_stretches
 from gfimu.diagnosis.diagnose import diagnose
-from gfimu.diagnosis.free_body.diagnose import _refuted
-from gfimu.diagnosis.free_body.noise import Projection
-from gfimu.diagnosis.free_body.run import prepare_body_run
-from gfimu.diagnosis.free_body.segment import BodySegment
-from gfimu.diagnosis.verdict.verdict import Gain, NamedCause, Residual
+from gfimu.diagnosis.terms.hand.drive import HandDrive
+from gfimu.diagnosis.terms.hand.learning import first_noise
+from gfimu.diagnosis.terms.hand.noise import Projection
+from gfimu.diagnosis.terms.hand.posterior import condition_hand
+from gfimu.diagnosis.verdict.gate import impossible_sizes, judge
+from gfimu.diagnosis.verdict.verdict import NamedCause, Residual
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray, Chip
 from gfimu.motion.body_drive import BodyDrive
@@ -150,16 +154,15 @@ def test_late_stamps_lose_nothing_on_a_free_body():
 @pytest.mark.parametrize(("vibration", "least", "most"), [(0.0, 1.0, 1.6), (0.3, 2.0, 1e3)])
 def test_what_the_noise_model_lacks_is_measured_along_the_columns_of_a_cause(vibration, least, most):
     hidden = ("scale_factor", {"b1": 0.05, "b2": -0.05})
-    segment = BodySegment(RIG, prepare_body_run(moved(hidden, seed=8, vibration=vibration), RIG), 0)
+    run = prepare_body_run(moved(hidden, seed=8, vibration=vibration), RIG)
+    (stretch,) = make_body_stretches(RIG, [run], [[]])
     cause = RIG.families()["scale_factor"](dict(hidden[1]))
-    line = segment.linearise([cause])
-    columns = []
+    at = condition_hand(stretch, HandDrive.of(stretch), [cause], first_noise(stretch))
+    changes = []
     for axis in (3, 4):
-        change = np.zeros_like(line.residual)
-        change[:, axis] = line.drive.force[:, axis - 3]
-        columns.append(segment.signature(segment.grouped(change)))
-    misfit = segment.misfit(np.stack(columns, axis=1), line, segment.nuisances([cause], line))
-    assert least <= misfit < most
+        changes.append(np.zeros_like(at.residual))
+        changes[-1][:, axis] = at.drive.spin.force[:, axis - 3]
+    assert least <= at.misfit(at.columns_of(changes)) < most
 
 
 def test_one_chip_on_a_free_body_is_refused():
@@ -200,7 +203,8 @@ GAIN = Gain("stretches", 0.1, 0.05, 0.95, 1.0, 0.1)
 )
 def test_the_gate_of_a_free_body(change, parameters, why):
     cause = NamedCause("scale_factor", parameters, {}, 0.997)
-    refuted = _refuted([cause], change.get("residual", RESIDUAL), change.get("gain", GAIN), RIG)
+    beyond = impossible_sizes([cause], RIG.families(), RIG.array)
+    refuted = beyond or judge(change.get("gain", GAIN), change.get("residual", RESIDUAL), [cause]).why
     assert (why in refuted) if why else refuted == ""
 
 

@@ -10,8 +10,8 @@ from made_diagnoses import SETTING, made_run
 from numpy.testing import assert_allclose
 from scipy.signal import lfilter
 
-from gfimu.diagnosis.criticism.residuals import residual_views
-from gfimu.diagnosis.criticism.whiteness import cumulative_periodogram, ljung_box, standardise, whitening_gain
+from gfimu.diagnosis.criticism.views.residuals import residual_views
+from gfimu.diagnosis.criticism.views.whiteness import cumulative_periodogram, ljung_box, standardise, whitening_gain
 from sim.effects import make_effect
 
 CHANNELS = tuple(f"a{chip}{axis}" for chip in range(1, 5) for axis in range(1, 4))

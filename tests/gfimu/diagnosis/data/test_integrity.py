@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d
 
-from gfimu.diagnosis.data.frozen import frozen_stretches
 from gfimu.diagnosis.data.integrity import check_integrity
 from gfimu.diagnosis.data.run import prepare_run
+from gfimu.diagnosis.data.samples import frozen_stretches
 from gfimu.diagnosis.diagnose import diagnose
 from gfimu.geometry.array import AccelerometerArray
 from sim.campaign import Measurement, measure

@@ -7,9 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gfimu.diagnosis.data.prepared_runs import PreparedRuns
 from gfimu.diagnosis.data.run import prepare_run
-from gfimu.diagnosis.diagnose import diagnose
+from gfimu.diagnosis.diagnose import diagnose, prepare
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.units import STANDARD_GRAVITY
@@ -130,7 +129,7 @@ def test_no_gross_effect_is_taken_for_a_wrong_file(name):
     rng = np.random.default_rng(7)
     motion = random_profile(rng, SHORT.duration)
     hidden = hidden_effect(rng, TWIN, name, motion, 6000.0, SHORT)
-    PreparedRuns.build([measure(rng, TWIN, [hidden], SHORT, motion=motion)], TWIN, ["run"])
+    prepare([measure(rng, TWIN, [hidden], SHORT, motion=motion)], TWIN, ["run"])
 
 
 def test_a_board_that_was_not_read_is_refused(sound):

@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from gfimu.diagnosis import diagnose
-from gfimu.diagnosis.data.temperature import between_steps
+from gfimu.diagnosis.data.rounding import between_steps
 from gfimu.geometry.array import AccelerometerArray
 from sim.campaign import Measurement, measure
 from sim.effects import make_effect

@@ -17,6 +17,7 @@ from gfimu.diagnosis.design.distinguishability import (
     normal_equations,
     plan_contenders,
 )
+from gfimu.diagnosis.design.planned_run import planned
 from gfimu.diagnosis.design.profile_search import plain_profile, profile_of, starting_points
 from gfimu.diagnosis.design.proposal import SEPARATED
 from gfimu.diagnosis.diagnose import diagnose
@@ -92,7 +93,7 @@ def test_a_design_beats_the_plain_run_and_every_start(twin, flex_or_quadratic):
     signatures, contenders = plan_contenders(twin, [flex, "quadratic"], duration=30.0, sample_rate=50.0)
     for point in starting_points(np.random.default_rng(1), 12):
         run = PlannedRun(profile_of(point, LIMITS), LIMITS.duration)
-        table = distinguishability(normal_equations([run.segment(twin, 0)], signatures)[0], contenders)
+        table = distinguishability(normal_equations(*planned(twin, [run]), signatures)[0], contenders)
         assert table.least_nats <= flex_or_quadratic.after.least_nats * 1.05  # found at half the sample rate
 
 
@@ -257,7 +258,7 @@ def test_a_random_profile_is_a_start_like_any_other(twin):
     # The search is not needed for easy pairs: any lively motion separates them, and the design does no worse.
     lively = PlannedRun(random_profile(np.random.default_rng(2), 30.0), 30.0)
     signatures, contenders = plan_contenders(twin, ["table_tilt", "bias"], duration=30.0, sample_rate=50.0)
-    usual = distinguishability(normal_equations([lively.segment(twin, 0)], signatures)[0], contenders).least_nats
+    usual = distinguishability(normal_equations(*planned(twin, [lively]), signatures)[0], contenders).least_nats
     proposal = design(
         twin, ["table_tilt", "bias"], limits=LIMITS, rng=np.random.default_rng(0), mountings={}, evaluations=9
     )

@@ -17,8 +17,11 @@ from gfimu.diagnosis.design.distinguishability import (
     plan_contenders,
     predict_distinguishability,
 )
+from gfimu.diagnosis.design.planned_run import planned
 from gfimu.diagnosis.design.table_profile import Leg, TableProfile
-from gfimu.diagnosis.signatures import signature_columns
+from gfimu.diagnosis.fit.linear import linearise
+from gfimu.diagnosis.terms.columns import Columns
+from gfimu.diagnosis.terms.library import family_columns
 from gfimu.errors import InputError
 from sim.effects import make_effect
 from sim.twin import Twin
@@ -230,15 +233,21 @@ def test_the_drive_is_marginalised_to_the_digits_that_a_margin_needs(twin):
     ramps = profile((0, 1), (15, 1.5), (15, 16), (0, 1.5))
     run = PlannedRun(ramps, 20.0, 100.0, bias_instability=0.0)
     signatures, contenders = plan_contenders(twin, ["tacho_scale", "sensor_position"], duration=20.0, sample_rate=100.0)
-    segment = run.segment(twin, 0)
-    gram = normal_equations([segment], signatures)[0]
-    columns, _ = signature_columns(segment, signatures, (), ())  # (c + 1, P, n)
-    weight = np.sqrt(segment.inverse_variance)
-    jacobian = segment.linearise(()).jacobian
-    drive = np.vstack([jacobian.channel(column).toarray() * w for column, w in enumerate(weight)])
-    values, vectors = np.linalg.eigh(segment.drive_prior.precision.toarray())
+    stretches, point = planned(twin, [run])
+    gram = normal_equations(stretches, point, signatures)[0]
+    [posterior] = linearise(stretches, point).posteriors
+    weight = np.sqrt(posterior.observed.weights)
+    columns = Columns.together(
+        [
+            family_columns(stretches[0], posterior.observed, posterior.drive, (), one.family, one.shape)
+            for one in signatures
+        ]
+    )
+    wanted = np.column_stack([(columns.times(one) * weight).ravel() for one in np.eye(columns.count)])
+    unit = np.eye(posterior.jacobian.size)
+    drive = np.column_stack([(posterior.jacobian.times(one) * weight).ravel() for one in unit])
+    values, vectors = np.linalg.eigh(posterior.drive.add_precision(np.zeros(unit.shape)))
     prior = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
-    wanted = np.concatenate([part.T * w for part, w in zip(columns, weight, strict=True)])  # (n (c + 1), P)
     rival = wanted[:, [1, 2, 4, 5, 7, 8, 10, 11]]  # heights change nothing
     system = np.block([[drive, rival], [prior, np.zeros((len(prior), rival.shape[1]))]])
     target = np.concatenate([wanted[:, 0], np.zeros(len(prior))])

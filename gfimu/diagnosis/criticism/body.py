@@ -1,0 +1,96 @@
+"""What a free body leaves: functions of its motion and time, a tone, and noise that grows with the motion."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
+
+from gfimu.diagnosis.criticism.series_tests import SLOWEST_LINE, LackOfFit
+from gfimu.diagnosis.data.body.stretch import BodyStretch
+from gfimu.diagnosis.policy import Policy
+from gfimu.diagnosis.terms.hand.drive import HandDrive
+from gfimu.diagnosis.terms.hand.noise import BodyNoise
+from gfimu.diagnosis.terms.hand.posterior import HandPosterior
+from gfimu.geometry.kinematics import omega_products
+
+__all__ = ["body_functions", "motion_noise", "tone"]
+
+_STEPS = 8  # numerical: parts of a run at whose edges a step is looked for
+_WINDOW = 1024  # numerical: samples in which an oscillator that is not steady is a line
+_NEIGHBOURS = 41  # numerical: frequencies about a line that give its background
+_DISAGREE = "every channel: disagreement per rate of change of the reading, s"
+_LOST = "angular acceleration missed by the gyro: rad/s² per m/s³ of change"
+
+
+def motion_noise(stretches: Sequence[BodyStretch], levels: Sequence[BodyNoise], policy: Policy) -> LackOfFit:
+    """Return the noise that grows with the motion, which no effect of the library is."""
+    noise = max(levels, key=lambda one: one.log_odds)
+    if noise.log_odds <= policy.lack_odds:
+        return LackOfFit(-np.inf, "", {})
+    parts, surrogate = [], {}
+    if noise.agitation:
+        parts.append(
+            "the channels disagree from sample to sample in proportion to how fast their readings change, as if each "
+            f"were sampled at an instant of its own, {1e3 * noise.agitation:.2g} ms rms apart"
+        )
+        surrogate[_DISAGREE] = noise.agitation
+    if noise.acceleration_slope:
+        fast = [s.change[s.use & ~s.run.rest] for s in stretches]
+        typical = noise.acceleration_slope * float(np.sqrt(np.mean(np.concatenate(fast) ** 2)))
+        parts.append(
+            f"the angular acceleration differs from what the gyro's samples say by {typical:.2g} rad/s² rms in motion"
+        )
+        surrogate[_LOST] = noise.acceleration_slope
+    return LackOfFit(-np.inf, "; ".join(parts), surrogate, noise_odds=noise.log_odds)
+
+
+def body_functions(stretch: BodyStretch, drive: HandDrive) -> dict[str, NDArray[np.float64]]:
+    """Return functions of the motion and time at the groups of a stretch, each (m,)."""
+    rate, acceleration = drive.spin.rate_at()
+    speed = np.linalg.norm(rate, axis=1)
+    time = (stretch.run.t - stretch.run.t[0]) / max(stretch.run.duration, 1e-9)
+    found = {f"ω{axis}": rate[:, place] for place, axis in enumerate("xyz")}
+    found |= dict(zip(("ωx²", "ωy²", "ωz²", "ωxωy", "ωxωz", "ωyωz"), omega_products(rate).T, strict=True))
+    found |= {f"dω{axis}/dt": acceleration[:, place] for place, axis in enumerate("xyz")}
+    found |= {"|ω|": speed, "|ω|⁴": speed**4, "the specific force squared": np.sum(drive.spin.force**2, axis=1)}
+    found |= {f"time (a step at {k / _STEPS:.0%} of the run)": np.sign(time - k / _STEPS) for k in range(1, _STEPS)}
+    grouped = stretch.grouped(np.column_stack([*found.values()]))
+    return dict(zip(found, grouped.T, strict=True))
+
+
+def tone(at: HandPosterior, policy: Policy) -> LackOfFit:
+    """Test every channel for a narrow line, over the whole run and, as oscillators wander, over short windows."""
+    stretch = at.stretch
+    spread = np.sqrt(at.levels.common(stretch.change_in_motion))
+    left = np.where(stretch.use[:, None], at.without_errors / spread[:, None], 0.0)[:, stretch.alive]
+    channels = [name for name, alive in zip(stretch.model.array.channels, stretch.alive, strict=True) if alive]
+    found = LackOfFit(-np.inf, "", {})
+    for length in {len(left), min(_WINDOW, len(left))}:
+        count = len(left) // length
+        pieces = left[: count * length].reshape(count, length, -1)
+        power = np.abs(np.fft.rfft(pieces - pieces.mean(axis=1, keepdims=True), axis=1)) ** 2 / length
+        frequency = np.fft.rfftfreq(length, stretch.run.sample_period)
+        high = frequency >= max(SLOWEST_LINE, 8.0 / (length * stretch.run.sample_period))
+        power = power[:, high]
+        level = np.maximum(np.median(power, axis=1, keepdims=True) / np.log(2.0), 1e-12)
+        # A line stands out of its neighbourhood; a motion that is not fully followed raises whole bands.
+        around = median_filter(power, size=(1, _NEIGHBOURS, 1), mode="nearest") / np.log(2.0)
+        ratio = power / np.maximum(level, around)
+        odds = ratio - np.log(ratio.size)
+        window, place, channel = np.unravel_index(int(np.argmax(odds)), odds.shape)
+        if odds[window, place, channel] > found.log_odds:
+            amplitude = 2 * np.sqrt(power[window, place, channel] / length)
+            one = frequency[high][place]
+            text = f"channel {channels[channel]} has a tone at {one:.2f} Hz, about {amplitude:.2g} m/s²"
+            if count > 1:
+                tops = frequency[high][np.argmax(ratio[:, :, channel], axis=1)]
+                sure = odds[:, :, channel].max(axis=1) > policy.lack_odds
+                low, top = tops[sure].min(initial=one), tops[sure].max(initial=one)
+                text += f", wandering from {low:.3g} to {top:.3g} Hz" if top - low > 4 * frequency[1] else ""
+            found = LackOfFit(
+                float(odds[window, place, channel]), text, {f"{channels[channel]}: tone at {one:.4f} Hz": amplitude}
+            )
+    return found

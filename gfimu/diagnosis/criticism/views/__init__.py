@@ -1,0 +1,1 @@
+"""Views of the residuals of a verdict: spectra, dependences, whiteness."""

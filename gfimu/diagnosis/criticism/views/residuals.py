@@ -1,0 +1,204 @@
+"""Residuals: what a prediction leaves over, looked at from every side on which a cause can show.
+
+Every view is data for a plot and at most one sentence, which is there only when the view shows more than chance would
+once in a thousand times, all its looks together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import dct
+
+from gfimu.diagnosis.criticism.views.dependence import Dependence, Fingerprint, dependences, fingerprint, listed
+from gfimu.diagnosis.criticism.views.residual_spectrum import ResidualSpectrum, order_spectrum, time_spectrum
+from gfimu.diagnosis.criticism.views.run_view import RunView
+from gfimu.diagnosis.criticism.views.whiteness import cumulative_periodogram, ljung_box, standardise, whitening_gain
+from gfimu.diagnosis.policy import Policy
+
+__all__ = ["ResidualSize", "ResidualViews", "Whiteness", "residual_views"]
+
+
+@dataclass(frozen=True)
+class ResidualSize:
+    """Rms of the residual per channel against the noise, m/s², each (c,); NaN for a channel without data."""
+
+    channels: tuple[str, ...]
+    before: NDArray[np.float64]
+    after: NDArray[np.float64]
+    floor: NDArray[np.float64]
+    sentence: str
+
+
+@dataclass(frozen=True)
+class Whiteness:
+    """Whether the residual is noise: two tests per channel.
+
+    Parameters
+    ----------
+    ljung_box_before, ljung_box_after : ndarray, shape (c,)
+        p-values of the first 20 correlations.
+    periodogram_before, periodogram_after : ndarray, shape (c,)
+        p-values of the cumulative periodogram.
+    frequency : ndarray, shape (m,)
+        Frequencies of the cumulative periodograms, Hz.
+    cumulative_before, cumulative_after : ndarray, shape (m, c)
+        Cumulative periodograms from 0 to 1; a straight line for noise.
+    looks : int
+        Number of tests.
+    sentence : str
+        What matters, or empty.
+    """
+
+    ljung_box_before: NDArray[np.float64]
+    ljung_box_after: NDArray[np.float64]
+    periodogram_before: NDArray[np.float64]
+    periodogram_after: NDArray[np.float64]
+    frequency: NDArray[np.float64]
+    cumulative_before: NDArray[np.float64]
+    cumulative_after: NDArray[np.float64]
+    looks: int
+    sentence: str
+
+
+@dataclass(frozen=True)
+class ResidualViews:
+    """All views of the residual of one run.
+
+    Parameters
+    ----------
+    size : ResidualSize
+        Against the noise.
+    whiteness : Whiteness
+        Against no correlation.
+    dependences : tuple of Dependence
+        On time, rate, rate squared, acceleration, reading, temperature, and orders of the table's angle.
+    spectrum : ResidualSpectrum
+        In Hz.
+    orders : ResidualSpectrum or None
+        In cycles per revolution; None if the table hardly turns.
+    fingerprint : Fingerprint
+        Channels against basic terms.
+    """
+
+    size: ResidualSize
+    whiteness: Whiteness
+    dependences: tuple[Dependence, ...]
+    spectrum: ResidualSpectrum
+    orders: ResidualSpectrum | None
+    fingerprint: Fingerprint
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """The sentences of all views that matter."""
+        angle = self.strongest_order
+        views = (self.size, self.whiteness, *self.dependences, self.spectrum, self.orders)
+        told = [view for view in views if view is not None and view.sentence]
+        # Twelve orders of the angle are one view: its strongest speaks.
+        return tuple(
+            view.sentence for view in told if not isinstance(view, Dependence) or view.view != "angle" or view is angle
+        )
+
+    @property
+    def strongest_order(self) -> Dependence | None:
+        """The order of the table's angle that the residual follows most."""
+        orders = [one for one in self.dependences if one.view == "angle"]
+        spoken = [one for one in orders if one.sentence] or orders
+        return max(spoken, key=lambda one: one.strength, default=None)
+
+    def by_view(self, view: str) -> Dependence | None:
+        """Return the dependence shown by a view; of the angle, the strongest order."""
+        if view == "angle":
+            return self.strongest_order
+        return next((one for one in self.dependences if one.view == view), None)
+
+
+def residual_views(run: RunView, channels: Sequence[str], *, bias_instability: float = 0.0) -> ResidualViews:
+    """Look at the residuals of a run from every side.
+
+    Parameters
+    ----------
+    run : RunView
+        Measured and predicted channels, shape (n, c), and the drive.
+    channels : sequence of str
+        Names of the c channels.
+    bias_instability : float
+        Rms of the sensors' bias instability, m/s²: slow wander that is noise and no discrepancy.
+    """
+    names = tuple(channels)
+    before = np.where(run.valid, run.measured - run.before, 0.0)
+    after = np.where(run.valid, run.measured - run.after, 0.0)
+    period = float(run.t[1] - run.t[0])
+    gain = whitening_gain(len(run.t), period, run.white, bias_instability)
+    standard = tuple(standardise(dct(one, type=2, norm="ortho", axis=0) * gain) for one in (before, after))
+    pair = (standard[0], standard[1])
+    spectrum = time_spectrum(run, names, bias_instability, (before, after), pair)
+    return ResidualViews(
+        _size(run, names, bias_instability, before, after),
+        _whiteness(names, period, *pair),
+        dependences(run, names, gain, before, after),
+        spectrum,
+        order_spectrum(run, names, (before, after), pair, spectrum.line_before),
+        fingerprint(run, names, gain, before, after),
+    )
+
+
+def _size(
+    run: RunView,
+    channels: tuple[str, ...],
+    bias_instability: float,
+    before: NDArray[np.float64],
+    after: NDArray[np.float64],
+) -> ResidualSize:
+    count = run.valid.sum(axis=0).astype(float)
+    count[count == 0] = np.nan
+    old, new = (np.sqrt(np.sum(one**2, axis=0) / count) for one in (before, after))
+    floor = np.hypot(run.white, bias_instability)
+    large = np.flatnonzero(old > (1.0 + Policy.small) * floor)
+    if not large.size:
+        return ResidualSize(channels, old, new, floor, "")
+    ratio = old / floor
+    names = [channels[k] for k in large[np.argsort(-ratio[large])]]
+    where = "every channel" if len(names) == len(channels) else listed(names)
+    top = int(np.nanargmax(ratio))
+    sentence = (
+        f"Before, the residual is larger than the noise in {where}: up to {ratio[top]:.3g} times in {channels[top]}; "
+        f"after: at most {np.nanmax(new / floor):.3g} times."
+    )
+    return ResidualSize(channels, old, new, floor, sentence)
+
+
+def _whiteness(
+    channels: tuple[str, ...], period: float, before: NDArray[np.float64], after: NDArray[np.float64]
+) -> Whiteness:
+    old_p, old_rho = ljung_box(before)
+    new_p, new_rho = ljung_box(after)
+    old_periodogram, old_cumulative = cumulative_periodogram(before)
+    new_periodogram, new_cumulative = cumulative_periodogram(after)
+    looks = 2 * len(channels)
+    frequency = np.arange(1, len(old_cumulative) + 1) / (len(before) * period)
+    coloured = (np.minimum(old_p, old_periodogram) < Policy.chance / looks) & (np.abs(old_rho) > Policy.dominant)
+    still = (np.minimum(new_p, new_periodogram) < Policy.chance / looks) & (np.abs(new_rho) > Policy.dominant)
+    sentence = ""
+    if coloured.any() or still.any():
+        parts = []
+        if coloured.any():
+            top = int(np.argmax(np.where(coloured, np.abs(old_rho), 0.0)))
+            names = [channels[k] for k in np.argsort(-np.abs(old_rho)) if coloured[k]]
+            where = "every channel" if len(names) == len(channels) else listed(names)
+            parts.append(
+                f"before, the residual is not noise: neighbouring samples err alike in {where} "
+                f"(correlation {old_rho[top]:.2f} in {channels[top]})"
+            )
+        if still.any():
+            parts.append(f"after: still so in {listed([channels[k] for k in np.flatnonzero(still)])}")
+        elif coloured.any():
+            parts.append("after: it is")
+        sentence = "; ".join(parts) + "."
+        sentence = sentence[0].upper() + sentence[1:]
+    return Whiteness(
+        old_p, new_p, old_periodogram, new_periodogram, frequency, old_cumulative, new_cumulative, looks, sentence
+    )

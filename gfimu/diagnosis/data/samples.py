@@ -1,0 +1,137 @@
+"""Samples that are wrong: channels that hold one value, and isolated values far off their neighbours."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
+from scipy.special import ndtr
+
+from gfimu.diagnosis.data.run import Run, difference_noise
+from gfimu.diagnosis.policy import Policy
+
+__all__ = ["channel_spikes", "frozen_stretches", "reference_spikes", "told_frozen"]
+
+_LONGEST_EQUAL = 40
+_LEAST_NOISE = 0.1  # of a step: with less no run is long enough to tell
+_SPIKE = 8.0  # noise
+_ROUGH = 6.0  # how much neighbours usually differ there
+_NEIGHBOURS, _AROUND = 5, 9
+
+
+def frozen_stretches(
+    run: Run, prediction: NDArray[np.float64], quantum: float, limit: float | None, noise: NDArray[np.float64]
+) -> list[tuple[int, int, int]]:
+    """Return (channel, start, stop) of stretches in which a channel holds one value though it should not.
+
+    Parameters
+    ----------
+    run : Run
+        The run.
+    prediction : ndarray, shape (n, c)
+        What the simulation predicts for it, m/s².
+    quantum : float
+        Step of the readings, m/s².
+    limit : float, optional
+        Where readings are clipped, m/s².
+    noise : ndarray, shape (c,)
+        White noise before rounding, m/s².
+    """
+    found, edges, usual = [], [], []
+    for mine, valid in zip(run.readings.T, run.valid.T, strict=True):
+        change = np.flatnonzero((np.abs(np.diff(mine)) > 1e-12) | ~valid[1:])
+        edges.append(np.concatenate([[-1], change, [len(mine) - 1]]))
+        lengths = np.diff(edges[-1])
+        # How much the channel usually changes: away from the stretches in question.
+        alive = np.repeat(lengths <= _LONGEST_EQUAL, lengths) & valid
+        usual.append(float(np.median(np.abs(np.diff(mine[alive])))) if alive.sum() > 10 else np.nan)
+    # A channel that was dead all through would have changed like the quietest of the others.
+    quietest = 0.0 if np.isnan(usual).all() else float(np.nanmin(usual))
+    # In the middle of a step that is coarse beside the noise a channel at rest may well read the same for long.
+    spread = np.maximum(noise, _LEAST_NOISE * quantum)
+    same = np.log(2.0 * ndtr(0.5 * quantum / spread) - 1.0)  # (c,), of one reading more
+    least = np.maximum((np.log(Policy.chance) - np.log(run.readings.size)) / same, _LONGEST_EQUAL)
+    for channel in range(run.readings.shape[1]):
+        mine = run.readings[:, channel]
+        changes = quietest if np.isnan(usual[channel]) else usual[channel]
+        for place in np.flatnonzero(np.diff(edges[channel]) > _LONGEST_EQUAL):
+            start, stop = int(edges[channel][place]) + 1, int(edges[channel][place + 1]) + 1
+            at_limit = limit is not None and abs(mine[start]) >= limit - 0.6 * quantum
+            moving = float(np.ptp(prediction[start:stop, channel])) > 2.5 * quantum
+            restless = changes > 0.3 * quantum and stop - start > least[channel]
+            # Where all channels repeat themselves no single one has stopped.
+            others = np.diff(np.delete(run.readings[start:stop], channel, axis=1), axis=0)
+            alone = bool((others != 0.0).any(axis=1).mean() > 0.5)
+            if not at_limit and alone and run.valid[start:stop, channel].any() and (moving or restless):
+                found.append((channel, start, stop))
+    return found
+
+
+def told_frozen(
+    run: Run, frozen: Sequence[tuple[int, int, int]], names: Sequence[str]
+) -> tuple[dict[str, object], str]:
+    """Return the longest frozen stretch, with every channel that was frozen with it, and a sentence about all."""
+    _, start, stop = max(frozen, key=lambda one: one[2] - one[1])
+    # A value that happens to be read again lengthens a channel's stretch.
+    together = [one for one in frozen if max(abs(one[1] - start), abs(one[2] - stop)) < _LONGEST_EQUAL]
+    channels = [names[channel] for channel, _, _ in together]
+
+    def span(first: int, end: int) -> str:
+        return f"from {run.t[first]:.2f} s to {run.t[min(end, len(run.t) - 1)]:.2f} s"
+
+    if len(channels) == 1:
+        text = f"channel {channels[0]} holds one value {span(start, stop)}"
+    else:
+        text = f"channels {', '.join(channels)} hold one value each {span(start, stop)}"
+    for one in (one for one in frozen if one not in together):
+        text += f"; {names[one[0]]} does {span(one[1], one[2])}"
+    parameters: dict[str, object] = {
+        "channel": channels[0] if len(channels) == 1 else channels,
+        "start_s": float(run.t[start]),
+        "stop_s": float(run.t[min(stop, len(run.t) - 1)]),
+    }
+    return parameters, text
+
+
+def channel_spikes(run: Run, white: NDArray[np.float64], quantum: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Mark isolated readings, shape (n, c), far off the median of their five neighbours.
+
+    Parameters
+    ----------
+    run : Run
+        The run.
+    white, quantum : ndarray, shape (c,)
+        White noise and step of each channel, m/s².
+    """
+    readings = run.readings.copy()
+    for column, valid in zip(readings.T, run.valid.T, strict=True):
+        if valid.any():  # a gap is no neighbour
+            column[~valid] = np.interp(run.t[~valid], run.t[valid], column[valid])
+    smooth = median_filter(readings, size=(_NEIGHBOURS, 1), mode="nearest")
+    jump = np.abs(readings - smooth)
+    differences = np.abs(np.diff(readings, axis=0, prepend=readings[:1]))
+    rough = median_filter(differences, size=(_AROUND, 1), mode="nearest")
+    return run.valid & (jump > _SPIKE * np.maximum(white, 0.5 * quantum) + _ROUGH * rough)
+
+
+def reference_spikes(run: Run) -> NDArray[np.bool_]:
+    """Mark isolated values, shape (n,), of the reference: a pulse too many or too few, or interference."""
+    known = np.flatnonzero(run.reference_valid)
+    found = np.zeros(len(run.t), dtype=bool)
+    while len(known) > _AROUND:  # several close to each other hide among themselves
+        values = run.reference[known]
+        differences = np.abs(np.diff(values, prepend=values[:1]))
+        if not differences.any():
+            break
+        # A coarse reference differs by a step or not at all; the least difference of a fine one is below its noise.
+        noise = max(difference_noise(values), float(differences[differences > 0.0].min()))
+        rough = median_filter(differences, size=_AROUND, mode="mirror")
+        jump = np.abs(values - median_filter(values, size=_NEIGHBOURS, mode="mirror"))
+        wrong = jump > _SPIKE * noise + _ROUGH * rough
+        if not wrong.any():
+            break
+        found[known[wrong]] = True
+        known = known[~wrong]
+    return found

@@ -1,0 +1,1 @@
+"""Fit: linearise, integrate out the nuisance parameters, step, learn."""

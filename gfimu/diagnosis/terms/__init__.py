@@ -1,0 +1,1 @@
+"""Terms: everything unknown, how it shows in the observations, and its prior."""

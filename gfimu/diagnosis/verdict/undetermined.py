@@ -1,0 +1,99 @@
+"""Combinations of sizes that the data of a free body can't determine.
+
+Nothing is known of the specific force, so that what all chips share passes for it: an offset, a displacement, a delay.
+Two chips leave more. None of that is a list of special cases: the combinations are the eigenvectors of the normal
+equations, in units of the prior, along which the data say less than the prior does.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import qr
+
+from gfimu.diagnosis.fit.gauss_newton import determined
+from gfimu.diagnosis.policy import Policy
+from gfimu.diagnosis.search.screening import Screening, Signature
+from gfimu.geometry.array import AccelerometerArray
+
+__all__ = ["Undetermined", "undetermined", "undetermined_sentence"]
+
+_ALIKE = 0.15  # numerical: by which weights may differ that one word is enough for
+_LISTED = 3  # numerical: combinations in a sentence
+
+
+@dataclass(frozen=True)
+class Undetermined:
+    """A combination of the sizes of an effect that the data can't see.
+
+    Parameters
+    ----------
+    effect : str
+        Contract name.
+    combination : dict of str to float
+        Sizes by key that move together, relative to the largest.
+    """
+
+    effect: str
+    combination: dict[str, float]
+
+    @property
+    def text(self) -> str:
+        """The combination in words."""
+        keys = list(self.combination)
+        if len(keys) == 1:
+            return f"{self.effect} {keys[0]}"
+        weights = np.array([*self.combination.values()])
+        if np.ptp(weights) < _ALIKE:
+            return f"{self.effect} {', '.join(keys)} by the same amount"
+        return f"{self.effect} " + ", ".join(f"{key} × {weight:.2g}" for key, weight in self.combination.items())
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON form."""
+        return {"effect": self.effect, "combination": dict(self.combination), "text": self.text}
+
+
+def undetermined(screening: Screening, array: AccelerometerArray, least: float) -> tuple[Undetermined, ...]:
+    """Return the combinations of the sizes of each effect without a shape that have less information than ``least``."""
+    found: list[Undetermined] = []
+    for signature in screening.signatures if least else ():
+        if not signature.shape:
+            found += _of_effect(signature, screening.gram, array, least)
+    return tuple(found)
+
+
+def _of_effect(
+    signature: Signature, gram: NDArray[np.float64], array: AccelerometerArray, least: float
+) -> list[Undetermined]:
+    sizes = signature.family.sizes(array)
+    mine = gram[np.ix_(signature.columns, signature.columns)]
+    _, turn, seen = determined(mine, least)
+    basis = turn[:, ~seen].T  # (d, k)
+    if not len(basis):
+        return []
+    # Rows with one size each that no other row has: the plainest basis of the same space.
+    _, _, order = qr(basis, pivoting=True)
+    plain = np.linalg.solve(basis[:, order[: len(basis)]], basis)
+    plain *= [size.prior_std for size in sizes]
+    out = []
+    for row in plain / plain[np.arange(len(plain)), np.argmax(np.abs(plain), axis=1)][:, None]:
+        keep = np.abs(row) > Policy.small
+        combination = {size.key: round(float(w), 3) for size, w, on in zip(sizes, row, keep, strict=True) if on}
+        out.append(Undetermined(str(signature.family.name), combination))
+    return out
+
+
+def undetermined_sentence(combinations: tuple[Undetermined, ...]) -> str:
+    """Return one sentence on what stays at zero because these data can't see it."""
+    if len(combinations) == 1:
+        return f"These data can't determine one combination, which stays at zero: {combinations[0].text}."
+    # One of each effect first: they say most.
+    first = list({one.effect: one for one in reversed(combinations)}.values())[::-1][:_LISTED]
+    named = "; ".join(one.text for one in first)
+    return (
+        f"These data can't determine {len(combinations)} combinations, which stay at zero with the ± of what is usual, "
+        f"such as {named}."
+    )

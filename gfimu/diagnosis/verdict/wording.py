@@ -1,0 +1,209 @@
+"""The verdict in words that a person who has never seen the project understands."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from gfimu.diagnosis.criticism.gain import Gain
+from gfimu.diagnosis.policy import Policy
+from gfimu.diagnosis.verdict.verdict import NamedCause, Residual, Unexplained
+from gfimu.units import STANDARD_GRAVITY
+
+__all__ = ["SAME_SHARE", "Notes", "verdict_sentences"]
+
+SAME_SHARE = 5e-3  # numerical: half of the last digit of a share in words
+
+
+@dataclass(frozen=True)
+class Notes:
+    """What sentences hold besides the verdict.
+
+    Parameters
+    ----------
+    residue : float
+        Size of a calibration residue, in units of what a good calibration leaves; 0 where there is none.
+    unreferenced : float
+        Time without a reference, s.
+    terms : int, optional
+        Number of terms that describe an unknown, where it was tried.
+    loudest : tuple of (str, float, float), optional
+        Channel with the largest slow noise, its level, m/s², and that over the median of the others.
+    rest : str
+        What the strongest of the lack of fit looks like.
+    """
+
+    residue: float = 0.0
+    unreferenced: float = 0.0
+    terms: int | None = None
+    loudest: tuple[str, float, float] | None = None
+    rest: str = ""
+
+
+def verdict_sentences(
+    verdict: str,
+    causes: Sequence[NamedCause],
+    residual: Residual,
+    gain: Gain,
+    unexplained: Unexplained,
+    withdrawn: Sequence[str],
+    notes: Notes = Notes(),
+) -> tuple[str, ...]:
+    """Return the verdict in sentences, the most important first; ``withdrawn`` are causes that did not predict."""
+    words = [_headline(verdict, causes, unexplained, notes.residue, gain)]
+    words += [f"{cause.effect}: {cause.why}." for cause in causes if cause.why]
+    words += _coincidences(verdict, causes)
+    if verdict == "unknown" and notes.terms is not None:
+        words.append(_surrogate_sentence(notes.terms, unexplained.left_out))
+    if causes or notes.terms:
+        words.append(
+            f"The residual falls from {residual.rms_before:.3g} to {residual.rms_after:.3g} m/s²; "
+            f"the noise alone is {residual.noise_floor:.3g} m/s²."
+        )
+    words += _held_out(residual, gain)
+    words += _left_over(verdict, residual, unexplained, notes.rest)
+    words += _noted(notes)
+    words += [f"{name} was withdrawn: it did not predict held-out data." for name in withdrawn]
+    return tuple(words)
+
+
+def _coincidences(verdict: str, causes: Sequence[NamedCause]) -> list[str]:
+    """Say which effects could stand for a cause; an ambiguous verdict says it of all."""
+    return [
+        f"{', '.join(cause.not_distinguishable_from)} could imitate {cause.effect} in this data but would need "
+        f"a coincidence; {cause.would_be_separated_by} would settle it."
+        for cause in causes
+        if cause.not_distinguishable_from and verdict != "ambiguous"
+    ]
+
+
+def _held_out(residual: Residual, gain: Gain) -> list[str]:
+    """Say what the causes are worth on held-out data."""
+    if not gain.held_out:
+        return []
+    words = []
+    if np.isfinite(gain.share_of_excess_removed):
+        words.append(
+            f"On data the fit never saw ({gain.held_out}), {gain.share_of_excess_removed:.1%} of the excess is gone"
+            f"{_anywhere(gain)}."
+        )
+        words += _far_below(residual, gain)
+    if np.isnan(gain.rms_after):
+        words.append(f"On data the fit never saw ({gain.held_out}) the gain is within the noise and can't be measured.")
+    return words
+
+
+def _left_over(verdict: str, residual: Residual, unexplained: Unexplained, rest: str) -> list[str]:
+    """Say what the causes leave; an unknown verdict says it at first."""
+    if unexplained.significant:
+        told = f"Something is left that nothing in the library explains: {unexplained.signature}."
+        return [] if verdict == "unknown" else [told]
+    over = residual.rms_after / max(residual.noise_floor, 1e-12)
+    if verdict != "explained" or over <= 1.0 + Policy.small:
+        return []
+    told = (
+        f"What is left is {over:.2f} times the noise{f' ({rest})' if rest else ''}: "
+        "little against what is explained, and ± holds it."
+    )
+    return [told]
+
+
+def _noted(notes: Notes) -> list[str]:
+    """Say what is known of the noise, the calibration and the reference."""
+    words = []
+    if notes.loudest is not None and notes.loudest[1] > 0.0:
+        name, level, ratio = notes.loudest
+        words.append(
+            f"The largest slow noise is that of channel {name}: {level / STANDARD_GRAVITY * 1e3:.2f} mg, "
+            f"{ratio:.1f} times the median of the other channels."
+        )
+    if notes.residue > 0.0:
+        words.append(_residue_sentence(notes.residue))
+    if notes.unreferenced > 0.0:
+        words.append(f"{notes.unreferenced:.1f} s are left out, as the reference is missing there.")
+    return words
+
+
+def _anywhere(gain: Gain) -> str:
+    """Return the share without what belongs to the clock of one recording, where that is another one."""
+    share = gain.share_in_any_recording
+    if not np.isfinite(share) or abs(share - gain.share_of_excess_removed) < SAME_SHARE:
+        return ""
+    return f"; without terms of absolute time, as in any other recording, {max(share, 0.0):.1%}"
+
+
+def _far_below(residual: Residual, gain: Gain) -> list[str]:
+    """Say where far less is removed on unseen data than on the fitted ones."""
+    excess, left = (rms**2 - residual.noise_floor**2 for rms in (residual.rms_before, residual.rms_after))
+    if excess <= 0.0:
+        return []
+    fitted = min(1.0 - max(left, 0.0) / excess, 1.0)
+    share = gain.share_of_excess_removed
+    if share + 2.0 * float(np.nan_to_num(gain.share_std)) > fitted - Policy.sizeable:
+        return []
+    told = (
+        f"On the fitted data {fitted:.0%} of it is gone: so much more than on unseen data that the sizes may belong to "
+        "this recording alone; confirm them on another one."
+    )
+    return [told]
+
+
+def _headline(verdict: str, causes: Sequence[NamedCause], unexplained: Unexplained, residue: float, gain: Gain) -> str:
+    names = _listed([cause.effect for cause in causes])
+    if verdict == "nothing_found" and residue > 0.0:
+        return "No single thing is wrong with the simulation."
+    if verdict == "nothing_found":
+        return "The simulation agrees with the measurement: nothing was found beyond the sensors' own noise."
+    if verdict == "explained" and gain.share_of_excess_removed < 1.0 - Policy.small:
+        return (
+            f"The simulation is wrong in part because of {names}: {gain.share_of_excess_removed:.0%} of the excess is "
+            "gone on data the fit never saw."
+        )
+    if verdict == "explained":
+        return f"The simulation is wrong because of {names}."
+    if verdict == "ambiguous":
+        contested = [cause for cause in causes if cause.not_distinguishable_from]
+        by = next((cause.would_be_separated_by for cause in contested if cause.would_be_separated_by), "")
+        which = _listed([cause.effect for cause in contested])
+        return f"The simulation is wrong, but this data cannot tell {which} apart; {by} would."
+    return f"The simulation is wrong in a way that nothing in the library explains: {unexplained.signature}."
+
+
+def _surrogate_sentence(terms: int, left_out: int) -> str:
+    if not terms and not left_out:
+        return (
+            "No function of the motion, the angle or time predicts it on data the fit never saw, so the extended twin "
+            "is without it."
+        )
+    clock = ""
+    if left_out:
+        are, them = ("is", "it") if left_out == 1 else ("are", "them")
+        clock = (
+            f" {_many(left_out)} of absolute time {are} left out of the extended twin: another recording has other "
+            f"phases, and no second one confirms {them}."
+        )
+    if not terms:
+        return clock.strip()
+    what = "of the motion or the angle" if left_out else "of the motion, the angle or time"
+    verb = "describe" if terms > 1 else "describes"
+    return f"{_many(terms)} {what} {verb} it in the extended twin, without a name.{clock}"
+
+
+def _many(functions: int) -> str:
+    return f"{functions} functions" if functions > 1 else "One function"
+
+
+def _residue_sentence(scale: float) -> str:
+    times = "what" if scale == 1.0 else f"{scale:g} times what"
+    return (
+        f"The twin's calibration is a little off everywhere, by {times} a good calibration leaves of bias, gain, axes "
+        "and position; no single cause stands behind that, and the extended twin has the corrections."
+    )
+
+
+def _listed(names: Sequence[str]) -> str:
+    if len(names) < 2:
+        return "".join(names)
+    return f"{', '.join(names[:-1])} and {names[-1]}"

@@ -1,0 +1,80 @@
+"""Fits of causes: sizes with their standard deviations, shapes, and the evidence of what is not there."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from core_cases import cause_of, lively, small_twin, stretches_of
+
+from gfimu.diagnosis.data.cosine_basis import NoiseLevels
+from gfimu.diagnosis.fit.gauss_newton import SETTLED, fit, log_prior
+from gfimu.diagnosis.fit.learn import learn_roughness, starting_point
+from gfimu.diagnosis.fit.linear import energy_of
+from gfimu.diagnosis.policy import Policy
+
+TWIN = small_twin()
+ARRAY = TWIN.array
+POLICY = Policy()
+
+
+def started(effects=(), seed=1, duration=8.0):
+    """Stretches of white noise and the point at which a fit of them starts."""
+    stretches = stretches_of(TWIN, effects, seed=seed, duration=duration, motion=lively(), bias_instability=0.0)
+    point = learn_roughness(stretches, starting_point(stretches, 0.1), 2)
+    levels = tuple(NoiseLevels(one.white, np.full(7, 1e-5)) for one in point.levels)
+    return stretches, replace(point, levels=levels)
+
+
+def test_sizes_are_found_with_their_standard_deviations():
+    truth = np.array([1.5, -0.8])
+    hidden = cause_of("table_tilt", ARRAY, truth)
+    chi2 = 0.0
+    for seed in range(6):
+        stretches, point = started([hidden.effect(ARRAY, 0)], seed)
+        found = fit(stretches, replace(point, causes=(hidden.at(np.zeros(2)),)), POLICY)
+        off = found.causes[0].coordinates - truth
+        chi2 += float(off @ np.linalg.solve(found.causes[0].covariance, off))
+        assert found.objective == pytest.approx(energy_of(stretches, found.point))
+    assert 3.0 < chi2 < 28.3  # of 12 degrees of freedom, both sides at a half percent
+
+
+def test_a_shape_is_found_with_its_standard_deviation():
+    hidden = cause_of("warm_up", ARRAY, np.linspace(3.0, 6.0, 6), time_constant_s=2.5)
+    stretches, point = started([hidden.effect(ARRAY, 0)])
+    start = cause_of("warm_up", ARRAY, np.ones(6), time_constant_s=4.0)
+    (found,) = fit(stretches, replace(point, causes=(start,)), replace(POLICY, steps=25)).causes
+    std = found.shape_std["time_constant_s"]
+    assert std < 0.5
+    assert abs(found.shape["time_constant_s"] - 2.5) < 4.0 * std
+
+
+def test_what_is_there_is_more_probable_and_what_is_not_is_less():
+    hidden = cause_of("table_tilt", ARRAY, [1.5, -0.8])
+    stretches, point = started([hidden.effect(ARRAY, 0)])
+    nothing = fit(stretches, point, POLICY)
+    assert (nothing.causes, nothing.names, nothing.key) == ((), frozenset(), frozenset())
+    there = fit(stretches, replace(point, causes=(hidden.at(np.zeros(2)),)), POLICY)
+    assert there.log_evidence > nothing.log_evidence + 100.0
+    both = fit(stretches, replace(there.point, causes=(*there.causes, cause_of("scale_factor", ARRAY))), POLICY)
+    assert both.objective <= there.objective + SETTLED
+    assert both.log_evidence < there.log_evidence
+    assert both.names == {"table_tilt", "scale_factor"}
+
+
+def test_a_size_of_one_sign_keeps_it():
+    stretches, point = started()
+    found = fit(stretches, replace(point, causes=(cause_of("centrifugal_flex", ARRAY, [1.0]),)), POLICY)
+    (cause,) = found.causes
+    assert cause.coordinates[0] > 0.0
+    assert cause.coordinates[0] < 4.0 * np.sqrt(cause.covariance[0, 0])
+
+
+def test_prior_of_a_set():
+    one, other = (
+        replace(cause_of(name, ARRAY), log_prior=value) for name, value in (("gravity", -3.0), ("bias", -5.0))
+    )
+    assert log_prior((), POLICY) == 0.0
+    assert log_prior((one,), POLICY) == -3.0
+    assert log_prior((one, other), POLICY) == -8.0 + POLICY.extra_cause

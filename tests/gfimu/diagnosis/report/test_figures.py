@@ -1,0 +1,103 @@
+"""Figures of the report: what they draw, read back from the picture."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from xml.etree import ElementTree as ET
+
+import numpy as np
+import pytest
+from made_runs import PERIOD, made_view
+
+from gfimu.diagnosis.criticism.views.residuals import residual_views
+from gfimu.diagnosis.report import figures
+
+CHANNELS = ("a11", "a12", "a13", "a21")
+T = PERIOD * np.arange(3000)
+RATE = 5.0 + 2.0 * np.sin(0.6 * T)
+
+
+@pytest.fixture(scope="module")
+def view():
+    return made_view(RATE, np.column_stack([3e-3 * RATE**2, np.zeros((len(T), 3))]))
+
+
+@pytest.fixture(scope="module")
+def views(view):
+    return residual_views(view, CHANNELS)
+
+
+def texts(svg):
+    return [one.text for one in ET.fromstring(svg).iter("{http://www.w3.org/2000/svg}text") if one.text]
+
+
+def drawn(views, view):
+    dependence = views.by_view("rate squared")
+    return {
+        "before_after": figures.before_after_figure(view, views.size),
+        "channels": figures.channels_figure(view, views.size),
+        "dependence": figures.dependence_figure(dependence, CHANNELS),
+        "spectrum": figures.spectrum_figure(views.spectrum),
+        "whiteness": figures.whiteness_figure(views.whiteness),
+        "fingerprint": figures.fingerprint_figure(views.fingerprint),
+    }
+
+
+def test_every_figure_is_well_formed_labelled_and_the_same_each_time(views, view):
+    first = drawn(views, view)
+    assert first["spectrum"] == figures.spectrum_figure(views.spectrum)
+    labels = {
+        "before_after": {"measured − predicted, channel a11", "time, s", "m/s²", *CHANNELS},
+        "channels": {*CHANNELS, "time, s"},
+        "dependence": {"ω², rad²/s²", "mean residual, m/s²", "a11"},
+        "spectrum": {"frequency, Hz", "amplitude density, m/s²/√Hz", "before", "after", "noise"},
+        "whiteness": {"frequency, Hz", "share of the power below"},
+        "fingerprint": {*CHANNELS, "ω²", "standard deviations"},
+    }
+    for name, svg in first.items():
+        assert labels[name] <= set(texts(svg)), name
+        assert not re.search(r"<svg [^>]* (width|height)=", svg)
+    names = [set(re.findall(r'\bid="([^"]+)"', svg)) for svg in first.values()]
+    assert len(set().union(*names)) == sum(len(one) for one in names)  # on one page none takes another's place
+
+
+def test_a_long_run_keeps_its_extremes():
+    t = np.arange(100_000.0)
+    values = np.sin(1e-3 * t)
+    values[54_321], values[77] = 9.0, -7.0
+    times, shown = figures._thinned(t, values)
+    assert len(shown) <= figures._MOST_POINTS
+    assert (shown.max(), shown.min()) == (9.0, -7.0)
+    assert abs(times[int(np.argmax(shown))] - 54_321) < 100
+    assert figures._thinned(t[:100], values[:100])[1] is not None
+    assert np.array_equal(figures._thinned(t[:100], values[:100])[1], values[:100])
+
+
+def test_a_moving_mean_is_over_valid_samples():
+    values = np.array([1.0, np.nan, 3.0, 5.0, np.nan, np.nan, np.nan, 2.0])
+    expected = [1.0, 2.0, 4.0, 4.0, 5.0, np.nan, 2.0, 2.0]
+    np.testing.assert_allclose(figures._moving_mean(values, 3), expected)
+
+
+def points(svg, colour):
+    """Vertices (m, 2) of the longest line of a colour."""
+    paths = re.findall(rf'<path d="([^"]+)"[^>]*style="[^"]*stroke: {colour}', svg)
+    longest = max(paths, key=len)
+    return np.array([[float(x), float(y)] for x, y in re.findall(r"[ML] ([-\d.]+) ([-\d.]+)", longest)])
+
+
+def test_a_line_does_not_vanish_between_the_points_drawn(views):
+    at = np.linspace(0.1, 50.0, 12_000)
+    before = np.full(len(at), 1e-3)
+    before[6_543] = 1.0
+    level = np.full(len(at), 2e-3)
+    svg = figures.spectrum_figure(replace(views.spectrum, at=at, before=before, after=level, noise=level))
+    line = points(svg, figures._BEFORE)
+    top = int(np.argmin(line[:, 1]))  # downwards in a picture
+    usual = np.median(line[:, 1])
+    assert usual - line[top, 1] > 0.8 * (line[:, 1].max() - line[:, 1].min())
+    # On a logarithmic axis of frequency.
+    place = np.log(at[6_543] / at[0]) / np.log(at[-1] / at[0])
+    across = (line[top, 0] - line[0, 0]) / (line[-1, 0] - line[0, 0])
+    assert across == pytest.approx(place, abs=0.01)
