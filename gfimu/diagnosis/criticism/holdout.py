@@ -181,7 +181,8 @@ def gate_gains(
 
     It is the log evidence of both parts together less that of the fitted part. The halves of one run are whitened as
     one block for the joint evidence, so that slow noise common to both does not count as a repetition; many short
-    blocks would each count it again. A residue of the calibration is integrated out in both.
+    blocks would each count it again. A residue of the calibration is integrated out in both. Halves of a free body's
+    run are predicted from each other instead.
 
     Parameters
     ----------
@@ -201,7 +202,7 @@ def gate_gains(
     fits = [found, *without.values()]
     gains = []
     for pair in pairs:
-        if isinstance(pair.test.stretches[0], BodyStretch):
+        if isinstance(pair.test.stretches[0], BodyStretch) and not other_recording:
             gains.append(_squares_removed(pair, fits, policy))
             continue
         part = _evidence_of(pair.train, fits, pair.residue, policy)
@@ -215,7 +216,7 @@ def gate_gains(
 def _squares_removed(pair: Holdout, fits: Sequence[Fit], policy: Policy) -> list[float]:
     """Return by what each set of causes, fitted to one part of free bodies, predicts the other worse than the first.
 
-    Slow noise is free in each part: that a constant of the one is that of the other too speaks for a bias.
+    Slow noise is free in each part of a run: that a constant of the one is that of the other too speaks for a bias.
     """
 
     def one(causes: Sequence[Cause]) -> float:
