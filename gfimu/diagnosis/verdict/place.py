@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from gfimu.diagnosis.criticism.rigid_motion import rigid_motion
-from gfimu.diagnosis.data.likely_mistakes import likely_mistake
+from gfimu.diagnosis.criticism.views.rigid_motion import rigid_motion
 from gfimu.diagnosis.data.run import Run
 from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.fit.learn import predicted_by_reference
 from gfimu.diagnosis.policy import Policy
+from gfimu.diagnosis.verdict.likely_mistakes import likely_mistake
 from gfimu.diagnosis.verdict.verdict import Diagnosis
 
 __all__ = ["with_place"]

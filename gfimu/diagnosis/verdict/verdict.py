@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from gfimu.diagnosis.criticism.gain import Gain
-from gfimu.diagnosis.criticism.rigid_motion import RigidMotion
+from gfimu.diagnosis.criticism.views.rigid_motion import RigidMotion
 from gfimu.diagnosis.criticism.views.run_view import RunView
 from gfimu.diagnosis.policy import Policy
 from gfimu.files.atomic_file import write_text

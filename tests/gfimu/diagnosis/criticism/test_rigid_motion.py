@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from gfimu.diagnosis.criticism.rigid_motion import motion_columns, rigid_motion
+from gfimu.diagnosis.criticism.views.rigid_motion import motion_columns, rigid_motion
 from gfimu.diagnosis.data.stretch import make_stretches
-from gfimu.diagnosis.diagnose import diagnose, prepare
+from gfimu.diagnosis.diagnose import prepare
 from gfimu.geometry.array import AccelerometerArray
 from sim.campaign import Measurement, measure
 from sim.effects import make_effect
@@ -102,15 +100,3 @@ def test_an_array_without_spare_combinations_says_nothing():
 
 def test_more_combinations_see_more():
     assert hidden("bias", {"a11_m_s2": 0.1}, array="corners8").combinations == 15
-
-
-def test_of_an_unknown_cause_the_verdict_says_where_it_is():
-    twin = twin_of("cube12")
-    recording = measure(np.random.default_rng(9), twin, [], Measurement(duration=20.0))
-    sway = 0.2 * np.sin(2 * np.pi * 1.37 * recording.t_s + 0.8 * np.sin(2 * np.pi * 0.23 * recording.t_s))
-    readings = recording.readings + np.outer(sway, twin.array.axes[:, 2])
-    found = diagnose([replace(recording, readings=readings)], twin)
-    assert found.verdict == "unknown"
-    assert found.rigid.place == "array"
-    assert found.sentences[1] == found.rigid.sentence
-    assert found.to_dict()["rigid_motion"]["place"] == "array"

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gfimu.diagnosis.data.likely_mistakes import likely_mistake
 from gfimu.diagnosis.diagnose import diagnose, prepare
 from gfimu.diagnosis.fit.learn import predicted_by_reference
+from gfimu.diagnosis.verdict.likely_mistakes import likely_mistake
 from gfimu.geometry.array import AccelerometerArray
 from sim.campaign import Measurement, measure
 from sim.effects import make_effect
@@ -39,9 +39,7 @@ def test_a_sound_recording_has_none(sound):
 
 
 def test_an_effect_of_the_library_is_none():
-    world = measure(
-        np.random.default_rng(6), TWIN, [make_effect("mount_tilt", {"x_rad": 0.05, "y_rad": -0.03})], SHORT
-    )
+    world = measure(np.random.default_rng(6), TWIN, [make_effect("mount_tilt", {"x_rad": 0.05, "y_rad": -0.03})], SHORT)
     assert mistake_in(world) is None
 
 

@@ -26,7 +26,7 @@ _NOISE = 4.0  # numerical: squares in units of noise that are no misfit
 _CHANGED = 2  # numerical: channels that are named before they are only counted
 _SHOWN = 6  # numerical: channels in a sentence
 _LENGTHS = {"mm": 1e3, "cm": 1e2, "inches": 1.0 / 0.0254}
-"""Units for which a length of the array file may have been taken: how many there are in a metre."""
+"""Numerical: units for which a length of the array file may have been taken, and how many there are in a metre."""
 
 Predict = Callable[[WorldModel, Run], NDArray[np.float64]]
 
