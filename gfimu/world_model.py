@@ -306,6 +306,10 @@ class WorldModel(Protocol):
         """Return the model with these effects added to its own."""
         ...
 
+    def with_array(self, array: AccelerometerArray) -> WorldModel:
+        """Return the model of another array with the same channels."""
+        ...
+
     def to_toml(self) -> str:
         """Return the twin file."""
         ...

@@ -299,6 +299,10 @@ class Twin:
         """Return the twin with these effects added to its own."""
         return replace(self, effects=self._effects_with(effects))
 
+    def with_array(self, array: AccelerometerArray) -> Twin:
+        """Return the twin of another array with the same channels."""
+        return replace(self, array=array, array_name="")
+
 
 if TYPE_CHECKING:
 

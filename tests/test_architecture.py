@@ -274,7 +274,7 @@ OUTSIDE = {
     "data": {"gfimu.recording", "gfimu.motion.body_drive"},
     "terms": {"gfimu.motion.body_drive"},
     "criticism": {"gfimu.geometry.kinematics"},
-    "verdict": {"gfimu.motion.attitude"},
+    "verdict": {"gfimu.motion.attitude", "gfimu.files.model_files"},
     "report": {"gfimu.recording", "gfimu.visual"},
 }
 """What of this project a single room of the diagnosis may import besides."""

@@ -25,6 +25,7 @@ from gfimu.diagnosis.search.nuisance_models import Understanding
 from gfimu.diagnosis.verdict.conclude import Described, conclude, is_dominant, is_unknown, named_causes
 from gfimu.diagnosis.verdict.gate import impossible_sizes, judge, measurable
 from gfimu.diagnosis.verdict.naming import conflicting
+from gfimu.diagnosis.verdict.place import with_place
 from gfimu.diagnosis.verdict.sample_notes import with_sample_notes
 from gfimu.diagnosis.verdict.verdict import Diagnosis
 from gfimu.errors import InputError
@@ -88,6 +89,7 @@ def diagnose(
         prepared = prepare(recordings, model, labels, settings)
         kept = prepare(held_out, model, held_labels, settings) if held_out else None
         found = _Diagnosis(prepared, kept, model, settings, tell).verdict()
+        found = with_place(found, _stretches(model, prepared), prepared.runs, settings)
         return with_sample_notes(found, prepared.runs)
 
 

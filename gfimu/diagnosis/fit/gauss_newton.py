@@ -26,7 +26,7 @@ from gfimu.diagnosis.terms.cause import Cause, effects_of
 from gfimu.diagnosis.terms.jacobian import Jacobian
 from gfimu.geometry.array import AccelerometerArray
 
-__all__ = ["SETTLED", "Fit", "determined", "fit", "is_rough", "log_prior"]
+__all__ = ["SETTLED", "Fit", "determined", "fit", "is_rough", "linearly_without", "log_prior"]
 
 SETTLED = 0.3  # numerical: nats that a step must promise to be taken
 _SHARES = (1.0, 0.3, 0.08)  # numerical: of a step that goes uphill
@@ -106,6 +106,37 @@ def fit(stretches: Sequence[Stretch], start: Point, policy: Policy, *, closely: 
         done += more
     found = _judged(stretches, point, linear, done, policy.least_information)
     return replace(found, log_posterior=found.log_evidence + log_prior(point.causes, policy))
+
+
+def linearly_without(found: Fit, cause: Cause, policy: Policy) -> Fit:
+    """Return what a fit would be without one of its causes, in the linear world about it.
+
+    Parameters
+    ----------
+    found : Fit
+        A fit at its optimum.
+    cause : Cause
+        One of its causes.
+    policy : Policy
+        Thresholds.
+    """
+    others = tuple(one for one in found.causes if one is not cause)
+    keep = np.concatenate([np.full(len(one.coordinates), one is not cause) for one in found.causes])
+    z = np.concatenate([one.coordinates for one in found.causes])
+    nothing = found.objective + 2.0 * float(found.score @ z) - float(z @ found.gram @ z)
+    gram, score = found.gram[np.ix_(keep, keep)], found.score[keep]
+    covariance = inverse(gram + np.eye(len(score)) / SCALES[-1] ** 2)
+    mean = covariance @ score
+    ends = np.cumsum([len(one.coordinates) for one in others])[:-1]
+    parts = np.split(np.arange(len(mean)), ends) if others else []
+    causes = tuple(
+        replace(one, coordinates=mean[mine], covariance=covariance[np.ix_(mine, mine)])
+        for one, mine in zip(others, parts, strict=True)
+    )
+    objective = nothing - 2.0 * float(score @ mean) + float(mean @ gram @ mean)
+    value = found.volume - 0.5 * nothing + log_evidence(gram, score)
+    point = replace(found.point, causes=causes)
+    return Fit(point, value, value + log_prior(causes, policy), objective, gram, score, found.volume)
 
 
 def is_rough(stretches: Sequence[Stretch], found: Fit) -> bool:

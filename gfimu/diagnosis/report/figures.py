@@ -19,6 +19,7 @@ from scipy.ndimage import uniform_filter1d
 from gfimu.diagnosis.criticism.views.dependence import Dependence, Fingerprint
 from gfimu.diagnosis.criticism.views.residual_spectrum import ResidualSpectrum
 from gfimu.diagnosis.criticism.views.residuals import ResidualSize, Whiteness
+from gfimu.diagnosis.criticism.views.rigid_motion import BandPower
 from gfimu.diagnosis.criticism.views.run_view import RunView
 from gfimu.diagnosis.policy import Policy
 
@@ -27,6 +28,7 @@ __all__ = [
     "channels_figure",
     "dependence_figure",
     "fingerprint_figure",
+    "rigid_figure",
     "spectrum_figure",
     "whiteness_figure",
 ]
@@ -134,6 +136,24 @@ def spectrum_figure(spectrum: ResidualSpectrum) -> str:
             axis.set_xlim(0, float(spectrum.at[-1]))
         axis.set_xlabel("frequency, Hz" if spectrum.unit == "Hz" else spectrum.unit)
         axis.set_ylabel(spectrum.quantity)
+        _legend_above(axis)
+        return _svg(figure)
+
+
+def rigid_figure(power: BandPower) -> str:
+    """Draw the power of the given simulation's residual in single chips, the whole array and a spin, over frequency."""
+    with mpl.rc_context(_STYLE):
+        figure = Figure(figsize=(5.4, 2.5), layout="constrained")
+        axis = figure.subplots()
+        axis.axhline(1.0, color=_NOISE, linestyle="--", label="noise")
+        parts = ((power.spin, "spin"), (power.array, "whole array"), (power.chips, "single chips"))
+        for (values, label), colour in zip(parts, _CHANNELS, strict=False):
+            if np.isfinite(values).any():
+                axis.plot(power.frequency, values, color=colour, linewidth=1.2, label=label)
+        axis.set_xscale("log")
+        axis.set_yscale("log")
+        axis.set_xlabel("frequency, Hz")
+        axis.set_ylabel("power over that of noise")
         _legend_above(axis)
         return _svg(figure)
 

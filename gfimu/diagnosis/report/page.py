@@ -11,6 +11,7 @@ from jinja2 import Environment, FileSystemLoader, select_autoescape
 
 from gfimu import __version__
 from gfimu.diagnosis.criticism.views.residuals import ResidualViews, residual_views
+from gfimu.diagnosis.criticism.views.rigid_motion import RigidMotion
 from gfimu.diagnosis.report import figures
 from gfimu.diagnosis.report.plain_words import (
     gain_rows,
@@ -45,6 +46,7 @@ _VIEWS = (
     ("temperature", "over the board's temperature"),
     ("reading", "over the reading itself"),
 )
+_PLACE_LOOKS = 4  # single chips and the whole array, at all frequencies and at low ones
 _MOST_PARAMETERS = 14
 _MOST_RIVALS = 8
 
@@ -178,7 +180,15 @@ def _views(diagnosis: Diagnosis, views: ResidualViews) -> list[Mapping[str, Any]
         if spectrum is not None:
             picture = figures.spectrum_figure(spectrum)
             shown.append({"title": title, "sentence": spectrum.sentence, "picture": picture, "looks": spectrum.looks})
+    if diagnosis.rigid is not None and diagnosis.rigid.combinations:
+        picture, sentence = figures.rigid_figure(diagnosis.rigid.power), _place(diagnosis.rigid)
+        shown.append({"title": "whose motion is it?", "sentence": sentence, "picture": picture, "looks": _PLACE_LOOKS})
     picture = figures.whiteness_figure(views.whiteness)
     looks = views.whiteness.looks
     shown.append({"title": "is it noise?", "sentence": views.whiteness.sentence, "picture": picture, "looks": looks})
     return shown
+
+
+def _place(rigid: RigidMotion) -> str:
+    """Return what the division of the residual shows; of a spin nothing, as the noise of the reference is one too."""
+    return "" if rigid.place == "spin" else rigid.sentence

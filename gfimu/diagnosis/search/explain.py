@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from gfimu.diagnosis.data.stretch import Stretch
-from gfimu.diagnosis.fit.gauss_newton import Fit, fit, is_rough
+from gfimu.diagnosis.fit.gauss_newton import Fit, fit, is_rough, linearly_without
 from gfimu.diagnosis.fit.learn import LEARNINGS, learn_noise, learn_roughness, sharpened, starting_point
 from gfimu.diagnosis.fit.linear import Point, with_residue
 from gfimu.diagnosis.fit.parallel import each_apart
@@ -24,6 +24,7 @@ from gfimu.world_model import memory_of
 __all__ = ["Explanation", "Sets", "exactly", "excess", "explain", "explained", "hardly_eases", "prune", "reduced"]
 
 Report = Callable[[float, str], None]
+_FAR = 10.0  # numerical: times `Policy.close`
 _Key = frozenset[tuple[str, str]]
 
 
@@ -78,6 +79,15 @@ class Sets:
         rough = [one for key in new if (one := self.found.get(key)) is not None and self._is_worth_it(one)]
         self._keep([self._closely(max(rough, key=_posterior))] if rough else [])
         return [self.found.get(_key(point.causes)) for point in points]
+
+    def without_each(self, found: Fit) -> list[Fit | None]:
+        """Fit a set without each of its causes; what is far behind in the linear world about it need not be fitted."""
+        missing = [cause for cause in found.causes if found.key - {cause.key} not in self.found]
+        for cause in missing:
+            fewer = linearly_without(found, cause, self.policy)
+            if found.log_posterior - fewer.log_posterior > _FAR * self.policy.close:
+                self._keep([fewer])
+        return self.fit([_less(found, cause) for cause in found.causes])
 
     def _keep(self, fits: Sequence[Fit | None]) -> None:
         self.found |= {one.key: one for one in fits if one is not None}
@@ -435,7 +445,7 @@ def prune(sets: Sets) -> Fit:
     """
     best = sets.best
     while best.causes:
-        without = sets.fit([_less(best, cause) for cause in best.causes])
+        without = sets.without_each(best)
         lost = np.array([np.inf if one is None else best.log_posterior - one.log_posterior for one in without])
         weakest = int(np.argmin(lost))
         needed = sets.policy.cause_odds

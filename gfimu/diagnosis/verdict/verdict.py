@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from gfimu.diagnosis.criticism.gain import Gain
+from gfimu.diagnosis.criticism.views.rigid_motion import RigidMotion
 from gfimu.diagnosis.criticism.views.run_view import RunView
 from gfimu.diagnosis.policy import Policy
 from gfimu.files.atomic_file import write_text
@@ -151,6 +152,8 @@ class Unexplained:
         Whether such terms are in the extended twin, as they predict data that their fit never saw.
     left_out : int
         How many of the terms are not in it, as they are of absolute time, which another recording has otherwise.
+    mistake : str
+        A mistake in the files that makes the simulation fit; empty where none does.
     """
 
     significant: bool = False
@@ -159,6 +162,7 @@ class Unexplained:
     surrogate: Mapping[str, float] = field(default_factory=dict)
     extends_twin: bool = False
     left_out: int = 0
+    mistake: str = ""
 
 
 @dataclass(frozen=True)
@@ -189,6 +193,8 @@ class Diagnosis:
     undetermined : tuple of mapping
         Combinations of sizes that these data can't see, which stay at zero: ``effect``, ``combination`` (weights by
         key) and ``text``.
+    rigid : RigidMotion, optional
+        Whether the residual of the given simulation is a motion of the whole array; None for a free body.
     """
 
     verdict: str
@@ -202,6 +208,7 @@ class Diagnosis:
     sentences: tuple[str, ...]
     noise: Mapping[str, Any]
     undetermined: tuple[Mapping[str, Any], ...] = ()
+    rigid: RigidMotion | None = None
 
     @property
     def in_part(self) -> bool:
@@ -257,7 +264,9 @@ class Diagnosis:
                 "surrogate": dict(self.unexplained.surrogate),
                 "extends_twin": self.unexplained.extends_twin,
                 "left_out": self.unexplained.left_out,
+                "mistake": self.unexplained.mistake,
             },
+            "rigid_motion": None if self.rigid is None else self.rigid.to_dict(),
             "rivals": [{"effects": list(r.effects), "log_odds": r.log_odds, "why": r.why} for r in self.rivals],
             "noise": dict(self.noise),
             "undetermined": [dict(one) for one in self.undetermined],

@@ -9,7 +9,7 @@ import pytest
 from core_cases import cause_of, lively, small_twin, stretches_of
 
 from gfimu.diagnosis.data.cosine_basis import NoiseLevels
-from gfimu.diagnosis.fit.gauss_newton import SETTLED, fit, log_prior
+from gfimu.diagnosis.fit.gauss_newton import SETTLED, fit, linearly_without, log_prior
 from gfimu.diagnosis.fit.learn import learn_roughness, starting_point
 from gfimu.diagnosis.fit.linear import energy_of
 from gfimu.diagnosis.policy import Policy
@@ -61,6 +61,21 @@ def test_what_is_there_is_more_probable_and_what_is_not_is_less():
     assert both.objective <= there.objective + SETTLED
     assert both.log_evidence < there.log_evidence
     assert both.names == {"table_tilt", "scale_factor"}
+
+
+def test_what_is_left_without_a_cause_follows_from_the_linear_world():
+    tilt, bias = cause_of("table_tilt", ARRAY, [0.3, -0.2]), cause_of("bias", ARRAY, np.linspace(-0.2, 0.2, 6))
+    stretches, point = started([tilt.effect(ARRAY, 0), bias.effect(ARRAY, 0)])
+    both = fit(stretches, replace(point, causes=(tilt.at(np.zeros(2)), bias.at(np.zeros(6)))), POLICY)
+    for place in range(2):
+        alone = fit(stretches, replace(both.point, causes=(both.causes[1 - place],)), POLICY)
+        told = linearly_without(both, both.causes[place], POLICY)
+        assert told.key == alone.key
+        assert both.log_posterior - alone.log_posterior > 10.0
+        assert told.log_posterior - both.log_posterior == pytest.approx(
+            alone.log_posterior - both.log_posterior, rel=0.02, abs=1.0
+        )
+        assert told.objective == pytest.approx(alone.objective, rel=0.01)
 
 
 def test_a_size_of_one_sign_keeps_it():

@@ -141,6 +141,23 @@ def test_nothing_is_found_in_noise(seed):
     assert found.best is found.nothing or found.best.key == found.nothing.key
 
 
+def test_a_set_far_behind_is_not_fitted(tilted, monkeypatch):
+    added = cause_of("mount_tilt", TWIN.array, [0.0, 0.0])
+    best = replace(tilted.best, point=replace(tilted.best.point, causes=(*tilted.best.causes, added)))
+    size = len(tilted.best.score)
+    gram = np.zeros((size + 2, size + 2))
+    gram[:size, :size], score = tilted.best.gram, np.append(tilted.best.score, [0.0, 0.0])
+    best = replace(best, gram=gram, score=score, log_posterior=tilted.best.log_posterior - 1.0)
+    fitted = []
+    monkeypatch.setattr(Sets, "_roughly", lambda self, point: fitted.append(frozenset(c.name for c in point.causes)))
+    for strong, expected in ((True, [frozenset({"table_tilt"})]), (False, [{"table_tilt"}, {"mount_tilt"}])):
+        sets = Sets(tilted.stretches, best.point, Policy())
+        fitted.clear()
+        sets.without_each(best if strong else replace(best, score=1e-3 * score))
+        assert sorted(fitted, key=sorted) == sorted(expected, key=sorted)
+        assert (frozenset({added.key}) in sets.found) == strong
+
+
 @pytest.mark.parametrize(("name", "share"), [("cogging", 0.02), ("hysteresis", 0.01), ("table_tilt", 0.0)])
 def test_a_further_cause_must_bring_more_than_an_inexact_one_leaves(tilted, name, share):
     """A set of two whose second brings a little less, and a little more, than the share of the first."""

@@ -1,0 +1,158 @@
+"""Mistakes that are likely where a simulation does not fit at all, and which of them makes it fit.
+
+Channels may be swapped or have the wrong sign, the array file may give lengths in another unit, or the array may be
+another one of the library. None of that is an effect of a part or a rig: it is tried where the sizes found are
+impossible, or where nothing in the library fits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
+
+from gfimu.diagnosis.data.run import Run
+from gfimu.files.model_files import list_models
+from gfimu.geometry.array import AccelerometerArray
+from gfimu.world_model import WorldModel
+
+__all__ = ["LikelyMistake", "likely_mistake"]
+
+_REMOVED = 0.8  # numerical: of the misfit, by a mistake that is worth a word
+_NOISE = 4.0  # numerical: squares in units of noise that are no misfit
+_CHANGED = 2  # numerical: channels that are named before they are only counted
+_SHOWN = 6  # numerical: channels in a sentence
+_LENGTHS = {"mm": 1e3, "cm": 1e2, "inches": 1.0 / 0.0254}
+"""Numerical: units for which a length of the array file may have been taken, and how many there are in a metre."""
+
+Predict = Callable[[WorldModel, Run], NDArray[np.float64]]
+
+
+@dataclass(frozen=True)
+class LikelyMistake:
+    """A mistake that would explain what does not fit.
+
+    Parameters
+    ----------
+    text : str
+        What is wrong, for people.
+    before, after : float
+        Rms of the misfit without it and with it mended, m/s².
+    """
+
+    text: str
+    before: float
+    after: float
+
+    @property
+    def sentence(self) -> str:
+        """The mistake with what mending it is worth."""
+        text = f"{self.text[:1].upper()}{self.text[1:]}"
+        return f"{text}: with that mended the misfit falls from {self.before:.3g} to {self.after:.3g} m/s²."
+
+
+def likely_mistake(model: WorldModel, runs: Sequence[Run], predict: Predict) -> LikelyMistake | None:
+    """Return the likely mistake that removes the most of a misfit; None where none removes four fifths of it.
+
+    Parameters
+    ----------
+    model : WorldModel
+        The simulation.
+    runs : sequence of Run
+        The recordings.
+    predict : callable
+        Predicts the channels (n, c), m/s², of a run by a model that its reference drives.
+    """
+    white = model.expected_noise(1.0 / runs[0].sample_period).white
+    told = [predict(model, run) for run in runs]
+    before = _Misfit.of(runs, told, white)
+    if before.squares < _NOISE:
+        return None
+    options: list[tuple[str, _Misfit]] = []
+    for text, array in _other_arrays(model.array):
+        other = model.with_array(array)
+        options.append((text, _Misfit.of(runs, [predict(other, run) for run in runs], white)))
+    options += _read_otherwise(model.array, runs, told, white)
+    least = min(misfit.squares for _, misfit in options)
+    if least > (1.0 - _REMOVED) * before.squares:
+        return None
+    # Another order of the channels does as well as some other arrays: the plainest comes first.
+    text, after = next(one for one in options if one[1].squares <= least + _NOISE)
+    return LikelyMistake(text, before.rms, after.rms)
+
+
+@dataclass(frozen=True)
+class _Misfit:
+    """Mean square of a misfit in units of the noise, and its rms, m/s²."""
+
+    squares: float
+    rms: float
+
+    @classmethod
+    def of(cls, runs: Sequence[Run], told: Sequence[NDArray[np.float64]], white: NDArray[np.float64]) -> _Misfit:
+        error = np.concatenate(
+            [np.where(run.valid, run.readings - one, 0.0) for run, one in zip(runs, told, strict=True)]
+        )
+        return cls(float(np.mean((error / white) ** 2)), float(np.sqrt(np.mean(error**2))))
+
+
+def _read_otherwise(
+    array: AccelerometerArray, runs: Sequence[Run], told: Sequence[NDArray[np.float64]], white: NDArray[np.float64]
+) -> Iterator[tuple[str, _Misfit]]:
+    """Yield the best order and signs of the channels, if they are others than those of the array."""
+    valid = np.concatenate([run.valid for run in runs])
+    readings = np.concatenate([np.where(run.valid, run.readings, 0.0) for run in runs])
+    predicted = np.concatenate(told)
+    count = np.maximum(valid.sum(axis=0), 1)[:, None]
+    power = np.sum(readings**2, axis=0)[:, None] + valid.T.astype(float) @ predicted**2  # (c, c)
+    cross = readings.T @ predicted
+    weight = np.where(valid.any(axis=0), 1.0 / white, 0.0)[:, None] ** 2 / count
+    costs = np.stack([(power - 2.0 * sign * cross) * weight for sign in (1.0, -1.0)])
+    # Arrays have symmetries. Of orders that fit the same, that with fewer signs and the same axes of other chips.
+    axis = np.concatenate([np.arange(len(chip.axes)) for chip in array.chips])
+    costs[1] += 0.5 * _NOISE
+    costs += 0.25 * _NOISE * (axis[:, None] != axis)
+    costs += _NOISE * (1.0 - np.eye(len(axis)))
+    mine, its = linear_sum_assignment(costs.min(axis=0))
+    signs = np.where(costs[0, mine, its] <= costs[1, mine, its], 1.0, -1.0)
+    changed = np.flatnonzero((its != mine) | (signs < 0.0))
+    if not len(changed):
+        return
+    starts = np.cumsum([len(one) for one in told])[:-1]
+    otherwise = np.split(predicted[:, its] * signs, starts)
+    yield _order_in_words(array.channels, its, signs, changed), _Misfit.of(runs, otherwise, white)
+
+
+def _order_in_words(
+    channels: Sequence[str], its: NDArray[np.intp], signs: NDArray[np.float64], changed: NDArray[np.intp]
+) -> str:
+    """Say which channels read what others, or their opposites, should."""
+    if len(changed) == _CHANGED and its[changed[0]] == changed[1] and (signs[changed] > 0.0).all():
+        return f"channels {channels[changed[0]]} and {channels[changed[1]]} are swapped"
+    if (its[changed] == changed).all():
+        names = ", ".join(channels[place] for place in changed[:_SHOWN])
+        more = f" and {len(changed) - _SHOWN} more" if len(changed) > _SHOWN else ""
+        return f"the sign of {names}{more} is wrong"
+    pairs = [f"{channels[place]} reads {'−' if signs[place] < 0 else ''}{channels[its[place]]}" for place in changed]
+    more = f" and {len(pairs) - _SHOWN} more" if len(pairs) > _SHOWN else ""
+    return f"the order of the channels is wrong ({', '.join(pairs[:_SHOWN])}{more})"
+
+
+def _other_arrays(array: AccelerometerArray) -> Iterator[tuple[str, AccelerometerArray]]:
+    """Yield the array with lengths in other units, and arrays of the library that have the same channels."""
+    axes = [chip.axes for chip in array.chips]
+    for unit, scale in _LENGTHS.items():
+        too_large = array.with_geometry(array.chip_positions / scale, axes)
+        yield f"the lengths of the array file are in {unit}, not in m", too_large
+        yield (
+            f"the lengths of the array file are {scale:.4g} times too small",
+            array.with_geometry(array.chip_positions * scale, axes),
+        )
+    for name in list_models("arrays"):
+        other = AccelerometerArray.load(name)
+        if other.channels == array.channels:
+            placed = array.with_geometry(other.chip_positions, [chip.axes for chip in other.chips])
+            yield f"the array is {name} of the library, not the one that the simulation has", placed

@@ -1,0 +1,43 @@
+"""Where to look for an unknown cause: what the residual shows without any fit, and likely mistakes of the files."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from gfimu.diagnosis.criticism.views.rigid_motion import rigid_motion
+from gfimu.diagnosis.data.run import Run
+from gfimu.diagnosis.data.stretch import Stretch
+from gfimu.diagnosis.fit.learn import predicted_by_reference
+from gfimu.diagnosis.policy import Policy
+from gfimu.diagnosis.verdict.likely_mistakes import likely_mistake
+from gfimu.diagnosis.verdict.verdict import Diagnosis
+
+__all__ = ["with_place"]
+
+
+def with_place(found: Diagnosis, stretches: Sequence[Stretch], runs: Sequence[Run], policy: Policy) -> Diagnosis:
+    """Return a verdict with the place of what the given simulation misses; an unknown one says it in words.
+
+    Parameters
+    ----------
+    found : Diagnosis
+        The verdict.
+    stretches : sequence of Stretch
+        The data with the simulation as it was given.
+    runs : sequence of Run
+        The recordings.
+    policy : Policy
+        Thresholds.
+    """
+    rigid = rigid_motion(stretches, policy)
+    found = replace(found, rigid=rigid)
+    if rigid is None or found.verdict != "unknown":
+        return found
+    mistake = likely_mistake(stretches[0].model, runs, predicted_by_reference)
+    if mistake is not None:
+        unexplained, more = replace(found.unexplained, mistake=mistake.text), mistake.sentence
+    else:
+        unexplained, more = found.unexplained, rigid.sentence
+    first, *others = found.sentences
+    return replace(found, unexplained=unexplained, sentences=(first, more, *others) if more else found.sentences)
