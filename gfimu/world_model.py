@@ -127,9 +127,9 @@ class EffectFamily(Protocol):
     What else it may know of itself is optional: ``whole`` (shape parameters that are whole numbers), ``shape_limits``
     (least and largest value by shape parameter), ``needs_temperature``, ``tolerance`` (what a good calibration leaves
     of each size), ``of_one_recording``, ``of_wiring`` (`is_of_wiring`), ``of_pose`` (it depends on the specific force
-    alone), ``contained_in`` (effects that can do all that it does), ``level_error`` (to which
-    a level of a reading is found at best, in units of its white noise), ``memory_s`` and, of a fault of the samples,
-    ``channel_order`` of an effect, and ``scan`` (`shapes_to_screen`).
+    alone), ``alike_by_lot`` (chips of one lot have nearly the same sizes), ``contained_in`` (effects that can do all
+    that it does), ``level_error`` (to which a level of a reading is found at best, in units of its white noise),
+    ``memory_s`` and, of a fault of the samples, ``channel_order`` of an effect, and ``scan`` (`shapes_to_screen`).
     """
 
     @property

@@ -6,7 +6,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
+from gfimu.diagnosis.criticism.coincidence.bound_numbers import coincidences
 from gfimu.diagnosis.criticism.gain import Gain
 from gfimu.diagnosis.criticism.holdout import Holdout, gate_gains, held_out_gain, other_recordings, split
 from gfimu.diagnosis.criticism.lack_of_fit import LackOfFit, lack_of_fit
@@ -88,7 +90,14 @@ def diagnose(
         tell(0.02, "read")
         prepared = prepare(recordings, model, labels, settings)
         kept = prepare(held_out, model, held_labels, settings) if held_out else None
-        found = _Diagnosis(prepared, kept, model, settings, tell).verdict()
+        try:
+            found = _Diagnosis(prepared, kept, model, settings, tell).verdict()
+        except np.linalg.LinAlgError as error:
+            told = ", ".join(labels)
+            raise InputError(
+                f"{told}: the equations of this run have no solution ({error}); are the readings and the reference of "
+                "the same run, in the units that the file says?"
+            ) from error
         found = with_place(found, _stretches(model, prepared), prepared.runs, settings)
         return with_sample_notes(found, prepared.runs)
 
@@ -135,13 +144,19 @@ class _Diagnosis:
         tell(0.88, "lack of fit")
         understanding, left = self._apart_from_the_rest(understanding)
         withdrawn: list[str] = []
+        bound = self._coincidence(understanding.explanation)
+        if bound:
+            return self._described(understanding, left, withdrawn, bound)
         gain = Gain()
         if not is_dominant(understanding.explanation, left, policy):
             tell(0.92, "hold out")
-            understanding, withdrawn = self._gated(understanding)
-            left = self._left(understanding.explanation) if withdrawn else left
-            tell(0.97, "measure the gain")
-            gain = self._gain(understanding.explanation, understanding.explanation.best)
+            try:
+                understanding, withdrawn = self._gated(understanding)
+                left = self._left(understanding.explanation) if withdrawn else left
+                tell(0.97, "measure the gain")
+                gain = self._gain(understanding.explanation, understanding.explanation.best)
+            except np.linalg.LinAlgError:
+                return self._described(understanding, left, withdrawn, "the causes found can't be fitted to part of it")
         if is_unknown(understanding.explanation, left, gain, policy):
             return self._described(understanding, left, withdrawn, "")
         found = conclude(self._prepared, understanding, left, gain, policy, withdrawn=withdrawn)
@@ -217,6 +232,15 @@ class _Diagnosis:
             return Gain()
         label = "blocks of the recording, odd and even from each other" if self._kept is None else "another recording"
         return held_out_gain(fit.causes, self._pairs(explanation, fit), self._policy, label=label)
+
+    def _coincidence(self, explanation: Explanation) -> str:
+        """Return what binds the numbers of the causes that nothing should bind; empty where nothing does."""
+        first = explanation.stretches[0]
+        if isinstance(first, BodyStretch):  # its motion has no arms that all recordings share
+            return ""
+        mounting = Rotation.from_rotvec(first.run.mounting).as_matrix()
+        found = coincidences(explanation.best, self._model.array, mounting)
+        return found[0].sentence if found and found[0].log_odds > self._policy.steady else ""
 
     def _impossible(self, explanation: Explanation) -> str:
         """Return the signature where every set that the data can't tell apart holds a size beyond physics."""

@@ -126,9 +126,6 @@ class Policy:
         hidden in the runs ``faint`` of `sim.study` the most likely.
     most_certain : float
         Largest probability that is reported [1]. Set by `sim.study`: of causes surer than this, 3 of 1000 were wrong.
-    frame_gain : float
-        Nats per root of the number of samples by which a motion is simpler in one frame than in the other [1]. Set on
-        64 runs with nothing hidden, of which one reached 2.3.
     free_body : bool
         Whether the thresholds are those of a free body, whose drive nothing is known of [1]. Set by `of_body`. What all
         its chips share then passes for specific force; an effect means nothing beside one that can do all it does; sets
@@ -174,7 +171,6 @@ class Policy:
     block_angle_std: float = 5e-3
     temperature: float = 1.2
     most_certain: float = 0.997
-    frame_gain: float = 2.5
     free_body: bool = False
 
     @property

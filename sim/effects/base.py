@@ -108,6 +108,8 @@ class Effect(ABC):
     of_wiring: ClassVar[bool] = False
     """True for a fault of the samples that changes a prediction without noise: it carries readings elsewhere or scales
     them."""
+    alike_by_lot: ClassVar[bool] = False
+    """True where chips of one lot have nearly the same: equal sizes are no coincidence."""
     of_pose: ClassVar[bool] = False
     """True where it depends on the specific force alone: while a body rests it is constant, as slow noise nearly is."""
     contained_in: ClassVar[frozenset[str]] = frozenset()

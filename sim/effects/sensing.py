@@ -132,6 +132,7 @@ class BiasTemperature(_PerChannel):
     suffix = "_m_s2_K"
     unit = "m/s²/K"
     needs_temperature = True
+    alike_by_lot = True
     prior_std = 0.8 * _MG
     separated_by = "a run in which the temperature changes while the motion does not"
 
@@ -152,6 +153,7 @@ class WarmUp(_PerChannel):
     suffix = "_m_s2"
     unit = "m/s²"
     prior_std = 10 * _MG
+    alike_by_lot = True
     shape_limits: ClassVar = {"time_constant_s": (1.0, 1e5)}
     separated_by = "a cold start followed by a long rest, or a longer run"
     other_units: ClassVar = {"time_constant_s": "s"}

@@ -17,7 +17,7 @@ from gfimu.diagnosis.data.cosine_basis import NoiseLevels
 from gfimu.diagnosis.data.run import smooth_rate
 from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.fit.gauss_newton import fit
-from gfimu.diagnosis.fit.learn import FOLLOWED
+from gfimu.diagnosis.fit.learn import FOLLOWED, LEAST_VALID
 from gfimu.diagnosis.fit.linear import Point
 from gfimu.diagnosis.fit.posterior import condition
 from gfimu.diagnosis.policy import Policy
@@ -31,7 +31,6 @@ from gfimu.world_model import Effect, is_of_one_recording
 __all__ = ["Measured", "gain_of", "measure"]
 
 _BLOCK = 40  # numerical: groups of samples of a free body whose gain counts as one value
-_LEAST_VALID = 1e-3  # numerical: share of the samples that count
 
 
 @dataclass(frozen=True)
@@ -235,7 +234,7 @@ def _floor(stretch: Stretch, drive: Drive, white: NDArray[np.float64], policy: P
     """
     count, limit = len(white), policy.noise_stds**2
     first = min(int(2 * count * stretch.run.sample_period * FOLLOWED / drive.spline.spacing), count // 2)
-    power = stretch.basis.transform(white)[first:] ** 2 / stretch.mask.mean(axis=0).clip(_LEAST_VALID)
+    power = stretch.basis.transform(white)[first:] ** 2 / stretch.mask.mean(axis=0).clip(LEAST_VALID)
     expectation = chi2.cdf(limit, 3) + limit * chi2.sf(limit, 1)  # of a squared standard normal, clipped
     level = np.minimum(power, limit).mean(axis=0) / expectation
     valid = stretch.mask.sum(axis=0)

@@ -19,12 +19,13 @@ from gfimu.diagnosis.data.run import Run, difference_noise
 from gfimu.diagnosis.data.samples import channel_spikes, frozen_stretches, told_frozen
 from gfimu.world_model import Effect, ExpectedNoise, WorldModel
 
-__all__ = ["IntegrityReport", "check_integrity"]
+__all__ = ["SIGNIFICANT_RMS", "IntegrityReport", "check_integrity"]
 
 _RANGE_FACTORS = (1 / 16, 1 / 8, 1 / 4, 1 / 2, 2.0, 4.0, 8.0, 16.0)
 _REMOVED = 0.7
 _FITTING = 0.6  # of the power of the readings
-_SIGNIFICANT_RMS = 12.0
+SIGNIFICANT_RMS = 12.0
+"""Of a misfit, in units of noise."""
 _VARIED_RMS, _NOISE = 3.0, 1.5  # of a slow table, noise; power of white noise and some bias instability
 _MANY = 3  # inverted channels that are more likely than exchanged ones
 _CAUGHT = 0.8  # of the samples that should be beyond a limit
@@ -350,7 +351,7 @@ def _exchanged_channels(
         signed = _signed(misfit, inverted, (one, two), (two, one))
         if _clears(signed, _signed(misfit, inverted, (one, one), (two, two))):
             after = signed
-        if before > 2 * _SIGNIFICANT_RMS**2 and after < (1 - _REMOVED) * before:
+        if before > 2 * SIGNIFICANT_RMS**2 and after < (1 - _REMOVED) * before:
             order = np.arange(len(names))
             order[[one, two]] = order[[two, one]]
             told = f"{names[one]} and {names[two]} read what the other should"
@@ -396,7 +397,7 @@ def _other_ranges(
             after, before = float(scaled[mine].sum()), float(own[mine].sum())
             # A prediction that is too large by far comes nearer by any factor.
             limit = min((1 - _REMOVED) * before, _FITTING * float(power[mine].sum()))
-            if before > 2 * _SIGNIFICANT_RMS**2 and after < limit:
+            if before > 2 * SIGNIFICANT_RMS**2 and after < limit:
                 found: dict[str, object] = {"chip": chip.name, "factor": factor}
                 told = f"chip {chip.name} reads {factor:g} times what it should"
                 options.append((before - after, "wrong_range", found, told, prediction * np.where(mine, factor, 1.0)))
@@ -416,7 +417,7 @@ def _exchanged_chips(
         pairs = np.column_stack([channels[one], channels[two]])  # (axes, 2)
         before = float(misfit[pairs, pairs].sum())
         after = float((misfit[pairs[:, 0], pairs[:, 1]] + misfit[pairs[:, 1], pairs[:, 0]]).sum())
-        if before - after > by_two + 2 * _SIGNIFICANT_RMS**2 and after < (1 - _REMOVED) * before:
+        if before - after > by_two + 2 * SIGNIFICANT_RMS**2 and after < (1 - _REMOVED) * before:
             order = np.arange(len(names))
             order[pairs] = pairs[:, ::-1]
             told = f"chips {chips[one].name} and {chips[two].name} read what the other should"
@@ -432,7 +433,7 @@ def _signed(misfit: NDArray[np.float64], inverted: NDArray[np.float64], *places:
 
 def _clears(after: float, before: float) -> bool:
     """Tell whether a mean squared misfit is significant, and gone after."""
-    return before > _SIGNIFICANT_RMS**2 and after < (1 - _REMOVED) * before
+    return before > SIGNIFICANT_RMS**2 and after < (1 - _REMOVED) * before
 
 
 def _reads_negative(run: Run, prediction: NDArray[np.float64], white: float, channel: int) -> bool:

@@ -12,17 +12,20 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import label
 
+from gfimu.diagnosis.data.integrity import SIGNIFICANT_RMS
 from gfimu.diagnosis.data.run import REFERENCE_COLUMNS, Run
 from gfimu.errors import InputError
 from gfimu.units import STANDARD_GRAVITY
 from gfimu.world_model import WorldModel
 
-__all__ = ["refuse_implausible"]
+__all__ = ["NOISE", "REMOVED", "refuse_implausible"]
 
-_SIGNIFICANT_RMS, _LARGE_RMS = 2.0, 12.0  # of the misfit, in noise units: for a reversed reference, for all else
-_REMOVED = 0.8  # of the misfit, by another reading of the file
+_SIGNIFICANT_RMS = 2.0  # of the misfit, in noise units, for a reversed reference
+REMOVED = 0.8
+"""Share of a misfit that another reading of the file removes where it is the right one."""
 _MISSED, _MISSED_VARYING = 0.05, 0.3  # of the power of the readings, and of what varies in them, by one that fits
-_NOISE = 4.0
+NOISE = 4.0
+"""Squares in units of noise that are no misfit."""
 _AT_REST = 0.05  # of the largest rate
 _FEWEST = 20
 _UNRELATED = 0.1  # correlation
@@ -80,12 +83,12 @@ def refuse_implausible(
     """
     expected = model.expected_noise(1.0 / run.sample_period)
     misfit = _misfit(run, prediction, expected.white)
-    if misfit.varying < _SIGNIFICANT_RMS**2 and misfit.whole < _LARGE_RMS**2:
+    if misfit.varying < _SIGNIFICANT_RMS**2 and misfit.whole < SIGNIFICANT_RMS**2:
         return
     column = REFERENCE_COLUMNS[model.drive_source]
     _refuse_unrelated(run, prediction, expected.white, column)
     scales = _ANGLES if model.drive_source == "angle" else _RATES
-    if misfit.whole < _LARGE_RMS**2:
+    if misfit.whole < SIGNIFICANT_RMS**2:
         scales = {words: scale for words, scale in scales.items() if scale < 0.0}
     references = [
         _Reading(f"column {column} {words}, by what the channels feel; mend it", other, predict(other), steady=False)
@@ -96,7 +99,7 @@ def refuse_implausible(
     if model.drive_source != "angle":
         reverse = references[list(scales).index("has the opposite sign")]
         options += _signed_in_parts(run, prediction, reverse, expected.white, predict, column)
-    if misfit.whole > _LARGE_RMS**2:
+    if misfit.whole > SIGNIFICANT_RMS**2:
         options += _in_units([_Reading("", run, prediction), *references], expected.quantum)
         options += _turned(run, predict)
     found: list[tuple[float, str]] = []
@@ -104,9 +107,9 @@ def refuse_implausible(
         after = _misfit(option.run, option.prediction, expected.white)
         power = _misfit(option.run, np.zeros_like(prediction), expected.white)
         # Of what varies too: gravity alone would make the power of most runs.
-        fits = after.whole < _MISSED * power.whole and after.varying < max(_MISSED_VARYING * power.varying, _NOISE)
+        fits = after.whole < _MISSED * power.whole and after.varying < max(_MISSED_VARYING * power.varying, NOISE)
         left = after.whole / misfit.whole if option.steady else after.varying / misfit.varying
-        if fits and left < 1.0 - _REMOVED:
+        if fits and left < 1.0 - REMOVED:
             found.append((left, option.text))
     if found:
         raise InputError(f"{run.name}: {min(found)[1]}")
@@ -153,7 +156,7 @@ def _signed_in_parts(
             float(np.sum(np.where(run.valid[rows], (run.readings[rows] - told[rows]) / white, 0.0) ** 2))
             for told in (prediction, reverse.prediction)
         )
-        if other < (1.0 - _REMOVED) * as_told:
+        if other < (1.0 - REMOVED) * as_told:
             reference[rows] *= -1.0
             turned += 1
     if turned == 0:
@@ -167,7 +170,7 @@ def _refuse_unrelated(run: Run, prediction: NDArray[np.float64], white: NDArray[
     """Refuse a run in which much should vary and no channel goes with what it should read."""
     related, spreads = [], []
     for mine, told, valid, sigma in zip(run.readings.T, prediction.T, run.valid.T, white, strict=True):
-        if valid.sum() < _FEWEST or np.std(told[valid]) < _LARGE_RMS * sigma:
+        if valid.sum() < _FEWEST or np.std(told[valid]) < SIGNIFICANT_RMS * sigma:
             continue
         spreads.append(float(np.ptp(mine[valid])))
         related.append(abs(float(np.corrcoef(mine[valid], told[valid])[0, 1])) if spreads[-1] > 0.0 else 0.0)

@@ -18,6 +18,7 @@ from gfimu.world_model import WorldModel
 
 __all__ = [
     "GYRO_COLUMNS",
+    "MINIMUM_SAMPLES",
     "REFERENCE_COLUMNS",
     "Run",
     "difference_noise",
@@ -32,7 +33,7 @@ REFERENCE_COLUMNS: Mapping[str, str] = {"tacho": "tacho_rad_s", "angle": "angle_
 """Column of the reference of a table, by the drive source of the twin."""
 
 MINIMUM_DURATION = 4.0
-_MINIMUM_SAMPLES = 80
+MINIMUM_SAMPLES = 80
 _LONGEST_PERIOD = 0.2  # s
 _HELD = 5  # equal values of a reference whose noise shows
 _FINE, _FEW_REPEATS = 1e-4, 0.01  # noise to the largest value, and equal neighbours, of such a reference
@@ -148,10 +149,10 @@ def prepare_run(recording: Recording, model: WorldModel, *, name: str = "run") -
     """
     recording, impossible = possible_values(recording, model)
     readings = recording.for_array(model.array)
-    if len(recording) < _MINIMUM_SAMPLES or recording.duration < MINIMUM_DURATION:
+    if len(recording) < MINIMUM_SAMPLES or recording.duration < MINIMUM_DURATION:
         raise InputError(
             f"{name}: {len(recording)} samples over {recording.duration:.1f} s are too short to diagnose; "
-            f"record at least {MINIMUM_DURATION:.0f} s and {_MINIMUM_SAMPLES} samples, better 40 s"
+            f"record at least {MINIMUM_DURATION:.0f} s and {MINIMUM_SAMPLES} samples, better 40 s"
         )
     if not np.isfinite(readings).any():
         raise InputError(f"{name}: no channel has a value; record the channels of array {model.array.name!r}")
@@ -184,7 +185,7 @@ def prepare_run(recording: Recording, model: WorldModel, *, name: str = "run") -
     full[unreferenced] = 0.0
     left_out = float((valid & unreferenced[:, None]).any(axis=1).sum()) * period
     valid[unreferenced] = False
-    if valid.any(axis=1).sum() < _MINIMUM_SAMPLES:
+    if valid.any(axis=1).sum() < MINIMUM_SAMPLES:
         raise InputError(
             f"{name}: column {column} has no {_SHORTEST:.0f} s without a gap of {_BRIDGED} s or more; record the "
             "reference without interruption"

@@ -28,6 +28,7 @@ from gfimu.world_model import WorldModel
 __all__ = [
     "FOLLOWED",
     "LEARNINGS",
+    "LEAST_VALID",
     "learn_noise",
     "learn_roughness",
     "predicted_by_reference",
@@ -42,7 +43,8 @@ Numerical: just beyond the Nyquist frequency of the knots, 0.5 over their spacin
 """
 LEARNINGS = 3
 """Numerical: rounds of the fixed point of the roughness."""
-_LEAST_VALID = 0.01  # numerical: share of the samples that count
+LEAST_VALID = 0.01
+"""Numerical: share of the samples that count."""
 _LEAST_WIDTH = 0.4  # numerical: sample periods of a knot interval that is cut
 _HALVINGS = 5  # numerical: of a knot interval
 _BLUR = 0.5  # numerical: standard deviations that a drive misses in an interval that is worth a try
@@ -220,7 +222,7 @@ def _left(stretch: Stretch, point: Point, linear: Linear, place: int) -> _Left:
     cosines = stretch.basis.transform(residual)
     level = white_level(cosines, FOLLOWED / posterior.drive.spline.spacing, stretch.run.sample_period)
     # Missing samples stand as zeros, as where the reference comes at a lower rate.
-    level = level / np.sqrt(np.maximum(stretch.mask.mean(axis=0), _LEAST_VALID))
+    level = level / np.sqrt(np.maximum(stretch.mask.mean(axis=0), LEAST_VALID))
     if stretch.steps.coarse:
         error = np.where(stretch.mask, stretch.measured - seen.prediction, np.nan)
         if isinstance(seen.modes, WeighedModes):

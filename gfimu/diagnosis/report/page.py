@@ -46,9 +46,7 @@ _VIEWS = (
     ("temperature", "over the board's temperature"),
     ("reading", "over the reading itself"),
 )
-_PLACE_LOOKS = 4  # single chips and the whole array, at all frequencies and at low ones
 _MOST_PARAMETERS = 14
-_MOST_RIVALS = 8
 
 
 def write_report(path: str | Path, diagnosis: Diagnosis) -> None:
@@ -87,7 +85,7 @@ def _content(diagnosis: Diagnosis) -> Mapping[str, Any]:
         "surrogate": _surrogate(diagnosis) if diagnosis.unexplained.significant else {},
         "extended": diagnosis.unexplained.extends_twin,
         "unexplained": diagnosis.unexplained,
-        "rivals": diagnosis.rivals[:_MOST_RIVALS],
+        "rivals": diagnosis.rivals,
         "gain": diagnosis.gain,
         "gain_rows": gain_rows(diagnosis),
         "share": percent(diagnosis.gain.share_of_excess_removed),
@@ -182,7 +180,14 @@ def _views(diagnosis: Diagnosis, views: ResidualViews) -> list[Mapping[str, Any]
             shown.append({"title": title, "sentence": spectrum.sentence, "picture": picture, "looks": spectrum.looks})
     if diagnosis.rigid is not None and diagnosis.rigid.combinations:
         picture, sentence = figures.rigid_figure(diagnosis.rigid.power), _place(diagnosis.rigid)
-        shown.append({"title": "whose motion is it?", "sentence": sentence, "picture": picture, "looks": _PLACE_LOOKS})
+        shown.append(
+            {
+                "title": "whose motion is it?",
+                "sentence": sentence,
+                "picture": picture,
+                "looks": len(diagnosis.rigid.excesses),
+            }
+        )
     picture = figures.whiteness_figure(views.whiteness)
     looks = views.whiteness.looks
     shown.append({"title": "is it noise?", "sentence": views.whiteness.sentence, "picture": picture, "looks": looks})

@@ -267,8 +267,13 @@ def _relearned(stretches: Sequence[Stretch], best: Fit, policy: Policy, *, sharp
     point = best.point
     for _ in range(policy.rounds):
         before = found
-        point = _learnt(stretches, found.point, policy)
-        found = fit(stretches, point, policy, closely=best.point.exact)
+        try:
+            learnt = _learnt(stretches, found.point, policy)
+            found = fit(stretches, learnt, policy, closely=best.point.exact)
+        except np.linalg.LinAlgError:  # what was learnt last leaves nothing that can be solved
+            found = before
+            break
+        point = learnt
         if found.log_posterior - before.log_posterior < policy.steady:
             if not sharpen:
                 break

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
+from gfimu.diagnosis.data.plausibility import NOISE, REMOVED
 from gfimu.diagnosis.data.run import Run
 from gfimu.files.model_files import list_models
 from gfimu.geometry.array import AccelerometerArray
@@ -21,10 +22,6 @@ from gfimu.world_model import WorldModel
 
 __all__ = ["LikelyMistake", "likely_mistake"]
 
-_REMOVED = 0.8  # numerical: of the misfit, by a mistake that is worth a word
-_NOISE = 4.0  # numerical: squares in units of noise that are no misfit
-_CHANGED = 2  # numerical: channels that are named before they are only counted
-_SHOWN = 6  # numerical: channels in a sentence
 _LENGTHS = {"mm": 1e3, "cm": 1e2, "inches": 1.0 / 0.0254}
 """Numerical: units for which a length of the array file may have been taken, and how many there are in a metre."""
 
@@ -69,7 +66,7 @@ def likely_mistake(model: WorldModel, runs: Sequence[Run], predict: Predict) -> 
     white = model.expected_noise(1.0 / runs[0].sample_period).white
     told = [predict(model, run) for run in runs]
     before = _Misfit.of(runs, told, white)
-    if before.squares < _NOISE:
+    if before.squares < NOISE:
         return None
     options: list[tuple[str, _Misfit]] = []
     for text, array in _other_arrays(model.array):
@@ -77,10 +74,10 @@ def likely_mistake(model: WorldModel, runs: Sequence[Run], predict: Predict) -> 
         options.append((text, _Misfit.of(runs, [predict(other, run) for run in runs], white)))
     options += _read_otherwise(model.array, runs, told, white)
     least = min(misfit.squares for _, misfit in options)
-    if least > (1.0 - _REMOVED) * before.squares:
+    if least > (1.0 - REMOVED) * before.squares:
         return None
     # Another order of the channels does as well as some other arrays: the plainest comes first.
-    text, after = next(one for one in options if one[1].squares <= least + _NOISE)
+    text, after = next(one for one in options if one[1].squares <= least + NOISE)
     return LikelyMistake(text, before.rms, after.rms)
 
 
@@ -111,11 +108,11 @@ def _read_otherwise(
     cross = readings.T @ predicted
     weight = np.where(valid.any(axis=0), 1.0 / white, 0.0)[:, None] ** 2 / count
     costs = np.stack([(power - 2.0 * sign * cross) * weight for sign in (1.0, -1.0)])
-    # Arrays have symmetries. Of orders that fit the same, that with fewer signs and the same axes of other chips.
+    # Arrays have symmetries. Of orders that fit the same: no wrong sign, then as named, then the axis of that number.
     axis = np.concatenate([np.arange(len(chip.axes)) for chip in array.chips])
-    costs[1] += 0.5 * _NOISE
-    costs += 0.25 * _NOISE * (axis[:, None] != axis)
-    costs += _NOISE * (1.0 - np.eye(len(axis)))
+    costs[1] += NOISE + NOISE
+    costs += NOISE * (1.0 - np.eye(len(axis)))
+    costs += NOISE * (axis[:, None] != axis) / len(axis)
     mine, its = linear_sum_assignment(costs.min(axis=0))
     signs = np.where(costs[0, mine, its] <= costs[1, mine, its], 1.0, -1.0)
     changed = np.flatnonzero((its != mine) | (signs < 0.0))
@@ -130,15 +127,13 @@ def _order_in_words(
     channels: Sequence[str], its: NDArray[np.intp], signs: NDArray[np.float64], changed: NDArray[np.intp]
 ) -> str:
     """Say which channels read what others, or their opposites, should."""
-    if len(changed) == _CHANGED and its[changed[0]] == changed[1] and (signs[changed] > 0.0).all():
-        return f"channels {channels[changed[0]]} and {channels[changed[1]]} are swapped"
     if (its[changed] == changed).all():
-        names = ", ".join(channels[place] for place in changed[:_SHOWN])
-        more = f" and {len(changed) - _SHOWN} more" if len(changed) > _SHOWN else ""
-        return f"the sign of {names}{more} is wrong"
-    pairs = [f"{channels[place]} reads {'−' if signs[place] < 0 else ''}{channels[its[place]]}" for place in changed]
-    more = f" and {len(pairs) - _SHOWN} more" if len(pairs) > _SHOWN else ""
-    return f"the order of the channels is wrong ({', '.join(pairs[:_SHOWN])}{more})"
+        return f"the sign of {', '.join(channels[place] for place in changed)} is wrong"
+    if (signs[changed] > 0.0).all() and (its[its[changed]] == changed).all():
+        pairs = [f"{channels[place]} and {channels[its[place]]}" for place in changed if place < its[place]]
+        return f"channels {', '.join(pairs)} are swapped"
+    reads = [f"{channels[place]} reads {'−' if signs[place] < 0 else ''}{channels[its[place]]}" for place in changed]
+    return f"the order of the channels is wrong ({', '.join(reads)})"
 
 
 def _other_arrays(array: AccelerometerArray) -> Iterator[tuple[str, AccelerometerArray]]:

@@ -108,6 +108,9 @@ def everything_is_explained(patch):
     believed = SimpleNamespace(withdrawn=False, why="", in_part=False)
     patch.setattr(ENGINE, "judge", lambda *_: believed)  # the gate's judgement of what was found
     patch.setattr(ENGINE, "impossible_sizes", lambda *_: "")
+    patch.setattr(ENGINE, "coincidences", lambda *_: [])
+    kept = ENGINE._Diagnosis
+    patch.setattr(kept, "_apart_from_the_rest", lambda self, found: (found, self._left(found.explanation)))
 
 
 def samples_unchecked(patch):

@@ -18,10 +18,12 @@ from scipy.stats import f as f_distribution
 from gfimu.diagnosis.criticism.views.run_view import RunView
 from gfimu.diagnosis.policy import Policy
 
-__all__ = ["Dependence", "Fingerprint", "Quantity", "dependences", "fingerprint", "listed", "quantities"]
+__all__ = ["BINS", "Dependence", "Fingerprint", "Quantity", "dependences", "fingerprint", "listed", "quantities"]
 
 _HIGHEST_ORDER = 12  # numerical: cycles per revolution that are looked at
-_BINS, _FEWEST_IN_BIN = 40, 5  # numerical: of a plot, and samples in each
+BINS = 40
+"""Numerical: of a plot."""
+_FEWEST_IN_BIN = 5  # numerical: samples in each of them
 _FEWEST_SAMPLES = 50  # numerical: for a regression
 
 
@@ -352,14 +354,14 @@ def _binned(
     """Centres of equal bins of a quantity, and the mean of each residual in them, all of shape (b, c)."""
     at = np.broadcast_to(quantity.at.reshape(len(valid), -1), valid.shape)
     low, high = at.min(axis=0), at.max(axis=0)
-    place = np.clip(((at - low) / np.maximum(high - low, 1e-300) * _BINS).astype(int), 0, _BINS - 1)  # (n, c)
+    place = np.clip(((at - low) / np.maximum(high - low, 1e-300) * BINS).astype(int), 0, BINS - 1)  # (n, c)
     channels = range(valid.shape[1])
-    count = np.column_stack([np.bincount(place[:, k], valid[:, k], _BINS) for k in channels])
+    count = np.column_stack([np.bincount(place[:, k], valid[:, k], BINS) for k in channels])
     means = []
     for residual in residuals:
-        total = np.column_stack([np.bincount(place[:, k], residual[:, k], _BINS) for k in channels])
+        total = np.column_stack([np.bincount(place[:, k], residual[:, k], BINS) for k in channels])
         means.append(np.where(count >= _FEWEST_IN_BIN, total / np.maximum(count, 1), np.nan))
-    return low + (high - low) * ((np.arange(_BINS) + 0.5) / _BINS)[:, None], means
+    return low + (high - low) * ((np.arange(BINS) + 0.5) / BINS)[:, None], means
 
 
 def _varies(quantity: Quantity) -> bool:

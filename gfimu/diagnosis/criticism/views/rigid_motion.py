@@ -19,26 +19,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
+from scipy.stats import chi2
 
+from gfimu.diagnosis.criticism.views.dependence import BINS
 from gfimu.diagnosis.data.body.stretch import BodyStretch
 from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.fit.learn import starting_point
 from gfimu.diagnosis.policy import Policy
+from gfimu.diagnosis.terms.coloured_noise import FLICKER_GRID
 from gfimu.geometry.array import AccelerometerArray
-from gfimu.units import STANDARD_GRAVITY
 
 __all__ = ["BandPower", "RigidMotion", "motion_columns", "rigid_motion"]
 
-_SLOW_HZ = 5.0  # numerical: what rigs do is below, and noise counts for less there
-_QUIET = 0.4  # numerical: share of the lowest frequencies that are left out of the level of white noise
-_MOST_FLICKER = 0.6e-3 * STANDARD_GRAVITY  # numerical: so that slow noise can't take what is to be found
-_FLICKERS = np.geomspace(0.02e-3 * STANDARD_GRAVITY, _MOST_FLICKER, 18)  # numerical
 _SECOND_ORDER = 0.01  # numerical: share of a large motion's squares that its second order leaves outside the columns
-_DEPENDENT = 1e-7  # numerical: of the strongest direction
-_MEDIAN_OF_SQUARES = 0.4549  # numerical: of a standard normal variable
-_LEVEL_VARIANCE = 5.45  # numerical: relative, of a variance that is learnt from a median, times the number of values
-_OUTLIER = 9.0  # numerical: squares of three standard deviations: what is larger is no noise
-_BANDS = 60  # numerical: bands of frequency in the picture
+_FRAME_SPREAD = 0.6  # numerical: standard deviation of the gain of a frame by noise, nats per root of samples
 
 
 @dataclass(frozen=True)
@@ -68,7 +62,7 @@ class RigidMotion:
     ----------
     chips, chips_slow : float
         Excess of the squares over those of noise in the combinations that no motion reaches, at all frequencies and
-        below 5 Hz, in standard deviations, the error of the noise's level included.
+        at low ones, in standard deviations, the error of the noise's level included.
     array, array_slow : float
         The same in the combinations of a motion of the whole array other than a spin.
     combinations : int
@@ -93,6 +87,11 @@ class RigidMotion:
     simpler: float
     power: BandPower
 
+    @property
+    def excesses(self) -> tuple[float, ...]:
+        """All excesses, in standard deviations."""
+        return self.chips, self.chips_slow, self.array, self.array_slow
+
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON form."""
         return {
@@ -100,9 +99,9 @@ class RigidMotion:
             "frame": self.frame,
             "combinations": self.combinations,
             "chips_std": self.chips,
-            "chips_below_5_hz_std": self.chips_slow,
+            "chips_slow_std": self.chips_slow,
             "array_std": self.array,
-            "array_below_5_hz_std": self.array_slow,
+            "array_slow_std": self.array_slow,
         }
 
     @property
@@ -139,7 +138,7 @@ def rigid_motion(stretches: Sequence[Stretch], policy: Policy = Policy()) -> Rig
     stretches : sequence of Stretch
         The data. Of a free body nothing can be said: it has a motion that nobody knows.
     policy : Policy
-        Thresholds ``excess_stds`` and ``frame_gain``.
+        Threshold ``excess_stds``.
     """
     first = stretches[0]
     if isinstance(first, BodyStretch):
@@ -150,7 +149,7 @@ def rigid_motion(stretches: Sequence[Stretch], policy: Policy = Policy()) -> Rig
     for stretch, drive in zip(stretches, point.drives, strict=True):
         left = np.where(stretch.mask, stretch.measured - stretch.predict([], drive.spin), 0.0)[:, :-1]
         state = stretch.motion(stretch.known, drive.spin).at(stretch.run.t)
-        parts.append(_Part.of(stretch, left, np.asarray(state.angle), alive))
+        parts.append(_Part.of(stretch, left, np.asarray(state.angle), alive, policy))
     combinations = parts[0].chips.values.shape[1]
     chips = _excess([part.chips for part in parts], combinations)
     array = _excess([part.array for part in parts], combinations)
@@ -163,7 +162,7 @@ def rigid_motion(stretches: Sequence[Stretch], policy: Policy = Policy()) -> Rig
         place = "chips" if apart else "array" if max(array) > policy.excess_stds else "spin"
     simpler = sum(part.simpler for part in parts) / float(np.sqrt(sum(part.samples for part in parts)))
     frame = ""
-    if place == "array" and abs(simpler) > policy.frame_gain:
+    if place == "array" and abs(simpler) > policy.excess_stds * _FRAME_SPREAD:
         frame = "laboratory" if simpler > 0.0 else "body"
     return RigidMotion(*chips, *array, combinations, place, frame, simpler, _by_band(parts))
 
@@ -226,7 +225,12 @@ class _Part:
 
     @classmethod
     def of(
-        cls, stretch: Stretch, left: NDArray[np.float64], angle: NDArray[np.float64], alive: NDArray[np.bool_]
+        cls,
+        stretch: Stretch,
+        left: NDArray[np.float64],
+        angle: NDArray[np.float64],
+        alive: NDArray[np.bool_],
+        policy: Policy,
     ) -> _Part:
         """Divide the residual (n, c) of a stretch, the table at ``angle`` (n,), its channels ``alive`` (c,)."""
         period, n = stretch.run.sample_period, len(stretch.run.t)
@@ -237,8 +241,8 @@ class _Part:
         cosines = stretch.basis.transform(left[:, alive] / white)  # (n, c)
         spin, array, chips = (cosines @ basis for basis in _bases(columns))
         flicker = stretch.basis.spectrum_of_flicker(n) / np.median(white) ** 2
-        variance = _noise(chips, flicker, len(stretch.basis.frequency))
-        slow = frequency < _SLOW_HZ
+        variance = _noise(chips, flicker, len(stretch.basis.frequency), policy)
+        slow = np.arange(n) < len(stretch.basis.frequency)
         motion = (left[:, alive] / white) @ columns @ np.linalg.pinv(columns.T @ columns)  # (n, 9)
         return cls(
             frequency,
@@ -254,26 +258,27 @@ def _bases(columns: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[n
     """Return orthonormal bases of a spin, of other motions and of what no motion reaches, from columns (c, 9)."""
     spin, _ = np.linalg.qr(columns[:, [5, 6]])  # tangential and centripetal arm
     rest = columns - spin @ (spin.T @ columns)
-    left, power, _ = np.linalg.svd(rest, full_matrices=False)
-    array = left[:, power > _DEPENDENT * power[0]]
+    left, _, _ = np.linalg.svd(rest, full_matrices=False)
+    array = left[:, : np.linalg.matrix_rank(rest)]
     whole = np.hstack([spin, array])
     basis, _ = np.linalg.qr(np.hstack([whole, np.eye(len(columns))]))
     return spin, array, basis[:, whole.shape[1] :]
 
 
-def _noise(chips: NDArray[np.float64], flicker: NDArray[np.float64], slow: int) -> NDArray[np.float64]:
+def _noise(chips: NDArray[np.float64], flicker: NDArray[np.float64], slow: int, policy: Policy) -> NDArray[np.float64]:
     """Return the variance (n,) of noise, learnt from what no motion reaches: white noise, and bounded slow noise."""
-    n = len(flicker)
+    levels = FLICKER_GRID[policy.largest_flicker >= FLICKER_GRID]
     if not chips.shape[1]:
-        return np.ones(n) + flicker * _FLICKERS[len(_FLICKERS) // 2] ** 2
-    white = np.median(chips[int(_QUIET * n) :] ** 2) / _MEDIAN_OF_SQUARES
+        return np.ones(len(flicker)) + flicker * policy.usual_flicker**2
+    white = np.median(chips[slow:] ** 2) / chi2.median(1)
     squares, count = np.sum(chips[:slow] ** 2, axis=1), chips.shape[1]
 
     def misfit(level: float) -> float:
         variance = white + flicker[:slow] * level**2
-        return float(np.sum(count * np.log(variance) + np.minimum(squares / variance, count * _OUTLIER)))
+        # What is larger than noise ever is must not pass for slow noise.
+        return float(np.sum(count * np.log(variance) + np.minimum(squares / variance, count * policy.noise_stds**2)))
 
-    return np.asarray(white + flicker * min(_FLICKERS, key=misfit) ** 2)
+    return np.asarray(white + flicker * min(levels, key=misfit) ** 2)
 
 
 def _simpler(motion: NDArray[np.complex128], angle: NDArray[np.float64]) -> float:
@@ -296,11 +301,12 @@ def _excess(shares: Sequence[_Share], combinations: int) -> tuple[float, float]:
     """Return the excess of all stretches in standard deviations, at all frequencies and below the limit.
 
     Of N squares the sum errs by √(2N), and by N times the relative error of the variance that they are compared with,
-    which is learnt from the combinations that no motion reaches at the upper frequencies.
+    which is learnt from the combinations that no motion reaches.
     """
     total = np.sum([share.excess() for share in shares], axis=0)
     samples = sum(len(share.values) for share in shares)
-    level = _LEVEL_VARIANCE / max((1.0 - _QUIET) * samples * combinations, 1.0)
+    median = chi2.median(1)
+    level = (2.0 * median * chi2.pdf(median, 1)) ** -2 / max(samples * combinations, 1.0)  # of a median
     whole, slow = total[:, 0] / np.sqrt(np.maximum(2.0 * total[:, 1] + total[:, 1] ** 2 * level, 1.0))
     return float(whole), float(slow)
 
@@ -309,7 +315,7 @@ def _by_band(parts: Sequence[_Part]) -> BandPower:
     """Return the mean power by bands of frequency that grow with it."""
     part = max(parts, key=lambda one: one.samples)
     top = part.frequency[-1]
-    edges = np.unique(np.concatenate([[1], np.geomspace(2, len(part.frequency), _BANDS).astype(int)]))
+    edges = np.unique(np.concatenate([[1], np.geomspace(2, len(part.frequency), BINS).astype(int)]))
     starts = edges[:-1]
     frequency = top * np.sqrt(edges[:-1] * edges[1:]) / len(part.frequency)
 

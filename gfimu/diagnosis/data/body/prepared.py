@@ -12,7 +12,7 @@ from gfimu.diagnosis.data.body.run import prepare_body_run
 from gfimu.diagnosis.data.body.stretch import BodyStretch
 from gfimu.diagnosis.data.integrity import check_integrity
 from gfimu.diagnosis.data.prepared_runs import PreparedRuns
-from gfimu.diagnosis.data.run import Run
+from gfimu.diagnosis.data.run import MINIMUM_SAMPLES, Run
 from gfimu.errors import InputError
 from gfimu.motion.body_drive import BodyDrive
 from gfimu.recording import Recording
@@ -21,7 +21,6 @@ from gfimu.world_model import BodyModel, Effect, WorldModel
 __all__ = ["prepare_bodies", "robust_prediction"]
 
 _SWEEPS = 12  # numerical: reweightings until the channels that disagree have no weight
-_FEWEST = 80  # numerical: samples
 
 
 def prepare_bodies(
@@ -75,9 +74,9 @@ def _refuse_too_few(stretch: BodyStretch, name: str) -> None:
             "free body is unknown; record the channels of two chips at least"
         )
     whole = int(valid[:, alive].all(axis=1).sum())
-    if whole < _FEWEST:
+    if whole < MINIMUM_SAMPLES:
         raise InputError(
-            f"{name}: {whole} samples have a value of every channel; a free body needs {_FEWEST}: record again "
+            f"{name}: {whole} samples have a value of every channel; a free body needs {MINIMUM_SAMPLES}: record again "
             "within the range of the sensors"
         )
 

@@ -17,14 +17,15 @@ from gfimu.diagnosis.data.cosine_basis import NoiseLevels
 from gfimu.diagnosis.policy import Policy
 from gfimu.geometry.array import AccelerometerArray
 
-__all__ = ["BodyNoise", "Projection", "learn_motion_noise", "white_from_rows"]
+__all__ = ["LEAST_POWER", "BodyNoise", "Projection", "learn_motion_noise", "white_from_rows"]
 
 _AGITATION_GRID = np.concatenate([[0.0], np.geomspace(2e-5, 2e-2, 31)])  # numerical: s
 _SLOPE_GRID = np.concatenate([[0.0], np.geomspace(1e-3, 3.0, 22)])  # numerical: rad/s² per m/s³
 _FLOOR_GRID = np.concatenate([[0.0], np.geomspace(1e-2, 3e2, 19)])  # numerical: rad/s²
 _RATIO_SPREAD = 0.5  # numerical: holds ratios of channels that few combinations hardly tell apart
 _QUIET, _FEWEST_QUIET = 0.34, 200  # numerical: share of the samples that change least, and how many they have to be
-_LEAST_POWER = 1e-9  # numerical: of the loudest row, below which a row is rounding errors
+LEAST_POWER = 1e-9
+"""Numerical: of the loudest row, or the strongest direction, below which there are rounding errors."""
 
 
 @dataclass(frozen=True)
@@ -132,7 +133,7 @@ def white_from_rows(
         quiet = both
     second = np.diff(projected, 2, axis=0)[quiet]
     power = (np.median(np.abs(second), axis=0) / 0.6745) ** 2 / 6.0
-    alive = power > _LEAST_POWER * power.max(initial=0.0)
+    alive = power > LEAST_POWER * power.max(initial=0.0)
     mixing = projector[np.ix_(alive, alive)] ** 2 * expected[alive] ** 2
     scale = power[alive].sum() / mixing.sum()
     error = power[alive] * (

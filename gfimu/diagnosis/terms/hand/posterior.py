@@ -26,7 +26,7 @@ from gfimu.diagnosis.data.body.stretch import BodyStretch
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.terms.columns import Columns
 from gfimu.diagnosis.terms.hand.drive import HandDrive
-from gfimu.diagnosis.terms.hand.noise import BodyNoise, Projection
+from gfimu.diagnosis.terms.hand.noise import LEAST_POWER, BodyNoise, Projection
 from gfimu.motion.body_drive import BodyDrive
 from gfimu.world_model import Effect
 
@@ -35,7 +35,6 @@ __all__ = ["HandPosterior", "condition_hand"]
 _FORCE_STEPS = 6  # numerical
 _FORCE_DONE = 0.02  # numerical: of the white noise
 _BLOCK_S, _MOST_BLOCKS = 0.5, 128  # numerical: block of time, s, of the test of the noise
-_SEEN = 1e-9  # numerical: of the strongest direction
 _TAKEN = 6  # numerical: combinations of the channels that the drive takes
 
 
@@ -373,7 +372,7 @@ class HandPosterior:
         Econometrica 50, 1982, in the directions of the columns).
         """
         strength, turn = np.linalg.eigh(self._driveless(columns, self._taken(columns))[0])
-        seen = strength > _SEEN * max(strength[-1], 1e-300) if len(strength) else np.zeros(0, dtype=bool)
+        seen = strength > LEAST_POWER * max(strength[-1], 1e-300) if len(strength) else np.zeros(0, dtype=bool)
         if not seen.any():
             return 1.0
         products, left = (

@@ -63,7 +63,8 @@ def test_what_has_no_steps_to_see_is_left_as_it_is(values):
 
 def test_a_strong_dependence_on_temperature_leaves_nothing_for_others():
     twin = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12", sample_rate=400.0)
-    sizes = {f"{name}_m_s2_K": (-1.0) ** number for number, name in enumerate(twin.array.channels)}
+    drawn = np.random.default_rng(21).standard_normal(12)
+    sizes = {f"{name}_m_s2_K": float(size) for name, size in zip(twin.array.channels, drawn, strict=True)}
     hidden = make_effect("bias_temperature", sizes, twin.array)
     run = measure(np.random.default_rng(22), twin, [hidden], Measurement(duration=15.0, sample_rate=400.0))
     reference = {**run.reference, "temperature_degC": rounded(run.reference["temperature_degC"])}

@@ -59,10 +59,17 @@ def test_a_wrong_sign_is_named(sound):
 
 
 def test_chips_in_another_order_are_named(sound):
-    order = np.r_[3:6, 0:3, 6:12]
+    order = np.r_[3:6, 6:9, 0:3, 9:12]
     found = mistake_in(reordered(sound, order, 1.0))
     assert found.text.startswith("the order of the channels is wrong")
     assert f"{CUBE.channels[0]} reads {CUBE.channels[3]}, {CUBE.channels[1]} reads {CUBE.channels[4]}" in found.text
+
+
+def test_two_chips_in_each_others_place_are_named(sound):
+    found = mistake_in(reordered(sound, np.r_[3:6, 0:3, 6:12], 1.0))
+    a, b = CUBE.channels[:3], CUBE.channels[3:6]
+    # The third axes all read gravity: which is which can't be told.
+    assert found.text == f"channels {a[0]} and {b[0]}, {a[1]} and {b[1]} are swapped"
 
 
 @pytest.mark.parametrize(

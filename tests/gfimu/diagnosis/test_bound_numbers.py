@@ -1,0 +1,41 @@
+"""What one thing upstream of all chips does is not told as a fault of every chip."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gfimu.diagnosis import diagnose
+from gfimu.geometry.array import AccelerometerArray
+from gfimu.recording import Recording
+from sim.campaign import Measurement, measure
+from sim.effects import make_effect
+from sim.twin import Twin
+
+TWIN = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
+
+
+def recorded(seed, effects=(), cubic=0.0):
+    """A run whose tachometer reads ω + cubic · ω³."""
+    run = measure(np.random.default_rng(seed), TWIN, effects, Measurement(duration=24.0))
+    reference = {name: values + cubic * values**3 for name, values in run.reference.items()}
+    return Recording.from_arrays(run.t_s, run.readings, TWIN.array, reference=reference)
+
+
+def test_a_tachometer_that_is_bent_is_no_curve_of_twelve_channels():
+    found = diagnose([recorded(4, cubic=1e-4)], TWIN)
+    assert found.verdict == "unknown"
+    assert "go as the centripetal arm" in found.unexplained.signature
+    assert not found.causes
+    # What describes it then is the reference's, and predicts data that its fit never saw.
+    assert found.gain.share_of_excess_removed == pytest.approx(1.0, abs=0.1)
+
+
+def test_curves_of_twelve_channels_are_told_as_they_are():
+    sizes = 2e-3 * np.random.default_rng(3).standard_normal(12)
+    keys = [f"{channel}_s2_m" for channel in TWIN.array.channels]
+    hidden = make_effect("quadratic", dict(zip(keys, sizes, strict=True)), TWIN.array)
+    found = diagnose([recorded(4, [hidden])], TWIN)
+    assert found.verdict == "explained"
+    (cause,) = found.causes
+    assert cause.effect == "quadratic"
