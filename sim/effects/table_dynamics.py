@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numba import njit
@@ -51,10 +52,9 @@ class RippledSpin:
         self._grid = np.arange(t[0], t[-1] + 2 * step, step)
         spin = motion.at(self._grid)
         torque = amplitude * spin.rate**2 / (spin.rate**2 + _REST_RATE**2)
-        system = (np.array([[0.0, 1.0], [-_SERVO_STIFFNESS, -_DRAG]]), np.array([[0.0], [1.0]]))
-        a, b, *_ = cont2discrete((*system, np.eye(2), np.zeros((2, 1))), step)
+        a, b = _servo_of(step)
         self._angle, self._rate, self._acceleration = _servo_error(
-            torque, order * spin.angle + phase, float(order), a, b[:, 0]
+            torque, order * spin.angle + phase, float(order), a, b
         )
 
     def at(self, t: ArrayLike) -> SpinState:
@@ -122,11 +122,8 @@ class TwistingSpin:
         self._grid = np.arange(t[0], t[-1] + 2 * step, step)
         push = -motion.at(self._grid).acceleration
         push = push - push[0]  # steady before the first sample
-        system = (np.array([[0.0, 1.0], [-(natural**2), -2 * damping * natural]]), np.array([[0.0], [1.0]]))
-        outputs = (np.eye(2), np.zeros((2, 1)))
-        a, b, c, d, _ = cont2discrete((*system, *outputs), step, method="foh")
-        poles = np.array([1.0, -np.trace(a), np.linalg.det(a)])
-        twist, twist_rate = (lfilter(_numerator(a, b, c[[row]], d[[row]], poles), poles, push) for row in range(2))
+        numerators, poles = _filter_of(natural, damping, step)
+        twist, twist_rate = (lfilter(numerator, poles, push) for numerator in numerators)
         self._angle, self._rate = gain * twist, gain * twist_rate
         self._acceleration = gain * (push - natural**2 * twist - 2 * damping * natural * twist_rate)
 
@@ -135,6 +132,26 @@ class TwistingSpin:
         return _added(
             self._motion, np.asarray(t, dtype=float), self._grid, (self._angle, self._rate, self._acceleration)
         )
+
+
+@lru_cache(maxsize=32)
+def _servo_of(step: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return transition (2, 2) and input (2,) of the error of the servo over one step, for reading only."""
+    system = (np.array([[0.0, 1.0], [-_SERVO_STIFFNESS, -_DRAG]]), np.array([[0.0], [1.0]]))
+    a, b, *_ = cont2discrete((*system, np.eye(2), np.zeros((2, 1))), step)
+    return a, b[:, 0]
+
+
+@lru_cache(maxsize=256)
+def _filter_of(
+    natural: float, damping: float, step: float
+) -> tuple[tuple[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]:
+    """Return the numerators of twist and twist rate, and the poles, of a mode over one step, for reading only."""
+    system = (np.array([[0.0, 1.0], [-(natural**2), -2 * damping * natural]]), np.array([[0.0], [1.0]]))
+    a, b, c, d, _ = cont2discrete((*system, np.eye(2), np.zeros((2, 1))), step, method="foh")
+    poles = np.array([1.0, -np.trace(a), np.linalg.det(a)])
+    twist, rate = (_numerator(a, b, c[[row]], d[[row]], poles) for row in range(2))
+    return (twist, rate), poles
 
 
 def _numerator(

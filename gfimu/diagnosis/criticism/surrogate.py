@@ -25,7 +25,7 @@ from gfimu.diagnosis.criticism.generic import (
 )
 from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.fit.evidence import log_evidence, log_evidence_each
-from gfimu.diagnosis.fit.gauss_newton import Fit, fit
+from gfimu.diagnosis.fit.gauss_newton import FEW, Fit, fit
 from gfimu.diagnosis.fit.learn import learn_noise
 from gfimu.diagnosis.fit.linear import Point
 from gfimu.diagnosis.fit.observed_at import observed_at
@@ -38,7 +38,6 @@ from gfimu.world_model import BasisUnits
 
 __all__ = ["Surrogate", "surrogates"]
 
-_FEW = 3  # numerical: rounds, steps of each (only the drive is not linear), strongest lines in time and in angle
 _HIGHEST_ORDER = 48  # numerical: cycles per revolution
 _PADDED = 8  # numerical: zero padding of a periodogram
 
@@ -140,10 +139,10 @@ def _ever_richer(
 ) -> list[Surrogate]:
     """Choose terms and fit them, round by round; returns the surrogate of every round."""
     observations = sum(stretch.observations for stretch in stretches)
-    present = fit(stretches, start, replace(policy, steps=_FEW))
+    present = fit(stretches, start, replace(policy, steps=FEW))
     terms: list[_Term] = []
     found: list[Surrogate] = []
-    for _ in range(_FEW):
+    for _ in range(FEW):
         more = _strongest(stretches, present.point, terms, policy, units, hints)
         if not more:
             break
@@ -151,7 +150,7 @@ def _ever_richer(
         terms = [*kept, *more]
         causes = (*kept.values(), *(term.cause(stretches[0], units) for term in more))
         point = replace(present.point, causes=causes)
-        richer = fit(stretches, point, replace(policy, steps=_FEW))
+        richer = fit(stretches, point, replace(policy, steps=FEW))
         unexplained = max(present.objective - observations, 0.0)
         if not present.objective - richer.objective > policy.dominant * unexplained:
             break
@@ -162,7 +161,7 @@ def _ever_richer(
 
 def _settled(stretches: Sequence[Stretch], point: Point, policy: Policy) -> Fit:
     """Fit terms, learn the noise that they leave, and fit them again under it."""
-    few = replace(policy, steps=_FEW)
+    few = replace(policy, steps=FEW)
     first = fit(stretches, point, few)
     return fit(stretches, learn_noise(stretches, first.point), few)
 
@@ -240,12 +239,12 @@ def _line_functions(stretches: Sequence[Stretch], point: Point) -> list[str]:
     angle = motion_of(stretch, point, point.drives[longest]).angle
     orders = np.arange(1, _HIGHEST_ORDER + 1)
     power = np.sum(np.abs(np.exp(1j * np.outer(orders, angle)) @ residual) ** 2, axis=1)
-    found = [name for order in orders[np.argsort(-power)[:_FEW]] for name in ripples(int(order))]
+    found = [name for order in orders[np.argsort(-power)[:FEW]] for name in ripples(int(order))]
     padded = _PADDED * len(residual)
     power = np.abs(np.fft.rfft(residual * np.hanning(len(residual))[:, None], padded, axis=0)) ** 2
     frequency = np.fft.rfftfreq(padded, stretch.run.sample_period)
     summed = np.where(frequency > FEWEST_CYCLES / stretch.run.duration, power.sum(axis=1), 0.0)
-    for _ in range(_FEW):
+    for _ in range(FEW):
         place = int(np.clip(np.argmax(summed), 1, len(summed) - 2))
         low, top, high = np.log(np.maximum(summed[place - 1 : place + 2], 1e-300))
         # The vertex of the parabola through the logs of a peak and its neighbours.

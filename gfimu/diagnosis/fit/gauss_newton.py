@@ -26,8 +26,10 @@ from gfimu.diagnosis.terms.cause import Cause, effects_of
 from gfimu.diagnosis.terms.jacobian import Jacobian
 from gfimu.geometry.array import AccelerometerArray
 
-__all__ = ["SETTLED", "Fit", "determined", "fit", "is_rough", "linearly_without", "log_prior"]
+__all__ = ["FEW", "SETTLED", "Fit", "determined", "fit", "is_rough", "linearly_without", "log_prior"]
 
+FEW = 3
+"""Numerical: steps of a fit whose only other unknown is a drive, or that is only looked at; rounds of such fits."""
 SETTLED = 0.3  # numerical: nats that a step must promise to be taken
 _SHARES = (1.0, 0.3, 0.08)  # numerical: of a step that goes uphill
 _SHAPE_STEP = 0.3  # numerical: most that a shape moves in a step

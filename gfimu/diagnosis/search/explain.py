@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from gfimu.diagnosis.data.stretch import Stretch
-from gfimu.diagnosis.fit.gauss_newton import Fit, fit, is_rough, linearly_without
+from gfimu.diagnosis.fit.gauss_newton import FEW, Fit, fit, is_rough, linearly_without
 from gfimu.diagnosis.fit.learn import LEARNINGS, learn_noise, learn_roughness, sharpened, starting_point
 from gfimu.diagnosis.fit.linear import Point, with_residue
 from gfimu.diagnosis.fit.parallel import each_apart
@@ -92,11 +92,11 @@ class Sets:
     def _keep(self, fits: Sequence[Fit | None]) -> None:
         self.found |= {one.key: one for one in fits if one is not None}
 
-    def _roughly(self, point: Point) -> Fit | None:
+    def _roughly(self, point: Point, policy: Policy | None = None) -> Fit | None:
         """Fit with the derivative that the point has; unless that is exact, without what remembers for long."""
         try:
             point = replace(point, levels=self.base.levels, residue=self.base.residue)
-            return self._own_roughness(fit(self.stretches, point, self.policy, closely=False))
+            return self._own_roughness(fit(self.stretches, point, policy or self.policy, closely=False))
         except (np.linalg.LinAlgError, ValueError):
             return None
 
@@ -134,9 +134,13 @@ class Sets:
 
     def refit(self, points: Sequence[Point]) -> None:
         """Fit a set again from other starts, and keep what is more probable; a start that leads back is left there."""
-        again = each_apart(self._roughly, [replace(point, exact=False) for point in points])
-        fits = [one for one in again if one is not None and not _is_alike(one, self.found[one.key])]
-        self.count += len(fits)
+        first = replace(self.policy, steps=FEW)
+        looks = each_apart(lambda point: self._roughly(replace(point, exact=False), first), points)
+        others = [one for one in looks if one is not None and not _is_alike(one, self.found[one.key])]
+        # What leads after a few steps is followed to its optimum.
+        again = self._roughly(max(others, key=_posterior).point, self.policy) if others else None
+        fits = [one for one in (again,) if one is not None and not _is_alike(one, self.found[one.key])]
+        self.count += len(others)
         rough = [one for one in fits if self._is_worth_it(one)]
         closely = self._closely(max(rough, key=_posterior)) if rough else None
         for one in (*fits, closely):
