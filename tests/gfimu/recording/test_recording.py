@@ -371,8 +371,9 @@ def test_reading_holds_one_copy_of_the_data(tmp_path, suffix):
         for file in (small, large):
             pq.write_table(pq.read_table(file), file, row_group_size=n, compression="none", use_dictionary=False)
     command = [sys.executable, "-c", PEAK, str(small), str(large)]
-    samples, kilobytes = subprocess.run(command, capture_output=True, text=True, check=True).stdout.split()
-    assert int(samples) == n
+    told = [subprocess.run(command, capture_output=True, text=True, check=True).stdout.split() for _ in range(2)]
+    assert {int(samples) for samples, _ in told} == {n}
     data = n * 13 * 8 / 1024
-    # The small file has warmed up the blocks of the reader; a second copy of the data would make it 2 or more.
-    assert int(kilobytes) < 1.6 * data
+    # The small file has warmed up the blocks of the reader; a second copy of the data would make it 2 or more. Threads
+    # of the reader that happen to run at once add a little: the smaller of two readings.
+    assert min(int(kilobytes) for _, kilobytes in told) < 1.6 * data
