@@ -11,7 +11,7 @@ from gfimu.diagnosis import diagnose
 from gfimu.geometry.array import AccelerometerArray
 from sim.campaign import Measurement, measure
 from sim.effects import make_effect
-from sim.motion import SpinState
+from sim.motion import SpinState, SplineSpin
 from sim.twin import Twin
 
 DURATION = 14.0
@@ -73,3 +73,23 @@ def test_a_recording_held_out_may_have_corners_too():
     assert [cause.effect for cause in found.causes] == ["eccentricity"]
     assert found.gain.held_out == "another recording"
     assert found.gain.share_of_excess_removed > 0.995
+
+
+@pytest.mark.study
+def test_friction_where_a_table_turns_back_is_no_mode():
+    """A sweep through rest against Coulomb friction: the acceleration jumps wherever the table turns back."""
+    step, friction, drag = 1e-4, 6.0, 0.8  # s, rad/s², 1/s
+    t = np.arange(-1.0, 16.0, step)
+    torque = 30.0 * np.sin(2 * np.pi * (0.2 * t + 0.02 * t**2))
+    rate = np.zeros(len(t))
+    for k in range(1, len(t)):
+        before = rate[k - 1]
+        if before == 0.0 and abs(torque[k]) < friction:
+            continue
+        against = friction * np.sign(before or torque[k])
+        after = before + step * (torque[k] - against - drag * before)
+        rate[k] = 0.0 if before * after < 0.0 else after
+    motion = SplineSpin.through(t[::5], rate[::5])
+    twin = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
+    recording = measure(np.random.default_rng(1), twin, [], Measurement(duration=15.0), motion=motion)
+    assert diagnose([recording], twin).verdict == "nothing_found"

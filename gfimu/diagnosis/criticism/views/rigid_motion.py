@@ -42,7 +42,7 @@ class BandPower:
     Parameters
     ----------
     frequency : ndarray, shape (k,)
-        Middle of each band, Hz.
+        Middle of each band, Hz; what is constant is at the left end.
     chips, array, spin : ndarray, shape (k,)
         Mean power in units of the noise, in the combinations that no motion reaches, in those of the whole array, and
         in those of a spin about the axis; NaN where there is no such combination.
@@ -312,12 +312,12 @@ def _excess(shares: Sequence[_Share], combinations: int) -> tuple[float, float]:
 
 
 def _by_band(parts: Sequence[_Part]) -> BandPower:
-    """Return the mean power by bands of frequency that grow with it."""
+    """Return the mean power by bands of frequency that grow with it, the first of what is constant."""
     part = max(parts, key=lambda one: one.samples)
-    top = part.frequency[-1]
-    edges = np.unique(np.concatenate([[1], np.geomspace(2, len(part.frequency), BINS).astype(int)]))
+    count = len(part.frequency)
+    edges = np.unique(np.concatenate([[0, 1], np.geomspace(2, count, BINS).astype(int)]))
     starts = edges[:-1]
-    frequency = top * np.sqrt(edges[:-1] * edges[1:]) / len(part.frequency)
+    frequency = part.frequency[-1] / count * np.sqrt(np.maximum(starts, 0.5) * edges[1:])
 
     def power(share: _Share) -> NDArray[np.float64]:
         if not share.values.shape[1]:
