@@ -93,9 +93,9 @@ def diagnose(
         try:
             found = _Diagnosis(prepared, kept, model, settings, tell).verdict()
         except np.linalg.LinAlgError as error:
-            told = ", ".join(labels)
+            runs = ", ".join(labels)
             raise InputError(
-                f"{told}: the equations of this run have no solution ({error}); are the readings and the reference of "
+                f"{runs}: the equations of this run have no solution ({error}); are the readings and the reference of "
                 "the same run, in the units that the file says?"
             ) from error
         found = with_place(found, _stretches(model, prepared), prepared.runs, settings)

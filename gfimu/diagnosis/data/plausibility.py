@@ -20,7 +20,7 @@ from gfimu.world_model import WorldModel
 
 __all__ = ["NOISE", "REMOVED", "refuse_implausible"]
 
-_SIGNIFICANT_RMS = 2.0  # of the misfit, in noise units, for a reversed reference
+_REVERSED_RMS = 2.0  # of the misfit, in noise units, for a reversed reference
 REMOVED = 0.8
 """Share of a misfit that another reading of the file removes where it is the right one."""
 _MISSED, _MISSED_VARYING = 0.05, 0.3  # of the power of the readings, and of what varies in them, by one that fits
@@ -83,7 +83,7 @@ def refuse_implausible(
     """
     expected = model.expected_noise(1.0 / run.sample_period)
     misfit = _misfit(run, prediction, expected.white)
-    if misfit.varying < _SIGNIFICANT_RMS**2 and misfit.whole < SIGNIFICANT_RMS**2:
+    if misfit.varying < _REVERSED_RMS**2 and misfit.whole < SIGNIFICANT_RMS**2:
         return
     column = REFERENCE_COLUMNS[model.drive_source]
     _refuse_unrelated(run, prediction, expected.white, column)

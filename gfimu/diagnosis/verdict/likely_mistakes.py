@@ -64,15 +64,15 @@ def likely_mistake(model: WorldModel, runs: Sequence[Run], predict: Predict) -> 
         Predicts the channels (n, c), m/s², of a run by a model that its reference drives.
     """
     white = model.expected_noise(1.0 / runs[0].sample_period).white
-    told = [predict(model, run) for run in runs]
-    before = _Misfit.of(runs, told, white)
+    predictions = [predict(model, run) for run in runs]
+    before = _Misfit.of(runs, predictions, white)
     if before.squares < NOISE:
         return None
     options: list[tuple[str, _Misfit]] = []
     for text, array in _other_arrays(model.array):
         other = model.with_array(array)
         options.append((text, _Misfit.of(runs, [predict(other, run) for run in runs], white)))
-    options += _read_otherwise(model.array, runs, told, white)
+    options += _read_otherwise(model.array, runs, predictions, white)
     least = min(misfit.squares for _, misfit in options)
     if least > (1.0 - REMOVED) * before.squares:
         return None
@@ -89,20 +89,23 @@ class _Misfit:
     rms: float
 
     @classmethod
-    def of(cls, runs: Sequence[Run], told: Sequence[NDArray[np.float64]], white: NDArray[np.float64]) -> _Misfit:
+    def of(cls, runs: Sequence[Run], predictions: Sequence[NDArray[np.float64]], white: NDArray[np.float64]) -> _Misfit:
         error = np.concatenate(
-            [np.where(run.valid, run.readings - one, 0.0) for run, one in zip(runs, told, strict=True)]
+            [np.where(run.valid, run.readings - one, 0.0) for run, one in zip(runs, predictions, strict=True)]
         )
         return cls(float(np.mean((error / white) ** 2)), float(np.sqrt(np.mean(error**2))))
 
 
 def _read_otherwise(
-    array: AccelerometerArray, runs: Sequence[Run], told: Sequence[NDArray[np.float64]], white: NDArray[np.float64]
+    array: AccelerometerArray,
+    runs: Sequence[Run],
+    predictions: Sequence[NDArray[np.float64]],
+    white: NDArray[np.float64],
 ) -> Iterator[tuple[str, _Misfit]]:
     """Yield the best order and signs of the channels, if they are others than those of the array."""
     valid = np.concatenate([run.valid for run in runs])
     readings = np.concatenate([np.where(run.valid, run.readings, 0.0) for run in runs])
-    predicted = np.concatenate(told)
+    predicted = np.concatenate(predictions)
     count = np.maximum(valid.sum(axis=0), 1)[:, None]
     power = np.sum(readings**2, axis=0)[:, None] + valid.T.astype(float) @ predicted**2  # (c, c)
     cross = readings.T @ predicted
@@ -118,7 +121,7 @@ def _read_otherwise(
     changed = np.flatnonzero((its != mine) | (signs < 0.0))
     if not len(changed):
         return
-    starts = np.cumsum([len(one) for one in told])[:-1]
+    starts = np.cumsum([len(one) for one in predictions])[:-1]
     otherwise = np.split(predicted[:, its] * signs, starts)
     yield _order_in_words(array.channels, its, signs, changed), _Misfit.of(runs, otherwise, white)
 

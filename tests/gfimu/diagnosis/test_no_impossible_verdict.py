@@ -1,6 +1,7 @@
 """No impossible verdict: what the gate withdraws, in which words, and what is said where causes explain in part."""
 
 import json
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -14,6 +15,7 @@ from gfimu.diagnosis.report.plain_words import headline
 from gfimu.diagnosis.verdict.naming import capped
 from gfimu.diagnosis.verdict.verdict import NamedCause
 from gfimu.diagnosis.verdict.wording import verdict_sentences
+from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
 from sim.campaign import Measurement, measure, random_profile
@@ -104,3 +106,26 @@ def test_one_channel_with_far_more_slow_noise_is_told(twin):
     quiet = diagnose([run], twin)
     assert quiet.verdict == "nothing_found"
     assert quiet.noise["bias_instability_largest_m_s2"] < 4 * quiet.noise["bias_instability_m_s2"]
+
+
+class Singular:
+    """Stands for a step of the diagnosis whose equations can't be solved."""
+
+    def __call__(self, *_, **__):
+        raise np.linalg.LinAlgError("Eigenvalues did not converge")
+
+
+def test_causes_that_cannot_be_judged_on_held_out_data_do_not_stand(twin, monkeypatch):
+    tilted = make_effect("mount_tilt", {"x_rad": 0.01, "y_rad": 0.0})
+    run = measure(np.random.default_rng(3), twin, [tilted], Measurement(duration=12.0))
+    monkeypatch.setattr(sys.modules["gfimu.diagnosis.diagnose"], "gate_gains", Singular())
+    found = diagnose([run], twin)
+    assert (found.verdict, found.causes) == ("unknown", ())
+    assert "can't be fitted to part of it" in found.unexplained.signature
+
+
+def test_equations_without_a_solution_are_one_line_with_a_remedy(twin, monkeypatch):
+    run = measure(np.random.default_rng(3), twin, [], Measurement(duration=8.0))
+    monkeypatch.setattr(sys.modules["gfimu.diagnosis.diagnose"], "understand_any_length", Singular())
+    with pytest.raises(InputError, match=r"first\.csv: the equations of this run have no solution .*; are the"):
+        diagnose([run], twin, names=["first.csv"])

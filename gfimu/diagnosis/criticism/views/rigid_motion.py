@@ -1,4 +1,4 @@
-"""Whether what a simulation misses is a motion of the whole array, told from its residual without any fit.
+"""Whether what a simulation misses is a motion of the whole array: a test of its residual that needs no fit.
 
 A small motion of the array beside the one that the simulation has, Ω = ω ẑ + δω, changes reading i by
 
@@ -68,11 +68,10 @@ class RigidMotion:
     combinations : int
         How many combinations no motion reaches; 0 where the array has none and can't be tested.
     place : {"", "chips", "array", "spin"}
-        Where the residual is made; empty where that can't be said.
+        Where the residual is made: ``"spin"`` where neither of the others is seen, also where there is nothing; empty
+        where that can't be tested.
     frame : {"", "laboratory", "body"}
         In which frame a motion of the whole array is simpler; empty where that can't be said.
-    simpler : float
-        By how much it is simpler in the laboratory, nats per root of the number of samples.
     power : BandPower
         The same by frequency.
     """
@@ -84,7 +83,6 @@ class RigidMotion:
     combinations: int
     place: str
     frame: str
-    simpler: float
     power: BandPower
 
     @property
@@ -117,8 +115,8 @@ class RigidMotion:
                 f"{_FRAMES[self.frame]}."
             ),
             "spin": (
-                "It is no disagreement of the chips, nor a motion of the array off its axis: look at the reference, "
-                "its timing, or what all chips and their supply have in common."
+                "Neither a disagreement of the chips nor a motion of the array off its axis is seen beyond noise: look "
+                "first at the reference, its timing, and what all chips and their supply have in common."
             ),
         }.get(self.place, "")
 
@@ -164,7 +162,7 @@ def rigid_motion(stretches: Sequence[Stretch], policy: Policy = Policy()) -> Rig
     frame = ""
     if place == "array" and abs(simpler) > policy.excess_stds * _FRAME_SPREAD:
         frame = "laboratory" if simpler > 0.0 else "body"
-    return RigidMotion(*chips, *array, combinations, place, frame, simpler, _by_band(parts))
+    return RigidMotion(*chips, *array, combinations, place, frame, _by_band(parts))
 
 
 def motion_columns(array: AccelerometerArray, mounting: NDArray[np.float64]) -> NDArray[np.float64]:
