@@ -1,8 +1,8 @@
 """Mistakes that are likely where a simulation does not fit at all, and which of them makes it fit.
 
-Channels may be swapped or have the wrong sign, the array file may give lengths in another unit, or the array may be
-another one of the library. None of that is an effect of a part or a rig: it is tried where the sizes found are
-impossible, or where nothing in the library fits.
+The file may have its channels in another order or with other signs than the check of the samples mends, the array file
+may give lengths in another unit, or the array may be another one of the library. None of that is an effect of a part or
+a rig: it is tried where the sizes found are impossible, or where nothing in the library fits.
 """
 
 from __future__ import annotations
@@ -130,13 +130,8 @@ def _order_in_words(
     channels: Sequence[str], its: NDArray[np.intp], signs: NDArray[np.float64], changed: NDArray[np.intp]
 ) -> str:
     """Say which channels read what others, or their opposites, should."""
-    if (its[changed] == changed).all():
-        return f"the sign of {', '.join(channels[place] for place in changed)} is wrong"
-    if (signs[changed] > 0.0).all() and (its[its[changed]] == changed).all():
-        pairs = [f"{channels[place]} and {channels[its[place]]}" for place in changed if place < its[place]]
-        return f"channels {', '.join(pairs)} are swapped"
     reads = [f"{channels[place]} reads {'−' if signs[place] < 0 else ''}{channels[its[place]]}" for place in changed]
-    return f"the order of the channels is wrong ({', '.join(reads)})"
+    return f"the order or the signs of the channels are wrong ({', '.join(reads)})"
 
 
 def _other_arrays(array: AccelerometerArray) -> Iterator[tuple[str, AccelerometerArray]]:
