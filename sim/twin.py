@@ -24,7 +24,7 @@ from gfimu.world_model import BasisUnits, BodyModel, EffectFamily, ExpectedNoise
 from gfimu.world_model import Effect as AnyEffect
 from sim import forward
 from sim.body import body_channels
-from sim.effects import BODY_EFFECTS, EFFECTS, ENCODER_EFFECTS, Effect, apply_effects, make_effect
+from sim.effects import BODY_EFFECTS, ENCODER_EFFECTS, TABLE_EFFECTS, Effect, apply_effects, make_effect
 from sim.effects.unknown import UnknownTerm
 from sim.world import World
 
@@ -199,7 +199,7 @@ class Twin:
 
     def families(self) -> Mapping[str, type[Effect]]:
         """Return the library of effects: those of a table with its kind of reference, or of a free body."""
-        return {"gyro": BODY_EFFECTS, "angle": ENCODER_EFFECTS}.get(self.drive_source, EFFECTS)
+        return {"gyro": BODY_EFFECTS, "angle": ENCODER_EFFECTS}.get(self.drive_source, TABLE_EFFECTS)
 
     def unnamed(self, dependence: str, units: BasisUnits, *, of_reference: bool = False) -> EffectFamily:
         """Return what no effect of the library explains as one more, with a size per channel or one of the reference.
