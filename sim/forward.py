@@ -21,6 +21,7 @@ __all__ = [
     "arm_growth",
     "channels",
     "growing_arms",
+    "lean_states",
     "leaning",
     "nodding_motion",
     "reference",
@@ -164,24 +165,39 @@ def leaning(
     """
     if not world.leans:
         return 0.0
-    here, ahead, behind = (motion.at(t + step) for step in (0.0, _LEAN_STEP, -_LEAN_STEP))
+    here = motion.at(t)
     rate, acceleration = here.rate[:, None], here.acceleration[:, None]
     added = np.zeros((len(t), len(geometry.axes)))
-    upright = np.array([0.0, 0.0, 1.0])
-    cos, sin = np.cos(here.angle), np.sin(here.angle)
-    x, y, z = geometry.up
-    up = np.stack([cos * x + sin * y, cos * y - sin * x, np.full_like(cos, z)], axis=-1)  # (n, 3)
-    for lean in world.leans:
-        now, later, earlier = (lean.function(spin)[:, None] for spin in (here, ahead, behind))
-        first = (later - earlier) / (2.0 * _LEAN_STEP)
-        second = (later - 2.0 * now + earlier) / _LEAN_STEP**2
-        turned = np.cross(lean.vector, geometry.axes)  # (c, 3)
-        moved = np.cross(lean.vector, geometry.places)
-        across, inward = (_along(geometry.axes, vectors) for vectors in _spun(upright, moved))  # (c,)
-        spun, pulled = (_along(turned, vectors) for vectors in _spun(upright, geometry.places))
+    vertical = np.array([0.0, 0.0, 1.0])
+    up = _turned_back(here, geometry.up)
+    for lean, states in zip(world.leans, lean_states(world, motion, t), strict=True):
+        vector = lean.vector / np.linalg.norm(lean.vector)
+        now, first, second = (state[:, None] for state in states)
+        turned = np.cross(vector, geometry.axes)  # (c, 3)
+        moved = np.cross(vector, geometry.places)
+        across, inward = (_along(geometry.axes, vectors) for vectors in _spun(vertical, moved))  # (c,)
+        spun, pulled = (_along(turned, vectors) for vectors in _spun(vertical, geometry.places))
         added += now * (world.gravity * up @ turned.T + acceleration * (spun + across) + rate**2 * (pulled + inward))
         added += first * 2.0 * rate * across + second * _along(geometry.axes, moved)
     return added
+
+
+def lean_states(world: World, motion: SpinMotion, t: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    """Return the angle of every lean about its own line, rad, with its two derivatives, each (3, n)."""
+    found = []
+    for lean in world.leans:
+        size = float(np.linalg.norm(lean.vector))
+        earlier, now, later = (size * lean.function(motion.at(t + step)) for step in (-_LEAN_STEP, 0.0, _LEAN_STEP))
+        first, second = (later - earlier) / (2.0 * _LEAN_STEP), (later - 2.0 * now + earlier) / _LEAN_STEP**2
+        found.append(np.stack([now, first, second]))
+    return found
+
+
+def _turned_back(spin: SpinState, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return vectors of the room, (n, 3) or (3,), in the turning frame, (n, 3)."""
+    cos, sin = np.cos(spin.angle), np.sin(spin.angle)
+    x, y, z = np.broadcast_to(vectors, (len(cos), 3)).T
+    return np.stack([cos * x + sin * y, cos * y - sin * x, z], axis=-1)
 
 
 def _spun(axis: NDArray[np.float64], places: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -201,9 +217,7 @@ def shaking(
     if not world.shakes:
         return 0.0
     total = sum((shake(spin, t) for shake in world.shakes), start=np.zeros((len(t), 3)))
-    cos, sin = np.cos(spin.angle), np.sin(spin.angle)
-    turned = np.stack([cos * total[:, 0] + sin * total[:, 1], cos * total[:, 1] - sin * total[:, 0], total[:, 2]], -1)
-    return turned @ geometry.axes.T
+    return _turned_back(spin, total) @ geometry.axes.T
 
 
 def _mechanical(

@@ -41,15 +41,19 @@ class Dependence:
         Its unit in keys, such as ``"rad3_s3"``; empty for a constant.
     usual : float
         Its value in an ordinary run, in that unit.
-    function : callable
-        The function of the spin, shape (n,).
+    function : callable, optional
+        The function of the spin, shape (n,); None where it is one of something else.
     """
 
     name: str
     words: str
     unit: str
     usual: float
-    function: Callable[[SpinState], NDArray[np.float64]]
+    function: Callable[[SpinState], NDArray[np.float64]] | None = None
+
+    def of(self, spin: SpinState) -> NDArray[np.float64]:
+        """Return the function of a spin, (n,); zeros where it is one of something else."""
+        return np.zeros_like(spin.rate) if self.function is None else self.function(spin)
 
     def key(self, quantity: str) -> str:
         """Return the key of a coefficient: what is changed, per unit of the function."""
@@ -95,7 +99,7 @@ class _OfReference(Unlisted):
 
     def apply(self, world: World) -> World:
         """Add the error to the reading."""
-        size, function = self.value(self.dependence.key("error_rad_s")), self.dependence.function
+        size, function = self.value(self.dependence.key("error_rad_s")), self.dependence.of
         return world.changed(
             reference_steps=(*world.reference_steps, lambda reading, spin, t: reading + size * function(spin))
         )
@@ -148,7 +152,9 @@ class _OfCube(Unlisted):
     def apply(self, world: World) -> World:
         """Let the cube lean."""
         vector = np.array([*self.vector([self.dependence.key(f"{axis}_rad") for axis in "xy"]), 0.0])
-        return world.changed(leans=(*world.leans, Lean(vector, self.dependence.function)))
+        if not vector.any():
+            return world
+        return world.changed(leans=(*world.leans, Lean(vector, self.dependence.of)))
 
 
 class LeanByRateSquared(_OfCube):
@@ -196,7 +202,7 @@ class _OfSupply(Unlisted):
 
     def apply(self, world: World) -> World:
         """Multiply the readings by 1 + ratio · f."""
-        ratio, function = self.value(self.dependence.key("ratio")), self.dependence.function
+        ratio, function = self.value(self.dependence.key("ratio")), self.dependence.of
         return _sensed(world, lambda readings, context: readings * (1.0 + ratio * function(context.spin))[:, None])
 
 
@@ -233,7 +239,7 @@ class GainTemperature(Unlisted):
     grammar_place = "supply"
     needs_temperature = True
     separated_by = "a run in which the temperature changes while the motion does not"
-    dependence = Dependence("T", "temperature", "K", _KELVIN, lambda spin: np.zeros_like(spin.rate))
+    dependence = Dependence("T", "temperature", "K", _KELVIN)
 
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
@@ -272,7 +278,7 @@ class _OfChannels(Unlisted):
 
     def apply(self, world: World) -> World:
         """Add coefficient · f to each reading."""
-        sizes, function = self.per_channel(world.array), self.dependence.function
+        sizes, function = self.per_channel(world.array), self.dependence.of
         return _sensed(world, lambda readings, context: readings + np.outer(function(context.spin), sizes))
 
 
@@ -299,7 +305,7 @@ class Cubic(_OfChannels):
     summary = "a third-order non-linearity per channel"
     of_pose = True
     separated_by = "several speeds, or static poses on all sides"
-    dependence = Dependence("f^3", "reading³", "m3_s6", _RATE**3, lambda spin: spin.rate**3)
+    dependence = Dependence("f^3", "reading³", "m3_s6", _RATE**3)
 
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
@@ -323,7 +329,7 @@ class LaggedTemperature(_OfChannels):
     separated_by = "a run in which the temperature changes while the motion does not"
     shape_limits: ClassVar = {"time_constant_s": (0.5, 1e4)}
     other_units: ClassVar = {"time_constant_s": "s"}
-    dependence = Dependence("T lagged", "lagged temperature", "K", _KELVIN, lambda spin: np.zeros_like(spin.rate))
+    dependence = Dependence("T lagged", "lagged temperature", "K", _KELVIN)
 
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:

@@ -54,6 +54,9 @@ class NamedCause:
         One sentence: where and how it shows.
     log_odds : float
         Log odds of the explanation with this cause against the best one without it.
+    unlisted : mapping of str to str
+        Of an effect that the contract has no name for: its ``place`` in the chain, the ``dependence`` on the motion and
+        the ``pattern`` of its sizes. Empty for all others.
     """
 
     effect: str
@@ -65,6 +68,7 @@ class NamedCause:
     would_be_separated_by: str = ""
     why: str = ""
     log_odds: float = 0.0
+    unlisted: Mapping[str, str] = field(default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON form of the contract."""
@@ -81,6 +85,7 @@ class NamedCause:
             "would_be_separated_by": self.would_be_separated_by,
             "why": self.why,
             "log_odds": self.log_odds,
+            **({"effect": "unlisted", "name": self.effect, **self.unlisted} if self.unlisted else {}),
         }
 
 
