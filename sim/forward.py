@@ -216,7 +216,7 @@ def shaking(
     """Return what accelerations of the whole rig in the room add to the readings, shape (n, c), m/s²; 0 without."""
     if not world.shakes:
         return 0.0
-    total = sum((shake(spin, t) for shake in world.shakes), start=np.zeros((len(t), 3)))
+    total = np.sum([shake(spin, t) for shake in world.shakes], axis=0)
     return _turned_back(spin, total) @ geometry.axes.T
 
 

@@ -309,15 +309,12 @@ def _free_state(body: BodyState) -> tuple[NDArray[np.float64], NDArray[np.float6
     )
 
 
-def _gravity(
-    world: World, motion: SpinMotion | BodyMotion, t: NDArray[np.float64]
-) -> NDArray[np.float64] | None:
+def _gravity(world: World, motion: SpinMotion | BodyMotion, t: NDArray[np.float64]) -> NDArray[np.float64] | None:
     """Return gravity as a rig feels it that is shaken in the room, (n, 3), m/s²; None where nothing shakes it."""
     if not world.shakes:
         return None
     spin = cast("SpinMotion", motion).at(t)
-    shaken = sum((shake(spin, t) for shake in world.shakes), start=np.zeros((len(t), 3)))
-    return np.array([0.0, 0.0, -world.gravity]) - shaken
+    return np.array([0.0, 0.0, -world.gravity]) - np.sum([shake(spin, t) for shake in world.shakes], axis=0)
 
 
 def _inverse(

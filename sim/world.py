@@ -67,9 +67,7 @@ class SensingStep(Protocol):
 class ReferenceStep(Protocol):
     """A change of the reference (tachometer) between the table and the file."""
 
-    def __call__(
-        self, reading: NDArray[np.float64], spin: SpinState, t: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def __call__(self, reading: NDArray[np.float64], spin: SpinState, t: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the changed reference reading, shape (n,), rad/s; ``spin`` is the table's at these times ``t``, s."""
         ...
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from gfimu.diagnosis.criticism.coincidence.bound_numbers import coincidences
+from gfimu.diagnosis.criticism.coincidence.bound_numbers import Coincidence, coincidences
 from gfimu.diagnosis.criticism.gain import Gain
 from gfimu.diagnosis.criticism.holdout import Holdout, gate_gains, held_out_gain, other_recordings, split
 from gfimu.diagnosis.criticism.lack_of_fit import LackOfFit, lack_of_fit
@@ -26,6 +26,7 @@ from gfimu.diagnosis.search.long_run import understand_any_length
 from gfimu.diagnosis.search.nuisance_models import Understanding
 from gfimu.diagnosis.verdict.conclude import Described, conclude, is_dominant, is_unknown, named_causes
 from gfimu.diagnosis.verdict.gate import impossible_sizes, judge, measurable
+from gfimu.diagnosis.verdict.library import LibraryEvidence, with_library
 from gfimu.diagnosis.verdict.naming import conflicting
 from gfimu.diagnosis.verdict.place import with_place
 from gfimu.diagnosis.verdict.sample_notes import with_sample_notes
@@ -145,8 +146,8 @@ class _Diagnosis:
         understanding, left = self._apart_from_the_rest(understanding)
         withdrawn: list[str] = []
         bound = self._coincidence(understanding.explanation)
-        if bound:
-            return self._described(understanding, left, withdrawn, bound)
+        if bound is not None and bound.log_odds > policy.steady:
+            return self._described(understanding, left, withdrawn, bound.sentence)
         gain = Gain()
         if not is_dominant(understanding.explanation, left, policy):
             tell(0.92, "hold out")
@@ -170,9 +171,19 @@ class _Diagnosis:
         if refuted:
             return self._described(understanding, left, withdrawn, refuted)
         told = measurable(gain)
-        if told is gain:
-            return found
-        return conclude(self._prepared, understanding, left, told, policy, withdrawn=withdrawn)
+        if told is not gain:
+            found = conclude(self._prepared, understanding, left, told, policy, withdrawn=withdrawn)
+        return self._doubted(found, understanding.explanation)
+
+    def _doubted(self, found: Diagnosis, explanation: Explanation) -> Diagnosis:
+        """Return a verdict whose probabilities include that the truth is outside the library."""
+        bound = self._coincidence(explanation)
+        confirmed = self._kept is not None and found.gain.share_of_excess_removed >= 1.0 - self._policy.small
+        nats = float("nan") if bound is None else bound.log_odds
+        evidence = LibraryEvidence(float(np.nan_to_num(nats)), found.unexplained.log_odds, confirmed)
+        fits = [explanation.best, *conflicting(explanation, self._policy)]
+        shapes = {cause.name: tuple(cause.shape) for fit in fits for cause in fit.causes}
+        return with_library(replace(found, coincidence=nats), evidence, shapes, self._policy)
 
     def _apart_from_the_rest(self, understanding: Understanding) -> tuple[Understanding, LackOfFit]:
         """Drop causes that explain less than what no cause explains: they would be made of it.
@@ -233,14 +244,14 @@ class _Diagnosis:
         label = "blocks of the recording, odd and even from each other" if self._kept is None else "another recording"
         return held_out_gain(fit.causes, self._pairs(explanation, fit), self._policy, label=label)
 
-    def _coincidence(self, explanation: Explanation) -> str:
-        """Return what binds the numbers of the causes that nothing should bind; empty where nothing does."""
+    def _coincidence(self, explanation: Explanation) -> Coincidence | None:
+        """Return what most likely binds the numbers of the causes that nothing should bind; None where nothing can."""
         first = explanation.stretches[0]
         if isinstance(first, BodyStretch):  # its motion has no arms that all recordings share
-            return ""
+            return None
         mounting = Rotation.from_rotvec(first.run.mounting).as_matrix()
         found = coincidences(explanation.best, self._model.array, mounting)
-        return found[0].sentence if found and found[0].log_odds > self._policy.steady else ""
+        return found[0] if found else None
 
     def _impossible(self, explanation: Explanation) -> str:
         """Return the signature where every set that the data can't tell apart holds a size beyond physics."""

@@ -67,10 +67,9 @@ EFFECTS: dict[str, type[Effect]] = {
 }
 """Every effect of a rig on its table in the contract's first table, by its name there."""
 
-FURTHER_EFFECTS: dict[str, type[Effect]] = {
-    effect.name: effect
-    for effect in (rig.TachoLag, body.ChipDelay, rig.ChipLag, rig.BearingShake, rig.BenchSway, *UNLISTED.values())
-}
+_OF_RIG: tuple[type[Effect], ...] = (rig.TachoLag, body.ChipDelay, rig.ChipLag, rig.BearingShake, rig.BenchSway)
+
+FURTHER_EFFECTS: dict[str, type[Effect]] = {**{effect.name: effect for effect in _OF_RIG}, **UNLISTED}
 """What a rig on its table may have besides: further effects with a name, and the points of the grammar."""
 
 NOT_OF_A_BODY: dict[str, str] = {

@@ -39,9 +39,7 @@ class TachoLag(Effect):
         """Pass the reference through the low pass."""
         tau = self.value("time_constant_s")
 
-        def step(
-            reading: NDArray[np.float64], spin: SpinState, t: NDArray[np.float64]
-        ) -> NDArray[np.float64]:
+        def step(reading: NDArray[np.float64], spin: SpinState, t: NDArray[np.float64]) -> NDArray[np.float64]:
             return low_pass(reading[:, None], t, tau)[:, 0]
 
         return world.changed(reference_steps=(*world.reference_steps, step)) if tau > 0.0 else world

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.geometry.array import AccelerometerArray
-from gfimu.units import RATIO, STANDARD_GRAVITY
+from gfimu.units import STANDARD_GRAVITY
 from gfimu.world_model import SpinState
 from sim.effects.base import LARGEST_TURN, Effect, Pattern, Size, channel_patterns
 from sim.effects.low_pass import low_pass
@@ -68,7 +68,9 @@ CONSTANT = Dependence("1", "a constant", "", 1.0, lambda spin: np.ones_like(spin
 SPEED = Dependence("|omega|", "|rate|", "rad_s", _RATE, lambda spin: np.abs(spin.rate))
 RATE = Dependence("omega", "rate", "rad_s", _RATE, lambda spin: spin.rate)
 RATE_SQUARED = Dependence("omega^2", "rate²", "rad2_s2", _RATE**2, lambda spin: spin.rate**2)
-SIGNED_SQUARE = Dependence("omega|omega|", "rate · |rate|", "rad2_s2", _RATE**2, lambda spin: spin.rate * abs(spin.rate))
+SIGNED_SQUARE = Dependence(
+    "omega|omega|", "rate · |rate|", "rad2_s2", _RATE**2, lambda spin: spin.rate * abs(spin.rate)
+)
 RATE_CUBED = Dependence("omega^3", "rate³", "rad3_s3", _RATE**3, lambda spin: spin.rate**3)
 ACCELERATION = Dependence("alpha", "angular acceleration", "rad_s2", _ACCELERATION, lambda spin: spin.acceleration)
 LOAD = Dependence("|alpha|", "|angular acceleration|", "rad_s2", _ACCELERATION, lambda spin: np.abs(spin.acceleration))
@@ -249,7 +251,9 @@ class GainTemperature(Unlisted):
     def apply(self, world: World) -> World:
         """Multiply the readings by 1 + ratio · (T − 25 °C)."""
         ratio = self.value("ratio_per_K")
-        return _sensed(world, lambda readings, context: readings * (1.0 + ratio * (context.temperature - 25.0))[:, None])
+        return _sensed(
+            world, lambda readings, context: readings * (1.0 + ratio * (context.temperature - 25.0))[:, None]
+        )
 
 
 class _OfChannels(Unlisted):

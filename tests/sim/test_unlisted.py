@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scipy.signal import lti, lsim
+from scipy.signal import lsim, lti
 
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray

@@ -170,7 +170,11 @@ def name_cause(
     parameters, std = cause_parameters(cause, array)
     same = mimics(explanation, cause, policy) if fit is explanation.best else []
     without = explanation.without.get(cause.name)
-    why = _sentence(cause, array, share) + _at_most(explanation, fit, cause) + _or_other_nuisances(explanation, cause, policy)
+    why = (
+        _sentence(cause, array, share)
+        + _at_most(explanation, fit, cause)
+        + _or_other_nuisances(explanation, cause, policy)
+    )
     named = NamedCause(
         cause.name,
         parameters,

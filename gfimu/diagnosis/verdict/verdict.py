@@ -200,6 +200,11 @@ class Diagnosis:
         key) and ``text``.
     rigid : RigidMotion, optional
         Whether the residual of the given simulation is a motion of the whole array; None for a free body.
+    library_probability : float
+        Probability that the causes are the truth and imitate nothing outside the library, the least of them; it is in
+        their own probabilities. NaN where no cause was inferred.
+    coincidence : float
+        Log odds of the likeliest pattern that binds the free numbers of the causes, nats; NaN where none can be tested.
     """
 
     verdict: str
@@ -214,6 +219,8 @@ class Diagnosis:
     noise: Mapping[str, Any]
     undetermined: tuple[Mapping[str, Any], ...] = ()
     rigid: RigidMotion | None = None
+    library_probability: float = float("nan")
+    coincidence: float = float("nan")
 
     @property
     def in_part(self) -> bool:
@@ -238,6 +245,8 @@ class Diagnosis:
             "format_version": FORMAT_VERSION,
             "verdict": self.verdict,
             "in_part": self.in_part,
+            "library_probability": self.library_probability,
+            "coincidence_nats": self.coincidence,
             "sentences": list(self.sentences),
             "causes": [cause.to_dict() for cause in self.causes],
             "residual": {
