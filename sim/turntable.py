@@ -284,9 +284,9 @@ def _table_state(
         place = model.joint(_NOD_JOINT).dofadr[0]
         lean = (part @ _nod_axis(world) for part in world.nod.lean(spin))
         position[:, place], velocity[:, place], acceleration[:, place] = lean
-    for number, lean in enumerate(leaning):
+    for number, state in enumerate(leaning):
         place = model.joint(f"{_LEAN_JOINT}{number}").dofadr[0]
-        position[:, place], velocity[:, place], acceleration[:, place] = lean
+        position[:, place], velocity[:, place], acceleration[:, place] = state
     if world.stretch:
         # Unless the arms are said to move, their own velocity is left out, as in the forward model.
         centre = Rotation.from_rotvec(world.mount_rotvec).inv().apply(world.cube_offset)
@@ -314,7 +314,8 @@ def _gravity(world: World, motion: SpinMotion | BodyMotion, t: NDArray[np.float6
     if not world.shakes:
         return None
     spin = cast("SpinMotion", motion).at(t)
-    return np.array([0.0, 0.0, -world.gravity]) - np.sum([shake(spin, t) for shake in world.shakes], axis=0)
+    shaken = np.sum([shake(spin, t) for shake in world.shakes], axis=0)
+    return np.asarray(np.array([0.0, 0.0, -world.gravity]) - shaken)
 
 
 def _inverse(

@@ -178,7 +178,7 @@ class _Diagnosis:
     def _doubted(self, found: Diagnosis, explanation: Explanation) -> Diagnosis:
         """Return a verdict whose probabilities include that the truth is outside the library."""
         bound = self._coincidence(explanation)
-        confirmed = self._kept is not None and found.gain.share_of_excess_removed >= 1.0 - self._policy.small
+        confirmed = found.gain.of_other_recording and found.gain.share_of_excess_removed >= 1.0 - self._policy.small
         nats = float("nan") if bound is None else bound.log_odds
         evidence = LibraryEvidence(float(np.nan_to_num(nats)), found.unexplained.log_odds, confirmed)
         fits = [explanation.best, *conflicting(explanation, self._policy)]
@@ -242,7 +242,8 @@ class _Diagnosis:
         if not found:
             return Gain()
         label = "blocks of the recording, odd and even from each other" if self._kept is None else "another recording"
-        return held_out_gain(fit.causes, self._pairs(explanation, fit), self._policy, label=label)
+        gain = held_out_gain(fit.causes, self._pairs(explanation, fit), self._policy, label=label)
+        return replace(gain, of_other_recording=self._kept is not None)
 
     def _coincidence(self, explanation: Explanation) -> Coincidence | None:
         """Return what most likely binds the numbers of the causes that nothing should bind; None where nothing can."""

@@ -104,7 +104,7 @@ class Effect(ABC):
     level_error: ClassVar[float] = 0.0
     """Standard deviation to which a level of a reading is found at best, in units of the reading's white noise."""
     of_one_recording: ClassVar[bool] = False
-    """True where its phase is that of a clock no other recording shares: it does not predict another one."""
+    """True where it goes with absolute time, of which no other recording needs to share phase or start."""
     of_wiring: ClassVar[bool] = False
     """True for a fault of the samples that changes a prediction without noise: it carries readings elsewhere or scales
     them."""

@@ -1,4 +1,4 @@
-"""A first-order low pass of sampled series: bandwidth of a sensing chain, of a chip, of a tachometer, of a temperature."""
+"""A first-order low pass of sampled series: of a sensing chain, a chip, a tachometer or a temperature."""
 
 from __future__ import annotations
 

@@ -84,7 +84,7 @@ class ChipLag(Effect):
 
 
 class BearingShake(Effect):
-    """The table shakes up and down so many times per revolution, harder with the rate: balls of a bearing, gear teeth."""
+    """The table shakes up and down so many times per revolution, as balls of a bearing or gear teeth make it."""
 
     name = "bearing_shake"
     summary = "the table shakes up and down so many times per revolution, in proportion to the rate"

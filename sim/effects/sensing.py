@@ -153,6 +153,7 @@ class WarmUp(_PerChannel):
     unit = "m/s²"
     prior_std = 10 * _MG
     alike_by_lot = True
+    of_one_recording = True
     shape_limits: ClassVar = {"time_constant_s": (1.0, 1e5)}
     separated_by = "a cold start followed by a long rest, or a longer run"
     other_units: ClassVar = {"time_constant_s": "s"}

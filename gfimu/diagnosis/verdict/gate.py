@@ -70,7 +70,11 @@ def measurable(gain: Gain) -> Gain:
     There the error may rise as well as fall by chance, and says nothing.
     """
     rises = gain.log_likelihood_per_sample < 0.0 or gain.rms_after > gain.rms_before
-    return Gain(gain.held_out) if rises and np.isnan(gain.share_of_excess_removed) else gain
+    return (
+        Gain(gain.held_out, of_other_recording=gain.of_other_recording)
+        if rises and np.isnan(gain.share_of_excess_removed)
+        else gain
+    )
 
 
 def _held_out_figure(gain: Gain, policy: Policy) -> str:

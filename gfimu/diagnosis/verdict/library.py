@@ -139,5 +139,5 @@ def with_library(
 
 def _sentence(least: float, evidence: LibraryEvidence) -> str:
     """Say how likely it is that the truth is among the effects that were tried, and what would tell."""
-    told = f"That what is named is the truth, and no imitation of something the library lacks, has a probability of {least:.0%}"
+    told = f"That what is named is the truth and imitates nothing outside the library has a probability of {least:.0%}"
     return told if evidence.confirmed else f"{told}; another recording, with another motion, would test it (--held-out)"
