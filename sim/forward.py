@@ -131,8 +131,14 @@ def _nodding_readings(
     omega, alpha, gravity = turn.apply(omega), turn.apply(alpha), turn.apply(gravity)
     x, y, z = omega.T
     products = np.stack([x * x, y * y, z * z, x * y, x * z, y * z], axis=-1)  # (n, 6)
-    arm = alpha @ placed.tangential.T + products @ placed.centripetal.T
-    return gravity @ placed.axes.T + arm * np.reshape(stretch, (-1, 1))
+    readings = gravity @ placed.axes.T + alpha @ placed.tangential.T + products @ placed.centripetal.T
+    if not world.stretch:
+        return readings
+    # Arms are longer across the axis alone: α × r and ω × (ω × r) of that part of them, along each sensing axis.
+    across, axes = placed.places * [1.0, 1.0, 0.0], placed.axes
+    along = np.sum(omega**2, axis=1)[:, None] * _along(axes, across)
+    longer = alpha @ np.cross(across, axes).T + (omega @ across.T) * (omega @ axes.T) - along
+    return readings + (np.reshape(stretch, (-1, 1)) - 1.0) * longer
 
 
 def arm_growth(world: World, motion: SpinMotion, t: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
@@ -151,7 +157,7 @@ def growing_arms(
     if not (world.moving_arms and world.stretch):
         return 0.0
     first, second = arm_growth(world, motion, t)
-    along = -0.5 * geometry.centripetal[:, :3].sum(axis=1)  # r · a of each sensing axis a
+    along = -geometry.centripetal[:, 2]  # r · a across the axis, of each sensing axis a: the load is radial
     return np.outer(2 * motion.at(t).rate * first, geometry.tangential[:, 2]) + np.outer(second, along)
 
 

@@ -192,9 +192,15 @@ def _turntable(world: World) -> mujoco.MjSpec:
     for number, lean in enumerate(world.leans):
         axis = mount.inv().apply(lean.vector / np.linalg.norm(lean.vector))
         cube.add_joint(name=f"{_LEAN_JOINT}{number}", type=mujoco.mjtJoint.mjJNT_HINGE, axis=axis, pos=foot)
-    _fit_chips(spec, world.array, arms if world.stretch else None)
+    _fit_chips(spec, world.array, _across(arms, mount) if world.stretch else None)
     spec.option.gravity = [0.0, 0.0, -world.gravity]
     return spec
+
+
+def _across(arms: NDArray[np.float64], mount: Rotation) -> NDArray[np.float64]:
+    """Return the parts of arms (k, 3), in cube axes, across the axis of the table: there the load is."""
+    axis = mount.inv().apply([0.0, 0.0, 1.0])
+    return np.asarray(arms - np.outer(arms @ axis, axis))
 
 
 def _nod_axis(world: World) -> NDArray[np.float64]:
@@ -289,9 +295,9 @@ def _table_state(
         position[:, place], velocity[:, place], acceleration[:, place] = state
     if world.stretch:
         # Unless the arms are said to move, their own velocity is left out, as in the forward model.
-        centre = Rotation.from_rotvec(world.mount_rotvec).inv().apply(world.cube_offset)
-        for chip in world.array.chips:
-            arm = float(np.linalg.norm(centre + chip.position))
+        mount = Rotation.from_rotvec(world.mount_rotvec)
+        arms = _across(mount.inv().apply(world.cube_offset) + world.array.chip_positions, mount)
+        for chip, arm in zip(world.array.chips, np.linalg.norm(arms, axis=1), strict=True):
             if arm:
                 place = model.joint(f"stretch_{chip.name}").dofadr[0]
                 position[:, place] = arm * world.stretch * spin.rate**2

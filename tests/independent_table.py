@@ -159,7 +159,8 @@ def differenced_readings(rig, t, angle, rate):
     if amplitude:
         nod = np.outer(amplitude * np.cos(angle + phase), [np.cos(azimuth), np.sin(azimuth), 0.0])
         frame = Rotation.from_rotvec(nod).as_matrix() @ frame
-    arms = rig.arms[None] * (1.0 + rig.stretch * rate**2)[:, None, None]
+    grown = (1.0 + rig.stretch * rate**2)[:, None] * [1.0, 1.0, 0.0] + [0.0, 0.0, 1.0]  # the load is radial
+    arms = rig.arms[None] * grown[:, None, :]
     to_rig = frame.transpose(0, 2, 1)
     positions = arms @ to_rig  # (n, 4, 3)
     h = t[1] - t[0]

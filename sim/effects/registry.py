@@ -67,7 +67,10 @@ EFFECTS: dict[str, type[Effect]] = {
 }
 """Every effect of a rig on its table in the contract's first table, by its name there."""
 
-_OF_RIG: tuple[type[Effect], ...] = (rig.TachoLag, body.ChipDelay, rig.ChipLag, rig.BearingShake, rig.BenchSway)
+_OF_RIG: tuple[type[Effect], ...] = (
+    *(rig.TachoLag, body.ChipDelay, rig.ChipLag, rig.BearingShake, rig.BenchSway),
+    sensing.ColdStart,
+)
 
 FURTHER_EFFECTS: dict[str, type[Effect]] = {**{effect.name: effect for effect in _OF_RIG}, **UNLISTED}
 """What a rig on its table may have besides: further effects with a name, and the points of the grammar."""
@@ -130,7 +133,7 @@ def make_effect(
 _CHAIN = (
     *("sensor_position", "misalignment", "mount_tilt", "eccentricity", "centrifugal_flex", "table_tilt", "axis_wobble"),
     *("cross_axis", "scale_factor", "gain_drift", "quadratic", "vibration_rectification", "hysteresis"),
-    *("bias", "bias_temperature", "warm_up", "interference_tone", "sensor_lag", "unknown"),
+    *("bias", "bias_temperature", "warm_up", "cold_start", "interference_tone", "sensor_lag", "unknown"),
 )
 
 

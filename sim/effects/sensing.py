@@ -18,6 +18,7 @@ from sim.world import SensingStep, World
 __all__ = [
     "Bias",
     "BiasTemperature",
+    "ColdStart",
     "CrossAxis",
     "GainDrift",
     "Hysteresis",
@@ -169,6 +170,26 @@ class WarmUp(_PerChannel):
         tau = max(self.value("time_constant_s", 20.0), 1e-3)
         return _with_step(
             world, lambda readings, context: readings - np.outer(np.expm1(-world.since_start(context.t) / tau), offset)
+        )
+
+
+class ColdStart(WarmUp):
+    """Offsets that decay from power-on: a unit that was calibrated warm and starts cold."""
+
+    name = "cold_start"
+    summary = "offsets decay exponentially after power-on (calibrated warm, started cold)"
+
+    @classmethod
+    def shapes(cls, duration: float, sample_rate: float) -> tuple[dict[str, float], ...]:
+        """Return time constants from a fraction of the run to most of it."""
+        return tuple({"time_constant_s": float(tau)} for tau in duration * np.array([0.05, 0.2, 0.7]))
+
+    def apply(self, world: World) -> World:
+        """Add offset · exp(−t/τ)."""
+        offset = self.per_channel(world.array)
+        tau = max(self.value("time_constant_s", 20.0), 1e-3)
+        return _with_step(
+            world, lambda readings, context: readings + np.outer(np.exp(-world.since_start(context.t) / tau), offset)
         )
 
 
