@@ -6,7 +6,7 @@ Estimation and diagnosis know no more of a simulation than this. `sim.twin.Twin`
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
@@ -34,6 +34,7 @@ __all__ = [
     "is_of_one_recording",
     "is_of_wiring",
     "memory_of",
+    "prior_of",
     "shapes_to_screen",
 ]
 
@@ -136,6 +137,12 @@ def is_of_wiring(effect: Effect) -> bool:
     return bool(getattr(effect, "of_wiring", False))
 
 
+def prior_of(family: EffectFamily, families: Iterable[EffectFamily]) -> float:
+    """Return the prior probability of one kind of effect among several, of which some are rarer (``rarity``)."""
+    total = sum(1.0 / float(getattr(one, "rarity", 1.0)) for one in families)
+    return 1.0 / (float(getattr(family, "rarity", 1.0)) * total)
+
+
 def memory_of(effect: Effect) -> float:
     """Return how long a reading depends on the drive before it by an effect, s; others need not say so."""
     return float(getattr(effect, "memory_s", 0.0))
@@ -149,8 +156,9 @@ class EffectFamily(Protocol):
     of each size), ``of_one_recording``, ``of_wiring`` (`is_of_wiring`), ``of_pose`` (it depends on the specific force
     alone), ``alike_by_lot`` (chips of one lot have nearly the same sizes), ``contained_in`` (effects that can do all
     that it does), ``level_error`` (to which a level of a reading is found at best, in units of its white noise),
-    ``memory_s`` and, of a fault of the samples, ``channel_order`` of an effect, ``scan`` (`shapes_to_screen`), and of a
-    point of a grammar that has no name of its own ``grammar_place`` and ``dependence`` (`Dependence`).
+    ``memory_s``, ``rarity`` (`prior_of`) and, of a fault of the samples, ``channel_order`` of an effect, ``scan``
+    (`shapes_to_screen`), and of a point of a grammar that has no name of its own ``grammar_place`` and ``dependence``
+    (`Dependence`).
     """
 
     @property

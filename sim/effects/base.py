@@ -115,6 +115,9 @@ class Effect(ABC):
     contained_in: ClassVar[frozenset[str]] = frozenset()
     """Effects that can do all that it does: beside one of them it has no size of its own."""
 
+    rarity: ClassVar[float] = 1.0
+    """How many times rarer it is than a usual effect, before any data."""
+
     def __init__(self, parameters: Mapping[str, Any]) -> None:
         self.parameters: dict[str, Any] = dict(parameters)
 

@@ -19,6 +19,7 @@ from sim.world import SampleContext, World
 __all__ = ["BearingShake", "BenchSway", "ChipLag", "TachoLag"]
 
 _LEAST_RATIO, _MOST_RATIO = 0.2, 20.0  # cycles per revolution
+_RARE = 10.0  # times rarer than the effects that every rig may have, by choice
 _GRID = 2e-3  # s, on which a mode is simulated
 
 
@@ -28,6 +29,7 @@ class TachoLag(Effect):
     name = "tacho_lag"
     summary = "the reference has a first-order low pass of its own"
     place = "reference"
+    rarity = _RARE
     separated_by = "a fast chirp of the rate"
 
     @classmethod
@@ -51,6 +53,7 @@ class ChipLag(Effect):
     name = "chip_lag"
     summary = "chips have first-order lags of their own (another output data rate)"
     place = "sensing"
+    rarity = _RARE
     separated_by = "faster changes of the specific force"
 
     @classmethod
@@ -89,6 +92,7 @@ class BearingShake(Effect):
     name = "bearing_shake"
     summary = "the table shakes up and down so many times per revolution, in proportion to the rate"
     place = "geometry"
+    rarity = _RARE
     separated_by = "slow and fast steady rotation: the frequency of the shaking follows the rate"
     other_units: ClassVar = {"amplitude_m_s2_per_rad_s": "m/s²/(rad/s)", "order": NUMBER, "phase_rad": "rad"}
     shape_limits: ClassVar = {"order": (_LEAST_RATIO, _MOST_RATIO)}
@@ -176,6 +180,7 @@ class BenchSway(Effect):
     name = "bench_sway"
     summary = "the bench sways at a mode of its own under a rotating unbalance"
     place = "geometry"
+    rarity = _RARE
     separated_by = "slow steady rotation through the speed at which the bench sways most"
     other_units: ClassVar = {"frequency_hz": "Hz", "damping_ratio": RATIO}
     shape_limits: ClassVar = {"damping_ratio": (5e-3, 0.3), "frequency_hz": (0.3, 100.0)}
