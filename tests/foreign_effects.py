@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from independent_effects import CHANNELS, MG, G, WHITE, _phase, _sign, _some_channels, _turning_channel, _vector
+from independent_effects import CHANNELS, MG, WHITE, G, _phase, _sign, _some_channels, _turning_channel, _vector
 from independent_table import Rig, read_positions
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import gaussian_filter1d, uniform_filter1d
@@ -69,8 +69,8 @@ class Places:
 class Foreign:
     """An effect: stage in the chain, place, dependence in words, draw(rng, plan) of its parameters at a typical size.
 
-    ``shape`` are the parameters that no scaling touches, ``kin`` effects of a library that are the same physics.
-    Those without a continuous size are ``sizeless``.
+    ``shape`` are the parameters that no scaling touches, ``most`` is how large one of the others gets in practice,
+    ``kin`` are names of a library that would be no wrong answer. Those without a continuous size are ``sizeless``.
     """
 
     stage: str
@@ -79,13 +79,17 @@ class Foreign:
     draw: Callable
     act: Callable
     shape: tuple[str, ...] = ()
+    most: tuple[str, float] | None = None
     kin: tuple[str, ...] = ()
     sizeless: bool = False
 
     def scaled(self, parameters, factor):
-        """Return the parameters with the size multiplied."""
+        """Return the parameters with the size multiplied, as far as it gets in practice."""
         if self.sizeless:
             return parameters
+        if self.most:
+            key, most = self.most
+            factor = min(factor, most / abs(parameters[key]))
         return {key: value if key in self.shape else value * factor for key, value in parameters.items()}
 
 
@@ -184,6 +188,24 @@ def bench_sway(one, run, places):
 @_foreign(
     "places",
     "bench",
+    "time: the bench sinks on soft feet, so that the axis leans over in the lab and settles",
+    lambda rng, plan: {
+        "lean_rad": 2e-3,
+        "azimuth_rad": _azimuth(rng),
+        "time_constant_s": float(plan.duration * rng.uniform(0.1, 0.6)),
+    },
+    shape=("azimuth_rad", "time_constant_s"),
+    kin=("table_tilt",),
+)
+def sinking_bench(one, run, places):
+    sunk = one["lean_rad"] * -np.expm1(-np.maximum(run.t - run.t[0], 0.0) / one["time_constant_s"])
+    behind = one["azimuth_rad"] - run.angle  # a fixed direction of the lab, seen from the table
+    return places.turned(sunk[:, None] * np.stack([np.cos(behind), np.sin(behind), 0 * sunk], axis=1))
+
+
+@_foreign(
+    "places",
+    "bench",
     "time, by chance, in a band of frequencies: shaking of the floor along fixed directions of the lab",
     lambda rng, plan: {
         **{f"{axis}_m_s2": MG * rng.uniform(1.0, 3.0) for axis in "xyz"},
@@ -267,7 +289,7 @@ def lean_with_turns(one, run, places):
     "places",
     "cube",
     "mode of the cube on its foot, driven by the angular acceleration: it rocks about a horizontal line of the table",
-    lambda rng, plan: {"gain": 0.1 * _sign(rng), "azimuth_rad": _azimuth(rng), **_mode(rng, 5.0, 18.0)},
+    lambda rng, plan: {"gain": 0.1 * _sign(rng), "azimuth_rad": _azimuth(rng), **_mode(rng, 3.0, 9.0)},
     shape=("azimuth_rad", *_MODE),
 )
 def rocking_foot(one, run, places):
@@ -289,7 +311,7 @@ def stretch_in_plane(one, run, places):
 @_foreign(
     "places",
     "chip",
-    "own specific force through a mode with a dead band: a chip rattles along one of its axes in a loose solder joint",
+    "own specific force through a mode with a dead band: a chip rattles along one of its axes on a loose screw",
     lambda rng, plan: {"channel": _turning_channel(rng), "gap_m": 5e-5, "frequency_hz": float(rng.uniform(50, 90))},
     shape=("channel", "frequency_hz"),
 )
@@ -353,6 +375,17 @@ def chip_crosstalk(one, run, readings):
 def supply_sag(one, run, readings):
     sag = one["per_rate_s_rad"] * np.abs(run.rate) + one["per_acceleration_s2_rad"] * np.abs(run.acceleration)
     return readings * (1.0 - sag)[:, None]
+
+
+@_foreign(
+    "analogue",
+    "supply",
+    "waves of the angle, common to all gains: the slip ring's contact is worse on one side",
+    lambda rng, plan: {"amplitude": 5e-3, "order": float(rng.integers(1, 4)), "phase_rad": _phase(rng)},
+    shape=("order", "phase_rad"),
+)
+def slip_ring(one, run, readings):
+    return readings * (1.0 + one["amplitude"] * np.cos(one["order"] * run.angle + one["phase_rad"]))[:, None]
 
 
 @_foreign(
@@ -430,6 +463,7 @@ def turn_on_bias(one, run, readings):
     "first-order lag of one chip alone",
     lambda rng, plan: {"chip": f"a{rng.integers(1, 5)}", "time_constant_s": 3e-3},
     shape=("chip",),
+    most=("time_constant_s", 0.05),
 )
 def chip_lag(one, run, readings):
     out, mine = readings.copy(), _channels_of(one["chip"])
@@ -467,6 +501,17 @@ def tacho_offset(one, run, reading):
 @_foreign(
     "reference",
     "reference",
+    "the rate's being small: below a least rate the tachometer reads nothing",
+    lambda rng, plan: {"least_rad_s": 0.5},
+    most=("least_rad_s", 5.0),
+)
+def tacho_dead_band(one, run, reading):
+    return np.where(np.abs(reading) < one["least_rad_s"], 0.0, reading)
+
+
+@_foreign(
+    "reference",
+    "reference",
     "first-order lag of the tachometer",
     lambda rng, plan: {"time_constant_s": 0.02},
     kin=("tacho_latency",),
@@ -498,6 +543,7 @@ def tacho_disc(one, run, reading):
     "reference",
     "mean of the rate over the last gate of the counter, held until the next",
     lambda rng, plan: {"gate_s": 0.03},
+    most=("gate_s", 0.1),
 )
 def tacho_gate(one, run, reading):
     gate = one["gate_s"]
@@ -533,11 +579,38 @@ def free_running_chips(one, run, stamps, times):
     "one chip alone is late by a constant time",
     lambda rng, plan: {"chip": f"a{rng.integers(1, 5)}", "delay_s": 2e-3},
     shape=("chip",),
+    most=("delay_s", 0.03),
 )
 def late_chip(one, run, stamps, times):
     late = np.zeros(4)
     late[int(one["chip"][1]) - 1] = one["delay_s"]
     return stamps, times - late
+
+
+@_foreign(
+    "times",
+    "clock",
+    "integral of the board's temperature: the board's clock runs slower as it warms up",
+    lambda rng, plan: {"ratio_1_K": 2e-4 * _sign(rng)},
+    most=("ratio_1_K", 5e-3),
+    kin=("clock_error",),
+)
+def warming_clock(one, run, stamps, times):
+    late = one["ratio_1_K"] * run.step * np.cumsum(run.temperature - 25.0)
+    late = np.interp(times, run.t, late)
+    return stamps, times - (late - late[0])
+
+
+@_foreign(
+    "times",
+    "host",
+    "time, from one moment on: a queue of samples is never emptied again and all chips are late",
+    lambda rng, plan: {"delay_s": 0.01, "time_s": float(plan.duration * rng.uniform(0.2, 0.8))},
+    shape=("time_s",),
+    most=("delay_s", 0.1),
+)
+def late_from_then(one, run, stamps, times):
+    return stamps, times - one["delay_s"] * (times >= one["time_s"])
 
 
 _READ_S = 3e-4  # what reading a sample takes
@@ -548,6 +621,7 @@ _READ_S = 3e-4  # what reading a sample takes
     "host",
     "time, by chance: the host comes late to a sample, stamps it then and reads the tachometer then; nothing is lost",
     lambda rng, plan: {"mean_s": 2e-3},
+    most=("mean_s", 0.02),
 )
 def stamp_jitter(one, run, stamps, times):
     queue = _READ_S * np.arange(len(stamps))

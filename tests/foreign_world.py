@@ -23,6 +23,7 @@ from independent_world import HiddenRun, Setting, _draw_temperature, _measured
 from scipy.interpolate import CubicSpline
 
 from gfimu.geometry.array import AccelerometerArray
+from gfimu.units import STANDARD_GRAVITY
 from sim import forward
 from sim.campaign import Measurement, measure, random_profile
 from sim.motion import SplineSpin
@@ -110,23 +111,26 @@ def _hidden(seed, effects, size, plan, run, read=by_positions):
     hidden = {}
     for name in effects:
         rng = np.random.default_rng([seed, 79, zlib.crc32(name.encode())])
-        unit = FOREIGN[name].draw(rng, plan)
+        drawn = FOREIGN[name].draw(rng, plan).items()
+        unit = {key: value if isinstance(value, str | int) else float(value) for key, value in drawn}
         hidden[name] = unit if FOREIGN[name].sizeless else sized(name, unit, size, plan, run, read)
     return hidden
 
 
 def sized(name, unit, size, plan, run, read=by_positions):
     """Scale an effect's parameters until it is ``size`` large, by secants between the logarithms."""
-    factor, power, last = 1.0, 1.0, None
-    for _ in range(12):
-        reached = distance({name: FOREIGN[name].scaled(unit, factor)}, plan, run, read)
-        if abs(reached / size - 1) < 0.02:
+    factor, power, last, best = 1.0, 1.0, None, (np.inf, unit)
+    for _ in range(9):
+        parameters = FOREIGN[name].scaled(unit, factor)
+        reached = max(distance({name: parameters}, plan, run, read), 1e-9)
+        best = min(best, (abs(np.log(reached / size)), parameters), key=lambda one: one[0])
+        if best[0] < 0.01 or (last and reached == last[1]):
             break
-        if last and reached > 0 and factor != last[0]:
+        if last:
             power = float(np.clip(np.log(reached / last[1]) / np.log(factor / last[0]), 0.3, 3.0))
-        last = (factor, max(reached, 1e-9))
-        factor *= float(np.clip((size / last[1]) ** (1 / power), 1e-2, 1e2))
-    return FOREIGN[name].scaled(unit, factor)
+        last = (factor, reached)
+        factor *= float(np.clip((size / reached) ** (1 / power), 1e-2, 1e2))
+    return best[1]
 
 
 def distance(hidden, plan, run, read=by_positions):
@@ -184,7 +188,7 @@ def in_turning_frame(run, places):
     shaken = CubicSpline(run.t, places.lab)(run.t, 2) if len(places.lab) > 1 else np.zeros((1, 3))
     x, y, z = shaken.T
     cos, sin = np.cos(run.angle), np.sin(run.angle)
-    force = force + np.stack([cos * x + sin * y, cos * y - sin * x, z + 9.80665 + 0 * cos], axis=-1)[:, None]
+    force = force + np.stack([cos * x + sin * y, cos * y - sin * x, z + STANDARD_GRAVITY + 0 * cos], axis=-1)[:, None]
     return (places.axes @ force[..., None]).reshape(len(run.t), 12)
 
 
@@ -204,7 +208,7 @@ class ForeignTwin(Twin):
             _, times, channels, tacho = noise_free(run, context.t, self.hidden, in_turning_frame)
             for act, one in acting(self.hidden, "noise"):
                 channels = act(one, run, times, channels)
-            _, _, ideal, rate = noise_free(run, context.t, {})
+            ideal, rate = noise_free(run, context.t, {})[2:]
             told[:] = [tacho - rate]
             return readings + (channels - ideal)
 
