@@ -212,7 +212,7 @@ class ForeignTwin(Twin):
             told[:] = [tacho - rate]
             return readings + (channels - ideal)
 
-        def refer(reading, spin):
+        def refer(reading, spin, t):
             return reading + told[0]  # the channels are always read first
 
         nominal = super().world(effects, mounting, start)
