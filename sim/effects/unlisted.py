@@ -357,6 +357,24 @@ class LaggedTemperature(_OfChannels):
         return _sensed(world, step)
 
 
+class TemperatureGradient(LaggedTemperature):
+    """Offsets that follow the difference of temperature within the unit: between the sensor and what lags behind it."""
+
+    name = "temperature_gradient"
+    summary = "offsets follow a difference of temperature within the unit, as it is while the temperature changes"
+    dependence = Dependence("T - T lagged", "temperature less lagged temperature", "K", _KELVIN)
+
+    def apply(self, world: World) -> World:
+        """Add coefficient · (T − lagged T)."""
+        sizes, tau = self.per_channel(world.array), max(self.value("time_constant_s", 5.0), 1e-3)
+
+        def step(readings: NDArray[np.float64], context: SampleContext) -> NDArray[np.float64]:
+            lagged = low_pass(context.temperature[:, None], context.t, tau)
+            return readings + (context.temperature[:, None] - lagged) * sizes
+
+        return _sensed(world, step)
+
+
 def _sensed(world: World, step: Callable[[NDArray[np.float64], SampleContext], NDArray[np.float64]]) -> World:
     return world.changed(sensing_steps=(*world.sensing_steps, step))
 
@@ -380,6 +398,7 @@ UNLISTED: dict[str, type[Unlisted]] = {
         OffsetByLoad,
         Cubic,
         LaggedTemperature,
+        TemperatureGradient,
     )
 }
 """Every point of the grammar that the search tries, by name."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tomllib
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,7 @@ from gfimu.diagnosis import diagnose
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
 from sim.campaign import Measurement, measure
-from sim.effects import make_effect
+from sim.effects import EFFECTS, make_effect
 from sim.twin import Twin
 
 TWIN = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
@@ -22,8 +24,29 @@ def recorded(seed, effects=(), cubic=0.0):
     return Recording.from_arrays(run.t_s, run.readings, TWIN.array, reference=reference)
 
 
-def test_a_tachometer_that_is_bent_is_no_curve_of_twelve_channels():
+def test_a_tachometer_that_is_bent_is_named_by_place_and_dependence():
     found = diagnose([recorded(4, cubic=1e-4)], TWIN)
+    assert found.verdict == "explained"
+    (cause,) = found.causes
+    assert cause.unlisted == {"place": "reference", "dependence": "omega^3", "pattern": "one"}
+    (size,) = cause.parameters.values()
+    assert size == pytest.approx(1e-4, abs=4 * next(iter(cause.std.values())))
+    told = found.to_dict()["causes"][0]
+    assert told["effect"] == "unlisted"
+    assert told["name"] == "reference_rate_cubed"
+    assert "it goes with rate³" in cause.why
+    assert Twin.from_dict(tomllib.loads(found.twin.to_toml())).effects[0].parameters == pytest.approx(cause.parameters)
+
+
+class FirstTable(Twin):
+    """A twin without the grammar."""
+
+    def families(self):
+        return EFFECTS
+
+
+def test_without_the_grammar_it_is_no_curve_of_twelve_channels():
+    found = diagnose([recorded(4, cubic=1e-4)], FirstTable(array=TWIN.array, array_name="cube12"))
     assert found.verdict == "unknown"
     assert "go as the centripetal arm" in found.unexplained.signature
     assert not found.causes
