@@ -172,12 +172,13 @@ def stick_slip(one, run, places):
     "bench",
     "mode of the bench in a horizontal line of the lab, driven by the unbalance: ω² and α, turned by the angle",
     lambda rng, plan: {
-        "unbalance_m": 1e-6,
+        "unbalance_m": 1e-4,  # eccentricity times the share of the whole mass
         "azimuth_rad": _azimuth(rng),
         "phase_rad": _phase(rng),
-        **_mode(rng, 1.5, 6.0),
+        **_mode(rng, 1.2, 3.0),
     },
     shape=("azimuth_rad", "phase_rad", *_MODE),
+    most=("unbalance_m", 5e-3),
 )
 def bench_sway(one, run, places):
     heavy = run.angle + one["phase_rad"] - one["azimuth_rad"]
@@ -257,6 +258,7 @@ def footsteps(one, run, places):
         "phase_rad": _phase(rng),
     },
     shape=("order", "phase_rad"),
+    most=("amplitude_m", 3e-4),
 )
 def bearing_shake(one, run, places):
     up = one["amplitude_m"] * np.cos(one["order"] * run.angle + one["phase_rad"])
@@ -314,6 +316,7 @@ def stretch_in_plane(one, run, places):
     "own specific force through a mode with a dead band: a chip rattles along one of its axes on a loose screw",
     lambda rng, plan: {"channel": _turning_channel(rng), "gap_m": 5e-5, "frequency_hz": float(rng.uniform(50, 90))},
     shape=("channel", "frequency_hz"),
+    most=("gap_m", 1e-3),
 )
 def loose_chip(one, run, places):
     chip, axis = divmod(CHANNELS.index(one["channel"]), 3)
