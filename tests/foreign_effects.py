@@ -69,6 +69,9 @@ class Places:
 class Foreign:
     """An effect: stage in the chain, place, dependence in words, draw(rng, plan) of its parameters at a typical size.
 
+    ``act`` takes the parameters, the motion and what its stage passes on: places, readings (n, 12), the reference's
+    reading, stamps and sample times, or sample times and channels; in the drive the parameters and the rig.
+
     ``shape`` are the parameters that no scaling touches, ``most`` is how large one of the others gets in practice,
     ``kin`` are names of a library that would be no wrong answer. Those without a continuous size are ``sizeless``.
     """
