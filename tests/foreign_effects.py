@@ -596,7 +596,7 @@ def late_chip(one, run, stamps, times):
 @_foreign(
     "times",
     "clock",
-    "integral of the board's temperature: the board's clock runs slower as it warms up",
+    "integral of the board's temperature: the board's clock changes its rate as it warms up",
     lambda rng, plan: {"ratio_1_K": 2e-4 * _sign(rng)},
     most=("ratio_1_K", 5e-3),
     kin=("clock_error",),
