@@ -69,6 +69,9 @@ class Places:
 class Foreign:
     """An effect: stage in the chain, place, dependence in words, draw(rng, plan) of its parameters at a typical size.
 
+    ``act`` takes the parameters, the motion and what its stage passes on: places, readings (n, 12), the reference's
+    reading, stamps and sample times, or sample times and channels; in the drive the parameters and the rig.
+
     ``shape`` are the parameters that no scaling touches, ``most`` is how large one of the others gets in practice,
     ``kin`` are names of a library that would be no wrong answer. Those without a continuous size are ``sizeless``.
     """
@@ -172,12 +175,13 @@ def stick_slip(one, run, places):
     "bench",
     "mode of the bench in a horizontal line of the lab, driven by the unbalance: ω² and α, turned by the angle",
     lambda rng, plan: {
-        "unbalance_m": 1e-6,
+        "unbalance_m": 1e-4,  # eccentricity times the share of the whole mass
         "azimuth_rad": _azimuth(rng),
         "phase_rad": _phase(rng),
-        **_mode(rng, 1.5, 6.0),
+        **_mode(rng, 1.2, 3.0),
     },
     shape=("azimuth_rad", "phase_rad", *_MODE),
+    most=("unbalance_m", 5e-3),
 )
 def bench_sway(one, run, places):
     heavy = run.angle + one["phase_rad"] - one["azimuth_rad"]
@@ -257,6 +261,7 @@ def footsteps(one, run, places):
         "phase_rad": _phase(rng),
     },
     shape=("order", "phase_rad"),
+    most=("amplitude_m", 3e-4),
 )
 def bearing_shake(one, run, places):
     up = one["amplitude_m"] * np.cos(one["order"] * run.angle + one["phase_rad"])
@@ -314,6 +319,7 @@ def stretch_in_plane(one, run, places):
     "own specific force through a mode with a dead band: a chip rattles along one of its axes on a loose screw",
     lambda rng, plan: {"channel": _turning_channel(rng), "gap_m": 5e-5, "frequency_hz": float(rng.uniform(50, 90))},
     shape=("channel", "frequency_hz"),
+    most=("gap_m", 1e-3),
 )
 def loose_chip(one, run, places):
     chip, axis = divmod(CHANNELS.index(one["channel"]), 3)
@@ -590,7 +596,7 @@ def late_chip(one, run, stamps, times):
 @_foreign(
     "times",
     "clock",
-    "integral of the board's temperature: the board's clock runs slower as it warms up",
+    "integral of the board's temperature: the board's clock changes its rate as it warms up",
     lambda rng, plan: {"ratio_1_K": 2e-4 * _sign(rng)},
     most=("ratio_1_K", 5e-3),
     kin=("clock_error",),
