@@ -180,7 +180,8 @@ class _Diagnosis:
         bound = self._coincidence(explanation)
         confirmed = found.gain.of_other_recording and found.gain.share_of_excess_removed >= 1.0 - self._policy.small
         nats = float("nan") if bound is None else bound.log_odds
-        evidence = LibraryEvidence(float(np.nan_to_num(nats)), found.unexplained.log_odds, confirmed)
+        left = max(found.unexplained.log_odds, self._policy.lack_odds if found.unexplained.significant else 0.0)
+        evidence = LibraryEvidence(float(np.nan_to_num(nats)), left, confirmed)
         fits = [explanation.best, *conflicting(explanation, self._policy)]
         shapes = {cause.name: tuple(cause.shape) for fit in fits for cause in fit.causes}
         return with_library(replace(found, coincidence=nats), evidence, shapes, self._policy)

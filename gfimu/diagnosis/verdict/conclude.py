@@ -274,7 +274,9 @@ def conclude(
     )
     words = verdict_sentences(verdict, causes, residual, gain, unexplained, withdrawn, notes)
     others_told = rival_list(explanation, policy)
-    open_ones = undetermined(explanation.screening, array, policy.least_information)
+    # Of a table those of the causes alone: it could have many others, each with something that it does not show.
+    looked_at = None if policy.free_body else {cause.effect for cause in causes}
+    open_ones = undetermined(explanation.screening, array, policy.least_share, looked_at)
     words = (*words, undetermined_sentence(open_ones)) if open_ones else words
     if of_time:
         words = (*words, _of_absolute_time(of_time))

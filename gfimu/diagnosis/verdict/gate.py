@@ -16,7 +16,10 @@ from gfimu.diagnosis.verdict.verdict import NamedCause, Residual
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.world_model import EffectFamily, bound_of
 
-__all__ = ["Judgement", "impossible_sizes", "judge", "measurable"]
+__all__ = ["NOT_THIS_UNIT", "Judgement", "impossible_sizes", "judge", "measurable"]
+
+NOT_THIS_UNIT = "the array file, axes or units do not fit these data"
+"""Signature of sizes beyond physics."""
 
 
 @dataclass(frozen=True)
@@ -125,7 +128,7 @@ def impossible_sizes(
         return ""
     worst = max(beyond)[1]
     others = f" (and {len(beyond) - 1} more)" if len(beyond) > 1 else ""
-    return f"the array file, axes or units do not fit these data: {worst}{others}"
+    return f"{NOT_THIS_UNIT}: {worst}{others}"
 
 
 def _found(causes: Sequence[NamedCause]) -> str:

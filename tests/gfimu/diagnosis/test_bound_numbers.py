@@ -62,3 +62,14 @@ def test_curves_of_twelve_channels_are_told_as_they_are():
     assert found.verdict == "explained"
     (cause,) = found.causes
     assert cause.effect == "quadratic"
+
+
+def test_what_an_upright_run_can_not_see_of_a_cause_is_listed():
+    """No reading depends on the height of a chip while the axis stands upright."""
+    keys = [f"a{chip}_{axis}_m" for chip in range(1, 5) for axis in "xy"]
+    sizes = 2e-3 * np.random.default_rng(7).standard_normal(8)
+    hidden = make_effect("sensor_position", dict(zip(keys, sizes, strict=True)), TWIN.array)
+    found = diagnose([recorded(4, [hidden])], TWIN)
+    assert [cause.effect for cause in found.causes] == ["sensor_position"]
+    assert {one["text"] for one in found.undetermined} == {f"sensor_position a{chip}_z_m" for chip in range(1, 5)}
+    assert all(abs(found.causes[0].parameters.get(f"a{chip}_z_m", 0.0)) < 1e-6 for chip in range(1, 5))
