@@ -32,8 +32,8 @@ class LibraryEvidence:
         Log odds of the likeliest pattern among the free numbers of the causes against none, nats; 0 where none is
         likelier than chance.
     unexplained : float
-        Log odds of the strongest lack of fit beside the causes, nats, at least ``Policy.lack_odds`` where the slow noise
-        of one channel stands out; 0 where chance is likelier.
+        Log odds of the strongest lack of fit beside the causes, nats, at least ``Policy.lack_odds`` where the slow
+        noise of a channel stands out; 0 where chance is likelier.
     confirmed : bool
         Whether another recording, which the fit never saw, was predicted.
     """
