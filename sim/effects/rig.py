@@ -19,7 +19,7 @@ from sim.world import SampleContext, World
 __all__ = ["BearingShake", "BenchSway", "ChipLag", "TachoLag"]
 
 _LEAST_RATIO, _MOST_RATIO = 0.2, 20.0  # cycles per revolution
-_RARE = 10.0  # times rarer than the effects that every rig may have, by choice
+_RARE = 30.0  # times rarer than the effects that every rig may have, by choice
 _GRID = 2e-3  # s, on which a mode is simulated
 
 

@@ -178,7 +178,7 @@ class ColdStart(WarmUp):
 
     name = "cold_start"
     summary = "offsets decay exponentially after power-on (calibrated warm, started cold)"
-    rarity = 10.0  # times rarer than offsets that settle, by choice
+    rarity = 30.0  # times rarer than offsets that settle, by choice
 
     @classmethod
     def shapes(cls, duration: float, sample_rate: float) -> tuple[dict[str, float], ...]:

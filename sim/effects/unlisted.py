@@ -84,7 +84,7 @@ class Unlisted(Effect):
     """Place in the grammar: reference, cube on the table, supply, channel."""
     dependence: ClassVar[Dependence]
     separated_by = "runs at several speeds and accelerations, in both directions"
-    rarity = 10.0  # by choice: all points together are as probable as a few usual effects
+    rarity = 30.0  # by choice: all points together are as probable as one usual effect
 
 
 class _OfReference(Unlisted):

@@ -106,7 +106,11 @@ def is_unknown(explanation: Explanation, left: LackOfFit, gain: Gain, policy: Po
         and gain.share_of_excess_removed < 1.0 - policy.dominant
     )
     doubtful = missed or _is_full(explanation, policy) or is_dominant(explanation, left, policy)
-    return doubtful and (_depends(explanation, left, policy) or not explanation.best.causes)
+    if not explanation.best.causes:
+        return doubtful
+    # The slow noise of one channel takes what smooth functions would show.
+    loud = loudest_channel(explanation.stretches, explanation.best.point, policy).stands_out(policy)
+    return doubtful and (_depends(explanation, left, policy) or loud)
 
 
 def _is_full(explanation: Explanation, policy: Policy) -> bool:
