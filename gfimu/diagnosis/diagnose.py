@@ -40,6 +40,10 @@ __all__ = ["diagnose", "prepare"]
 
 Report = Callable[[float, str], None]
 
+_INTERRUPTED = (
+    "The search was interrupted: this is the most probable explanation by then, not compared with held-out data."
+)
+
 
 def diagnose(
     recordings: Sequence[Recording],
@@ -142,6 +146,9 @@ class _Diagnosis:
         policy, tell = self._policy, self._report
         stretches = _stretches(self._model, self._prepared)
         understanding = understand_any_length(stretches, policy, lambda share, text: tell(0.05 + 0.8 * share, text))
+        if understanding.explanation.interrupted:
+            tell(1.0, "interrupted")
+            return self._so_far(understanding)
         tell(0.88, "lack of fit")
         understanding, left = self._apart_from_the_rest(understanding)
         withdrawn: list[str] = []
@@ -174,6 +181,12 @@ class _Diagnosis:
         if told is not gain:
             found = conclude(self._prepared, understanding, left, told, policy, withdrawn=withdrawn)
         return self._doubted(found, understanding.explanation)
+
+    def _so_far(self, understanding: Understanding) -> Diagnosis:
+        """Return the verdict of a search that was interrupted: nothing is held out, and other causes were not tried."""
+        left = self._left(understanding.explanation)
+        found = conclude(self._prepared, understanding, left, Gain(), self._policy)
+        return replace(found, sentences=(_INTERRUPTED, *found.sentences))
 
     def _doubted(self, found: Diagnosis, explanation: Explanation) -> Diagnosis:
         """Return a verdict whose probabilities include that the truth is outside the library."""

@@ -17,7 +17,7 @@ from gfimu.diagnosis.verdict.verdict import Diagnosis
 __all__ = ["with_place"]
 
 _NO_MISTAKE = (
-    "Other orders and signs of the channels, millimetres, centimetres or inches for metres, and the other arrays of the "
+    "Other orders and signs of the channels, millimetres, centimetres or inches for metres, and other arrays of the "
     "library were tried: none of them fits."
 )
 
