@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import ClassVar
 
 import numpy as np
@@ -20,6 +21,7 @@ __all__ = ["BearingShake", "BenchSway", "ChipLag", "TachoLag"]
 
 _LEAST_RATIO, _MOST_RATIO = 0.2, 20.0  # cycles per revolution
 _RARE = 30.0  # times rarer than the effects that every rig may have, by choice
+_SWAYS, _SWAY_DAMPING = np.geomspace(1.0, 20.0, 24), 0.05  # Hz and 1: modes of a bench to look at
 _GRID = 2e-3  # s, on which a mode is simulated
 
 
@@ -141,7 +143,7 @@ class BearingShake(Effect):
         return world.changed(shakes=(*world.shakes, shake))
 
 
-def shake_orders(left: list[Whitened], count: int) -> tuple[list[dict[str, float]], float]:
+def shake_orders(left: Sequence[Whitened], count: int) -> tuple[list[dict[str, float]], float]:
     """Return the strongest orders of a vertical acceleration of the whole array in proportion to the rate."""
     turned = max(float(np.ptp(one.state.angle)) for one in left)
     step = np.pi / max(turned, 2 * np.pi)  # half of what a run of so many turns tells apart
@@ -193,8 +195,13 @@ class BenchSway(Effect):
 
     @classmethod
     def shapes(cls, duration: float, sample_rate: float) -> tuple[dict[str, float], ...]:
-        """Return natural frequencies from 1 to 20 Hz."""
-        return tuple({"frequency_hz": float(f), "damping_ratio": 0.05} for f in np.geomspace(1.0, 20.0, 14))
+        """Return one mode; the scan over frequencies finds it."""
+        return ({"frequency_hz": 5.0, "damping_ratio": 0.05},)
+
+    @classmethod
+    def scan(cls, left, duration, sample_rate):  # type: ignore[no-untyped-def]
+        """Return the modes that follow the horizontal motion of the residual best."""
+        return sway_shapes(left, 2)
 
     @property
     def memory_s(self) -> float:
@@ -208,16 +215,39 @@ class BenchSway(Effect):
         natural, damping = 2 * np.pi * self.value("frequency_hz", 5.0), self.value("damping_ratio", 0.05)
 
         def shake(spin: SpinState, t: NDArray[np.float64]) -> NDArray[np.float64]:
-            cos, sin = np.cos(spin.angle), np.sin(spin.angle)
-            # Second derivative of the direction of the unbalance, with its sign turned: the force on the bench.
-            forces = np.stack(
-                [spin.rate**2 * cos + spin.acceleration * sin, spin.rate**2 * sin - spin.acceleration * cos], axis=-1
-            )
-            sway = _mode_acceleration(forces, t, natural, damping)
+            sway = _mode_acceleration(_unbalance(spin), t, natural, damping)
             x, y = sway @ [x_cosine, x_sine], sway @ [y_cosine, y_sine]
             return np.stack([x, y, np.zeros_like(x)], axis=-1)
 
         return world.changed(shakes=(*world.shakes, shake))
+
+
+def sway_shapes(left: Sequence[Whitened], count: int) -> tuple[list[dict[str, float]], float]:
+    """Return the modes of a bench whose sway under a rotating unbalance follows a residual best."""
+    power, energy = np.zeros(len(_SWAYS)), np.full(len(_SWAYS), 1e-30)
+    for one in left:
+        across = one.array.axes[:, :2]
+        x, y = (one.residual[:, :-1] @ across).T  # score of an acceleration in the turning frame
+        cos, sin = np.cos(one.state.angle), np.sin(one.state.angle)
+        score = np.stack([cos * x - sin * y, sin * x + cos * y], axis=-1)  # in the room
+        weight = 0.5 * float(np.sum(across**2 * one.weights[:-1, None]))
+        forces = _unbalance(one.state)
+        for place, frequency in enumerate(_SWAYS):
+            sway = _mode_acceleration(forces, one.t, 2 * np.pi * frequency, _SWAY_DAMPING)
+            power[place] += float(np.sum((sway.T @ score) ** 2))
+            energy[place] += weight * float(np.mean(np.sum(sway**2, axis=0)))
+    best = peaks(power / energy, count)
+    return [{"frequency_hz": float(_SWAYS[place]), "damping_ratio": _SWAY_DAMPING} for place in best], float(
+        len(_SWAYS)
+    )
+
+
+def _unbalance(spin: SpinState) -> NDArray[np.float64]:
+    """Return the force of a rotating unbalance per its mass and radius, (n, 2): what turns it, with the sign turned."""
+    cos, sin = np.cos(spin.angle), np.sin(spin.angle)
+    return np.stack(
+        [spin.rate**2 * cos + spin.acceleration * sin, spin.rate**2 * sin - spin.acceleration * cos], axis=-1
+    )
 
 
 def _mode_acceleration(

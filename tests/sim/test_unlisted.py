@@ -9,7 +9,7 @@ from gfimu.geometry.array import AccelerometerArray
 from sim import forward
 from sim.campaign import random_profile
 from sim.effects import EFFECTS, FURTHER_EFFECTS, make_effect
-from sim.effects.rig import shake_orders
+from sim.effects.rig import shake_orders, sway_shapes
 from sim.effects.unlisted import UNLISTED
 from sim.motion import SpinState
 from sim.turntable import prescribed_readings
@@ -177,3 +177,15 @@ def test_names_are_new_and_points_say_what_they_go_with():
 def test_a_wrong_key_of_a_point_is_refused():
     with pytest.raises(InputError, match=r"reference_rate_cubed.*unknown parameter 'x_m'.*error_rad_s_per_rad3_s3"):
         make_effect("reference_rate_cubed", {"x_m": 1.0}, ARRAY)
+
+
+def test_a_scan_finds_the_mode_of_a_bench():
+    channels, _ = changes(make_effect("bench_sway", {"y_sine_m": 1e-3, "frequency_hz": 4.0, "damping_ratio": 0.06}))
+
+    class Left:
+        residual = np.column_stack([channels, np.zeros(len(T))])
+        weights = np.ones(13)
+        t, state, array = T, MOTION.at(T), ARRAY
+
+    shapes, _ = sway_shapes([Left], 2)
+    assert shapes[0]["frequency_hz"] == pytest.approx(4.0, rel=0.1)
