@@ -157,8 +157,8 @@ def main():
             file.write(json.dumps(outcome) + "\n")
             file.flush()
             outcomes.append(outcome)
-            print(outcome["generator"], outcome["effects"][0], _said(outcome), flush=True)  # noqa: T201
-    print(table(outcomes))  # noqa: T201
+            print(outcome["generator"], outcome["effects"][0], _said(outcome), flush=True)
+    print(table(outcomes))
 
 
 if __name__ == "__main__":
