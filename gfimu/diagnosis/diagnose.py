@@ -30,7 +30,7 @@ from gfimu.diagnosis.verdict.library import LibraryEvidence, with_library
 from gfimu.diagnosis.verdict.naming import conflicting
 from gfimu.diagnosis.verdict.place import with_place
 from gfimu.diagnosis.verdict.sample_notes import with_sample_notes
-from gfimu.diagnosis.verdict.verdict import Diagnosis
+from gfimu.diagnosis.verdict.verdict import Diagnosis, NamedCause
 from gfimu.errors import InputError
 from gfimu.recording import Recording
 from gfimu.recording.carried_array import warn_of_other_array
@@ -40,9 +40,8 @@ __all__ = ["diagnose", "prepare"]
 
 Report = Callable[[float, str], None]
 
-_INTERRUPTED = (
-    "The search was interrupted: this is the most probable explanation by then, not compared with held-out data."
-)
+_INTERRUPTED = "the search was interrupted, leading by then and not yet compared with held-out data"
+_SHOWN = 4  # numerical: sizes of a cause in a line
 
 
 def diagnose(
@@ -183,10 +182,15 @@ class _Diagnosis:
         return self._doubted(found, understanding.explanation)
 
     def _so_far(self, understanding: Understanding) -> Diagnosis:
-        """Return the verdict of a search that was interrupted: nothing is held out, and other causes were not tried."""
-        left = self._left(understanding.explanation)
-        found = conclude(self._prepared, understanding, left, Gain(), self._policy)
-        return replace(found, sentences=(_INTERRUPTED, *found.sentences))
+        """Return what a search that was interrupted had found: no verdict, as nothing was held out or criticised."""
+        explanation, policy = understanding.explanation, self._policy
+        if not explanation.best.causes:
+            raise KeyboardInterrupt
+        leading = named_causes(explanation, explanation.best, policy)
+        told = f"{_INTERRUPTED}: {'; '.join(one.effect + _sizes(one) for one in leading)}"
+        left = self._left(explanation)
+        found = conclude(self._prepared, understanding, left, Gain(), policy, refuted=told, unknown=True)
+        return replace(found, sentences=(f"No verdict: {told}.", *found.sentences[1:]))
 
     def _doubted(self, found: Diagnosis, explanation: Explanation) -> Diagnosis:
         """Return a verdict whose probabilities include that the truth is outside the library."""
@@ -290,9 +294,18 @@ class _Diagnosis:
             samples = sum(len(run.t) for run in self._kept.runs)
             better = gain.log_likelihood_per_sample - float(np.nan_to_num(alone.log_likelihood_per_sample))
             carried, gain = (whole, gain) if better * samples > self._policy.ambiguous else (carried, alone)
-        elif carried is not None and gain.share_in_any_recording <= 0.0:
+        elif carried is not None and (
+            gain.share_in_any_recording <= 0.0 or not self._carries_over(explanation, carried)
+        ):
             carried = None
         return Described(whole, carried), gain
+
+    def _carries_over(self, explanation: Explanation, described: Fit) -> bool:
+        """Tell whether one half of a run predicts the other: blocks in between follow what changes with time."""
+        if self._kept is not None:
+            return True
+        halves = held_out_gain(described.causes, self._pairs(explanation, described, np.inf), self._policy, label="")
+        return not halves.share_of_excess_removed < self._policy.least_share
 
     def _described(
         self, understanding: Understanding, left: LackOfFit, withdrawn: Sequence[str], refuted: str
@@ -318,3 +331,10 @@ class _Diagnosis:
             refuted=refuted,
             unknown=True,
         )
+
+
+def _sizes(cause: NamedCause) -> str:
+    """Return the largest sizes of a cause over their uncertainty, in a line."""
+    numbers = [(key, float(cause.parameters[key]), std) for key, std in cause.std.items() if std > 0.0]
+    first = sorted(numbers, key=lambda one: -abs(one[1]) / one[2])[:_SHOWN]
+    return f" ({', '.join(f'{key} = {value:.4g} ± {std:.2g}' for key, value, std in first)})" if first else ""

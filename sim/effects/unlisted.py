@@ -25,6 +25,8 @@ __all__ = ["UNLISTED", "Dependence", "Unlisted"]
 
 _RATE, _ACCELERATION, _ANGLE, _KELVIN = 10.0, 20.0, 20.0, 3.0  # rad/s, rad/s², rad and K of an ordinary run
 _MG = STANDARD_GRAVITY / 1000.0
+_READ = {"rad": "rad", "rad_s": "rad/s", "rad2_s2": "rad²/s²", "rad3_s3": "rad³/s³", "rad_s2": "rad/s²"}
+"""Units of keys as people read them."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +63,7 @@ class Dependence:
 
     def per(self, unit: str) -> str:
         """Return the unit of a coefficient as people read it."""
-        return f"{unit}/({self.unit})" if self.unit else unit
+        return f"{unit}/({_READ[self.unit]})" if self.unit else unit
 
 
 CONSTANT = Dependence("1", "a constant", "", 1.0, lambda spin: np.ones_like(spin.rate))

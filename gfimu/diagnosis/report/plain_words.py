@@ -73,6 +73,8 @@ def headline(diagnosis: Diagnosis) -> str:
             return "Nothing is wrong with the simulation that this recording could show."
         case "unknown" if found:
             return f"Found: {_joined(found)}. Something else is real too, and nothing in the library explains it."
+        case "unknown" if diagnosis.sentences[:1] and diagnosis.sentences[0].startswith("No verdict"):
+            return diagnosis.sentences[0]
         case "unknown":
             return "Something real is missing in the simulation, and nothing in the library explains it."
         case "ambiguous":
