@@ -5,6 +5,7 @@ import pytest
 from scipy.signal import lsim, lti
 
 from gfimu.errors import InputError
+from gfimu.files.model_files import find_model
 from gfimu.geometry.array import AccelerometerArray
 from sim import forward
 from sim.campaign import random_profile
@@ -12,6 +13,7 @@ from sim.effects import EFFECTS, FURTHER_EFFECTS, make_effect
 from sim.effects.rig import shake_orders, sway_shapes
 from sim.effects.unlisted import UNLISTED
 from sim.motion import SpinState
+from sim.scenarios import Scenario
 from sim.turntable import prescribed_readings
 from sim.twin import Twin
 
@@ -189,3 +191,11 @@ def test_a_scan_finds_the_mode_of_a_bench():
 
     shapes, _ = sway_shapes([Left], 2)
     assert shapes[0]["frequency_hz"] == pytest.approx(4.0, rel=0.1)
+
+
+def test_a_tumbling_body_has_no_spin_that_an_effect_could_go_with(tmp_path):
+    path = tmp_path / "tumble.toml"
+    scenario = find_model("scenarios", "tumble").read_text(encoding="utf-8")
+    path.write_text(f'{scenario}\n[[effect]]\nname = "gain_by_speed"\nparameters = {{ ratio_per_rad_s = 1e-3 }}\n')
+    with pytest.raises(InputError, match="gain_by_speed.*which a tumbling body has not"):
+        Scenario.load(path)
