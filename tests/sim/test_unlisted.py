@@ -197,5 +197,5 @@ def test_a_tumbling_body_has_no_spin_that_an_effect_could_go_with(tmp_path):
     path = tmp_path / "tumble.toml"
     scenario = find_model("scenarios", "tumble").read_text(encoding="utf-8")
     path.write_text(f'{scenario}\n[[effect]]\nname = "gain_by_speed"\nparameters = {{ ratio_per_rad_s = 1e-3 }}\n')
-    with pytest.raises(InputError, match="gain_by_speed.*which a tumbling body has not"):
+    with pytest.raises(InputError, match=r"gain_by_speed.*which a tumbling body has not"):
         Scenario.load(path)
