@@ -41,7 +41,6 @@ __all__ = ["diagnose", "prepare"]
 Report = Callable[[float, str], None]
 
 _INTERRUPTED = "the search was interrupted, leading by then and not yet compared with held-out data"
-_SHOWN = 4  # numerical: sizes of a cause in a line
 
 
 def diagnose(
@@ -334,7 +333,10 @@ class _Diagnosis:
 
 
 def _sizes(cause: NamedCause) -> str:
-    """Return the largest sizes of a cause over their uncertainty, in a line."""
-    numbers = [(key, float(cause.parameters[key]), std) for key, std in cause.std.items() if std > 0.0]
-    first = sorted(numbers, key=lambda one: -abs(one[1]) / one[2])[:_SHOWN]
-    return f" ({', '.join(f'{key} = {value:.4g} ± {std:.2g}' for key, value, std in first)})" if first else ""
+    """Return the sizes of a cause that differ from zero, in a line."""
+    shown = [
+        f"{key} = {float(cause.parameters[key]):.4g} ± {std:.2g}"
+        for key, std in cause.std.items()
+        if std > 0.0 and abs(float(cause.parameters[key])) > Policy.stds * std
+    ]
+    return f" ({', '.join(shown)})" if shown else ""

@@ -18,9 +18,6 @@ from gfimu.diagnosis.verdict.verdict import Diagnosis, NamedCause
 
 __all__ = ["LibraryEvidence", "LibraryRule", "library_probability", "standing_out", "with_library"]
 
-_LEAST_STDS, _MOST_STDS = 0.3, 100.0  # numerical: where sizes over their uncertainty say no more
-_MOST_NATS = 20.0  # numerical: where a pattern says no more
-
 
 @dataclass(frozen=True)
 class LibraryEvidence:
@@ -57,6 +54,8 @@ class LibraryRule:
         effect taken out of it in some) and in foreign ones (``tests/foreign_study.py``); 11 of these names were wrong.
     most : float
         Largest probability without another recording.
+    nats, stds : tuple of (float, float)
+        Where c and z are clipped: what is beyond says no more.
     """
 
     constant: float = 1.19
@@ -64,6 +63,8 @@ class LibraryRule:
     size: float = 0.67
     unexplained: float = -0.83
     most: float = 0.97
+    nats: tuple[float, float] = (0.0, 20.0)
+    stds: tuple[float, float] = (0.3, 100.0)
 
 
 def standing_out(cause: NamedCause, shape: Collection[str]) -> float:
@@ -95,8 +96,8 @@ def library_probability(evidence: LibraryEvidence, stds: float, rule: LibraryRul
     """
     odds = (
         rule.constant
-        + rule.coincidence * float(np.clip(evidence.coincidence, 0.0, _MOST_NATS))
-        + rule.size * float(np.log(np.clip(stds, _LEAST_STDS, _MOST_STDS)))
+        + rule.coincidence * float(np.clip(evidence.coincidence, *rule.nats))
+        + rule.size * float(np.log(np.clip(stds, *rule.stds)))
         + rule.unexplained * float(np.log1p(max(evidence.unexplained, 0.0)))
     )
     return min(float(expit(odds)), policy.most_certain if evidence.confirmed else rule.most)
