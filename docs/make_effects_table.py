@@ -6,34 +6,54 @@ Run ``python docs/make_effects_table.py``.
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
 
 from gfimu import AccelerometerArray
-from sim.effects import EFFECTS
+from sim.effects import EFFECTS, FURTHER_EFFECTS, Effect
+from sim.effects.unlisted import UNLISTED
 
 PAGE = Path(__file__).parent / "diagnosis.md"
 START, STOP = "<!-- effects: made by make_effects_table.py -->", "<!-- effects: end -->"
+FURTHER = ("<!-- further effects: made by make_effects_table.py -->", "<!-- further effects: end -->")
+GRAMMAR = ("<!-- grammar: made by make_effects_table.py -->", "<!-- grammar: end -->")
 MOST_KEYS = 4
 
 
-def effects_table() -> str:
+def effects_table(effects: Mapping[str, type[Effect]] = EFFECTS) -> str:
     """Return the table: name, what is wrong, parameters, what separates it from its rivals."""
-    array = AccelerometerArray.load("cube12")
     rows = [
         "| name | what is so in the world and missing in the simulation | parameters | what separates it from rivals |"
     ]
     rows.append("|---|---|---|---|")
-    for name, effect in EFFECTS.items():
-        keys = effect.parameter_keys(array)
-        shown = ", ".join(f"`{key}`" for key in keys[:MOST_KEYS]) + (" …" if len(keys) > MOST_KEYS else "")
-        rows.append(f"| `{name}` | {effect.summary} | {shown} | {effect.separated_by} |")
+    for name, effect in effects.items():
+        rows.append(f"| `{name}` | {effect.summary} | {_keys(effect)} | {effect.separated_by} |")
     return "\n".join(rows)
 
 
+def grammar_table() -> str:
+    """Return the points of the grammar: name, place, dependence, what is wrong, parameters."""
+    rows = ["| name | place | goes with | what is so in the world and missing in the simulation | parameters |"]
+    rows.append("|---|---|---|---|---|")
+    for name, point in UNLISTED.items():
+        place, words = point.grammar_place, point.dependence.words.replace("|", "\\|")
+        rows.append(f"| `{name}` | {place} | {words} | {point.summary.replace('|', chr(92) + '|')} | {_keys(point)} |")
+    return "\n".join(rows)
+
+
+def _keys(effect: type[Effect]) -> str:
+    keys = effect.parameter_keys(AccelerometerArray.load("cube12"))
+    return ", ".join(f"`{key}`" for key in keys[:MOST_KEYS]) + (" …" if len(keys) > MOST_KEYS else "")
+
+
 def with_table(page: str) -> str:
-    """Return the text of the page with the present table between its marks."""
-    pattern = re.compile(re.escape(START) + ".*?" + re.escape(STOP), flags=re.DOTALL)
-    return pattern.sub(lambda _: f"{START}\n{effects_table()}\n{STOP}", page)
+    """Return the text of the page with the present tables between their marks."""
+    named = {name: effect for name, effect in FURTHER_EFFECTS.items() if name not in UNLISTED}
+    parts = (((START, STOP), effects_table()), (FURTHER, effects_table(named)), (GRAMMAR, grammar_table()))
+    for (start, stop), table in parts:
+        pattern = re.compile(re.escape(start) + ".*?" + re.escape(stop), flags=re.DOTALL)
+        page = pattern.sub(f"{start}\n{table}\n{stop}".replace("\\", "\\\\"), page)
+    return page
 
 
 if __name__ == "__main__":

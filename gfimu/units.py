@@ -46,6 +46,18 @@ RATIO, NUMBER, NAME = "ratio", "number", "name"
 """What stands in place of a unit: a small relative number (people read percent), a count or factor, words."""
 
 KEY_ENDINGS: dict[str, str] = {
+    **{
+        f"{one}/({many})": f"{start}_per_{end}"
+        for one, start in (("rad/s", "rad_s"), ("rad", "rad"), ("m/s²", "m_s2"))
+        for many, end in (("rad", "rad"), ("rad/s", "rad_s"), ("rad²/s²", "rad2_s2"), ("rad³/s³", "rad3_s3"))
+    },
+    "rad/(rad/s²)": "rad_per_rad_s2",
+    "m/s²/(rad/s²)": "m_s2_per_rad_s2",
+    "1/(rad/s)": "per_rad_s",
+    "1/(rad²/s²)": "per_rad2_s2",
+    "1/(rad/s²)": "per_rad_s2",
+    "1/K": "per_K",
+    "s⁴/m²": "s4_m2",
     "m/s²/(rad/s)⁴": "m_s2_per_rad4_s4",
     "m/s²/√s": "m_s2_rts",
     "s²/rad²": "s2_rad2",

@@ -6,7 +6,7 @@ Estimation and diagnosis know no more of a simulation than this. `sim.twin.Twin`
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
@@ -19,6 +19,7 @@ from gfimu.motion.body_drive import BodyDrive
 __all__ = [
     "BasisUnits",
     "BodyModel",
+    "Dependence",
     "Effect",
     "EffectFamily",
     "ExpectedNoise",
@@ -29,9 +30,11 @@ __all__ = [
     "Whitened",
     "WorldModel",
     "bound_of",
+    "dependence_of",
     "is_of_one_recording",
     "is_of_wiring",
     "memory_of",
+    "prior_of",
     "shapes_to_screen",
 ]
 
@@ -106,6 +109,24 @@ class Effect(Protocol):
         ...
 
 
+class Dependence(Protocol):
+    """What an effect without a name of its own goes with: a function of the motion."""
+
+    @property
+    def name(self) -> str: ...  # noqa: D102
+    @property
+    def words(self) -> str: ...  # noqa: D102
+    def of(self, spin: SpinState) -> NDArray[np.float64]:
+        """Return the function of a spin, shape (n,); zeros where it is one of something else."""
+        ...
+
+
+def dependence_of(family: EffectFamily) -> Dependence | None:
+    """Return what an effect goes with that has no name of its own; None of those that have one."""
+    found: Dependence | None = getattr(family, "dependence", None)
+    return found
+
+
 def is_of_one_recording(family: EffectFamily) -> bool:
     """Tell whether a kind of effect has the phase of a clock that no other recording shares; others need not say so."""
     return bool(getattr(family, "of_one_recording", False))
@@ -114,6 +135,12 @@ def is_of_one_recording(family: EffectFamily) -> bool:
 def is_of_wiring(effect: Effect) -> bool:
     """Tell whether a fault of the samples changes a prediction without noise; others need not say so."""
     return bool(getattr(effect, "of_wiring", False))
+
+
+def prior_of(family: EffectFamily, families: Iterable[EffectFamily]) -> float:
+    """Return the prior probability of one kind of effect among several, of which some are rarer (``rarity``)."""
+    total = sum(1.0 / float(getattr(one, "rarity", 1.0)) for one in families)
+    return 1.0 / (float(getattr(family, "rarity", 1.0)) * total)
 
 
 def memory_of(effect: Effect) -> float:
@@ -129,7 +156,9 @@ class EffectFamily(Protocol):
     of each size), ``of_one_recording``, ``of_wiring`` (`is_of_wiring`), ``of_pose`` (it depends on the specific force
     alone), ``alike_by_lot`` (chips of one lot have nearly the same sizes), ``contained_in`` (effects that can do all
     that it does), ``level_error`` (to which a level of a reading is found at best, in units of its white noise),
-    ``memory_s`` and, of a fault of the samples, ``channel_order`` of an effect, and ``scan`` (`shapes_to_screen`).
+    ``memory_s``, ``rarity`` (`prior_of`) and, of a fault of the samples, ``channel_order`` of an effect, ``scan``
+    (`shapes_to_screen`), and of a point of a grammar that has no name of its own ``grammar_place`` and ``dependence``
+    (`Dependence`).
     """
 
     @property

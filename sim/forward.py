@@ -21,13 +21,17 @@ __all__ = [
     "arm_growth",
     "channels",
     "growing_arms",
+    "lean_states",
+    "leaning",
     "nodding_motion",
     "reference",
     "rigid_readings",
+    "shaking",
     "table_geometry",
 ]
 
 _JERK_STEP = 1e-4  # s
+_LEAN_STEP = 2e-3  # s: no finer than the grid on which a mode is simulated
 
 
 @dataclass(frozen=True)
@@ -44,12 +48,21 @@ class TableGeometry:
         Reading per product of the angular rate, m (`gfimu.geometry.array.OMEGA_PRODUCTS`).
     up : ndarray, shape (3,)
         The world's up in the frame of the tilted axis.
+    places : ndarray, shape (c, 3)
+        Places of the chips, m.
     """
 
     axes: NDArray[np.float64]
     tangential: NDArray[np.float64]
     centripetal: NDArray[np.float64]
     up: NDArray[np.float64]
+    places: NDArray[np.float64]
+
+    def of(self, channels: NDArray[np.bool_]) -> TableGeometry:
+        """Return the geometry of some channels."""
+        return TableGeometry(
+            self.axes[channels], self.tangential[channels], self.centripetal[channels], self.up, self.places[channels]
+        )
 
 
 def table_geometry(world: World) -> TableGeometry:
@@ -60,7 +73,7 @@ def table_geometry(world: World) -> TableGeometry:
         [chip.axes @ mount.T for chip in world.array.chips],
     )
     up = Rotation.from_rotvec(world.axis_rotvec).as_matrix()[2]
-    return TableGeometry(moved.axes, moved.regression_matrix[:, :3], moved.centripetal_matrix, up)
+    return TableGeometry(moved.axes, moved.regression_matrix[:, :3], moved.centripetal_matrix, up, moved.positions)
 
 
 def rigid_readings(world: World, spin: SpinState, geometry: TableGeometry | None = None) -> NDArray[np.float64]:
@@ -118,8 +131,14 @@ def _nodding_readings(
     omega, alpha, gravity = turn.apply(omega), turn.apply(alpha), turn.apply(gravity)
     x, y, z = omega.T
     products = np.stack([x * x, y * y, z * z, x * y, x * z, y * z], axis=-1)  # (n, 6)
-    arm = alpha @ placed.tangential.T + products @ placed.centripetal.T
-    return gravity @ placed.axes.T + arm * np.reshape(stretch, (-1, 1))
+    readings = gravity @ placed.axes.T + alpha @ placed.tangential.T + products @ placed.centripetal.T
+    if not world.stretch:
+        return readings
+    # Arms are longer across the axis alone: α × r and ω × (ω × r) of that part of them, along each sensing axis.
+    across, axes = placed.places * [1.0, 1.0, 0.0], placed.axes
+    along = np.sum(omega**2, axis=1)[:, None] * _along(axes, across)
+    longer = alpha @ np.cross(across, axes).T + (omega @ across.T) * (omega @ axes.T) - along
+    return readings + (np.reshape(stretch, (-1, 1)) - 1.0) * longer
 
 
 def arm_growth(world: World, motion: SpinMotion, t: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
@@ -138,8 +157,82 @@ def growing_arms(
     if not (world.moving_arms and world.stretch):
         return 0.0
     first, second = arm_growth(world, motion, t)
-    along = -0.5 * geometry.centripetal[:, :3].sum(axis=1)  # r · a of each sensing axis a
+    along = -geometry.centripetal[:, 2]  # r · a across the axis, of each sensing axis a: the load is radial
     return np.outer(2 * motion.at(t).rate * first, geometry.tangential[:, 2]) + np.outer(second, along)
+
+
+def leaning(
+    world: World, motion: SpinMotion, t: NDArray[np.float64], geometry: TableGeometry
+) -> NDArray[np.float64] | float:
+    """Return what leans of the cube add to the readings, to first order in the lean, shape (n, c), m/s²; 0 without.
+
+    A lean n(t) in the turning frame moves a place r to r + n × r and an axis a to a + n × a. The place is then
+    accelerated by n̈ × r + 2 ω × (ṅ × r) + α × (n × r) + ω × (ω × (n × r)) more.
+    """
+    if not world.leans:
+        return 0.0
+    here = motion.at(t)
+    rate, acceleration = here.rate[:, None], here.acceleration[:, None]
+    added = np.zeros((len(t), len(geometry.axes)))
+    vertical = np.array([0.0, 0.0, 1.0])
+    up = _turned_back(here, geometry.up)
+    for lean, states in zip(world.leans, lean_states(world, motion, t), strict=True):
+        vector = lean.vector / np.linalg.norm(lean.vector)
+        now, first, second = (state[:, None] for state in states)
+        turned = np.cross(vector, geometry.axes)  # (c, 3)
+        moved = np.cross(vector, geometry.places)
+        across, inward = (_along(geometry.axes, vectors) for vectors in _spun(vertical, moved))  # (c,)
+        spun, pulled = (_along(turned, vectors) for vectors in _spun(vertical, geometry.places))
+        added += now * (world.gravity * up @ turned.T + acceleration * (spun + across) + rate**2 * (pulled + inward))
+        added += first * 2.0 * rate * across + second * _along(geometry.axes, moved)
+    return added
+
+
+def lean_states(world: World, motion: SpinMotion, t: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    """Return the angle of every lean about its own line, rad, with its two derivatives, each (3, n)."""
+    found = []
+    for lean in world.leans:
+        size = float(np.linalg.norm(lean.vector))
+        earlier, now, later = (size * lean.function(motion.at(t + step)) for step in (-_LEAN_STEP, 0.0, _LEAN_STEP))
+        first, second = (later - earlier) / (2.0 * _LEAN_STEP), (later - 2.0 * now + earlier) / _LEAN_STEP**2
+        found.append(np.stack([now, first, second]))
+    return found
+
+
+def _turned_back(spin: SpinState, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return vectors of the room, (n, 3) or (3,), in the turning frame, (n, 3)."""
+    cos, sin = np.cos(spin.angle), np.sin(spin.angle)
+    x, y, z = np.broadcast_to(vectors, (len(cos), 3)).T
+    return np.stack([cos * x + sin * y, cos * y - sin * x, z], axis=-1)
+
+
+def _spun(axis: NDArray[np.float64], places: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return axis × place and axis × (axis × place), each (c, 3)."""
+    across = np.cross(axis, places)
+    return across, np.cross(axis, across)
+
+
+def _along(axes: NDArray[np.float64], vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.einsum("ck,ck->c", axes, vectors)
+
+
+def shaking(
+    world: World, spin: SpinState, t: NDArray[np.float64], geometry: TableGeometry
+) -> NDArray[np.float64] | float:
+    """Return what accelerations of the whole rig in the room add to the readings, shape (n, c), m/s²; 0 without."""
+    if not world.shakes:
+        return 0.0
+    total = np.sum([shake(spin, t) for shake in world.shakes], axis=0)
+    return _turned_back(spin, total) @ geometry.axes.T
+
+
+def _mechanical(
+    world: World, motion: SpinMotion, t: NDArray[np.float64], geometry: TableGeometry
+) -> NDArray[np.float64]:
+    """Return what ideal sensors read, with arms that grow, a cube that leans and a rig that shakes, (n, c), m/s²."""
+    spin = motion.at(t)
+    readings = rigid_readings(world, spin, geometry) + growing_arms(world, motion, t, geometry)
+    return readings + leaning(world, motion, t, geometry) + shaking(world, spin, t, geometry)
 
 
 def channels(
@@ -175,15 +268,12 @@ def channels(
     true_times = t / (1.0 + world.clock_ratio)
     spin = motion.at(true_times)
     if world.chip_delay is None:
-        readings = rigid_readings(world, spin, geometry) + growing_arms(world, motion, true_times, geometry)
+        readings = _mechanical(world, motion, true_times, geometry)
     else:
         readings = np.empty((len(t), world.array.n_channels))
         for chip, times in enumerate(world.chip_times(t).T):
             mine = world.array.chip_of_channel == chip
-            part = TableGeometry(
-                geometry.axes[mine], geometry.tangential[mine], geometry.centripetal[mine], geometry.up
-            )
-            readings[:, mine] = rigid_readings(world, motion.at(times), part) + growing_arms(world, motion, times, part)
+            readings[:, mine] = _mechanical(world, motion, times, geometry.of(mine))
     warm = np.full(len(t), world.temperature) if temperature is None else temperature
     return world.sense(readings, SampleContext(t, spin, warm))
 
@@ -192,8 +282,9 @@ def reference(world: World, motion: SpinMotion, t: NDArray[np.float64]) -> NDArr
     """Noise-free reading of the tachometer of a world at reference times, shape (n,), rad/s."""
     for step in world.motion_steps:
         motion = step(motion, t)
-    spin = motion.at(t - world.tacho_delay)
+    times = t - world.tacho_delay
+    spin = motion.at(times)
     reading = spin.rate
     for change in world.reference_steps:
-        reading = change(reading, spin)
+        reading = change(reading, spin, times)
     return reading

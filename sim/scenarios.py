@@ -23,6 +23,7 @@ from sim import forward
 from sim.adxl345 import Sensor, SensorSettings, conversion_offsets
 from sim.data_sheet import DataSheet
 from sim.effects import Effect, apply_effects
+from sim.effects.unlisted import Unlisted
 from sim.motion import BodyMotion, BodyState, SpinMotion, SpinState
 from sim.scenario_file import ReferenceSettings, change_key, scenario_fields
 from sim.truth import cube_state, truth_columns
@@ -354,10 +355,13 @@ def _refuse_table_keys(scenario: Scenario, source: str) -> None:
         raise InputError(f"{source}: mounting_rotvec_rad belongs to the table; a tumbling body starts upright")
     world = scenario.world
     nominal = replace(scenario, effects=()).world
-    same = ("nod", "stretch", "motion_steps", "mount_steps", "reference_steps")
+    same = ("nod", "stretch", "leans", "shakes", "motion_steps", "mount_steps", "reference_steps")
     moved = ("cube_offset", "mount_rotvec", "axis_rotvec")
-    if any(getattr(world, name) != getattr(nominal, name) for name in same) or any(
-        not np.array_equal(getattr(world, name), getattr(nominal, name)) for name in moved
+    of_spin = any(isinstance(one, Unlisted) and one.dependence.function is not None for one in scenario.effects)
+    if (
+        of_spin
+        or any(getattr(world, name) != getattr(nominal, name) for name in same)
+        or any(not np.array_equal(getattr(world, name), getattr(nominal, name)) for name in moved)
     ):
         names = ", ".join(effect.name for effect in scenario.effects)
         raise InputError(f"{source}: among the effects {names} some change the table, which a tumbling body has not")

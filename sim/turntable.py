@@ -9,6 +9,7 @@ MuJoCo's sensors still belong to the old state, position and velocity to the new
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import cast
 
@@ -23,13 +24,14 @@ from gfimu.errors import InputError
 from gfimu.files.model_files import find_model
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.short_repr import short_repr
-from sim.forward import arm_growth
+from sim.forward import arm_growth, lean_states
 from sim.motion import BodyMotion, BodyState, SpinMotion, SpinState, SplineSpin
 from sim.world import Nod, World
 
 __all__ = ["DrivenRun", "drive", "free_model", "prescribed_readings", "turntable_model"]
 
 _NOD_JOINT = "nod"
+_LEAN_JOINT = "lean"
 _SPIN_JOINT = "spin"
 _LONGEST_STEP = 1e-3  # physics step of a driven run, s
 
@@ -125,7 +127,7 @@ def prescribed_readings(world: World, motion: SpinMotion | BodyMotion, t: NDArra
         times = chip_times[:, int(np.argmax(together))]
         imposed = _imposed(world, model, motion, times)
         channels = together[world.array.chip_of_channel]
-        readings[:, channels] = _inverse(model, *imposed)[:, channels]
+        readings[:, channels] = _inverse(model, *imposed, gravity=_gravity(world, motion, times))[:, channels]
     return readings
 
 
@@ -154,7 +156,7 @@ def drive(world: World, command: SpinMotion, duration: float, *, step: float = _
     """
     if not 0 < step <= duration:
         raise InputError(f"physics step {step} s: must be positive and at most the duration {duration} s")
-    model = turntable_model(world.changed(nod=Nod(), stretch=0.0))
+    model = turntable_model(world.changed(nod=Nod(), stretch=0.0, leans=()))
     model.opt.timestep = step
     data = mujoco.MjData(model)
     t: NDArray[np.float64] = np.arange(int(np.floor(duration / step * (1 + 1e-12))) + 2, dtype=float) * step
@@ -186,9 +188,19 @@ def _turntable(world: World) -> mujoco.MjSpec:
     arms = mount.inv().apply(world.cube_offset) + world.array.chip_positions  # from the axis, in cube axes
     cube = spec.body("cube")
     cube.pos, cube.quat = world.cube_offset, _quaternion(mount)
-    _fit_chips(spec, world.array, arms if world.stretch else None)
+    foot = mount.inv().apply(-world.cube_offset)  # of the cube on the axis, in cube axes
+    for number, lean in enumerate(world.leans):
+        axis = mount.inv().apply(lean.vector / np.linalg.norm(lean.vector))
+        cube.add_joint(name=f"{_LEAN_JOINT}{number}", type=mujoco.mjtJoint.mjJNT_HINGE, axis=axis, pos=foot)
+    _fit_chips(spec, world.array, _across(arms, mount) if world.stretch else None)
     spec.option.gravity = [0.0, 0.0, -world.gravity]
     return spec
+
+
+def _across(arms: NDArray[np.float64], mount: Rotation) -> NDArray[np.float64]:
+    """Return the parts of arms (k, 3), in cube axes, across the axis of the table: there the load is."""
+    axis = mount.inv().apply([0.0, 0.0, 1.0])
+    return np.asarray(arms - np.outer(arms @ axis, axis))
 
 
 def _nod_axis(world: World) -> NDArray[np.float64]:
@@ -255,7 +267,7 @@ def _imposed(
     if isinstance(state, BodyState):
         return _free_state(state)
     first, second = arm_growth(world, cast("SpinMotion", motion), t) if world.moving_arms else (0.0, 0.0)
-    return _table_state(world, model, state, first, second)
+    return _table_state(world, model, state, first, second, lean_states(world, cast("SpinMotion", motion), t))
 
 
 def _table_state(
@@ -264,10 +276,12 @@ def _table_state(
     spin: world_model.SpinState,
     growth: NDArray[np.float64] | float,
     growing: NDArray[np.float64] | float,
+    leaning: Sequence[NDArray[np.float64]] = (),
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Positions, velocities and accelerations of the rig's joints, each (n, nv), for a spin of the table.
 
-    ``growth`` and ``growing`` are the first and second derivative of the arms' relative length.
+    ``growth`` and ``growing`` are the first and second derivative of the arms' relative length, ``leaning`` each lean
+    of the cube with its derivatives (3, n).
     """
     position, velocity, acceleration = (np.zeros((len(spin.angle), model.nv)) for _ in range(3))
     place = model.joint(_SPIN_JOINT).dofadr[0]
@@ -276,11 +290,14 @@ def _table_state(
         place = model.joint(_NOD_JOINT).dofadr[0]
         lean = (part @ _nod_axis(world) for part in world.nod.lean(spin))
         position[:, place], velocity[:, place], acceleration[:, place] = lean
+    for number, state in enumerate(leaning):
+        place = model.joint(f"{_LEAN_JOINT}{number}").dofadr[0]
+        position[:, place], velocity[:, place], acceleration[:, place] = state
     if world.stretch:
         # Unless the arms are said to move, their own velocity is left out, as in the forward model.
-        centre = Rotation.from_rotvec(world.mount_rotvec).inv().apply(world.cube_offset)
-        for chip in world.array.chips:
-            arm = float(np.linalg.norm(centre + chip.position))
+        mount = Rotation.from_rotvec(world.mount_rotvec)
+        arms = _across(mount.inv().apply(world.cube_offset) + world.array.chip_positions, mount)
+        for chip, arm in zip(world.array.chips, np.linalg.norm(arms, axis=1), strict=True):
             if arm:
                 place = model.joint(f"stretch_{chip.name}").dofadr[0]
                 position[:, place] = arm * world.stretch * spin.rate**2
@@ -298,13 +315,24 @@ def _free_state(body: BodyState) -> tuple[NDArray[np.float64], NDArray[np.float6
     )
 
 
+def _gravity(world: World, motion: SpinMotion | BodyMotion, t: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    """Return gravity as a rig feels it that is shaken in the room, (n, 3), m/s²; None where nothing shakes it."""
+    if not world.shakes:
+        return None
+    spin = cast("SpinMotion", motion).at(t)
+    shaken = np.sum([shake(spin, t) for shake in world.shakes], axis=0)
+    return np.asarray(np.array([0.0, 0.0, -world.gravity]) - shaken)
+
+
 def _inverse(
     model: mujoco.MjModel,
     position: NDArray[np.float64],
     velocity: NDArray[np.float64],
     acceleration: NDArray[np.float64],
+    *,
+    gravity: NDArray[np.float64] | None = None,
 ) -> NDArray[np.float64]:
-    """Return the readings (n, c) of the accelerometers in imposed states."""
+    """Return the readings (n, c) of the accelerometers in imposed states, under a gravity (n, 3) of each."""
     data = mujoco.MjData(model)
     qpos, qvel, qacc, sensors = data.qpos, data.qvel, data.qacc, data.sensordata  # views into the simulation
     log = np.empty((len(position), model.nsensordata))
@@ -313,6 +341,8 @@ def _inverse(
         qpos[:] = q
         qvel[:] = v
         qacc[:] = a
+        if gravity is not None:
+            model.opt.gravity[:] = gravity[row]
         inverse(model, data)
         log[row] = sensors
     return log[:, _accelerometers(model)]

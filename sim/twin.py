@@ -24,7 +24,15 @@ from gfimu.world_model import BasisUnits, BodyModel, EffectFamily, ExpectedNoise
 from gfimu.world_model import Effect as AnyEffect
 from sim import forward
 from sim.body import body_channels
-from sim.effects import BODY_EFFECTS, EFFECTS, ENCODER_EFFECTS, Effect, apply_effects, make_effect
+from sim.effects import (
+    BODY_EFFECTS,
+    ENCODER_EFFECTS,
+    FURTHER_EFFECTS,
+    TABLE_EFFECTS,
+    Effect,
+    apply_effects,
+    make_effect,
+)
 from sim.effects.unknown import UnknownTerm
 from sim.world import World
 
@@ -60,6 +68,8 @@ class Twin:
         Extensions of the model; a nominal twin has none.
     array_name : str
         Array as named in the file.
+    grammar : bool
+        Whether a diagnosis also searches the further effects of a rig and the points of the grammar.
     """
 
     array: AccelerometerArray
@@ -72,6 +82,7 @@ class Twin:
     full_resolution: bool = True
     effects: tuple[Effect, ...] = ()
     array_name: str = ""
+    grammar: bool = False
 
     __repr__ = short_repr
 
@@ -97,6 +108,7 @@ class Twin:
                 "gravity_m_s2",
                 "cube_offset_m",
                 "sample_rate_hz",
+                "grammar",
                 "drive",
                 "sensor",
                 "effect",
@@ -131,6 +143,7 @@ class Twin:
             full_resolution=bool(sensor.get("full_resolution", True)),
             effects=tuple(_effect(entry, array, source) for entry in data.get("effect", [])),
             array_name=str(data["array"]),
+            grammar=bool(data.get("grammar", False)),
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -143,6 +156,8 @@ class Twin:
             "drive": {"source": self.drive_source},
             "sensor": {"part": self.part, "range_g": self.range_g, "full_resolution": self.full_resolution},
         }
+        if self.grammar:
+            data["grammar"] = True
         if self.effects:
             data["effect"] = [{"name": effect.name, "parameters": effect.parameters} for effect in self.effects]
         return data
@@ -199,7 +214,10 @@ class Twin:
 
     def families(self) -> Mapping[str, type[Effect]]:
         """Return the library of effects: those of a table with its kind of reference, or of a free body."""
-        return {"gyro": BODY_EFFECTS, "angle": ENCODER_EFFECTS}.get(self.drive_source, EFFECTS)
+        library = {"gyro": BODY_EFFECTS, "angle": ENCODER_EFFECTS}.get(self.drive_source, TABLE_EFFECTS)
+        if self.grammar or self.drive_source == "gyro":
+            return library
+        return {name: family for name, family in library.items() if name not in FURTHER_EFFECTS}
 
     def unnamed(self, dependence: str, units: BasisUnits, *, of_reference: bool = False) -> EffectFamily:
         """Return what no effect of the library explains as one more, with a size per channel or one of the reference.

@@ -11,6 +11,7 @@ frame turned by ``mount_rotvec``, with its origin at ``cube_offset`` (table fram
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
@@ -23,7 +24,7 @@ from gfimu.units import STANDARD_GRAVITY
 from gfimu.world_model import SpinState
 from sim.motion import SpinMotion
 
-__all__ = ["DataStep", "MotionStep", "Nod", "ReferenceStep", "SampleContext", "SensingStep", "World"]
+__all__ = ["DataStep", "Lean", "MotionStep", "Nod", "ReferenceStep", "SampleContext", "SensingStep", "Shake", "World"]
 
 _ONE_LINE = 1e-9  # of the square of a nod: what rounding leaves of an area
 
@@ -66,8 +67,16 @@ class SensingStep(Protocol):
 class ReferenceStep(Protocol):
     """A change of the reference (tachometer) between the table and the file."""
 
-    def __call__(self, reading: NDArray[np.float64], spin: SpinState) -> NDArray[np.float64]:
-        """Return the changed reference reading, shape (n,), rad/s; ``spin`` is the table's at these times."""
+    def __call__(self, reading: NDArray[np.float64], spin: SpinState, t: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the changed reference reading, shape (n,), rad/s; ``spin`` is the table's at these times ``t``, s."""
+        ...
+
+
+class Shake(Protocol):
+    """An acceleration of the whole rig in the room (bench, floor, bearing)."""
+
+    def __call__(self, spin: SpinState, t: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return it in world axes, shape (n, 3), m/s²; ``spin`` is the table's at these times ``t``, s."""
         ...
 
 
@@ -127,6 +136,22 @@ class Nod:
 
 
 @dataclass(frozen=True)
+class Lean:
+    """A lean of the cube about the point where the axis meets the table: a rotation vector that follows the motion.
+
+    Parameters
+    ----------
+    vector : ndarray, shape (3,)
+        Rotation vector in the table frame where the function is 1, rad.
+    function : callable
+        The function of the spin, shape (n,).
+    """
+
+    vector: NDArray[np.float64]
+    function: Callable[[SpinState], NDArray[np.float64]]
+
+
+@dataclass(frozen=True)
 class World:
     """Everything that decides what twelve channels and a tachometer read, except the drive and the noise.
 
@@ -148,6 +173,10 @@ class World:
         Relative stretch of the arms per rate squared, s²/rad²: arm × (1 + stretch·ω²).
     moving_arms : bool
         Whether readings hold what the stretching itself is: the Coriolis and radial acceleration of a growing arm.
+    leans : tuple of Lean
+        Leans of the cube against the table.
+    shakes : tuple
+        Accelerations of the whole rig in the room.
     chip_delay : ndarray, shape (k,)
         How late each chip is sampled after the time stamp, s.
     clock_ratio : float
@@ -180,6 +209,8 @@ class World:
     nod: Nod = Nod()
     stretch: float = 0.0
     moving_arms: bool = False
+    leans: tuple[Lean, ...] = ()
+    shakes: tuple[Shake, ...] = ()
     chip_delay: NDArray[np.float64] | None = None
     clock_ratio: float = 0.0
     tacho_delay: float = 0.0

@@ -26,7 +26,7 @@ MJCF = """
   </option>
   <worldbody>
     <body name="rotor">
-      <joint name="shaft" type="hinge" axis="0 0 1" armature="0.003" damping="0.01" frictionloss="0.008"/>
+      <joint name="shaft" type="hinge" axis="0 0 1" armature="0.003" damping="0.01" frictionloss="{friction}"/>
       <geom type="cylinder" size="0.12 0.006" mass="2.3"/>
       <body name="cube" pos="{cube[0]} {cube[1]} {cube[2]}" quat="{turn[0]} {turn[1]} {turn[2]} {turn[3]}">
         <geom type="box" size="0.05 0.05 0.05" mass="0.4"/>
@@ -65,6 +65,7 @@ class Rig:
     cogging: tuple[float, float, float] = (0.0, 1.0, 0.0)  # rad/s², order, rad
     wobble: tuple[float, float, float] = (0.0, 0.0, 0.0)  # amplitude, phase, azimuth of the nod's axis
     stretch: float = 0.0  # s²/rad²
+    friction: float = 0.008  # N m, Coulomb's, in the bearing
 
     @property
     def down(self):
@@ -116,6 +117,7 @@ def mjcf_of(rig, step):
         sensors="".join(sensors),
         stiffness=mode * natural**2,
         torsion_damping=2 * rig.torsion_damping * natural * mode,
+        friction=rig.friction,
     )
 
 
@@ -159,23 +161,27 @@ def differenced_readings(rig, t, angle, rate):
     if amplitude:
         nod = np.outer(amplitude * np.cos(angle + phase), [np.cos(azimuth), np.sin(azimuth), 0.0])
         frame = Rotation.from_rotvec(nod).as_matrix() @ frame
-    arms = rig.arms[None] * (1.0 + rig.stretch * rate**2)[:, None, None]
+    grown = (1.0 + rig.stretch * rate**2)[:, None] * [1.0, 1.0, 0.0] + [0.0, 0.0, 1.0]  # the load is radial
+    arms = rig.arms[None] * grown[:, None, :]
     to_rig = frame.transpose(0, 2, 1)
-    positions = arms @ to_rig  # (n, 4, 3)
-    h = t[1] - t[0]
-    inner = len(t) - 8
+    axes = (rig.axes.reshape(12, 3) @ to_rig).reshape(len(t), 4, 3, 3)
+    return read_positions(arms @ to_rig, axes, t[1] - t[0], rig.down)
+
+
+def read_positions(positions, axes, h, down):
+    """Specific force (n, 12) of chips at positions (n, 4, 3) with axes (n, 4, 3 axes, 3), every ``h`` seconds."""
+    inner = len(positions) - 8
     acceleration = sum(c * positions[k : k + inner] for k, c in enumerate(_STENCIL)) / h**2
     acceleration = np.concatenate([acceleration[:1]] * 4 + [acceleration] + [acceleration[-1:]] * 4)
-    axes = (rig.axes.reshape(12, 3) @ to_rig).reshape(len(t), 4, 3, 3)
-    return (axes @ (acceleration - rig.down)[..., None]).reshape(len(t), 12)
+    return (axes @ (acceleration - down)[..., None]).reshape(len(positions), 12)
 
 
-def random_command(rng, duration, top=15.0):
-    """Draw a commanded rate: S-curves between held speeds, smooth random waypoints, or plateaus with chirps.
+def random_command(rng, duration, top=15.0, kind=None):
+    """Draw a commanded rate: S-curves between held speeds (0), smooth random waypoints, or plateaus with chirps (2).
 
     The table rests for the first 0.3 s, so that its angle is zero at the first sample.
     """
-    kind = rng.integers(3)
+    kind = rng.integers(3) if kind is None else kind
     fine = np.arange(-2.0, duration + 2.0, 1e-3)
     if kind == 1:
         knots = np.concatenate([[-2.0, 0.3], 0.3 + np.cumsum(rng.uniform(0.8, 2.5, int(duration) + 10))])

@@ -35,6 +35,10 @@ def _diagnose(
         Path | None,
         typer.Option("--calibration", help="Calibration of the unit, applied first (JSON, from `gfimu calibrate`)."),
     ] = None,
+    grammar: Annotated[
+        bool,
+        typer.Option("--grammar", help="Also search further effects and places times dependences; up to minutes."),
+    ] = False,
     json: JsonOption = False,
 ) -> None:
     """Show what a simulation gets wrong against recordings, name the cause, extend the simulation, measure the gain.
@@ -43,13 +47,17 @@ def _diagnose(
 
     Example: gfimu diagnose run.parquet --twin cube12_turntable --out diagnosis
 
+    When the verdict is unknown: gfimu diagnose run.parquet --twin cube12_turntable --grammar --out diagnosis
+
     A unit fresh from the bench: gfimu diagnose run.parquet --twin cube12_turntable --calibration cal.json --out d
     """
     from gfimu.commands.diagnose import diagnose
     from gfimu.diagnosis.report.folder import FILES
 
     with progress("diagnosing", total=1.0) as done:
-        found = diagnose(runs, twin, out=out, held_out=held_out or [], calibration=calibration, report=done)
+        found = diagnose(
+            runs, twin, out=out, held_out=held_out or [], calibration=calibration, report=done, grammar=grammar
+        )
     written = {meaning: out / name for name, meaning in FILES.items()}
     if json:
         print_json(found.to_dict() | {"files": written})

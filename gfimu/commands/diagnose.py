@@ -31,6 +31,7 @@ def diagnose(
     calibration: Calibration | str | Path | None = None,
     names: Sequence[str] | None = None,
     report: Callable[[float, str], None] | None = None,
+    grammar: bool = False,
 ) -> Diagnosis:
     """Show what a simulation gets wrong against recordings, name the cause, extend the simulation, measure the gain.
 
@@ -50,6 +51,9 @@ def diagnose(
         Names of the runs, for people; those of their files by default.
     report : callable, optional
         Called with the share done, 0 to 1, and a line of text.
+    grammar : bool
+        Whether further effects of a rig, and places times dependences without a name of their own, are searched too, as
+        a twin file with ``grammar = true`` asks for.
 
     Returns
     -------
@@ -66,6 +70,7 @@ def diagnose(
 
     runs, unseen = as_runs(recordings), as_runs(held_out)
     model = as_twin(twin)
+    model = replace(model, grammar=True) if grammar else model
     unit = None if calibration is None else as_calibration(calibration)
     read, kept = ([_opened(run, model, unit) for run in group] for group in (runs, unseen))
     if unit is not None and unit.positions:

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from gfimu.diagnosis.criticism.coincidence.bound_numbers import coincidences
+from gfimu.diagnosis.criticism.coincidence.bound_numbers import Coincidence, coincidences
 from gfimu.diagnosis.criticism.gain import Gain
 from gfimu.diagnosis.criticism.holdout import Holdout, gate_gains, held_out_gain, other_recordings, split
 from gfimu.diagnosis.criticism.lack_of_fit import LackOfFit, lack_of_fit
@@ -26,10 +26,11 @@ from gfimu.diagnosis.search.long_run import understand_any_length
 from gfimu.diagnosis.search.nuisance_models import Understanding
 from gfimu.diagnosis.verdict.conclude import Described, conclude, is_dominant, is_unknown, named_causes
 from gfimu.diagnosis.verdict.gate import impossible_sizes, judge, measurable
+from gfimu.diagnosis.verdict.library import LibraryEvidence, with_library
 from gfimu.diagnosis.verdict.naming import conflicting
 from gfimu.diagnosis.verdict.place import with_place
 from gfimu.diagnosis.verdict.sample_notes import with_sample_notes
-from gfimu.diagnosis.verdict.verdict import Diagnosis
+from gfimu.diagnosis.verdict.verdict import Diagnosis, NamedCause
 from gfimu.errors import InputError
 from gfimu.recording import Recording
 from gfimu.recording.carried_array import warn_of_other_array
@@ -38,6 +39,8 @@ from gfimu.world_model import WorldModel, is_of_one_recording
 __all__ = ["diagnose", "prepare"]
 
 Report = Callable[[float, str], None]
+
+_INTERRUPTED = "the search was interrupted, leading by then and not yet compared with held-out data"
 
 
 def diagnose(
@@ -141,12 +144,15 @@ class _Diagnosis:
         policy, tell = self._policy, self._report
         stretches = _stretches(self._model, self._prepared)
         understanding = understand_any_length(stretches, policy, lambda share, text: tell(0.05 + 0.8 * share, text))
+        if understanding.explanation.interrupted:
+            tell(1.0, "interrupted")
+            return self._so_far(understanding)
         tell(0.88, "lack of fit")
         understanding, left = self._apart_from_the_rest(understanding)
         withdrawn: list[str] = []
         bound = self._coincidence(understanding.explanation)
-        if bound:
-            return self._described(understanding, left, withdrawn, bound)
+        if bound is not None and bound.log_odds > policy.steady:
+            return self._described(understanding, left, withdrawn, bound.sentence)
         gain = Gain()
         if not is_dominant(understanding.explanation, left, policy):
             tell(0.92, "hold out")
@@ -170,9 +176,31 @@ class _Diagnosis:
         if refuted:
             return self._described(understanding, left, withdrawn, refuted)
         told = measurable(gain)
-        if told is gain:
-            return found
-        return conclude(self._prepared, understanding, left, told, policy, withdrawn=withdrawn)
+        if told is not gain:
+            found = conclude(self._prepared, understanding, left, told, policy, withdrawn=withdrawn)
+        return self._doubted(found, understanding.explanation)
+
+    def _so_far(self, understanding: Understanding) -> Diagnosis:
+        """Return what a search that was interrupted had found: no verdict, as nothing was held out or criticised."""
+        explanation, policy = understanding.explanation, self._policy
+        if not explanation.best.causes:
+            raise KeyboardInterrupt
+        leading = named_causes(explanation, explanation.best, policy)
+        told = f"{_INTERRUPTED}: {'; '.join(one.effect + _sizes(one) for one in leading)}"
+        left = self._left(explanation)
+        found = conclude(self._prepared, understanding, left, Gain(), policy, refuted=told, unknown=True)
+        return replace(found, sentences=(f"No verdict: {told}.", *found.sentences[1:]))
+
+    def _doubted(self, found: Diagnosis, explanation: Explanation) -> Diagnosis:
+        """Return a verdict whose probabilities include that the truth is outside the library."""
+        bound = self._coincidence(explanation)
+        confirmed = found.gain.of_other_recording and found.gain.share_of_excess_removed >= 1.0 - self._policy.small
+        nats = float("nan") if bound is None else bound.log_odds
+        left = max(found.unexplained.log_odds, self._policy.lack_odds if found.unexplained.significant else 0.0)
+        evidence = LibraryEvidence(float(np.nan_to_num(nats)), left, confirmed)
+        fits = [explanation.best, *conflicting(explanation, self._policy)]
+        shapes = {cause.name: tuple(cause.shape) for fit in fits for cause in fit.causes}
+        return with_library(replace(found, coincidence=nats), evidence, shapes, self._policy)
 
     def _apart_from_the_rest(self, understanding: Understanding) -> tuple[Understanding, LackOfFit]:
         """Drop causes that explain less than what no cause explains: they would be made of it.
@@ -231,16 +259,17 @@ class _Diagnosis:
         if not found:
             return Gain()
         label = "blocks of the recording, odd and even from each other" if self._kept is None else "another recording"
-        return held_out_gain(fit.causes, self._pairs(explanation, fit), self._policy, label=label)
+        gain = held_out_gain(fit.causes, self._pairs(explanation, fit), self._policy, label=label)
+        return replace(gain, of_other_recording=self._kept is not None)
 
-    def _coincidence(self, explanation: Explanation) -> str:
-        """Return what binds the numbers of the causes that nothing should bind; empty where nothing does."""
+    def _coincidence(self, explanation: Explanation) -> Coincidence | None:
+        """Return what most likely binds the numbers of the causes that nothing should bind; None where nothing can."""
         first = explanation.stretches[0]
         if isinstance(first, BodyStretch):  # its motion has no arms that all recordings share
-            return ""
+            return None
         mounting = Rotation.from_rotvec(first.run.mounting).as_matrix()
         found = coincidences(explanation.best, self._model.array, mounting)
-        return found[0].sentence if found and found[0].log_odds > self._policy.steady else ""
+        return found[0] if found else None
 
     def _impossible(self, explanation: Explanation) -> str:
         """Return the signature where every set that the data can't tell apart holds a size beyond physics."""
@@ -264,9 +293,18 @@ class _Diagnosis:
             samples = sum(len(run.t) for run in self._kept.runs)
             better = gain.log_likelihood_per_sample - float(np.nan_to_num(alone.log_likelihood_per_sample))
             carried, gain = (whole, gain) if better * samples > self._policy.ambiguous else (carried, alone)
-        elif carried is not None and gain.share_in_any_recording <= 0.0:
+        elif carried is not None and (
+            gain.share_in_any_recording <= 0.0 or not self._carries_over(explanation, carried)
+        ):
             carried = None
         return Described(whole, carried), gain
+
+    def _carries_over(self, explanation: Explanation, described: Fit) -> bool:
+        """Tell whether one half of a run predicts the other: blocks in between follow what changes with time."""
+        if self._kept is not None:
+            return True
+        halves = held_out_gain(described.causes, self._pairs(explanation, described, np.inf), self._policy, label="")
+        return not halves.share_of_excess_removed < self._policy.least_share
 
     def _described(
         self, understanding: Understanding, left: LackOfFit, withdrawn: Sequence[str], refuted: str
@@ -292,3 +330,13 @@ class _Diagnosis:
             refuted=refuted,
             unknown=True,
         )
+
+
+def _sizes(cause: NamedCause) -> str:
+    """Return the sizes of a cause that differ from zero, in a line."""
+    shown = [
+        f"{key} = {float(cause.parameters[key]):.4g} ± {std:.2g}"
+        for key, std in cause.std.items()
+        if std > 0.0 and abs(float(cause.parameters[key])) > Policy.stds * std
+    ]
+    return f" ({', '.join(shown)})" if shown else ""

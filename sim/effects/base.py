@@ -104,7 +104,7 @@ class Effect(ABC):
     level_error: ClassVar[float] = 0.0
     """Standard deviation to which a level of a reading is found at best, in units of the reading's white noise."""
     of_one_recording: ClassVar[bool] = False
-    """True where its phase is that of a clock no other recording shares: it does not predict another one."""
+    """True where it goes with absolute time, of which no other recording needs to share phase or start."""
     of_wiring: ClassVar[bool] = False
     """True for a fault of the samples that changes a prediction without noise: it carries readings elsewhere or scales
     them."""
@@ -114,6 +114,9 @@ class Effect(ABC):
     """True where it depends on the specific force alone: while a body rests it is constant, as slow noise nearly is."""
     contained_in: ClassVar[frozenset[str]] = frozenset()
     """Effects that can do all that it does: beside one of them it has no size of its own."""
+
+    rarity: ClassVar[float] = 1.0
+    """How many times rarer it is than a usual effect, before any data."""
 
     def __init__(self, parameters: Mapping[str, Any]) -> None:
         self.parameters: dict[str, Any] = dict(parameters)

@@ -235,7 +235,7 @@ class Gravity(Effect):
 
 
 class CentrifugalFlex(Effect):
-    """Arms that stretch with ω²: each is as long as the present rate makes it.
+    """Arms that stretch with ω² across the axis, where the load is: each is as long as the present rate makes it.
 
     With ``moving_arms`` = 1 it also moves while it grows, as a soft rig does, which adds Coriolis and radial
     acceleration; without, the arm of the moment turns as if rigid.

@@ -7,17 +7,20 @@ from typing import Any
 
 from gfimu.errors import unknown_name
 from gfimu.geometry.array import AccelerometerArray
-from sim.effects import body, digital, mechanical, sensing, timing
+from sim.effects import body, digital, mechanical, rig, sensing, timing
 from sim.effects.base import Effect
 from sim.effects.unknown import Unknown
+from sim.effects.unlisted import UNLISTED
 from sim.world import World
 
 __all__ = [
     "BODY_EFFECTS",
     "EFFECTS",
     "ENCODER_EFFECTS",
+    "FURTHER_EFFECTS",
     "NOT_OF_AN_ENCODER",
     "NOT_OF_A_BODY",
+    "TABLE_EFFECTS",
     "apply_effects",
     "make_effect",
 ]
@@ -62,7 +65,15 @@ EFFECTS: dict[str, type[Effect]] = {
         digital.DroppedFrames,
     )
 }
-"""Every effect of a rig on its table, by its contract name."""
+"""Every effect of a rig on its table in the contract's first table, by its name there."""
+
+_OF_RIG: tuple[type[Effect], ...] = (
+    *(rig.TachoLag, body.ChipDelay, rig.ChipLag, rig.BearingShake, rig.BenchSway),
+    sensing.ColdStart,
+)
+
+FURTHER_EFFECTS: dict[str, type[Effect]] = {**{effect.name: effect for effect in _OF_RIG}, **UNLISTED}
+"""What a rig on its table may have besides: further effects with a name, and the points of the grammar."""
 
 NOT_OF_A_BODY: dict[str, str] = {
     **dict.fromkeys(("eccentricity", "mount_tilt", "table_tilt", "axis_wobble"), "a body in the hand has no axis"),
@@ -88,11 +99,18 @@ BODY_EFFECTS: dict[str, type[Effect]] = {
 NOT_OF_AN_ENCODER: dict[str, str] = {
     "tacho_scale": "the marks of an encoder are counted, its full turn has no gain",
     "tacho_ripple": "the modulation of a rate; an angle has none",
+    **dict.fromkeys(
+        ("tacho_lag", *(name for name, point in UNLISTED.items() if point.place == "reference")),
+        "the error of a rate; an angle has its own",
+    ),
 }
 """Effects that a diagnosis of a table whose reference is an angle does not look for, and why."""
 
+TABLE_EFFECTS: dict[str, type[Effect]] = EFFECTS | FURTHER_EFFECTS
+"""Every effect of a rig on its table whose reference is a rate."""
+
 ENCODER_EFFECTS: dict[str, type[Effect]] = {
-    name: effect for name, effect in EFFECTS.items() if name not in NOT_OF_AN_ENCODER
+    name: effect for name, effect in TABLE_EFFECTS.items() if name not in NOT_OF_AN_ENCODER
 }
 """Every effect of a rig whose reference is an angle, by its contract name."""
 
@@ -103,7 +121,7 @@ def make_effect(
     name: str, parameters: Mapping[str, Any] | None = None, array: AccelerometerArray | None = None
 ) -> Effect:
     """Build an effect by name; raises `InputError` for an unknown name or, given the array, an unknown key."""
-    known = EFFECTS | BODY_EFFECTS | {Unknown.name: Unknown}
+    known = TABLE_EFFECTS | BODY_EFFECTS | {Unknown.name: Unknown}
     if name not in known:
         raise unknown_name("effect", name, known)
     effect = known[name](parameters or {})
@@ -115,7 +133,7 @@ def make_effect(
 _CHAIN = (
     *("sensor_position", "misalignment", "mount_tilt", "eccentricity", "centrifugal_flex", "table_tilt", "axis_wobble"),
     *("cross_axis", "scale_factor", "gain_drift", "quadratic", "vibration_rectification", "hysteresis"),
-    *("bias", "bias_temperature", "warm_up", "interference_tone", "sensor_lag", "unknown"),
+    *("bias", "bias_temperature", "warm_up", "cold_start", "interference_tone", "sensor_lag", "unknown"),
 )
 
 

@@ -92,7 +92,7 @@ class TachoScale(Effect):
     def apply(self, world: World) -> World:
         """Multiply the reference by 1 + ratio."""
         gain = 1 + self.value("ratio")
-        return world.changed(reference_steps=(*world.reference_steps, lambda reading, spin: reading * gain))
+        return world.changed(reference_steps=(*world.reference_steps, lambda reading, spin, t: reading * gain))
 
 
 class TachoRipple(Effect):
@@ -141,7 +141,7 @@ class TachoRipple(Effect):
         amplitude, order = self.value("amplitude"), self.value("order", 1.0)
         phase = self.value("phase_rad")
 
-        def step(reading: NDArray[np.float64], spin: SpinState) -> NDArray[np.float64]:
+        def step(reading: NDArray[np.float64], spin: SpinState, t: NDArray[np.float64]) -> NDArray[np.float64]:
             return reading * (1 + amplitude * np.sin(order * spin.angle + phase))
 
         return world.changed(reference_steps=(*world.reference_steps, step))

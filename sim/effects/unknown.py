@@ -77,7 +77,7 @@ class Unknown(Effect):
             values = function(Motion.of(context.spin, world.since_start(context.t), units))
             return readings + np.outer(values, sizes)
 
-        def refer(reading: NDArray[np.float64], spin: SpinState) -> NDArray[np.float64]:
+        def refer(reading: NDArray[np.float64], spin: SpinState, t: NDArray[np.float64]) -> NDArray[np.float64]:
             return reading + of_reference * function(Motion.of(spin, np.zeros(len(reading)), units))
 
         if sizes.any():

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from gfimu.errors import unknown_name
-from sim.effects import BODY_EFFECTS, EFFECTS, ENCODER_EFFECTS
+from sim.effects import BODY_EFFECTS, EFFECTS, NOT_OF_AN_ENCODER
 
 __all__ = ["BODY_PARTS", "EXOTICS", "STUDIES", "Case", "study_cases"]
 
@@ -279,8 +279,9 @@ def _residue() -> list[Case]:
 def _elsewhere(study: str, first_seed: int, settings: Mapping[str, Any], count: int = 24) -> list[Case]:
     """Return cases away from the usual run: a third with nothing hidden, the rest with one effect."""
     rng = np.random.default_rng(first_seed)
-    library = ENCODER_EFFECTS if "encoder_counts" in settings else EFFECTS
-    order = [str(name) for name in rng.permutation(list(library))]
+    left_out = NOT_OF_AN_ENCODER if "encoder_counts" in settings else {}
+    library = [name for name in EFFECTS if name not in left_out]
+    order = [str(name) for name in rng.permutation(library)]
     cases = []
     for number in range(count):
         hidden = () if number % 3 == 0 else (order[number % len(order)],)

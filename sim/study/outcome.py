@@ -15,6 +15,7 @@ import numpy as np
 
 from gfimu.diagnosis.design.distinguishability import energy_left, normal_equations, plan_contenders
 from gfimu.diagnosis.design.planned_run import PlannedRun, planned
+from gfimu.diagnosis.verdict.library import standing_out
 from gfimu.diagnosis.verdict.verdict import Diagnosis, NamedCause
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
@@ -32,6 +33,7 @@ __all__ = ["HiddenWorld", "SmallerLibrary", "draw_world", "outcome_of", "run_cas
 
 _MG = STANDARD_GRAVITY / 1000.0
 _TURN = 2 * np.pi
+_SHAPES = frozenset(("frequency_hz", "damping_ratio", "order", "width_m_s2", "time_constant_s"))
 _CLIPPED_ABOVE = 1.07
 _FASTEST_SHARE = 0.02
 _LONGEST_PLANNED = 120.0  # s: a planned run has one drive, whose normal equations grow with its square
@@ -254,6 +256,7 @@ def outcome_of(diagnosis: Diagnosis, truth: Sequence[tuple[str, Mapping[str, Any
                 "probability": cause.probability,
                 "log_odds": cause.log_odds,
                 "rivals": list(cause.not_distinguishable_from),
+                "stds": standing_out(cause, _SHAPES),
                 "z": {key: round(value, 3) for key, value in scores.items()},
             }
         )
@@ -267,6 +270,10 @@ def outcome_of(diagnosis: Diagnosis, truth: Sequence[tuple[str, Mapping[str, Any
         "noise_floor": residual.noise_floor,
         "rival_log_odds": max((rival.log_odds for rival in diagnosis.rivals), default=None),
         "unexplained": diagnosis.unexplained.significant,
+        "unexplained_nats": diagnosis.unexplained.log_odds,
+        "library_probability": diagnosis.library_probability,
+        "coincidence_nats": diagnosis.coincidence,
+        "rigid": None if diagnosis.rigid is None else diagnosis.rigid.to_dict(),
         "signature": diagnosis.unexplained.signature,
         "noise": dict(diagnosis.noise),
         "truth": {name: {key: _plain(value) for key, value in parameters.items()} for name, parameters in truth},

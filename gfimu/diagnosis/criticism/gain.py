@@ -31,6 +31,8 @@ class Gain:
     share_in_any_recording : float
         The same share without terms of absolute time, which another recording has otherwise; NaN where nothing can
         be said.
+    of_other_recording : bool
+        Whether the held-out data are another recording.
     """
 
     held_out: str = ""
@@ -45,3 +47,4 @@ class Gain:
     drift_after: float = float("nan")
     share_std: float = float("nan")
     share_in_any_recording: float = float("nan")
+    of_other_recording: bool = False

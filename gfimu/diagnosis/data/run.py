@@ -169,7 +169,10 @@ def prepare_run(recording: Recording, model: WorldModel, *, name: str = "run") -
     grid = time_grid(recording.t_s)
     place, n = grid.place, grid.size
     if n > 4 * len(recording):
-        raise InputError(f"{name}: more samples are missing than present; record again without the long gaps")
+        raise InputError(
+            f"{name}: more samples are missing than present; record again without the long gaps, or, where t_s is when "
+            "the host read them in bursts, write the times at which the chips sampled"
+        )
     t = grid.t
     full = np.zeros((n, readings.shape[1]))
     full[place] = readings

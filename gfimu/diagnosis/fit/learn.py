@@ -48,7 +48,7 @@ LEAST_VALID = 0.01
 _LEAST_WIDTH = 0.4  # numerical: sample periods of a knot interval that is cut
 _HALVINGS = 5  # numerical: of a knot interval
 _BLUR = 0.5  # numerical: standard deviations that a drive misses in an interval that is worth a try
-_REFERENCE_ROUNDS = 5  # numerical: to the roughness of a drive from its reference alone
+_REFERENCE_ROUNDS = 5  # numerical: to the roughness of a drive from its reference alone, and to invert its errors
 
 
 def starting_point(stretches: Sequence[Stretch], spacing: float) -> Point:
@@ -72,7 +72,16 @@ def _by_reference(stretch: Stretch, spacing: float) -> Drive:
     noise = stretch.steps.reference_noise(float(stretch.first_levels.white[-1]))
     weights = np.where(stretch.run.reference_valid, noise, np.inf)
     order = 0 if stretch.is_angle else 1
-    return drive.by_reference(times[:, -1], stretch.run.reference[seen], weights[seen], order, _REFERENCE_ROUNDS)
+    reading = stretch.run.reference[seen]
+    found = drive.by_reference(times[:, -1], reading, weights[seen], order, _REFERENCE_ROUNDS)
+    if not any(effect.place == "reference" for effect in (*stretch.model.effects, *stretch.known)):
+        return found
+    # What the twin believes of its reference is inverted: d = reading - (predicted reading of d - d).
+    for _ in range(_REFERENCE_ROUNDS):
+        state = found.spin.at(times[:, -1])
+        error = stretch.predict([], found.spin)[seen, -1] - (state.angle if stretch.is_angle else state.rate)
+        found = drive.by_reference(times[:, -1], reading - error, weights[seen], order, _REFERENCE_ROUNDS)
+    return found
 
 
 def predicted_by_reference(model: WorldModel, run: Run) -> NDArray[np.float64]:

@@ -73,6 +73,8 @@ def headline(diagnosis: Diagnosis) -> str:
             return "Nothing is wrong with the simulation that this recording could show."
         case "unknown" if found:
             return f"Found: {_joined(found)}. Something else is real too, and nothing in the library explains it."
+        case "unknown" if diagnosis.sentences[:1] and diagnosis.sentences[0].startswith("No verdict"):
+            return diagnosis.sentences[0]
         case "unknown":
             return "Something real is missing in the simulation, and nothing in the library explains it."
         case "ambiguous":
@@ -128,7 +130,7 @@ def story(diagnosis: Diagnosis) -> str:
         )
     if diagnosis.verdict == "nothing_found":
         return text + "No cause in the library, and no pattern of any other kind, predicts the data better than chance."
-    parts = [_put_in(diagnosis), _on_unseen_data(diagnosis), _of_absolute_time(diagnosis)]
+    parts = [_put_in(diagnosis), _on_unseen_data(diagnosis), _of_absolute_time(diagnosis), _in_library(diagnosis)]
     if diagnosis.unexplained.significant:
         parts.append(f"Left unexplained: {diagnosis.unexplained.signature}. ")
     level = float(diagnosis.noise.get("bias_instability_largest_m_s2", 0.0))
@@ -163,6 +165,17 @@ def _on_unseen_data(diagnosis: Diagnosis) -> str:
     if diagnosis.unexplained.left_out and math.isfinite(gain.share_in_any_recording):
         text += f"In any other recording it would be {percent(max(gain.share_in_any_recording, 0.0))}. "
     return text
+
+
+def _in_library(diagnosis: Diagnosis) -> str:
+    """Return how likely it is that what is named is true and imitates nothing that the library lacks."""
+    share = diagnosis.library_probability
+    if not math.isfinite(share):
+        return ""
+    return (
+        "An effect that is not in the library could look like this; that none does has a probability of "
+        f"{percent(share)}. "
+    )
 
 
 def _of_absolute_time(diagnosis: Diagnosis) -> str:

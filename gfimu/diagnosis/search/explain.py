@@ -49,6 +49,8 @@ class Explanation:
     elsewhere : tuple of Fit
         The best set under each other model of the nuisance parameters, its log posterior less what that model needs
         more than this one.
+    interrupted : bool
+        Whether the search was ended by an interrupt.
     """
 
     best: Fit
@@ -60,6 +62,7 @@ class Explanation:
     fits: int = 0
     by_reference: tuple[Drive, ...] = ()
     elsewhere: tuple[Fit, ...] = ()
+    interrupted: bool = False
 
 
 class Sets:
@@ -213,12 +216,19 @@ def explain(
     found = []
     for number, sets in enumerate(starts):
         found.append(_searched(sets, partial(_tell_part, tell, number, len(starts))))
+        if found[-1].interrupted:
+            break
     best = max(found, key=lambda one: one.best.log_posterior)
-    return replace(best, fits=sum(one.fits for one in found), by_reference=reference.drives)
+    return replace(
+        best,
+        fits=sum(one.fits for one in found),
+        by_reference=reference.drives,
+        interrupted=found[-1].interrupted,
+    )
 
 
-def _tell_part(tell: Report, number: int, count: int, share: float) -> None:
-    tell(0.1 + 0.8 * (number + share) / count, "search")
+def _tell_part(tell: Report, number: int, count: int, share: float, text: str) -> None:
+    tell(0.1 + 0.8 * (number + share) / count, text)
 
 
 def _started(stretches: Sequence[Stretch], reference: Point, policy: Policy) -> list[Sets]:
@@ -236,28 +246,38 @@ def _started(stretches: Sequence[Stretch], reference: Point, policy: Policy) -> 
     return [_under(sets, one, [nothing]) for one in ((point,) if closer is point else (closer, point))]
 
 
-def _searched(sets: Sets, tell: Callable[[float], None]) -> Explanation:
-    """Screen, fit the leaders and learn the nuisances, until the most probable set repeats itself."""
-    stretches, policy = sets.stretches, sets.policy
-    fits, seen = 0, set()
-    for number in range(policy.rounds):
-        tell(number / policy.rounds)
-        before = sets.best
-        screening = screen(stretches, before.point)
-        _fit_leaders(sets, screening, before, near=number > 0)
-        leader = prune(sets)
-        if leader.key not in seen:
-            _fit_other_shapes(sets, leader)
-        # While a set still grows its noise is that of the largest: a smaller one would pass for more noise.
-        best = sets.best if policy.free_body and sets.best.key not in seen else prune(sets)
-        fits += sets.count
-        if number > 0 and (best.key in seen or hardly_eases(stretches, before, best, policy)):
-            break
-        seen.add(best.key)
-        learnt = _relearned(stretches, best, policy, sharpen=best.key != before.key)
-        sets = _under(sets, learnt, _near(sets, best))
+def _searched(sets: Sets, tell: Report) -> Explanation:
+    """Screen, fit the leaders and learn the nuisances, until the most probable set repeats itself.
+
+    An interrupt (Ctrl-C) ends the search with what is known by then.
+    """
+    policy, fits, seen, last = sets.policy, 0, set[_Key](), None
+    try:
+        for number in range(policy.rounds):
+            tell(number / policy.rounds, _leading(sets.best))
+            before = sets.best
+            last = (before.key, screen(sets.stretches, before.point))
+            _fit_leaders(sets, last[1], before, near=number > 0)
+            leader = prune(sets)
+            if leader.key not in seen:
+                _fit_other_shapes(sets, leader)
+            # While a set still grows its noise is that of the largest: a smaller one would pass for more noise.
+            best = sets.best if policy.free_body and sets.best.key not in seen else prune(sets)
+            fits += sets.count
+            if number > 0 and (best.key in seen or hardly_eases(sets.stretches, before, best, policy)):
+                break
+            seen.add(best.key)
+            learnt = _relearned(sets.stretches, best, policy, sharpen=best.key != before.key)
+            sets = _under(sets, learnt, _near(sets, best))
+    except KeyboardInterrupt:
+        return replace(explained(sets, prune(sets), fits + sets.count), interrupted=True)
     best = prune(sets)
-    return explained(sets, best, fits + sets.count, screening if best.key == before.key else None)
+    return explained(sets, best, fits + sets.count, last[1] if last is not None and best.key == last[0] else None)
+
+
+def _leading(best: Fit) -> str:
+    """Return what a search says of itself: the most probable set so far."""
+    return f"search; leading: {' + '.join(sorted(best.names))}" if best.causes else "search"
 
 
 def _relearned(stretches: Sequence[Stretch], best: Fit, policy: Policy, *, sharpen: bool) -> Point:

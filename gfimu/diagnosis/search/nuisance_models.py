@@ -59,6 +59,8 @@ def understand(stretches: Sequence[Stretch], policy: Policy, report: Report | No
         _understood(stretches, explain(stretches, policy, report=lambda s, text: tell(0.6 * s, text)), policy, 0.0)
     ]
     plain, derivatives = found[0].explanation, _Derivatives(stretches)
+    if plain.interrupted:
+        return found[0]
     rough = _left_by_inexactness(plain)
     offered = [(_offers(stretches, plain, model, derivatives), model) for model in _models(stretches, plain, policy)]
     # The most promising first: what it finds leaves the others little to search for.

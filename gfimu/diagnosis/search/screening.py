@@ -16,7 +16,7 @@ from gfimu.diagnosis.terms.cause import Cause, effects_of, mixing_of
 from gfimu.diagnosis.terms.columns import Columns
 from gfimu.diagnosis.terms.library import family_columns
 from gfimu.geometry.array import AccelerometerArray
-from gfimu.world_model import EffectFamily, Whitened, shapes_to_screen
+from gfimu.world_model import EffectFamily, Whitened, prior_of, shapes_to_screen
 
 __all__ = ["Hypothesis", "Screening", "Signature", "columns_of_run", "hypotheses_of", "screen"]
 
@@ -165,7 +165,7 @@ def _whitened(stretch: Stretch, posterior: Posterior, causes: Sequence[Cause]) -
 
 def hypotheses_of(signatures: Sequence[Signature], array: AccelerometerArray, runs: int) -> list[Hypothesis]:
     """List every effect at every place it can take, with its prior."""
-    families = len({signature.family.name for signature in signatures})
+    families = list({str(signature.family.name): signature.family for signature in signatures}.values())
     out = []
     for signature in signatures:
         patterns = signature.family.patterns(array)
@@ -173,7 +173,7 @@ def hypotheses_of(signatures: Sequence[Signature], array: AccelerometerArray, ru
         for number, pattern in enumerate(patterns):
             # The freest place is as probable as all others together, which are equally so.
             share = 1.0 / (min(len(patterns), 2) * (1 if number == 0 else len(patterns) - 1))
-            prior = float(np.log(share / (families * signature.looks)))
+            prior = float(np.log(share * prior_of(signature.family, families) / signature.looks))
             mixing = mixing_of(pattern, runs) if anew else pattern.mixing
             cause = Cause(signature.family, pattern.name, mixing, signature.shape, np.zeros(mixing.shape[1]), prior)
             out.append(Hypothesis(cause, signature, cause.positive(array)))

@@ -41,7 +41,8 @@ from gfimu.diagnosis.verdict.naming import (
 from gfimu.diagnosis.verdict.undetermined import undetermined, undetermined_sentence
 from gfimu.diagnosis.verdict.verdict import Diagnosis, NamedCause, Residual, Unexplained
 from gfimu.diagnosis.verdict.wording import Notes, verdict_sentences
-from gfimu.world_model import Effect, Spin, WorldModel
+from gfimu.geometry.array import AccelerometerArray
+from gfimu.world_model import Effect, Spin, WorldModel, is_of_one_recording
 
 __all__ = ["Described", "conclude", "is_dominant", "is_unknown", "named_causes"]
 
@@ -105,7 +106,11 @@ def is_unknown(explanation: Explanation, left: LackOfFit, gain: Gain, policy: Po
         and gain.share_of_excess_removed < 1.0 - policy.dominant
     )
     doubtful = missed or _is_full(explanation, policy) or is_dominant(explanation, left, policy)
-    return doubtful and (_depends(explanation, left, policy) or not explanation.best.causes)
+    if not explanation.best.causes:
+        return doubtful
+    # The slow noise of one channel takes what smooth functions would show.
+    loud = loudest_channel(explanation.stretches, explanation.best.point, policy).stands_out(policy)
+    return doubtful and (_depends(explanation, left, policy) or loud)
 
 
 def _is_full(explanation: Explanation, policy: Policy) -> bool:
@@ -250,8 +255,7 @@ def conclude(
     levels = believed.point.levels[0]
     floor = body_noise_floor(first, levels) if isinstance(first, BodyStretch) else _noise_floor(runs, first, believed)
     residual = Residual.of_views(runs, array.channels, floor)
-    extends = not unknown or (described is not None and described.carried is not None)
-    extension = effects_of(believed.causes, array, 0) if extends else []
+    extension, of_time = _extension(believed, described, array, unknown=unknown, confirmed=gain.of_other_recording)
     twin = model.extended([*_library_effects(model, found), *_residue(explanation), *extension])
     expected = model.expected_noise(1.0 / first.run.sample_period)
     noise: dict[str, Any] = {
@@ -268,14 +272,18 @@ def conclude(
     notes = Notes(
         residue=understanding.residue,
         unreferenced=sum(run.unreferenced for run in prepared.runs),
-        terms=len(believed.causes) if unknown and extends else 0,
+        terms=len(extension) if unknown else 0,
         loudest=(loudest.name, loudest.level, loudest.ratio),
         rest=left.signature if left.log_odds > policy.lack_odds else "",
     )
     words = verdict_sentences(verdict, causes, residual, gain, unexplained, withdrawn, notes)
     others_told = rival_list(explanation, policy)
-    open_ones = undetermined(explanation.screening, array, policy.least_information)
+    # Of a table those of the causes alone: it could have many others, each with something that it does not show.
+    looked_at = None if policy.free_body else {cause.effect for cause in causes}
+    open_ones = undetermined(explanation.screening, array, policy.least_share, looked_at)
     words = (*words, undetermined_sentence(open_ones)) if open_ones else words
+    if of_time:
+        words = (*words, _of_absolute_time(of_time))
     listed = tuple(one.to_dict() for one in open_ones)
     return Diagnosis(verdict, causes, residual, gain, unexplained, others_told, twin, runs, words, noise, listed)
 
@@ -285,6 +293,25 @@ def _believed(explanation: Explanation, described: Described | None, *, unknown:
     if not unknown:
         return explanation.best
     return described.carried if described is not None and described.carried is not None else explanation.nothing
+
+
+def _extension(
+    believed: Fit, described: Described | None, array: AccelerometerArray, *, unknown: bool, confirmed: bool
+) -> tuple[list[Effect], list[str]]:
+    """Return what extends the twin, and the names of causes of absolute time that do not, as nothing confirms them."""
+    if unknown:
+        carried = described is not None and described.carried is not None
+        return (effects_of(believed.causes, array, 0) if carried else []), []
+    of_time = [one for one in believed.causes if is_of_one_recording(one.family) and not confirmed]
+    return effects_of([one for one in believed.causes if one not in of_time], array, 0), [one.name for one in of_time]
+
+
+def _of_absolute_time(names: Sequence[str]) -> str:
+    go, are, them = ("goes", "is", "it") if len(names) == 1 else ("go", "are", "them")
+    return (
+        f"{' and '.join(names)} {go} with absolute time and {are} not in the extended twin: another recording has "
+        f"another phase or start, and none confirms {them}."
+    )
 
 
 def _loud(loudest: LoudestChannel, policy: Policy) -> str:

@@ -16,7 +16,10 @@ from gfimu.diagnosis.verdict.verdict import NamedCause, Residual
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.world_model import EffectFamily, bound_of
 
-__all__ = ["Judgement", "impossible_sizes", "judge", "measurable"]
+__all__ = ["NOT_THIS_UNIT", "Judgement", "impossible_sizes", "judge", "measurable"]
+
+NOT_THIS_UNIT = "the array file, axes or units do not fit these data"
+"""Signature of sizes beyond physics."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +73,11 @@ def measurable(gain: Gain) -> Gain:
     There the error may rise as well as fall by chance, and says nothing.
     """
     rises = gain.log_likelihood_per_sample < 0.0 or gain.rms_after > gain.rms_before
-    return Gain(gain.held_out) if rises and np.isnan(gain.share_of_excess_removed) else gain
+    return (
+        Gain(gain.held_out, of_other_recording=gain.of_other_recording)
+        if rises and np.isnan(gain.share_of_excess_removed)
+        else gain
+    )
 
 
 def _held_out_figure(gain: Gain, policy: Policy) -> str:
@@ -121,7 +128,7 @@ def impossible_sizes(
         return ""
     worst = max(beyond)[1]
     others = f" (and {len(beyond) - 1} more)" if len(beyond) > 1 else ""
-    return f"the array file, axes or units do not fit these data: {worst}{others}"
+    return f"{NOT_THIS_UNIT}: {worst}{others}"
 
 
 def _found(causes: Sequence[NamedCause]) -> str:

@@ -17,7 +17,7 @@ from gfimu.diagnosis.search.explain import Explanation
 from gfimu.diagnosis.terms.cause import Cause
 from gfimu.diagnosis.verdict.verdict import NamedCause, Rival
 from gfimu.geometry.array import AccelerometerArray
-from gfimu.world_model import Effect, EffectFamily
+from gfimu.world_model import Effect, EffectFamily, dependence_of
 
 __all__ = [
     "capped",
@@ -170,7 +170,11 @@ def name_cause(
     parameters, std = cause_parameters(cause, array)
     same = mimics(explanation, cause, policy) if fit is explanation.best else []
     without = explanation.without.get(cause.name)
-    why = _sentence(cause, array, share) + _or_other_nuisances(explanation, cause, policy)
+    why = (
+        _sentence(cause, array, share)
+        + _at_most(explanation, fit, cause)
+        + _or_other_nuisances(explanation, cause, policy)
+    )
     named = NamedCause(
         cause.name,
         parameters,
@@ -181,8 +185,37 @@ def name_cause(
         str(cause.family.separated_by) if same else "",
         why,
         0.0 if without is None else float(fit.log_posterior - without.log_posterior),
+        _unlisted(cause),
     )
     return capped(named, policy, cause.shape)
+
+
+def _unlisted(cause: Cause) -> dict[str, str]:
+    """Return place, dependence and pattern of a cause that the contract has no name for; nothing of others."""
+    dependence = dependence_of(cause.family)
+    if dependence is None:
+        return {}
+    place = str(getattr(cause.family, "grammar_place", cause.family.place))
+    return {"place": place, "dependence": dependence.name, "pattern": cause.place or "one"}
+
+
+def _at_most(explanation: Explanation, fit: Fit, cause: Cause) -> str:
+    """Return what a cause without a name goes with, and what it makes where that is largest in the first recording."""
+    dependence = dependence_of(cause.family)
+    if dependence is None:
+        return ""
+    stretch = explanation.stretches[0]
+    spin = fit.point.drives[0].spin.at(stretch.run.t)
+    values = dependence.of(spin)
+    at = int(np.abs(values).argmax())
+    told = f"; it goes with {dependence.words}"
+    if dependence.name == "1" or not values[at]:
+        return told
+    sizes = cause.sizes(stretch.model.array, stretch.index)
+    number = int(np.abs(sizes).argmax())
+    unit = cause.family.sizes(stretch.model.array)[number].unit.split("/(")[0]
+    amount = f"{100 * sizes[number] * values[at]:.2g} %" if unit == "1" else f"{sizes[number] * values[at]:.3g} {unit}"
+    return f"{told}: {amount} at {spin.rate[at]:.3g} rad/s and {spin.acceleration[at]:.3g} rad/s²"
 
 
 def _or_other_nuisances(explanation: Explanation, cause: Cause, policy: Policy) -> str:

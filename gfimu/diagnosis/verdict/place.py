@@ -10,10 +10,16 @@ from gfimu.diagnosis.data.run import Run
 from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.fit.learn import predicted_by_reference
 from gfimu.diagnosis.policy import Policy
+from gfimu.diagnosis.verdict.gate import NOT_THIS_UNIT
 from gfimu.diagnosis.verdict.likely_mistakes import likely_mistake
 from gfimu.diagnosis.verdict.verdict import Diagnosis
 
 __all__ = ["with_place"]
+
+_NO_MISTAKE = (
+    "Other orders and signs of the channels, millimetres, centimetres or inches for metres, and other arrays of the "
+    "library were tried: none of them fits."
+)
 
 
 def with_place(found: Diagnosis, stretches: Sequence[Stretch], runs: Sequence[Run], policy: Policy) -> Diagnosis:
@@ -37,6 +43,8 @@ def with_place(found: Diagnosis, stretches: Sequence[Stretch], runs: Sequence[Ru
     mistake = likely_mistake(stretches[0].model, runs, predicted_by_reference)
     if mistake is not None:
         unexplained, more = replace(found.unexplained, mistake=mistake.text), mistake.sentence
+    elif found.unexplained.signature.startswith(NOT_THIS_UNIT):
+        unexplained, more = found.unexplained, _NO_MISTAKE
     else:
         unexplained, more = found.unexplained, rigid.sentence
     first, *others = found.sentences

@@ -1,12 +1,14 @@
-"""Combinations of sizes that the data of a free body can't determine.
+"""Combinations of sizes that the data can't determine.
 
-Nothing is known of the specific force, so that what all chips share passes for it: an offset, a displacement, a delay.
-Two chips leave more. None of that is a list of special cases: the combinations are the eigenvectors of the normal
-equations, in units of the prior, along which the data say less than the prior does.
+On an upright table no reading depends on the height of a chip, nor at rest on a gain across gravity. Of a free body
+nothing is known of the specific force, so that what all chips share passes for it: an offset, a displacement, a delay.
+None of that is a list of special cases: the combinations are the eigenvectors of the normal equations, in units of the
+prior, along which the data say less than the prior does.
 """
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Any
 
@@ -56,11 +58,16 @@ class Undetermined:
         return {"effect": self.effect, "combination": dict(self.combination), "text": self.text}
 
 
-def undetermined(screening: Screening, array: AccelerometerArray, least: float) -> tuple[Undetermined, ...]:
-    """Return the combinations of the sizes of each effect without a shape that have less information than ``least``."""
+def undetermined(
+    screening: Screening, array: AccelerometerArray, least: float, only: Collection[str] | None = None
+) -> tuple[Undetermined, ...]:
+    """Return the combinations of the sizes of each effect without a shape that have less information than ``least``.
+
+    ``only`` are the names of the effects to look at; by default all.
+    """
     found: list[Undetermined] = []
-    for signature in screening.signatures if least else ():
-        if not signature.shape:
+    for signature in screening.signatures:
+        if not signature.shape and (only is None or signature.family.name in only):
             found += _of_effect(signature, screening.gram, array, least)
     return tuple(found)
 

@@ -54,6 +54,9 @@ class NamedCause:
         One sentence: where and how it shows.
     log_odds : float
         Log odds of the explanation with this cause against the best one without it.
+    unlisted : mapping of str to str
+        Of an effect that the contract has no name for: its ``place`` in the chain, the ``dependence`` on the motion and
+        the ``pattern`` of its sizes. Empty for all others.
     """
 
     effect: str
@@ -65,6 +68,7 @@ class NamedCause:
     would_be_separated_by: str = ""
     why: str = ""
     log_odds: float = 0.0
+    unlisted: Mapping[str, str] = field(default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON form of the contract."""
@@ -81,6 +85,7 @@ class NamedCause:
             "would_be_separated_by": self.would_be_separated_by,
             "why": self.why,
             "log_odds": self.log_odds,
+            **({"effect": "unlisted", "name": self.effect, **self.unlisted} if self.unlisted else {}),
         }
 
 
@@ -195,6 +200,11 @@ class Diagnosis:
         key) and ``text``.
     rigid : RigidMotion, optional
         Whether the residual of the given simulation is a motion of the whole array; None for a free body.
+    library_probability : float
+        Probability that the causes are the truth and imitate nothing outside the library, the least of them; it is in
+        their own probabilities. NaN where no cause was inferred.
+    coincidence : float
+        Log odds of the likeliest pattern that binds the free numbers of the causes, nats; NaN where none can be tested.
     """
 
     verdict: str
@@ -209,6 +219,8 @@ class Diagnosis:
     noise: Mapping[str, Any]
     undetermined: tuple[Mapping[str, Any], ...] = ()
     rigid: RigidMotion | None = None
+    library_probability: float = float("nan")
+    coincidence: float = float("nan")
 
     @property
     def in_part(self) -> bool:
@@ -233,6 +245,8 @@ class Diagnosis:
             "format_version": FORMAT_VERSION,
             "verdict": self.verdict,
             "in_part": self.in_part,
+            "library_probability": self.library_probability,
+            "coincidence_nats": self.coincidence,
             "sentences": list(self.sentences),
             "causes": [cause.to_dict() for cause in self.causes],
             "residual": {

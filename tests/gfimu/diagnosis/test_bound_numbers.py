@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import tomllib
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -22,7 +25,21 @@ def recorded(seed, effects=(), cubic=0.0):
     return Recording.from_arrays(run.t_s, run.readings, TWIN.array, reference=reference)
 
 
-def test_a_tachometer_that_is_bent_is_no_curve_of_twelve_channels():
+def test_a_tachometer_that_is_bent_is_named_by_place_and_dependence():
+    found = diagnose([recorded(4, cubic=1e-4)], replace(TWIN, grammar=True))
+    assert found.verdict == "explained"
+    (cause,) = found.causes
+    assert cause.unlisted == {"place": "reference", "dependence": "omega^3", "pattern": "one"}
+    (size,) = cause.parameters.values()
+    assert size == pytest.approx(1e-4, abs=4 * next(iter(cause.std.values())))
+    told = found.to_dict()["causes"][0]
+    assert told["effect"] == "unlisted"
+    assert told["name"] == "reference_rate_cubed"
+    assert "it goes with rate³" in cause.why
+    assert Twin.from_dict(tomllib.loads(found.twin.to_toml())).effects[0].parameters == pytest.approx(cause.parameters)
+
+
+def test_without_the_grammar_it_is_no_curve_of_twelve_channels():
     found = diagnose([recorded(4, cubic=1e-4)], TWIN)
     assert found.verdict == "unknown"
     assert "go as the centripetal arm" in found.unexplained.signature
@@ -39,3 +56,14 @@ def test_curves_of_twelve_channels_are_told_as_they_are():
     assert found.verdict == "explained"
     (cause,) = found.causes
     assert cause.effect == "quadratic"
+
+
+def test_what_an_upright_run_can_not_see_of_a_cause_is_listed():
+    """No reading depends on the height of a chip while the axis stands upright."""
+    keys = [f"a{chip}_{axis}_m" for chip in range(1, 5) for axis in "xy"]
+    sizes = 2e-3 * np.random.default_rng(7).standard_normal(8)
+    hidden = make_effect("sensor_position", dict(zip(keys, sizes, strict=True)), TWIN.array)
+    found = diagnose([recorded(4, [hidden])], TWIN)
+    assert [cause.effect for cause in found.causes] == ["sensor_position"]
+    assert {one["text"] for one in found.undetermined} == {f"sensor_position a{chip}_z_m" for chip in range(1, 5)}
+    assert all(abs(found.causes[0].parameters.get(f"a{chip}_z_m", 0.0)) < 1e-6 for chip in range(1, 5))

@@ -26,11 +26,13 @@ from gfimu.diagnosis.criticism.coincidence.patterns import (
     channel_patterns,
     chip_patterns,
     distinct,
+    pair_patterns,
 )
 from gfimu.diagnosis.fit.evidence import SCALES, inverse, log_evidence
 from gfimu.diagnosis.fit.gauss_newton import Fit
 from gfimu.diagnosis.terms.cause import Cause
 from gfimu.geometry.array import AccelerometerArray
+from gfimu.world_model import Size
 
 __all__ = ["Coincidence", "coincidences"]
 
@@ -51,6 +53,8 @@ class Coincidence:
         What they are in proportion to.
     numbers, free : int
         How many numbers, and how many free ones the pattern has.
+    common : bool
+        Whether one thing before all chips makes it; else one thing in each chip does.
     """
 
     log_odds: float
@@ -58,14 +62,16 @@ class Coincidence:
     pattern: str
     numbers: int
     free: int
+    common: bool = True
 
     @property
     def sentence(self) -> str:
         """What it says, for people."""
         names = " and ".join(self.causes)
+        one = "one cause common to all chips, before them," if self.common else "one cause in each chip"
         return (
             f"the {self.numbers} numbers of {names} are no chance: they go as {self.pattern}; "
-            "one cause common to all chips, before them, is more likely than so many"
+            f"{one} is more likely than so many"
         )
 
 
@@ -119,11 +125,13 @@ def _on_a_pattern(
             turn[mine, mine] = scatter * np.eye(count)
             turn[mine, total:] = columns
             values.append(_evidence(fit, turn))
-        tried.append((_average(values) - free, Pattern(pattern.name, columns)))
+        tried.append((_average(values) - free, Pattern(pattern.name, columns, pattern.common)))
     if not tried:
         return None
     odds, best = max(tried, key=lambda pair: pair[0])
-    return Coincidence(odds - float(np.log(len(tried))), (cause.name,), best.name, count, best.columns.shape[1])
+    return Coincidence(
+        odds - float(np.log(len(tried))), (cause.name,), best.name, count, best.columns.shape[1], best.common
+    )
 
 
 def _patterns(cause: Cause, array: AccelerometerArray, mounting: NDArray[np.float64]) -> list[Pattern]:
@@ -137,11 +145,23 @@ def _patterns(cause: Cause, array: AccelerometerArray, mounting: NDArray[np.floa
         size.key.startswith(channel) for size, channel in zip(sizes, array.channels, strict=True)
     ):
         return [one for one in distinct(channel_patterns(array, mounting), prior) if not (usual and one.is_of_equals)]
+    pairs = _pairs(sizes, array)
+    if pairs:
+        return distinct(pair_patterns(array, pairs), prior)
     components, rest = divmod(len(sizes), len(array.chips))
     chips = np.repeat([chip.name for chip in array.chips], components)
     if rest or not all(size.key.startswith(chip) for size, chip in zip(sizes, chips, strict=False)):
         return []
     return distinct(chip_patterns(array, mounting, components), prior)
+
+
+def _pairs(sizes: Sequence[Size], array: AccelerometerArray) -> list[tuple[int, int]]:
+    """Return the pairs of channels that sizes belong to; none where they belong to something else."""
+    names = list(array.channels)
+    parts = [size.key.split("_from_") for size in sizes]
+    if any(len(part) != 2 or part[0] not in names or part[1] not in names for part in parts):
+        return []
+    return [(names.index(to), names.index(source)) for to, source in parts]
 
 
 def _in_coordinates(cause: Cause, pattern: Pattern) -> NDArray[np.float64] | None:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from gfimu.geometry.array import AccelerometerArray
 
-__all__ = ["NOTHING", "SPARE", "Pattern", "channel_patterns", "chip_patterns", "distinct"]
+__all__ = ["NOTHING", "SPARE", "Pattern", "channel_patterns", "chip_patterns", "distinct", "pair_patterns"]
 
 NOTHING = float(np.sqrt(np.finfo(float).eps))
 """Numerical: share of a pattern, or of a metre, that is rounding."""
@@ -33,10 +33,13 @@ class Pattern:
         What the numbers are in proportion to, for people.
     columns : ndarray, shape (m, r)
         The m numbers from r free ones.
+    common : bool
+        Whether one thing before all chips makes it; else one thing in each chip does.
     """
 
     name: str
     columns: NDArray[np.float64]
+    common: bool = True
 
     @property
     def is_of_equals(self) -> bool:
@@ -112,6 +115,21 @@ def chip_patterns(array: AccelerometerArray, mounting: NDArray[np.float64], comp
     return [Pattern(name, columns.reshape(count * components, -1)) for name, columns in found]
 
 
+def pair_patterns(array: AccelerometerArray, pairs: Sequence[tuple[int, int]]) -> list[Pattern]:
+    """Return the pattern of a number per ordered pair of channels of a chip that turned axes leave.
+
+    What channel i picks up from j, j picks up from i with the other sign.
+    """
+    place = {pair: number for number, pair in enumerate(pairs)}
+    half = [(i, j) for i, j in pairs if i < j]
+    turned = np.zeros((len(pairs), len(half)))
+    for column, (i, j) in enumerate(half):
+        turned[place[i, j], column], turned[place[j, i], column] = 1.0, -1.0
+    chip = np.array([array.chip_of_channel[i] for i, _ in half])
+    groups = [chip >= 0, *(chip == number for number in range(len(array.chips)))]
+    return [Pattern("axes that are turned, opposite in every pair", turned[:, one], common=False) for one in groups]
+
+
 def distinct(patterns: Sequence[Pattern], prior: NDArray[np.float64]) -> list[Pattern]:
     """Return patterns in units of the prior (m,), of unit rms, without those that span what another does.
 
@@ -131,7 +149,7 @@ def distinct(patterns: Sequence[Pattern], prior: NDArray[np.float64]) -> list[Pa
         if any(span.shape == left.shape and np.sum((span.T @ left) ** 2) > left.shape[1] - NOTHING for span in spans):
             continue
         spans.append(left)
-        kept.append(Pattern(one.name, columns / np.linalg.norm(columns, axis=0) * np.sqrt(used)))
+        kept.append(Pattern(one.name, columns / np.linalg.norm(columns, axis=0) * np.sqrt(used), one.common))
     return kept
 
 

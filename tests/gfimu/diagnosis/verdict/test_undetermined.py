@@ -70,9 +70,10 @@ def test_data_that_say_as_much_as_the_prior_leave_nothing_open():
     assert len(undetermined(screening_of(0.5 * LEAST * np.eye(COUNT)), ARRAY, LEAST)) == COUNT
 
 
-def test_nothing_is_open_on_a_table_or_of_an_effect_with_a_shape():
+def test_nothing_is_open_of_an_effect_that_is_not_asked_for_or_has_a_shape():
     blind = np.zeros((COUNT, COUNT))
-    assert undetermined(screening_of(blind), ARRAY, 0.0) == ()
+    assert undetermined(screening_of(blind), ARRAY, LEAST, {"scale_factor"}) == ()
+    assert len(undetermined(screening_of(blind), ARRAY, LEAST, {"bias"})) == COUNT
     assert undetermined(screening_of(blind, {"frequency_hz": 3.0}), ARRAY, LEAST) == ()
 
 

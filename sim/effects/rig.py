@@ -1,0 +1,264 @@
+"""Further effects of a rig on its table: a slow tachometer, slow or late chips, a bearing and a bench that move."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import cont2discrete, lfilter
+
+from gfimu.geometry.array import AccelerometerArray
+from gfimu.units import NUMBER, RATIO
+from gfimu.world_model import SpinState, Whitened
+from sim.effects.base import Effect, Pattern, Size, chip_patterns
+from sim.effects.low_pass import low_pass
+from sim.effects.scans import peaks
+from sim.world import SampleContext, World
+
+__all__ = ["BearingShake", "BenchSway", "ChipLag", "TachoLag"]
+
+_LEAST_RATIO, _MOST_RATIO = 0.2, 20.0  # cycles per revolution
+_RARE = 30.0  # times rarer than the effects that every rig may have, by choice
+_SWAYS, _SWAY_DAMPING = np.geomspace(1.0, 20.0, 24), 0.05  # Hz and 1: modes of a bench to look at
+_GRID = 2e-3  # s, on which a mode is simulated
+
+
+class TachoLag(Effect):
+    """A tachometer that is filtered: a first-order lag of its own."""
+
+    name = "tacho_lag"
+    summary = "the reference has a first-order low pass of its own"
+    place = "reference"
+    rarity = _RARE
+    separated_by = "a fast chirp of the rate"
+
+    @classmethod
+    def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
+        """One time constant, never negative."""
+        return (Size("time_constant_s", "s", 1e-2, positive=True, step=0.5),)
+
+    def apply(self, world: World) -> World:
+        """Pass the reference through the low pass."""
+        tau = self.value("time_constant_s")
+
+        def step(reading: NDArray[np.float64], spin: SpinState, t: NDArray[np.float64]) -> NDArray[np.float64]:
+            return low_pass(reading[:, None], t, tau)[:, 0]
+
+        return world.changed(reference_steps=(*world.reference_steps, step)) if tau > 0.0 else world
+
+
+class ChipLag(Effect):
+    """Chips with a limited bandwidth, each of its own."""
+
+    name = "chip_lag"
+    summary = "chips have first-order lags of their own (another output data rate)"
+    place = "sensing"
+    rarity = _RARE
+    separated_by = "faster changes of the specific force"
+
+    @classmethod
+    def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
+        """One time constant per chip, never negative."""
+        return tuple(Size(f"{chip.name}_s", "s", 5e-3, positive=True, step=0.5) for chip in array.chips)
+
+    @classmethod
+    def reach(cls, array: AccelerometerArray) -> NDArray[np.bool_]:
+        """Return the channels of each chip."""
+        return np.arange(len(array.chips))[:, None] == array.chip_of_channel
+
+    @classmethod
+    def patterns(cls, array: AccelerometerArray) -> tuple[Pattern, ...]:
+        """Return one chip: what all share is the lag of the sensing chain."""
+        return chip_patterns(array, 1)[1:]
+
+    def apply(self, world: World) -> World:
+        """Pass each chip's readings through its low pass."""
+        taus = self.vector([f"{chip.name}_s" for chip in world.array.chips])
+        chip = world.array.chip_of_channel
+
+        def step(readings: NDArray[np.float64], context: SampleContext) -> NDArray[np.float64]:
+            readings = readings.copy()
+            for number in np.flatnonzero(taus > 0.0):
+                mine = chip == number
+                readings[:, mine] = low_pass(readings[:, mine], context.t, float(taus[number]))
+            return readings
+
+        return world.changed(sensing_steps=(*world.sensing_steps, step)) if (taus > 0.0).any() else world
+
+
+class BearingShake(Effect):
+    """The table shakes up and down so many times per revolution, as balls of a bearing or gear teeth make it."""
+
+    name = "bearing_shake"
+    summary = "the table shakes up and down so many times per revolution, in proportion to the rate"
+    place = "geometry"
+    rarity = _RARE
+    separated_by = "slow and fast steady rotation: the frequency of the shaking follows the rate"
+    other_units: ClassVar = {"amplitude_m_s2_per_rad_s": "m/s²/(rad/s)", "order": NUMBER, "phase_rad": "rad"}
+    shape_limits: ClassVar = {"order": (_LEAST_RATIO, _MOST_RATIO)}
+
+    @classmethod
+    def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
+        """Sine and cosine amplitudes per rate."""
+        return tuple(Size(f"{wave}_m_s2_per_rad_s", "m/s²/(rad/s)", 5e-3) for wave in ("sine", "cosine"))
+
+    @classmethod
+    def shapes(cls, duration: float, sample_rate: float) -> tuple[dict[str, float], ...]:
+        """Return one order; the scan over orders finds it."""
+        return ({"order": 7.3},)
+
+    @classmethod
+    def scan(cls, left, duration, sample_rate):  # type: ignore[no-untyped-def]
+        """Return the strongest orders, whole or not, of a vertical acceleration."""
+        return shake_orders(left, 2)
+
+    @classmethod
+    def from_sizes(cls, array, values, shape) -> Effect:  # type: ignore[no-untyped-def]
+        """Turn sine and cosine into amplitude and phase."""
+        sine, cosine = (float(v) for v in values)
+        amplitude = {"amplitude_m_s2_per_rad_s": float(np.hypot(sine, cosine))}
+        return cls({**amplitude, "phase_rad": float(np.arctan2(cosine, sine)), **shape})
+
+    def size_values(self, array: AccelerometerArray) -> NDArray[np.float64]:
+        """Return sine and cosine amplitudes."""
+        amplitude, phase = self.value("amplitude_m_s2_per_rad_s"), self.value("phase_rad")
+        return amplitude * np.array([np.cos(phase), np.sin(phase)])
+
+    @classmethod
+    def parameter_units(cls, array: AccelerometerArray) -> dict[str, str]:
+        """Return the units of amplitude and phase instead of the sizes."""
+        return dict(cls.other_units)
+
+    def apply(self, world: World) -> World:
+        """Shake the rig by amplitude · |ω| · sin(order·θ + phase)."""
+        amplitude, order = self.value("amplitude_m_s2_per_rad_s"), self.value("order", 1.0)
+        phase = self.value("phase_rad")
+
+        def shake(spin: SpinState, t: NDArray[np.float64]) -> NDArray[np.float64]:
+            up = amplitude * np.abs(spin.rate) * np.sin(order * spin.angle + phase)
+            return np.outer(up, [0.0, 0.0, 1.0])
+
+        return world.changed(shakes=(*world.shakes, shake))
+
+
+def shake_orders(left: Sequence[Whitened], count: int) -> tuple[list[dict[str, float]], float]:
+    """Return the strongest orders of a vertical acceleration of the whole array in proportion to the rate."""
+    turned = max(float(np.ptp(one.state.angle)) for one in left)
+    step = np.pi / max(turned, 2 * np.pi)  # half of what a run of so many turns tells apart
+    orders = np.arange(_LEAST_RATIO, _MOST_RATIO, step)
+    power, energy = np.zeros(len(orders)), 1e-30
+    for one in left:
+        up = one.array.axes[:, 2]
+        speed = np.abs(one.state.rate)
+        score = (one.residual[:, :-1] @ up) * speed
+        energy += float(np.sum(speed**2) * np.sum(up**2 * one.weights[:-1]))
+        power += np.abs(_along_angle(one.state.angle, score, orders)) ** 2
+    best = peaks(power / energy, count, apart=4)
+    return [{"order": float(orders[place])} for place in best], float(len(orders)) / 4.0
+
+
+def _along_angle(
+    angle: NDArray[np.float64], score: NDArray[np.float64], orders: NDArray[np.float64]
+) -> NDArray[np.complex128]:
+    """Return Σ score · exp(i · order · angle) at evenly spaced orders, by a transform of the score binned by angle."""
+    bins = 2 * np.pi / (8.0 * orders[-1])
+    place = (angle - angle.min()) / bins
+    low = place.astype(np.intp)
+    series = np.zeros(low.max() + 2)
+    np.add.at(series, low, score * (1.0 - (place - low)))
+    np.add.at(series, low + 1, score * (place - low))
+    step = orders[1] - orders[0]
+    length = max(round(2 * np.pi / (bins * step)), len(series))
+    spectrum = np.fft.fft(series, length)
+    at = np.round(orders * bins / (2 * np.pi) * length).astype(np.intp)
+    return np.asarray(spectrum[at])
+
+
+class BenchSway(Effect):
+    """The bench sways at a mode of its own, driven by an unbalance that turns with the table."""
+
+    name = "bench_sway"
+    summary = "the bench sways at a mode of its own under a rotating unbalance"
+    place = "geometry"
+    rarity = _RARE
+    separated_by = "slow steady rotation through the speed at which the bench sways most"
+    other_units: ClassVar = {"frequency_hz": "Hz", "damping_ratio": RATIO}
+    shape_limits: ClassVar = {"damping_ratio": (5e-3, 0.3), "frequency_hz": (0.3, 100.0)}
+    _KEYS = ("x_cosine_m", "x_sine_m", "y_cosine_m", "y_sine_m")
+
+    @classmethod
+    def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
+        """How far the bench sways far above its mode, along the room's x and y."""
+        return tuple(Size(key, "m", 1e-3) for key in cls._KEYS)
+
+    @classmethod
+    def shapes(cls, duration: float, sample_rate: float) -> tuple[dict[str, float], ...]:
+        """Return one mode; the scan over frequencies finds it."""
+        return ({"frequency_hz": 5.0, "damping_ratio": 0.05},)
+
+    @classmethod
+    def scan(cls, left, duration, sample_rate):  # type: ignore[no-untyped-def]
+        """Return the modes that follow the horizontal motion of the residual best."""
+        return sway_shapes(left, 2)
+
+    @property
+    def memory_s(self) -> float:
+        """Return how long it takes the mode to decay to a three-hundredth."""
+        natural = 2 * np.pi * self.value("frequency_hz", 5.0)
+        return float(np.log(300.0) / (self.value("damping_ratio", 0.05) * natural))
+
+    def apply(self, world: World) -> World:
+        """Let the bench sway."""
+        x_cosine, x_sine, y_cosine, y_sine = self.vector(self._KEYS)
+        natural, damping = 2 * np.pi * self.value("frequency_hz", 5.0), self.value("damping_ratio", 0.05)
+
+        def shake(spin: SpinState, t: NDArray[np.float64]) -> NDArray[np.float64]:
+            sway = _mode_acceleration(_unbalance(spin), t, natural, damping)
+            x, y = sway @ [x_cosine, x_sine], sway @ [y_cosine, y_sine]
+            return np.stack([x, y, np.zeros_like(x)], axis=-1)
+
+        return world.changed(shakes=(*world.shakes, shake))
+
+
+def sway_shapes(left: Sequence[Whitened], count: int) -> tuple[list[dict[str, float]], float]:
+    """Return the modes of a bench whose sway under a rotating unbalance follows a residual best."""
+    power, energy = np.zeros(len(_SWAYS)), np.full(len(_SWAYS), 1e-30)
+    for one in left:
+        across = one.array.axes[:, :2]
+        x, y = (one.residual[:, :-1] @ across).T  # score of an acceleration in the turning frame
+        cos, sin = np.cos(one.state.angle), np.sin(one.state.angle)
+        score = np.stack([cos * x - sin * y, sin * x + cos * y], axis=-1)  # in the room
+        weight = 0.5 * float(np.sum(across**2 * one.weights[:-1, None]))
+        forces = _unbalance(one.state)
+        for place, frequency in enumerate(_SWAYS):
+            sway = _mode_acceleration(forces, one.t, 2 * np.pi * frequency, _SWAY_DAMPING)
+            power[place] += float(np.sum((sway.T @ score) ** 2))
+            energy[place] += weight * float(np.mean(np.sum(sway**2, axis=0)))
+    best = peaks(power / energy, count)
+    return [{"frequency_hz": float(_SWAYS[place]), "damping_ratio": _SWAY_DAMPING} for place in best], float(
+        len(_SWAYS)
+    )
+
+
+def _unbalance(spin: SpinState) -> NDArray[np.float64]:
+    """Return the force of a rotating unbalance per its mass and radius, (n, 2): what turns it, with the sign turned."""
+    cos, sin = np.cos(spin.angle), np.sin(spin.angle)
+    return np.stack(
+        [spin.rate**2 * cos + spin.acceleration * sin, spin.rate**2 * sin - spin.acceleration * cos], axis=-1
+    )
+
+
+def _mode_acceleration(
+    forces: NDArray[np.float64], t: NDArray[np.float64], natural: float, damping: float
+) -> NDArray[np.float64]:
+    """Return q̈ of q̈ + 2ζω₀q̇ + ω₀²q = force for forces (n, k) at times (n,), at rest before."""
+    grid = np.arange(t[0], t[-1] + _GRID, _GRID)
+    system = ([1.0, 0.0, 0.0], [1.0, 2 * damping * natural, natural**2])
+    numerator, denominator, _ = cont2discrete(system, _GRID, method="foh")
+    columns = []
+    for force in forces.T:
+        on_grid = np.interp(grid, t, force)
+        columns.append(np.interp(t, grid, lfilter(numerator.ravel(), denominator, on_grid)))
+    return np.column_stack(columns)

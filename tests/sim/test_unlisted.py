@@ -1,0 +1,201 @@
+"""The points of the grammar and the further effects of a rig, against MuJoCo, closed forms and their own definition."""
+
+import numpy as np
+import pytest
+from scipy.signal import lsim, lti
+
+from gfimu.errors import InputError
+from gfimu.files.model_files import find_model
+from gfimu.geometry.array import AccelerometerArray
+from sim import forward
+from sim.campaign import random_profile
+from sim.effects import EFFECTS, FURTHER_EFFECTS, make_effect
+from sim.effects.rig import shake_orders, sway_shapes
+from sim.effects.unlisted import UNLISTED
+from sim.motion import SpinState
+from sim.scenarios import Scenario
+from sim.turntable import prescribed_readings
+from sim.twin import Twin
+
+ARRAY = AccelerometerArray.load("cube12")
+TWIN = Twin(array=ARRAY, array_name="cube12")
+T = np.arange(0.0, 20.0, 0.01)
+WARM = 25.0 + 3.0 * (1.0 - np.exp(-T / 6.0))
+MOTION = random_profile(np.random.default_rng(1), 20.0)
+OF_REFERENCE = {name for name, family in FURTHER_EFFECTS.items() if family.place == "reference"}
+WHOLE_CUBE = {name for name, family in FURTHER_EFFECTS.items() if family.place == "geometry"}
+
+
+def usual(name, rng=None):
+    """An effect of usual size, in its first shape."""
+    family = FURTHER_EFFECTS[name]
+    sizes = np.array([size.prior_std for size in family.sizes(ARRAY)])
+    if rng is not None:
+        sizes = sizes * np.where([one.positive for one in family.sizes(ARRAY)], 1.0, rng.standard_normal(len(sizes)))
+    return family.from_sizes(ARRAY, sizes, family.shapes(20.0, 100.0)[0])
+
+
+def changes(*effects):
+    before = TWIN.predict(MOTION, T, temperature=WARM)
+    after = TWIN.predict(MOTION, T, effects=effects, temperature=WARM)
+    return after[0] - before[0], after[1] - before[1]
+
+
+@pytest.mark.parametrize("name", FURTHER_EFFECTS)
+def test_an_effect_comes_back_from_its_sizes_and_from_a_twin_file(name, tmp_path):
+    effect = usual(name, np.random.default_rng(2))
+    family = FURTHER_EFFECTS[name]
+    again = family.from_sizes(ARRAY, effect.size_values(ARRAY), effect.shape_values())
+    assert again.parameters == pytest.approx(effect.parameters)
+    effect.check(ARRAY)
+    assert set(family.parameter_units(ARRAY)) >= set(effect.parameters)
+    extended = TWIN.extended([effect])
+    path = tmp_path / "twin.toml"
+    path.write_text(extended.to_toml())
+    for one, other in zip(
+        Twin.load(path).predict(MOTION, T, temperature=WARM), extended.predict(MOTION, T, temperature=WARM), strict=True
+    ):
+        np.testing.assert_allclose(one, other, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", FURTHER_EFFECTS)
+def test_an_effect_acts_at_its_place_alone(name):
+    channels, reference = changes(usual(name))
+    if name in OF_REFERENCE:
+        assert not channels.any()
+        assert reference.any()
+    else:
+        assert channels.any()
+        assert not reference.any()
+
+
+@pytest.mark.parametrize("name", sorted(WHOLE_CUBE))
+def test_mujoco_agrees_on_what_leans_and_shakes(name):
+    """To the square of the lean: the forward model is linear in it."""
+    effect = usual(name)
+    t = T[::20]
+    world = TWIN.world([effect])
+    expected = prescribed_readings(world, MOTION, t)
+    seen = forward.channels(world, MOTION, t)
+    change = np.abs(expected - prescribed_readings(TWIN.world(), MOTION, t)).max()
+    assert np.abs(seen - expected).max() < 0.02 * change
+
+
+def test_a_cube_that_leans_at_once_about_its_foot_is_a_tilted_mounting_moved():
+    """A constant lean turns the axes and moves the centre, so that it is two effects of the first table."""
+    x, y = 2e-6, -1e-6
+    angle = MOTION.at(T).angle
+    leant = make_effect("lean_by_turns", {"x_rad_per_rad": x, "y_rad_per_rad": y})
+    channels, _ = changes(leant)
+    late = np.flatnonzero(np.abs(MOTION.at(T).rate) < 1e-6)
+    tilt = make_effect("mount_tilt", {"x_rad": x * angle[late[-1]], "y_rad": y * angle[late[-1]]})
+    still, _ = changes(tilt)
+    np.testing.assert_allclose(channels[late[-1]], still[late[-1]], atol=1e-4 * np.abs(still).max())
+
+
+@pytest.mark.parametrize(
+    ("name", "function"),
+    [
+        ("reference_offset", lambda spin: np.ones_like(spin.rate)),
+        ("reference_by_direction", lambda spin: np.abs(spin.rate)),
+        ("reference_rate_squared", lambda spin: spin.rate * np.abs(spin.rate)),
+        ("reference_rate_cubed", lambda spin: spin.rate**3),
+    ],
+)
+def test_the_error_of_a_reference_is_its_function(name, function):
+    effect = usual(name)
+    (size,) = effect.size_values(ARRAY)
+    np.testing.assert_allclose(changes(effect)[1], size * function(MOTION.at(T)), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "function"),
+    [
+        ("gain_by_speed", lambda spin: np.abs(spin.rate)),
+        ("gain_by_rate_squared", lambda spin: spin.rate**2),
+        ("gain_by_load", lambda spin: np.abs(spin.acceleration)),
+        ("gain_temperature", lambda spin: WARM - 25.0),
+    ],
+)
+def test_a_gain_of_the_supply_multiplies_every_reading(name, function):
+    effect = usual(name)
+    (ratio,) = effect.size_values(ARRAY)
+    readings, _ = TWIN.predict(MOTION, T)
+    np.testing.assert_allclose(changes(effect)[0], readings * ratio * function(MOTION.at(T))[:, None], atol=1e-12)
+
+
+def test_a_slow_tachometer_is_a_first_order_filter():
+    fine = np.arange(0.0, 20.0, 1e-3)
+    rate = MOTION.at(fine).rate
+    _, filtered, _ = lsim(lti([1.0], [0.05, 1.0]), rate - rate[0], fine)
+    _, reference = TWIN.predict(MOTION, T, effects=[make_effect("tacho_lag", {"time_constant_s": 0.05})])
+    np.testing.assert_allclose(reference, filtered[::10] + rate[0], atol=2e-3)
+
+
+def test_one_slow_chip_leaves_the_others_alone():
+    channels, _ = changes(make_effect("chip_lag", {"a2_s": 0.02}))
+    slow, _ = changes(make_effect("sensor_lag", {"time_constant_s": 0.02}))
+    mine = ARRAY.chip_of_channel == 1
+    np.testing.assert_allclose(channels[:, mine], slow[:, mine], atol=1e-12)
+    assert not channels[:, ~mine].any()
+
+
+def test_a_bench_far_above_its_mode_sways_as_its_unbalance_turns():
+    """Force m r ω² on a free mass M: it stays where the centre of both is, so that it moves by −m r / M."""
+    t = np.arange(0.0, 10.0, 1e-3)
+    spin = SpinState(20.0 * t, np.full_like(t, 20.0), np.zeros_like(t))
+    size = 1e-3
+    effect = make_effect("bench_sway", {"x_cosine_m": size, "frequency_hz": 0.3, "damping_ratio": 0.05})
+    shaken = TWIN.world([effect]).shakes[0](spin, t)
+    late = t > 8.0
+    np.testing.assert_allclose(shaken[late, 0], (size * 400.0 * np.cos(spin.angle))[late], atol=0.05 * size * 400.0)
+    assert not shaken[:, 1:].any()
+
+
+def test_a_scan_finds_the_order_of_a_shake():
+    channels, _ = changes(make_effect("bearing_shake", {"amplitude_m_s2_per_rad_s": 2e-3, "order": 7.31}))
+
+    class Left:
+        residual = np.column_stack([channels, np.zeros(len(T))])
+        weights = np.ones(13)
+        t, state, array = T, MOTION.at(T), ARRAY
+
+    shapes, looks = shake_orders([Left], 2)
+    assert shapes[0]["order"] == pytest.approx(7.31, abs=0.02)
+    assert looks > 100
+
+
+def test_names_are_new_and_points_say_what_they_go_with():
+    assert not set(FURTHER_EFFECTS) & set(EFFECTS)
+    assert set(UNLISTED) <= set(FURTHER_EFFECTS)
+    for name, family in UNLISTED.items():
+        assert family.name == name
+        assert family.grammar_place
+        assert family.dependence.words
+        assert family.summary
+        assert family.separated_by
+
+
+def test_a_wrong_key_of_a_point_is_refused():
+    with pytest.raises(InputError, match=r"reference_rate_cubed.*unknown parameter 'x_m'.*error_rad_s_per_rad3_s3"):
+        make_effect("reference_rate_cubed", {"x_m": 1.0}, ARRAY)
+
+
+def test_a_scan_finds_the_mode_of_a_bench():
+    channels, _ = changes(make_effect("bench_sway", {"y_sine_m": 1e-3, "frequency_hz": 4.0, "damping_ratio": 0.06}))
+
+    class Left:
+        residual = np.column_stack([channels, np.zeros(len(T))])
+        weights = np.ones(13)
+        t, state, array = T, MOTION.at(T), ARRAY
+
+    shapes, _ = sway_shapes([Left], 2)
+    assert shapes[0]["frequency_hz"] == pytest.approx(4.0, rel=0.1)
+
+
+def test_a_tumbling_body_has_no_spin_that_an_effect_could_go_with(tmp_path):
+    path = tmp_path / "tumble.toml"
+    scenario = find_model("scenarios", "tumble").read_text(encoding="utf-8")
+    path.write_text(f'{scenario}\n[[effect]]\nname = "gain_by_speed"\nparameters = {{ ratio_per_rad_s = 1e-3 }}\n')
+    with pytest.raises(InputError, match=r"gain_by_speed.*which a tumbling body has not"):
+        Scenario.load(path)
