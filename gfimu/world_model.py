@@ -302,6 +302,10 @@ class WorldModel(Protocol):
         """Return all kinds of effects it could have, by name."""
         ...
 
+    def searching(self, *, wide: bool) -> WorldModel:
+        """Return the model with all that may be wrong with a rig among its families, or with the usual effects."""
+        ...
+
     def unnamed(self, dependence: str, units: BasisUnits, *, of_reference: bool = False) -> EffectFamily:
         """Return what no effect of the library explains as one more: a function of `generic_basis` per channel."""
         ...

@@ -69,7 +69,8 @@ class Twin:
     array_name : str
         Array as named in the file.
     grammar : bool
-        Whether a diagnosis also searches the further effects of a rig and the points of the grammar.
+        Whether a diagnosis searches the further effects of a rig and the points of the grammar at once; otherwise it
+        does so where the usual effects give no good answer.
     """
 
     array: AccelerometerArray
@@ -218,6 +219,10 @@ class Twin:
         if self.grammar or self.drive_source == "gyro":
             return library
         return {name: family for name, family in library.items() if name not in FURTHER_EFFECTS}
+
+    def searching(self, *, wide: bool) -> Twin:
+        """Return the twin that searches the further effects and the grammar always, or only the usual effects."""
+        return replace(self, grammar=wide)
 
     def unnamed(self, dependence: str, units: BasisUnits, *, of_reference: bool = False) -> EffectFamily:
         """Return what no effect of the library explains as one more, with a size per channel or one of the reference.

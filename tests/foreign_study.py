@@ -10,7 +10,6 @@ import argparse
 import json
 import random
 from collections import Counter, defaultdict
-from dataclasses import replace
 from multiprocessing import Pool
 from pathlib import Path
 
@@ -97,7 +96,6 @@ def run_case(job):
     outcome = {"generator": generator, "key": case.key, **case.to_dict(), "causes": [], "processor_s": 0.0}
     try:
         world = draw_world(case, f"{foreign_world.__file__}:{generator}")
-        world = replace(world, twin=replace(world.twin, grammar=True))
         start = processor_time()
         found = diagnose([world.recording], world.twin)
         outcome |= {"reached": world.reached, "processor_s": processor_time() - start}

@@ -37,7 +37,9 @@ def _diagnose(
     ] = None,
     grammar: Annotated[
         bool,
-        typer.Option("--grammar", help="Also search further effects and places times dependences; up to minutes."),
+        typer.Option(
+            "--grammar", help="Search the wider library of effects at once, not only where the usual one fails."
+        ),
     ] = False,
     json: JsonOption = False,
 ) -> None:
@@ -47,7 +49,7 @@ def _diagnose(
 
     Example: gfimu diagnose run.parquet --twin cube12_turntable --out diagnosis
 
-    When the verdict is unknown: gfimu diagnose run.parquet --twin cube12_turntable --grammar --out diagnosis
+    A rig known to be unusual: gfimu diagnose run.parquet --twin cube12_turntable --grammar --out diagnosis
 
     A unit fresh from the bench: gfimu diagnose run.parquet --twin cube12_turntable --calibration cal.json --out d
     """

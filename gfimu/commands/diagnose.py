@@ -52,8 +52,8 @@ def diagnose(
     report : callable, optional
         Called with the share done, 0 to 1, and a line of text.
     grammar : bool
-        Whether further effects of a rig, and places times dependences without a name of their own, are searched too, as
-        a twin file with ``grammar = true`` asks for.
+        Whether further effects of a rig, and places times dependences without a name of their own, are searched at
+        once, as a twin file with ``grammar = true`` asks for, and not only where the usual effects give no good answer.
 
     Returns
     -------

@@ -2,45 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
-from gfimu.diagnosis.criticism.coincidence.bound_numbers import Coincidence, coincidences
-from gfimu.diagnosis.criticism.gain import Gain
-from gfimu.diagnosis.criticism.holdout import Holdout, gate_gains, held_out_gain, other_recordings, split
-from gfimu.diagnosis.criticism.lack_of_fit import LackOfFit, lack_of_fit
-from gfimu.diagnosis.criticism.surrogate import surrogates
 from gfimu.diagnosis.data.body.prepared import prepare_bodies
-from gfimu.diagnosis.data.body.stretch import BodyStretch, make_body_stretches
 from gfimu.diagnosis.data.prepared_runs import PreparedRuns
-from gfimu.diagnosis.data.stretch import Stretch, make_stretches
-from gfimu.diagnosis.fit.gauss_newton import Fit
 from gfimu.diagnosis.fit.learn import predicted_by_reference
 from gfimu.diagnosis.fit.parallel import one_blas_thread
+from gfimu.diagnosis.one_library import LibraryDiagnosis, Report, stretches_of
 from gfimu.diagnosis.policy import Policy
-from gfimu.diagnosis.search.explain import Explanation, reduced
-from gfimu.diagnosis.search.long_run import understand_any_length
-from gfimu.diagnosis.search.nuisance_models import Understanding
-from gfimu.diagnosis.verdict.conclude import Described, conclude, is_dominant, is_unknown, named_causes
-from gfimu.diagnosis.verdict.gate import impossible_sizes, judge, measurable
-from gfimu.diagnosis.verdict.library import LibraryEvidence, with_library
-from gfimu.diagnosis.verdict.naming import conflicting
+from gfimu.diagnosis.verdict.library import LibraryRule, with_wider_library
 from gfimu.diagnosis.verdict.place import with_place
 from gfimu.diagnosis.verdict.sample_notes import with_sample_notes
-from gfimu.diagnosis.verdict.verdict import Diagnosis, NamedCause
+from gfimu.diagnosis.verdict.verdict import Diagnosis
 from gfimu.errors import InputError
 from gfimu.recording import Recording
 from gfimu.recording.carried_array import warn_of_other_array
-from gfimu.world_model import WorldModel, is_of_one_recording
+from gfimu.world_model import WorldModel
 
 __all__ = ["diagnose", "prepare"]
 
-Report = Callable[[float, str], None]
-
-_INTERRUPTED = "the search was interrupted, leading by then and not yet compared with held-out data"
+_FIRST = 0.5  # of the progress that is told: the search of the usual library, where there is a wider one
 
 
 def diagnose(
@@ -94,14 +77,14 @@ def diagnose(
         prepared = prepare(recordings, model, labels, settings)
         kept = prepare(held_out, model, held_labels, settings) if held_out else None
         try:
-            found = _Diagnosis(prepared, kept, model, settings, tell).verdict()
+            found = _by_stages(prepared, kept, model, settings, tell)
         except np.linalg.LinAlgError as error:
             runs = ", ".join(labels)
             raise InputError(
                 f"{runs}: the equations of this run have no solution ({error}); are the readings and the reference of "
                 "the same run, in the units that the file says?"
             ) from error
-        found = with_place(found, _stretches(model, prepared), prepared.runs, settings)
+        found = with_place(found, stretches_of(model, prepared), prepared.runs, settings)
         return with_sample_notes(found, prepared.runs)
 
 
@@ -114,229 +97,36 @@ def prepare(
     return PreparedRuns.build(recordings, model, names, predicted_by_reference)
 
 
-def _stretches(model: WorldModel, prepared: PreparedRuns) -> tuple[Stretch, ...]:
-    make = make_body_stretches if model.drive_source == "gyro" else make_stretches
-    return make(model, prepared.runs, prepared.effects)
+def _by_stages(
+    prepared: PreparedRuns, kept: PreparedRuns | None, model: WorldModel, policy: Policy, report: Report
+) -> Diagnosis:
+    """Return the verdict by the usual library; where that holds no good answer, by the wider one if it has a better.
 
-
-class _Diagnosis:
-    """The steps of a diagnosis: explain, look at the lack of fit, hold out, conclude.
-
-    Parameters
-    ----------
-    prepared, kept : PreparedRuns
-        Runs to explain, and those kept for the gain, if any.
-    model : WorldModel
-        What the simulation believes.
-    policy : Policy
-        Thresholds.
-    report : callable
-        Called with the share done and a line of text.
+    What is rare is searched for only where the usual effects fail: it would compete with them everywhere else.
     """
-
-    def __init__(
-        self, prepared: PreparedRuns, kept: PreparedRuns | None, model: WorldModel, policy: Policy, report: Report
-    ) -> None:
-        self._prepared, self._kept, self._model, self._policy, self._report = prepared, kept, model, policy, report
-
-    def verdict(self) -> Diagnosis:
-        """Return the verdict."""
-        policy, tell = self._policy, self._report
-        stretches = _stretches(self._model, self._prepared)
-        understanding = understand_any_length(stretches, policy, lambda share, text: tell(0.05 + 0.8 * share, text))
-        if understanding.explanation.interrupted:
-            tell(1.0, "interrupted")
-            return self._so_far(understanding)
-        tell(0.88, "lack of fit")
-        understanding, left = self._apart_from_the_rest(understanding)
-        withdrawn: list[str] = []
-        bound = self._coincidence(understanding.explanation)
-        if bound is not None and bound.log_odds > policy.steady:
-            return self._described(understanding, left, withdrawn, bound.sentence)
-        gain = Gain()
-        if not is_dominant(understanding.explanation, left, policy):
-            tell(0.92, "hold out")
-            try:
-                understanding, withdrawn = self._gated(understanding)
-                left = self._left(understanding.explanation) if withdrawn else left
-                tell(0.97, "measure the gain")
-                gain = self._gain(understanding.explanation, understanding.explanation.best)
-            except np.linalg.LinAlgError:
-                return self._described(understanding, left, withdrawn, "the causes found can't be fitted to part of it")
-        if is_unknown(understanding.explanation, left, gain, policy):
-            return self._described(understanding, left, withdrawn, "")
-        found = conclude(self._prepared, understanding, left, gain, policy, withdrawn=withdrawn)
-        refuted = self._impossible(understanding.explanation)
-        if refuted:  # a twin with such sizes leaves nothing that is worth a description
-            return conclude(
-                self._prepared, understanding, left, Gain(), policy, withdrawn=withdrawn, refuted=refuted, unknown=True
-            )
-        fitted = understanding.explanation.best.names
-        refuted = judge(gain, found.residual, [one for one in found.causes if one.effect in fitted], policy).why
-        if refuted:
-            return self._described(understanding, left, withdrawn, refuted)
-        told = measurable(gain)
-        if told is not gain:
-            found = conclude(self._prepared, understanding, left, told, policy, withdrawn=withdrawn)
-        return self._doubted(found, understanding.explanation)
-
-    def _so_far(self, understanding: Understanding) -> Diagnosis:
-        """Return what a search that was interrupted had found: no verdict, as nothing was held out or criticised."""
-        explanation, policy = understanding.explanation, self._policy
-        if not explanation.best.causes:
-            raise KeyboardInterrupt
-        leading = named_causes(explanation, explanation.best, policy)
-        told = f"{_INTERRUPTED}: {'; '.join(one.effect + _sizes(one) for one in leading)}"
-        left = self._left(explanation)
-        found = conclude(self._prepared, understanding, left, Gain(), policy, refuted=told, unknown=True)
-        return replace(found, sentences=(f"No verdict: {told}.", *found.sentences[1:]))
-
-    def _doubted(self, found: Diagnosis, explanation: Explanation) -> Diagnosis:
-        """Return a verdict whose probabilities include that the truth is outside the library."""
-        bound = self._coincidence(explanation)
-        confirmed = found.gain.of_other_recording and found.gain.share_of_excess_removed >= 1.0 - self._policy.small
-        nats = float("nan") if bound is None else bound.log_odds
-        left = max(found.unexplained.log_odds, self._policy.lack_odds if found.unexplained.significant else 0.0)
-        evidence = LibraryEvidence(float(np.nan_to_num(nats)), left, confirmed)
-        fits = [explanation.best, *conflicting(explanation, self._policy)]
-        shapes = {cause.name: tuple(cause.shape) for fit in fits for cause in fit.causes}
-        return with_library(replace(found, coincidence=nats), evidence, shapes, self._policy)
-
-    def _apart_from_the_rest(self, understanding: Understanding) -> tuple[Understanding, LackOfFit]:
-        """Drop causes that explain less than what no cause explains: they would be made of it.
-
-        Real hands leave more than some right causes of a free body explain.
-        """
-        explanation = understanding.explanation
-        left = self._left(explanation)
-        if self._policy.free_body:
-            return understanding, left
-        while len(explanation.best.causes) > 1 and left.log_odds > self._policy.lack_odds:
-            best = explanation.best
-            lost = {name: best.log_posterior - fewer.log_posterior for name, fewer in explanation.without.items()}
-            weakest = min(lost, key=lost.__getitem__)
-            if lost[weakest] >= left.log_odds:
-                break
-            explanation = reduced(explanation, weakest, self._policy)
-            left = self._left(explanation)
-        return replace(understanding, explanation=explanation), left
-
-    def _left(self, explanation: Explanation) -> LackOfFit:
-        return lack_of_fit(
-            explanation.stretches,
-            explanation.best,
-            spikes=self._prepared.spikes,
-            rounded=self._prepared.rounded,
-            policy=self._policy,
-        )
-
-    def _pairs(self, explanation: Explanation, fit: Fit, duration: float | None = None) -> list[Holdout]:
-        """Pair fitted and held-out data: other recordings where given, blocks of the runs otherwise."""
-        if self._kept is None:
-            return split(explanation.stretches, fit, self._policy, duration=duration)
-        stretches = _stretches(self._model, self._kept)
-        return other_recordings(explanation.stretches, fit, stretches, self._policy)
-
-    def _gated(self, understanding: Understanding) -> tuple[Understanding, list[str]]:
-        """Withdraw causes that do not predict held-out data."""
-        explanation, withdrawn = understanding.explanation, []
-        if not explanation.best.causes:
-            return understanding, []
-        pairs = self._pairs(explanation, explanation.best, np.inf)
-        while explanation.best.causes:
-            best = explanation.best
-            gains = gate_gains(best, explanation.without, pairs, self._policy, other_recording=self._kept is not None)
-            worst = min(gains, key=gains.__getitem__)
-            if gains[worst] >= self._policy.ambiguous:
-                break
-            withdrawn.append(worst)
-            explanation = reduced(explanation, worst, self._policy)
-        return replace(understanding, explanation=explanation), withdrawn
-
-    def _gain(self, explanation: Explanation, fit: Fit) -> Gain:
-        """Measure what all that was found is worth on data the fit never saw."""
-        found = fit.causes or fit.point.residue or any(stretch.known for stretch in explanation.stretches)
-        if not found:
-            return Gain()
-        label = "blocks of the recording, odd and even from each other" if self._kept is None else "another recording"
-        gain = held_out_gain(fit.causes, self._pairs(explanation, fit), self._policy, label=label)
-        return replace(gain, of_other_recording=self._kept is not None)
-
-    def _coincidence(self, explanation: Explanation) -> Coincidence | None:
-        """Return what most likely binds the numbers of the causes that nothing should bind; None where nothing can."""
-        first = explanation.stretches[0]
-        if isinstance(first, BodyStretch):  # its motion has no arms that all recordings share
-            return None
-        mounting = Rotation.from_rotvec(first.run.mounting).as_matrix()
-        found = coincidences(explanation.best, self._model.array, mounting)
-        return found[0] if found else None
-
-    def _impossible(self, explanation: Explanation) -> str:
-        """Return the signature where every set that the data can't tell apart holds a size beyond physics."""
-        families, array = self._model.families(), self._model.array
-        found = [
-            impossible_sizes(named_causes(explanation, one, self._policy), families, array)
-            for one in (explanation.best, *conflicting(explanation, self._policy))
-        ]
-        return found[0] if all(found) else ""
-
-    def _describing(self, explanation: Explanation, whole: Fit) -> tuple[Described, Gain]:
-        """Return a description with what it is worth on held-out data, and which of its terms the twin gets.
-
-        Terms of absolute time have the phase of one recording: only another one can confirm them.
-        """
-        gain = self._gain(explanation, whole)
-        kept = tuple(cause for cause in whole.causes if not is_of_one_recording(cause.family))
-        carried = replace(whole, point=replace(whole.point, causes=kept)) if kept else None
-        if len(kept) < len(whole.causes) and self._kept is not None:
-            alone = self._gain(explanation, carried) if carried is not None else Gain()
-            samples = sum(len(run.t) for run in self._kept.runs)
-            better = gain.log_likelihood_per_sample - float(np.nan_to_num(alone.log_likelihood_per_sample))
-            carried, gain = (whole, gain) if better * samples > self._policy.ambiguous else (carried, alone)
-        elif carried is not None and (
-            gain.share_in_any_recording <= 0.0 or not self._carries_over(explanation, carried)
-        ):
-            carried = None
-        return Described(whole, carried), gain
-
-    def _carries_over(self, explanation: Explanation, described: Fit) -> bool:
-        """Tell whether one half of a run predicts the other: blocks in between follow what changes with time."""
-        if self._kept is not None:
-            return True
-        halves = held_out_gain(described.causes, self._pairs(explanation, described, np.inf), self._policy, label="")
-        return not halves.share_of_excess_removed < self._policy.least_share
-
-    def _described(
-        self, understanding: Understanding, left: LackOfFit, withdrawn: Sequence[str], refuted: str
-    ) -> Diagnosis:
-        """Return the verdict unknown, with the description that predicts best what its fit never saw, if one does."""
-        explanation, described, gain = understanding.explanation, None, Gain()
-        body = isinstance(explanation.stretches[0], BodyStretch)  # its motion has no functions to describe it by
-        found = [] if body else surrogates(explanation.stretches, explanation.nothing, self._policy, left.hints)
-        for one in found:
-            tried, worth = self._describing(explanation, one.fit)
-            better = worth.log_likelihood_per_sample > float(np.nan_to_num(gain.log_likelihood_per_sample))
-            # Less than a tenth of the excess describes nothing.
-            if better and not worth.share_of_excess_removed < self._policy.small:
-                described, gain = tried, worth
-        return conclude(
-            self._prepared,
-            understanding,
-            left,
-            gain,
-            self._policy,
-            withdrawn=withdrawn,
-            described=described,
-            refuted=refuted,
-            unknown=True,
-        )
+    wide = model.searching(wide=True)
+    is_wider = wide.families().keys() > model.families().keys()
+    end = _FIRST if is_wider else 1.0
+    usual = LibraryDiagnosis(prepared, kept, model, policy, lambda share, text: report(end * share, text))
+    understanding = usual.understood()
+    if understanding.explanation.interrupted:
+        return usual.so_far(understanding)
+    found = usual.verdict(understanding)
+    if not is_wider or _worth(found) >= LibraryRule.enough:
+        return found
+    wider = LibraryDiagnosis(
+        prepared, kept, wide, policy, lambda share, text: report(end + (1.0 - end) * share, f"wider library: {text}")
+    )
+    understanding = wider.understood()
+    other = found if understanding.explanation.interrupted else wider.verdict(understanding)
+    return with_wider_library(other) if _worth(other) > _worth(found) else found
 
 
-def _sizes(cause: NamedCause) -> str:
-    """Return the sizes of a cause that differ from zero, in a line."""
-    shown = [
-        f"{key} = {float(cause.parameters[key]):.4g} ± {std:.2g}"
-        for key, std in cause.std.items()
-        if std > 0.0 and abs(float(cause.parameters[key])) > Policy.stds * std
-    ]
-    return f" ({', '.join(shown)})" if shown else ""
+def _worth(found: Diagnosis) -> float:
+    """Return how far a verdict answers: the probability that the library holds the truth, less where it is unknown.
+
+    Of two descriptions of what is unknown that counts which removes more of the error that its fit never saw.
+    """
+    if found.verdict == "unknown":
+        return min(float(np.nan_to_num(found.gain.share_of_excess_removed)), 1.0) - 2.0
+    return 1.0 if np.isnan(found.library_probability) else found.library_probability

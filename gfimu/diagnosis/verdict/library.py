@@ -16,7 +16,14 @@ from scipy.special import expit
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.verdict.verdict import Diagnosis, NamedCause
 
-__all__ = ["LibraryEvidence", "LibraryRule", "library_probability", "standing_out", "with_library"]
+__all__ = [
+    "LibraryEvidence",
+    "LibraryRule",
+    "library_probability",
+    "standing_out",
+    "with_library",
+    "with_wider_library",
+]
 
 
 @dataclass(frozen=True)
@@ -56,6 +63,8 @@ class LibraryRule:
         Largest probability without another recording.
     nats, stds : tuple of (float, float)
         Where c and z are clipped: what is beyond says no more.
+    enough : float
+        Probability from which the wider library is not searched. By choice.
     """
 
     constant: float = 1.19
@@ -65,6 +74,7 @@ class LibraryRule:
     most: float = 0.97
     nats: tuple[float, float] = (0.0, 20.0)
     stds: tuple[float, float] = (0.3, 100.0)
+    enough: float = 0.8
 
 
 def standing_out(cause: NamedCause, shape: Collection[str]) -> float:
@@ -137,6 +147,12 @@ def with_library(
     least = min(likely.values())
     words = (*found.sentences, f"{_sentence(least, evidence)}.")
     return replace(found, causes=causes, library_probability=least, sentences=words)
+
+
+def with_wider_library(found: Diagnosis) -> Diagnosis:
+    """Return a verdict by the wider library, after the usual one gave no good answer; its twin has the usual one."""
+    words = (*found.sentences, "The usual effects did not explain the data: further ones were searched, too.")
+    return replace(found, twin=found.twin.searching(wide=False), sentences=words)
 
 
 def _sentence(least: float, evidence: LibraryEvidence) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import tomllib
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -18,6 +17,13 @@ from sim.twin import Twin
 TWIN = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
 
 
+class Usual(Twin):
+    """A twin that has no wider library than the usual one."""
+
+    def searching(self, *, wide):
+        return self
+
+
 def recorded(seed, effects=(), cubic=0.0):
     """A run whose tachometer reads ω + cubic · ω³."""
     run = measure(np.random.default_rng(seed), TWIN, effects, Measurement(duration=24.0))
@@ -26,8 +32,13 @@ def recorded(seed, effects=(), cubic=0.0):
 
 
 def test_a_tachometer_that_is_bent_is_named_by_place_and_dependence():
-    found = diagnose([recorded(4, cubic=1e-4)], replace(TWIN, grammar=True))
+    said = []
+    found = diagnose([recorded(4, cubic=1e-4)], TWIN, report=lambda share, text: said.append((share, text)))
     assert found.verdict == "explained"
+    assert any(text.startswith("wider library") for _, text in said)  # as the usual one has no answer
+    assert "further ones were searched" in " ".join(found.sentences)
+    assert np.all(np.diff([share for share, _ in said]) >= 0.0)
+    assert "grammar" not in found.twin.to_dict()  # the next diagnosis begins with the usual effects again
     (cause,) = found.causes
     assert cause.unlisted == {"place": "reference", "dependence": "omega^3", "pattern": "one"}
     (size,) = cause.parameters.values()
@@ -39,8 +50,8 @@ def test_a_tachometer_that_is_bent_is_named_by_place_and_dependence():
     assert Twin.from_dict(tomllib.loads(found.twin.to_toml())).effects[0].parameters == pytest.approx(cause.parameters)
 
 
-def test_without_the_grammar_it_is_no_curve_of_twelve_channels():
-    found = diagnose([recorded(4, cubic=1e-4)], TWIN)
+def test_by_the_usual_effects_it_is_no_curve_of_twelve_channels():
+    found = diagnose([recorded(4, cubic=1e-4)], Usual(array=TWIN.array, array_name=TWIN.array_name))
     assert found.verdict == "unknown"
     assert "go as the centripetal arm" in found.unexplained.signature
     assert not found.causes
@@ -52,10 +63,22 @@ def test_curves_of_twelve_channels_are_told_as_they_are():
     sizes = 2e-3 * np.random.default_rng(3).standard_normal(12)
     keys = [f"{channel}_s2_m" for channel in TWIN.array.channels]
     hidden = make_effect("quadratic", dict(zip(keys, sizes, strict=True)), TWIN.array)
-    found = diagnose([recorded(4, [hidden])], TWIN)
+    said = []
+    found = diagnose([recorded(4, [hidden])], TWIN, report=lambda share, text: said.append(text))
     assert found.verdict == "explained"
     (cause,) = found.causes
     assert cause.effect == "quadratic"
+    assert not any(text.startswith("wider library") for text in said)
+
+
+def test_an_interrupt_of_the_wider_search_leaves_the_verdict_by_the_usual_effects():
+    def report(share, text):
+        if text.startswith("wider library") and "leading" in text:
+            raise KeyboardInterrupt
+
+    found = diagnose([recorded(4, cubic=1e-4)], TWIN, report=report)
+    assert found.verdict == "unknown"
+    assert "go as the centripetal arm" in found.unexplained.signature
 
 
 def test_what_an_upright_run_can_not_see_of_a_cause_is_listed():

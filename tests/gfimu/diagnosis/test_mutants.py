@@ -19,7 +19,7 @@ from sim.twin import Twin
 
 PINNED = Pins.load()
 CASES = {hidden.name: hidden for hidden in hidden_cases()}
-ENGINE = sys.modules[diagnose.__module__]
+ENGINE = sys.modules["gfimu.diagnosis.one_library"]
 
 
 def diagnosed(hidden, world, twin=None):
@@ -101,7 +101,7 @@ def residuals_unjudged(patch):
     patch.setattr(ENGINE, "is_unknown", lambda *_: False)
     patch.setattr(ENGINE, "is_dominant", lambda *_: False)
     patch.setattr(ENGINE, "coincidences", lambda *_: [])
-    kept = ENGINE._Diagnosis
+    kept = ENGINE.LibraryDiagnosis
     patch.setattr(kept, "_apart_from_the_rest", lambda self, found: (found, self._left(found.explanation)))
 
 
