@@ -29,6 +29,7 @@ __all__ = [
     "SpinState",
     "Whitened",
     "WorldModel",
+    "acts_back",
     "bound_of",
     "dependence_of",
     "is_of_one_recording",
@@ -148,6 +149,14 @@ def memory_of(effect: Effect) -> float:
     return float(getattr(effect, "memory_s", 0.0))
 
 
+def acts_back(effect: Effect) -> bool:
+    """Tell whether what an effect remembers acts back on the motion, as a mode between table and array does.
+
+    What only adds to the readings has little to do with how they depend on the drive.
+    """
+    return bool(getattr(effect, "acts_back", True))
+
+
 class EffectFamily(Protocol):
     """A kind of effect: its coordinates, places, shapes and how to build one.
 
@@ -156,9 +165,9 @@ class EffectFamily(Protocol):
     of each size), ``of_one_recording``, ``of_wiring`` (`is_of_wiring`), ``of_pose`` (it depends on the specific force
     alone), ``alike_by_lot`` (chips of one lot have nearly the same sizes), ``contained_in`` (effects that can do all
     that it does), ``level_error`` (to which a level of a reading is found at best, in units of its white noise),
-    ``memory_s``, ``rarity`` (`prior_of`) and, of a fault of the samples, ``channel_order`` of an effect, ``scan``
-    (`shapes_to_screen`), and of a point of a grammar that has no name of its own ``grammar_place`` and ``dependence``
-    (`Dependence`).
+    ``memory_s``, ``acts_back`` (`acts_back`), ``rarity`` (`prior_of`) and, of a fault of the samples,
+    ``channel_order`` of an effect, ``scan`` (`shapes_to_screen`), and of a point of a grammar that has no name of its
+    own ``grammar_place`` and ``dependence`` (`Dependence`).
     """
 
     @property

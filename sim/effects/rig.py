@@ -184,6 +184,7 @@ class BenchSway(Effect):
     place = "geometry"
     rarity = _RARE
     separated_by = "slow steady rotation through the speed at which the bench sways most"
+    acts_back = False
     other_units: ClassVar = {"frequency_hz": "Hz", "damping_ratio": RATIO}
     shape_limits: ClassVar = {"damping_ratio": (5e-3, 0.3), "frequency_hz": (0.3, 100.0)}
     _KEYS = ("x_cosine_m", "x_sine_m", "y_cosine_m", "y_sine_m")

@@ -31,7 +31,7 @@ from gfimu.diagnosis.terms.hand.posterior import condition_hand
 from gfimu.diagnosis.terms.jacobian import Jacobian, Reach, differentiate, measured_reach
 from gfimu.diagnosis.terms.observed import Observed, observe
 from gfimu.diagnosis.terms.slow_modes import SlowModes, WeighedModes
-from gfimu.world_model import Effect, memory_of
+from gfimu.world_model import Effect, acts_back, memory_of
 
 __all__ = ["Posterior", "condition", "energy", "posterior_of", "remembers_long"]
 
@@ -189,17 +189,14 @@ def _cholesky(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def remembers_long(effects: Sequence[Effect]) -> bool:
     """Tell whether an effect remembers the drive for so long that the derivative leaves it out unless it is exact."""
-    return any(memory_of(effect) > _LONG_MEMORY for effect in effects)
+    return any(memory_of(effect) > _LONG_MEMORY and acts_back(effect) for effect in effects)
 
 
 def _jacobian(stretch: Stretch, drive: Drive, effects: Sequence[Effect], seen: Observed, *, exact: bool) -> Jacobian:
-    """Differentiate by the drive; unless ``exact``, without what remembers the drive for long."""
-    longest = max((memory_of(effect) for effect in (*stretch.model.effects, *effects)), default=0.0)
-    present = list(effects)
-    base = seen.prediction
-    if longest > _LONG_MEMORY and not exact:
-        present = [effect for effect in effects if memory_of(effect) <= _LONG_MEMORY]
-        base = stretch.predict(present, drive.spin)
+    """Differentiate by the drive; without what remembers it for long, unless that acts back and ``exact`` is asked."""
+    present = [effect for effect in effects if memory_of(effect) <= _LONG_MEMORY or (exact and acts_back(effect))]
+    longest = max((memory_of(effect) for effect in (*stretch.model.effects, *present)), default=0.0)
+    base = seen.prediction if len(present) == len(effects) else stretch.predict(present, drive.spin)
 
     def predict(coefficients: NDArray[np.float64]) -> NDArray[np.float64]:
         return stretch.predict(present, drive.spline.spin(coefficients))

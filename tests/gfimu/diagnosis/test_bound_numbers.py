@@ -6,6 +6,7 @@ import tomllib
 
 import numpy as np
 import pytest
+from usual_twin import UsualTwin
 
 from gfimu.diagnosis import diagnose
 from gfimu.geometry.array import AccelerometerArray
@@ -15,13 +16,6 @@ from sim.effects import make_effect
 from sim.twin import Twin
 
 TWIN = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
-
-
-class Usual(Twin):
-    """A twin that has no wider library than the usual one."""
-
-    def searching(self, *, wide):
-        return self
 
 
 def recorded(seed, effects=(), cubic=0.0):
@@ -51,7 +45,7 @@ def test_a_tachometer_that_is_bent_is_named_by_place_and_dependence():
 
 
 def test_by_the_usual_effects_it_is_no_curve_of_twelve_channels():
-    found = diagnose([recorded(4, cubic=1e-4)], Usual(array=TWIN.array, array_name=TWIN.array_name))
+    found = diagnose([recorded(4, cubic=1e-4)], UsualTwin(array=TWIN.array, array_name=TWIN.array_name))
     assert found.verdict == "unknown"
     assert "go as the centripetal arm" in found.unexplained.signature
     assert not found.causes

@@ -42,6 +42,7 @@ SLOW = (
     *("outside-stick_slip-600-independent-400", "outside-backlash-600-independent-406"),
     *("hard-warm_up+scale_factor-792-independent-872024", "outside-tacho_ripple-600-campaign-424"),
     *("outside-table_tilt-600-campaign-420", "single-cogging-60-independent-109"),
+    *("outside-square_wave-600-independent-404", "outside-cogging-600-campaign-426"),
 )
 """Each takes more than fifteen seconds; they run with ``pytest -m study`` and with ``hidden_pins.py --check``."""
 

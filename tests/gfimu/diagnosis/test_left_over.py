@@ -6,6 +6,7 @@ import re
 
 import numpy as np
 import pytest
+from usual_twin import UsualTwin
 
 from gfimu.diagnosis import diagnose
 from gfimu.diagnosis.criticism.series_tests import lines
@@ -27,7 +28,7 @@ CHANNEL = "a12"
 
 @pytest.fixture(scope="module")
 def twin():
-    return Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
+    return UsualTwin(array=AccelerometerArray.load("cube12"), array_name="cube12")
 
 
 def recorded(twin, seed, change, effects=()):

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from made_diagnoses import made_diagnosis
+from usual_twin import UsualTwin
 
 from gfimu.diagnosis import diagnose
 from gfimu.diagnosis.policy import Policy
@@ -22,14 +23,13 @@ from sim.campaign import Measurement, measure, random_profile
 from sim.effects import make_effect
 from sim.study.cases import study_cases
 from sim.study.outcome import draw_world
-from sim.twin import Twin
 
 SETTING = Measurement(duration=24.0)
 
 
 @pytest.fixture(scope="module")
 def twin():
-    return Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
+    return UsualTwin(array=AccelerometerArray.load("cube12"), array_name="cube12")
 
 
 @pytest.mark.parametrize(

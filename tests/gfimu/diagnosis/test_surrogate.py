@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from usual_twin import UsualTwin
 
 from gfimu.diagnosis import diagnose
 from gfimu.diagnosis.report.folder import write_diagnosis
@@ -21,7 +22,7 @@ CHANNEL = "a31"
 
 @pytest.fixture(scope="module")
 def twin():
-    return Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
+    return UsualTwin(array=AccelerometerArray.load("cube12"), array_name="cube12")
 
 
 def recorded(twin, seed, change):
