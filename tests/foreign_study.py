@@ -10,6 +10,8 @@ import argparse
 import json
 import random
 from collections import Counter, defaultdict
+from dataclasses import replace
+from functools import partial
 from multiprocessing import Pool
 from pathlib import Path
 
@@ -90,12 +92,13 @@ def recorded_again(generator, case, array):
     return Recording.from_arrays(columns.pop("t_s"), readings, array, reference=columns)
 
 
-def run_case(job):
+def run_case(job, *, at_once=False):
     """Draw, diagnose and predict one case; a refusal is an outcome, too."""
     generator, case = job
     outcome = {"generator": generator, "key": case.key, **case.to_dict(), "causes": [], "processor_s": 0.0}
     try:
         world = draw_world(case, f"{foreign_world.__file__}:{generator}")
+        world = replace(world, twin=replace(world.twin, grammar=at_once))
         start = processor_time()
         found = diagnose([world.recording], world.twin)
         outcome |= {"reached": world.reached, "processor_s": processor_time() - start}
@@ -147,13 +150,16 @@ def main():
     parser.add_argument("--out", type=Path, required=True, help="file of outcomes (JSON lines)")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--all", action="store_true", help="all three profiles of each effect")
+    parser.add_argument(
+        "--grammar", action="store_true", help="search the wider library at once"
+    )
     options = parser.parse_args()
     lines = options.out.read_text().splitlines() if options.out.exists() else []
     outcomes = [json.loads(line) for line in lines]
     done = {(one["generator"], one["key"]) for one in outcomes}
     todo = [job for job in jobs(every=options.all) if (job[0], job[1].key) not in done]
     with Pool(options.workers, maxtasksperchild=10) as pool, options.out.open("a") as file:
-        for outcome in pool.imap_unordered(run_case, todo):
+        for outcome in pool.imap_unordered(partial(run_case, at_once=options.grammar), todo):
             file.write(json.dumps(outcome) + "\n")
             file.flush()
             outcomes.append(outcome)
