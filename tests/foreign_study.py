@@ -150,9 +150,7 @@ def main():
     parser.add_argument("--out", type=Path, required=True, help="file of outcomes (JSON lines)")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--all", action="store_true", help="all three profiles of each effect")
-    parser.add_argument(
-        "--grammar", action="store_true", help="search the wider library at once"
-    )
+    parser.add_argument("--grammar", action="store_true", help="search the wider library at once")
     options = parser.parse_args()
     lines = options.out.read_text().splitlines() if options.out.exists() else []
     outcomes = [json.loads(line) for line in lines]

@@ -23,8 +23,6 @@ from gfimu.world_model import WorldModel
 
 __all__ = ["diagnose", "prepare"]
 
-_FIRST = 0.5  # of the progress that is told: the search of the usual library, where there is a wider one
-
 
 def diagnose(
     recordings: Sequence[Recording],
@@ -106,7 +104,7 @@ def _by_stages(
     """
     wide = model.searching(wide=True)
     is_wider = wide.families().keys() > model.families().keys()
-    end = _FIRST if is_wider else 1.0
+    end = 0.5 if is_wider else 1.0  # of the progress that is told
     usual = LibraryDiagnosis(prepared, kept, model, policy, lambda share, text: report(end * share, text))
     understanding = usual.understood()
     if understanding.explanation.interrupted:
