@@ -95,7 +95,7 @@ def headline(diagnosis: Diagnosis) -> str:
 
 def summary(diagnosis: Diagnosis, cause: NamedCause) -> str:
     """Return what is wrong according to a cause, in the effect's own words, and where."""
-    family = diagnosis.twin.families().get(cause.effect)
+    family = diagnosis.twin.searching(wide=True).families().get(cause.effect)
     words = str(family.summary) if family is not None else cause.effect.replace("_", " ")
     return f"{words} ({cause.place})" if cause.place else words
 
@@ -107,7 +107,7 @@ def _short(diagnosis: Diagnosis, cause: NamedCause) -> str:
 
 
 def _words(diagnosis: Diagnosis, effect: str) -> str:
-    family = diagnosis.twin.families().get(effect)
+    family = diagnosis.twin.searching(wide=True).families().get(effect)
     return str(family.summary).split(":", maxsplit=1)[0] if family is not None else effect.replace("_", " ")
 
 
@@ -198,7 +198,7 @@ def _silent(diagnosis: Diagnosis, run: RunView) -> list[str]:
 
 def parameter_units(diagnosis: Diagnosis, cause: NamedCause) -> Mapping[str, str]:
     """Return the units that the effect of a cause declares for its parameters, by key."""
-    family = diagnosis.twin.families().get(cause.effect)
+    family = diagnosis.twin.searching(wide=True).families().get(cause.effect)
     return {} if family is None else family.parameter_units(diagnosis.twin.array)
 
 

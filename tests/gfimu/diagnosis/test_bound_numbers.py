@@ -9,6 +9,7 @@ import pytest
 from usual_twin import UsualTwin
 
 from gfimu.diagnosis import diagnose
+from gfimu.diagnosis.report.plain_words import headline
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
 from sim.campaign import Measurement, measure
@@ -32,6 +33,7 @@ def test_a_tachometer_that_is_bent_is_named_by_place_and_dependence():
     assert any(text.startswith("wider library") for _, text in said)  # as the usual one has no answer
     assert "further ones were searched" in " ".join(found.sentences)
     assert np.all(np.diff([share for share, _ in said]) >= 0.0)
+    assert headline(found).endswith("the gain of the reference changes with the rate squared.")
     assert "grammar" not in found.twin.to_dict()  # the next diagnosis begins with the usual effects again
     (cause,) = found.causes
     assert cause.unlisted == {"place": "reference", "dependence": "omega^3", "pattern": "one"}
