@@ -104,7 +104,7 @@ def _by_stages(
     """
     wide = model.searching(wide=True)
     is_wider = wide.families().keys() > model.families().keys()
-    end = 0.5 if is_wider else 1.0  # of the progress that is told
+    end = 0.5 if is_wider else 1.0  # of the progress that is reported
     usual = LibraryDiagnosis(prepared, kept, model, policy, lambda share, text: report(end * share, text))
     understanding = usual.understood()
     if understanding.explanation.interrupted:
@@ -117,7 +117,8 @@ def _by_stages(
     )
     understanding = wider.understood()
     other = found if understanding.explanation.interrupted else wider.verdict(understanding)
-    return with_wider_library(other) if _worth(other) > _worth(found) else found
+    better = other.verdict != "nothing_found" and _worth(other) > _worth(found)
+    return with_wider_library(other) if better else found
 
 
 def _worth(found: Diagnosis) -> float:
