@@ -115,7 +115,8 @@ def _by_stages(
     wider = LibraryDiagnosis(
         prepared, kept, wide, policy, lambda share, text: report(end + (1.0 - end) * share, f"wider library: {text}")
     )
-    understanding = wider.understood()
+    # The biases and the calibration are the same ones: a model of them that lost will not win beside rarer causes.
+    understanding = wider.understood({understanding.model})
     other = found if understanding.explanation.interrupted else wider.verdict(understanding)
     better = other.verdict != "nothing_found" and _worth(other) > _worth(found)
     return with_wider_library(other) if better else found

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -61,10 +61,12 @@ class LibraryDiagnosis:
     ) -> None:
         self._prepared, self._kept, self._model, self._policy, self._report = prepared, kept, model, policy, report
 
-    def understood(self) -> Understanding:
-        """Return what a search finds."""
+    def understood(self, models: Collection[str] | None = None) -> Understanding:
+        """Return what a search finds, under some models of the nuisance parameters only or under all."""
         stretches, tell = stretches_of(self._model, self._prepared), self._report
-        return understand_any_length(stretches, self._policy, lambda share, text: tell(0.05 + 0.8 * share, text))
+        return understand_any_length(
+            stretches, self._policy, lambda share, text: tell(0.05 + 0.8 * share, text), models=models
+        )
 
     def verdict(self, understanding: Understanding) -> Diagnosis:
         """Return the verdict on what a search found."""

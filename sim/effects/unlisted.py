@@ -134,6 +134,14 @@ class ReferenceSquare(_OfReference):
     dependence = SIGNED_SQUARE
 
 
+class ReferenceEven(_OfReference):
+    """A reference whose error has one sign in both directions and grows with the rate squared."""
+
+    name = "reference_error_by_rate_squared"
+    summary = "the reference is off in proportion to the rate squared, the same way in both directions"
+    dependence = RATE_SQUARED
+
+
 class ReferenceCube(_OfReference):
     """A reference whose gain grows with the rate squared."""
 
@@ -387,6 +395,7 @@ UNLISTED: dict[str, type[Unlisted]] = {
         ReferenceOffset,
         ReferenceSpeed,
         ReferenceSquare,
+        ReferenceEven,
         ReferenceCube,
         LeanByRateSquared,
         LeanByRate,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -37,12 +37,18 @@ def spread_over_runs(runs: Sequence[int], most: int) -> list[int]:
     return chosen
 
 
-def understand_any_length(stretches: Sequence[Stretch], policy: Policy, report: Report) -> Understanding:
-    """Explain stretches; where there are many, some of them, and fit what was found to all."""
+def understand_any_length(
+    stretches: Sequence[Stretch], policy: Policy, report: Report, *, models: Collection[str] | None = None
+) -> Understanding:
+    """Explain stretches; where there are many, some of them, and fit what was found to all.
+
+    `models` names the only alternatives for the nuisance parameters that are searched; all by default.
+    """
     chosen = spread_over_runs([stretch.index for stretch in stretches], policy.most_searched)
     if len(chosen) == len(stretches):
-        return understand(stretches, policy, report)
-    part = understand([stretches[place] for place in chosen], policy, lambda s, text: report(0.6 * s, text))
+        return understand(stretches, policy, report, models=models)
+    some = [stretches[place] for place in chosen]
+    part = understand(some, policy, lambda s, text: report(0.6 * s, text), models=models)
     report(0.6, "the whole length")
     best = part.explanation.best
     start = starting_point(stretches, policy.knots)

@@ -7,7 +7,7 @@ says whether it is worth a search of its own.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain
@@ -44,25 +44,45 @@ class Understanding:
         Size of the residue of the calibration in units of its tolerances; 0 where it has none.
     log_odds : float
         That this model needs over white noise and bias instability alone.
+    model : str
+        Name of this model; empty for white noise and bias instability alone.
     """
 
     explanation: Explanation
     walk: Walk | None
     residue: float
     log_odds: float
+    model: str = ""
 
 
-def understand(stretches: Sequence[Stretch], policy: Policy, report: Report | None = None) -> Understanding:
-    """Explain stretches under every model of the nuisance parameters that is worth a search."""
+def understand(
+    stretches: Sequence[Stretch],
+    policy: Policy,
+    report: Report | None = None,
+    *,
+    models: Collection[str] | None = None,
+) -> Understanding:
+    """Explain stretches under every model of the nuisance parameters that is worth a search.
+
+    Parameters
+    ----------
+    stretches : sequence of Stretch
+        What to explain.
+    policy : Policy
+        Thresholds.
+    report : callable, optional
+        Called with the share done and a line of text.
+    models : collection of str, optional
+        Names of the only alternatives to white noise and bias instability alone that are searched; all by default.
+    """
     tell = report or (lambda share, text: None)
-    found = [
-        _understood(stretches, explain(stretches, policy, report=lambda s, text: tell(0.6 * s, text)), policy, 0.0)
-    ]
+    found = [_understood(stretches, explain(stretches, policy, report=lambda s, text: tell(0.6 * s, text)), policy)]
     plain, derivatives = found[0].explanation, _Derivatives(stretches)
     if plain.interrupted:
         return found[0]
     rough = _left_by_inexactness(plain)
-    offered = [(_offers(stretches, plain, model, derivatives), model) for model in _models(stretches, plain, policy)]
+    alternatives = [one for one in _models(stretches, policy) if models is None or one.name in models]
+    offered = [(_offers(stretches, plain, model, derivatives), model) for model in alternatives]
     # The most promising first: what it finds leaves the others little to search for.
     for offers, model in sorted(offered, key=lambda pair: _most(pair[0]) - pair[1].odds, reverse=True):
         tell(0.6, model.name)
@@ -71,7 +91,7 @@ def understand(stretches: Sequence[Stretch], policy: Policy, report: Report | No
         beside = [_offers(stretches, one, model, derivatives) for key, one in others.items() if key != plain.best.key]
         start = _start(stretches, [*offers, *chain(*beside)], _leader(found), odds, policy)
         if start is not None:
-            other = _understood(stretches, explain(stretches, policy, start=start), policy, odds)
+            other = _understood(stretches, explain(stretches, policy, start=start), policy, odds, model.name)
             # What looked like a random walk beside some causes may be no such thing beside the best of that model.
             if other.walk is None or other.walk.is_likely(policy):
                 found.append(other)
@@ -117,7 +137,7 @@ class _Offer:
     point: Point
 
 
-def _models(stretches: Sequence[Stretch], plain: Explanation, policy: Policy) -> list[_Model]:
+def _models(stretches: Sequence[Stretch], policy: Policy) -> list[_Model]:
     """Return the alternatives to white noise and bias instability alone."""
     first = stretches[0]
     if isinstance(first, BodyStretch):  # its slow noise takes what walks; a residue would need the force of many poses
@@ -219,10 +239,12 @@ def _promise(stretches: Sequence[Stretch], before: Point, after: Point, taken: _
     return values[1] - values[0]
 
 
-def _understood(stretches: Sequence[Stretch], explanation: Explanation, policy: Policy, odds: float) -> Understanding:
+def _understood(
+    stretches: Sequence[Stretch], explanation: Explanation, policy: Policy, odds: float = 0.0, model: str = ""
+) -> Understanding:
     point = explanation.best.point
     walk = None
     if point.levels[0].walk > 0.0 and stretches[0].first_levels.walk == 0.0:
         walk = walk_strength(stretches, point, policy)
     residue = 0.0 if point.residue is None else point.residue.scale
-    return Understanding(explanation, walk, residue, odds)
+    return Understanding(explanation, walk, residue, odds, model)

@@ -19,10 +19,10 @@ from sim.twin import Twin
 TWIN = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
 
 
-def recorded(seed, effects=(), cubic=0.0):
-    """A run whose tachometer reads ω + cubic · ω³."""
+def recorded(seed, effects=(), cubic=0.0, square=0.0):
+    """A run whose tachometer reads ω + square · ω² + cubic · ω³."""
     run = measure(np.random.default_rng(seed), TWIN, effects, Measurement(duration=24.0))
-    reference = {name: values + cubic * values**3 for name, values in run.reference.items()}
+    reference = {name: values + square * values**2 + cubic * values**3 for name, values in run.reference.items()}
     return Recording.from_arrays(run.t_s, run.readings, TWIN.array, reference=reference)
 
 
@@ -44,6 +44,16 @@ def test_a_tachometer_that_is_bent_is_named_by_place_and_dependence():
     assert told["name"] == "reference_rate_cubed"
     assert "it goes with rate³" in cause.why
     assert Twin.from_dict(tomllib.loads(found.twin.to_toml())).effects[0].parameters == pytest.approx(cause.parameters)
+
+
+def test_a_tachometer_that_reads_too_much_in_both_directions_is_no_change_of_its_gain():
+    # A run in both directions: one that turns one way can not tell the two apart.
+    found = diagnose([recorded(5, square=1e-3)], TWIN)
+    (cause,) = found.causes
+    assert found.verdict == "explained"
+    assert cause.unlisted == {"place": "reference", "dependence": "omega^2", "pattern": "one"}
+    (size,) = cause.parameters.values()
+    assert size == pytest.approx(1e-3, abs=4 * next(iter(cause.std.values())))
 
 
 def test_by_the_usual_effects_it_is_no_curve_of_twelve_channels():

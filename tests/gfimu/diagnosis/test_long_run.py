@@ -43,9 +43,9 @@ def counting(monkeypatch):
     searched = []
     understand = long_run.understand
 
-    def counted(some, *rest):
+    def counted(some, *rest, **options):
         searched.append(len(some))
-        return understand(some, *rest)
+        return understand(some, *rest, **options)
 
     monkeypatch.setattr(long_run, "understand", counted)
     return searched
