@@ -236,7 +236,8 @@ ROOMS = {
     "gfimu.files": set(),
     "gfimu.parts": {"gfimu.files", "gfimu.geometry.array"},
     "gfimu.geometry": {"gfimu.bounds", "gfimu.files", "gfimu.parts.files"},
-    "gfimu.recording": {"gfimu.files", "gfimu.geometry", "gfimu.parts", "gfimu.rate.integration"},
+    "gfimu.importing": {"gfimu.files", "gfimu.geometry.array"},
+    "gfimu.recording": {"gfimu.files", "gfimu.geometry", "gfimu.importing", "gfimu.parts", "gfimu.rate.integration"},
     "gfimu.motion": {"gfimu.files", "gfimu.geometry", "gfimu.parts", "gfimu.rate", "gfimu.recording"},
     "gfimu.position_drift": {"gfimu.geometry", "gfimu.motion", "gfimu.rate.integration"},
 }

@@ -12,6 +12,7 @@ from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
 from gfimu.recording.carried_array import array_difference
 from gfimu.recording.formats import open_run
+from gfimu.recording.mapped import MappedFile
 from gfimu.recording.mimu4444 import is_mimu4444, read_mimu4444
 
 __all__ = ["open_calibrated", "open_calibrated_run", "open_uncalibrated"]
@@ -19,7 +20,7 @@ __all__ = ["open_calibrated", "open_calibrated_run", "open_uncalibrated"]
 _TEXT = (".txt", ".txt.gz")
 
 
-def open_uncalibrated(path: str | Path, *, array: AccelerometerArray | None = None) -> Recording:
+def open_uncalibrated(path: str | Path | MappedFile, *, array: AccelerometerArray | None = None) -> Recording:
     """Read a recording to calibrate from: raw counts stay counts, other units become m/s².
 
     CSV and Parquet recordings, MIMU4444 streams, and plain text of rows ``time x y z`` (``.txt``, ``.txt.gz``) as
@@ -34,7 +35,7 @@ def open_uncalibrated(path: str | Path, *, array: AccelerometerArray | None = No
 
 
 def open_calibrated(
-    path: str | Path, calibration: Calibration, *, array: AccelerometerArray | None = None
+    path: str | Path | MappedFile, calibration: Calibration, *, array: AccelerometerArray | None = None
 ) -> Recording:
     """Read a recording in the unit of a calibration and correct it.
 
@@ -47,7 +48,7 @@ def open_calibrated(
 
 
 def open_calibrated_run(
-    path: str | Path, calibration: Calibration, array: AccelerometerArray | None = None
+    path: str | Path | MappedFile, calibration: Calibration, array: AccelerometerArray | None = None
 ) -> tuple[Recording, AccelerometerArray]:
     """Read a recording with its array and correct both: readings by the error models, positions where fitted.
 
@@ -57,7 +58,7 @@ def open_calibrated_run(
         As `gfimu.recording.formats.open_run`, or if the calibration does not fit the recording.
     """
     recording, geometry = open_run(path, array)
-    if calibration.unit == "lsb" and not is_mimu4444(path):
+    if calibration.unit == "lsb" and not isinstance(path, MappedFile) and not is_mimu4444(path):
         recording = Recording.read(path, array=geometry, unit="lsb")
     corrected, calibrated = calibration.apply(recording), calibration.calibrated_array(geometry)
     if _carries(recording, geometry):  # another array of its own stays in it, so that the difference is reported
@@ -74,7 +75,9 @@ def _carries(recording: Recording, array: AccelerometerArray) -> bool:
     return own is not None and not array_difference(own, array)
 
 
-def _open(path: str | Path, array: AccelerometerArray | None, unit: str | None) -> Recording:
+def _open(path: str | Path | MappedFile, array: AccelerometerArray | None, unit: str | None) -> Recording:
+    if isinstance(path, MappedFile):
+        return path.read(array)
     if str(path).endswith(_TEXT) and Path(path).is_file():
         return read_text_triad(path)
     if is_mimu4444(path):

@@ -20,6 +20,7 @@ COMMAND_FILES = (
     "simulate",
     "estimate",
     "live",
+    "inspect",
     "convert",
     "diagnose",
     "drift",

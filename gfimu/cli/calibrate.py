@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from gfimu.calibration.registry import METHODS
+from gfimu.cli.mapped import MapOption, mapped
 from gfimu.cli.output import JsonOption, print_json, print_paths, print_table
 
 if TYPE_CHECKING:
@@ -67,6 +68,7 @@ def _calibrate(
         float, typer.Option("--bias-walk", help="With --update: random walk of a bias between poses, m/s²/√s.")
     ] = 0.0,
     picture: Annotated[Path | None, typer.Option("--picture", help="Picture to write (.png, .svg, .pdf).")] = None,
+    column_map: MapOption = None,
     json: JsonOption = False,
 ) -> None:
     """Calibrate the accelerometers of a recording, each parameter with its standard deviation.
@@ -77,7 +79,7 @@ def _calibrate(
 
     result = calibrate(
         method,
-        run,
+        mapped(run, column_map),
         out=out,
         array=array,
         gravity=gravity,
@@ -88,7 +90,7 @@ def _calibrate(
         rest_threshold=rest_threshold,
         min_rest=min_rest,
         levelling_std=levelling_std,
-        motion=motion,
+        motion=None if motion is None else mapped(motion, column_map),
         update=update,
         turn_on_std=turn_on_std,
         bias_walk=bias_walk,

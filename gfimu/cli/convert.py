@@ -7,7 +7,9 @@ from typing import Annotated
 
 import typer
 
+from gfimu.cli.mapped import MapOption, TableOption, mapped
 from gfimu.cli.output import JsonOption, print_json, print_paths, print_table
+from gfimu.errors import InputError
 
 __all__ = ["register"]
 
@@ -18,19 +20,38 @@ def register(app: typer.Typer) -> None:
 
 
 def _convert(
-    source: Annotated[Path, typer.Argument(help="Recording: .csv, .parquet, or a MIMU4444 stream (.bin, .bin.gz).")],
+    sources: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="SOURCE...",
+            help="Recording: .csv, .parquet, a MIMU4444 stream, or with --map a foreign file, one per chip.",
+        ),
+    ],
     target: Annotated[Path, typer.Argument(help="Recording to write, .csv or .parquet.")],
     array: Annotated[
         str | None, typer.Option("--array", help="Array whose channels must be there; else every channel found.")
     ] = None,
+    column_map: MapOption = None,
+    table: TableOption = None,
     json: JsonOption = False,
 ) -> None:
-    """Convert a recording between CSV and Parquet, or import a MIMU4444 stream. Readings become m/s².
+    """Convert a recording between CSV and Parquet, or import a MIMU4444 stream or a foreign file. Readings become m/s².
 
     Example: gfimu convert exp_1.bin.gz run.parquet
+
+    A Klipper recording: gfimu convert adxl345-x.csv run.parquet --map klipper
+
+    A file of unknown layout: gfimu inspect log.txt --out log.toml, then gfimu convert log.txt run.csv --map log.toml
+
+    One file per chip on a common clock: gfimu convert chip1.csv chip2.csv run.parquet --map klipper --array mine.toml
     """
     from gfimu.commands.convert import convert
 
+    if len(sources) > 1 and column_map is None:
+        raise InputError(
+            f"{sources[1]}: several sources need --map, which says what the columns of each chip's file are"
+        )
+    source = mapped(sources[0], column_map, table=table, others=tuple(sources[1:]))
     recording = convert(source, target, array=array)
     figures = {
         "samples": len(recording),

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from gfimu.cli.mapped import MapOption, mapped
 from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, print_text, progress
 
 if TYPE_CHECKING:
@@ -41,6 +42,7 @@ def _diagnose(
             "--grammar", help="Search the wider library of effects at once, not only where the usual one fails."
         ),
     ] = False,
+    column_map: MapOption = None,
     json: JsonOption = False,
 ) -> None:
     """Show what a simulation gets wrong against recordings, name the cause, extend the simulation, measure the gain.
@@ -58,7 +60,13 @@ def _diagnose(
 
     with progress("diagnosing", total=1.0) as done:
         found = diagnose(
-            runs, twin, out=out, held_out=held_out or [], calibration=calibration, report=done, grammar=grammar
+            [mapped(run, column_map) for run in runs],
+            twin,
+            out=out,
+            held_out=[mapped(run, column_map) for run in held_out or []],
+            calibration=calibration,
+            report=done,
+            grammar=grammar,
         )
     written = {meaning: out / name for name, meaning in FILES.items()}
     if json:

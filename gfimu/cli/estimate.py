@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from gfimu.cli.mapped import MapOption, mapped
 from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, print_text, progress
 from gfimu.rate.registry import RATE_METHODS, rate_method, recursive_methods
 
@@ -51,6 +52,7 @@ def _estimate(
         bool, typer.Option("--force", help="Go on where the checks of units, time, array and channels refuse the file.")
     ] = False,
     rrd: Annotated[Path | None, typer.Option("--rrd", help="Rerun recording to write.")] = None,
+    column_map: MapOption = None,
     json: JsonOption = False,
 ) -> None:
     """Estimate p, α, ω, attitude and table angle from a recording.
@@ -62,7 +64,7 @@ def _estimate(
 
     with progress(_describe(method), total=1.0) as done:
         found = estimate_run(
-            run,
+            mapped(run, column_map),
             array,
             out=out,
             method=method,

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from gfimu.cli.mapped import MapOption, mapped
 from gfimu.cli.output import JsonOption, print_json, print_paths, print_table
 
 __all__ = ["register"]
@@ -29,6 +30,7 @@ def _noise(
     calibration: Annotated[Path | None, typer.Option("--calibration", help="Calibration to apply first.")] = None,
     kalibr: Annotated[Path | None, typer.Option("--kalibr", help="Kalibr imu.yaml to write.")] = None,
     picture: Annotated[Path | None, typer.Option("--picture", help="Picture to write (.png, .svg, .pdf).")] = None,
+    column_map: MapOption = None,
     json: JsonOption = False,
 ) -> None:
     """Identify velocity random walk N, bias instability B, acceleration random walk K, quantisation Q and ramp R.
@@ -39,7 +41,12 @@ def _noise(
     from gfimu.sensor_noise.identification import TERMS
 
     result = noise(
-        run, stretch=stretch, rest_threshold=rest_threshold, calibration=calibration, kalibr=kalibr, picture=picture
+        mapped(run, column_map),
+        stretch=stretch,
+        rest_threshold=rest_threshold,
+        calibration=calibration,
+        kalibr=kalibr,
+        picture=picture,
     )
     written = {} if kalibr is None else {"Kalibr": kalibr}
     written |= {} if picture is None else {"picture": picture}

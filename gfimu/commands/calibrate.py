@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from gfimu.calibration.result import Calibration
     from gfimu.geometry.array import AccelerometerArray
     from gfimu.recording import Recording
+    from gfimu.recording.mapped import MappedFile
 
 __all__ = ["calibrate"]
 
@@ -30,7 +31,7 @@ _OPTION_NAMES = {
 @writes(reads=("recording", "array", "motion", "update"), out=CALIBRATION, picture=PICTURE)
 def calibrate(
     method: str,
-    recording: Recording | str | Path,
+    recording: Recording | str | Path | MappedFile,
     *,
     out: str | Path | None = None,
     array: AccelerometerArray | str | Path | None = None,
@@ -42,7 +43,7 @@ def calibrate(
     rest_threshold: float | None = None,
     min_rest: float | None = None,
     levelling_std: float | None = None,
-    motion: Recording | str | Path | None = None,
+    motion: Recording | str | Path | MappedFile | None = None,
     update: Calibration | str | Path | None = None,
     turn_on_std: float = 0.03,
     bias_walk: float = 0.0,
@@ -144,14 +145,14 @@ def _refuse_unused(method: CalibrationMethod, **given: object) -> None:
             raise InputError(f"{_OPTION_NAMES[name]}; use it with {users}, not {method.name}")
 
 
-def _uncalibrated(recording: Recording | str | Path, array: AccelerometerArray | None) -> Recording:
+def _uncalibrated(recording: Recording | str | Path | MappedFile, array: AccelerometerArray | None) -> Recording:
     from gfimu.calibration.run_file import open_uncalibrated
     from gfimu.recording import Recording
 
     return recording if isinstance(recording, Recording) else open_uncalibrated(recording, array=array)
 
 
-def _own_array(recording: Recording | str | Path) -> AccelerometerArray:
+def _own_array(recording: Recording | str | Path | MappedFile) -> AccelerometerArray:
     from gfimu.commands.opened import as_run
 
     return as_run(recording, None)[1]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,13 +11,14 @@ from gfimu.files.outputs import RECORDING, writes
 if TYPE_CHECKING:
     from gfimu.geometry.array import AccelerometerArray
     from gfimu.recording import Recording
+    from gfimu.recording.mapped import MappedFile
 
 __all__ = ["convert"]
 
 
 @writes(reads=("source", "array"), target=RECORDING)
 def convert(
-    source: Recording | str | Path,
+    source: Recording | str | Path | MappedFile,
     target: str | Path | None = None,
     *,
     array: AccelerometerArray | str | Path | None = None,
@@ -25,8 +27,8 @@ def convert(
 
     Parameters
     ----------
-    source : Recording, str or Path
-        The recording, or its file: CSV, Parquet or a MIMU4444 stream.
+    source : Recording, str, Path or MappedFile
+        The recording, or its file: CSV, Parquet, a MIMU4444 stream, or a foreign file with its column map.
     target : str or Path, optional
         Recording to write, ``.csv`` or ``.parquet``.
     array : AccelerometerArray, str or Path, optional
@@ -47,7 +49,7 @@ def convert(
     if drawing is not None:
         recording = recording.carrying(drawing)
     elif "array_toml" in recording.metadata:
-        named = source if isinstance(source, str | Path) else "the recording"
+        named = os.fspath(source) if isinstance(source, str | os.PathLike) else "the recording"
         carried_array(recording.metadata, source=named)  # a damaged one is not passed on
     if target is not None:
         recording.write(target)

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from gfimu.diagnosis.design.profile_search import Limits
     from gfimu.diagnosis.design.proposal import Proposal
     from gfimu.recording import Recording
+    from gfimu.recording.formats import open_recording
     from gfimu.world_model import Effect, WorldModel
     from sim.twin import Twin
 
@@ -102,7 +103,7 @@ def design(
     asked = list(effects) if verdict is None else open_effects(verdict, model)
     at_hand = [
         prepare_run(
-            item if isinstance(item, Recording) else Recording.read(item, array=model.array),
+            item if isinstance(item, Recording) else open_recording(item, array=model.array),
             model,
             name=str(item) if isinstance(item, str | Path) else f"run {number}",
         )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
     from gfimu.calibration.result import Calibration
     from gfimu.diagnosis.verdict.verdict import Diagnosis
     from gfimu.recording import Recording
+    from gfimu.recording.mapped import MappedFile
     from sim.twin import Twin
 
 __all__ = ["FOLDER", "diagnose", "write_result"]
@@ -23,11 +25,11 @@ FOLDER = OutputFolder(("verdict.json", "twin.toml", "report.html", "diagnosis.rr
 
 @writes(reads=("recordings", "twin", "held_out", "calibration"), out=FOLDER)
 def diagnose(
-    recordings: Recording | str | Path | Sequence[Recording | str | Path],
+    recordings: Recording | str | Path | MappedFile | Sequence[Recording | str | Path | MappedFile],
     twin: Twin | str | Path,
     *,
     out: str | Path | None = None,
-    held_out: Recording | str | Path | Sequence[Recording | str | Path] = (),
+    held_out: Recording | str | Path | MappedFile | Sequence[Recording | str | Path | MappedFile] = (),
     calibration: Calibration | str | Path | None = None,
     names: Sequence[str] | None = None,
     report: Callable[[float, str], None] | None = None,
@@ -114,7 +116,7 @@ def write_result(out: str | Path, found: Diagnosis, recording: Recording) -> dic
     )
 
 
-def _opened(recording: Recording | str | Path, model: Twin, unit: Calibration | None) -> Recording:
+def _opened(recording: Recording | str | Path | MappedFile, model: Twin, unit: Calibration | None) -> Recording:
     """Return a recording with the channels of the twin's array, calibrated where there is a calibration."""
     from gfimu.calibration.run_file import open_calibrated_run
     from gfimu.recording import Recording
@@ -127,9 +129,9 @@ def _opened(recording: Recording | str | Path, model: Twin, unit: Calibration | 
     return open_calibrated_run(recording, unit, model.array)[0]
 
 
-def _names(runs: Sequence[Recording | str | Path]) -> list[str]:
+def _names(runs: Sequence[Recording | str | Path | MappedFile]) -> list[str]:
     """Return names for people: file names where they tell the runs apart."""
-    paths = [Path(run) if isinstance(run, str | Path) else None for run in runs]
+    paths = [Path(run) if isinstance(run, str | os.PathLike) else None for run in runs]
     short = [path.name if path is not None else f"run {number}" for number, path in enumerate(paths, start=1)]
     if len(set(short)) == len(short):
         return short

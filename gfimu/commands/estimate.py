@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from gfimu.geometry.array import AccelerometerArray
     from gfimu.motion.estimation import Estimate
     from gfimu.recording import Recording
+    from gfimu.recording.mapped import MappedFile
 
 __all__ = ["EstimatedRun", "estimate", "estimate_run"]
 
@@ -44,7 +45,7 @@ _READS = ("recording", "array", "calibration")
 
 @writes(reads=_READS, out=ESTIMATE, rrd=RERUN)
 def estimate(
-    recording: Recording | str | Path,
+    recording: Recording | str | Path | MappedFile,
     array: AccelerometerArray | str | Path | None = None,
     *,
     out: str | Path | None = None,
@@ -125,7 +126,7 @@ def estimate(
 
 @writes(reads=_READS, out=ESTIMATE, rrd=RERUN)
 def estimate_run(
-    recording: Recording | str | Path,
+    recording: Recording | str | Path | MappedFile,
     array: AccelerometerArray | str | Path | None = None,
     *,
     out: str | Path | None = None,
@@ -156,7 +157,7 @@ def estimate_run(
 
 
 def _opened(
-    recording: Recording | str | Path,
+    recording: Recording | str | Path | MappedFile,
     array: AccelerometerArray | str | Path | None,
     calibration: Calibration | str | Path | None,
 ) -> tuple[Recording, AccelerometerArray]:

@@ -10,6 +10,7 @@ from gfimu.files.outputs import KALIBR, PICTURE, writes
 if TYPE_CHECKING:
     from gfimu.calibration.result import Calibration
     from gfimu.recording import Recording
+    from gfimu.recording.mapped import MappedFile
     from gfimu.sensor_noise import RecordingNoise
 
 __all__ = ["noise"]
@@ -17,7 +18,7 @@ __all__ = ["noise"]
 
 @writes(reads=("recording", "calibration"), kalibr=KALIBR, picture=PICTURE)
 def noise(
-    recording: Recording | str | Path,
+    recording: Recording | str | Path | MappedFile,
     *,
     stretch: str = "rest",
     rest_threshold: float | None = None,

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from gfimu.calibration.result import Calibration
     from gfimu.geometry.array import AccelerometerArray
     from gfimu.recording import Recording
+    from gfimu.recording.mapped import MappedFile
     from sim.twin import Twin
 
 __all__ = [
@@ -52,7 +53,7 @@ def array_of(recording: Recording) -> AccelerometerArray:
 
 
 def as_run(
-    recording: Recording | str | Path, array: AccelerometerArray | str | Path | None
+    recording: Recording | str | Path | MappedFile, array: AccelerometerArray | str | Path | None
 ) -> tuple[Recording, AccelerometerArray]:
     """Return a recording with its array; the recording's own array if none is given."""
     from gfimu.recording import Recording
@@ -82,6 +83,8 @@ def as_twin(twin: Twin | str | Path) -> Twin:
     return Twin.load(twin)
 
 
-def as_runs(recordings: Recording | str | Path | Sequence[Recording | str | Path]) -> list[Recording | str | Path]:
+def as_runs(
+    recordings: Recording | str | Path | MappedFile | Sequence[Recording | str | Path | MappedFile],
+) -> list[Recording | str | Path | MappedFile]:
     """Return recordings given as one of them, or as a list or tuple of several."""
     return list(recordings) if isinstance(recordings, list | tuple) else [recordings]  # type: ignore[list-item]

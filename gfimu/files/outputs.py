@@ -20,6 +20,7 @@ from gfimu.errors import InputError
 __all__ = [
     "ARRAY_FILE",
     "CALIBRATION",
+    "COLUMN_MAP",
     "ESTIMATE",
     "KALIBR",
     "PICTURE",
@@ -102,6 +103,7 @@ ESTIMATE = OutputFile("an estimate", (".csv", ".parquet"))
 RERUN = OutputFile("a rerun recording", (".rrd",))
 TRACE = OutputFile("a trace", (".vcd", ".rrd"))
 CALIBRATION = OutputFile("a calibration", (".json",))
+COLUMN_MAP = OutputFile("a column map", (".toml",))
 ARRAY_FILE = OutputFile("an array file", (".toml",))
 SCENARIO = OutputFile("a scenario file", (".toml",))
 KALIBR = OutputFile("a Kalibr file", (".yaml", ".yml"))
@@ -201,8 +203,8 @@ def _inputs(given: Mapping[str, Any], names: Iterable[str]) -> Iterator[Path]:
     for name in names:
         value = given.get(name)
         for item in value if isinstance(value, list | tuple) else [value]:
-            if isinstance(item, str | Path):
-                path = _model_file(_MODELS.get(name, ""), item)
+            if isinstance(item, str | os.PathLike):
+                path = _model_file(_MODELS.get(name, ""), os.fspath(item) if not isinstance(item, Path) else item)
                 yield path
                 yield from _named_inside(path)
 

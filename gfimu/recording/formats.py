@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import cast
 
@@ -10,35 +12,54 @@ from gfimu.files.column_file import ColumnFile, open_columns
 from gfimu.files.table import ArrowStream
 from gfimu.files.table_columns import TableColumns
 from gfimu.geometry.array import AccelerometerArray
+from gfimu.importing.recognise import map_hint
 from gfimu.recording.carried_array import carried_array, check_all_channels
+from gfimu.recording.mapped import MappedFile
 from gfimu.recording.mimu4444 import is_mimu4444, read_mimu4444
 from gfimu.recording.recording import Recording
 
 __all__ = ["open_recording", "open_run"]
 
 
-def open_recording(path: str | Path | ArrowStream, *, array: AccelerometerArray | None = None) -> Recording:
-    """Read a recording from a CSV or Parquet file, a MIMU4444 stream (told apart by content), or a table object.
+def open_recording(
+    path: str | Path | MappedFile | ArrowStream, *, array: AccelerometerArray | None = None
+) -> Recording:
+    """Read a recording from a CSV or Parquet file, a MIMU4444 stream, a foreign file with its map, or a table object.
 
     Raises
     ------
     InputError
         As `gfimu.Recording.read` and `gfimu.recording.mimu4444.read_mimu4444`.
     """
+    if isinstance(path, MappedFile):
+        return path.read(array)
     if isinstance(path, str | Path) and is_mimu4444(path):
         return read_mimu4444(path)
-    return Recording.read(path, array=array)
+    with _hinting_at_maps(path):
+        return Recording.read(path, array=array)
+
+
+@contextmanager
+def _hinting_at_maps(path: str | Path | ArrowStream) -> Iterator[None]:
+    """Add to the error of a file that is no recording of gfimu's by which column map it may be read."""
+    try:
+        yield
+    except InputError as error:
+        hint = map_hint(path) if isinstance(path, str | Path) and Path(path).exists() else ""
+        if not hint:
+            raise
+        raise type(error)(f"{error}; {hint}") from None
 
 
 def open_run(
-    path: str | Path | ArrowStream, array: AccelerometerArray | None = None
+    path: str | Path | MappedFile | ArrowStream, array: AccelerometerArray | None = None
 ) -> tuple[Recording, AccelerometerArray]:
     """Read a recording together with its array.
 
     Parameters
     ----------
-    path : str, Path or table
-        The recording, as `gfimu.Recording.read` takes it, or a MIMU4444 stream.
+    path : str, Path, MappedFile or table
+        The recording, as `gfimu.Recording.read` takes it, a MIMU4444 stream, or a foreign file with its map.
     array : AccelerometerArray, optional
         The array; by default the one that the recording carries or, as older ones do, names.
 
@@ -53,8 +74,17 @@ def open_run(
     if isinstance(path, str | Path):
         if is_mimu4444(path):
             return read_mimu4444(path), AccelerometerArray.load("mimu4444")
-        own = _own_array(open_columns(path), Path(path).parent)
-        return Recording.read(path, array=own), own
+        with _hinting_at_maps(path):
+            table_of_file = open_columns(path)
+            if "t_s" not in table_of_file.names:
+                Recording.read(path)  # raises what is missing first of all
+            own = _own_array(table_of_file, Path(path).parent)
+            return Recording.read(path, array=own), own
+    if isinstance(path, MappedFile):
+        recording = path.read()
+        if recording.array is None:
+            raise InputError(f"{path}: the column map names no array; give it with --array")
+        return recording, recording.array
     table = TableColumns(path)  # an Arrow stream can be read only once
     own = _own_array(table, None)
     return Recording.read(cast("ArrowStream", table), array=own), own

@@ -1,0 +1,43 @@
+"""Under `gfimu inspect`: what a file of unknown layout seems to hold."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from gfimu.errors import InputError
+from gfimu.files.outputs import COLUMN_MAP, writes
+
+if TYPE_CHECKING:
+    from gfimu.importing import Inspection
+
+__all__ = ["inspect"]
+
+
+@writes(reads=("file",), out=COLUMN_MAP)
+def inspect(file: str | Path, *, table: str = "", out: str | Path | None = None) -> Inspection:
+    """Look at a file of unknown layout: columns, units, rate, gaps, rails, corrupt values, chips, a map to start from.
+
+    Parameters
+    ----------
+    file : str or Path
+        Text, Parquet, zip of text, MATLAB, HDF5, ULog, MCAP, ROS bag.
+    table : str
+        Table, topic or member to look at; by default the one with the most accelerations.
+    out : str or Path, optional
+        Column map to write, ``.toml``.
+
+    Raises
+    ------
+    InputError
+        If the file can't be read, or holds no accelerations that a map to write could name.
+    """
+    from gfimu.files.atomic_file import write_text
+    from gfimu.importing import inspect_file
+
+    found = inspect_file(file, table=table)
+    if out is not None:
+        if found.column_map is None:
+            raise InputError(f"{file}: no three columns that look like accelerations; no map was written")
+        write_text(out, found.map_text())
+    return found

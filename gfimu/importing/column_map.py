@@ -1,0 +1,187 @@
+"""Maps from the columns of a foreign file to a recording: a small TOML file, checked against one schema."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated, Any
+
+import msgspec
+
+from gfimu.errors import InputError
+from gfimu.files.model_files import find_model, list_models, read_toml
+from gfimu.importing.notation import factor_of
+
+__all__ = ["ColumnMap", "ColumnSpec", "TextSpec", "TimeSpec", "list_maps", "load_map", "map_toml"]
+
+_Meta = msgspec.Meta
+
+REFERENCE_KINDS = {
+    "tacho_rad_s": "rate",
+    "command_rad_s": "rate",
+    "angle_rad": "angle",
+    "temperature_degC": "temperature",
+    "gyro_x_rad_s": "rate",
+    "gyro_y_rad_s": "rate",
+    "gyro_z_rad_s": "rate",
+}
+"""References of a recording, and the kind of their unit."""
+
+_Positive = Annotated[float, _Meta(gt=0)]
+_Column = Annotated[
+    str | int | tuple[str | int, ...],
+    _Meta(description="Name of the column, or its number from 1; of several the first one that is there."),
+]
+
+
+class ColumnSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A column that holds a sensing axis or a reference: (number − offset) · scale, in a unit."""
+
+    column: _Column
+    unit: Annotated[str, _Meta(description="Unit of the numbers times scale, such as m/s^2, g, mg, deg/s, rpm.")]
+    scale: Annotated[
+        float, _Meta(description="What one step of the number is, in that unit; negative to turn the axis.")
+    ] = 1.0
+    offset: Annotated[float, _Meta(description="Number at zero.")] = 0.0
+    table: Annotated[str, _Meta(description="Table of the file; by default that of the channels.")] = ""
+
+
+class TimeSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """When the samples were taken: a column of times or counts, or a constant rate."""
+
+    column: Annotated[_Column | None, _Meta(description="Column of the times; none where only the rate is known.")] = (
+        None
+    )
+    unit: Annotated[str, _Meta(description="s, ms, us, ns, min, h, or datetime for a date with a time of day.")] = "s"
+    scale: Annotated[float, _Meta(description="What one step of the number is, in that unit.", gt=0)] = 1.0
+    rate_hz: Annotated[_Positive | None, _Meta(description="Sample rate, Hz, where there is no column.")] = None
+    wrap: Annotated[_Positive | None, _Meta(description="Number at which the counter of the times starts anew.")] = None
+
+
+class TextSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Layout of a text file, where it is not to be found from the file itself."""
+
+    separator: Annotated[str, _Meta(description="Between cells: , ; tab or space.")] = ""
+    decimal: Annotated[str, _Meta(description="Decimal mark: . or ,")] = ""
+    skip_lines: Annotated[
+        Annotated[int, _Meta(ge=0)] | None, _Meta(description="Lines before the first line of numbers.")
+    ] = None
+    columns: Annotated[tuple[str, ...], _Meta(description="Names of the columns, where the file has none.")] = ()
+
+
+class ColumnMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What the columns of a file are.
+
+    Channels have the names of an array's sensing axes (a11, a12, a13, a21 …), references those of a recording
+    (tacho_rad_s, angle_rad, gyro_x_rad_s …).
+    """
+
+    name: Annotated[str, _Meta(description="Name of the map.")]
+    channels: Annotated[
+        dict[str, ColumnSpec], _Meta(description="Sensing axes by the array's channel names.", min_length=1)
+    ]
+    summary: Annotated[str, _Meta(description="What writes such files, one line.")] = ""
+    format: Annotated[
+        str, _Meta(description="text, parquet, zip, matlab, hdf5, ulog, mcap, rosbag; else by content.")
+    ] = ""
+    table: Annotated[str, _Meta(description="Table of the file that holds the channels, where it has several.")] = ""
+    array: Annotated[str, _Meta(description="Array that is assumed where none is given.")] = ""
+    time: Annotated[TimeSpec, _Meta(description="When the samples were taken.")] = TimeSpec()
+    reference: Annotated[dict[str, ColumnSpec], _Meta(description="References by their name in a recording.")] = {}
+    optional: Annotated[tuple[str, ...], _Meta(description="Channels or references that a file may lack.")] = ()
+    missing: Annotated[tuple[float, ...], _Meta(description="Numbers that stand for a missing value.")] = ()
+    keep_other: Annotated[bool, _Meta(description="Keep other columns, as raw_<name>.")] = True
+    text: Annotated[TextSpec, _Meta(description="Layout of a text file.")] = TextSpec()
+
+    def check(self, source: str) -> None:
+        """Raise `InputError` for a unit or reference that is not known, or a map without times."""
+        if self.time.column is None and self.time.rate_hz is None:
+            raise InputError(f"{source}: time has neither a column nor rate_hz; give one")
+        if self.time.unit != "datetime":
+            factor_of(self.time.unit, "time", where=f"{source}: time")
+        for name, spec in self.channels.items():
+            factor_of(spec.unit, "acceleration", where=f"{source}: channel {name}")
+            if not name[-1:].isdigit():
+                raise InputError(f"{source}: channel {name!r} does not end in the number of its axis; name it as a11")
+        for name, spec in self.reference.items():
+            if name not in REFERENCE_KINDS:
+                raise InputError(f"{source}: unknown reference {name!r}; valid: {', '.join(REFERENCE_KINDS)}")
+            factor_of(spec.unit, REFERENCE_KINDS[name], where=f"{source}: reference {name}")
+        if self.array:
+            from gfimu.geometry.array import AccelerometerArray
+
+            AccelerometerArray.load(self.array, beside=Path(source).parent)
+
+    def is_required(self, name: str) -> bool:
+        """Whether a file must have a channel or reference."""
+        return name not in self.optional
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the map as its TOML file holds it, without what is as by default."""
+        found = msgspec.to_builtins(self)
+        plain = msgspec.to_builtins(ColumnMap("", {"a11": ColumnSpec(1, "g")}))
+        short = {key: value for key, value in found.items() if value != plain[key] or key in {"name", "channels"}}
+        for group in ("channels", "reference"):
+            for key, spec in short.get(group, {}).items():
+                short[group][key] = {
+                    item: value
+                    for item, value in spec.items()
+                    if item in {"column", "unit"} or value not in (1.0, 0.0, "")
+                }
+        for group in ("time", "text"):
+            if group in short:
+                short[group] = {key: value for key, value in short[group].items() if value != plain[group][key]}
+        return short
+
+
+def map_toml(column_map: ColumnMap) -> str:
+    """Return the text of a map's TOML file, a column per line."""
+    content = column_map.to_dict()
+    lines = [f"{key} = {_toml(value)}" for key, value in content.items() if not isinstance(value, dict)]
+    for group in ("time", "text", "channels", "reference"):
+        if group in content:
+            lines += ["", f"[{group}]", *(f"{key} = {_toml(value)}" for key, value in content[group].items())]
+    return "\n".join(lines) + "\n"
+
+
+def _toml(value: Any) -> str:
+    """Return a value as TOML, a table in one line."""
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{key} = {_toml(one)}" for key, one in value.items()) + " }"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(_toml(one) for one in value) + "]"
+    if isinstance(value, float):
+        return repr(float(f"{value:.9g}"))
+    return json.dumps(value, ensure_ascii=False)
+
+
+def list_maps() -> list[str]:
+    """Names of the maps that come with gfimu."""
+    return list_models("maps")
+
+
+def load_map(name: str | Path | ColumnMap) -> ColumnMap:
+    """Return a map given as such, by the name of one that comes with gfimu, or as a TOML file.
+
+    Raises
+    ------
+    InputError
+        If there is no such map, or the file has an unknown key, unit or reference; the message names it.
+    """
+    if isinstance(name, ColumnMap):
+        return name
+    path = find_model("maps", name)
+    try:
+        found = msgspec.convert({"name": path.stem, **read_toml(path)}, ColumnMap)
+    except msgspec.ValidationError as error:
+        raise InputError(f"{path}: {_plain_words(str(error))}; correct the map") from None
+    found.check(str(path))
+    return found
+
+
+def _plain_words(text: str) -> str:
+    """Return a message of the schema with the place in the file instead of a JSON path."""
+    reason, _, place = text.partition(" - at ")
+    where = place.strip("`").removeprefix("$.")
+    words = reason.replace("Object", "the map") if not where else reason
+    return f"{where}: {words}" if where and where != "$" else words

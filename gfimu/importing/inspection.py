@@ -1,0 +1,274 @@
+"""A look at a file of unknown layout: its columns, what they seem to be, what is odd, and a map to start from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gfimu.errors import InputError
+from gfimu.importing.clock import Times, times_of
+from gfimu.importing.column_map import ColumnMap, ColumnSpec, TextSpec, TimeSpec, map_toml
+from gfimu.importing.guess import (
+    TriadUnit,
+    find_time,
+    find_triads,
+    unit_of_acceleration,
+    unit_of_rate,
+)
+from gfimu.importing.oddities import oddities
+from gfimu.importing.raw_table import RawFile, RawTable
+from gfimu.importing.readers import read_foreign
+from gfimu.importing.recognise import fitting_maps
+
+__all__ = ["ColumnView", "Inspection", "inspect_file"]
+
+
+@dataclass(frozen=True)
+class ColumnView:
+    """A column as it looks.
+
+    Parameters
+    ----------
+    name : str
+        Its name in the file.
+    least, most, median : float
+        Of its numbers; NaN for text.
+    missing : int
+        Cells without a number.
+    role : str
+        What it seems to be.
+    """
+
+    name: str
+    least: float
+    most: float
+    median: float
+    missing: int
+    role: str = ""
+
+
+@dataclass(frozen=True)
+class Inspection:
+    """What a file seems to hold.
+
+    Parameters
+    ----------
+    source, format, table : str
+        The file, its format, and the table that was looked at.
+    tables : tuple of str
+        All tables of the file with their rows.
+    rows : int
+        Of that table.
+    columns : tuple of ColumnView
+        As they look.
+    fitting : tuple of str
+        Maps that come with gfimu and fit, the most plausible first.
+    column_map : ColumnMap, optional
+        A map to start from; None if no accelerations were found.
+    reasons : tuple of str
+        What the map rests on, one line each.
+    findings : tuple of str
+        What is odd: gaps, rails, corrupt values, noisy channels.
+    sample_rate_hz : float
+        By the times; NaN if unknown.
+    chips : int
+        Triads of accelerations.
+    """
+
+    source: str
+    format: str
+    table: str
+    tables: tuple[str, ...]
+    rows: int
+    columns: tuple[ColumnView, ...]
+    fitting: tuple[str, ...]
+    column_map: ColumnMap | None
+    reasons: tuple[str, ...] = ()
+    findings: tuple[str, ...] = ()
+    sample_rate_hz: float = float("nan")
+    chips: int = 0
+
+    def map_text(self) -> str:
+        """Return the suggested map as a TOML file with the reasons as comments."""
+        if self.column_map is None:
+            return ""
+        head = "".join(f"# {line}\n" for line in (f"Suggested by gfimu inspect for {self.source}", *self.reasons))
+        return head + map_toml(self.column_map)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return all as JSON holds it."""
+        return {
+            "source": self.source,
+            "format": self.format,
+            "table": self.table,
+            "tables": list(self.tables),
+            "rows": self.rows,
+            "sample_rate_hz": self.sample_rate_hz,
+            "chips": self.chips,
+            "columns": [vars(one) for one in self.columns],
+            "fitting_maps": list(self.fitting),
+            "findings": list(self.findings),
+            "reasons": list(self.reasons),
+            "map_toml": self.map_text(),
+        }
+
+
+def inspect_file(path: str | Path, *, table: str = "", text: TextSpec = TextSpec()) -> Inspection:
+    """Look at a file of unknown layout.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file, of any format that has a reader.
+    table : str
+        Table of the file to look at; by default the one with the most triads of accelerations.
+    text : TextSpec
+        Layout of a text file, where it is known.
+
+    Raises
+    ------
+    InputError
+        If the file can't be read at all.
+    """
+    raw = read_foreign(path, text=text)
+    chosen = raw.table(table) if table else _most_promising(raw)
+    time = find_time(chosen)
+    taken = [str(time[0].column)] if time else []
+    triads = find_triads(chosen, taken)
+    forces = [one.columns for one in triads if one.kind == "acceleration"]
+    rates = [one.columns for one in triads if one.kind == "rate"]
+    reasons = [time[1] if time else "no column of times was found: rate_hz is a guess to correct"]
+    channels, roles = _channels(chosen, forces, reasons)
+    reference = _reference(chosen, rates, reasons, roles)
+    if time:
+        roles[str(time[0].column)] = "time"
+    spec = time[0] if time else TimeSpec(rate_hz=100.0)
+    suggested = None
+    if channels:
+        suggested = ColumnMap(
+            _map_name(path),
+            channels,
+            time=spec,
+            reference=reference,
+            text=_layout(chosen, text),
+            table=chosen.name if len(raw.tables) > 1 else "",
+            format="" if raw.format == "text" else raw.format,
+        )
+    times, findings = _times(chosen, spec, raw.source)
+    findings += [note.removeprefix(f"{raw.source}: ") for note in chosen.notes]
+    findings += oddities({name: chosen.numbers(name) for three in forces for name in three})
+    rate = 1.0 / float(np.median(np.diff(times.t_s))) if times is not None and len(times.t_s) > 1 else float("nan")
+    return Inspection(
+        raw.source,
+        raw.format,
+        chosen.name,
+        tuple(f"{name or 'the file'} ({len(one)} rows)" for name, one in raw.tables.items()),
+        len(chosen),
+        tuple(_view(chosen, name, roles.get(name, "")) for name in chosen.columns),
+        tuple(fitting_maps(raw)),
+        suggested,
+        tuple(reasons),
+        tuple(findings),
+        rate,
+        len(forces),
+    )
+
+
+def _map_name(path: str | Path) -> str:
+    return Path(path).name.partition(".")[0] or "map"
+
+
+def _layout(table: RawTable, text: TextSpec) -> TextSpec:
+    return text if table.named or text.columns else TextSpec(columns=tuple(table.columns))
+
+
+def _most_promising(raw: RawFile) -> RawTable:
+    """Return the table with the most triads of accelerations, the longest of those."""
+
+    def worth(table: RawTable) -> tuple[int, int]:
+        return sum(one.kind == "acceleration" for one in find_triads(table)), len(table)
+
+    return max(raw.tables.values(), key=worth)
+
+
+def _channels(
+    table: RawTable, forces: Sequence[tuple[str, str, str]], reasons: list[str]
+) -> tuple[dict[str, ColumnSpec], dict[str, str]]:
+    """Return the channels of a map, and the roles of their columns."""
+    channels, roles = {}, {}
+    for chip, columns in enumerate(forces, start=1):
+        unit = unit_of_acceleration(table, columns)
+        reasons.append(f"chip a{chip} ({', '.join(columns)}): {unit.why}{'' if unit.sure else ' (check this)'}")
+        for axis, name in enumerate(columns, start=1):
+            channels[f"a{chip}{axis}"] = _spec(name, unit, axis - 1)
+            roles[name] = f"a{chip}{axis}, {_scaled(unit)}"
+    return channels, roles
+
+
+def _reference(
+    table: RawTable, rates: Sequence[tuple[str, str, str]], reasons: list[str], roles: dict[str, str]
+) -> dict[str, ColumnSpec]:
+    """Return the first gyro, and a tachometer, angle or temperature by their names."""
+    reference = {}
+    for columns in rates[:1]:
+        unit = unit_of_rate(table, columns)
+        reasons.append(f"gyro ({', '.join(columns)}): {unit.why}{'' if unit.sure else ' (check this)'}")
+        for axis, name in zip("xyz", columns, strict=True):
+            reference[f"gyro_{axis}_rad_s"] = _spec(name, unit, 0)
+            roles[name] = f"gyro {axis}, {_scaled(unit)}"
+    for name in table.columns:
+        plain = name.lower()
+        if name in roles or table.columns[name].dtype == object:
+            continue
+        if (
+            any(word in plain for word in ("tacho", "rpm", "omega_ref", "table_rate"))
+            and "tacho_rad_s" not in reference
+        ):
+            by_name = "rpm" if "rpm" in plain else "deg/s" if "deg" in plain else "rad/s"
+            reference["tacho_rad_s"] = ColumnSpec(name, by_name)
+            roles[name] = f"tachometer, {by_name}"
+            reasons.append(f"tachometer ({name}): {by_name}, by its name (check this)")
+    return reference
+
+
+def _spec(name: str, unit: TriadUnit, axis: int) -> ColumnSpec:
+    return ColumnSpec(name, unit.unit, unit.scale, unit.offset[axis])
+
+
+def _scaled(unit: TriadUnit) -> str:
+    return unit.unit if unit.scale == 1.0 else f"1/{1.0 / unit.scale:.5g} {unit.unit}"
+
+
+def _view(table: RawTable, name: str, role: str) -> ColumnView:
+    values = table.numbers(name) if table.columns[name].dtype.kind != "M" else np.full(len(table), np.nan)
+    known = values[np.isfinite(values)]
+    if not len(known):
+        return ColumnView(name, np.nan, np.nan, np.nan, len(values), role or "text")
+    missing = int(len(values) - len(known))
+    return ColumnView(name, float(known.min()), float(known.max()), float(np.median(known)), missing, role)
+
+
+def _times(table: RawTable, spec: TimeSpec, source: str) -> tuple[Times | None, list[str]]:
+    """Return the times of a table, and what is odd about them."""
+    try:
+        times = times_of(table, spec, source)
+    except InputError as error:
+        return None, [str(error).removeprefix(f"{source}: ")]
+    found = [note.removeprefix(f"{source}: ") for note in times.notes]
+    if spec.column is None or len(times.t_s) < 3:
+        return times, found
+    steps = np.diff(times.t_s)
+    usual = float(np.median(steps))
+    gaps = steps > 1.5 * usual
+    if gaps.any():
+        lost = float(np.sum(steps[gaps] - usual))
+        place = times.t_s[int(np.argmax(gaps))] - times.t_s[0]
+        found.append(f"{int(gaps.sum())} gaps, {lost:.3g} s in all, the first {place:.4g} s after the start")
+    jitter = float(np.std(steps[~gaps]) / usual)
+    if jitter > 0.02:
+        found.append(f"the sample period scatters by {100 * jitter:.2g}% of itself")
+    return times, found

@@ -1,0 +1,115 @@
+"""Units as other programs write them, and their factors to SI."""
+
+from __future__ import annotations
+
+import math
+import re
+
+from gfimu.errors import UnitError
+from gfimu.units import STANDARD_GRAVITY
+
+__all__ = ["ACCELERATION", "ANGLE", "RATE", "TEMPERATURE", "TIME", "bracketed_unit", "factor_of", "kind_of"]
+
+_DEGREE = math.pi / 180.0
+
+ACCELERATION = {
+    "m/s2": 1.0,
+    "mm/s2": 1e-3,
+    "cm/s2": 1e-2,
+    "g": STANDARD_GRAVITY,
+    "mg": STANDARD_GRAVITY / 1e3,
+    "ug": STANDARD_GRAVITY / 1e6,
+    "ft/s2": 0.3048,
+}
+RATE = {"rad/s": 1.0, "mrad/s": 1e-3, "deg/s": _DEGREE, "mdeg/s": 1e-3 * _DEGREE, "rpm": math.pi / 30.0, "hz": math.tau}
+ANGLE = {"rad": 1.0, "mrad": 1e-3, "deg": _DEGREE, "rev": math.tau}
+TIME = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
+TEMPERATURE = {"degc": 1.0}
+
+_KINDS = {"acceleration": ACCELERATION, "rate": RATE, "angle": ANGLE, "time": TIME, "temperature": TEMPERATURE}
+_SAME = {
+    "m/s/s": "m/s2",
+    "ms-2": "m/s2",
+    "m/sec2": "m/s2",
+    "m_s2": "m/s2",
+    "mm_s2": "mm/s2",
+    "gn": "g",
+    "gs": "g",
+    "milli-g": "mg",
+    "rads-1": "rad/s",
+    "rad_s": "rad/s",
+    "radians/s": "rad/s",
+    "rad/sec": "rad/s",
+    "degs-1": "deg/s",
+    "deg/sec": "deg/s",
+    "deg_s": "deg/s",
+    "dps": "deg/s",
+    "1/min": "rpm",
+    "degrees": "deg",
+    "degree": "deg",
+    "radians": "rad",
+    "turns": "rev",
+    "turn": "rev",
+    "sec": "s",
+    "second": "s",
+    "seconds": "s",
+    "msec": "ms",
+    "milliseconds": "ms",
+    "usec": "us",
+    "microseconds": "us",
+    "nsec": "ns",
+    "nanoseconds": "ns",
+    "c": "degc",
+    "celsius": "degc",
+    "deg": "deg",
+}
+_BRACKETS = re.compile(r"\s*[\[({]\s*([^\])}]+?)\s*[\])}]\s*$")
+
+
+def _plain(text: str) -> str:
+    """Return a unit without the marks that people set differently."""
+    short = (
+        text.strip().lower().replace("²", "2").replace("µ", "u").replace("μ", "u").replace("⁻¹", "-1").replace("⁻", "-")
+    )
+    short = short.replace("°c", "degc").replace("°", "deg").replace("^", "").replace("*", "").replace("·", "")
+    short = short.replace(" ", "")
+    return _SAME.get(short, short)
+
+
+def factor_of(unit: str, kind: str, *, where: str = "") -> float:
+    """Return the factor of a unit to SI.
+
+    Parameters
+    ----------
+    unit : str
+        As people write it: ``m/s^2``, ``m_s2``, ``°/s``, ``dps``, ``rad s^-1``.
+    kind : {"acceleration", "rate", "angle", "time", "temperature"}
+        What is measured.
+    where : str
+        What has that unit, for messages.
+
+    Raises
+    ------
+    UnitError
+        If the unit is none of that kind.
+    """
+    factors = _KINDS[kind]
+    try:
+        return factors[_plain(unit)]
+    except KeyError:
+        place = f"{where}: " if where else ""
+        raise UnitError(f"{place}unknown unit {unit!r} for {kind}; valid: {', '.join(factors)}") from None
+
+
+def kind_of(unit: str) -> str:
+    """Return what is measured in a unit; empty if it is not known."""
+    plain = _plain(unit)
+    return next((kind for kind, factors in _KINDS.items() if plain in factors), "")
+
+
+def bracketed_unit(name: str) -> tuple[str, str]:
+    """Split the name of a column into the name and a unit in brackets at its end; empty without one."""
+    found = _BRACKETS.search(name)
+    if found is None or not kind_of(found[1]):
+        return name.strip(), ""
+    return name[: found.start()].strip(), found[1]

@@ -1,0 +1,141 @@
+"""Files that hold tables by themselves: Parquet, MATLAB and HDF5, and an archive of text files."""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from gfimu.errors import GfimuError, InputError
+from gfimu.importing.column_map import TextSpec
+from gfimu.importing.raw_table import RawFile, RawTable
+from gfimu.importing.readers.text import table_of_text
+
+__all__ = ["arrow_table", "read_archive", "read_hdf5", "read_matlab", "read_parquet"]
+
+_MOST_COLUMNS = 64  # of one matrix: what has more is no table of samples
+
+
+def read_parquet(path: Path, text: TextSpec = TextSpec()) -> RawFile:
+    """Read a Parquet file."""
+    try:
+        table = pq.read_table(path)
+    except (pa.ArrowException, OSError) as error:
+        raise InputError(f"{path}: damaged Parquet file ({str(error).splitlines()[0][:120]}); write it again") from None
+    return RawFile(str(path), "parquet", {"": arrow_table(table)})
+
+
+def arrow_table(table: pa.Table) -> RawTable:
+    """Return the columns of an Arrow table."""
+    columns: dict[str, NDArray[Any]] = {}
+    for name in table.column_names:
+        column = table.column(name)
+        kind = column.type
+        if pa.types.is_timestamp(kind):
+            columns[name] = column.cast(pa.timestamp("ns")).to_numpy().astype("datetime64[ns]")
+        elif pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_decimal(kind):
+            values = column if not pa.types.is_decimal(kind) else column.cast(pa.float64())
+            columns[name] = np.array(values.to_numpy())
+        else:
+            columns[name] = np.array(column.to_pylist(), dtype=object)
+    return RawTable("", columns)
+
+
+def read_archive(path: Path, text: TextSpec = TextSpec()) -> RawFile:
+    """Read the text files of a zip archive, each as a table."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            members = [one for one in archive.namelist() if Path(one).suffix.lower() in {".csv", ".txt", ".tsv"}]
+            tables = {one: _member(archive.read(one), f"{path}/{one}", text) for one in members}
+    except (zipfile.BadZipFile, OSError, RuntimeError) as error:
+        raise InputError(f"{path}: damaged archive ({error}); copy it again") from None
+    found = {name: table for name, table in tables.items() if table is not None}
+    if not found:
+        raise InputError(f"{path}: no text file with numbers in the archive; unpack it and give the recording")
+    return RawFile(str(path), "zip", found)
+
+
+def _member(data: bytes, source: str, text: TextSpec) -> RawTable | None:
+    try:
+        return table_of_text(data, source, text)
+    except InputError:
+        return None  # a description, not a table
+
+
+def read_matlab(path: Path, text: TextSpec = TextSpec()) -> RawFile:
+    """Read the variables of a MATLAB file; those of equal length are one table."""
+    from scipy.io import loadmat
+
+    try:
+        content = loadmat(path, simplify_cells=True)
+    except NotImplementedError:  # version 7.3 is HDF5
+        return read_hdf5(path, text)
+    except (ValueError, TypeError, OSError) as error:
+        raise InputError(f"{path}: damaged MATLAB file ({str(error)[:120]}); save it again") from None
+    found: dict[str, NDArray[Any]] = {}
+    for name, value in content.items():
+        if not name.startswith("__"):
+            _gather(name, value, found)
+    return _by_length(path, "matlab", found)
+
+
+def read_hdf5(path: Path, text: TextSpec = TextSpec()) -> RawFile:
+    """Read the data sets of an HDF5 file; those of equal length are one table."""
+    try:
+        import h5py
+    except ImportError:
+        raise GfimuError(f"{path}: HDF5 needs h5py, which is not installed: pip install 'gfimu[formats]'") from None
+    found: dict[str, NDArray[Any]] = {}
+
+    def take(name: str, item: Any) -> None:
+        if isinstance(item, h5py.Dataset) and item.shape:
+            _gather(name.replace("/", "."), item[()], found)
+
+    try:
+        with h5py.File(path, "r") as file:
+            file.visititems(take)
+    except OSError as error:
+        raise InputError(f"{path}: damaged HDF5 file ({str(error)[:120]}); write it again") from None
+    return _by_length(path, "hdf5", found)
+
+
+def _gather(name: str, value: Any, found: dict[str, NDArray[Any]]) -> None:
+    """Collect the columns of a value: a vector, a matrix, a structure of them."""
+    if isinstance(value, Mapping):
+        for key, item in value.items():
+            _gather(f"{name}.{key}", item, found)
+        return
+    values = np.asarray(value)
+    if values.dtype.names:
+        for key in values.dtype.names:
+            _gather(f"{name}.{key}", values[key], found)
+        return
+    if values.dtype.kind not in "iuf" or values.size < 2:
+        return
+    values = np.squeeze(values)
+    if values.ndim == 1:
+        found[name] = values
+    elif values.ndim == 2:
+        upright = values if len(values) >= values.shape[1] else values.T
+        if upright.shape[1] <= _MOST_COLUMNS:
+            found |= {f"{name}_{place}": column for place, column in enumerate(upright.T, start=1)}
+
+
+def _by_length(path: Path, kind: str, found: Mapping[str, NDArray[Any]]) -> RawFile:
+    """Group columns by their length: the samples of one clock belong together."""
+    if not found:
+        raise InputError(f"{path}: no vector or matrix of numbers; save the readings as one")
+    lengths = sorted(
+        {len(values) for values in found.values()}, key=lambda n: -sum(len(v) == n for v in found.values())
+    )
+    tables = {
+        f"{length} rows": RawTable(f"{length} rows", {key: v for key, v in found.items() if len(v) == length})
+        for length in lengths
+    }
+    return RawFile(str(path), kind, tables)

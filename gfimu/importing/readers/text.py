@@ -1,0 +1,144 @@
+"""Text files of numbers: CSV of any separator, columns between spaces, with or without names."""
+
+from __future__ import annotations
+
+import gzip
+import io
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.csv as pa_csv
+from numpy.typing import NDArray
+
+from gfimu.errors import InputError
+from gfimu.importing.column_map import TextSpec
+from gfimu.importing.raw_table import RawFile, RawTable
+from gfimu.importing.readers.text_layout import COMMENT_MARKS, Layout, layout_of
+
+__all__ = ["is_text", "read_text", "table_of_text"]
+
+_NUMERIC = r"^[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?$"
+_INTEGER = r"^[+-]?(\d{1,18}|[1-8]\d{18})$"  # of 64 bits
+_NO_NUMBER = ["", "nan", "-nan", "+nan", "na", "n/a", "null", "none", "-"]
+_INFINITE = r"^[+-]?inf(inity)?$"
+_IS_NUMBERS = 0.5  # of the filled cells of a column
+
+
+def read_text(path: Path, text: TextSpec = TextSpec()) -> RawFile:
+    """Read a text file, gzipped or not.
+
+    Raises
+    ------
+    InputError
+        If it is empty, not text, or no line holds numbers.
+    """
+    data = path.read_bytes()
+    if data[:2] == b"\x1f\x8b":
+        try:
+            data = gzip.decompress(data)
+        except (OSError, EOFError) as error:
+            raise InputError(f"{path}: damaged gzip file ({error}); copy it again") from None
+    return RawFile(str(path), "text", {"": table_of_text(data, str(path), text)})
+
+
+def table_of_text(data: bytes, source: str, text: TextSpec = TextSpec()) -> RawTable:
+    """Return the table that the bytes of a text file hold."""
+    content = _decoded(data, source)
+    if not content.strip():
+        raise InputError(f"{source}: empty file; record again or give another file")
+    lines = content.split("\n")
+    layout = layout_of(lines, separator=text.separator, decimal=text.decimal, skip=text.skip_lines, names=text.columns)
+    if layout is None:
+        raise InputError(
+            f"{source}: no line holds numbers; give a recording, or the separator in a map (text.separator)"
+        )
+    body = _body(lines[layout.first :], layout)
+    skipped = []
+
+    def skip(row: Any) -> str:
+        skipped.append(row)
+        return "skip"
+
+    separator = layout.separator
+    try:
+        table = pa_csv.read_csv(
+            io.BytesIO(body.encode()),
+            pa_csv.ReadOptions(column_names=list(layout.names), use_threads=False),
+            pa_csv.ParseOptions(delimiter=separator, invalid_row_handler=skip, newlines_in_values=False),
+            pa_csv.ConvertOptions(column_types=dict.fromkeys(layout.names, pa.string()), strings_can_be_null=False),
+        )
+    except pa.ArrowException as error:
+        reason = str(error).splitlines()[0][:120]
+        raise InputError(f"{source}: can't be read as text in columns ({reason}); give its layout in a map") from None
+    if table.num_rows == 0:
+        raise InputError(
+            f"{source}: no line has the {len(layout.names)} cells of the columns {', '.join(layout.names[:6])}"
+        )
+    notes = [f"{source}: left out {len(skipped)} lines with another number of cells"] if skipped else []
+    columns: dict[str, NDArray[Any]] = {}
+    for name in layout.names:
+        values, unreadable = _values(table.column(name).combine_chunks(), layout.decimal)
+        if values is None:
+            continue  # an empty column, as after a separator that closes each line
+        columns[name] = values
+        if unreadable:
+            notes.append(f"{source}: column {name}: {unreadable} cells are no numbers and count as missing")
+    return RawTable("", columns, tuple(notes), layout.named)
+
+
+def _decoded(data: bytes, source: str) -> str:
+    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return data.decode("utf-16", errors="replace").replace("\r\n", "\n").replace("\r", "\n")
+    if b"\x00" in data[:4096]:
+        raise InputError(f"{source}: a binary file of unknown format; gfimu inspect lists the formats that are known")
+    try:
+        content = data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        content = data.decode("latin-1")
+    return content.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def _body(lines: list[str], layout: Layout) -> str:
+    """Return the lines of numbers in one piece, without comments among them."""
+    kept = [line for line in lines if line.strip() and line.lstrip()[0] not in COMMENT_MARKS]
+    if layout.separator == " ":
+        return "\n".join(" ".join(line.split()) for line in kept) + "\n"
+    if layout.separator != ";" and any(line.rstrip().endswith(";") for line in kept[:3]):
+        kept = [line.rstrip().rstrip(";") for line in kept]
+    return "\n".join(kept) + "\n"
+
+
+def _values(cells: pa.Array, decimal: str) -> tuple[NDArray[Any] | None, int]:
+    """Return the cells of a column as numbers if most are, else as text; None if all are empty."""
+    plain = pc.utf8_trim_whitespace(cells)
+    low = pc.utf8_lower(plain)
+    empty = pc.is_in(low, value_set=pa.array(_NO_NUMBER))
+    filled = len(cells) - pc.sum(empty).as_py()
+    if filled == 0:
+        # Cells that say "nan" are missing numbers; a column without a single sign is none.
+        return (np.full(len(cells), np.nan), 0) if pc.any(pc.not_equal(plain, "")).as_py() else (None, 0)
+    if decimal == ",":
+        plain = pc.replace_substring(plain, ",", ".")
+    infinite = pc.match_substring_regex(low, _INFINITE)
+    good = pc.match_substring_regex(plain, _NUMERIC)
+    count = pc.sum(good).as_py() + pc.sum(infinite).as_py()
+    if count < _IS_NUMBERS * filled:
+        return np.array(cells.to_pylist(), dtype=object), 0
+    if count == len(cells) and pc.all(pc.match_substring_regex(plain, _INTEGER)).as_py():
+        return pc.cast(plain, pa.int64()).to_numpy(zero_copy_only=False), 0
+    numbers = pc.cast(pc.if_else(good, plain, pa.scalar(None, pa.string())), pa.float64())
+    values = np.array(numbers.to_numpy(zero_copy_only=False))
+    mask = infinite.to_numpy(zero_copy_only=False)
+    values[mask] = np.inf
+    return values, filled - count
+
+
+def is_text(head: bytes) -> bool:
+    """Tell whether the first bytes of a file look like text."""
+    return head[:2] in (b"\xff\xfe", b"\xfe\xff") or (
+        b"\x00" not in head and not re.search(rb"[\x01-\x08\x0e-\x1a]", head)
+    )

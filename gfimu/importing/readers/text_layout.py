@@ -1,0 +1,122 @@
+"""The layout of a text file of numbers: separator, decimal mark, names of the columns, first line of numbers."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+__all__ = ["COMMENT_MARKS", "Layout", "cells_of", "layout_of"]
+
+COMMENT_MARKS = "#;%/*"
+_LOOKED_AT = 400  # lines
+_SEPARATORS = {"comma": ",", "semicolon": ";", "tab": "\t", "space": " "}
+_NUMBER = {
+    ".": re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE),
+    ",": re.compile(r"[+-]?(\d+,?\d*|,\d+)([eE][+-]?\d+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE),
+}
+_LEAST_NUMBERS = 0.5  # of the cells of a line of data
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How a text file is laid out.
+
+    Parameters
+    ----------
+    separator : str
+        One character; a space stands for any number of spaces and tabs.
+    decimal : str
+        ``.`` or ``,``.
+    first : int
+        Number of lines before the first line of numbers.
+    names : tuple of str
+        Names of the columns, one per cell of a line.
+    named : bool
+        Whether the file has these names itself.
+    """
+
+    separator: str
+    decimal: str
+    first: int
+    names: tuple[str, ...]
+    named: bool
+
+
+def layout_of(
+    lines: Sequence[str], *, separator: str = "", decimal: str = "", skip: int | None = None, names: Sequence[str] = ()
+) -> Layout | None:
+    """Find the layout of a text file from its first lines; None if no line holds numbers.
+
+    Parameters
+    ----------
+    lines : sequence of str
+        First lines of the file.
+    separator, decimal : str
+        Known ones; found from the lines if empty.
+    skip : int, optional
+        Known number of lines before the first line of numbers.
+    names : sequence of str
+        Known names of the columns.
+    """
+    looked = list(lines[:_LOOKED_AT])
+    best: tuple[tuple[int, int], Layout] | None = None
+    for mark in [_SEPARATORS.get(separator, separator)] if separator else _SEPARATORS.values():
+        for point in [decimal] if decimal else [".", ","]:
+            if point == mark:
+                continue
+            counted = [(number, len(cells)) for number, cells in _data_lines(looked, mark, point, skip or 0)]
+            if not counted:
+                continue
+            (width, lines_so), *_ = Counter(count for _, count in counted).most_common(1)
+            first = next(number for number, count in counted if count == width) if skip is None else skip
+            header = _header(looked[:first], mark, width) if not names else None
+            known = tuple(names) or header or tuple(f"column_{place}" for place in range(1, width + 1))
+            score = (lines_so, width)
+            # A point is the usual decimal mark: a comma has to read more lines, or more cells of them.
+            if best is None or score > best[0]:
+                best = score, Layout(mark, point, first, known, bool(names) or header is not None)
+    return None if best is None else best[1]
+
+
+def cells_of(line: str, separator: str) -> list[str]:
+    """Split a line; a space stands for any number of spaces and tabs, and a last ``;`` closes the line."""
+    if separator == " ":
+        return line.split()
+    closed = line.rstrip()
+    if separator != ";":
+        closed = closed.rstrip(";")
+    return [cell.strip().strip('"') for cell in closed.split(separator)]
+
+
+def _data_lines(lines: Sequence[str], separator: str, decimal: str, skip: int) -> list[tuple[int, list[str]]]:
+    """Return the lines that hold numbers, with their places."""
+    number = _NUMBER[decimal]
+    found = []
+    for place, line in enumerate(lines):
+        if place < skip or not line.strip() or line.lstrip()[0] in COMMENT_MARKS:
+            continue
+        cells = cells_of(line, separator)
+        filled = [cell for cell in cells if cell]
+        numeric = sum(number.fullmatch(cell) is not None for cell in filled)
+        if numeric and numeric >= _LEAST_NUMBERS * len(filled):
+            found.append((place, cells))
+    return found
+
+
+def _header(before: Sequence[str], separator: str, width: int) -> tuple[str, ...] | None:
+    """Return the names in the last line before the numbers, if it has one for each cell."""
+    for line in reversed(before):
+        if not line.strip():
+            continue
+        cells = cells_of(line.lstrip().lstrip(COMMENT_MARKS).lstrip(), separator)
+        if len(cells) == width + 1:  # the line says what it is: ";Headers, time, Ax"
+            cells = cells[1:]
+        if len(cells) < width - 1 or len(cells) > width:
+            return None
+        cells += [""] * (width - len(cells))
+        names = [cell or f"column_{place}" for place, cell in enumerate(cells, start=1)]
+        repeated = Counter(names)
+        return tuple(f"{name}_{place}" if repeated[name] > 1 else name for place, name in enumerate(names, start=1))
+    return None

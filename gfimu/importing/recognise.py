@@ -1,0 +1,94 @@
+"""Which of the shipped maps a file of unknown origin fits."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from gfimu.errors import GfimuError, InputError
+from gfimu.importing.clock import times_of
+from gfimu.importing.column_map import ColumnMap, list_maps, load_map
+from gfimu.importing.guess import rest_windows
+from gfimu.importing.notation import factor_of
+from gfimu.importing.raw_table import RawFile, RawTable
+from gfimu.importing.readers import read_foreign
+from gfimu.units import STANDARD_GRAVITY
+
+__all__ = ["fitting_maps", "map_hint"]
+
+_GRAVITY_WITHIN = 0.08  # relative: gains of parts lie within
+_RATES = (5.0, 8000.0)  # Hz, of a recording of motion
+
+
+def map_hint(path: str | Path) -> str:
+    """Return how a file that is no recording of gfimu's may be read, for a message; empty if there is no way."""
+    try:
+        raw = read_foreign(path)
+    except GfimuError:
+        return ""
+    if any(table.find("t_s") for table in raw.tables.values()):
+        return ""  # a recording of gfimu's with another fault
+    fitting = fitting_maps(raw)
+    if fitting:
+        return f"it looks like a file for --map {' or '.join(fitting[:2])}"
+    return f"gfimu inspect {path} shows what it holds and prints a column map for --map"
+
+
+def fitting_maps(raw: RawFile) -> list[str]:
+    """Return the shipped maps that a file has all columns of and that give the most plausible rate and gravity."""
+    found = []
+    for name in list_maps():
+        column_map = load_map(name)
+        if column_map.format and column_map.format != raw.format:
+            continue
+        tables = [one for key, one in raw.tables.items() if not column_map.table or key == column_map.table]
+        score = max((_score(table, column_map) for table in tables), default=0)
+        if score:
+            found.append((_plausibility(raw, column_map), score, name))
+    best = max((plausible for plausible, *_ in found), default=0)
+    return [name for plausible, _, name in sorted(found, key=lambda one: (-one[1], one[2])) if plausible == best]
+
+
+def _score(table: RawTable, column_map: ColumnMap) -> int:
+    """Return how many columns of a map a table has; 0 if it lacks one that is needed."""
+    if column_map.text.columns:  # the file itself has no names: their number has to do
+        return len(table.columns) if not table.named and len(table.columns) == len(column_map.text.columns) else 0
+    if not table.named:
+        return 0
+    columns = {**column_map.channels, **column_map.reference}
+    present = [name for name, spec in columns.items() if table.find(spec.column) is not None]
+    missing = [
+        name
+        for name, spec in columns.items()
+        if name not in present and column_map.is_required(name) and not spec.table
+    ]
+    has_time = column_map.time.column is None or table.find(column_map.time.column) is not None
+    return 0 if missing or not has_time else len(present) + 1
+
+
+def _plausibility(raw: RawFile, column_map: ColumnMap) -> int:
+    """Return how many of rate, gravity and range of the gyro are as they should be by a map."""
+    for found in raw.tables.values():
+        table = found
+        if column_map.text.columns and len(found.columns) == len(column_map.text.columns):
+            table = RawTable(found.name, dict(zip(column_map.text.columns, found.columns.values(), strict=True)))
+        three = [(table.find(spec.column), spec) for spec in list(column_map.channels.values())[:3]]
+        if any(name is None for name, _ in three):
+            continue
+        try:
+            t = times_of(table, column_map.time, raw.source).t_s
+        except InputError:
+            return 0
+        rate = 1.0 / float(np.median(np.diff(t))) if len(t) > 1 else 0.0
+        values = np.column_stack(
+            [
+                (table.numbers(str(name)) - spec.offset) * spec.scale * factor_of(spec.unit, "acceleration")
+                for name, spec in three
+            ]
+        )
+        windows = rest_windows(values)
+        length = float(np.median(np.linalg.norm(windows, axis=1))) if len(windows) else 0.0
+        gravity = abs(length / STANDARD_GRAVITY - 1.0) < _GRAVITY_WITHIN
+        return 2 * gravity + (_RATES[0] <= rate <= _RATES[1])
+    return 0
