@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from gfimu.commands.diagnose import diagnose as diagnose
     from gfimu.commands.drift import drift as drift
     from gfimu.commands.estimate import estimate as estimate
+    from gfimu.commands.inspect import inspect as inspect
     from gfimu.commands.live import live as live
     from gfimu.commands.noise import noise as noise
     from gfimu.commands.optimize import optimize as optimize
@@ -109,6 +110,7 @@ _PUBLIC = {
     "centripetal_agreement": "gfimu.motion.estimate_summary",
     "closed_form": "gfimu.geometry.kinematics",
     "convert": "gfimu.commands.convert",
+    "inspect": "gfimu.commands.inspect",
     "demo": "gfimu.commands.demo",
     "design": "gfimu.commands.design",
     "diagnose": "gfimu.commands.diagnose",

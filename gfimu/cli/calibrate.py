@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from gfimu.calibration.registry import METHODS
-from gfimu.cli.mapped import MapOption, mapped
+from gfimu.cli.mapped import MapOption
 from gfimu.cli.output import JsonOption, print_json, print_paths, print_table
 
 if TYPE_CHECKING:
@@ -79,7 +79,7 @@ def _calibrate(
 
     result = calibrate(
         method,
-        mapped(run, column_map),
+        run,
         out=out,
         array=array,
         gravity=gravity,
@@ -90,7 +90,8 @@ def _calibrate(
         rest_threshold=rest_threshold,
         min_rest=min_rest,
         levelling_std=levelling_std,
-        motion=None if motion is None else mapped(motion, column_map),
+        motion=motion,
+        column_map=column_map,
         update=update,
         turn_on_std=turn_on_std,
         bias_walk=bias_walk,

@@ -7,9 +7,8 @@ from typing import Annotated
 
 import typer
 
-from gfimu.cli.mapped import MapOption, TableOption, mapped
+from gfimu.cli.mapped import MapOption, TableOption
 from gfimu.cli.output import JsonOption, print_json, print_paths, print_table
-from gfimu.errors import InputError
 
 __all__ = ["register"]
 
@@ -20,7 +19,7 @@ def register(app: typer.Typer) -> None:
 
 
 def _convert(
-    sources: Annotated[
+    source: Annotated[
         list[Path],
         typer.Argument(
             metavar="SOURCE...",
@@ -47,12 +46,7 @@ def _convert(
     """
     from gfimu.commands.convert import convert
 
-    if len(sources) > 1 and column_map is None:
-        raise InputError(
-            f"{sources[1]}: several sources need --map, which says what the columns of each chip's file are"
-        )
-    source = mapped(sources[0], column_map, table=table, others=tuple(sources[1:]))
-    recording = convert(source, target, array=array)
+    recording = convert(source, target, array=array, column_map=column_map, table=table)
     figures = {
         "samples": len(recording),
         "channels": len(recording.channels),
@@ -63,5 +57,5 @@ def _convert(
     if json:
         print_json(figures | {"files": {"recording": target}})
     else:
-        print_table(str(source), ("quantity", "value"), figures.items())
+        print_table(", ".join(map(str, source)), ("quantity", "value"), figures.items())
         print_paths([("recording", target)])

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gfimu.cli.mapped import MapOption, mapped
+from gfimu.cli.mapped import MapOption
 from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, print_text, progress
 
 if TYPE_CHECKING:
@@ -60,10 +60,11 @@ def _diagnose(
 
     with progress("diagnosing", total=1.0) as done:
         found = diagnose(
-            [mapped(run, column_map) for run in runs],
+            runs,
             twin,
             out=out,
-            held_out=[mapped(run, column_map) for run in held_out or []],
+            held_out=held_out or [],
+            column_map=column_map,
             calibration=calibration,
             report=done,
             grammar=grammar,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gfimu.cli.mapped import MapOption, mapped
+from gfimu.cli.mapped import MapOption
 from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, print_text, progress
 from gfimu.rate.registry import RATE_METHODS, rate_method, recursive_methods
 
@@ -64,13 +64,14 @@ def _estimate(
 
     with progress(_describe(method), total=1.0) as done:
         found = estimate_run(
-            mapped(run, column_map),
+            run,
             array,
             out=out,
             method=method,
             form=form,
             rest_bias=rest_bias,
             calibration=calibration,
+            column_map=column_map,
             omega0=None if unknown_start else (0.0, 0.0, 0.0),
             fuse_gyro=gyro,
             with_position=position,

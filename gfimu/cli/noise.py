@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from gfimu.cli.mapped import MapOption, mapped
+from gfimu.cli.mapped import MapOption
 from gfimu.cli.output import JsonOption, print_json, print_paths, print_table
 
 __all__ = ["register"]
@@ -41,7 +41,8 @@ def _noise(
     from gfimu.sensor_noise.identification import TERMS
 
     result = noise(
-        mapped(run, column_map),
+        run,
+        column_map=column_map,
         stretch=stretch,
         rest_threshold=rest_threshold,
         calibration=calibration,

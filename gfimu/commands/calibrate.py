@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from gfimu.calibration.registry import CalibrationMethod
     from gfimu.calibration.result import Calibration
     from gfimu.geometry.array import AccelerometerArray
+    from gfimu.importing import ColumnMap
     from gfimu.recording import Recording
     from gfimu.recording.mapped import MappedFile
 
@@ -28,13 +29,14 @@ _OPTION_NAMES = {
 """What the options are that some methods do not use, by the field of the task."""
 
 
-@writes(reads=("recording", "array", "motion", "update"), out=CALIBRATION, picture=PICTURE)
+@writes(reads=("recording", "array", "motion", "update", "column_map"), out=CALIBRATION, picture=PICTURE)
 def calibrate(
     method: str,
     recording: Recording | str | Path | MappedFile,
     *,
     out: str | Path | None = None,
     array: AccelerometerArray | str | Path | None = None,
+    column_map: ColumnMap | str | Path | None = None,
     gravity: float | None = None,
     latitude: float | None = None,
     height: float = 0.0,
@@ -64,6 +66,8 @@ def calibrate(
         Calibration file to write, ``.json``.
     array : AccelerometerArray, str or Path, optional
         The array, its name or file; the recording's own by default.
+    column_map : ColumnMap, str or Path, optional
+        What the columns of a foreign file are: a map, its name or TOML file (``--map``); see `gfimu.inspect`.
     gravity : float, optional
         Local gravity, m/s²; standard gravity by default.
     latitude, height : float, optional
@@ -95,7 +99,7 @@ def calibrate(
     """
     from gfimu.calibration.methods import CalibrationTask, run_calibration
     from gfimu.calibration.registry import calibration_method
-    from gfimu.commands.opened import as_array, as_calibration
+    from gfimu.commands.opened import as_array, as_calibration, by_map
 
     chosen = calibration_method(method)
     levelling = levelling_std_rad if levelling_std is None else levelling_std
@@ -110,7 +114,8 @@ def calibrate(
     )
     drawing = None if array is None else as_array(array)
     local_gravity = _gravity(gravity, latitude, height)
-    run = _uncalibrated(recording, drawing)
+    source = by_map(recording, column_map)
+    run = _uncalibrated(source, drawing)
     task = CalibrationTask(
         run,
         gravity=local_gravity,
@@ -119,8 +124,8 @@ def calibrate(
         rest_threshold=rest_threshold,
         min_rest_s=min_rest_s if min_rest is None else min_rest,
         levelling_std_rad=levelling,
-        array=_own_array(recording) if drawing is None and "array" in chosen.options else drawing,
-        motion=None if motion is None else _uncalibrated(motion, drawing),
+        array=_own_array(source) if drawing is None and "array" in chosen.options else drawing,
+        motion=None if motion is None else _uncalibrated(by_map(motion, column_map), drawing),
         update=None if update is None else as_calibration(update),
         turn_on_std_m_s2=turn_on_std,
         bias_walk_m_s2_rt_s=bias_walk,

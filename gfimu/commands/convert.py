@@ -3,54 +3,77 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from gfimu.errors import InputError
 from gfimu.files.outputs import RECORDING, writes
 
 if TYPE_CHECKING:
     from gfimu.geometry.array import AccelerometerArray
+    from gfimu.importing import ColumnMap
     from gfimu.recording import Recording
     from gfimu.recording.mapped import MappedFile
 
 __all__ = ["convert"]
 
 
-@writes(reads=("source", "array"), target=RECORDING)
+@writes(reads=("source", "array", "column_map"), target=RECORDING)
 def convert(
-    source: Recording | str | Path | MappedFile,
+    source: Recording | str | Path | MappedFile | Sequence[str | Path],
     target: str | Path | None = None,
     *,
     array: AccelerometerArray | str | Path | None = None,
+    column_map: ColumnMap | str | Path | None = None,
+    table: str | None = None,
 ) -> Recording:
     """Read a recording in any format that is known, in m/s², and write it as CSV or Parquet.
 
     Parameters
     ----------
     source : Recording, str, Path or MappedFile
-        The recording, or its file: CSV, Parquet, a MIMU4444 stream, or a foreign file with its column map.
+        The recording, or its file: CSV, Parquet, a MIMU4444 stream, or a foreign file with its column map;
+        one file per chip on a common clock, with a map.
     target : str or Path, optional
         Recording to write, ``.csv`` or ``.parquet``.
     array : AccelerometerArray, str or Path, optional
         Array whose channels must be there; every channel found by default.
+    column_map : ColumnMap, str or Path, optional
+        What the columns of a foreign file are: a map, its name or TOML file (``--map``); see `gfimu.inspect`.
+    table : str, optional
+        With a map: the table, topic or member of a file that holds several.
 
     Raises
     ------
     InputError
         If the source can't be read, or the target can't be written where it is asked for.
     """
-    from gfimu.commands.opened import as_array
+    from gfimu.commands.opened import as_array, files_by_map
     from gfimu.recording import Recording
     from gfimu.recording.carried_array import carried_array
     from gfimu.recording.formats import open_recording
+    from gfimu.recording.mapped import MappedFile
 
     drawing = None if array is None else as_array(array)
-    recording = source if isinstance(source, Recording) else open_recording(source, array=drawing)
+    given = _given(source)
+    if column_map is not None and not isinstance(given[0], Recording | MappedFile):
+        given = [files_by_map([one for one in given if isinstance(one, str | Path)], column_map, table)]
+    if len(given) > 1:
+        raise InputError(f"{given[1]}: several files need --map, which says what the columns of each chip's file are")
+    recording = given[0] if isinstance(given[0], Recording) else open_recording(given[0], array=drawing)
     if drawing is not None:
         recording = recording.carrying(drawing)
     elif "array_toml" in recording.metadata:
-        named = os.fspath(source) if isinstance(source, str | os.PathLike) else "the recording"
+        named = os.fspath(given[0]) if isinstance(given[0], str | os.PathLike) else "the recording"
         carried_array(recording.metadata, source=named)  # a damaged one is not passed on
     if target is not None:
         recording.write(target)
     return recording
+
+
+def _given(
+    source: Recording | str | Path | MappedFile | Sequence[str | Path],
+) -> list[Recording | str | Path | MappedFile]:
+    """Return one source or several as a list."""
+    return list(source) if isinstance(source, list | tuple) else [source]  # type: ignore[list-item]

@@ -13,6 +13,7 @@ from gfimu.files.outputs import OutputFolder, writes
 if TYPE_CHECKING:
     from gfimu.calibration.result import Calibration
     from gfimu.diagnosis.verdict.verdict import Diagnosis
+    from gfimu.importing import ColumnMap
     from gfimu.recording import Recording
     from gfimu.recording.mapped import MappedFile
     from sim.twin import Twin
@@ -23,7 +24,7 @@ FOLDER = OutputFolder(("verdict.json", "twin.toml", "report.html", "diagnosis.rr
 """What the folder of a diagnosis holds."""
 
 
-@writes(reads=("recordings", "twin", "held_out", "calibration"), out=FOLDER)
+@writes(reads=("recordings", "twin", "held_out", "calibration", "column_map"), out=FOLDER)
 def diagnose(
     recordings: Recording | str | Path | MappedFile | Sequence[Recording | str | Path | MappedFile],
     twin: Twin | str | Path,
@@ -31,6 +32,7 @@ def diagnose(
     out: str | Path | None = None,
     held_out: Recording | str | Path | MappedFile | Sequence[Recording | str | Path | MappedFile] = (),
     calibration: Calibration | str | Path | None = None,
+    column_map: ColumnMap | str | Path | None = None,
     names: Sequence[str] | None = None,
     report: Callable[[float, str], None] | None = None,
     grammar: bool = False,
@@ -49,6 +51,8 @@ def diagnose(
         Recordings kept for measuring the gain.
     calibration : Calibration, str or Path, optional
         Calibration of the unit, applied first.
+    column_map : ColumnMap, str or Path, optional
+        What the columns of a foreign file are: a map, its name or TOML file (``--map``); see `gfimu.inspect`.
     names : sequence of str, optional
         Names of the runs, for people; those of their files by default.
     report : callable, optional
@@ -67,10 +71,10 @@ def diagnose(
     InputError
         If a recording is too short or lacks the reference that drives the twin, or the folder can't be written.
     """
-    from gfimu.commands.opened import as_calibration, as_runs, as_twin
+    from gfimu.commands.opened import as_calibration, as_runs, as_twin, by_map
     from gfimu.diagnosis.diagnose import diagnose as explain
 
-    runs, unseen = as_runs(recordings), as_runs(held_out)
+    runs, unseen = ([by_map(run, column_map) for run in as_runs(group)] for group in (recordings, held_out))
     model = as_twin(twin)
     model = replace(model, grammar=True) if grammar else model
     unit = None if calibration is None else as_calibration(calibration)

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
     from gfimu.calibration.result import Calibration
     from gfimu.geometry.array import AccelerometerArray
+    from gfimu.importing import ColumnMap
     from gfimu.motion.estimation import Estimate
     from gfimu.recording import Recording
     from gfimu.recording.mapped import MappedFile
@@ -40,7 +41,7 @@ class EstimatedRun:
     array: AccelerometerArray
 
 
-_READS = ("recording", "array", "calibration")
+_READS = ("recording", "array", "calibration", "column_map")
 
 
 @writes(reads=_READS, out=ESTIMATE, rrd=RERUN)
@@ -53,6 +54,7 @@ def estimate(
     form: str = "auto",
     rest_bias: bool = False,
     calibration: Calibration | str | Path | None = None,
+    column_map: ColumnMap | str | Path | None = None,
     unknown_start: bool = False,
     gyro: bool = False,
     position: bool = False,
@@ -83,6 +85,8 @@ def estimate(
         Read the biases off the first rest (table level) and take them off.
     calibration : Calibration, str or Path, optional
         Calibration to apply first.
+    column_map : ColumnMap, str or Path, optional
+        What the columns of a foreign file are: a map, its name or TOML file (``--map``); see `gfimu.inspect`.
     unknown_start : bool
         The run may start spinning (filter, smoother); the same as ``omega0=None``.
     gyro, fuse_gyro : bool
@@ -112,6 +116,7 @@ def estimate(
         rrd=rrd,
         rest_bias=rest_bias,
         calibration=calibration,
+        column_map=column_map,
         method=method,
         form=form,
         omega0=None if unknown_start else omega0,
@@ -133,6 +138,7 @@ def estimate_run(
     rrd: str | Path | None = None,
     rest_bias: bool = False,
     calibration: Calibration | str | Path | None = None,
+    column_map: ColumnMap | str | Path | None = None,
     **options: Any,
 ) -> EstimatedRun:
     """Estimate and keep the recording and array beside the result, for a summary; ``options`` as `estimate`.
@@ -142,10 +148,11 @@ def estimate_run(
     InputError
         As `estimate`.
     """
+    from gfimu.commands.opened import by_map
     from gfimu.motion.estimation import estimate as solve
     from gfimu.motion.rest_bias import estimate_from_rest
 
-    run, geometry = _opened(recording, array, calibration)
+    run, geometry = _opened(by_map(recording, column_map), array, calibration)
     found = (estimate_from_rest if rest_bias else solve)(run, geometry, **options)
     if out is not None:
         found.write(out)

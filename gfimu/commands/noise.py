@@ -9,6 +9,7 @@ from gfimu.files.outputs import KALIBR, PICTURE, writes
 
 if TYPE_CHECKING:
     from gfimu.calibration.result import Calibration
+    from gfimu.importing import ColumnMap
     from gfimu.recording import Recording
     from gfimu.recording.mapped import MappedFile
     from gfimu.sensor_noise import RecordingNoise
@@ -16,13 +17,14 @@ if TYPE_CHECKING:
 __all__ = ["noise"]
 
 
-@writes(reads=("recording", "calibration"), kalibr=KALIBR, picture=PICTURE)
+@writes(reads=("recording", "calibration", "column_map"), kalibr=KALIBR, picture=PICTURE)
 def noise(
     recording: Recording | str | Path | MappedFile,
     *,
     stretch: str = "rest",
     rest_threshold: float | None = None,
     calibration: Calibration | str | Path | None = None,
+    column_map: ColumnMap | str | Path | None = None,
     kalibr: str | Path | None = None,
     picture: str | Path | None = None,
 ) -> RecordingNoise:
@@ -38,6 +40,8 @@ def noise(
         Threshold of rest, reading unit squared; chosen by the data if not given.
     calibration : Calibration, str or Path, optional
         Calibration to apply first.
+    column_map : ColumnMap, str or Path, optional
+        What the columns of a foreign file are: a map, its name or TOML file (``--map``); see `gfimu.inspect`.
     kalibr : str or Path, optional
         Kalibr ``imu.yaml`` to write.
     picture : str or Path, optional
@@ -49,16 +53,17 @@ def noise(
         If the recording can't be read or never rests, or an output can't be written where it is asked for.
     """
     from gfimu.calibration.run_file import open_calibrated, open_uncalibrated
-    from gfimu.commands.opened import as_calibration
+    from gfimu.commands.opened import as_calibration, by_map
     from gfimu.files.atomic_file import write_text
     from gfimu.recording import Recording
     from gfimu.sensor_noise import kalibr_yaml, recording_noise
 
     unit = None if calibration is None else as_calibration(calibration)
-    if isinstance(recording, Recording):
-        run = recording if unit is None else unit.apply(recording)
+    source = by_map(recording, column_map)
+    if isinstance(source, Recording):
+        run = source if unit is None else unit.apply(source)
     else:
-        run = open_uncalibrated(recording) if unit is None else open_calibrated(recording, unit)
+        run = open_uncalibrated(source) if unit is None else open_calibrated(source, unit)
     result = recording_noise(run, stretch=stretch, rest_threshold=rest_threshold)
     if kalibr is not None:
         write_text(kalibr, kalibr_yaml(result))

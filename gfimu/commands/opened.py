@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from gfimu.errors import InputError
 
 if TYPE_CHECKING:
     from gfimu.calibration.result import Calibration
     from gfimu.geometry.array import AccelerometerArray
+    from gfimu.importing import ColumnMap
     from gfimu.recording import Recording
     from gfimu.recording.mapped import MappedFile
     from sim.twin import Twin
@@ -22,7 +23,11 @@ __all__ = [
     "as_run",
     "as_runs",
     "as_twin",
+    "by_map",
+    "files_by_map",
 ]
+
+_Source = TypeVar("_Source")
 
 
 def as_array(array: AccelerometerArray | str | Path) -> AccelerometerArray:
@@ -63,6 +68,41 @@ def as_run(
     if isinstance(recording, Recording):
         return recording, drawing or array_of(recording)
     return open_run(recording, drawing)
+
+
+def by_map(recording: _Source, column_map: ColumnMap | str | Path | None) -> _Source | MappedFile:
+    """Return a recording or its file as it is; a foreign file with its column map, where one is given.
+
+    Raises
+    ------
+    InputError
+        If there is no such map.
+    """
+    if column_map is None or not isinstance(recording, str | Path):
+        return recording
+    return files_by_map([recording], column_map)
+
+
+def files_by_map(
+    files: Sequence[str | Path], column_map: ColumnMap | str | Path, table: str | None = None
+) -> MappedFile:
+    """Return files of chips on one clock with their column map, and the table of each that is meant.
+
+    Raises
+    ------
+    InputError
+        If there is no such map.
+    """
+    import msgspec
+
+    from gfimu.importing import load_map
+    from gfimu.recording.mapped import MappedFile
+
+    chosen = load_map(column_map)
+    if table is not None:
+        chosen = msgspec.structs.replace(chosen, table=table)
+    first, *others = (Path(file) for file in files)
+    return MappedFile(first, chosen, tuple(others))
 
 
 def as_calibration(calibration: Calibration | str | Path) -> Calibration:

@@ -32,7 +32,8 @@ def score(
     Parameters
     ----------
     arrays : AccelerometerArray, str, Path, or sequence of these, optional
-        Arrays, names of shipped arrays, array files (.toml) or MJCF files (.xml); all shipped arrays by default.
+        Arrays, names of shipped arrays, array files (.toml) or MJCF files (.xml); all shipped arrays that see all
+        six motions by default.
     length_unit_m : float, optional
         Length that counts as 1 for all of them; without it each array's own unit (half the edge of a cube).
     speed_rad_s : float
@@ -55,11 +56,16 @@ def score(
     from gfimu.errors import unknown_name
     from gfimu.files.model_files import list_models
     from gfimu.geometry.array import AccelerometerArray
+    from gfimu.geometry.observability import unseen_motions
     from gfimu.geometry.scoring import score as score_arrays
 
     if spin_axis not in _AXES:
         raise unknown_name("axis", spin_axis, _AXES)
-    given = [arrays] if isinstance(arrays, AccelerometerArray | str | Path) else list(arrays or list_models("arrays"))
+    if arrays:
+        given = [arrays] if isinstance(arrays, AccelerometerArray | str | Path) else list(arrays)
+    else:  # boxes of one or two chips see less than a rigid body's motion
+        shipped = [AccelerometerArray.load(name) for name in list_models("arrays")]
+        given = [array for array in shipped if not unseen_motions(array)]
     omega = [speed_rad_s * component for component in _AXES[spin_axis]] if omega_rad_s is None else omega_rad_s
     return score_arrays(
         [as_array(item) for item in given], length_unit_m=length_unit_m, omega_rad_s=omega, noise_m_s2=noise_m_s2

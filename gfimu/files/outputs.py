@@ -40,6 +40,7 @@ _Result = TypeVar("_Result")
 
 _MODELS = {
     "array": "arrays",
+    "column_map": "maps",
     "scenario": "scenarios",
     "twin": "twins",
 }

@@ -21,15 +21,28 @@ OTHER_WORDS = {
     "--input": "input_kind",
     "--format": "form",
     "--range": "range_g",
+    "--map": "column_map",
 }
 """Options whose word Python or its builtins take, and the arguments that stand for them."""
 
 NO_ARGUMENT = {"--json", "--help"}
-NAMES_A_FILE = {"array", "twin", "scenario", "image", "verdict", "calibration", "update", "motion", "recording"}
+NAMES_A_FILE = {
+    "array",
+    "twin",
+    "scenario",
+    "image",
+    "verdict",
+    "calibration",
+    "update",
+    "motion",
+    "recording",
+    "column_map",
+}
 
 CALLS = {
     "simulate": {"scenario": "rest", "out": "made.csv"},
     "estimate": {"recording": "in.csv", "array": "cube12", "out": "made.csv"},
+    "inspect": {"file": "in.csv"},
     "convert": {"source": "in.csv", "target": "made.csv"},
     "diagnose": {"recordings": "in.csv", "twin": "cube12_turntable", "out": "made"},
     "design": {"effects": "bias", "twin": "cube12_turntable"},
