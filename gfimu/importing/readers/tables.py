@@ -71,12 +71,13 @@ def _member(data: bytes, source: str, text: TextSpec) -> RawTable | None:
 def read_matlab(path: Path, text: TextSpec = TextSpec()) -> RawFile:
     """Read the variables of a MATLAB file; those of equal length are one table."""
     from scipy.io import loadmat
+    from scipy.io.matlab import MatReadError
 
     try:
         content = loadmat(path, simplify_cells=True)
     except NotImplementedError:  # version 7.3 is HDF5
         return read_hdf5(path, text)
-    except (ValueError, TypeError, OSError) as error:
+    except (ValueError, TypeError, OSError, IndexError, KeyError, MatReadError) as error:
         raise InputError(f"{path}: damaged MATLAB file ({str(error)[:120]}); save it again") from None
     found: dict[str, NDArray[Any]] = {}
     for name, value in content.items():

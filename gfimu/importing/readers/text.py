@@ -5,6 +5,7 @@ from __future__ import annotations
 import gzip
 import io
 import re
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -40,7 +41,7 @@ def read_text(path: Path, text: TextSpec = TextSpec()) -> RawFile:
     if data[:2] == b"\x1f\x8b":
         try:
             data = gzip.decompress(data)
-        except (OSError, EOFError) as error:
+        except (OSError, EOFError, zlib.error) as error:
             raise InputError(f"{path}: damaged gzip file ({error}); copy it again") from None
     return RawFile(str(path), "text", {"": table_of_text(data, str(path), text)})
 

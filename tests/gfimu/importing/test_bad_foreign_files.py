@@ -1,0 +1,134 @@
+"""Damaged, foreign or wrongly mapped files end in one line that names file and remedy, and what is odd is told."""
+
+import foreign_files as files
+import numpy as np
+import pytest
+
+from gfimu.errors import InputError, RecordingWarning, UnitError
+from gfimu.importing import inspect_file, load_map
+from gfimu.importing.oddities import oddities
+from gfimu.recording.mapped import mapped_recording
+
+MAP = 'name = "m"\n[time]\ncolumn = "t"\n[channels]\na11 = { column = "x", unit = "g" }\n'
+
+BAD_MAPS = {
+    "unknown unit": (MAP.replace('"g"', '"furlong"'), ["a11", "furlong", "m/s2"]),
+    "unknown key": ("colour = 1\n" + MAP, ["colour"]),
+    "unknown reference": (MAP + '[reference]\nspeed = { column = "v", unit = "rpm" }\n', ["speed", "tacho_rad_s"]),
+    "unit of another kind": (MAP + '[reference]\ntacho_rad_s = { column = "v", unit = "g" }\n', ["tacho_rad_s", "rpm"]),
+    "no time": (MAP.replace('column = "t"\n', ""), ["rate_hz"]),
+    "negative rate": (MAP.replace('column = "t"', "rate_hz = -5.0"), ["time.rate_hz"]),
+    "no channels": ('name = "m"\n[time]\nrate_hz = 5.0\n[channels]\n', ["channels"]),
+    "a number for a name": (MAP.replace('column = "x"', "column = 1.5"), ["channels"]),
+    "no TOML": ("name =\n", ["TOML"]),
+    "unknown array": ('array = "nowhere"\n' + MAP, ["nowhere", "cube12"]),
+}
+
+
+@pytest.mark.parametrize(("text", "words"), BAD_MAPS.values(), ids=BAD_MAPS)
+def test_a_bad_map_is_one_line(tmp_path, text, words):
+    file = tmp_path / "m.toml"
+    file.write_text(text)
+    with pytest.raises(InputError) as error:
+        load_map(file)
+    message = str(error.value)
+    assert "\n" not in message
+    assert all(word in message for word in words), message
+
+
+BAD_FILES = {
+    "empty": (b"", ["empty file"]),
+    "binary": (bytes(range(256)) * 20, ["unknown format", "ulog"]),
+    "damaged zip": (b"PK\x03\x04" + bytes(100), ["damaged archive"]),
+    "damaged ULog": (b"ULog\x01\x12\x35\x01" + bytes(4), ["ULog"]),
+    "damaged MCAP": (b"\x89MCAP0\r\n" + bytes(50), ["MCAP"]),
+    "damaged MATLAB": (b"MATLAB 5.0 MAT-file" + bytes(30), ["MATLAB"]),
+    "damaged HDF5": (b"\x89HDF\r\n\x1a\n" + bytes(50), ["HDF5"]),
+    "damaged bag": (b"#ROSBAG V2.0\n" + bytes(50), ["ROS bag"]),
+    "damaged gzip": (b"\x1f\x8b\x08" + bytes(50), ["gzip"]),
+    "damaged Parquet": (b"PAR1" + bytes(50), ["damaged Parquet"]),
+}
+
+
+@pytest.mark.parametrize(("content", "words"), BAD_FILES.values(), ids=BAD_FILES)
+def test_a_bad_file_is_one_line(tmp_path, content, words):
+    file = tmp_path / "run.bag"
+    file.write_bytes(content)
+    with pytest.raises(InputError) as error:
+        inspect_file(file)
+    message = str(error.value)
+    assert message.startswith(str(file))
+    assert "\n" not in message
+    assert all(word in message for word in words), message
+
+
+def test_another_map_than_the_file_needs_is_named(tmp_path):
+    with pytest.raises(InputError, match=r"needs column 'accel_x'.*--map euroc"):
+        mapped_recording(files.euroc(tmp_path / "data.csv"), "klipper")
+
+
+def text_run(tmp_path, t, force=files.FORCE):
+    names = ["time", "accel_x", "accel_y", "accel_z"]
+    return files.rows(tmp_path / "run.csv", [",".join(names)], [t, *(1000.0 * force.T)], form="{:.12g}")
+
+
+def test_repeated_times_are_left_out_and_said(tmp_path):
+    t = files.T.copy()
+    t[100] = t[99]
+    with pytest.warns(RecordingWarning, match="1 rows whose time does not increase"):
+        assert len(mapped_recording(text_run(tmp_path, t), "klipper")) == files.N - 1
+
+
+def test_rounded_times_are_refused_with_the_remedy(tmp_path):
+    with pytest.raises(InputError, match=r"do not increase.*rate_hz"):
+        mapped_recording(text_run(tmp_path, np.round(files.T, 1)), "klipper")
+
+
+def test_numbers_that_stand_for_missing_are_missing(tmp_path):
+    force = files.FORCE.copy()
+    force[40:50, 1] = -0.999
+    text = 'name = "m"\nmissing = [-999.0]\n[time]\ncolumn = "time"\n[channels]\n' + "".join(
+        f'a1{number} = {{ column = "accel_{axis}", unit = "mm/s^2" }}\n' for number, axis in enumerate("xyz", 1)
+    )
+    (tmp_path / "m.toml").write_text(text)
+    recording = mapped_recording(text_run(tmp_path, files.T, force), tmp_path / "m.toml")
+    assert np.flatnonzero(np.isnan(recording.readings[:, 1])).tolist() == list(range(40, 50))
+
+
+def test_a_map_does_not_fit_an_array_of_other_size(tmp_path):
+    from gfimu import AccelerometerArray
+
+    with pytest.raises(InputError, match=r"3 channels.*'cube12' has 12.*--array"):
+        mapped_recording(files.klipper(tmp_path / "a.csv"), "klipper", array=AccelerometerArray.load("cube12"))
+
+
+def test_rails_corrupt_values_and_noise_are_told():
+    rng = np.random.default_rng(0)
+    values = {
+        name: np.round(6000.0 * np.sin(np.arange(8000) / 500.0) + 20.0 * rng.standard_normal(8000)) for name in "abcd"
+    }
+    values["a"] = np.clip(values["a"], -8000, 5600.0)
+    over = values["a"] == 5600.0
+    values["a"][over] += rng.choice([0.0, 1.0, 3.0, 10.0], over.sum(), p=[0.97, 0.01, 0.01, 0.01])  # it overshoots
+    values["b"][17] = 1e19
+    values["b"][20:23] = np.nan
+    values["c"] += 300.0 * rng.standard_normal(8000)
+    values["d"][:] = 7.0
+    told = oddities(values)
+    assert any(line.startswith("a:") and "rail" in line and "most 5600" in line for line in told)
+    assert not any("rail" in line and line[0] in "bcd" for line in told)
+    assert any(line.startswith("b: 1 values that can be no reading") for line in told)
+    assert any(line.startswith("b: 3 of 8000 cells are empty") for line in told)
+    assert any(line.startswith("c is noisy") for line in told)
+    assert "d reads 7 throughout" in told
+
+
+def test_units_are_read_as_people_write_them():
+    from gfimu.importing.notation import factor_of
+
+    for text in ("m/s^2", "m/s²", "m s^-2", "m_s2", "M/S2"):
+        assert factor_of(text, "acceleration") == 1.0
+    for text in ("deg/s", "°/s", "dps", "deg s^-1"):
+        assert factor_of(text, "rate") == pytest.approx(np.pi / 180.0)
+    with pytest.raises(UnitError, match="rpm"):
+        factor_of("knots", "rate")
