@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from gfimu.commands.drift import drift as drift
     from gfimu.commands.estimate import estimate as estimate
     from gfimu.commands.inspect import inspect as inspect
+    from gfimu.commands.join import join as join
     from gfimu.commands.live import live as live
     from gfimu.commands.noise import noise as noise
     from gfimu.commands.optimize import optimize as optimize
@@ -111,6 +112,7 @@ _PUBLIC = {
     "closed_form": "gfimu.geometry.kinematics",
     "convert": "gfimu.commands.convert",
     "inspect": "gfimu.commands.inspect",
+    "join": "gfimu.commands.join",
     "demo": "gfimu.commands.demo",
     "design": "gfimu.commands.design",
     "diagnose": "gfimu.commands.diagnose",

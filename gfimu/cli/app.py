@@ -22,6 +22,7 @@ COMMAND_FILES = (
     "live",
     "inspect",
     "convert",
+    "join",
     "diagnose",
     "drift",
     "design",

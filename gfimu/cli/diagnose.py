@@ -43,6 +43,15 @@ def _diagnose(
         ),
     ] = False,
     column_map: MapOption = None,
+    reference: Annotated[
+        Path | None,
+        typer.Option(
+            "--reference", help="Reference of the first run on a clock of its own; aligned as by `gfimu join`."
+        ),
+    ] = None,
+    reference_map: Annotated[
+        str | None, typer.Option("--reference-map", metavar="MAP", help="Column map of that file.")
+    ] = None,
     json: JsonOption = False,
 ) -> None:
     """Show what a simulation gets wrong against recordings, name the cause, extend the simulation, measure the gain.
@@ -52,6 +61,8 @@ def _diagnose(
     Example: gfimu diagnose run.parquet --twin cube12_turntable --out diagnosis
 
     A rig known to be unusual: gfimu diagnose run.parquet --twin cube12_turntable --grammar --out diagnosis
+
+    Two loggers of two clocks: gfimu diagnose accel.csv --map mine.toml --reference tacho.csv --twin rig.toml --out d
 
     A unit fresh from the bench: gfimu diagnose run.parquet --twin cube12_turntable --calibration cal.json --out d
     """
@@ -65,6 +76,8 @@ def _diagnose(
             out=out,
             held_out=held_out or [],
             column_map=column_map,
+            reference=reference,
+            reference_map=reference_map,
             calibration=calibration,
             report=done,
             grammar=grammar,

@@ -24,7 +24,7 @@ FOLDER = OutputFolder(("verdict.json", "twin.toml", "report.html", "diagnosis.rr
 """What the folder of a diagnosis holds."""
 
 
-@writes(reads=("recordings", "twin", "held_out", "calibration", "column_map"), out=FOLDER)
+@writes(reads=("recordings", "twin", "held_out", "calibration", "column_map", "reference", "reference_map"), out=FOLDER)
 def diagnose(
     recordings: Recording | str | Path | MappedFile | Sequence[Recording | str | Path | MappedFile],
     twin: Twin | str | Path,
@@ -33,6 +33,8 @@ def diagnose(
     held_out: Recording | str | Path | MappedFile | Sequence[Recording | str | Path | MappedFile] = (),
     calibration: Calibration | str | Path | None = None,
     column_map: ColumnMap | str | Path | None = None,
+    reference: str | Path | None = None,
+    reference_map: ColumnMap | str | Path | None = None,
     names: Sequence[str] | None = None,
     report: Callable[[float, str], None] | None = None,
     grammar: bool = False,
@@ -53,6 +55,10 @@ def diagnose(
         Calibration of the unit, applied first.
     column_map : ColumnMap, str or Path, optional
         What the columns of a foreign file are: a map, its name or TOML file (``--map``); see `gfimu.inspect`.
+    reference : str or Path, optional
+        Reference of the first run on a clock of its own; it is aligned first, as by `gfimu.join`.
+    reference_map : ColumnMap, str or Path, optional
+        What the columns of that file are.
     names : sequence of str, optional
         Names of the runs, for people; those of their files by default.
     report : callable, optional
@@ -82,6 +88,11 @@ def diagnose(
     if unit is not None and unit.positions:
         model = replace(model, array=unit.calibrated_array(model.array), array_name="array.toml")
     labels = _names(runs) if names is None else names
+    if reference is not None:
+        from gfimu.commands.join import join
+
+        first, *others = read
+        read = [join(first, reference, reference_map=reference_map).recording, *others]
     found = explain(read, model, held_out=kept, names=labels, report=report)
     if out is not None:
         if report is not None:

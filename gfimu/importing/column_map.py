@@ -77,9 +77,7 @@ class ColumnMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """
 
     name: Annotated[str, _Meta(description="Name of the map.")]
-    channels: Annotated[
-        dict[str, ColumnSpec], _Meta(description="Sensing axes by the array's channel names.", min_length=1)
-    ]
+    channels: Annotated[dict[str, ColumnSpec], _Meta(description="Sensing axes by the array's channel names.")] = {}
     summary: Annotated[str, _Meta(description="What writes such files, one line.")] = ""
     format: Annotated[
         str, _Meta(description="text, parquet, zip, matlab, hdf5, ulog, mcap, rosbag; else by content.")
@@ -97,6 +95,8 @@ class ColumnMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         """Raise `InputError` for a unit or reference that is not known, or a map without times."""
         if self.time.column is None and self.time.rate_hz is None:
             raise InputError(f"{source}: time has neither a column nor rate_hz; give one")
+        if not self.channels and not self.reference:
+            raise InputError(f"{source}: neither channels nor references; name one column at least")
         if self.time.unit != "datetime":
             factor_of(self.time.unit, "time", where=f"{source}: time")
         for name, spec in self.channels.items():

@@ -28,7 +28,7 @@ from gfimu.importing.recognise import fitting_maps
 from gfimu.recording.carried_array import array_metadata
 from gfimu.recording.recording import Recording
 
-__all__ = ["MappedFile", "mapped_recording"]
+__all__ = ["MappedFile", "mapped_recording", "mapped_reference"]
 
 _GAP = 1.5  # sample periods, from which values are not interpolated
 
@@ -98,6 +98,8 @@ def mapped_recording(
         If the file can't be read, lacks a column of the map, or its times do not increase.
     """
     chosen = load_map(column_map)
+    if not chosen.channels:
+        raise InputError(f"map {chosen.name!r} has references only; a recording needs [channels]")
     if isinstance(source, str | Path):
         pieces = [_piece(read_foreign(source, chosen.format, chosen.text), chosen)]
     elif isinstance(source, list | tuple):
@@ -110,6 +112,35 @@ def mapped_recording(
     for note in merged.times.notes:
         warnings.warn(note, RecordingWarning, stacklevel=2)
     return _recording(merged, chosen, geometry, [one.source for one in pieces])
+
+
+def mapped_reference(
+    path: str | Path, column_map: ColumnMap
+) -> tuple[NDArray[np.float64], dict[str, NDArray[np.float64]], float]:
+    """Read the references alone of a foreign file by a map of its columns.
+
+    Returns
+    -------
+    t_s : ndarray, shape (m,)
+        Times, s.
+    columns : dict of str to ndarray, shape (m,)
+        References by their name, SI.
+    origin_s : float
+        Time on the file's clock at which ``t_s`` is zero, s.
+
+    Raises
+    ------
+    InputError
+        As `mapped_recording`; also if the map names no reference that the file has.
+    """
+    piece = _piece(read_foreign(path, column_map.format, column_map.text), column_map)
+    if not piece.reference:
+        raise InputError(
+            f"{path}: map {column_map.name!r} gives no reference; add one under [reference], as tacho_rad_s"
+        )
+    for note in piece.times.notes:
+        warnings.warn(note, RecordingWarning, stacklevel=2)
+    return piece.times.t_s, dict(piece.reference), piece.times.origin_s
 
 
 def _as_raw(source: Any) -> RawTable:

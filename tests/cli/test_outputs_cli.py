@@ -43,6 +43,7 @@ CALLS = {
     "simulate": {"scenario": "rest", "out": "made.csv"},
     "estimate": {"recording": "in.csv", "array": "cube12", "out": "made.csv"},
     "inspect": {"file": "in.csv"},
+    "join": {"channels": "in.csv", "reference": "other.csv", "out": "made.csv"},
     "convert": {"source": "in.csv", "target": "made.csv"},
     "diagnose": {"recordings": "in.csv", "twin": "cube12_turntable", "out": "made"},
     "design": {"effects": "bias", "twin": "cube12_turntable"},

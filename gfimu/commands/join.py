@@ -1,0 +1,70 @@
+"""Under `gfimu join`: channels and a reference of two clocks in one recording."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from gfimu.files.outputs import RECORDING, writes
+
+if TYPE_CHECKING:
+    from gfimu.geometry.array import AccelerometerArray
+    from gfimu.importing import ColumnMap
+    from gfimu.joining import Joined, ReferenceSeries
+    from gfimu.recording import Recording
+    from gfimu.recording.mapped import MappedFile
+
+__all__ = ["join"]
+
+
+@writes(reads=("channels", "reference", "array", "column_map", "reference_map"), out=RECORDING)
+def join(
+    channels: Recording | str | Path | MappedFile,
+    reference: ReferenceSeries | str | Path,
+    *,
+    out: str | Path | None = None,
+    array: AccelerometerArray | str | Path | None = None,
+    column_map: ColumnMap | str | Path | None = None,
+    reference_map: ColumnMap | str | Path | None = None,
+    most_rate_error: float = 0.02,
+    force: bool = False,
+) -> Joined:
+    """Find offset and rate error between two clocks and put channels and reference into one recording.
+
+    Parameters
+    ----------
+    channels : Recording, str, Path or MappedFile
+        The recording of the accelerometers, or its file.
+    reference : ReferenceSeries, str or Path
+        Tachometer, encoder angle, command or gyro with times of its own, or the file.
+    out : str or Path, optional
+        Recording to write, ``.csv`` or ``.parquet``.
+    array : AccelerometerArray, str or Path, optional
+        The array of the channels; the recording's own by default.
+    column_map, reference_map : ColumnMap, str or Path, optional
+        What the columns of a foreign file are, of the channels (``--map``) and of the reference.
+    most_rate_error : float
+        Largest rate error between the clocks that is searched, a ratio.
+    force : bool
+        Join nevertheless where the two don't seem to belong together.
+
+    Raises
+    ------
+    InputError
+        If a file can't be read, the reference does not change, or the two don't seem to belong together.
+    """
+    from gfimu.commands.opened import as_array, by_map
+    from gfimu.joining import ReferenceSeries, join_reference, open_reference
+    from gfimu.recording import Recording
+    from gfimu.recording.formats import open_recording
+
+    drawing = None if array is None else as_array(array)
+    source = by_map(channels, column_map)
+    recording = source if isinstance(source, Recording) else open_recording(source, array=drawing)
+    if drawing is not None:
+        recording = recording.carrying(drawing)
+    series = reference if isinstance(reference, ReferenceSeries) else open_reference(reference, reference_map)
+    joined = join_reference(recording, series, most_rate_error=most_rate_error, force=force)
+    if out is not None:
+        joined.recording.write(out)
+    return joined

@@ -1,0 +1,6 @@
+"""Two files of two clocks: the offset and rate error between them, and one recording of both."""
+
+from gfimu.joining.join import Joined, join_reference
+from gfimu.joining.reference_file import ReferenceSeries, open_reference
+
+__all__ = ["Joined", "ReferenceSeries", "join_reference", "open_reference"]

@@ -1,0 +1,218 @@
+"""One recording of channels and a reference that were logged on two clocks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gfimu.errors import InputError
+from gfimu.joining.alignment import Alignment, Signals, align, uniform
+from gfimu.joining.reference_file import ReferenceSeries
+from gfimu.recording import Recording
+
+__all__ = ["Joined", "join_reference"]
+
+_MOST_ROWS = 20_000  # of the grid on which offsets are searched
+_FINEST = 0.005  # s, step of that grid
+_ODDS = 30.0  # nats, by which the best offset has to beat the next, and a foreign reference
+_LEVERS = 5.0  # standard deviations between the levers by ω² and by α
+_LEVER_SHARE = 0.15  # of a lever: gains, axes and a tilt of the table make it differ by so much
+_LOST = 0.2  # of the variance, on a quarter that the fit did not see
+_FOREIGN = 6  # references of shuffled pieces
+
+
+@dataclass(frozen=True)
+class Joined:
+    """A recording with its reference on one clock, and how sure that is.
+
+    Parameters
+    ----------
+    recording : Recording
+        The channels at their own times, with each value of the reference in the row nearest in time, moved to the
+        time of that row along its slope; NaN in between.
+    alignment : Alignment
+        Offset and rate error with their standard deviations.
+    odds_over_second : float
+        Log odds over the next-best offset, nats.
+    odds_over_foreign : float
+        Log odds over the best of references that can't belong to the channels, nats: this one reversed, and shuffled.
+    doubts : tuple of str
+        Why the two may not belong together; empty if they do.
+    levers_m : dict of str to (float, float)
+        Distance of each tri-axial chip from the axis by ω² and by α, m, for a table's reference.
+    """
+
+    recording: Recording
+    alignment: Alignment
+    odds_over_second: float
+    odds_over_foreign: float
+    doubts: tuple[str, ...]
+    levers_m: dict[str, tuple[float, float]]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the figures as JSON holds them."""
+        found = self.alignment
+        return {
+            "offset_s": found.offset,
+            "offset_std_s": found.offset_std,
+            "rate_error": found.rate_error,
+            "rate_error_std": found.rate_error_std,
+            "overlap_s": found.overlap_s,
+            "explained": dict(zip(self.recording.channels, found.explained.tolist(), strict=True)),
+            "second_offset_s": found.second_offset,
+            "log_odds_over_second": self.odds_over_second,
+            "log_odds_over_foreign": self.odds_over_foreign,
+            "levers_m": {chip: {"by_rate": a, "by_acceleration": b} for chip, (a, b) in self.levers_m.items()},
+            "doubts": list(self.doubts),
+        }
+
+
+def join_reference(
+    recording: Recording, reference: ReferenceSeries, *, most_rate_error: float = 0.02, force: bool = False
+) -> Joined:
+    """Align a reference with channels of another clock and put both into one recording.
+
+    Parameters
+    ----------
+    recording : Recording
+        Channels, m/s².
+    reference : ReferenceSeries
+        Tachometer, angle, command or gyro with times of its own.
+    most_rate_error : float
+        Largest rate error between the clocks that is searched.
+    force : bool
+        Join nevertheless where the two don't seem to belong together.
+
+    Raises
+    ------
+    InputError
+        If the reference does not change, the files are too short, or they don't belong together.
+    """
+    signals = _signals(recording, reference)
+    found = align(signals, most_rate_error=most_rate_error)
+    if found is None:
+        raise InputError(
+            f"{reference.source}: the reference does not change; a time can't be found from a constant rate"
+        )
+    over_second = float("inf") if np.isnan(found.second_offset) else found.odds_over(found.second_explained)
+    over_foreign = min(found.odds_over(one) for one in _foreign(signals))
+    levers, differ = _levers(recording, found) if signals.rate.shape[1] == 1 else ({}, [])
+    doubts = []
+    if over_foreign < _ODDS:
+        doubts.append("a reversed or shuffled reference fits nearly as well")
+    if over_second < _ODDS:
+        doubts.append(f"an offset of {found.second_offset:.4g} s fits nearly as well as {found.offset:.4g} s")
+    share = float(np.average(found.explained, weights=np.maximum(signals.readings.var(axis=0), 1e-18)))
+    if found.predicted < share - _LOST:
+        doubts.append(
+            f"{100 * share:.0f}% of the readings' variance is explained, but only {100 * max(found.predicted, 0.0):.0f}% "
+            "of a quarter that the fit did not see"
+        )
+    doubts += differ
+    joined = _joined(recording, reference, found)
+    if doubts and not force:
+        raise InputError(
+            f"{reference.source}: these recordings don't seem to belong together: {'; '.join(doubts)}; "
+            "--force (force=True) joins them nevertheless"
+        )
+    return Joined(joined, found, over_second, over_foreign, tuple(doubts), levers)
+
+
+def _signals(recording: Recording, reference: ReferenceSeries) -> Signals:
+    """Return channels and reference on uniform grids of one step."""
+    t_reference, rate = reference.rate()
+    if len(recording) < 16:
+        raise InputError("a recording of fewer than sixteen samples can't be aligned; record longer")
+    longest = max(recording.duration, float(t_reference[-1] - t_reference[0]))
+    step = max(_FINEST, recording.sample_period, longest / _MOST_ROWS)
+    coarse = max(step, float(np.median(np.diff(t_reference))) / 4.0)  # a slow reference has no finer detail
+    step = min(max(step, 0.25 * coarse), coarse)
+    readings = uniform(recording.t_s, recording.readings, step)
+    return Signals(step, float(recording.t_s[0]), float(t_reference[0]), readings, _smooth(t_reference, rate, step))
+
+
+def _smooth(t: NDArray[Any], rate: NDArray[Any], step: float) -> NDArray[np.float64]:
+    """Return a rate on a uniform grid, smoothed over three of its own samples or a twentieth of a second."""
+    grid = uniform(t, rate, step)
+    width = round(max(3.0 * float(np.median(np.diff(t))), 0.05) / step) | 1
+    window = np.hanning(width + 2)[1:-1]
+    window = np.asarray(window / window.sum())
+    half = width // 2
+    padded = np.pad(grid, ((half, half), (0, 0)), mode="edge")
+    return np.column_stack([np.convolve(one, window, mode="valid") for one in padded.T])
+
+
+def _foreign(signals: Signals) -> list[NDArray[np.float64]]:
+    """Return what references explain that can't belong to the channels: reversed, and shuffled in pieces."""
+    rng = np.random.default_rng(0)
+    pieces = np.array_split(signals.rate, max(len(signals.rate) // max(int(2.0 / signals.step), 1), 4))
+    others: list[NDArray[np.float64]] = [signals.rate[::-1]]
+    for _ in range(_FOREIGN):
+        order = rng.permutation(len(pieces))
+        others.append(np.asarray(np.concatenate([pieces[place][:: rng.choice([1, -1])] for place in order])))
+    found = []
+    for rate in others:
+        times = np.arange(len(rate)) * signals.step
+        smooth = _smooth(times, np.asarray(rate), signals.step)
+        one = align(replace(signals, rate=smooth), most_rate_error=0.0, refine=False)
+        found.append(np.zeros(signals.readings.shape[1]) if one is None else one.explained)
+    return found
+
+
+def _levers(recording: Recording, found: Alignment) -> tuple[dict[str, tuple[float, float]], list[str]]:
+    """Return each tri-axial chip's distance from the axis by ω² and by α, and where the two disagree.
+
+    The centripetal part points to the axis, the tangential one across it: they have one length and a right angle.
+    """
+    groups: dict[str, list[int]] = {}
+    for place, name in enumerate(recording.channels):
+        groups.setdefault(name[:-1], []).append(place)
+    levers, differ = {}, []
+    for chip, places in groups.items():
+        if len(places) != 3:
+            continue
+        by_rate, by_acceleration = found.coefficients[:, places]  # (3,) each, m
+        std = float(np.hypot(*np.linalg.norm(found.coefficient_std[:, places], axis=1)))
+        lengths = float(np.linalg.norm(by_rate)), float(np.linalg.norm(by_acceleration))
+        levers[chip] = lengths
+        largest = max(lengths)
+        allowed = _LEVERS * std + _LEVER_SHARE * largest
+        along = abs(float(by_rate @ by_acceleration)) / max(largest, 1e-12)
+        if abs(lengths[0] - lengths[1]) > allowed:
+            differ.append(f"chip {chip} is {lengths[0]:.3g} m off the axis by ω² and {lengths[1]:.3g} m by α")
+        elif along > allowed:
+            differ.append(f"the parts by ω² and by α of chip {chip} are not at a right angle")
+    return levers, differ
+
+
+def _joined(recording: Recording, reference: ReferenceSeries, found: Alignment) -> Recording:
+    """Return the recording with the reference in the rows nearest in time."""
+    t = recording.t_s
+    theirs = found.offset + (1.0 + found.rate_error) * reference.t_s
+    nearest = np.clip(np.searchsorted(t, theirs), 1, len(t) - 1)
+    nearest = nearest - (theirs - t[nearest - 1] < t[nearest] - theirs)
+    near = np.abs(t[nearest] - theirs) <= 0.75 * recording.sample_period
+    columns = dict(recording.reference)
+    for name, values in reference.columns.items():
+        known = near & np.isfinite(values)
+        moved = values + _slope(theirs, values) * (t[nearest] - theirs)
+        rows, place = np.unique(nearest[known], return_inverse=True)
+        column = np.full(len(t), np.nan)
+        column[rows] = np.bincount(place, moved[known]) / np.bincount(place)
+        columns[name] = column
+    facts = {
+        "reference_offset_s": found.offset,
+        "reference_offset_std_s": found.offset_std,
+        "reference_rate_error": found.rate_error,
+        "reference_rate_error_std": found.rate_error_std,
+    }
+    return replace(recording, reference=columns, metadata={**recording.metadata, **facts})
+
+
+def _slope(t: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the slope of a reference at its samples, between its neighbours; zero where one is missing."""
+    slope = np.gradient(values, t)
+    return np.where(np.isfinite(slope), slope, 0.0)

@@ -1,0 +1,112 @@
+"""A reference with times of its own: tachometer, encoder angle or gyro in a file that holds no channels."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from gfimu.errors import InputError
+from gfimu.files.column_file import open_columns
+from gfimu.importing import ColumnMap, load_map
+from gfimu.importing.recognise import map_hint
+from gfimu.recording.mapped import mapped_reference
+from gfimu.units import REFERENCE_UNITS
+
+__all__ = ["ReferenceSeries", "open_reference"]
+
+_GYRO = ("gyro_x_rad_s", "gyro_y_rad_s", "gyro_z_rad_s")
+
+
+@dataclass(frozen=True)
+class ReferenceSeries:
+    """References on a clock of their own.
+
+    Parameters
+    ----------
+    source : str
+        Where they come from, for messages.
+    t_s : ndarray, shape (m,)
+        Times, s, strictly increasing.
+    columns : mapping of str to ndarray, shape (m,)
+        By their name in a recording, SI.
+    origin_s : float
+        Time on the file's clock at which ``t_s`` is zero, s.
+    """
+
+    source: str
+    t_s: NDArray[np.float64]
+    columns: Mapping[str, NDArray[np.float64]]
+    origin_s: float = 0.0
+
+    @property
+    def period(self) -> float:
+        """Median step of the times, s."""
+        return float(np.median(np.diff(self.t_s)))
+
+    def rate(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return times (k,) and the angular rate at them: (k, 1) about a table's axis, or (k, 3) of a gyro, rad/s.
+
+        Raises
+        ------
+        InputError
+            If there is neither a tachometer, an angle, a command nor a whole gyro.
+        """
+        for name in ("tacho_rad_s", "command_rad_s"):
+            if name in self.columns:
+                return self._known(self.columns[name][:, None])
+        if "angle_rad" in self.columns:
+            t, angle = self._known(self.columns["angle_rad"][:, None])
+            return t, CubicSpline(t, np.unwrap(angle[:, 0]))(t, 1)[:, None]
+        if all(name in self.columns for name in _GYRO):
+            return self._known(np.column_stack([self.columns[name] for name in _GYRO]))
+        raise InputError(
+            f"{self.source}: no angular rate among {', '.join(self.columns) or 'its columns'}; "
+            "a tachometer, angle, command or gyro of three axes is needed"
+        )
+
+    def _known(self, values: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        rows = np.isfinite(values).all(axis=1)
+        if rows.sum() < 8:
+            raise InputError(f"{self.source}: only {int(rows.sum())} values of the reference; record longer")
+        return self.t_s[rows], values[rows]
+
+
+def open_reference(path: str | Path, column_map: ColumnMap | str | Path | None = None) -> ReferenceSeries:
+    """Read a file of references: columns as in a recording (``t_s``, ``tacho_rpm`` …), or by a column map.
+
+    Raises
+    ------
+    InputError
+        If the file can't be read, or holds no reference.
+    """
+    if column_map is not None:
+        chosen = load_map(column_map)
+        t, columns, origin = mapped_reference(path, chosen)
+        return ReferenceSeries(str(path), t, columns, origin)
+    table = open_columns(path)
+    factors = {
+        f"{name}_{unit}": (f"{name}_{next(iter(units))}", factor)
+        for name, units in REFERENCE_UNITS.items()
+        for unit, factor in units.items()
+    }
+    names = [name for name in table.names if name in factors and name != "t_s"]
+    if "t_s" not in table.names or not names:
+        hint = map_hint(path)
+        missing = (
+            "column t_s is missing" if "t_s" not in table.names else "no reference; name one tacho_rpm, angle_deg …"
+        )
+        raise InputError(f"{path}: {missing}" + (f"; {hint} (--reference-map)" if hint else ""))
+    blocks = list(table.blocks(["t_s", *names]))
+    if not blocks:
+        raise InputError(f"{path}: no samples below the header; record again or give another file")
+    t, *values = (np.concatenate(parts) for parts in zip(*blocks, strict=True))
+    if not np.isfinite(t).all() or np.any(np.diff(t) <= 0):
+        raise InputError(f"{path}: t_s does not increase throughout; sort by time or drop the repeated samples")
+    columns = {factors[name][0]: value * factors[name][1] for name, value in zip(names, values, strict=True)}
+    origin = table.metadata.get("time_origin_s", 0.0)
+    return ReferenceSeries(str(path), t, columns, float(origin) if isinstance(origin, int | float) else 0.0)
