@@ -119,8 +119,8 @@ class ColumnMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     def to_dict(self) -> dict[str, Any]:
         """Return the map as its TOML file holds it, without what is as by default."""
         found = msgspec.to_builtins(self)
-        plain = msgspec.to_builtins(ColumnMap("", {"a11": ColumnSpec(1, "g")}))
-        short = {key: value for key, value in found.items() if value != plain[key] or key in {"name", "channels"}}
+        plain = msgspec.to_builtins(ColumnMap(""))
+        short = {key: value for key, value in found.items() if value != plain[key] or key == "name"}
         for group in ("channels", "reference"):
             for key, spec in short.get(group, {}).items():
                 short[group][key] = {

@@ -11,7 +11,7 @@ import numpy as np
 
 from gfimu.errors import InputError
 from gfimu.importing.clock import Times, times_of
-from gfimu.importing.column_map import ColumnMap, ColumnSpec, TextSpec, TimeSpec, map_toml
+from gfimu.importing.column_map import REFERENCE_KINDS, ColumnMap, ColumnSpec, TextSpec, TimeSpec, map_toml
 from gfimu.importing.guess import (
     TriadUnit,
     find_time,
@@ -19,12 +19,17 @@ from gfimu.importing.guess import (
     unit_of_acceleration,
     unit_of_rate,
 )
+from gfimu.importing.notation import bracketed_unit, kind_of
 from gfimu.importing.oddities import oddities
 from gfimu.importing.raw_table import RawFile, RawTable
 from gfimu.importing.readers import read_foreign
 from gfimu.importing.recognise import fitting_maps
 
 __all__ = ["ColumnView", "Inspection", "inspect_file"]
+
+_TACHO = ("tacho", "rpm", "omega", "speed")
+_ANGLE = ("angle", "theta", "encoder")
+_TEMPERATURE = ("temperature", "temp_", "degc")
 
 
 @dataclass(frozen=True)
@@ -148,7 +153,7 @@ def inspect_file(path: str | Path, *, table: str = "", text: TextSpec = TextSpec
         roles[str(time[0].column)] = "time"
     spec = time[0] if time else TimeSpec(rate_hz=100.0)
     suggested = None
-    if channels:
+    if channels or reference:
         suggested = ColumnMap(
             _map_name(path),
             channels,
@@ -212,7 +217,7 @@ def _channels(
 def _reference(
     table: RawTable, rates: Sequence[tuple[str, str, str]], reasons: list[str], roles: dict[str, str]
 ) -> dict[str, ColumnSpec]:
-    """Return the first gyro, and a tachometer, angle or temperature by their names."""
+    """Return the first gyro, and a tachometer, angle and temperature by their names."""
     reference = {}
     for columns in rates[:1]:
         unit = unit_of_rate(table, columns)
@@ -221,18 +226,30 @@ def _reference(
             reference[f"gyro_{axis}_rad_s"] = _spec(name, unit, 0)
             roles[name] = f"gyro {axis}, {_scaled(unit)}"
     for name in table.columns:
-        plain = name.lower()
-        if name in roles or table.columns[name].dtype == object:
+        known = _known_reference(name)
+        if known is None or name in roles or known[0] in reference or table.columns[name].dtype == object:
             continue
-        if (
-            any(word in plain for word in ("tacho", "rpm", "omega_ref", "table_rate"))
-            and "tacho_rad_s" not in reference
-        ):
-            by_name = "rpm" if "rpm" in plain else "deg/s" if "deg" in plain else "rad/s"
-            reference["tacho_rad_s"] = ColumnSpec(name, by_name)
-            roles[name] = f"tachometer, {by_name}"
-            reasons.append(f"tachometer ({name}): {by_name}, by its name (check this)")
+        key, by_name = known
+        reference[key] = ColumnSpec(name, by_name)
+        roles[name] = f"{key.partition('_')[0]}, {by_name}"
+        reasons.append(f"{key.partition('_')[0]} ({name}): {by_name}, by its name (check this)")
     return reference
+
+
+def _known_reference(name: str) -> tuple[str, str] | None:
+    """Return the reference that a column is by its name, and its unit; None if it is none."""
+    plain, bracketed = bracketed_unit(name.lower())
+    words = {"tacho_rad_s": _TACHO, "angle_rad": _ANGLE, "temperature_degC": _TEMPERATURE}
+    for key, marks in words.items():
+        if any(mark in plain for mark in marks):
+            if bracketed:
+                return (key, bracketed) if kind_of(bracketed) == REFERENCE_KINDS[key] else None
+            if key == "temperature_degC":
+                return key, "degC"
+            degrees = "deg" in plain
+            usual = "rpm" if "rpm" in plain else "deg/s" if degrees else "rad/s"
+            return key, usual if key == "tacho_rad_s" else "deg" if degrees else "rad"
+    return None
 
 
 def _spec(name: str, unit: TriadUnit, axis: int) -> ColumnSpec:

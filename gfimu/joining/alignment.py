@@ -1,7 +1,7 @@
 """The offset and the rate error between the clocks of two files, by what a turning body's accelerometers read.
 
-On a body that turns about a fixed axis a channel reads c₀ + c₁·ω² + c₂·α, on a free one a sum over the six products
-of ω and the three components of α. For every offset these functions of the reference are fitted to the channels by least
+About a fixed axis a channel reads c₀ + c₁·ω² + c₂·α; on a free body it reads a sum over the six products of ω and the
+three components of α. For every offset these functions of the reference are fitted to the channels by least
 squares; the offset of the best fit is the one sought. Correlations by FFT give all offsets at once, on a grid of rate
 errors; a nonlinear fit refines the best.
 """

@@ -108,8 +108,8 @@ def join_reference(
     share = float(np.average(found.explained, weights=np.maximum(signals.readings.var(axis=0), 1e-18)))
     if found.predicted < share - _LOST:
         doubts.append(
-            f"{100 * share:.0f}% of the readings' variance is explained, but only {100 * max(found.predicted, 0.0):.0f}% "
-            "of a quarter that the fit did not see"
+            f"{100 * share:.0f}% of the readings' variance is explained, but only "
+            f"{100 * max(found.predicted, 0.0):.0f}% of a quarter that the fit did not see"
         )
     doubts += differ
     joined = _joined(recording, reference, found)

@@ -88,7 +88,11 @@ def open_reference(path: str | Path, column_map: ColumnMap | str | Path | None =
         chosen = load_map(column_map)
         t, columns, origin = mapped_reference(path, chosen)
         return ReferenceSeries(str(path), t, columns, origin)
-    table = open_columns(path)
+    try:
+        table = open_columns(path)
+    except InputError as error:
+        hint = map_hint(path) if Path(path).exists() else ""
+        raise InputError(f"{error}" + (f"; {hint} (here --reference-map)" if hint else "")) from None
     factors = {
         f"{name}_{unit}": (f"{name}_{next(iter(units))}", factor)
         for name, units in REFERENCE_UNITS.items()
@@ -100,7 +104,7 @@ def open_reference(path: str | Path, column_map: ColumnMap | str | Path | None =
         missing = (
             "column t_s is missing" if "t_s" not in table.names else "no reference; name one tacho_rpm, angle_deg …"
         )
-        raise InputError(f"{path}: {missing}" + (f"; {hint} (--reference-map)" if hint else ""))
+        raise InputError(f"{path}: {missing}" + (f"; {hint} (here --reference-map)" if hint else ""))
     blocks = list(table.blocks(["t_s", *names]))
     if not blocks:
         raise InputError(f"{path}: no samples below the header; record again or give another file")
