@@ -53,13 +53,32 @@ def _estimate(
     ] = False,
     rrd: Annotated[Path | None, typer.Option("--rrd", help="Rerun recording to write.")] = None,
     column_map: MapOption = None,
+    axis: Annotated[
+        str | None,
+        typer.Option(
+            "--axis", help="Axis about which alone the array turns: x, y, z or 0,0,1. Few chips then suffice."
+        ),
+    ] = None,
+    axis_point: Annotated[
+        tuple[float, float, float], typer.Option("--axis-point", help="A point of that axis, body frame, m.")
+    ] = (0.0, 0.0, 0.0),
+    hub: Annotated[
+        str, typer.Option("--hub", help="With --axis: fixed (a table) or free (a wheel on a moving body).")
+    ] = "fixed",
+    inclination_rad: Annotated[
+        float | None, typer.Option("--inclination-rad", help="Angle between --axis and the vertical; else estimated.")
+    ] = None,
     json: JsonOption = False,
 ) -> None:
     """Estimate p, α, ω, attitude and table angle from a recording.
 
     Example: gfimu estimate run.parquet --method filter --rest-bias --out estimate.parquet
+
+    One chip on a table: gfimu estimate run.csv --array arm.toml --axis z --out estimate.csv
+
+    Two chips on a wheel: gfimu estimate run.csv --array wheel.toml --axis z --hub free --unknown-start --out est.csv
     """
-    from gfimu.commands.estimate import estimate_run
+    from gfimu.commands.estimate import estimate_run, turning_axis
     from gfimu.motion.estimate_summary import summarise
 
     with progress(_describe(method), total=1.0) as done:
@@ -72,6 +91,7 @@ def _estimate(
             rest_bias=rest_bias,
             calibration=calibration,
             column_map=column_map,
+            axis=turning_axis(axis, axis_point, hub, inclination_rad),
             omega0=None if unknown_start else (0.0, 0.0, 0.0),
             fuse_gyro=gyro,
             with_position=position,

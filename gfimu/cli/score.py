@@ -13,6 +13,7 @@ from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, p
 
 if TYPE_CHECKING:
     from gfimu.geometry.scoring import Score
+    from gfimu.known_axis import AxisBounds
 
 __all__ = ["register"]
 
@@ -36,19 +37,48 @@ def _score(
     noise: Annotated[
         float, typer.Option("--noise-m-s2", help="Standard deviation of a channel, m/s²: 0.0287 is ADXL345 at 100 Hz.")
     ] = 0.0287,
+    axis: Annotated[
+        str | None, typer.Option("--axis", help="Bounds of a rotation about this axis alone: x, y, z or 0,0,1.")
+    ] = None,
+    axis_point: Annotated[
+        tuple[float, float, float], typer.Option("--axis-point", help="A point of that axis, body frame, m.")
+    ] = (0.0, 0.0, 0.0),
+    hub: Annotated[str, typer.Option("--hub", help="With --axis: fixed (a table) or free (a wheel).")] = "fixed",
+    sample_rate_hz: Annotated[float, typer.Option("--sample-rate-hz", help="With --axis: sample rate, Hz.")] = 100.0,
     as_json: JsonOption = False,
 ) -> None:
     """Score array geometries: condition number, GDOP, errors per axis, what ω² leaves, what ω can be seen.
 
     Example: gfimu score cube12 p3_three_plus_one --speed-rad-s 10
+
+    Two chips on a wheel: gfimu score wheel.toml --axis z --hub free --speed-rad-s 12
     """
     from gfimu.commands.score import score
+    from gfimu.known_axis import AxisBounds
 
-    scores = score(arrays, length_unit_m=length_unit, speed_rad_s=speed, spin_axis=spin_axis, noise_m_s2=noise)
-    if as_json:
-        print_json({"length_unit_m": scores[0].length_unit_m, "arrays": [entry.to_dict() for entry in scores]})
+    scores = score(
+        arrays,
+        length_unit_m=length_unit,
+        speed_rad_s=speed,
+        spin_axis=spin_axis,
+        noise_m_s2=noise,
+        axis=axis,
+        axis_point=axis_point,
+        hub=hub,
+        sample_rate_hz=sample_rate_hz,
+    )
+    bounds = [entry for entry in scores if isinstance(entry, AxisBounds)]
+    if bounds:
+        if as_json:
+            print_json({"arrays": [entry.to_dict() for entry in bounds]})
+        else:
+            _print_bounds(bounds, noise, sample_rate_hz)
         return
-    _print_scores(scores, f"{speed:.4g} rad/s about {spin_axis} and channel noise {noise:.4g} m/s²")
+    figures = [entry for entry in scores if not isinstance(entry, AxisBounds)]
+    if as_json:
+        print_json({"length_unit_m": figures[0].length_unit_m, "arrays": [entry.to_dict() for entry in figures]})
+        return
+    _print_scores(figures, f"{speed:.4g} rad/s about {spin_axis} and channel noise {noise:.4g} m/s²")
 
 
 def _optimize(
@@ -164,6 +194,25 @@ def _print_scores(scores: list[Score], condition: str) -> None:
                 for first, (component, terms) in _with_first(entry.omega_squared_terms)
             ],
         )
+
+
+def _print_bounds(bounds: list[AxisBounds], noise: float, sample_rate_hz: float) -> None:
+    print_table(
+        f"Rotation about one known axis, {bounds[0].axis.hub} hub",
+        ["array", "σ_α, rad/s²", "σ of Ω², rad²/s²", "σ_Ω per sample, rad/s", "σ_Ω of a filter, rad/s"],
+        [
+            [
+                entry.array,
+                _number(entry.acceleration_std, ".4g"),
+                _number(entry.square_std, ".4g"),
+                _number(entry.sample_std, ".3g"),
+                _number(entry.filter_std, ".3g"),
+            ]
+            for entry in bounds
+        ],
+        note=f"At {bounds[0].rate_rad_s:.4g} rad/s, channel noise {noise:.4g} m/s², {sample_rate_hz:g} Hz; —: the "
+        "array can't tell. A filter is at this bound with biases known and white noise.",
+    )
 
 
 def _names_of(scores: list[Score], length: float) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
     from gfimu.calibration.result import Calibration
     from gfimu.geometry.array import AccelerometerArray
+    from gfimu.geometry.turning_axis import TurningAxis
     from gfimu.importing import ColumnMap
     from gfimu.motion.estimation import Estimate
     from gfimu.recording import Recording
@@ -55,6 +56,10 @@ def estimate(
     rest_bias: bool = False,
     calibration: Calibration | str | Path | None = None,
     column_map: ColumnMap | str | Path | None = None,
+    axis: TurningAxis | str | Sequence[float] | None = None,
+    axis_point: Sequence[float] = (0.0, 0.0, 0.0),
+    hub: str = "fixed",
+    inclination_rad: float | None = None,
     unknown_start: bool = False,
     gyro: bool = False,
     position: bool = False,
@@ -87,6 +92,15 @@ def estimate(
         Calibration to apply first.
     column_map : ColumnMap, str or Path, optional
         What the columns of a foreign file are: a map, its name or TOML file (``--map``); see `gfimu.inspect`.
+    axis : TurningAxis, str or sequence of float, optional
+        The axis about which alone the array turns, body frame: x, y, z, or three numbers. Few chips then suffice. By
+        default the array's own, where it can't see all six motions.
+    axis_point : sequence of float
+        A point of that axis, body frame, m.
+    hub : {"fixed", "free"}
+        Whether that axis stands still (a table) or moves with a body (a wheel).
+    inclination_rad : float, optional
+        Angle between that axis and the vertical, rad; estimated by default.
     unknown_start : bool
         The run may start spinning (filter, smoother); the same as ``omega0=None``.
     gyro, fuse_gyro : bool
@@ -117,6 +131,7 @@ def estimate(
         rest_bias=rest_bias,
         calibration=calibration,
         column_map=column_map,
+        axis=turning_axis(axis, axis_point, hub, inclination_rad),
         method=method,
         form=form,
         omega0=None if unknown_start else omega0,
@@ -139,6 +154,7 @@ def estimate_run(
     rest_bias: bool = False,
     calibration: Calibration | str | Path | None = None,
     column_map: ColumnMap | str | Path | None = None,
+    axis: TurningAxis | None = None,
     **options: Any,
 ) -> EstimatedRun:
     """Estimate and keep the recording and array beside the result, for a summary; ``options`` as `estimate`.
@@ -153,7 +169,11 @@ def estimate_run(
     from gfimu.motion.rest_bias import estimate_from_rest
 
     run, geometry = _opened(by_map(recording, column_map), array, calibration)
-    found = (estimate_from_rest if rest_bias else solve)(run, geometry, **options)
+    turning = _turning(axis, geometry)
+    if turning is not None:
+        found = _about_axis(run, geometry, turning, rest_bias=rest_bias, **options)
+    else:
+        found = (estimate_from_rest if rest_bias else solve)(run, geometry, **options)
     if out is not None:
         found.write(out)
     if rrd is not None:
@@ -180,3 +200,49 @@ def _opened(
         run, geometry = as_run(recording, array)
         return unit.apply(run), unit.calibrated_array(geometry)
     return open_calibrated_run(recording, unit, None if array is None else as_array(array))
+
+
+def turning_axis(
+    axis: TurningAxis | str | Sequence[float] | None,
+    point: Sequence[float],
+    hub: str,
+    inclination_rad: float | None,
+) -> TurningAxis | None:
+    """Return an axis given as such or by its numbers; None without one."""
+    from gfimu.geometry.turning_axis import TurningAxis
+
+    if axis is None or isinstance(axis, TurningAxis):
+        return axis
+    return TurningAxis.of(axis, point=point, hub=hub, inclination=inclination_rad)
+
+
+def _turning(axis: TurningAxis | None, array: AccelerometerArray) -> TurningAxis | None:
+    """Return the axis to estimate about: the one given, or the array's own where it can't see all six motions."""
+    from gfimu.geometry.observability import unseen_motions
+
+    if axis is not None:
+        return axis
+    return array.turning_axis if unseen_motions(array) else None
+
+
+def _about_axis(
+    recording: Recording, array: AccelerometerArray, axis: TurningAxis, *, rest_bias: bool, **options: Any
+) -> Estimate:
+    """Estimate about a known axis, with the biases read off a level rest first where that is asked for."""
+    from gfimu.errors import InputError
+    from gfimu.known_axis import estimate_about_axis
+
+    if rest_bias:
+        from gfimu.motion.rest_bias import rest_bias as read_off
+
+        if axis.hub == "free":
+            raise InputError("biases can't be read off the rest of a free hub, as its inclination isn't known exactly")
+        recording = read_off(recording, array).remove(recording)
+    return estimate_about_axis(
+        recording,
+        array,
+        axis,
+        at_rest=options.get("omega0") is not None,
+        smooth=options.get("method") == "smoother",
+        noise_std=options.get("noise_std"),
+    )

@@ -12,6 +12,8 @@ if TYPE_CHECKING:
 
     from gfimu.geometry.array import AccelerometerArray
     from gfimu.geometry.scoring import Score
+    from gfimu.geometry.turning_axis import TurningAxis
+    from gfimu.known_axis import AxisBounds
 
 __all__ = ["score"]
 
@@ -26,7 +28,11 @@ def score(
     spin_axis: str = "z",
     noise_m_s2: float = 0.0287,
     omega_rad_s: ArrayLike | None = None,
-) -> list[Score]:
+    axis: TurningAxis | str | Sequence[float] | None = None,
+    axis_point: Sequence[float] = (0.0, 0.0, 0.0),
+    hub: str = "fixed",
+    sample_rate_hz: float = 100.0,
+) -> list[Score] | list[AxisBounds]:
     """Score the geometry of one or several arrays.
 
     Parameters
@@ -44,6 +50,15 @@ def score(
         Standard deviation of every channel at which the rate bound is taken; the default is an ADXL345 at 100 Hz.
     omega_rad_s : array_like, shape (3,), optional
         Angular rate in place of ``speed_rad_s`` and ``spin_axis``.
+    axis : TurningAxis, str or sequence of float, optional
+        An axis about which alone the arrays turn: x, y, z, or three numbers, body frame. The bounds of that rotation
+        are returned then, for arrays of as few as one chip.
+    axis_point : sequence of float
+        A point of that axis, body frame, m.
+    hub : {"fixed", "free"}
+        Whether that axis stands still (a table) or moves with a body (a wheel).
+    sample_rate_hz : float
+        Sample rate at which the bound of a filter about that axis holds.
 
     Raises
     ------
@@ -66,6 +81,17 @@ def score(
     else:  # boxes of one or two chips see less than a rigid body's motion
         shipped = [AccelerometerArray.load(name) for name in list_models("arrays")]
         given = [array for array in shipped if not unseen_motions(array)]
+    if axis is not None:
+        from gfimu.geometry.turning_axis import TurningAxis
+        from gfimu.known_axis import axis_bounds
+
+        turning = axis if isinstance(axis, TurningAxis) else TurningAxis.of(axis, point=axis_point, hub=hub)
+        return [
+            axis_bounds(
+                as_array(item), turning, rate_rad_s=speed_rad_s, noise_std=noise_m_s2, sample_rate_hz=sample_rate_hz
+            )
+            for item in given
+        ]
     omega = [speed_rad_s * component for component in _AXES[spin_axis]] if omega_rad_s is None else omega_rad_s
     return score_arrays(
         [as_array(item) for item in given], length_unit_m=length_unit_m, omega_rad_s=omega, noise_m_s2=noise_m_s2

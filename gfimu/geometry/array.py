@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gfimu.errors import InputError
 from gfimu.files.model_files import find_model, read_toml
+from gfimu.geometry.turning_axis import TurningAxis
 from gfimu.parts.files import add_part_file, is_part_file
 from gfimu.short_repr import joined, short_repr
 
@@ -74,6 +75,8 @@ class AccelerometerArray:
         One line for people.
     part_files : mapping of str to str
         Text of the part files that are not in ``models/parts``, by the name that the chips use.
+    turning_axis : TurningAxis, optional
+        The axis about which alone the array turns, where it is known.
     """
 
     name: str
@@ -81,6 +84,7 @@ class AccelerometerArray:
     length_unit: float = 0.05
     description: str = ""
     part_files: Mapping[str, str] = field(default_factory=dict)
+    turning_axis: TurningAxis | None = None
 
     def __repr__(self) -> str:
         parts = ", ".join(dict.fromkeys(chip.part for chip in self.chips))
@@ -197,7 +201,7 @@ class AccelerometerArray:
     @classmethod
     def from_dict(cls, data: Mapping[str, Any], *, source: str = "array") -> AccelerometerArray:
         """Build an array from the keys of an array file (contract: ``name``, ``[[chip]]``)."""
-        known = {"name", "chip", "length_unit_m", "description"}
+        known = {"name", "chip", "length_unit_m", "description", "turning_axis"}
         for key in data:
             if key not in known:
                 raise InputError(f"{source}: unknown key {key!r}; valid: {', '.join(sorted(known))}")
@@ -211,14 +215,23 @@ class AccelerometerArray:
         length = data.get("length_unit_m")
         if length is None:
             length = float(np.max(np.abs([chip.position for chip in chips]))) or 1.0
-        return cls(str(data.get("name", Path(source).stem)), chips, float(length), str(data.get("description", "")))
+        turning = data.get("turning_axis")
+        return cls(
+            str(data.get("name", Path(source).stem)),
+            chips,
+            float(length),
+            str(data.get("description", "")),
+            turning_axis=None if turning is None else TurningAxis.from_dict(turning, source=source),
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of the array file."""
+        turning = {} if self.turning_axis is None else {"turning_axis": self.turning_axis.to_dict()}
         return {
             "name": self.name,
             "description": self.description,
             "length_unit_m": self.length_unit,
+            **turning,
             "chip": [
                 {
                     "name": chip.name,

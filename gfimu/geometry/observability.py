@@ -46,7 +46,7 @@ def require_all_motions(array: AccelerometerArray) -> None:
     if unseen:
         raise GeometryError(
             f"array {array.name!r} (rank {6 - len(unseen)} of 6, {array.n_channels} channels) can't see "
-            f"{'; '.join(unseen)}; add sensing axes that do"
+            f"{'; '.join(unseen)}; add sensing axes that do, or give the axis about which alone it turns (--axis)"
         )
 
 

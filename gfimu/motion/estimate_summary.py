@@ -113,7 +113,9 @@ def summarise(estimate: Estimate, recording: Recording, array: AccelerometerArra
     """
     known = np.isfinite(estimate.omega).all(axis=1) & np.isfinite(estimate.p).all(axis=1)
     last = int(np.flatnonzero(known)[-1]) if known.any() else -1
-    axis = Rotation.from_rotvec(recording.mounting_rotvec).inv().apply([0.0, 0.0, 1.0])
+    turning = estimate.metadata.get("turning_axis")
+    upright = Rotation.from_rotvec(recording.mounting_rotvec).inv().apply([0.0, 0.0, 1.0])
+    axis = upright if turning is None else np.asarray(turning["direction"], dtype=float)
     tacho = recording.reference.get("tacho_rad_s")
     gyro = _gyro(recording)
     consistency = estimate.metadata.get("consistency")

@@ -1,0 +1,233 @@
+"""The noise, the inclination and the start of a rotation about one axis, found by the likelihood of the filter."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+
+from gfimu.geometry.turning_axis import TurningAxis
+from gfimu.known_axis.channels import AxisChannels
+from gfimu.known_axis.recursion import filter_axis
+from gfimu.units import STANDARD_GRAVITY
+
+__all__ = ["AxisFit", "Settings", "fit_axis"]
+
+_LEARNT_FROM = 3000  # samples: enough for four numbers
+_TRIED_ON = 600  # samples, on which starts are compared
+_PHASES = 8  # of gravity at the start
+_LEVEL = 0.03  # rad: below it gravity across the axis shows no angle beside biases
+_STD_START = np.array([0.5, 0.3, 5.0])  # of [θ, Ω, α] at a start that was tried, rad, rad/s, rad/s²
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Numbers that the filter runs with.
+
+    Parameters
+    ----------
+    noise_scale : float
+        Standard deviation of the channels over that of their data sheets.
+    jerk : float
+        Spectral density of the change of α, rad²/s⁵.
+    hub : float
+        Standard deviation of the axis's own specific force, m/s²; 0 where it stands still.
+    inclination : float
+        Angle between axis and vertical, rad.
+    """
+
+    noise_scale: float
+    jerk: float
+    hub: float
+    inclination: float
+
+
+@dataclass(frozen=True)
+class AxisFit:
+    """What the likelihood found.
+
+    Parameters
+    ----------
+    settings : Settings
+        Numbers of the filter.
+    start : ndarray, shape (3,)
+        [θ, Ω, α] before the first sample.
+    start_covariance : ndarray, shape (3, 3)
+        Its covariance.
+    sign_log_odds : float
+        Log odds of the sign of the rate over the other one, nats.
+    """
+
+    settings: Settings
+    start: NDArray[np.float64]
+    start_covariance: NDArray[np.float64]
+    sign_log_odds: float
+
+
+class _Problem:
+    """Readings with what is known of their channels."""
+
+    def __init__(
+        self,
+        t: NDArray[np.float64],
+        y: NDArray[np.float64],
+        channels: AxisChannels,
+        noise: NDArray[np.float64],
+    ) -> None:
+        self.t, self.y, self.channels, self.noise = t, y, channels, noise
+
+    def likelihood(
+        self, settings: Settings, start: NDArray[np.float64], covariance: NDArray[np.float64], samples: int
+    ) -> float:
+        """Return the log likelihood of the first samples."""
+        found = self.run(settings, start, covariance, samples)[4]
+        return float(found) if np.isfinite(found) else -np.inf
+
+    def run(
+        self,
+        settings: Settings,
+        start: NDArray[np.float64],
+        covariance: NDArray[np.float64],
+        samples: int | None = None,
+    ) -> tuple:  # type: ignore[type-arg]
+        rows = slice(None, samples)
+        one = self.channels
+        gravity = STANDARD_GRAVITY
+        return filter_axis(
+            self.t[rows],
+            self.y[rows],
+            one.force,
+            one.by_acceleration,
+            one.by_square,
+            gravity * np.cos(settings.inclination),
+            gravity * np.sin(settings.inclination),
+            (settings.noise_scale * self.noise) ** 2,
+            settings.hub**2,
+            settings.jerk,
+            start,
+            covariance,
+        )
+
+
+def fit_axis(
+    t: NDArray[np.float64],
+    y: NDArray[np.float64],
+    channels: AxisChannels,
+    axis: TurningAxis,
+    noise: NDArray[np.float64],
+    *,
+    at_rest: bool,
+) -> AxisFit:
+    """Find noise, smoothness, inclination and start by the likelihood of the filter's innovations.
+
+    Parameters
+    ----------
+    t, y : ndarray, shapes (n,) and (n, c)
+        Times, s, and readings, m/s².
+    channels : AxisChannels
+        What the channels read.
+    axis : TurningAxis
+        The axis; a known inclination is kept.
+    noise : ndarray, shape (c,)
+        Standard deviation of the channels by their data sheets, m/s².
+    at_rest : bool
+        Whether the body is at rest at the first sample.
+    """
+    problem = _Problem(t, y, channels, noise)
+    tilt = _inclination(y, channels) if axis.inclination is None else axis.inclination
+    if axis.inclination is None and np.sin(tilt) <= _LEVEL:
+        tilt = 0.0 if np.cos(tilt) > 0.0 else np.pi  # upright: what is across would be biases
+    settings = Settings(2.0, 100.0, 0.0 if axis.hub == "fixed" else 1.0, tilt)
+    tried = min(_TRIED_ON, len(t))
+    covariance = np.diag(_STD_START**2)
+    if at_rest:
+        covariance = np.diag([_STD_START[0] ** 2, 1e-4, 1e-2])
+    starts = list(_starts(y, channels, tilt, at_rest=at_rest))
+    best = max(starts, key=lambda start: problem.likelihood(settings, start, covariance, tried))
+    settings = _learnt(problem, settings, axis, best, covariance)
+    best = max(starts, key=lambda start: problem.likelihood(settings, start, covariance, tried))
+    if at_rest:
+        return AxisFit(settings, best, covariance, float("inf"))
+    mirrored = [start for start in starts if start[1] * best[1] < 0.0] or [best * np.array([1.0, -1.0, -1.0])]
+    other = max(mirrored, key=lambda start: problem.likelihood(settings, start, covariance, tried))
+    one, two = problem.run(settings, best, covariance), problem.run(settings, other, covariance)
+    odds = float(one[4] - two[4])
+    if odds < 0.0:
+        best, odds = other, -odds
+    # Starts of either sign that end in one motion began where the rate was near zero: there is no other sign.
+    alike = np.median(np.abs(one[0][:, 1] - two[0][:, 1])) < 0.1 * np.median(np.abs(one[0][:, 1] + two[0][:, 1]))
+    return AxisFit(settings, best, covariance, float("inf") if alike else odds)
+
+
+def _inclination(y: NDArray[np.float64], channels: AxisChannels) -> float:
+    """Return the angle between axis and vertical from the mean force along the axis, rad."""
+    matrix = channels.motion_matrix()
+    rows = y[np.isfinite(y).all(axis=1)]
+    if not len(rows):
+        return 0.0
+    along = float(np.linalg.lstsq(matrix, rows.mean(axis=0), rcond=None)[0][2])
+    return float(np.arccos(np.clip(along / STANDARD_GRAVITY, -1.0, 1.0)))
+
+
+def _starts(
+    y: NDArray[np.float64], channels: AxisChannels, tilt: float, *, at_rest: bool
+) -> Iterator[NDArray[np.float64]]:
+    """Yield states to start from: the phase of gravity, and either sign of the rate that the first samples show."""
+    first = y[: max(min(20, len(y)), 1)]
+    known = first[np.isfinite(first).all(axis=1)]
+    mean = known.mean(axis=0) if len(known) else np.zeros(y.shape[1])
+    solution = np.linalg.lstsq(channels.motion_matrix(), mean, rcond=None)[0]
+    rate = 0.0 if at_rest else float(np.sqrt(max(solution[1], 0.0)))
+    phases = np.arange(_PHASES) * 2.0 * np.pi / _PHASES if np.sin(tilt) > _LEVEL else np.zeros(1)
+    if at_rest and np.sin(tilt) > _LEVEL:
+        phases = np.array([np.arctan2(-solution[4], solution[3])])
+    for phase in phases:
+        if at_rest:
+            yield np.array([phase, 0.0, 0.0])
+            continue
+        for speed in (rate, 0.5 * rate + 0.5, 2.0 * rate + 1.0):
+            yield np.array([phase, speed, 0.0])
+            yield np.array([phase, -speed, 0.0])
+
+
+def _learnt(
+    problem: _Problem,
+    settings: Settings,
+    axis: TurningAxis,
+    start: NDArray[np.float64],
+    covariance: NDArray[np.float64],
+) -> Settings:
+    """Return the settings of the greatest likelihood over the first minutes."""
+    samples = min(_LEARNT_FROM, len(problem.t))
+    free_tilt = axis.inclination is None and np.sin(settings.inclination) > _LEVEL
+
+    def of(values: NDArray[np.float64]) -> Settings:
+        scale, jerk, *others = values
+        found = replace(settings, noise_scale=float(np.exp(scale)), jerk=float(np.exp(jerk)))
+        if axis.hub == "free":
+            found = replace(found, hub=float(np.exp(others.pop(0))))
+        if free_tilt:
+            found = replace(found, inclination=float(np.clip(others.pop(0), 0.0, np.pi)))
+        return found
+
+    guess = [np.log(settings.noise_scale), np.log(settings.jerk)]
+    spans = [0.7, 2.0]
+    if axis.hub == "free":
+        guess.append(np.log(settings.hub))
+        spans.append(0.7)
+    if free_tilt:
+        guess.append(settings.inclination)
+        spans.append(0.1)
+    simplex = np.array(
+        [guess, *(np.array(guess) + np.eye(len(guess))[place] * span for place, span in enumerate(spans))]
+    )
+    found = minimize(
+        lambda values: -problem.likelihood(of(values), start, covariance, samples),
+        guess,
+        method="Nelder-Mead",
+        options={"initial_simplex": simplex, "maxfev": 20 + 20 * len(guess), "xatol": 0.05, "fatol": 1.0},
+    )
+    return of(found.x)

@@ -1,0 +1,50 @@
+"""A world of its own for rotations about one axis: the readings from second differences of positions in the world."""
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation
+
+from gfimu.geometry.array import AccelerometerArray, Chip
+from gfimu.recording import Recording
+from gfimu.units import STANDARD_GRAVITY
+
+RATE = 100.0
+NOISE = 0.0287  # m/s²
+
+
+def array_of(*positions):
+    chips = tuple(Chip(f"a{n}", np.array(place, float), np.eye(3)) for n, place in enumerate(positions, 1))
+    return AccelerometerArray("few", chips)
+
+
+def turned(
+    array, u, rng, *, point=(0.0, 0.0, 0.0), tilt=0.0, hub=0.0, rest=True, speed=8.0, duration=40.0, noise=NOISE
+):
+    """Return a recording of an array that turns about an axis, and its rate and angle at the samples.
+
+    The body's axis ``u`` stands at ``tilt`` from the vertical; the hub shakes by ``hub`` m/s², white.
+    """
+    knots = np.linspace(0.0, duration, 12)
+    rates = rng.uniform(-speed, speed, 12)
+    if rest:
+        rates[:2] = 0.0
+    rate = CubicSpline(knots, rates, bc_type="clamped")
+    angle = rate.antiderivative()
+    t = np.arange(0.0, duration, 1.0 / RATE)
+    u = np.asarray(u, float) / np.linalg.norm(u)
+    stands = Rotation.align_vectors([[np.sin(tilt), 0.0, np.cos(tilt)]], [u])[0]  # body at angle 0 to world
+
+    def attitude(at):
+        return stands * Rotation.from_rotvec(np.outer(angle(at) + 1.0, u))
+
+    h = 1e-4
+    readings = np.empty((len(t), array.n_channels))
+    shake = hub * rng.standard_normal((len(t), 3))
+    up = np.array([0.0, 0.0, STANDARD_GRAVITY])
+    for chip in range(len(array.chips)):
+        lever = array.chips[chip].position - np.asarray(point)
+        places = [attitude(at).apply(lever) for at in (t - h, t, t + h)]
+        acceleration = (places[0] - 2.0 * places[1] + places[2]) / h**2
+        readings[:, 3 * chip : 3 * chip + 3] = attitude(t).inv().apply(acceleration + up + shake)
+    readings += noise * rng.standard_normal(readings.shape)
+    return Recording.from_arrays(t, readings, array), rate(t), angle(t) - angle(t[0])
