@@ -39,6 +39,9 @@ if TYPE_CHECKING:
     from gfimu.calibration.result import load_calibration as load_calibration
     from gfimu.commands import firmware as firmware
     from gfimu.commands.calibrate import calibrate as calibrate
+    from gfimu.commands.catalogue import catalogue as catalogue
+    from gfimu.commands.catalogue import new as new
+    from gfimu.commands.catalogue import show as show
     from gfimu.commands.convert import convert as convert
     from gfimu.commands.demo import demo as demo
     from gfimu.commands.design import design as design
@@ -109,6 +112,7 @@ _PUBLIC = {
     "calibrate": "gfimu.commands.calibrate",
     "calibrate_array": "gfimu.calibration.array_calibration",
     "centripetal_agreement": "gfimu.motion.estimate_summary",
+    "catalogue": "gfimu.commands.catalogue",
     "closed_form": "gfimu.geometry.kinematics",
     "convert": "gfimu.commands.convert",
     "inspect": "gfimu.commands.inspect",
@@ -135,6 +139,7 @@ _PUBLIC = {
     "monte_carlo_drift": "gfimu.position_drift.monte_carlo",
     "motion_from_readings": "gfimu.geometry.kinematics",
     "navigate": "gfimu.motion.navigation",
+    "new": "gfimu.commands.catalogue",
     "noise": "gfimu.commands.noise",
     "null_space": "gfimu.geometry.kinematics",
     "open_recording": "gfimu.recording.formats",
@@ -146,6 +151,7 @@ _PUBLIC = {
     "record": "gfimu.commands.record",
     "recording_noise": "gfimu.sensor_noise",
     "score": "gfimu.commands.score",
+    "show": "gfimu.commands.catalogue",
     "simulate": "gfimu.commands.simulate",
     "specific_force": "gfimu.geometry.kinematics",
     "summarise": "gfimu.motion.estimate_summary",

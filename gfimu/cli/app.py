@@ -31,6 +31,9 @@ COMMAND_FILES = (
     "record",
     "firmware",
     "view",
+    "list",
+    "show",
+    "new",
 )
 
 _DEBUG = "--debug"

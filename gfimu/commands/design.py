@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from gfimu.diagnosis.design.profile_search import Limits
     from gfimu.diagnosis.design.proposal import Proposal
     from gfimu.recording import Recording
-    from gfimu.recording.formats import open_recording
     from gfimu.world_model import Effect, WorldModel
     from sim.twin import Twin
 
@@ -96,6 +95,7 @@ def design(
     from gfimu.diagnosis.design.design import design as propose
     from gfimu.files.atomic_file import write_text
     from gfimu.recording import Recording
+    from gfimu.recording.formats import open_recording
 
     if (verdict is None) == (not effects):
         raise InputError("name effects to tell apart, or give --verdict: one of the two")

@@ -69,9 +69,8 @@ def score(
     """
     from gfimu.commands.opened import as_array
     from gfimu.errors import unknown_name
-    from gfimu.files.model_files import list_models
     from gfimu.geometry.array import AccelerometerArray
-    from gfimu.geometry.observability import unseen_motions
+    from gfimu.geometry.observability import seeing_arrays
     from gfimu.geometry.scoring import score as score_arrays
 
     if spin_axis not in _AXES:
@@ -79,8 +78,7 @@ def score(
     if arrays:
         given = [arrays] if isinstance(arrays, AccelerometerArray | str | Path) else list(arrays)
     else:  # boxes of one or two chips see less than a rigid body's motion
-        shipped = [AccelerometerArray.load(name) for name in list_models("arrays")]
-        given = [array for array in shipped if not unseen_motions(array)]
+        given = list(seeing_arrays())
     if axis is not None:
         from gfimu.geometry.turning_axis import TurningAxis
         from gfimu.known_axis import axis_bounds

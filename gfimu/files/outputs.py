@@ -27,6 +27,7 @@ __all__ = [
     "RECORDING",
     "RERUN",
     "SCENARIO",
+    "TOML_FILE",
     "TRACE",
     "OutputFile",
     "OutputFolder",
@@ -107,6 +108,7 @@ CALIBRATION = OutputFile("a calibration", (".json",))
 COLUMN_MAP = OutputFile("a column map", (".toml",))
 ARRAY_FILE = OutputFile("an array file", (".toml",))
 SCENARIO = OutputFile("a scenario file", (".toml",))
+TOML_FILE = OutputFile("a TOML file", (".toml",))
 KALIBR = OutputFile("a Kalibr file", (".yaml", ".yml"))
 PICTURE = OutputFile("a picture", (".png", ".svg", ".pdf"))
 

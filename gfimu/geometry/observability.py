@@ -7,9 +7,10 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 from gfimu.errors import GeometryError
+from gfimu.files.model_files import list_models
 from gfimu.geometry.array import AccelerometerArray
 
-__all__ = ["MOTION_NAMES", "RANK_TOLERANCE", "require_all_motions", "unseen_motions"]
+__all__ = ["MOTION_NAMES", "RANK_TOLERANCE", "require_all_motions", "seeing_arrays", "unseen_motions"]
 
 MOTION_NAMES = ("alpha_x", "alpha_y", "alpha_z", "p_x", "p_y", "p_z")
 """Order of the columns of J and of the rows of its left inverse."""
@@ -32,6 +33,11 @@ def unseen_motions(array: AccelerometerArray) -> tuple[str, ...]:
     *_, pivots = scipy.linalg.qr(free.T, pivoting=True, mode="economic")
     basis = np.linalg.solve(free[pivots[: free.shape[1]]].T, free.T)  # (d, 6)
     return tuple(_motion_in_words(motion / scale) for motion in basis)
+
+
+def seeing_arrays() -> list[str]:
+    """Return the names of the shipped arrays that see all six motions; the others need a known axis."""
+    return [name for name in list_models("arrays") if not unseen_motions(AccelerometerArray.load(name))]
 
 
 def require_all_motions(array: AccelerometerArray) -> None:

@@ -25,6 +25,9 @@ OTHER_WORDS = {
 }
 """Options whose word Python or its builtins take, and the arguments that stand for them."""
 
+PYTHON_NAME = {"list": "catalogue"}
+"""Commands whose word is a builtin of Python, and the functions that stand for them."""
+
 NO_ARGUMENT = {"--json", "--help"}
 NAMES_A_FILE = {
     "array",
@@ -53,6 +56,7 @@ CALLS = {
     "view": {"file": "in.csv"},
     "optimize": {"chips": "4", "restarts": "1"},
     "demo": {},
+    "new": {"kind": "array", "out": "made.toml"},
     "firmware run": {},
     "firmware build": {},
     "firmware trace": {"out": "made.vcd"},
@@ -67,7 +71,7 @@ def commands():
             for inner, sub in command.commands.items():
                 yield f"{name} {inner}", sub, getattr(getattr(gfimu, name), inner)
         else:
-            yield name, command, getattr(gfimu, name)
+            yield name, command, getattr(gfimu, PYTHON_NAME.get(name, name))
 
 
 COMMANDS = {name: (command, function) for name, command, function in commands()}
@@ -113,7 +117,7 @@ def test_every_path_is_declared_as_read_or_written(name):
 def test_the_docs_list_every_command_with_its_function(project_root):
     page = (project_root / "docs" / "commands.md").read_text(encoding="utf-8")
     rows = dict(re.findall(r"^\| `gfimu ([a-z]+(?: [a-z]+)?)[^|]*\| `gfimu\.([a-z.]+)\(", page, re.MULTILINE))
-    assert rows == {name: name.replace(" ", ".") for name in COMMANDS}
+    assert rows == {name: PYTHON_NAME.get(name, name.replace(" ", ".")) for name in COMMANDS}
     for flag, argument in OTHER_WORDS.items():
         assert f"`{flag}` is `{argument}`" in page
     written = {suffix for _, function in COMMANDS.values() for output in getattr(function, "__outputs__", {}).values()

@@ -4,14 +4,14 @@ import json
 
 import pytest
 
-from gfimu.files.model_files import list_models
 from gfimu.geometry.array import AccelerometerArray
+from gfimu.geometry.observability import seeing_arrays
 
 
 def test_without_arguments_compares_every_shipped_array(gfimu_command):
     result = gfimu_command("score")
     assert result.code == 0
-    for name in list_models("arrays"):
+    for name in seeing_arrays():
         assert name in result.stdout
     assert "0.05 m" in result.stdout
     assert "1.0607" in result.stdout

@@ -8,7 +8,6 @@ from hypothesis.extra import numpy as hnp
 from scipy.spatial.transform import Rotation
 
 from gfimu.errors import GeometryError, InputError
-from gfimu.files.model_files import list_models
 from gfimu.geometry.array import AccelerometerArray, Chip
 from gfimu.geometry.kinematics import (
     closed_form,
@@ -23,8 +22,9 @@ from gfimu.geometry.kinematics import (
     specific_force,
     unseen_motions,
 )
+from gfimu.geometry.observability import seeing_arrays
 
-SHIPPED = list_models("arrays")
+SHIPPED = seeing_arrays()
 CUBES = ("cube12", "cube12_as_built")
 JOINT = ("cube12", "cube12_as_built", "corners8", "p3_three_plus_one", "mimu4444", "nap_3_2_2_2")
 

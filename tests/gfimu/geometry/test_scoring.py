@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from gfimu.errors import GeometryError, InputError
-from gfimu.files.model_files import list_models
 from gfimu.geometry.array import AccelerometerArray, Chip
 from gfimu.geometry.dilution import gdop, gdop_lower_bound
+from gfimu.geometry.observability import seeing_arrays
 from gfimu.geometry.scoring import ranking_remark, score
 
 # Lengths in units of half the cube's edge. κ and GDOP of the tetrahedral cube: GF-IMU paper (1.414, 1.061); the rest
@@ -206,7 +206,7 @@ def test_no_quadruple_in_the_cube_beats_the_tetrahedron():
 
 
 def test_every_shipped_array_is_scored_and_written_plainly():
-    for entry in score(list_models("arrays")):
+    for entry in score(seeing_arrays()):
         content = entry.to_dict()
         assert {
             "name",
@@ -268,7 +268,7 @@ def test_table_in_the_docs_is_what_the_code_computes(project_root):
         for line in (project_root / "docs" / "geometry.md").read_text(encoding="utf-8").splitlines()
         if line.startswith("| `")
     ]
-    assert {row[0].strip("`") for row in rows} == set(list_models("arrays"))
+    assert {row[0].strip("`") for row in rows} == set(seeing_arrays())
     for name, channels, condition, dilution, joint, left, seen in rows:
         (found,) = score(name.strip("`"))
         assert int(channels) == found.n_channels

@@ -1,0 +1,34 @@
+"""`gfimu list`: what comes with gfimu."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from gfimu.cli.output import JsonOption, print_json, print_table
+from gfimu.commands.catalogue import KINDS
+
+__all__ = ["register"]
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command(name="list")(_list)
+
+
+def _list(
+    kind: Annotated[str, typer.Argument(help=f"What to list: {', '.join(KINDS)}.")],
+    json: JsonOption = False,
+) -> None:
+    """List what comes with gfimu.
+
+    Example: gfimu list maps
+    """
+    from gfimu.commands.catalogue import catalogue
+
+    found = catalogue(kind)
+    if json:
+        print_json(found)
+    else:
+        print_table(kind, ("name", "what it is"), found.items(), left=2)

@@ -1,0 +1,69 @@
+"""What comes with gfimu can be listed and shown, and every file to start from works as it is."""
+
+import pytest
+
+from gfimu.commands.catalogue import KINDS, TEMPLATES
+from gfimu.files.model_files import list_models
+from gfimu.geometry.array import AccelerometerArray
+from gfimu.importing import load_map
+from gfimu.parts.part import Part
+from sim.data_sheet import DataSheet
+from sim.scenarios import Scenario
+from sim.twin import Twin
+
+LOADERS = {
+    "array": AccelerometerArray.load,
+    "part": lambda path: (Part.load(str(path)), DataSheet.load(str(path))),
+    "map": load_map,
+    "twin": Twin.load,
+    "scenario": Scenario.load,
+}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_all_of_a_kind_are_listed_with_what_they_are(gfimu_command, kind):
+    result = gfimu_command("list", kind, "--json")
+    assert result.code == 0
+    import json
+
+    found = json.loads(result.stdout)
+    assert len(found) >= 2
+    assert all(found.values())
+    if kind in {"arrays", "parts", "maps", "twins", "scenarios"}:
+        assert set(found) == set(list_models(kind))
+
+
+@pytest.mark.parametrize("kind", TEMPLATES)
+def test_a_file_to_start_from_can_be_used(gfimu_command, tmp_path, kind):
+    file = tmp_path / f"my_{kind}.toml"
+    assert gfimu_command("new", kind, "--out", file).code == 0
+    assert file.read_text().startswith("# ")
+    LOADERS[kind](file)
+    again = gfimu_command("new", kind, "--out", file)
+    assert again.code == 2
+    assert "is there already" in again.stderr
+
+
+@pytest.mark.parametrize("name", ["cube12", "adxl355", "klipper", "cube12_turntable", "rest", "table_tilt"])
+def test_what_has_a_name_is_shown(gfimu_command, name):
+    result = gfimu_command("show", name)
+    assert result.code == 0
+    assert name.partition("_turn")[0] in result.stdout
+
+
+@pytest.mark.parametrize("words", [("list", "nothing"), ("show", "nothing"), ("new", "nothing")])
+def test_an_unknown_name_is_one_line(gfimu_command, words):
+    result = gfimu_command(*words)
+    assert result.code == 2
+    assert result.stderr.count("\n") == 1
+    assert "nothing" in result.stderr
+
+
+@pytest.mark.parametrize("name", list_models("parts"))
+def test_every_shipped_part_has_a_sound_data_sheet(name):
+    part, sheet = Part.load(name), DataSheet.load(name)
+    assert 1e-7 < part.lsb < 1.0
+    assert sheet.full_range > 100 * part.lsb
+    density = part.noise_std_100_hz / 50.0**0.5 / 9.80665
+    assert ((density > 1e-5) & (density < 6e-3)).all()  # 10 µg/√Hz to 6 mg/√Hz
+    assert (sheet.offset_std < 0.5 * sheet.full_range).all()
