@@ -238,6 +238,7 @@ ROOMS = {
     "gfimu.geometry": {"gfimu.bounds", "gfimu.files", "gfimu.parts.files"},
     "gfimu.importing": {"gfimu.files", "gfimu.geometry.array"},
     "gfimu.recording": {"gfimu.files", "gfimu.geometry", "gfimu.importing", "gfimu.parts", "gfimu.rate.integration"},
+    "gfimu.exporting": {"gfimu.files", "gfimu.geometry", "gfimu.parts", "gfimu.recording"},
     "gfimu.joining": {"gfimu.files", "gfimu.importing", "gfimu.recording"},
     "gfimu.motion": {"gfimu.files", "gfimu.geometry", "gfimu.parts", "gfimu.rate", "gfimu.recording"},
     "gfimu.position_drift": {"gfimu.geometry", "gfimu.motion", "gfimu.rate.integration"},

@@ -26,7 +26,9 @@ def _convert(
             help="Recording: .csv, .parquet, a MIMU4444 stream, or with --map a foreign file, one per chip.",
         ),
     ],
-    target: Annotated[Path, typer.Argument(help="Recording to write, .csv or .parquet.")],
+    target: Annotated[
+        Path, typer.Argument(help="Recording to write: .csv, .parquet, .mcap (ROS 2), .euroc (a folder).")
+    ],
     array: Annotated[
         str | None, typer.Option("--array", help="Array whose channels must be there; else every channel found.")
     ] = None,
@@ -41,6 +43,8 @@ def _convert(
     A Klipper recording: gfimu convert adxl345-x.csv run.parquet --map klipper
 
     A file of unknown layout: gfimu inspect log.txt --out log.toml, then gfimu convert log.txt run.csv --map log.toml
+
+    For ROS 2: gfimu convert run.parquet run.mcap
 
     One file per chip on a common clock: gfimu convert chip1.csv chip2.csv run.parquet --map klipper --array mine.toml
     """

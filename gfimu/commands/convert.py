@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gfimu.errors import InputError
-from gfimu.files.outputs import RECORDING, writes
+from gfimu.files.outputs import EXPORT, writes
 
 if TYPE_CHECKING:
     from gfimu.geometry.array import AccelerometerArray
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 __all__ = ["convert"]
 
 
-@writes(reads=("source", "array", "column_map"), target=RECORDING)
+@writes(reads=("source", "array", "column_map"), target=EXPORT)
 def convert(
     source: Recording | str | Path | MappedFile | Sequence[str | Path],
     target: str | Path | None = None,
@@ -28,7 +28,7 @@ def convert(
     column_map: ColumnMap | str | Path | None = None,
     table: str | None = None,
 ) -> Recording:
-    """Read a recording in any format that is known, in m/s², and write it as CSV or Parquet.
+    """Read a recording in any format that is known, in m/s², and write it as CSV, Parquet, MCAP or EuRoC.
 
     Parameters
     ----------
@@ -36,7 +36,8 @@ def convert(
         The recording, or its file: CSV, Parquet, a MIMU4444 stream, or a foreign file with its column map;
         one file per chip on a common clock, with a map.
     target : str or Path, optional
-        Recording to write, ``.csv`` or ``.parquet``.
+        Recording to write: ``.csv`` or ``.parquet``; ``.mcap`` with a topic of ``sensor_msgs/Imu`` per tri-axial chip;
+        ``.euroc``, a folder in the layout of EuRoC / ASL.
     array : AccelerometerArray, str or Path, optional
         Array whose channels must be there; every channel found by default.
     column_map : ColumnMap, str or Path, optional
@@ -68,8 +69,18 @@ def convert(
         named = os.fspath(given[0]) if isinstance(given[0], str | os.PathLike) else "the recording"
         carried_array(recording.metadata, source=named)  # a damaged one is not passed on
     if target is not None:
-        recording.write(target)
+        _write(recording, Path(target))
     return recording
+
+
+def _write(recording: Recording, target: Path) -> None:
+    """Write a recording in the format that the ending of a file says."""
+    if target.suffix in {".mcap", ".euroc"}:
+        from gfimu.exporting import write_euroc, write_mcap
+
+        (write_mcap if target.suffix == ".mcap" else write_euroc)(target, recording)
+    else:
+        recording.write(target)
 
 
 def _given(

@@ -22,6 +22,7 @@ __all__ = [
     "CALIBRATION",
     "COLUMN_MAP",
     "ESTIMATE",
+    "EXPORT",
     "KALIBR",
     "PICTURE",
     "RECORDING",
@@ -101,6 +102,7 @@ class OutputFolder:
 Output = OutputFile | OutputFolder
 
 RECORDING = OutputFile("a recording", (".csv", ".parquet"))
+EXPORT = OutputFile("a recording", (".csv", ".parquet", ".mcap", ".euroc"))
 ESTIMATE = OutputFile("an estimate", (".csv", ".parquet"))
 RERUN = OutputFile("a rerun recording", (".rrd",))
 TRACE = OutputFile("a trace", (".vcd", ".rrd"))
