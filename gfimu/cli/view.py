@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from gfimu.cli.mapped import MapOption
 from gfimu.cli.output import print_paths
 
 __all__ = ["register"]
@@ -23,6 +24,7 @@ def _view(
         str | None,
         typer.Option("--array", help="Array: a name, a .toml file or MJCF sites (.xml); else the recording's own."),
     ] = None,
+    column_map: MapOption = None,
     out: Annotated[Path | None, typer.Option("--out", help="Write the .rrd here and don't open it.")] = None,
 ) -> None:
     """Open a run in the rerun viewer: the rig in 3-D, raw channels, and the estimate over time.
@@ -33,4 +35,10 @@ def _view(
     """
     from gfimu.commands.view import view
 
-    view(file, array=array, out=out, on_picture=lambda picture: print_paths([("rerun recording", picture)]))
+    view(
+        file,
+        array=array,
+        column_map=column_map,
+        out=out,
+        on_picture=lambda picture: print_paths([("rerun recording", picture)]),
+    )

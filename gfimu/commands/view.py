@@ -10,15 +10,17 @@ from gfimu.files.outputs import RERUN, check_outputs, writes
 
 if TYPE_CHECKING:
     from gfimu.geometry.array import AccelerometerArray
+    from gfimu.importing import ColumnMap
 
 __all__ = ["view"]
 
 
-@writes(reads=("file", "array"), out=RERUN)
+@writes(reads=("file", "array", "column_map"), out=RERUN)
 def view(
     file: str | Path,
     *,
     array: AccelerometerArray | str | Path | None = None,
+    column_map: ColumnMap | str | Path | None = None,
     out: str | Path | None = None,
     on_picture: Callable[[Path], None] | None = None,
 ) -> Path:
@@ -30,6 +32,8 @@ def view(
         A ``.rrd`` file, or a recording to make one from; its picture goes beside it as ``FILE.view.rrd``.
     array : AccelerometerArray, str or Path, optional
         The array, its name or file; the recording's own by default.
+    column_map : ColumnMap, str or Path, optional
+        What the columns of a foreign file are: a map, its name or TOML file (``--map``).
     out : str or Path, optional
         Write the ``.rrd`` here and don't open it.
     on_picture : callable, optional
@@ -47,7 +51,7 @@ def view(
     GfimuError
         If this machine has no display, or the viewer fails; the message says what to do instead.
     """
-    from gfimu.commands.opened import as_array
+    from gfimu.commands.opened import as_array, by_map
     from gfimu.visual.picture import picture_of, picture_path
     from gfimu.visual.viewer import open_viewer
 
@@ -57,7 +61,7 @@ def view(
         return source
     picture = picture_path(source) if out is None else Path(out)
     check_outputs([("out", picture, RERUN)], [source])
-    picture_of(source, picture, array=None if array is None else as_array(array))
+    picture_of(by_map(source, column_map), picture, array=None if array is None else as_array(array))
     if on_picture is not None:
         on_picture(picture)
     if out is None:

@@ -141,8 +141,17 @@ def identify_noise(values: ArrayLike, rate: float, *, candidates: Sequence[str] 
     Raises
     ------
     InputError
-        If the series is too short or does not vary.
+        If the series is too short, does not vary, or varies so smoothly that it is no noise.
     """
+    try:
+        return _identified(values, rate, candidates)
+    except np.linalg.LinAlgError:
+        raise InputError(
+            "the readings vary too smoothly for noise: the unit moves, or they were filtered; give a recording at rest"
+        ) from None
+
+
+def _identified(values: ArrayLike, rate: float, candidates: Sequence[str]) -> NoiseModel:
     series = np.asarray(values, dtype=float)
     if len(series) < _SHORTEST:
         raise InputError(f"{len(series)} samples are too few to identify noise; {_SHORTEST} or more are needed")

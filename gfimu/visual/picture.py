@@ -12,6 +12,7 @@ from gfimu.motion.estimation import Estimate, estimate
 from gfimu.motion.rest_bias import estimate_from_rest
 from gfimu.recording import Recording
 from gfimu.recording.formats import open_run
+from gfimu.recording.mapped import MappedFile
 from gfimu.visual.run import write_run
 
 __all__ = ["picture_of", "picture_path"]
@@ -25,12 +26,12 @@ def picture_path(recording: Path) -> Path:
     return Path(tempfile.mkdtemp(prefix="gfimu-")) / name
 
 
-def picture_of(recording: Path, out: Path, *, array: AccelerometerArray | None = None) -> None:
+def picture_of(recording: Path | MappedFile, out: Path, *, array: AccelerometerArray | None = None) -> None:
     """Write the rerun recording of a recording file, with its estimate where the array sees all six motions.
 
     Parameters
     ----------
-    recording : Path
+    recording : Path or MappedFile
         Recording, in any format that `gfimu.recording.formats.open_run` reads.
     out : Path
         File to write, ``.rrd``.
@@ -42,11 +43,12 @@ def picture_of(recording: Path, out: Path, *, array: AccelerometerArray | None =
     InputError
         If the recording can't be read, names no array, or the picture can't be written.
     """
-    if recording.suffix == ".rrd":
+    name = Path(recording)
+    if name.suffix == ".rrd":
         raise InputError(f"{recording}: already a rerun recording; open it without --out")
     run, geometry = open_run(recording, array)
     found, note = _estimate(run, geometry)
-    write_run(out, run, geometry, estimate=found, notes=note, title=recording.stem)
+    write_run(out, run, geometry, estimate=found, notes=note, title=name.stem)
 
 
 def _estimate(run: Recording, array: AccelerometerArray) -> tuple[Estimate | None, str]:
