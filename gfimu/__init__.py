@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from gfimu.commands.catalogue import catalogue as catalogue
     from gfimu.commands.catalogue import new as new
     from gfimu.commands.catalogue import show as show
+    from gfimu.commands.check import check as check
     from gfimu.commands.convert import convert as convert
     from gfimu.commands.demo import demo as demo
     from gfimu.commands.design import design as design
@@ -113,6 +114,7 @@ _PUBLIC = {
     "calibrate_array": "gfimu.calibration.array_calibration",
     "centripetal_agreement": "gfimu.motion.estimate_summary",
     "catalogue": "gfimu.commands.catalogue",
+    "check": "gfimu.commands.check",
     "closed_form": "gfimu.geometry.kinematics",
     "convert": "gfimu.commands.convert",
     "inspect": "gfimu.commands.inspect",

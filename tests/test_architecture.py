@@ -238,7 +238,7 @@ ROOMS = {
     "gfimu.geometry": {"gfimu.bounds", "gfimu.files", "gfimu.parts.files"},
     "gfimu.importing": {"gfimu.files", "gfimu.geometry.array"},
     "gfimu.recording": {"gfimu.files", "gfimu.geometry", "gfimu.importing", "gfimu.parts", "gfimu.rate.integration"},
-    "gfimu.exporting": {"gfimu.files", "gfimu.geometry", "gfimu.parts", "gfimu.recording"},
+    "gfimu.exporting": {"gfimu.geometry", "gfimu.parts", "gfimu.recording"},
     "gfimu.joining": {"gfimu.files", "gfimu.importing", "gfimu.recording"},
     "gfimu.motion": {"gfimu.files", "gfimu.geometry", "gfimu.parts", "gfimu.rate", "gfimu.recording"},
     "gfimu.position_drift": {"gfimu.geometry", "gfimu.motion", "gfimu.rate.integration"},
@@ -277,6 +277,7 @@ OUTSIDE = {
     "data": {"gfimu.recording", "gfimu.motion.body_drive"},
     "terms": {"gfimu.motion.body_drive"},
     "criticism": {"gfimu.geometry.kinematics"},
+    "design": {"gfimu.recording", "gfimu.importing.oddities"},
     "verdict": {"gfimu.motion.attitude", "gfimu.files.model_files"},
     "report": {"gfimu.recording", "gfimu.visual"},
 }

@@ -23,6 +23,7 @@ COMMAND_FILES = (
     "inspect",
     "convert",
     "join",
+    "check",
     "diagnose",
     "drift",
     "design",

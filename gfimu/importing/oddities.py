@@ -11,6 +11,8 @@ _NOISY = 3.0  # times the median noise of the channels of its kind
 _PILE = 0.002  # of the samples, at an extreme, from which it is a rail
 _LEAST_PILE = 8  # samples
 _PILE_WIDTH = 12.0  # counts: an ADC that overshoots piles up beside the rail, too
+_AT_ONE = 0.75  # of the samples near an extreme, that are at one count on a rail
+_LEAST_VALUES = 50  # of a channel that moves
 _CORRUPT = 1e6  # times the median size
 
 
@@ -46,7 +48,7 @@ def oddities(columns: dict[str, NDArray[np.float64]]) -> list[str]:
 def _rails(name: str, known: NDArray[np.float64]) -> list[str]:
     """Return the rails of a channel: values that pile up within a few counts of an extreme."""
     values = np.unique(known)
-    if len(values) < 3:
+    if len(values) < _LEAST_VALUES:
         return []
     count = float(np.min(np.diff(values)))
     found = []
@@ -57,6 +59,8 @@ def _rails(name: str, known: NDArray[np.float64]) -> list[str]:
         beside = np.abs(known - extreme) <= 3.0 * _PILE_WIDTH * count
         piled = int(np.sum(np.abs(known - pile) <= count))
         others = int(beside.sum() - near.sum())
-        if piled >= max(_PILE * len(known), _LEAST_PILE) and piled > 3 * max(others, 1):
+        # Noise spreads a level that is held over several counts; a rail holds all but a few at one.
+        at_one = float(counts.max()) / max(int(near.sum()), 1)
+        if piled >= max(_PILE * len(known), _LEAST_PILE) and piled > 3 * max(others, 1) and at_one > _AT_ONE:
             found.append(f"{name}: {int(near.sum())} samples at its rail, {side} {pile:g} (clipped)")
     return found

@@ -1,0 +1,81 @@
+"""`gfimu check`: what recordings can show before they are explained."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from gfimu.cli.mapped import MapOption
+from gfimu.cli.output import JsonOption, print_json, print_table, print_text
+
+if TYPE_CHECKING:
+    from gfimu.diagnosis.design.run_check import RunCheck
+
+__all__ = ["print_check", "register"]
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command(name="check")(_check)
+
+
+def _check(
+    runs: Annotated[list[Path], typer.Argument(metavar="RUN...", help="Recordings of one rig.")],
+    twin: Annotated[str, typer.Option("--twin", help="What the simulation believes: a name, or a twin file (.toml).")],
+    column_map: MapOption = None,
+    json: JsonOption = False,
+) -> None:
+    """Look at recordings before a diagnosis: quality of the data, what their motion tells apart, what to record next.
+
+    Example: gfimu check run.parquet --twin cube12_turntable
+    """
+    from gfimu.commands.check import check
+
+    found = check(runs, twin, column_map=column_map)
+    if json:
+        print_json(found.to_dict())
+    else:
+        print_check(found)
+
+
+def print_check(found: RunCheck) -> None:
+    """Print a check for people."""
+    rows = [
+        (
+            one["name"],
+            f"{one['duration_s']:.4g} s",
+            *(
+                (
+                    f"{one['sample_rate_hz']:.4g} Hz",
+                    f"{one['fastest_rad_s']:.3g} rad/s",
+                    f"{one['largest_acceleration_rad_s2']:.3g} rad/s²",
+                    f"{one['turns']:.3g}",
+                    (
+                        f"{100 * one['share_forwards']:.0f} / {100 * one['share_backwards']:.0f} / "
+                        f"{100 * one['share_at_rest']:.0f} %"
+                    ),
+                )
+                if "turns" in one
+                else ("", "", "", "", "")
+            ),
+        )
+        for one in found.runs
+    ]
+    print_table(
+        "Recordings",
+        ("run", "length", "rate", "fastest", "acceleration", "turns", "forwards / backwards / rest"),
+        rows,
+    )
+    print_text("Data: " + ("; ".join(found.findings) if found.findings else "nothing odd."))
+    if found.effects:
+        print_table(
+            "What this motion shows of the simulation's effects, each in its usual size",
+            ("effect", "d′", "can't be told from"),
+            [(one.name, f"{one.detectability:.3g}", ", ".join(one.confused_with[:4])) for one in found.effects],
+            left=1,
+            note="d′: size in standard deviations with the motion unknown; below 5 it may be missed.",
+        )
+    for line in found.advice:
+        print_text(f"- {line}")

@@ -1,0 +1,57 @@
+"""Under `gfimu check` and `gfimu diagnose --check`: what recordings can show before they are explained."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from gfimu.files.outputs import writes
+
+if TYPE_CHECKING:
+    from gfimu.diagnosis.design.run_check import RunCheck
+    from gfimu.importing import ColumnMap
+    from gfimu.recording import Recording
+    from gfimu.recording.mapped import MappedFile
+    from sim.twin import Twin
+
+__all__ = ["check"]
+
+
+@writes(reads=("recordings", "twin", "column_map"))
+def check(
+    recordings: Recording | str | Path | MappedFile | Sequence[Recording | str | Path | MappedFile],
+    twin: Twin | str | Path,
+    *,
+    column_map: ColumnMap | str | Path | None = None,
+) -> RunCheck:
+    """Look at recordings before a diagnosis: quality of the data, what their motion tells apart, what to record next.
+
+    Parameters
+    ----------
+    recordings : Recording, path, or sequence of these
+        Runs of one rig.
+    twin : Twin, str or Path
+        What the simulation believes: a twin, its name or file.
+    column_map : ColumnMap, str or Path, optional
+        What the columns of a foreign file are: a map, its name or TOML file (``--map``).
+
+    Raises
+    ------
+    InputError
+        If a recording can't be read, is too short, or lacks the reference that drives the twin.
+    """
+    from gfimu.commands.opened import as_runs, as_twin, by_map
+    from gfimu.diagnosis.design.run_check import check_runs
+    from gfimu.recording import Recording
+    from gfimu.recording.formats import open_recording
+
+    model = as_twin(twin)
+    given = [by_map(one, column_map) for one in as_runs(recordings)]
+    read = [one if isinstance(one, Recording) else open_recording(one, array=model.array) for one in given]
+    names = [
+        Path(one).name if isinstance(one, str | os.PathLike) else f"run {number}"
+        for number, one in enumerate(given, start=1)
+    ]
+    return check_runs(read, model, names)

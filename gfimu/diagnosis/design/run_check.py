@@ -1,0 +1,198 @@
+"""What recordings can show before they are explained: the quality of their data, and what their motion tells apart."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from gfimu.diagnosis.data.run import Run, prepare_run
+from gfimu.diagnosis.design.distinguishability import (
+    Distinguishability,
+    distinguishability,
+    normal_equations,
+    plan_contenders,
+)
+from gfimu.diagnosis.design.planned_run import recorded_stretches
+from gfimu.errors import InputError
+from gfimu.importing.oddities import oddities
+from gfimu.recording import Recording
+from gfimu.recording.checks import check_recording
+from gfimu.world_model import WorldModel
+
+__all__ = ["EffectView", "RunCheck", "check_runs"]
+
+_SEEN = 5.0  # d′ of an effect of usual size, from which it is found nearly always
+_APART = 3.0  # nats, expected for an effect over its rival
+_LONG = 30.0  # s
+_MOVES = 0.5  # rad/s: faster is motion
+_SHARE = 0.05  # of the time, in a direction or above half of the fastest rate
+_TURNS = 3.0
+
+
+@dataclass(frozen=True)
+class EffectView:
+    """How well the motion shows an effect of usual size.
+
+    Parameters
+    ----------
+    name : str
+        Effect.
+    detectability : float
+        d′: its size in standard deviations, the drive unknown.
+    confused_with : tuple of str
+        Effects that explain it as well, within 3 nats.
+    remedy : str
+        What would tell it apart.
+    """
+
+    name: str
+    detectability: float
+    confused_with: tuple[str, ...]
+    remedy: str
+
+
+@dataclass(frozen=True)
+class RunCheck:
+    """What recordings can show.
+
+    Parameters
+    ----------
+    runs : tuple of dict
+        Of each run: name, length, rate, speeds, turns.
+    findings : tuple of str
+        What is odd about the data.
+    effects : tuple of EffectView
+        The twin's effects that have a size, the best seen first; empty for a free body.
+    advice : tuple of str
+        What one more minute should be.
+    """
+
+    runs: tuple[dict[str, Any], ...]
+    findings: tuple[str, ...]
+    effects: tuple[EffectView, ...]
+    advice: tuple[str, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the check as JSON holds it."""
+        return {
+            "runs": list(self.runs),
+            "findings": list(self.findings),
+            "effects": [vars(one) for one in self.effects],
+            "advice": list(self.advice),
+        }
+
+
+def check_runs(recordings: Sequence[Recording], model: WorldModel, names: Sequence[str]) -> RunCheck:
+    """Look at recordings before a diagnosis.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        Runs of one rig.
+    model : WorldModel
+        What the simulation believes.
+    names : sequence of str
+        Names of the runs, for people.
+
+    Raises
+    ------
+    InputError
+        If a run is too short, or lacks the reference that drives the twin.
+    """
+    findings: list[str] = []
+    for recording, name in zip(recordings, names, strict=True):
+        findings += [f"{name}: {one.text}" for one in check_recording(recording, model.array)]
+        readings = recording.for_array(model.array)
+        odd = oddities(dict(zip(model.array.channels, readings.T, strict=True)))
+        findings += [f"{name}: {one}" for one in odd]
+        if len(recording.gaps):
+            findings.append(f"{name}: {len(recording.gaps)} gaps in its times")
+    if model.drive_source == "gyro":
+        facts = tuple({"name": name, "duration_s": one.duration} for name, one in zip(names, recordings, strict=True))
+        return RunCheck(facts, tuple(findings), (), ())
+    runs = [prepare_run(one, model, name=name) for one, name in zip(recordings, names, strict=True)]
+    facts = tuple(_facts(run, name, model) for run, name in zip(runs, names, strict=True))
+    effects = _effects(runs, model)
+    return RunCheck(facts, tuple(findings), effects, tuple(_advice(facts, effects)))
+
+
+def _facts(run: Run, name: str, model: WorldModel) -> dict[str, Any]:
+    """Return length, rate, speeds and turns of a run."""
+    known = np.isfinite(run.reference)
+    t, drive = run.t[known], run.reference[known]
+    rate = np.gradient(np.unwrap(drive), t) if model.drive_source == "angle" else drive
+    fastest = float(np.max(np.abs(rate)))
+    return {
+        "name": name,
+        "duration_s": run.duration,
+        "sample_rate_hz": 1.0 / run.sample_period,
+        "fastest_rad_s": fastest,
+        "largest_acceleration_rad_s2": float(np.quantile(np.abs(np.gradient(rate, t)), 0.99)),
+        "turns": float(np.abs(np.trapezoid(rate, t)) / (2.0 * np.pi)),
+        "share_forwards": float(np.mean(rate > _MOVES)),
+        "share_backwards": float(np.mean(rate < -_MOVES)),
+        "share_at_rest": float(np.mean(np.abs(rate) < 0.1 * _MOVES)),
+    }
+
+
+def _effects(runs: Sequence[Run], model: WorldModel) -> tuple[EffectView, ...]:
+    """Return how well each effect of the twin that has a size would show in these runs."""
+    families = model.families()
+    stretches, point = recorded_stretches(model, runs)
+    duration, period = max(run.duration for run in runs), min(run.sample_period for run in runs)
+    names = []
+    for name in families:
+        try:
+            plan_contenders(model, [name], duration=duration, sample_rate=1.0 / period, runs=len(runs))
+        except InputError:
+            continue  # wiring, lost samples: no size that a motion could make larger
+        names.append(name)
+    signatures, contenders = plan_contenders(model, names, duration=duration, sample_rate=1.0 / period, runs=len(runs))
+    # Of either sign, which only makes effects look more alike: fits of one sign would take ten times as long.
+    contenders = [replace(one, positive=np.zeros_like(one.positive)) for one in contenders]
+    found = distinguishability(normal_equations(stretches, point, signatures)[0], contenders)
+    order = np.argsort(-found.detectability)
+    return tuple(
+        EffectView(
+            found.effects[place],
+            float(found.detectability[place]),
+            tuple(_rivals(found, int(place))),
+            str(families[found.effects[place]].separated_by),
+        )
+        for place in order
+    )
+
+
+def _rivals(found: Distinguishability, place: int) -> list[str]:
+    if found.detectability[place] < _SEEN:
+        return []
+    close = found.nats[place] < _APART
+    return [name for number, name in enumerate(found.effects) if close[number] and number != place]
+
+
+def _advice(facts: Sequence[dict[str, Any]], effects: Sequence[EffectView]) -> list[str]:
+    """Return what one more recording should be."""
+    advice = []
+    if sum(one["duration_s"] for one in facts) < _LONG:
+        advice.append(f"record longer: {_LONG:.0f} s at least, a minute is better")
+    ways = {way: any(one[f"share_{way}"] > _SHARE for one in facts) for way in ("forwards", "backwards")}
+    if not all(ways.values()):
+        missing = next(way for way, there in ways.items() if not there)
+        advice.append(
+            f"turn {missing} as well: what goes with the rate and with its size can't be told apart otherwise"
+        )
+    if max(one["turns"] for one in facts) < _TURNS:
+        advice.append("make several whole turns one way: an axis out of level and ripples show once per turn")
+    if not any(one["share_at_rest"] > _SHARE for one in facts):
+        advice.append("begin with a few seconds of rest: biases are seen there")
+    unseen = [one for one in effects if one.detectability < _SEEN or one.confused_with]
+    remedies = dict.fromkeys(one.remedy for one in unseen if one.remedy)
+    advice += [f"{remedy}, for {', '.join(_of(unseen, remedy))}" for remedy in list(remedies)[:4]]
+    return advice
+
+
+def _of(effects: Sequence[EffectView], remedy: str) -> list[str]:
+    return [one.name for one in effects if one.remedy == remedy]
