@@ -81,7 +81,7 @@ def _estimate(
     from gfimu.commands.estimate import estimate_run, turning_axis
     from gfimu.motion.estimate_summary import summarise
 
-    with progress(_describe(method), total=1.0) as done:
+    with progress(_describe(method, axis), total=1.0) as done:
         found = estimate_run(
             run,
             array,
@@ -110,8 +110,14 @@ def _estimate(
         print_paths(written.items())
 
 
-def _describe(method: str) -> str:
+def _describe(method: str, axis: str | None = None) -> str:
     """Return what is being done, for the progress bar; says so when the filter is compiled first."""
+    if axis is not None:
+        from gfimu.known_axis.recursion import filter_axis
+        from gfimu.rate.first_call import must_compile
+
+        compiling = "compiling the filter, the first time only: a minute or so"
+        return compiling if must_compile(filter_axis) else "estimating about one axis"
     if rate_method(method).recursive:
         from gfimu.rate.first_call import must_compile
 

@@ -1,20 +1,22 @@
-"""Whether the rate filter has to be compiled before it can run."""
+"""Whether a filter has to be compiled before it can run."""
 
 from __future__ import annotations
+
+from typing import Any
 
 from gfimu.rate.recursion import forward
 
 __all__ = ["must_compile"]
 
 
-def must_compile() -> bool:
-    """Tell whether the first call of the filter will compile it: nothing is compiled here or kept from an earlier run.
+def must_compile(kernel: Any = forward) -> bool:
+    """Tell whether the first call of a filter will compile it: nothing is compiled here or kept from an earlier run.
 
     numba keeps compiled code beside the source, or in ``NUMBA_CACHE_DIR``, once per installation and kind of processor.
     """
-    if forward.signatures:
+    if kernel.signatures:
         return False
     try:  # numba has no public way to ask what it keeps
-        return not forward._cache._cache_file._load_index()
+        return not kernel._cache._cache_file._load_index()
     except (AttributeError, OSError):  # nothing can be kept
         return True
