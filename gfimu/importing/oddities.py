@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["oddities"]
+__all__ = ["DataRail", "oddities", "rails_of"]
 
 _NOISY = 3.0  # times the median noise of the channels of its kind
 _PILE = 0.002  # of the samples, at an extreme, from which it is a rail
@@ -46,21 +48,49 @@ def oddities(columns: dict[str, NDArray[np.float64]]) -> list[str]:
 
 
 def _rails(name: str, known: NDArray[np.float64]) -> list[str]:
-    """Return the rails of a channel: values that pile up within a few counts of an extreme."""
-    values = np.unique(known)
-    if len(values) < _LEAST_VALUES:
+    return [
+        f"{name}: {int(one.on.sum())} samples at its rail, {one.side} {one.level:g} (clipped)"
+        for one in rails_of(known)
+    ]
+
+
+@dataclass(frozen=True)
+class DataRail:
+    """A level beyond which a channel does not read, by its readings alone.
+
+    Parameters
+    ----------
+    side : str
+        ``most`` or ``least``.
+    level : float
+        Where the readings pile up.
+    on : ndarray of bool, shape (n,)
+        Readings that are on it.
+    """
+
+    side: str
+    level: float
+    on: NDArray[np.bool_]
+
+
+def rails_of(values: NDArray[np.float64]) -> list[DataRail]:
+    """Return the rails of a channel, (n,): values that pile up within a few counts of an extreme; NaN is left aside."""
+    known = np.isfinite(values)
+    levels = np.unique(values[known])
+    if len(levels) < _LEAST_VALUES:
         return []
-    count = float(np.min(np.diff(values)))
+    count = float(np.min(np.diff(levels)))
     found = []
-    for side, extreme in (("most", values[-1]), ("least", values[0])):
-        near = np.abs(known - extreme) <= _PILE_WIDTH * count
-        edge, counts = np.unique(known[near], return_counts=True)
-        pile = edge[int(np.argmax(counts))]
-        beside = np.abs(known - extreme) <= 3.0 * _PILE_WIDTH * count
-        piled = int(np.sum(np.abs(known - pile) <= count))
-        others = int(beside.sum() - near.sum())
+    for side, extreme in (("most", levels[-1]), ("least", levels[0])):
+        away = np.where(known, np.abs(values - extreme), np.inf)
+        near = away <= _PILE_WIDTH * count
+        edge, counts = np.unique(values[near], return_counts=True)
+        pile = float(edge[int(np.argmax(counts))])
+        others = int(np.sum(away <= 3.0 * _PILE_WIDTH * count) - near.sum())
+        piled = int(np.sum(np.abs(values[near] - pile) <= count))
         # Noise spreads a level that is held over several counts; a rail holds all but a few at one.
-        at_one = float(counts.max()) / max(int(near.sum()), 1)
-        if piled >= max(_PILE * len(known), _LEAST_PILE) and piled > 3 * max(others, 1) and at_one > _AT_ONE:
-            found.append(f"{name}: {int(near.sum())} samples at its rail, {side} {pile:g} (clipped)")
+        at_one = float(counts.max()) / int(near.sum())
+        if piled >= max(_PILE * known.sum(), _LEAST_PILE) and piled > 3 * max(others, 1) and at_one > _AT_ONE:
+            beyond = values >= pile - count if side == "most" else values <= pile + count
+            found.append(DataRail(side, pile, near & beyond))
     return found

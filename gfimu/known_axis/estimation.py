@@ -20,6 +20,7 @@ from gfimu.motion.attitude import from_rotation
 from gfimu.motion.estimation import FORMAT_VERSION, Estimate
 from gfimu.parts.part import white_noise_std
 from gfimu.recording import Recording
+from gfimu.recording.clipping import without_clipped
 from gfimu.units import STANDARD_GRAVITY
 
 __all__ = ["estimate_about_axis"]
@@ -70,6 +71,7 @@ def estimate_about_axis(
     require_visible(array, axis)
     if len(recording) < 20:
         raise InputError("a recording of fewer than twenty samples shows no rotation; record longer")
+    recording, clipped = without_clipped(recording, array)
     channels = AxisChannels.of(array, axis)
     t, y = recording.t_s, np.ascontiguousarray(recording.for_array(array))
     noise = white_noise_std(array, recording.sample_rate) if noise_std is None else np.asarray(noise_std, dtype=float)
@@ -115,7 +117,7 @@ def estimate_about_axis(
             "sign": sign,
             "sign_log_odds": fit.sign_log_odds if np.isfinite(fit.sign_log_odds) else None,
             "mean_normalised_innovation_squared": squares / max(count, 1),
-            "warnings": [] if sign == "decided" else [undecided],
+            "warnings": [*(one.text for one in clipped), *([] if sign == "decided" else [undecided])],
             "channels_left_out": [],
             "mounting_rotvec_rad": recording.mounting_rotvec.tolist(),
             "format_version": FORMAT_VERSION,

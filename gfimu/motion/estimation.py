@@ -37,6 +37,7 @@ from gfimu.rate.result import RateEstimate
 from gfimu.rate.sensing import SensorErrors
 from gfimu.recording import Recording
 from gfimu.recording.checks import Finding, check_recording, refuse_or_warn, without_dead_channels
+from gfimu.recording.clipping import without_clipped
 from gfimu.short_repr import joined, timing
 
 __all__ = ["Estimate", "estimate"]
@@ -216,6 +217,8 @@ def estimate(
     chosen = rate_method(method)
     found = refuse_or_warn(check_recording(recording, array) if findings is None else findings, force=force)
     recording = without_dead_channels(recording, array, found)
+    recording, clipped = without_clipped(recording, array)
+    found = (*found, *clipped)
     readings = recording.for_array(array)
     rate0 = None if omega0 is None else np.asarray(omega0, dtype=float)
     if rate0 is None:

@@ -51,7 +51,8 @@ class Finding:
     Parameters
     ----------
     kind : str
-        ``time``, ``unit``, ``chip_unit``, ``sign``, ``exchange``, ``duplicate``, ``array``, ``rest_bias`` or ``dead``.
+        ``time``, ``unit``, ``chip_unit``, ``sign``, ``exchange``, ``duplicate``, ``array``, ``rest_bias``, ``dead``
+        or ``clipped``.
     text : str
         Cause and remedy, one line.
     refused : bool
