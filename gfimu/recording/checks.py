@@ -23,7 +23,7 @@ from gfimu.recording.recording import Recording
 from gfimu.recording.rigid_evidence import Costs, Evidence, Otherwise, gather
 from gfimu.units import STANDARD_GRAVITY
 
-__all__ = ["Finding", "check_recording", "dead_channels", "refuse_or_warn", "without_dead_channels"]
+__all__ = ["Finding", "check_recording", "dead_channels", "noisy_channels", "refuse_or_warn", "without_dead_channels"]
 
 _FEWEST = 50  # samples
 _LEAST_NOISE = 0.3  # of the data sheet's: from that on a channel surely has noise of its own
@@ -85,11 +85,10 @@ def refuse_or_warn(findings: Iterable[Finding], *, force: bool = False) -> tuple
 def dead_channels(recording: Recording, array: AccelerometerArray) -> tuple[Finding, ...]:
     """Return the channels without any reading, or with one value throughout while the others have noise."""
     readings = recording.for_array(array)
-    limits = _limits(recording, array)
     found = []
     present = np.isfinite(readings)
     constant = _constant(readings)
-    noisy = np.zeros(array.n_channels, dtype=bool) if limits is None else _noise(readings) > _LEAST_NOISE * limits.noise
+    noisy = noisy_channels(recording, array)
     others = int(np.count_nonzero(noisy)) >= max(1, int(np.count_nonzero(~constant & present.any(axis=0))) // 2)
     for name, seen, held, column in zip(array.channels, present.T, constant, readings.T, strict=True):
         if not seen.any():
@@ -100,6 +99,14 @@ def dead_channels(recording: Recording, array: AccelerometerArray) -> tuple[Find
             text = f"channel {name} reads {value:.4g} m/s² throughout; the estimate goes on without it: check its chip"
             found.append(Finding("dead", text, False, (name,)))
     return tuple(found)
+
+
+def noisy_channels(recording: Recording, array: AccelerometerArray) -> NDArray[np.bool_]:
+    """Tell which channels surely have noise of their own, (c,); none where their data sheets are not known."""
+    limits = _limits(recording, array)
+    if limits is None:
+        return np.zeros(array.n_channels, dtype=bool)
+    return np.asarray(_noise(recording.for_array(array)) > _LEAST_NOISE * limits.noise)
 
 
 def without_dead_channels(recording: Recording, array: AccelerometerArray, findings: Iterable[Finding]) -> Recording:
