@@ -231,6 +231,7 @@ def _about_axis(
     """Estimate about a known axis, with the biases read off a level rest first where that is asked for."""
     from gfimu.errors import InputError
     from gfimu.known_axis import estimate_about_axis
+    from gfimu.rate.registry import rate_method
 
     if rest_bias:
         from gfimu.motion.rest_bias import rest_bias as read_off
@@ -243,6 +244,6 @@ def _about_axis(
         array,
         axis,
         at_rest=options.get("omega0") is not None,
-        smooth=options.get("method") == "smoother",
+        smooth=rate_method(options.get("method", "integrate")).uses_later_samples,
         noise_std=options.get("noise_std"),
     )

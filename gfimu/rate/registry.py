@@ -62,6 +62,8 @@ class RateMethod:
         innovations are tested for consistency.
     open_loop : bool
         α integrated from a known start: the error of a bias grows with time, and no measurement of ω bounds it.
+    uses_later_samples : bool
+        Later samples correct earlier ones: no method for a stream.
     """
 
     name: str
@@ -69,6 +71,7 @@ class RateMethod:
     uses: str
     recursive: bool = False
     open_loop: bool = False
+    uses_later_samples: bool = False
 
     @property
     def solver(self) -> RateSolver:
@@ -93,7 +96,9 @@ _RECORDS = (
     RateMethod("algebraic", "gfimu.rate.methods:algebraic_from_rest", "null space, sample by sample"),
     RateMethod("ml", "gfimu.rate.methods:maximum_likelihood_from_rest", "null space, sample by sample"),
     RateMethod("filter", "gfimu.rate.filter:filter_rate", "α, null space, rest, gyro; samples so far", recursive=True),
-    RateMethod("smoother", "gfimu.rate.smoother:smooth_rate", "the same, all samples", recursive=True),
+    RateMethod(
+        "smoother", "gfimu.rate.smoother:smooth_rate", "the same, all samples", recursive=True, uses_later_samples=True
+    ),
 )
 
 RATE_METHODS: Mapping[str, RateMethod] = MappingProxyType({method.name: method for method in _RECORDS})

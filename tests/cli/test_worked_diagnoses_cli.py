@@ -98,6 +98,7 @@ def seventy_seconds(recording):
     return recording.slice(*np.searchsorted(recording.t_s, [440.0, 510.0]))
 
 
+@pytest.mark.study
 def test_seventy_seconds_of_a_real_board_show_most_of_what_the_page_says(
     script, shared_data, page, project_root, tmp_path
 ):

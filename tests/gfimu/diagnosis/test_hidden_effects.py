@@ -43,6 +43,10 @@ SLOW = (
     *("hard-warm_up+scale_factor-792-independent-872024", "outside-tacho_ripple-600-campaign-424"),
     *("outside-table_tilt-600-campaign-420", "single-cogging-60-independent-109"),
     *("outside-square_wave-600-independent-404", "outside-cogging-600-campaign-426"),
+    *("outside-axis_wobble-600-independent-421", "outside-tone_on_one_channel-600-independent-402"),
+    *("outside-magnetic_pickup-600-independent-405", "outside-bias_jump-600-independent-403"),
+    *("hard-coarse_resolution-campaign-993012", "hard-axis_wobble-1500-campaign-253"),
+    "hard-cogging-60-independent-10046",
 )
 """Each takes more than fifteen seconds; they run with ``pytest -m study`` and with ``hidden_pins.py --check``."""
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from usual_twin import UsualTwin
 
 from gfimu.diagnosis import diagnose
 from gfimu.diagnosis.data import stretch
@@ -74,7 +75,7 @@ def test_nothing_is_found_in_a_long_quiet_recording(short_stretches):
 
 
 def test_what_has_no_name_is_described_on_some_stretches_and_fitted_to_all(short_stretches):
-    twin = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
+    twin = UsualTwin(array=AccelerometerArray.load("cube12"), array_name="cube12")
     rng = np.random.default_rng(13)
     motion = random_profile(rng, 30.0)
     run = measure(rng, twin, [], Measurement(duration=30.0), motion=motion)
