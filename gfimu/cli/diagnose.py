@@ -9,6 +9,7 @@ import typer
 
 from gfimu.cli.mapped import MapOption
 from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, print_text, progress
+from gfimu.errors import InputError
 
 if TYPE_CHECKING:
     from gfimu.diagnosis.verdict.verdict import Diagnosis
@@ -27,7 +28,12 @@ def _diagnose(
         typer.Argument(metavar="RUN...", help="Recordings of one rig: .csv, .parquet, .bin; fitted together."),
     ],
     twin: Annotated[str, typer.Option("--twin", help="What the simulation believes: a name, or a twin file (.toml).")],
-    out: Annotated[Path, typer.Option("--out", help="Folder for verdict.json, twin.toml, report.html, diagnosis.rrd.")],
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Folder for verdict.json, twin.toml, report.html, diagnosis.rrd.")
+    ] = None,
+    check: Annotated[
+        bool, typer.Option("--check", help="Only look at the recordings, as `gfimu check`: no diagnosis, no --out.")
+    ] = False,
     held_out: Annotated[
         list[Path] | None,
         typer.Option("--held-out", metavar="RUN", help="Recording kept for measuring the gain; may be repeated."),
@@ -60,12 +66,23 @@ def _diagnose(
 
     Example: gfimu diagnose run.parquet --twin cube12_turntable --out diagnosis
 
+    What the recording can show, first: gfimu diagnose run.parquet --twin cube12_turntable --check
+
     A rig known to be unusual: gfimu diagnose run.parquet --twin cube12_turntable --grammar --out diagnosis
 
     Two loggers of two clocks: gfimu diagnose accel.csv --map mine.toml --reference tacho.csv --twin rig.toml --out d
 
     A unit fresh from the bench: gfimu diagnose run.parquet --twin cube12_turntable --calibration cal.json --out d
     """
+    if check:
+        from gfimu.cli.check import print_check
+        from gfimu.commands.check import check as look
+
+        seen = look(runs, twin, column_map=column_map)
+        print_json(seen.to_dict()) if json else print_check(seen)
+        return
+    if out is None:
+        raise InputError("--out is missing: the folder for the diagnosis; --check needs none")
     from gfimu.commands.diagnose import diagnose
     from gfimu.diagnosis.report.folder import FILES
 

@@ -28,7 +28,7 @@ OTHER_WORDS = {
 PYTHON_NAME = {"list": "catalogue"}
 """Commands whose word is a builtin of Python, and the functions that stand for them."""
 
-NO_ARGUMENT = {"--json", "--help"}
+NO_ARGUMENT = {"--json", "--help", "--check"}
 NAMES_A_FILE = {
     "array",
     "twin",
