@@ -7,6 +7,7 @@ import math
 from gfimu.errors import UnitError
 
 __all__ = [
+    "GYRO_COLUMNS",
     "KEY_ENDINGS",
     "NAME",
     "NUMBER",
@@ -41,6 +42,9 @@ REFERENCE_UNITS: dict[str, dict[str, float]] = {
 }
 """Reference quantities of a recording, their units and factors; the first unit of each is the SI one."""
 
+
+GYRO_COLUMNS = ("gyro_x_rad_s", "gyro_y_rad_s", "gyro_z_rad_s")
+"""Columns of a recording's gyro, body axes."""
 
 RATIO, NUMBER, NAME = "ratio", "number", "name"
 """What stands in place of a unit: a small relative number (people read percent), a count or factor, words."""

@@ -27,7 +27,7 @@ def _check(
     column_map: MapOption = None,
     json: JsonOption = False,
 ) -> None:
-    """Look at recordings before a diagnosis: quality of the data, what their motion tells apart, what to record next.
+    """Look at recordings before a diagnosis: quality of the data, effects their motion separates, what to record next.
 
     Example: gfimu check run.parquet --twin cube12_turntable
     """
@@ -72,7 +72,7 @@ def print_check(found: RunCheck) -> None:
     if found.effects:
         print_table(
             "What this motion shows of the simulation's effects, each in its usual size",
-            ("effect", "d′", "can't be told from"),
+            ("effect", "d′", "not separable from"),
             [(one.name, f"{one.detectability:.3g}", ", ".join(one.confused_with[:4])) for one in found.effects],
             left=1,
             note="d′: size in standard deviations with the motion unknown; below 5 it may be missed.",

@@ -26,7 +26,7 @@ def check(
     *,
     column_map: ColumnMap | str | Path | None = None,
 ) -> RunCheck:
-    """Look at recordings before a diagnosis: quality of the data, what their motion tells apart, what to record next.
+    """Look at recordings before a diagnosis: quality of the data, effects their motion separates, what to record next.
 
     Parameters
     ----------

@@ -232,7 +232,14 @@ def _about_axis(
     from gfimu.errors import InputError
     from gfimu.known_axis import estimate_about_axis
     from gfimu.rate.registry import rate_method
+    from gfimu.recording.checks import check_recording, refuse_or_warn, without_dead_channels
 
+    for name, word in (("fuse_gyro", "--gyro"), ("with_position", "--position")):
+        if options.get(name):
+            raise InputError(f"{word} has no use with --axis: the rate about one axis is all that is estimated")
+    findings = check_recording(recording, array)
+    refuse_or_warn(findings, force=bool(options.get("force")))
+    recording = without_dead_channels(recording, array, findings)
     if rest_bias:
         from gfimu.motion.rest_bias import rest_bias as read_off
 

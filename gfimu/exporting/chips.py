@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray, Chip
 from gfimu.recording import Recording
+from gfimu.units import GYRO_COLUMNS
 
 __all__ = ["ChipStream", "chips_of", "stamps_ns"]
-
-_GYRO = ("gyro_x_rad_s", "gyro_y_rad_s", "gyro_z_rad_s")
 
 
 @dataclass(frozen=True)
@@ -47,8 +46,8 @@ def chips_of(recording: Recording) -> Iterator[ChipStream]:
     array = recording.array
     chips = array.chips if array is not None else _guessed(recording)
     gyro = None
-    if all(name in recording.reference for name in _GYRO):
-        gyro = np.column_stack([recording.reference[name] for name in _GYRO])
+    if all(name in recording.reference for name in GYRO_COLUMNS):
+        gyro = np.column_stack([recording.reference[name] for name in GYRO_COLUMNS])
     for chip in chips:
         if chip.axes.shape != (3, 3) or np.abs(chip.axes @ chip.axes.T - np.eye(3)).max() > 1e-3:
             raise InputError(

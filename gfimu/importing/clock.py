@@ -15,7 +15,7 @@ from gfimu.importing.raw_table import RawTable
 
 __all__ = ["Times", "times_of"]
 
-_FAR = 1e6  # s: times beyond count from the first sample, so that they keep their digits
+_FAR = 100.0  # s: times beyond count from the first sample; they keep their digits, and pictures begin there
 _MOST_DROPPED = 0.02  # of the rows, whose time does not increase
 
 

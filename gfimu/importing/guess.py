@@ -16,15 +16,25 @@ from gfimu.importing.notation import TIME, bracketed_unit, factor_of, kind_of
 from gfimu.importing.raw_table import RawTable
 from gfimu.units import STANDARD_GRAVITY
 
-__all__ = ["Triad", "TriadUnit", "find_time", "find_triads", "rest_windows", "unit_of_acceleration", "unit_of_rate"]
+__all__ = [
+    "NEAR",
+    "RATES",
+    "Triad",
+    "TriadUnit",
+    "find_time",
+    "find_triads",
+    "rest_windows",
+    "unit_of_acceleration",
+    "unit_of_rate",
+]
 
-_RATES = (5.0, 8000.0)  # Hz, of a recording of motion
+RATES = (5.0, 8000.0)  # Hz, of a recording of motion
 _TIME_WORDS = ("time", "stamp", "sec", "clock", "tick", "sampletimefine", "t_", "timestamp")
 _FORCE = re.compile(r"acc|force|^a[xyz_\d\[ ]|_a_|^a_|lin|adxl|mma|lis|bma|kx", re.IGNORECASE)
 _GYRO = re.compile(r"gyr|omega|angular|^w[xyz_\d\[ ]|^w_|rate|rot|itg", re.IGNORECASE)
 _NEITHER = re.compile(r"mag|euler|quat|orient|field|angle|roll|pitch|yaw|pos|vel_|std|cov|free|temp", re.IGNORECASE)
 _GRAVITY = {"m/s^2": 1.0, "g": STANDARD_GRAVITY, "mg": STANDARD_GRAVITY / 1e3, "mm/s^2": 1e-3, "cm/s^2": 1e-2}
-_NEAR = 0.08  # relative, of gravity at rest: gains of parts lie within
+NEAR = 0.08  # relative, of gravity at rest: gains of parts lie within
 _LOW_COUNTS = 20.0  # below that counts per g would be too coarse for any part
 _FASTEST_RAD_S = 40.0  # rad/s: beyond the range of nearly all gyros (2000 °/s is 35 rad/s)
 _ROUND = 0.03  # relative scatter of the poses about a sphere: gains of the axes differ by less
@@ -116,7 +126,7 @@ def _as_time(name: str, values: NDArray[Any]) -> tuple[TimeSpec, float, str] | N
     order = [unit for unit, marks in hints.items() if any(plain.lower().endswith(mark) for mark in marks)]
     for candidate in [*order, *(one for one in ("s", "ms", "us", "ns") if one not in order)]:
         rate = 1.0 / (usual * TIME[candidate])
-        if _RATES[0] <= rate <= _RATES[1]:
+        if RATES[0] <= rate <= RATES[1]:
             score = (4.0 if word else 1.0) - (2.0 if counter else 0.0)
             why = f"{name} increases by {usual:.6g} per row, which in {candidate} is {rate:.4g} Hz"
             return TimeSpec(name, candidate, wrap=wrap), score, why
@@ -208,11 +218,11 @@ def unit_of_acceleration(table: RawTable, columns: Sequence[str]) -> TriadUnit:
     unit = bracketed_unit(columns[0])[1]
     if unit:
         said = length * factor_of(unit, "acceleration")
-        agrees = abs(said / STANDARD_GRAVITY - 1.0) < _NEAR
+        agrees = abs(said / STANDARD_GRAVITY - 1.0) < NEAR
         why = f"the name has {unit}; at rest {said:.3g} m/s²" + ("" if agrees else ", which is not gravity")
         return TriadUnit(unit, 1.0, zero, why, agrees)
     for name, factor in _GRAVITY.items():
-        if abs(length * factor / STANDARD_GRAVITY - 1.0) < _NEAR:
+        if abs(length * factor / STANDARD_GRAVITY - 1.0) < NEAR:
             counts = name == "mg" and _whole(values)
             other = "; 1024 counts per g is as likely" if counts else ""
             return TriadUnit(
@@ -229,7 +239,7 @@ def unit_of_acceleration(table: RawTable, columns: Sequence[str]) -> TriadUnit:
             return TriadUnit("g", 1.0 / radius, offset, why, True)
     if length > _LOW_COUNTS:
         power = 2.0 ** round(math.log2(length))
-        if abs(length / power - 1.0) < _NEAR:
+        if abs(length / power - 1.0) < NEAR:
             return TriadUnit(
                 "g", 1.0 / power, zero, f"at rest its length is {length:.5g}: {power:g} counts per g", True
             )

@@ -61,7 +61,6 @@ _SAME = {
     "nanoseconds": "ns",
     "c": "degc",
     "celsius": "degc",
-    "deg": "deg",
 }
 _BRACKETS = re.compile(r"\s*[\[({]\s*([^\])}]+?)\s*[\])}]\s*$")
 

@@ -9,16 +9,13 @@ import numpy as np
 from gfimu.errors import GfimuError, InputError
 from gfimu.importing.clock import times_of
 from gfimu.importing.column_map import ColumnMap, list_maps, load_map
-from gfimu.importing.guess import rest_windows
+from gfimu.importing.guess import NEAR, RATES, rest_windows
 from gfimu.importing.notation import factor_of
 from gfimu.importing.raw_table import RawFile, RawTable
 from gfimu.importing.readers import read_foreign
 from gfimu.units import STANDARD_GRAVITY
 
 __all__ = ["fitting_maps", "map_hint"]
-
-_GRAVITY_WITHIN = 0.08  # relative: gains of parts lie within
-_RATES = (5.0, 8000.0)  # Hz, of a recording of motion
 
 
 def map_hint(path: str | Path) -> str:
@@ -89,6 +86,6 @@ def _plausibility(raw: RawFile, column_map: ColumnMap) -> int:
         )
         windows = rest_windows(values)
         length = float(np.median(np.linalg.norm(windows, axis=1))) if len(windows) else 0.0
-        gravity = abs(length / STANDARD_GRAVITY - 1.0) < _GRAVITY_WITHIN
-        return 2 * gravity + (_RATES[0] <= rate <= _RATES[1])
+        gravity = abs(length / STANDARD_GRAVITY - 1.0) < NEAR
+        return 2 * gravity + (RATES[0] <= rate <= RATES[1])
     return 0

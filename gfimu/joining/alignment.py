@@ -157,7 +157,7 @@ def align(signals: Signals, *, most_rate_error: float = 0.02, refine: bool = Tru
 
 
 def _width(signals: Signals) -> float:
-    """Return the time within which offsets can't be told apart by eye: over the rms frequency of the functions, s."""
+    """Return the correlation time of the functions, s: the inverse of their rms frequency."""
     functions = functions_of(signals.rate, signals.step)
     functions = functions - functions.mean(axis=0)
     slope = np.gradient(functions, signals.step, axis=0)

@@ -15,11 +15,9 @@ from gfimu.files.column_file import open_columns
 from gfimu.importing import ColumnMap, load_map
 from gfimu.importing.recognise import map_hint
 from gfimu.recording.mapped import mapped_reference
-from gfimu.units import REFERENCE_UNITS
+from gfimu.units import GYRO_COLUMNS, REFERENCE_UNITS
 
 __all__ = ["ReferenceSeries", "open_reference"]
-
-_GYRO = ("gyro_x_rad_s", "gyro_y_rad_s", "gyro_z_rad_s")
 
 
 @dataclass(frozen=True)
@@ -62,8 +60,8 @@ class ReferenceSeries:
         if "angle_rad" in self.columns:
             t, angle = self._known(self.columns["angle_rad"][:, None])
             return t, CubicSpline(t, np.unwrap(angle[:, 0]))(t, 1)[:, None]
-        if all(name in self.columns for name in _GYRO):
-            return self._known(np.column_stack([self.columns[name] for name in _GYRO]))
+        if all(name in self.columns for name in GYRO_COLUMNS):
+            return self._known(np.column_stack([self.columns[name] for name in GYRO_COLUMNS]))
         raise InputError(
             f"{self.source}: no angular rate among {', '.join(self.columns) or 'its columns'}; "
             "a tachometer, angle, command or gyro of three axes is needed"

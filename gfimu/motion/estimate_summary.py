@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.geometry.kinematics import null_space, omega_products
+from gfimu.geometry.observability import unseen_motions
 from gfimu.motion.estimation import Estimate
 from gfimu.recording import Recording
 from gfimu.short_repr import short_repr
@@ -135,7 +136,7 @@ def summarise(estimate: Estimate, recording: Recording, array: AccelerometerArra
         angle_rad=float(estimate.angle[last]),
         tacho_rmse_rad_s=None if tacho is None else _rms_difference(estimate.omega @ axis, tacho),
         gyro_rmse_rad_s=None if gyro is None else _rms_difference(estimate.omega, gyro),
-        centripetal=centripetal_agreement(recording, array),
+        centripetal=None if unseen_motions(array) else centripetal_agreement(recording, array),
         consistency=consistency,
         channels_left_out=tuple(estimate.metadata.get("channels_left_out", ())),
         warnings=(*estimate.metadata.get("warnings", ()), *_inconsistency(consistency)),

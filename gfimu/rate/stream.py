@@ -20,11 +20,9 @@ from gfimu.rate.kalman import FilterSettings
 from gfimu.rate.live import LiveRateFilter
 from gfimu.rate.result import RateEstimate
 from gfimu.rate.sensing import SensorErrors
-from gfimu.units import READING_UNITS
+from gfimu.units import GYRO_COLUMNS, READING_UNITS
 
 __all__ = ["StreamLayout", "filter_stream", "read_head"]
-
-_GYRO = ("gyro_x_rad_s", "gyro_y_rad_s", "gyro_z_rad_s")
 
 
 @dataclass(frozen=True)
@@ -88,7 +86,9 @@ class StreamLayout:
                 factor = _count_size(metadata or {}, array, channel)
             places.append(columns.index(found[0]))
             factors.append(factor)
-        gyro = tuple(columns.index(name) for name in _GYRO) if all(name in columns for name in _GYRO) else ()
+        gyro = (
+            tuple(columns.index(name) for name in GYRO_COLUMNS) if all(name in columns for name in GYRO_COLUMNS) else ()
+        )
         return cls(columns.index("t_s"), tuple(places), tuple(factors), gyro, len(columns))
 
 
@@ -177,7 +177,7 @@ def filter_stream(
         if layout is None:
             layout = StreamLayout.from_header(cells, array, metadata)
             if fuse_gyro and not layout.gyro:
-                raise InputError(f"the stream lacks {', '.join(_GYRO)}; send them, or leave --gyro out")
+                raise InputError(f"the stream lacks {', '.join(GYRO_COLUMNS)}; send them, or leave --gyro out")
             continue
         try:
             values = _numbers(cells, layout)

@@ -10,10 +10,9 @@ from gfimu.geometry.array import AccelerometerArray
 from gfimu.importing.oddities import rails_of
 from gfimu.recording.checks import Finding, noisy_channels
 from gfimu.recording.recording import Recording
+from gfimu.units import GYRO_COLUMNS
 
 __all__ = ["without_clipped"]
-
-_GYRO = ("gyro_x_rad_s", "gyro_y_rad_s", "gyro_z_rad_s")
 
 
 def without_clipped(recording: Recording, array: AccelerometerArray) -> tuple[Recording, tuple[Finding, ...]]:
@@ -37,7 +36,7 @@ def without_clipped(recording: Recording, array: AccelerometerArray) -> tuple[Re
             )
             found.append(Finding("clipped", text, False, (name,)))
     reference = dict(recording.reference)
-    for name in _GYRO:
+    for name in GYRO_COLUMNS:
         if name not in reference:
             continue
         values = np.array(reference[name])

@@ -1,4 +1,4 @@
-"""What recordings can show before they are explained: the quality of their data, and what their motion tells apart."""
+"""What recordings can show before they are explained: quality of the data, and effects that the motion separates."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from gfimu.diagnosis.design.distinguishability import (
     plan_contenders,
 )
 from gfimu.diagnosis.design.planned_run import recorded_stretches
+from gfimu.diagnosis.design.proposal import SEPARATED
 from gfimu.errors import InputError
 from gfimu.importing.oddities import oddities
 from gfimu.recording import Recording
@@ -25,10 +26,9 @@ from gfimu.world_model import WorldModel
 __all__ = ["EffectView", "RunCheck", "check_runs"]
 
 _SEEN = 5.0  # d′ of an effect of usual size, from which it is found nearly always
-_APART = 3.0  # nats, expected for an effect over its rival
 _LONG = 30.0  # s
 _MOVES = 0.5  # rad/s: faster is motion
-_SHARE = 0.05  # of the time, in a direction or above half of the fastest rate
+_SHARE = 0.05  # of the time, in one direction or at rest
 _TURNS = 3.0
 
 
@@ -43,7 +43,7 @@ class EffectView:
     detectability : float
         d′: its size in standard deviations, the drive unknown.
     confused_with : tuple of str
-        Effects that explain it as well, within 3 nats.
+        Effects that explain it as well: expected evidence below `SEPARATED`.
     remedy : str
         What would tell it apart.
     """
@@ -169,7 +169,7 @@ def _effects(runs: Sequence[Run], model: WorldModel) -> tuple[EffectView, ...]:
 def _rivals(found: Distinguishability, place: int) -> list[str]:
     if found.detectability[place] < _SEEN:
         return []
-    close = found.nats[place] < _APART
+    close = found.nats[place] < SEPARATED
     return [name for number, name in enumerate(found.effects) if close[number] and number != place]
 
 
@@ -181,9 +181,7 @@ def _advice(facts: Sequence[dict[str, Any]], effects: Sequence[EffectView]) -> l
     ways = {way: any(one[f"share_{way}"] > _SHARE for one in facts) for way in ("forwards", "backwards")}
     if not all(ways.values()):
         missing = next(way for way, there in ways.items() if not there)
-        advice.append(
-            f"turn {missing} as well: what goes with the rate and with its size can't be told apart otherwise"
-        )
+        advice.append(f"turn {missing} as well: what goes with the rate and with its size can't be separated otherwise")
     if max(one["turns"] for one in facts) < _TURNS:
         advice.append("make several whole turns one way: an axis out of level and ripples show once per turn")
     if not any(one["share_at_rest"] > _SHARE for one in facts):

@@ -1,4 +1,4 @@
-"""Damaged, foreign or wrongly mapped files end in one line that names file and remedy, and what is odd is told."""
+"""Damaged, foreign or wrongly mapped files end in one line that names file and remedy, and what is odd is reported."""
 
 import foreign_files as files
 import numpy as np
@@ -102,7 +102,7 @@ def test_a_map_does_not_fit_an_array_of_other_size(tmp_path):
         mapped_recording(files.klipper(tmp_path / "a.csv"), "klipper", array=AccelerometerArray.load("cube12"))
 
 
-def test_rails_corrupt_values_and_noise_are_told():
+def test_rails_corrupt_values_and_noise_are_reported():
     rng = np.random.default_rng(0)
     values = {
         name: np.round(6000.0 * np.sin(np.arange(8000) / 500.0) + 20.0 * rng.standard_normal(8000)) for name in "abcd"
@@ -114,13 +114,13 @@ def test_rails_corrupt_values_and_noise_are_told():
     values["b"][20:23] = np.nan
     values["c"] += 300.0 * rng.standard_normal(8000)
     values["d"][:] = 7.0
-    told = oddities(values)
-    assert any(line.startswith("a:") and "rail" in line and "most 5600" in line for line in told)
-    assert not any("rail" in line and line[0] in "bcd" for line in told)
-    assert any(line.startswith("b: 1 values that can be no reading") for line in told)
-    assert any(line.startswith("b: 3 of 8000 cells are empty") for line in told)
-    assert any(line.startswith("c is noisy") for line in told)
-    assert "d reads 7 throughout" in told
+    reported = oddities(values)
+    assert any(line.startswith("a:") and "rail" in line and "most 5600" in line for line in reported)
+    assert not any("rail" in line and line[0] in "bcd" for line in reported)
+    assert any(line.startswith("b: 1 values that can be no reading") for line in reported)
+    assert any(line.startswith("b: 3 of 8000 cells are empty") for line in reported)
+    assert any(line.startswith("c is noisy") for line in reported)
+    assert "d reads 7 throughout" in reported
 
 
 def test_units_are_read_as_people_write_them():

@@ -142,6 +142,13 @@ def test_an_array_file_holds_its_axis(tmp_path):
         AccelerometerArray.load(tmp_path / "bad.toml")
 
 
+@pytest.mark.parametrize("option", ["fuse_gyro", "with_position"])
+def test_what_one_axis_does_not_give_is_refused(option):
+    recording = turned(ONE, (0, 0, 1), np.random.default_rng(6))[0]
+    with pytest.raises(InputError, match="no use with --axis"):
+        gfimu.estimate(recording, ONE, axis="z", **{option: True})
+
+
 def test_the_array_s_own_axis_is_used_where_it_sees_too_little(tmp_path):
     recording, rate, _ = turned(ONE, (0, 0, 1), np.random.default_rng(6))
     with pytest.raises(GeometryError, match="--axis"):

@@ -1,4 +1,4 @@
-"""What a recording can show is said before its diagnosis: odd data, what its motion tells apart, what to record."""
+"""What a recording can show is said before its diagnosis: odd data, effects that its motion separates, next steps."""
 
 import numpy as np
 import pytest
