@@ -179,6 +179,11 @@ class Policy:
         return 0.5 * self.stds**2
 
     @property
+    def seen(self) -> float:
+        """d′ from which an effect is found nearly always: ``cause_odds`` in squares, and ``stds`` of chance beyond."""
+        return float(np.sqrt(2.0 * self.cause_odds)) + self.stds
+
+    @property
     def mimic_energy(self) -> float:
         """Squares that an effect may leave of another that it is confounded with: those of ``worth_a_search``."""
         return 2.0 * self.worth_a_search

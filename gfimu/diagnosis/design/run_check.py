@@ -17,19 +17,36 @@ from gfimu.diagnosis.design.distinguishability import (
 )
 from gfimu.diagnosis.design.planned_run import recorded_stretches
 from gfimu.diagnosis.design.proposal import SEPARATED
+from gfimu.diagnosis.policy import Policy
 from gfimu.errors import InputError
 from gfimu.importing.oddities import oddities
 from gfimu.recording import Recording
 from gfimu.recording.checks import check_recording
 from gfimu.world_model import WorldModel
 
-__all__ = ["EffectView", "RunCheck", "check_runs"]
+__all__ = ["EffectView", "RunCheck", "UsefulRun", "check_runs"]
 
-_SEEN = 5.0  # d′ of an effect of usual size, from which it is found nearly always
-_LONG = 30.0  # s
-_MOVES = 0.5  # rad/s: faster is motion
-_SHARE = 0.05  # of the time, in one direction or at rest
-_TURNS = 3.0
+
+@dataclass(frozen=True)
+class UsefulRun:
+    """What a recording should have before a diagnosis asks for nothing more; all by choice.
+
+    Parameters
+    ----------
+    duration : float
+        Length of all runs together [s]: several held-out blocks (`Policy.block_duration`).
+    rate : float
+        Slowest rate that counts as motion [rad/s]; a tenth of it is rest. A table turns faster, a drift of it slower.
+    share : float
+        Share of the time in each direction, and at rest, from which it is there [1].
+    turns : float
+        Whole turns one way [1], so that what returns once per turn is seen to return.
+    """
+
+    duration: float = 30.0
+    rate: float = 0.5
+    share: float = 0.05
+    turns: float = 3.0
 
 
 @dataclass(frozen=True)
@@ -85,7 +102,9 @@ class RunCheck:
         }
 
 
-def check_runs(recordings: Sequence[Recording], model: WorldModel, names: Sequence[str]) -> RunCheck:
+def check_runs(
+    recordings: Sequence[Recording], model: WorldModel, names: Sequence[str], *, useful: UsefulRun = UsefulRun()
+) -> RunCheck:
     """Look at recordings before a diagnosis.
 
     Parameters
@@ -96,6 +115,8 @@ def check_runs(recordings: Sequence[Recording], model: WorldModel, names: Sequen
         What the simulation believes.
     names : sequence of str
         Names of the runs, for people.
+    useful : UsefulRun
+        What a recording should have.
 
     Raises
     ------
@@ -114,12 +135,12 @@ def check_runs(recordings: Sequence[Recording], model: WorldModel, names: Sequen
         facts = tuple({"name": name, "duration_s": one.duration} for name, one in zip(names, recordings, strict=True))
         return RunCheck(facts, tuple(findings), (), ())
     runs = [prepare_run(one, model, name=name) for one, name in zip(recordings, names, strict=True)]
-    facts = tuple(_facts(run, name, model) for run, name in zip(runs, names, strict=True))
+    facts = tuple(_facts(run, name, model, useful) for run, name in zip(runs, names, strict=True))
     effects = _effects(runs, model)
-    return RunCheck(facts, tuple(findings), effects, tuple(_advice(facts, effects)))
+    return RunCheck(facts, tuple(findings), effects, tuple(_advice(facts, effects, useful)))
 
 
-def _facts(run: Run, name: str, model: WorldModel) -> dict[str, Any]:
+def _facts(run: Run, name: str, model: WorldModel, useful: UsefulRun) -> dict[str, Any]:
     """Return length, rate, speeds and turns of a run."""
     known = np.isfinite(run.reference)
     t, drive = run.t[known], run.reference[known]
@@ -132,9 +153,9 @@ def _facts(run: Run, name: str, model: WorldModel) -> dict[str, Any]:
         "fastest_rad_s": fastest,
         "largest_acceleration_rad_s2": float(np.quantile(np.abs(np.gradient(rate, t)), 0.99)),
         "turns": float(np.abs(np.trapezoid(rate, t)) / (2.0 * np.pi)),
-        "share_forwards": float(np.mean(rate > _MOVES)),
-        "share_backwards": float(np.mean(rate < -_MOVES)),
-        "share_at_rest": float(np.mean(np.abs(rate) < 0.1 * _MOVES)),
+        "share_forwards": float(np.mean(rate > useful.rate)),
+        "share_backwards": float(np.mean(rate < -useful.rate)),
+        "share_at_rest": float(np.mean(np.abs(rate) < 0.1 * useful.rate)),
     }
 
 
@@ -167,26 +188,26 @@ def _effects(runs: Sequence[Run], model: WorldModel) -> tuple[EffectView, ...]:
 
 
 def _rivals(found: Distinguishability, place: int) -> list[str]:
-    if found.detectability[place] < _SEEN:
+    if found.detectability[place] < Policy().seen:
         return []
     close = found.nats[place] < SEPARATED
     return [name for number, name in enumerate(found.effects) if close[number] and number != place]
 
 
-def _advice(facts: Sequence[dict[str, Any]], effects: Sequence[EffectView]) -> list[str]:
+def _advice(facts: Sequence[dict[str, Any]], effects: Sequence[EffectView], useful: UsefulRun) -> list[str]:
     """Return what one more recording should be."""
     advice = []
-    if sum(one["duration_s"] for one in facts) < _LONG:
-        advice.append(f"record longer: {_LONG:.0f} s at least, a minute is better")
-    ways = {way: any(one[f"share_{way}"] > _SHARE for one in facts) for way in ("forwards", "backwards")}
+    if sum(one["duration_s"] for one in facts) < useful.duration:
+        advice.append(f"record longer: {useful.duration:.0f} s at least, a minute is better")
+    ways = {way: any(one[f"share_{way}"] > useful.share for one in facts) for way in ("forwards", "backwards")}
     if not all(ways.values()):
         missing = next(way for way, there in ways.items() if not there)
         advice.append(f"turn {missing} as well: what goes with the rate and with its size can't be separated otherwise")
-    if max(one["turns"] for one in facts) < _TURNS:
+    if max(one["turns"] for one in facts) < useful.turns:
         advice.append("make several whole turns one way: an axis out of level and ripples show once per turn")
-    if not any(one["share_at_rest"] > _SHARE for one in facts):
+    if not any(one["share_at_rest"] > useful.share for one in facts):
         advice.append("begin with a few seconds of rest: biases are seen there")
-    unseen = [one for one in effects if one.detectability < _SEEN or one.confused_with]
+    unseen = [one for one in effects if one.detectability < Policy().seen or one.confused_with]
     remedies = dict.fromkeys(one.remedy for one in unseen if one.remedy)
     advice += [f"{remedy}, for {', '.join(_of(unseen, remedy))}" for remedy in list(remedies)[:4]]
     return advice
