@@ -30,6 +30,7 @@ from sim.effects import (
     FURTHER_EFFECTS,
     TABLE_EFFECTS,
     Effect,
+    added_effects,
     apply_effects,
     make_effect,
 )
@@ -215,7 +216,9 @@ class Twin:
 
     def families(self) -> Mapping[str, type[Effect]]:
         """Return the library of effects: those of a table with its kind of reference, or of a free body."""
-        library = {"gyro": BODY_EFFECTS, "angle": ENCODER_EFFECTS}.get(self.drive_source, TABLE_EFFECTS)
+        own = {"gyro": BODY_EFFECTS, "angle": ENCODER_EFFECTS}.get(self.drive_source, TABLE_EFFECTS)
+        added = {name: one for name, one in added_effects().items() if self.drive_source in one.drive_sources}
+        library = {**own, **added}
         if self.grammar or self.drive_source == "gyro":
             return library
         return {name: family for name, family in library.items() if name not in FURTHER_EFFECTS}

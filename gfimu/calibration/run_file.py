@@ -11,9 +11,8 @@ from gfimu.files.column_file import open_columns
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
 from gfimu.recording.carried_array import array_difference
-from gfimu.recording.formats import open_run
+from gfimu.recording.formats import format_of_recording, open_run
 from gfimu.recording.mapped import MappedFile
-from gfimu.recording.mimu4444 import is_mimu4444, read_mimu4444
 
 __all__ = ["open_calibrated", "open_calibrated_run", "open_uncalibrated"]
 
@@ -58,7 +57,7 @@ def open_calibrated_run(
         As `gfimu.recording.formats.open_run`, or if the calibration does not fit the recording.
     """
     recording, geometry = open_run(path, array)
-    if calibration.unit == "lsb" and not isinstance(path, MappedFile) and not is_mimu4444(path):
+    if calibration.unit == "lsb" and not isinstance(path, MappedFile) and format_of_recording(path) is None:
         recording = Recording.read(path, array=geometry, unit="lsb")
     corrected, calibrated = calibration.apply(recording), calibration.calibrated_array(geometry)
     if _carries(recording, geometry):  # another array of its own stays in it, so that the difference is reported
@@ -80,8 +79,9 @@ def _open(path: str | Path | MappedFile, array: AccelerometerArray | None, unit:
         return path.read(array)
     if str(path).endswith(_TEXT) and Path(path).is_file():
         return read_text_triad(path)
-    if is_mimu4444(path):
-        return read_mimu4444(path)
+    whole = format_of_recording(path)
+    if whole is not None:
+        return whole.read(path)
     if unit is None:
         names = open_columns(path).names
         unit = "lsb" if any(name.endswith("_lsb") for name in names) else "m_s2"

@@ -36,13 +36,15 @@ def catalogue(kind: str) -> dict[str, str]:
     if kind not in KINDS:
         raise unknown_name("kind", kind, KINDS)
     if kind == "effects":
-        from sim.effects import EFFECTS, FURTHER_EFFECTS
+        from sim.effects import EFFECTS, FURTHER_EFFECTS, added_effects
 
-        return {name: family.summary for name, family in {**EFFECTS, **FURTHER_EFFECTS}.items()}
+        return {name: family.summary for name, family in {**EFFECTS, **FURTHER_EFFECTS, **added_effects()}.items()}
     if kind == "formats":
-        from gfimu.importing.readers import READERS
+        from gfimu.importing.readers import readers
+        from gfimu.recording.formats import formats
 
-        return {name: _first_line(reader.__doc__ or "") for name, reader in READERS.items()}
+        whole = {name: one.summary for name, one in formats().items()}
+        return whole | {name: one.summary for name, one in readers().items()}
     return dict(_described(kind))
 
 
@@ -107,7 +109,3 @@ def _described(kind: str) -> Iterator[tuple[str, str]]:
             (line.lstrip("# ") for line in path.read_text(encoding="utf-8").splitlines() if line[:1] == "#"), ""
         )
         yield name, str(content.get("description") or content.get("summary") or comment)
-
-
-def _first_line(text: str) -> str:
-    return text.strip().partition("\n")[0]

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from gfimu.importing import ColumnMap
     from gfimu.recording import Recording
     from gfimu.recording.mapped import MappedFile
-    from sim.twin import Twin
+    from gfimu.world_model import WorldModel
 
 __all__ = ["check"]
 
@@ -22,7 +22,7 @@ __all__ = ["check"]
 @writes(reads=("recordings", "twin", "column_map"))
 def check(
     recordings: Recording | str | Path | MappedFile | Sequence[Recording | str | Path | MappedFile],
-    twin: Twin | str | Path,
+    twin: WorldModel | str | Path,
     *,
     column_map: ColumnMap | str | Path | None = None,
 ) -> RunCheck:
@@ -32,8 +32,8 @@ def check(
     ----------
     recordings : Recording, path, or sequence of these
         Runs of one rig.
-    twin : Twin, str or Path
-        What the simulation believes: a twin, its name or file.
+    twin : WorldModel, str or Path
+        What the simulation believes: a twin, its name or file, or a simulation of one's own (``rig.py:function``).
     column_map : ColumnMap, str or Path, optional
         What the columns of a foreign file are: a map, its name or TOML file (``--map``).
 

@@ -17,14 +17,13 @@ if TYPE_CHECKING:
     from gfimu.diagnosis.design.proposal import Proposal
     from gfimu.recording import Recording
     from gfimu.world_model import Effect, WorldModel
-    from sim.twin import Twin
 
 __all__ = ["design"]
 
 
 @writes(reads=("twin", "verdict", "run"), out=SCENARIO)
 def design(
-    twin: Twin | WorldModel | str | Path,
+    twin: WorldModel | str | Path,
     effects: Sequence[str | Effect] = (),
     *,
     verdict: str | Path | None = None,
@@ -47,8 +46,8 @@ def design(
 
     Parameters
     ----------
-    twin : Twin, str or Path
-        The simulation: a twin, its name or file.
+    twin : WorldModel, str or Path
+        The simulation: a twin, its name or file, or one of one's own (``rig.py:function``).
     effects : sequence of str or Effect
         Effects to tell apart; or give ``verdict``.
     verdict : str or Path, optional
@@ -99,7 +98,7 @@ def design(
 
     if (verdict is None) == (not effects):
         raise InputError("name effects to tell apart, or give --verdict: one of the two")
-    model: WorldModel = as_twin(twin) if isinstance(twin, str | Path) else twin
+    model = as_twin(twin)
     asked = list(effects) if verdict is None else open_effects(verdict, model)
     at_hand = [
         prepare_run(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,7 +15,7 @@ if TYPE_CHECKING:
     from gfimu.importing import ColumnMap
     from gfimu.recording import Recording
     from gfimu.recording.mapped import MappedFile
-    from sim.twin import Twin
+    from gfimu.world_model import WorldModel
 
 __all__ = ["FOLDER", "diagnose", "write_result"]
 
@@ -27,7 +26,7 @@ FOLDER = OutputFolder(("verdict.json", "twin.toml", "report.html", "diagnosis.rr
 @writes(reads=("recordings", "twin", "held_out", "calibration", "column_map", "reference", "reference_map"), out=FOLDER)
 def diagnose(
     recordings: Recording | str | Path | MappedFile | Sequence[Recording | str | Path | MappedFile],
-    twin: Twin | str | Path,
+    twin: WorldModel | str | Path,
     *,
     out: str | Path | None = None,
     held_out: Recording | str | Path | MappedFile | Sequence[Recording | str | Path | MappedFile] = (),
@@ -45,8 +44,9 @@ def diagnose(
     ----------
     recordings : Recording, path, or sequence of these
         Runs of one rig, fitted together.
-    twin : Twin, str or Path
-        What the simulation believes: a twin, its name or file.
+    twin : WorldModel, str or Path
+        What the simulation believes: a twin, its name or file; or a simulation of one's own, as such or as
+        ``rig.py:function`` (`gfimu.own_rig.load_model`).
     out : str or Path, optional
         Folder for ``verdict.json``, ``twin.toml``, ``report.html`` and ``diagnosis.rrd``; made if it isn't there.
     held_out : Recording, path, or sequence of these
@@ -82,11 +82,11 @@ def diagnose(
 
     runs, unseen = ([by_map(run, column_map) for run in as_runs(group)] for group in (recordings, held_out))
     model = as_twin(twin)
-    model = replace(model, grammar=True) if grammar else model
+    model = model.searching(wide=True) if grammar else model
     unit = None if calibration is None else as_calibration(calibration)
     read, kept = ([_opened(run, model, unit) for run in group] for group in (runs, unseen))
     if unit is not None and unit.positions:
-        model = replace(model, array=unit.calibrated_array(model.array), array_name="array.toml")
+        model = model.with_array(unit.calibrated_array(model.array))
     labels = _names(runs) if names is None else names
     if reference is not None:
         from gfimu.commands.join import join
@@ -102,7 +102,7 @@ def diagnose(
 
 
 def write_result(out: str | Path, found: Diagnosis, recording: Recording) -> dict[str, Path]:
-    """Write the folder of a diagnosis, with the rig of the extended twin drawn by its MuJoCo model."""
+    """Write the folder of a diagnosis; the rig of an extended `sim.twin.Twin` is drawn by its MuJoCo model."""
     import tomli_w
 
     from gfimu.diagnosis.report.folder import write_diagnosis
@@ -112,12 +112,12 @@ def write_result(out: str | Path, found: Diagnosis, recording: Recording) -> dic
 
     twin = found.twin
     if not isinstance(twin, Twin):
-        raise TypeError(f"only the rig of a sim.twin.Twin can be drawn, not of a {type(twin).__name__}")
+        return write_diagnosis(out, found, twin_toml=twin.to_toml())
     world = twin.world(mounting=recording.mounting_rotvec)
     content = twin.to_dict()
     more = {}
-    if content["array"] not in list_models("arrays"):
-        # An array file of the user's is named relative to the twin file: it moves with it.
+    if twin.array_name not in list_models("arrays"):
+        # An array file of the user's, and a calibrated one, is named relative to the twin file: it moves with it.
         content["array"] = "array.toml"
         more["array.toml"] = twin.array.to_toml()
     return write_diagnosis(
@@ -131,7 +131,7 @@ def write_result(out: str | Path, found: Diagnosis, recording: Recording) -> dic
     )
 
 
-def _opened(recording: Recording | str | Path | MappedFile, model: Twin, unit: Calibration | None) -> Recording:
+def _opened(recording: Recording | str | Path | MappedFile, model: WorldModel, unit: Calibration | None) -> Recording:
     """Return a recording with the channels of the twin's array, calibrated where there is a calibration."""
     from gfimu.calibration.run_file import open_calibrated_run
     from gfimu.recording import Recording

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from gfimu.importing import ColumnMap
     from gfimu.recording import Recording
     from gfimu.recording.mapped import MappedFile
-    from sim.twin import Twin
+    from gfimu.world_model import WorldModel
 
 __all__ = [
     "array_of",
@@ -114,13 +114,20 @@ def as_calibration(calibration: Calibration | str | Path) -> Calibration:
     return load_calibration(calibration)
 
 
-def as_twin(twin: Twin | str | Path) -> Twin:
-    """Return a twin given as such, by name or as a twin file."""
+def as_twin(twin: WorldModel | str | Path) -> WorldModel:
+    """Return a twin given as such, by name, as a twin file, or as a world model of one's own (``rig.py:function``).
+
+    Raises
+    ------
+    InputError
+        If there is none of that name, or it can't be used.
+    """
     if not isinstance(twin, str | Path):
         return twin
+    from gfimu.own_rig import load_model
     from sim.twin import Twin
 
-    return Twin.load(twin)
+    return load_model(twin) or Twin.load(twin)
 
 
 def as_runs(

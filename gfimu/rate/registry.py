@@ -13,6 +13,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Protocol, cast
 
 from gfimu.errors import InputError, unknown_name
+from gfimu.plugins import plugins
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -106,10 +107,19 @@ RATE_METHODS: Mapping[str, RateMethod] = MappingProxyType({method.name: method f
 
 
 def rate_method(name: str) -> RateMethod:
-    """Look up a method for the angular rate; raises `InputError` that lists the methods."""
-    if name not in RATE_METHODS:
-        raise unknown_name("method", name, RATE_METHODS)
-    return RATE_METHODS[name]
+    """Look up a method for the angular rate, of gfimu or of another package (``gfimu.estimators``).
+
+    Raises
+    ------
+    InputError
+        If there is none of that name; it lists the methods.
+    """
+    if name in RATE_METHODS:
+        return RATE_METHODS[name]
+    known = {**RATE_METHODS, **plugins("gfimu.estimators", RateMethod, RATE_METHODS)}
+    if name not in known:
+        raise unknown_name("method", name, known)
+    return known[name]
 
 
 def recursive_methods(separator: str = " or ") -> str:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import cast
 
@@ -13,12 +14,50 @@ from gfimu.files.table import ArrowStream
 from gfimu.files.table_columns import TableColumns
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.importing.recognise import map_hint
+from gfimu.plugins import plugins
 from gfimu.recording.carried_array import carried_array, check_all_channels
 from gfimu.recording.mapped import MappedFile
 from gfimu.recording.mimu4444 import is_mimu4444, read_mimu4444
 from gfimu.recording.recording import Recording
 
-__all__ = ["open_recording", "open_run"]
+__all__ = ["FORMATS", "RecordingFormat", "format_of_recording", "formats", "open_recording", "open_run"]
+
+
+@dataclass(frozen=True)
+class RecordingFormat:
+    """A file format that holds a whole recording, so that no column map is needed.
+
+    Parameters
+    ----------
+    summary : str
+        What writes such files, one line.
+    recognises : callable
+        From a path to whether the file is of this format, by its first bytes.
+    read : callable
+        From a path to a `Recording` that carries its array; raises `InputError` for a file that it can't read.
+    """
+
+    summary: str
+    recognises: Callable[[str | Path], bool]
+    read: Callable[[str | Path], Recording]
+
+
+FORMATS: Mapping[str, RecordingFormat] = {
+    "mimu4444": RecordingFormat("byte stream of a MIMU4444 board", is_mimu4444, read_mimu4444)
+}
+"""Formats of gfimu by name, besides its own CSV and Parquet."""
+
+
+def formats() -> dict[str, RecordingFormat]:
+    """Return the formats of whole recordings by name, those of other packages (``gfimu.formats``) first."""
+    return {**plugins("gfimu.formats", RecordingFormat, FORMATS), **FORMATS}
+
+
+def format_of_recording(path: object) -> RecordingFormat | None:
+    """Return the format that a file is of, or None: a file of gfimu's own, or one that needs a column map."""
+    if not isinstance(path, str | Path):
+        return None
+    return next((one for one in formats().values() if one.recognises(path)), None)
 
 
 def open_recording(
@@ -29,12 +68,13 @@ def open_recording(
     Raises
     ------
     InputError
-        As `gfimu.Recording.read` and `gfimu.recording.mimu4444.read_mimu4444`.
+        As `gfimu.Recording.read`, and the reader of the format.
     """
     if isinstance(path, MappedFile):
         return path.read(array)
-    if isinstance(path, str | Path) and is_mimu4444(path):
-        return read_mimu4444(path)
+    whole = format_of_recording(path)
+    if whole is not None:
+        return whole.read(cast("str | Path", path))
     with _hinting_at_maps(path):
         return Recording.read(path, array=array)
 
@@ -71,9 +111,13 @@ def open_run(
     """
     if array is not None:
         return open_recording(path, array=array), array
+    whole = format_of_recording(path)
+    if whole is not None:
+        recording = whole.read(cast("str | Path", path))
+        if recording.array is None:
+            raise InputError(f"{path}: the recording does not name its array; give it with --array")
+        return recording, recording.array
     if isinstance(path, str | Path):
-        if is_mimu4444(path):
-            return read_mimu4444(path), AccelerometerArray.load("mimu4444")
         with _hinting_at_maps(path):
             table_of_file = open_columns(path)
             if "t_s" not in table_of_file.names:

@@ -9,6 +9,7 @@ from sim.effects.registry import (
     NOT_OF_A_BODY,
     NOT_OF_AN_ENCODER,
     TABLE_EFFECTS,
+    added_effects,
     apply_effects,
     make_effect,
 )
@@ -24,6 +25,7 @@ __all__ = [
     "Effect",
     "Pattern",
     "Size",
+    "added_effects",
     "apply_effects",
     "make_effect",
 ]

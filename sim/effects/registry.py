@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from gfimu.errors import unknown_name
+from gfimu.errors import InputError, unknown_name
 from gfimu.geometry.array import AccelerometerArray
+from gfimu.plugins import plugins
 from sim.effects import body, digital, mechanical, rig, sensing, timing
 from sim.effects.base import Effect
 from sim.effects.unknown import Unknown
@@ -21,6 +22,7 @@ __all__ = [
     "NOT_OF_AN_ENCODER",
     "NOT_OF_A_BODY",
     "TABLE_EFFECTS",
+    "added_effects",
     "apply_effects",
     "make_effect",
 ]
@@ -114,6 +116,25 @@ ENCODER_EFFECTS: dict[str, type[Effect]] = {
 }
 """Every effect of a rig whose reference is an angle, by its contract name."""
 
+
+def added_effects() -> dict[str, type[Effect]]:
+    """Return the effects that other packages add (``gfimu.effects``), by name.
+
+    Raises
+    ------
+    InputError
+        If a package adds something else, or an effect under another name than its own.
+    """
+    added: dict[str, type[Effect]] = {}
+    for name, found in plugins("gfimu.effects", type, TABLE_EFFECTS | BODY_EFFECTS).items():
+        if not issubclass(found, Effect) or found.name != name:
+            raise InputError(
+                f"entry point {name!r} of gfimu.effects: {found.__name__} is no sim.effects.base.Effect of that name"
+            )
+        added[name] = found
+    return added
+
+
 _PLACES = ("geometry", "motion", "timing", "sensing", "reference", "noise", "data")
 
 
@@ -122,6 +143,8 @@ def make_effect(
 ) -> Effect:
     """Build an effect by name; raises `InputError` for an unknown name or, given the array, an unknown key."""
     known = TABLE_EFFECTS | BODY_EFFECTS | {Unknown.name: Unknown}
+    if name not in known:
+        known = known | added_effects()
     if name not in known:
         raise unknown_name("effect", name, known)
     effect = known[name](parameters or {})

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 from gfimu.errors import InputError, unknown_name
@@ -11,32 +12,48 @@ from gfimu.importing.raw_table import RawFile
 from gfimu.importing.readers.logs import read_bag, read_mcap, read_ulog
 from gfimu.importing.readers.tables import read_archive, read_hdf5, read_matlab, read_parquet
 from gfimu.importing.readers.text import is_text, read_text
+from gfimu.plugins import plugins
 
-__all__ = ["READERS", "format_of", "read_foreign"]
+__all__ = ["READERS", "Reader", "format_of", "read_foreign", "readers"]
 
-READERS: dict[str, Callable[[Path, TextSpec], RawFile]] = {
-    "text": read_text,
-    "parquet": read_parquet,
-    "zip": read_archive,
-    "matlab": read_matlab,
-    "hdf5": read_hdf5,
-    "ulog": read_ulog,
-    "mcap": read_mcap,
-    "rosbag": read_bag,
+
+@dataclass(frozen=True)
+class Reader:
+    """How files of one foreign format become tables.
+
+    Parameters
+    ----------
+    read : callable
+        From a path and the layout of a text file to a `RawFile`; raises `InputError` for a file that it can't read.
+    marks : tuple of bytes
+        What a file of this format begins with, one of these.
+    """
+
+    read: Callable[[Path, TextSpec], RawFile]
+    marks: tuple[bytes, ...]
+
+    @property
+    def summary(self) -> str:
+        """What it reads, one line."""
+        return (self.read.__doc__ or "").strip().partition("\n")[0]
+
+
+READERS: Mapping[str, Reader] = {
+    "text": Reader(read_text, (b"\x1f\x8b\x08",)),
+    "parquet": Reader(read_parquet, (b"PAR1",)),
+    "zip": Reader(read_archive, (b"PK\x03\x04",)),
+    "matlab": Reader(read_matlab, (b"MATL",)),
+    "hdf5": Reader(read_hdf5, (b"\x89HDF",)),
+    "ulog": Reader(read_ulog, (b"ULog",)),
+    "mcap": Reader(read_mcap, (b"\x89MCA",)),
+    "rosbag": Reader(read_bag, (b"#ROS", b"SQLi")),
 }
-"""Readers by the name of the format."""
+"""Readers of gfimu by the name of the format."""
 
-_HEADS = {
-    b"PAR1": "parquet",
-    b"PK\x03\x04": "zip",
-    b"\x89HDF": "hdf5",
-    b"ULog": "ulog",
-    b"\x89MCA": "mcap",
-    b"MATL": "matlab",
-    b"#ROS": "rosbag",
-    b"SQLi": "rosbag",
-    b"\x1f\x8b\x08": "text",
-}
+
+def readers() -> dict[str, Reader]:
+    """Return the readers by the name of their format, those of other packages (``gfimu.readers``) first."""
+    return {**plugins("gfimu.readers", Reader, READERS), **READERS}
 
 
 def format_of(path: Path) -> str:
@@ -60,12 +77,13 @@ def format_of(path: Path) -> str:
         raise InputError(f"{path}: {error.strerror or error}; check the path") from None
     if not head:
         raise InputError(f"{path}: empty file; record again or give another file")
-    for mark, name in _HEADS.items():
-        if head.startswith(mark):
+    known = readers()
+    for name, reader in known.items():
+        if head.startswith(reader.marks):
             return name
     if is_text(head):
         return "text"
-    raise InputError(f"{path}: a binary file of unknown format; known are {', '.join(READERS)}")
+    raise InputError(f"{path}: a binary file of unknown format; known are {', '.join(known)}")
 
 
 def read_foreign(path: str | Path, kind: str = "", text: TextSpec = TextSpec()) -> RawFile:
@@ -88,8 +106,9 @@ def read_foreign(path: str | Path, kind: str = "", text: TextSpec = TextSpec()) 
     file = Path(path)
     found = format_of(file)
     name = kind or found
-    if name not in READERS:
-        raise unknown_name("format", name, READERS)
+    known = readers()
+    if name not in known:
+        raise unknown_name("format", name, known)
     if name != found and {name, found} != {"matlab", "hdf5"}:  # MATLAB 7.3 writes HDF5
         raise InputError(f"{file}: holds {found}, not {name}; give a map for {found}")
-    return READERS[name](file, text)
+    return known[name].read(file, text)
