@@ -30,6 +30,7 @@ __all__ = [
     "Whitened",
     "WorldModel",
     "acts_back",
+    "axis_inclination",
     "bound_of",
     "dependence_of",
     "is_of_one_recording",
@@ -147,6 +148,11 @@ def prior_of(family: EffectFamily, families: Iterable[EffectFamily]) -> float:
 def memory_of(effect: Effect) -> float:
     """Return how long a reading depends on the drive before it by an effect, s; others need not say so."""
     return float(getattr(effect, "memory_s", 0.0))
+
+
+def axis_inclination(model: WorldModel) -> float:
+    """Return the angle between a table's axis and the vertical, rad; others than inclined tables need not say so."""
+    return float(getattr(model, "axis_inclination", 0.0))
 
 
 def acts_back(effect: Effect) -> bool:

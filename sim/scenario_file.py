@@ -15,6 +15,7 @@ from gfimu.files.model_files import find_model, read_toml
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.units import STANDARD_GRAVITY
 from sim.adxl345 import SensorSettings
+from sim.carried import Hand, Wheel
 from sim.data_sheet import DataSheet
 from sim.effects import Effect, make_effect
 from sim.motion import BodyMotion, SpinMotion
@@ -91,6 +92,7 @@ def scenario_fields(data: Mapping[str, Any], source: str, beside: Path | None) -
         "gravity": table.number("gravity_m_s2", STANDARD_GRAVITY, above=0.0),
         "cube_offset": _triple(table.numbers("cube_offset_m", 3, (0.0, 0.0, 0.06))),
         "mounting_rotvec": _triple(table.numbers("mounting_rotvec_rad", 3, (0.0, 0.0, 0.0))),
+        "axis_inclination": table.number("axis_inclination_rad", 0.0, least=0.0),
         "driven": drive.text("mode", "prescribed", choices=("prescribed", "driven")) == "driven",
         "physics_step": drive.number("step_s", 1e-3, above=0.0),
         "reference": _reference(table.table("reference")),
@@ -124,7 +126,7 @@ def change_key(data: dict[str, Any], change: str) -> None:
 
 def _motion(table: TomlTable) -> tuple[SpinMotion | BodyMotion, float]:
     """Motion of the [motion] table, and its length where it has one of its own, s."""
-    kind = table.text("kind", "profile", choices=("profile", "rest", "tumble", "poses"))
+    kind = table.text("kind", "profile", choices=("profile", "rest", "tumble", "poses", "wheel", "hand"))
     if kind == "poses":
         sequence = PoseSequence(
             table.text("poses", PoseSequence.poses),
@@ -145,6 +147,26 @@ def _motion(table: TomlTable) -> tuple[SpinMotion | BodyMotion, float]:
         )
         table.finish()
         return tumble, 0.0
+    if kind == "hand":
+        hand = Hand(
+            duration=table.number("duration_s", above=0.0),
+            turn=table.number("turn_rad", Hand.turn, least=0.0),
+            sway=table.number("sway_m", Hand.sway, least=0.0),
+            pace=table.number("pace_s", Hand.pace, above=0.0),
+            rest=table.number("rest_s", Hand.rest, least=0.0),
+            seed=table.whole("seed", Hand.seed) or 0,
+        )
+        table.finish()
+        return hand, hand.duration
+    wheel: dict[str, Any] = {}
+    if kind == "wheel":
+        wheel = {
+            "radius": table.number("radius_m", Wheel.radius, least=0.0),
+            "axis": _triple(table.numbers("axis", 3, Wheel.axis)),
+            "shake": table.number("shake_m_s2", Wheel.shake, least=0.0),
+            "shake_frequency": table.number("shake_hz", Wheel.shake_frequency, above=0.0),
+            "seed": table.whole("seed", Wheel.seed) or 0,
+        }
     angle = table.number("start_angle_rad", 0.0)
     if kind == "rest":
         table.finish()
@@ -152,7 +174,8 @@ def _motion(table: TomlTable) -> tuple[SpinMotion | BodyMotion, float]:
     rate = table.number("start_rate_rad_s", 0.0)
     segments = [_segment(entry) for entry in table.tables("segment")]
     table.finish()
-    return spin_profile(segments, start_rate=rate, start_angle=angle), sum(segment.duration for segment in segments)
+    spin = spin_profile(segments, start_rate=rate, start_angle=angle)
+    return Wheel(spin, **wheel) if wheel else spin, sum(segment.duration for segment in segments)
 
 
 def _segment(table: TomlTable) -> Segment:

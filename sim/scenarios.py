@@ -21,6 +21,7 @@ from gfimu.short_repr import short_repr
 from gfimu.units import STANDARD_GRAVITY
 from sim import forward
 from sim.adxl345 import Sensor, SensorSettings, conversion_offsets
+from sim.carried import Wheel
 from sim.data_sheet import DataSheet
 from sim.effects import Effect, apply_effects
 from sim.effects.unlisted import Unlisted
@@ -63,6 +64,8 @@ class Scenario:
         Cube centre from the point of the axis at table height, table frame, m.
     mounting_rotvec : tuple of float
         Rotation vector by which the cube was turned from upright before the run, rad.
+    axis_inclination : float
+        Angle between the table's axis and the vertical, rad, about the world's x axis: π/2 of a wheel or a pendulum.
     driven : bool
         Whether the motor drives the table after the command; otherwise the motion is prescribed.
     physics_step : float
@@ -88,6 +91,7 @@ class Scenario:
     gravity: float = STANDARD_GRAVITY
     cube_offset: tuple[float, float, float] = (0.0, 0.0, 0.06)
     mounting_rotvec: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    axis_inclination: float = 0.0
     driven: bool = False
     physics_step: float = 1e-3
     reference: ReferenceSettings = field(default_factory=ReferenceSettings)
@@ -110,6 +114,7 @@ class Scenario:
             gravity=self.gravity,
             cube_offset=np.array(self.cube_offset),
             mount_rotvec=np.array(self.mounting_rotvec),
+            axis_rotvec=np.array([self.axis_inclination, 0.0, 0.0]),
         )
         return apply_effects(nominal, self.effects)
 
@@ -285,7 +290,13 @@ def _references(
         tacho = forward.reference(world, _spin(run.motion), t) + rng.normal(size=len(t)) * quality.tacho_noise_std
         columns["tacho_rad_s"] = _stepped(tacho, quality.tacho_resolution)
         columns["command_rad_s"] = _spin(command).at(t).rate
-        columns["angle_rad"] = _stepped(table.at(t - world.tacho_delay).angle, quality.encoder_resolution)
+        columns["angle_rad"] = _stepped(
+            table.at(t - world.tacho_delay).angle + world.angle_zero, quality.encoder_resolution
+        )
+    if isinstance(command, Wheel):
+        late_spin = command.spin.at(t / (1.0 + world.clock_ratio) - world.tacho_delay)
+        noise = rng.normal(size=len(t)) * quality.tacho_noise_std
+        columns["tacho_rad_s"] = _stepped(late_spin.rate + noise, quality.tacho_resolution)
     if quality.gyro_noise_std is not None:
         late = command.at(t / (1.0 + world.clock_ratio) - world.tacho_delay) if run.free else body
         rates = late.omega if isinstance(late, BodyState) else body.omega

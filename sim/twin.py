@@ -28,6 +28,7 @@ from sim.effects import (
     BODY_EFFECTS,
     ENCODER_EFFECTS,
     FURTHER_EFFECTS,
+    INCLINED_EFFECTS,
     TABLE_EFFECTS,
     Effect,
     added_effects,
@@ -72,6 +73,9 @@ class Twin:
     grammar : bool
         Whether a diagnosis searches the further effects of a rig and the points of the grammar at once; otherwise it
         does so where the usual effects give no good answer.
+    axis_inclination : float
+        Angle between the table's axis and the vertical, rad: 0 of a level table, π/2 of a wheel or a pendulum. The
+        axis leans about the world's x axis; at the angle zero that is the table's x axis too.
     """
 
     array: AccelerometerArray
@@ -85,6 +89,7 @@ class Twin:
     effects: tuple[Effect, ...] = ()
     array_name: str = ""
     grammar: bool = False
+    axis_inclination: float = 0.0
 
     __repr__ = short_repr
 
@@ -111,6 +116,7 @@ class Twin:
                 "cube_offset_m",
                 "sample_rate_hz",
                 "grammar",
+                "axis_inclination_rad",
                 "drive",
                 "sensor",
                 "effect",
@@ -146,6 +152,7 @@ class Twin:
             effects=tuple(_effect(entry, array, source) for entry in data.get("effect", [])),
             array_name=str(data["array"]),
             grammar=bool(data.get("grammar", False)),
+            axis_inclination=_inclination(data.get("axis_inclination_rad", 0.0), source),
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -160,6 +167,8 @@ class Twin:
         }
         if self.grammar:
             data["grammar"] = True
+        if self.axis_inclination:
+            data["axis_inclination_rad"] = self.axis_inclination
         if self.effects:
             data["effect"] = [{"name": effect.name, "parameters": effect.parameters} for effect in self.effects]
         return data
@@ -187,7 +196,12 @@ class Twin:
         """
         turned = np.zeros(3) if mounting is None else mounting
         nominal = World(
-            self.array, gravity=self.gravity, cube_offset=self.cube_offset, mount_rotvec=turned, start=start
+            self.array,
+            gravity=self.gravity,
+            cube_offset=self.cube_offset,
+            mount_rotvec=turned,
+            axis_rotvec=np.array([self.axis_inclination, 0.0, 0.0]),
+            start=start,
         )
         return apply_effects(nominal, self._effects_with(effects))
 
@@ -218,7 +232,8 @@ class Twin:
         """Return the library of effects: those of a table with its kind of reference, or of a free body."""
         own = {"gyro": BODY_EFFECTS, "angle": ENCODER_EFFECTS}.get(self.drive_source, TABLE_EFFECTS)
         added = {name: one for name, one in added_effects().items() if self.drive_source in one.drive_sources}
-        library = {**own, **added}
+        inclined = INCLINED_EFFECTS if self.axis_inclination and self.drive_source == "angle" else {}
+        library = {**own, **inclined, **added}
         if self.grammar or self.drive_source == "gyro":
             return library
         return {name: family for name, family in library.items() if name not in FURTHER_EFFECTS}
@@ -261,7 +276,7 @@ class Twin:
         if world.data_steps:
             readings = self._digital(readings, self._effects_with(effects), world, t)
         if self.drive_source == "angle":
-            return readings, spin.at(t - world.tacho_delay).angle
+            return readings, spin.at(t - world.tacho_delay).angle + world.angle_zero
         return readings, forward.reference(world, spin, t)
 
     def predict_body(
@@ -335,6 +350,13 @@ if TYPE_CHECKING:
     def _proof(twin: Twin) -> BodyModel:
         """Let the type checker prove that a twin is a world model, of a table and of a free body."""
         return twin
+
+
+def _inclination(value: Any, source: str) -> float:
+    inclination = float(value) if isinstance(value, int | float) and not isinstance(value, bool) else math.nan
+    if not 0.0 <= inclination <= math.pi:
+        raise InputError(f"{source}: axis_inclination_rad = {value!r} must be between 0 and π rad")
+    return inclination
 
 
 def _own(effects: Sequence[AnyEffect]) -> list[Effect]:

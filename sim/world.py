@@ -167,6 +167,8 @@ class World:
         Rotation vector of the cube in the table frame, rad.
     axis_rotvec : ndarray, shape (3,)
         Rotation vector of the table's axis in the world, rad.
+    angle_zero : float
+        What an encoder reads at the angle zero, rad.
     nod : Nod
         Nod of the axis.
     stretch : float
@@ -206,6 +208,7 @@ class World:
     cube_offset: NDArray[np.float64] = field(default_factory=lambda: np.array([0.0, 0.0, 0.06]))
     mount_rotvec: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
     axis_rotvec: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
+    angle_zero: float = 0.0
     nod: Nod = Nod()
     stretch: float = 0.0
     moving_arms: bool = False

@@ -18,6 +18,7 @@ from gfimu.diagnosis.verdict.sample_notes import with_sample_notes
 from gfimu.diagnosis.verdict.verdict import Diagnosis
 from gfimu.errors import InputError
 from gfimu.recording import Recording
+from gfimu.recording.axis_gyro import with_axis_gyro
 from gfimu.recording.carried_array import warn_of_other_array
 from gfimu.world_model import WorldModel
 
@@ -91,6 +92,7 @@ def prepare(
 ) -> PreparedRuns:
     """Read recordings of a table or of a free body and find the faults of their samples."""
     if model.drive_source == "gyro":
+        recordings = [with_axis_gyro(one, model.array) for one in recordings]
         return prepare_bodies(recordings, model, names, spike_share=policy.body_spike_share)
     return PreparedRuns.build(recordings, model, names, predicted_by_reference)
 

@@ -19,6 +19,7 @@ __all__ = [
     "EFFECTS",
     "ENCODER_EFFECTS",
     "FURTHER_EFFECTS",
+    "INCLINED_EFFECTS",
     "NOT_OF_AN_ENCODER",
     "NOT_OF_A_BODY",
     "TABLE_EFFECTS",
@@ -76,6 +77,9 @@ _OF_RIG: tuple[type[Effect], ...] = (
 
 FURTHER_EFFECTS: dict[str, type[Effect]] = {**{effect.name: effect for effect in _OF_RIG}, **UNLISTED}
 """What a rig on its table may have besides: further effects with a name, and the points of the grammar."""
+
+INCLINED_EFFECTS: dict[str, type[Effect]] = {timing.AngleZero.name: timing.AngleZero}
+"""What a rig whose axis leans may have besides, where its reference is an angle: gravity shows the angle itself."""
 
 NOT_OF_A_BODY: dict[str, str] = {
     **dict.fromkeys(("eccentricity", "mount_tilt", "table_tilt", "axis_wobble"), "a body in the hand has no axis"),
@@ -142,7 +146,7 @@ def make_effect(
     name: str, parameters: Mapping[str, Any] | None = None, array: AccelerometerArray | None = None
 ) -> Effect:
     """Build an effect by name; raises `InputError` for an unknown name or, given the array, an unknown key."""
-    known = TABLE_EFFECTS | BODY_EFFECTS | {Unknown.name: Unknown}
+    known = TABLE_EFFECTS | BODY_EFFECTS | INCLINED_EFFECTS | {Unknown.name: Unknown}
     if name not in known:
         known = known | added_effects()
     if name not in known:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.units import NUMBER, RATIO
 from gfimu.world_model import SpinState
-from sim.effects.base import Effect, Size
+from sim.effects.base import LARGEST_TURN, Effect, Size
 from sim.effects.scans import order_shapes, per_rate
 from sim.world import World
 
@@ -93,6 +93,25 @@ class TachoScale(Effect):
         """Multiply the reference by 1 + ratio."""
         gain = 1 + self.value("ratio")
         return world.changed(reference_steps=(*world.reference_steps, lambda reading, spin, t: reading * gain))
+
+
+class AngleZero(Effect):
+    """The encoder's zero is not where the twin has it: gravity shows that where the axis leans."""
+
+    name = "angle_zero"
+    summary = "the encoder's zero is off the direction of gravity"
+    place = "reference"
+    per_run = True
+    separated_by = "poses at rest at several angles"
+
+    @classmethod
+    def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
+        """One angle."""
+        return (Size("offset_rad", "rad", 0.02, bound=LARGEST_TURN),)
+
+    def apply(self, world: World) -> World:
+        """Let the encoder read more by the offset."""
+        return world.changed(angle_zero=world.angle_zero + self.value("offset_rad"))
 
 
 class TachoRipple(Effect):

@@ -14,7 +14,8 @@ from scipy.integrate import cumulative_trapezoid
 from gfimu.diagnosis.data.cosine_basis import CosineBasis, NoiseLevels
 from gfimu.diagnosis.data.rounding import COARSE, NO_STEPS, Steps
 from gfimu.diagnosis.data.run import Run, difference_noise, smooth_rate
-from gfimu.diagnosis.data.spins import JoinedSpin, ScaledSpin
+from gfimu.diagnosis.data.spins import JoinedSpin, ScaledSpin, State
+from gfimu.diagnosis.data.start_angle import gravity_angle
 from gfimu.world_model import Effect, Spin, WorldModel, is_of_wiring
 
 __all__ = ["RunUp", "Stretch", "make_stretches"]
@@ -230,16 +231,20 @@ def make_stretches(model: WorldModel, runs: Sequence[Run], known: Sequence[Seque
             pieces += [(start, stop, lost) for start, stop in pairwise(edges)]
         for start, stop, lost in pieces:
             drift = noise * np.sqrt(run.sample_period * (run.t[start] - run.t[0]))
+            angle, angle_std = float(turned[start]), _LOST_ANGLE_STD if lost else float(np.hypot(1e-4, 2.0 * drift))
+            piece, part = run.rows(start, stop), slice(start, stop)
+            motion = State(turned[part], rate[part], np.gradient(rate[part], run.sample_period))
+            angle, angle_std = gravity_angle(model, piece, motion, acting) or (angle, angle_std)
             stretches.append(
                 Stretch(
                     model,
-                    run.rows(start, stop),
+                    piece,
                     index,
                     float(run.t[0]),
                     acting,
                     steps,
-                    float(turned[start]),
-                    _LOST_ANGLE_STD if lost else float(np.hypot(1e-4, 2.0 * drift)),
+                    angle,
+                    angle_std,
                     len(pieces),
                 )
             )

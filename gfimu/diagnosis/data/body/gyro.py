@@ -62,6 +62,9 @@ def smooth_gyro(gyro: NDArray[np.float64], missing: NDArray[np.bool_], period: f
     rate, noise, densities = np.empty_like(gyro), np.empty(3), []
     phase = 2.0 * np.sin(np.pi * np.linspace(0.0, 0.5, 513))
     for axis, values in enumerate(gyro.T):
+        if not np.ptp(values):  # of an axis about which a wheel doesn't turn
+            rate[:, axis], noise[axis] = values, 0.0
+            continue
         most = _LOUDER * _noise_where_quiet(values)
         fits = [_fit(values, weight, order, most) for order in _ORDERS]
         _, order, cut, noise[axis] = max(fits)
@@ -71,7 +74,7 @@ def smooth_gyro(gyro: NDArray[np.float64], missing: NDArray[np.bool_], period: f
         # The posterior's spectrum is the noise's times what is passed.
         slope = np.linspace(0.0, np.pi, 513) / period
         densities.append(noise[axis] ** 2 * np.max(slope**2 * passed))
-    return SmoothGyro(rate, noise, float(np.sqrt(np.mean(densities))))
+    return SmoothGyro(rate, noise, float(np.sqrt(sum(densities) / 3.0)))
 
 
 def _noise_where_quiet(values: NDArray[np.float64]) -> float:

@@ -1,0 +1,157 @@
+"""Motions of bodies that are carried: a wheel on a moving hub, and a hand."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import make_interp_spline
+from scipy.spatial.transform import Rotation
+
+from gfimu.errors import InputError
+from sim.motion import BodyState, SpinMotion
+
+__all__ = ["Hand", "Wheel"]
+
+_AXLE = np.array([0.0, 1.0, 0.0])  # of a wheel, in the world: it rolls along x
+
+
+@dataclass(frozen=True)
+class Wheel:
+    """A wheel that rolls along the world's x axis; its axle is level, its hub shakes over the ground.
+
+    Parameters
+    ----------
+    spin : SpinMotion
+        Angle about the axle, rad; positive angles roll forwards.
+    radius : float
+        Rolling radius, m; 0 for a wheel on a stand.
+    axis : tuple of float
+        Direction of the axle in the body.
+    shake : float
+        Rms acceleration of the hub up and down, and along x besides rolling, m/s².
+    shake_frequency : float
+        About its highest frequency, Hz.
+    seed : int
+        Seed of the ground.
+    """
+
+    spin: SpinMotion
+    radius: float = 0.0
+    axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    shake: float = 0.0
+    shake_frequency: float = 5.0
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if self.radius < 0 or self.shake < 0 or self.shake_frequency <= 0:
+            raise InputError("wheel: radius_m and shake_m_s2 must not be negative, shake_hz must be positive")
+        if not np.linalg.norm(self.axis) > 0:
+            raise InputError(f"wheel axis {self.axis}: give a direction, such as [0, 0, 1]")
+
+    def at(self, t: ArrayLike) -> BodyState:
+        """State of the wheel at times ``t``, s, shape (n,)."""
+        times = np.asarray(t, dtype=float)
+        state = self.spin.at(times)
+        axis = np.asarray(self.axis) / np.linalg.norm(self.axis)
+        upright = Rotation.align_vectors([_AXLE], [axis])[0]
+        turned = (Rotation.from_rotvec(np.outer(state.angle, _AXLE)) * upright).as_matrix()
+        place, speed, push = (self._ground(times, order) for order in range(3))
+        for column, rolled in zip((place, speed, push), (state.angle, state.rate, state.acceleration), strict=True):
+            column[:, 0] += self.radius * rolled
+        return BodyState(place, turned, speed, push, np.outer(state.rate, axis), np.outer(state.acceleration, axis))
+
+    @cached_property
+    def _waves(self) -> NDArray[np.float64]:
+        """Angular frequency, rad/s, and phases of the shaking along x and z, rad, (3, k)."""
+        rng = np.random.default_rng(self.seed)
+        frequencies = 2.0 * np.pi * self.shake_frequency * rng.uniform(0.2, 1.0, 24)
+        return np.vstack([frequencies, rng.uniform(0.0, 2.0 * np.pi, (2, 24))])
+
+    def _ground(self, t: NDArray[np.float64], order: int) -> NDArray[np.float64]:
+        """Return a derivative of the hub's place by the ground, (n, 3), m, m/s or m/s²."""
+        out = np.zeros((len(t), 3))
+        omega, *phases = self._waves
+        size = self.shake * np.sqrt(2.0 / len(omega))
+        for axis, phase in zip((0, 2), phases, strict=True):
+            waves = np.exp(1j * (np.outer(t, omega) + phase)) * (1j * omega) ** (order - 2)
+            out[:, axis] = size * waves.real.sum(axis=1)
+        return out
+
+
+@dataclass(frozen=True)
+class Hand:
+    """A body that a hand turns and moves at random.
+
+    Euler angles (z, y, x) and the place are quintic splines through random knots, at rest at first and at the end.
+
+    Parameters
+    ----------
+    duration : float
+        Length, s.
+    turn : float
+        Rms of the angles, rad.
+    sway : float
+        Rms of the place along each axis, m.
+    pace : float
+        Time between two knots, s; a hand needs about half a second there and back.
+    rest : float
+        Rest at the start and at the end, s.
+    seed : int
+        Seed of the knots.
+    """
+
+    duration: float
+    turn: float = 0.7
+    sway: float = 0.15
+    pace: float = 0.4
+    rest: float = 2.0
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if self.pace <= 0 or self.rest < 0 or self.duration < 2.0 * self.rest + 4.0 * self.pace:
+            raise InputError(
+                f"hand: {self.duration:g} s are too short for rest_s = {self.rest:g} at both ends and a few movements "
+                f"of pace_s = {self.pace:g}; give a longer duration_s"
+            )
+
+    @cached_property
+    def _spline(self):  # type: ignore[no-untyped-def]
+        count = int((self.duration - 2.0 * self.rest) / self.pace) + 1
+        times = np.linspace(self.rest, self.duration - self.rest, count)
+        knots = np.random.default_rng(self.seed).standard_normal((count, 6)) * ([self.turn] * 3 + [self.sway] * 3)
+        knots[[0, -1]] = 0.0
+        flat = [(1, np.zeros(6)), (2, np.zeros(6))]
+        return make_interp_spline(times, knots, k=5, bc_type=(flat, flat))
+
+    def at(self, t: ArrayLike) -> BodyState:
+        """State of the body at times ``t``, s, shape (n,)."""
+        times = np.asarray(t, dtype=float)
+        moving = np.clip(times, self.rest, self.duration - self.rest)
+        inside = ((times > self.rest) & (times < self.duration - self.rest))[:, None]
+        value, slope, bend = self._spline(moving), *(self._spline(moving, order) * inside for order in (1, 2))
+        omega, alpha = _euler_rates(value[:, :3], slope[:, :3], bend[:, :3])
+        turned = Rotation.from_euler("ZYX", value[:, :3]).as_matrix()
+        return BodyState(value[:, 3:], turned, slope[:, 3:], bend[:, 3:], omega, alpha)
+
+
+def _euler_rates(
+    angle: NDArray[np.float64], rate: NDArray[np.float64], bend: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return rate and angular acceleration in body axes of Euler angles yaw ψ, pitch θ, roll φ, each (n, 3).
+
+    ω = (φ̇ − ψ̇ sin θ, θ̇ cos φ + ψ̇ cos θ sin φ, −θ̇ sin φ + ψ̇ cos θ cos φ) (Titterton & Weston, Strapdown Inertial
+    Navigation Technology, 2nd ed., 3.48, inverted); α is its derivative.
+    """
+    (_, pitch, roll), (yaw_1, pitch_1, roll_1), (yaw_2, pitch_2, roll_2) = angle.T, rate.T, bend.T
+    sp, cp, sr, cr = np.sin(pitch), np.cos(pitch), np.sin(roll), np.cos(roll)
+    omega = [roll_1 - yaw_1 * sp, pitch_1 * cr + yaw_1 * cp * sr, -pitch_1 * sr + yaw_1 * cp * cr]
+    flat, flat_1 = yaw_1 * cp, yaw_2 * cp - yaw_1 * sp * pitch_1
+    alpha = [
+        roll_2 - yaw_2 * sp - yaw_1 * cp * pitch_1,
+        pitch_2 * cr - pitch_1 * sr * roll_1 + flat_1 * sr + flat * cr * roll_1,
+        -pitch_2 * sr - pitch_1 * cr * roll_1 + flat_1 * cr - flat * sr * roll_1,
+    ]
+    return np.stack(omega, axis=-1), np.stack(alpha, axis=-1)
