@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
-from gfimu.cli.mapped import MapOption, TableOption
+from gfimu.cli.mapped import MapOption, MapSetOption, TableOption
 from gfimu.cli.output import JsonOption, print_json, print_paths, print_table
 
 __all__ = ["register"]
@@ -33,6 +33,15 @@ def _convert(
         str | None, typer.Option("--array", help="Array whose channels must be there; else every channel found.")
     ] = None,
     column_map: MapOption = None,
+    map_set: MapSetOption = None,
+    drop: Annotated[
+        str,
+        typer.Option(
+            "--drop",
+            metavar="KIND,...",
+            help="Rows to leave out, counted: corrupt, out_of_range, missing, duplicates, unordered.",
+        ),
+    ] = "",
     table: TableOption = None,
     json: JsonOption = False,
 ) -> None:
@@ -46,11 +55,18 @@ def _convert(
 
     For ROS 2: gfimu convert run.parquet run.mcap
 
+    A plain csv, no map written: gfimu convert log.csv run.csv --map-set time.column=ms --map-set time.unit=ms
+    --map-set unit=g --map-set channels.a11=ax --map-set channels.a12=ay --map-set channels.a13=az
+
+    A damaged recording: gfimu convert run.csv clean.csv --drop corrupt,duplicates
+
     One file per chip on a common clock: gfimu convert chip1.csv chip2.csv run.parquet --map klipper --array mine.toml
     """
     from gfimu.commands.convert import convert
 
-    recording = convert(source, target, array=array, column_map=column_map, table=table)
+    recording = convert(
+        source, target, array=array, column_map=column_map, map_set=map_set or [], drop=drop, table=table
+    )
     figures = {
         "samples": len(recording),
         "channels": len(recording.channels),
@@ -58,8 +74,13 @@ def _convert(
         "sample_rate_hz": recording.sample_rate if len(recording) > 1 else None,
         "gaps": len(recording.gaps) if len(recording) > 1 else 0,
     } | {key: value for key, value in recording.metadata.items() if key.startswith(("packets", "bytes"))}
+    figures |= {f"dropped_rows_{kind}": count for kind, count in recording.dropped.items()}
     if json:
         print_json(figures | {"files": {"recording": target}})
     else:
-        print_table(", ".join(map(str, source)), ("quantity", "value"), figures.items())
+        print_table(", ".join(map(str, source)), ("quantity", "value"), _shown(figures))
         print_paths([("recording", target)])
+
+
+def _shown(figures: dict[str, Any]) -> list[tuple[str, str]]:
+    return [(key, f"{value:.9g}" if isinstance(value, float) else str(value)) for key, value in figures.items()]

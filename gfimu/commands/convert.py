@@ -26,6 +26,8 @@ def convert(
     *,
     array: AccelerometerArray | str | Path | None = None,
     column_map: ColumnMap | str | Path | None = None,
+    map_set: Sequence[str] = (),
+    drop: str | Sequence[str] = (),
     table: str | None = None,
 ) -> Recording:
     """Read a recording in any format that is known, in m/s², and write it as CSV, Parquet, MCAP or EuRoC.
@@ -42,6 +44,11 @@ def convert(
         Array whose channels must be there; every channel found by default.
     column_map : ColumnMap, str or Path, optional
         What the columns of a foreign file are: a map, its name or TOML file (``--map``); see `gfimu.inspect`.
+    map_set : sequence of str
+        Keys of that map to set, such as ``"time.unit=ms"`` (``--map-set``); without a map they are all of it.
+    drop : str or sequence of str
+        Rows to leave out, counted and reported: ``corrupt``, ``out_of_range``, ``missing``, ``duplicates``,
+        ``unordered`` (see `gfimu.recording.filtered`).
     table : str, optional
         With a map: the table, topic or member of a file that holds several.
 
@@ -50,7 +57,7 @@ def convert(
     InputError
         If the source can't be read, or the target can't be written where it is asked for.
     """
-    from gfimu.commands.opened import as_array, files_by_map
+    from gfimu.commands.opened import as_array, by_map, files_by_map
     from gfimu.recording import Recording
     from gfimu.recording.carried_array import carried_array
     from gfimu.recording.formats import open_recording
@@ -58,8 +65,12 @@ def convert(
 
     drawing = None if array is None else as_array(array)
     given = _given(source)
-    if column_map is not None and not isinstance(given[0], Recording | MappedFile):
-        given = [files_by_map([one for one in given if isinstance(one, str | Path)], column_map, table)]
+    changes = [*map_set, *_dropping(drop)]
+    if isinstance(given[0], Recording | MappedFile):
+        given = [by_map(given[0], None, changes), *given[1:]]
+    elif column_map is not None or changes:
+        files = [one for one in given if isinstance(one, str | Path)]
+        given = [files_by_map(files, column_map, table, changes)]
     if len(given) > 1:
         raise InputError(f"{given[1]}: several files need --map, which says what the columns of each chip's file are")
     recording = given[0] if isinstance(given[0], Recording) else open_recording(given[0], array=drawing)
@@ -71,6 +82,12 @@ def convert(
     if target is not None:
         _write(recording, Path(target))
     return recording
+
+
+def _dropping(drop: str | Sequence[str]) -> list[str]:
+    """Return the change of a column map that leaves rows out."""
+    kinds = drop if isinstance(drop, str) else ",".join(drop)
+    return [f"drop={kinds}"] if kinds else []
 
 
 def _write(recording: Recording, target: Path) -> None:
