@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from gfimu.cli.mapped import MapOption, MapSetOption, TableOption
 from gfimu.cli.output import JsonOption, print_json, print_paths, print_table
+
+if TYPE_CHECKING:
+    from gfimu.calibration.result import Calibration
 
 __all__ = ["register"]
 
@@ -23,11 +27,13 @@ def _convert(
         list[Path],
         typer.Argument(
             metavar="SOURCE...",
-            help="Recording: .csv, .parquet, a MIMU4444 stream, or with --map a foreign file, one per chip.",
+            help="Recording: .csv, .parquet, a MIMU4444 stream, or with --map a foreign file, one per chip; "
+            "or a calibration (.json).",
         ),
     ],
     target: Annotated[
-        Path, typer.Argument(help="Recording to write: .csv, .parquet, .mcap (ROS 2), .euroc (a folder).")
+        Path,
+        typer.Argument(help="File to write: .csv, .parquet, .mcap (ROS 2), .euroc (a folder); .yaml of a calibration."),
     ],
     array: Annotated[
         str | None, typer.Option("--array", help="Array whose channels must be there; else every channel found.")
@@ -43,6 +49,15 @@ def _convert(
         ),
     ] = "",
     table: TableOption = None,
+    to: Annotated[str | None, typer.Option("--to", help="Of a calibration, the format: kalibr or ros.")] = None,
+    lsb_m_s2: Annotated[
+        float | None,
+        typer.Option("--lsb-m-s2", help="Of a calibration for counts: m/s² per count, as the sensor's driver has it."),
+    ] = None,
+    chip: Annotated[str | None, typer.Option("--chip", help="Of a calibration: the one chip to export.")] = None,
+    noise: Annotated[
+        Path | None, typer.Option("--noise", help="Of a calibration: recording at rest, for noise and sample rate.")
+    ] = None,
     json: JsonOption = False,
 ) -> None:
     """Convert a recording between CSV and Parquet, or import a MIMU4444 stream or a foreign file. Readings become m/s².
@@ -52,6 +67,8 @@ def _convert(
     A Klipper recording: gfimu convert adxl345-x.csv run.parquet --map klipper
 
     A file of unknown layout: gfimu inspect log.txt --out log.toml, then gfimu convert log.txt run.csv --map log.toml
+
+    A calibration for Kalibr: gfimu convert cal.json imu.yaml --to kalibr --array mine.toml --noise rest.parquet
 
     For ROS 2: gfimu convert run.parquet run.mcap
 
@@ -65,8 +82,21 @@ def _convert(
     from gfimu.commands.convert import convert
 
     recording = convert(
-        source, target, array=array, column_map=column_map, map_set=map_set or [], drop=drop, table=table
+        source,
+        target,
+        array=array,
+        column_map=column_map,
+        map_set=map_set or [],
+        drop=drop,
+        table=table,
+        to=to,
+        lsb_m_s2=lsb_m_s2,
+        chip=chip,
+        noise=noise,
     )
+    if not isinstance(recording, Recording):
+        _print_calibration(recording, target, str(to), json=json)
+        return
     figures = {
         "samples": len(recording),
         "channels": len(recording.channels),
@@ -82,5 +112,14 @@ def _convert(
         print_paths([("recording", target)])
 
 
-def _shown(figures: dict[str, Any]) -> list[tuple[str, str]]:
+def _print_calibration(found: Calibration, target: Path, to: str, *, json: bool) -> None:
+    figures = {"format": to, "method": found.method, "unit": found.unit, "chips": len(found.chips)}
+    if json:
+        print_json(figures | {"files": {"calibration": target}})
+    else:
+        print_table(str(target), ("quantity", "value"), _shown(figures))
+        print_paths([("calibration", target)])
+
+
+def _shown(figures: Mapping[str, object]) -> list[tuple[str, str]]:
     return [(key, f"{value:.9g}" if isinstance(value, float) else str(value)) for key, value in figures.items()]
