@@ -80,6 +80,7 @@ def _convert(
     One file per chip on a common clock: gfimu convert chip1.csv chip2.csv run.parquet --map klipper --array mine.toml
     """
     from gfimu.commands.convert import convert
+    from gfimu.recording import Recording
 
     recording = convert(
         source,

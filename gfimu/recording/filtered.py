@@ -67,7 +67,7 @@ def filtered_recording(
     if isinstance(source, str | Path) and is_mimu4444(source):
         recording = read_mimu4444(source)
         recording = recording.slice(min(column_map.skip_rows, len(recording)))
-        return _chosen_rows(recording, column_map, np.isnan(recording.readings), str(source))
+        return _chosen_rows(recording, column_map, np.isnan(recording.readings), str(source), array)
     table = open_columns(source)
     if "t_s" not in table.names:
         hint = map_hint(source) if isinstance(source, str | Path) else ""
@@ -79,10 +79,17 @@ def filtered_recording(
     recording = replace(recording, metadata=_counted(recording.metadata, dropped))
     columns = (_column_of(name, table.names) for name in recording.channels)
     absent = np.column_stack([np.isnan(next(iter(whole.blocks([name])))[0]) for name in columns])
-    return _chosen_rows(recording, column_map, absent, str(table.file))
+    return _chosen_rows(recording, column_map, absent, str(table.file), array)
 
 
-def without_rows(recording: Recording, drop: Collection[str], *, absent: NDArray[np.bool_], source: str) -> Recording:
+def without_rows(
+    recording: Recording,
+    drop: Collection[str],
+    *,
+    absent: NDArray[np.bool_],
+    source: str,
+    array: AccelerometerArray | None = None,
+) -> Recording:
     """Return a recording without rows that are corrupt, out of range or lack a value, where that is asked for.
 
     Parameters
@@ -95,6 +102,8 @@ def without_rows(recording: Recording, drop: Collection[str], *, absent: NDArray
         Readings that the file itself had not.
     source : str
         The file, for messages.
+    array : AccelerometerArray, optional
+        The array whose parts state the range; the recording's own by default.
 
     Raises
     ------
@@ -104,7 +113,7 @@ def without_rows(recording: Recording, drop: Collection[str], *, absent: NDArray
     unknown = np.isnan(recording.readings)
     rows = {"corrupt": (unknown & ~absent).any(axis=1), "missing": absent.any(axis=1)}
     if "out_of_range" in drop:
-        rows["out_of_range"] = _out_of_range(recording, source)
+        rows["out_of_range"] = _out_of_range(recording, array or recording.array, source)
     kept = np.ones(len(recording), dtype=bool)
     counts = {}
     for kind, said in _SAID.items():
@@ -153,10 +162,17 @@ def rows_between(t_s: NDArray[np.float64], spec: TimeSpec, source: str) -> NDArr
     return rows
 
 
-def _chosen_rows(recording: Recording, column_map: ColumnMap, absent: NDArray[np.bool_], source: str) -> Recording:
+def _chosen_rows(
+    recording: Recording,
+    column_map: ColumnMap,
+    absent: NDArray[np.bool_],
+    source: str,
+    array: AccelerometerArray | None,
+) -> Recording:
     rows = np.flatnonzero(rows_between(recording.t_s, column_map.time, source))
     first, stop = int(rows[0]), int(rows[-1]) + 1
-    return without_rows(recording.slice(first, stop), column_map.drop, absent=absent[first:stop], source=source)
+    taken = recording.slice(first, stop)
+    return without_rows(taken, column_map.drop, absent=absent[first:stop], source=source, array=array)
 
 
 def _ordered(table: ColumnFile, column_map: ColumnMap) -> tuple[TableColumns, Mapping[str, int]]:
@@ -179,9 +195,8 @@ def _ordered(table: ColumnFile, column_map: ColumnMap) -> tuple[TableColumns, Ma
     return whole, dropped
 
 
-def _out_of_range(recording: Recording, source: str) -> NDArray[np.bool_]:
+def _out_of_range(recording: Recording, array: AccelerometerArray | None, source: str) -> NDArray[np.bool_]:
     """Mark the rows (n,) in which a channel reads more than its part can."""
-    array = recording.array
     if recording.unit != "m_s2" or array is None:
         raise InputError(f"{source}: to drop out_of_range, give the array with --array; its parts state their range")
     rails = dict(zip(array.channels, rails_of_array(array), strict=True))

@@ -350,4 +350,4 @@ def _recording(piece: _Piece, chosen: ColumnMap, array: AccelerometerArray | Non
     table.file = piece.source
     recording = Recording.read(table, array=array)  # type: ignore[arg-type]
     absent = np.column_stack([np.isnan(values) for values in piece.channels.values()])
-    return without_rows(recording, chosen.drop, absent=absent, source=piece.source)
+    return without_rows(recording, chosen.drop, absent=absent, source=piece.source, array=array)
