@@ -240,7 +240,6 @@ ROOMS = {
     "gfimu.recording": {"gfimu.files", "gfimu.geometry", "gfimu.importing", "gfimu.parts", "gfimu.rate.integration"},
     "gfimu.exporting": {
         "gfimu.calibration",
-        "gfimu.files",
         "gfimu.geometry",
         "gfimu.parts",
         "gfimu.recording",

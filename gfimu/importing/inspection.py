@@ -194,7 +194,7 @@ def _own_recording(raw: RawFile, table: RawTable, chips: dict[str, list[str]]) -
     channels = [name for names in chips.values() for name in names]
     roles = {name: f"{name.partition('_')[0]}, {name.partition('_')[2]}" for name in channels} | {"t_s": "time"}
     roles |= {name: "reference" for name in table.columns if _is_reference(name) and name != "t_s"}
-    times, findings = _times(table, TimeSpec("t_s"), raw.source)
+    times, findings = _times(table, TimeSpec("t_s"), raw.source, drop=("duplicates", "unordered"))
     if times is not None and times.dropped:
         findings.append("with such rows it is refused; gfimu convert --drop duplicates,unordered leaves them out")
     findings += oddities({name: table.numbers(name) for name in channels})
@@ -309,10 +309,10 @@ def _view(table: RawTable, name: str, role: str) -> ColumnView:
     return ColumnView(name, float(known.min()), float(known.max()), float(np.median(known)), missing, role)
 
 
-def _times(table: RawTable, spec: TimeSpec, source: str) -> tuple[Times | None, list[str]]:
+def _times(table: RawTable, spec: TimeSpec, source: str, *, drop: Sequence[str] = ()) -> tuple[Times | None, list[str]]:
     """Return the times of a table, and what is odd about them."""
     try:
-        times = times_of(table, spec, source)
+        times = times_of(table, spec, source, drop=drop)
     except InputError as error:
         return None, [str(error).removeprefix(f"{source}: ")]
     found = [note.removeprefix(f"{source}: ") for note in times.notes]
