@@ -58,10 +58,11 @@ def open_calibrated_run(
         As `gfimu.recording.formats.open_run`, or if the calibration does not fit the recording.
     """
     recording, geometry = open_run(path, array)
-    if calibration.unit == "lsb" and isinstance(path, MappedFile):
-        recording = path.read(geometry, unit="lsb")
-    elif calibration.unit == "lsb" and not is_mimu4444(path):
-        recording = Recording.read(path, array=geometry, unit="lsb")
+    if calibration.unit == "lsb":
+        if isinstance(path, MappedFile):
+            recording = path.read(geometry, unit="lsb")
+        elif not is_mimu4444(path):
+            recording = Recording.read(path, array=geometry, unit="lsb")
     corrected, calibrated = calibration.apply(recording), calibration.calibrated_array(geometry)
     if _carries(recording, geometry):  # another array of its own stays in it, so that the difference is reported
         corrected = corrected.carrying(calibrated)

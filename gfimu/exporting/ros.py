@@ -66,7 +66,7 @@ def inverse_form(
 
     dSM = −SM dM SM, and d(SM b) = dSM b + SM db.
     """
-    inverse = np.linalg.inv(chip.sensitivity)
+    inverse = np.asarray(np.linalg.inv(chip.sensitivity), dtype=np.float64)
     of_inverse = -np.kron(inverse, inverse.T)  # (9, 9), rows of SM by rows of M
     jacobian = np.zeros((12, 12))
     jacobian[:9, :9] = of_inverse
