@@ -57,8 +57,11 @@ def open_calibrated_run(
         As `gfimu.recording.formats.open_run`, or if the calibration does not fit the recording.
     """
     recording, geometry = open_run(path, array)
-    if calibration.unit == "lsb" and not isinstance(path, MappedFile) and format_of_recording(path) is None:
-        recording = Recording.read(path, array=geometry, unit="lsb")
+    if calibration.unit == "lsb":
+        if isinstance(path, MappedFile):
+            recording = path.read(geometry, unit="lsb")
+        elif format_of_recording(path) is None:
+            recording = Recording.read(path, array=geometry, unit="lsb")
     corrected, calibrated = calibration.apply(recording), calibration.calibrated_array(geometry)
     if _carries(recording, geometry):  # another array of its own stays in it, so that the difference is reported
         corrected = corrected.carrying(calibrated)
@@ -76,7 +79,7 @@ def _carries(recording: Recording, array: AccelerometerArray) -> bool:
 
 def _open(path: str | Path | MappedFile, array: AccelerometerArray | None, unit: str | None) -> Recording:
     if isinstance(path, MappedFile):
-        return path.read(array)
+        return path.read(array, unit=unit)
     if str(path).endswith(_TEXT) and Path(path).is_file():
         return read_text_triad(path)
     whole = format_of_recording(path)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from gfimu.calibration.registry import METHODS
-from gfimu.cli.mapped import MapOption
+from gfimu.cli.mapped import MapOption, MapSetOption
 from gfimu.cli.output import JsonOption, print_json, print_paths, print_table
 
 if TYPE_CHECKING:
@@ -69,6 +69,7 @@ def _calibrate(
     ] = 0.0,
     picture: Annotated[Path | None, typer.Option("--picture", help="Picture to write (.png, .svg, .pdf).")] = None,
     column_map: MapOption = None,
+    map_set: MapSetOption = None,
     json: JsonOption = False,
 ) -> None:
     """Calibrate the accelerometers of a recording, each parameter with its standard deviation.
@@ -92,6 +93,7 @@ def _calibrate(
         levelling_std=levelling_std,
         motion=motion,
         column_map=column_map,
+        map_set=map_set or [],
         update=update,
         turn_on_std=turn_on_std,
         bias_walk=bias_walk,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gfimu.cli.mapped import MapOption
+from gfimu.cli.mapped import MapOption, MapSetOption
 from gfimu.cli.output import JsonOption, print_json, print_table, print_text
 
 if TYPE_CHECKING:
@@ -25,6 +25,7 @@ def _check(
     runs: Annotated[list[Path], typer.Argument(metavar="RUN...", help="Recordings of one rig.")],
     twin: Annotated[str, typer.Option("--twin", help="What the simulation believes: a name, or a twin file (.toml).")],
     column_map: MapOption = None,
+    map_set: MapSetOption = None,
     json: JsonOption = False,
 ) -> None:
     """Look at recordings before a diagnosis: quality of the data, effects their motion separates, what to record next.
@@ -33,7 +34,7 @@ def _check(
     """
     from gfimu.commands.check import check
 
-    found = check(runs, twin, column_map=column_map)
+    found = check(runs, twin, column_map=column_map, map_set=map_set or [])
     if json:
         print_json(found.to_dict())
     else:

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gfimu.cli.mapped import MapOption, TableOption
+from gfimu.cli.mapped import MapOption, MapSetOption, TableOption
 from gfimu.cli.output import JsonOption, print_json, print_paths, print_table
+
+if TYPE_CHECKING:
+    from gfimu.calibration.result import Calibration
 
 __all__ = ["register"]
 
@@ -23,17 +27,37 @@ def _convert(
         list[Path],
         typer.Argument(
             metavar="SOURCE...",
-            help="Recording: .csv, .parquet, a MIMU4444 stream, or with --map a foreign file, one per chip.",
+            help="Recording: .csv, .parquet, a MIMU4444 stream, or with --map a foreign file, one per chip; "
+            "or a calibration (.json).",
         ),
     ],
     target: Annotated[
-        Path, typer.Argument(help="Recording to write: .csv, .parquet, .mcap (ROS 2), .euroc (a folder).")
+        Path,
+        typer.Argument(help="File to write: .csv, .parquet, .mcap (ROS 2), .euroc (a folder); .yaml of a calibration."),
     ],
     array: Annotated[
         str | None, typer.Option("--array", help="Array whose channels must be there; else every channel found.")
     ] = None,
     column_map: MapOption = None,
+    map_set: MapSetOption = None,
+    drop: Annotated[
+        str,
+        typer.Option(
+            "--drop",
+            metavar="KIND,...",
+            help="Rows to leave out, counted: corrupt, out_of_range, missing, duplicates, unordered.",
+        ),
+    ] = "",
     table: TableOption = None,
+    to: Annotated[str | None, typer.Option("--to", help="Of a calibration, the format: kalibr or ros.")] = None,
+    lsb_m_s2: Annotated[
+        float | None,
+        typer.Option("--lsb-m-s2", help="Of a calibration for counts: m/s² per count, as the sensor's driver has it."),
+    ] = None,
+    chip: Annotated[str | None, typer.Option("--chip", help="Of a calibration: the one chip to export.")] = None,
+    noise: Annotated[
+        Path | None, typer.Option("--noise", help="Of a calibration: recording at rest, for noise and sample rate.")
+    ] = None,
     json: JsonOption = False,
 ) -> None:
     """Convert a recording between CSV and Parquet, or import a MIMU4444 stream or a foreign file. Readings become m/s².
@@ -44,13 +68,36 @@ def _convert(
 
     A file of unknown layout: gfimu inspect log.txt --out log.toml, then gfimu convert log.txt run.csv --map log.toml
 
+    A calibration for Kalibr: gfimu convert cal.json imu.yaml --to kalibr --array mine.toml --noise rest.parquet
+
     For ROS 2: gfimu convert run.parquet run.mcap
+
+    A plain csv, no map written: gfimu convert log.csv run.csv --map-set time.column=ms --map-set time.unit=ms
+    --map-set unit=g --map-set channels.a11=ax --map-set channels.a12=ay --map-set channels.a13=az
+
+    A damaged recording: gfimu convert run.csv clean.csv --drop corrupt,duplicates
 
     One file per chip on a common clock: gfimu convert chip1.csv chip2.csv run.parquet --map klipper --array mine.toml
     """
     from gfimu.commands.convert import convert
+    from gfimu.recording import Recording
 
-    recording = convert(source, target, array=array, column_map=column_map, table=table)
+    recording = convert(
+        source,
+        target,
+        array=array,
+        column_map=column_map,
+        map_set=map_set or [],
+        drop=drop,
+        table=table,
+        to=to,
+        lsb_m_s2=lsb_m_s2,
+        chip=chip,
+        noise=noise,
+    )
+    if not isinstance(recording, Recording):
+        _print_calibration(recording, target, str(to), json=json)
+        return
     figures = {
         "samples": len(recording),
         "channels": len(recording.channels),
@@ -58,8 +105,22 @@ def _convert(
         "sample_rate_hz": recording.sample_rate if len(recording) > 1 else None,
         "gaps": len(recording.gaps) if len(recording) > 1 else 0,
     } | {key: value for key, value in recording.metadata.items() if key.startswith(("packets", "bytes"))}
+    figures |= {f"dropped_rows_{kind}": count for kind, count in recording.dropped.items()}
     if json:
         print_json(figures | {"files": {"recording": target}})
     else:
-        print_table(", ".join(map(str, source)), ("quantity", "value"), figures.items())
+        print_table(", ".join(map(str, source)), ("quantity", "value"), _shown(figures))
         print_paths([("recording", target)])
+
+
+def _print_calibration(found: Calibration, target: Path, to: str, *, json: bool) -> None:
+    figures = {"format": to, "method": found.method, "unit": found.unit, "chips": len(found.chips)}
+    if json:
+        print_json(figures | {"files": {"calibration": target}})
+    else:
+        print_table(str(target), ("quantity", "value"), _shown(figures))
+        print_paths([("calibration", target)])
+
+
+def _shown(figures: Mapping[str, object]) -> list[tuple[str, str]]:
+    return [(key, f"{value:.9g}" if isinstance(value, float) else str(value)) for key, value in figures.items()]

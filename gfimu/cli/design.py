@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from gfimu.cli.mapped import MapOption, MapSetOption
 from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, progress
 
 if TYPE_CHECKING:
@@ -32,6 +33,8 @@ def _design(
         list[Path] | None,
         typer.Option("--run", help="Recording at hand, to be diagnosed together with the new one; may be repeated."),
     ] = None,
+    column_map: MapOption = None,
+    map_set: MapSetOption = None,
     max_rate: Annotated[float, typer.Option("--max-rate", metavar="RAD/S", help="Largest rate of the table.")] = 15.0,
     max_acceleration: Annotated[
         float, typer.Option("--max-acceleration", metavar="RAD/S²", help="Largest angular acceleration of the table.")
@@ -55,6 +58,8 @@ def _design(
             effects or [],
             verdict=verdict,
             run=runs or [],
+            column_map=column_map,
+            map_set=map_set or [],
             max_rate=max_rate,
             max_acceleration=max_acceleration,
             duration=duration,

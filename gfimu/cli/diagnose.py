@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gfimu.cli.mapped import MapOption
+from gfimu.cli.mapped import MapOption, MapSetOption, ReferenceMapSetOption
 from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, print_text, progress
 from gfimu.errors import InputError
 
@@ -49,6 +49,7 @@ def _diagnose(
         ),
     ] = False,
     column_map: MapOption = None,
+    map_set: MapSetOption = None,
     reference: Annotated[
         Path | None,
         typer.Option(
@@ -58,6 +59,7 @@ def _diagnose(
     reference_map: Annotated[
         str | None, typer.Option("--reference-map", metavar="MAP", help="Column map of that file.")
     ] = None,
+    reference_map_set: ReferenceMapSetOption = None,
     json: JsonOption = False,
 ) -> None:
     """Show what a simulation gets wrong against recordings, name the cause, extend the simulation, measure the gain.
@@ -78,7 +80,7 @@ def _diagnose(
         from gfimu.cli.check import print_check
         from gfimu.commands.check import check as look
 
-        seen = look(runs, twin, column_map=column_map)
+        seen = look(runs, twin, column_map=column_map, map_set=map_set or [])
         print_json(seen.to_dict()) if json else print_check(seen)
         return
     if out is None:
@@ -93,8 +95,10 @@ def _diagnose(
             out=out,
             held_out=held_out or [],
             column_map=column_map,
+            map_set=map_set or [],
             reference=reference,
             reference_map=reference_map,
+            reference_map_set=reference_map_set or [],
             calibration=calibration,
             report=done,
             grammar=grammar,

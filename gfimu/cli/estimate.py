@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gfimu.cli.mapped import MapOption
+from gfimu.cli.mapped import MapOption, MapSetOption
 from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, print_text, progress
 from gfimu.rate.registry import RATE_METHODS, rate_method, recursive_methods
 
@@ -53,6 +53,7 @@ def _estimate(
     ] = False,
     rrd: Annotated[Path | None, typer.Option("--rrd", help="Rerun recording to write.")] = None,
     column_map: MapOption = None,
+    map_set: MapSetOption = None,
     axis: Annotated[
         str | None,
         typer.Option(
@@ -91,6 +92,7 @@ def _estimate(
             rest_bias=rest_bias,
             calibration=calibration,
             column_map=column_map,
+            map_set=map_set or [],
             axis=turning_axis(axis, axis_point, hub, inclination_rad),
             omega0=None if unknown_start else (0.0, 0.0, 0.0),
             fuse_gyro=gyro,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gfimu.cli.mapped import MapOption
+from gfimu.cli.mapped import MapOption, MapSetOption, ReferenceMapSetOption
 from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, print_text
 
 if TYPE_CHECKING:
@@ -29,9 +29,11 @@ def _join(
         str | None, typer.Option("--array", help="Array of the channels; else the recording's own.")
     ] = None,
     column_map: MapOption = None,
+    map_set: MapSetOption = None,
     reference_map: Annotated[
         str | None, typer.Option("--reference-map", metavar="MAP", help="Column map of a foreign file of references.")
     ] = None,
+    reference_map_set: ReferenceMapSetOption = None,
     most_rate_error: Annotated[
         float,
         typer.Option("--most-rate-error", help="Largest rate error between the clocks that is searched, a ratio."),
@@ -53,7 +55,9 @@ def _join(
         out=out,
         array=array,
         column_map=column_map,
+        map_set=map_set or [],
         reference_map=reference_map,
+        reference_map_set=reference_map_set or [],
         most_rate_error=most_rate_error,
         force=force,
     )

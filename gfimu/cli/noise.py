@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from gfimu.cli.mapped import MapOption
+from gfimu.cli.mapped import MapOption, MapSetOption
 from gfimu.cli.output import JsonOption, print_json, print_paths, print_table
 
 __all__ = ["register"]
@@ -31,6 +31,7 @@ def _noise(
     kalibr: Annotated[Path | None, typer.Option("--kalibr", help="Kalibr imu.yaml to write.")] = None,
     picture: Annotated[Path | None, typer.Option("--picture", help="Picture to write (.png, .svg, .pdf).")] = None,
     column_map: MapOption = None,
+    map_set: MapSetOption = None,
     json: JsonOption = False,
 ) -> None:
     """Identify velocity random walk N, bias instability B, acceleration random walk K, quantisation Q and ramp R.
@@ -43,6 +44,7 @@ def _noise(
     result = noise(
         run,
         column_map=column_map,
+        map_set=map_set or [],
         stretch=stretch,
         rest_threshold=rest_threshold,
         calibration=calibration,

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from gfimu.cli.mapped import MapOption
+from gfimu.cli.mapped import MapOption, MapSetOption
 from gfimu.cli.output import print_paths
 
 __all__ = ["register"]
@@ -25,6 +25,7 @@ def _view(
         typer.Option("--array", help="Array: a name, a .toml file or MJCF sites (.xml); else the recording's own."),
     ] = None,
     column_map: MapOption = None,
+    map_set: MapSetOption = None,
     out: Annotated[Path | None, typer.Option("--out", help="Write the .rrd here and don't open it.")] = None,
 ) -> None:
     """Open a run in the rerun viewer: the rig in 3-D, raw channels, and the estimate over time.
@@ -39,6 +40,7 @@ def _view(
         file,
         array=array,
         column_map=column_map,
+        map_set=map_set or [],
         out=out,
         on_picture=lambda picture: print_paths([("rerun recording", picture)]),
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -37,6 +38,7 @@ def calibrate(
     out: str | Path | None = None,
     array: AccelerometerArray | str | Path | None = None,
     column_map: ColumnMap | str | Path | None = None,
+    map_set: Sequence[str] = (),
     gravity: float | None = None,
     latitude: float | None = None,
     height: float = 0.0,
@@ -68,6 +70,8 @@ def calibrate(
         The array, its name or file; the recording's own by default.
     column_map : ColumnMap, str or Path, optional
         What the columns of a foreign file are: a map, its name or TOML file (``--map``); see `gfimu.inspect`.
+    map_set : sequence of str
+        Keys of that map to set, such as ``"time.unit=ms"`` (``--map-set``); without a map they are all of it.
     gravity : float, optional
         Local gravity, m/s²; standard gravity by default.
     latitude, height : float, optional
@@ -114,7 +118,7 @@ def calibrate(
     )
     drawing = None if array is None else as_array(array)
     local_gravity = _gravity(gravity, latitude, height)
-    source = by_map(recording, column_map)
+    source = by_map(recording, column_map, map_set)
     run = _uncalibrated(source, drawing)
     task = CalibrationTask(
         run,
@@ -125,7 +129,7 @@ def calibrate(
         min_rest_s=min_rest_s if min_rest is None else min_rest,
         levelling_std_rad=levelling,
         array=_own_array(source) if drawing is None and "array" in chosen.options else drawing,
-        motion=None if motion is None else _uncalibrated(by_map(motion, column_map), drawing),
+        motion=None if motion is None else _uncalibrated(by_map(motion, column_map, map_set), drawing),
         update=None if update is None else as_calibration(update),
         turn_on_std_m_s2=turn_on_std,
         bias_walk_m_s2_rt_s=bias_walk,

@@ -25,6 +25,7 @@ def check(
     twin: WorldModel | str | Path,
     *,
     column_map: ColumnMap | str | Path | None = None,
+    map_set: Sequence[str] = (),
 ) -> RunCheck:
     """Look at recordings before a diagnosis: quality of the data, effects their motion separates, what to record next.
 
@@ -36,6 +37,8 @@ def check(
         What the simulation believes: a twin, its name or file, or a simulation of one's own (``rig.py:function``).
     column_map : ColumnMap, str or Path, optional
         What the columns of a foreign file are: a map, its name or TOML file (``--map``).
+    map_set : sequence of str
+        Keys of that map to set, such as ``"time.unit=ms"`` (``--map-set``); without a map they are all of it.
 
     Raises
     ------
@@ -48,7 +51,7 @@ def check(
     from gfimu.recording.formats import open_recording
 
     model = as_twin(twin)
-    given = [by_map(one, column_map) for one in as_runs(recordings)]
+    given = [by_map(one, column_map, map_set) for one in as_runs(recordings)]
     read = [one if isinstance(one, Recording) else open_recording(one, array=model.array) for one in given]
     names = [
         Path(one).name if isinstance(one, str | os.PathLike) else f"run {number}"

@@ -11,55 +11,97 @@ from gfimu.errors import InputError
 from gfimu.files.outputs import EXPORT, writes
 
 if TYPE_CHECKING:
+    from gfimu.calibration.result import Calibration
     from gfimu.geometry.array import AccelerometerArray
     from gfimu.importing import ColumnMap
     from gfimu.recording import Recording
     from gfimu.recording.mapped import MappedFile
+    from gfimu.sensor_noise import RecordingNoise
 
 __all__ = ["convert"]
 
 
-@writes(reads=("source", "array", "column_map"), target=EXPORT)
+@writes(reads=("source", "array", "column_map", "noise"), target=EXPORT)
 def convert(
-    source: Recording | str | Path | MappedFile | Sequence[str | Path],
+    source: Recording | Calibration | str | Path | MappedFile | Sequence[str | Path],
     target: str | Path | None = None,
     *,
     array: AccelerometerArray | str | Path | None = None,
     column_map: ColumnMap | str | Path | None = None,
+    map_set: Sequence[str] = (),
+    drop: str | Sequence[str] = (),
     table: str | None = None,
-) -> Recording:
+    to: str | None = None,
+    lsb_m_s2: float | None = None,
+    chip: str | None = None,
+    noise: RecordingNoise | Recording | str | Path | None = None,
+) -> Recording | Calibration:
     """Read a recording in any format that is known, in m/s², and write it as CSV, Parquet, MCAP or EuRoC.
+
+    Or read a calibration and write it as Kalibr's or imu_calib's YAML.
 
     Parameters
     ----------
-    source : Recording, str, Path or MappedFile
-        The recording, or its file: CSV, Parquet, a MIMU4444 stream, or a foreign file with its column map;
-        one file per chip on a common clock, with a map.
+    source : Recording, Calibration, str, Path or MappedFile
+        A calibration, or its ``.json`` file; or a recording, or its file: CSV, Parquet, a MIMU4444 stream, or a
+        foreign file with its column map; one file per chip on a common clock, with a map.
     target : str or Path, optional
         Recording to write: ``.csv`` or ``.parquet``; ``.mcap`` with a topic of ``sensor_msgs/Imu`` per tri-axial chip;
-        ``.euroc``, a folder in the layout of EuRoC / ASL.
+        ``.euroc``, a folder in the layout of EuRoC / ASL. Of a calibration: ``.yaml``.
     array : AccelerometerArray, str or Path, optional
         Array whose channels must be there; every channel found by default.
     column_map : ColumnMap, str or Path, optional
         What the columns of a foreign file are: a map, its name or TOML file (``--map``); see `gfimu.inspect`.
+    map_set : sequence of str
+        Keys of that map to set, such as ``"time.unit=ms"`` (``--map-set``); without a map they are all of it.
+    drop : str or sequence of str
+        Rows to leave out, counted and reported: ``corrupt``, ``out_of_range``, ``missing``, ``duplicates``,
+        ``unordered`` (see `gfimu.recording.filtered`).
     table : str, optional
         With a map: the table, topic or member of a file that holds several.
+    to : {"kalibr", "ros"}, optional
+        Of a calibration, the format: `gfimu.exporting.kalibr`, `gfimu.exporting.ros`.
+    lsb_m_s2 : float, optional
+        Of a calibration for raw counts: size of a count by which the sensor's driver makes m/s² of counts; by default
+        that of the array's parts.
+    chip : str, optional
+        Of a calibration: the one chip to export; all by default.
+    noise : RecordingNoise, Recording, str or Path, optional
+        Of a calibration: a recording at rest for the noise, or what `gfimu.noise` found; by default the data sheets'.
+
+    Returns
+    -------
+    Recording or Calibration
+        What was read.
 
     Raises
     ------
     InputError
         If the source can't be read, or the target can't be written where it is asked for.
     """
-    from gfimu.commands.opened import as_array, files_by_map
+    from gfimu.commands.export_calibration import export_calibration
+    from gfimu.commands.opened import as_array, by_map, files_by_map
     from gfimu.recording import Recording
     from gfimu.recording.carried_array import carried_array
     from gfimu.recording.formats import open_recording
     from gfimu.recording.mapped import MappedFile
 
     drawing = None if array is None else as_array(array)
+    calibration = _calibration(source)
+    if calibration is not None:
+        export_calibration(
+            calibration, target, to=to, array=drawing, lsb_m_s2=lsb_m_s2, chip=chip, noise=noise, map_set=map_set
+        )
+        return calibration
+    if (to, lsb_m_s2, chip, noise) != (None, None, None, None):
+        raise InputError("--to, --lsb-m-s2, --chip and --noise are for a calibration (.json, from gfimu calibrate)")
     given = _given(source)
-    if column_map is not None and not isinstance(given[0], Recording | MappedFile):
-        given = [files_by_map([one for one in given if isinstance(one, str | Path)], column_map, table)]
+    changes = [*map_set, *_dropping(drop)]
+    if isinstance(given[0], Recording | MappedFile):
+        given = [by_map(given[0], None, changes), *given[1:]]
+    elif column_map is not None or changes:
+        files = [one for one in given if isinstance(one, str | Path)]
+        given = [files_by_map(files, column_map, table, changes)]
     if len(given) > 1:
         raise InputError(f"{given[1]}: several files need --map, which says what the columns of each chip's file are")
     recording = given[0] if isinstance(given[0], Recording) else open_recording(given[0], array=drawing)
@@ -73,8 +115,16 @@ def convert(
     return recording
 
 
+def _dropping(drop: str | Sequence[str]) -> list[str]:
+    """Return the change of a column map that leaves rows out."""
+    kinds = drop if isinstance(drop, str) else ",".join(drop)
+    return [f"drop={kinds}"] if kinds else []
+
+
 def _write(recording: Recording, target: Path) -> None:
     """Write a recording in the format that the ending of a file says."""
+    if target.suffix in {".yaml", ".yml"}:
+        raise InputError(f"{target}: YAML is for calibrations; write a recording as .csv, .parquet, .mcap or .euroc")
     if target.suffix in {".mcap", ".euroc"}:
         from gfimu.exporting import write_euroc, write_mcap
 
@@ -83,8 +133,19 @@ def _write(recording: Recording, target: Path) -> None:
         recording.write(target)
 
 
+def _calibration(source: object) -> Calibration | None:
+    """Return the calibration that is to be converted; None for a recording."""
+    from gfimu.calibration.result import Calibration, load_calibration
+
+    if isinstance(source, list | tuple) and len(source) == 1:
+        source = source[0]
+    if isinstance(source, str | Path):
+        return load_calibration(source) if Path(source).suffix == ".json" else None
+    return source if isinstance(source, Calibration) else None
+
+
 def _given(
-    source: Recording | str | Path | MappedFile | Sequence[str | Path],
+    source: Recording | Calibration | str | Path | MappedFile | Sequence[str | Path],
 ) -> list[Recording | str | Path | MappedFile]:
     """Return one source or several as a list."""
     return list(source) if isinstance(source, list | tuple) else [source]  # type: ignore[list-item]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,19 +16,23 @@ if TYPE_CHECKING:
     from gfimu.diagnosis.data.run import Run
     from gfimu.diagnosis.design.profile_search import Limits
     from gfimu.diagnosis.design.proposal import Proposal
+    from gfimu.importing import ColumnMap
     from gfimu.recording import Recording
+    from gfimu.recording.mapped import MappedFile
     from gfimu.world_model import Effect, WorldModel
 
 __all__ = ["design"]
 
 
-@writes(reads=("twin", "verdict", "run"), out=SCENARIO)
+@writes(reads=("twin", "verdict", "run", "column_map"), out=SCENARIO)
 def design(
     twin: WorldModel | str | Path,
     effects: Sequence[str | Effect] = (),
     *,
     verdict: str | Path | None = None,
-    run: Recording | str | Path | Sequence[Recording | str | Path] = (),
+    run: Recording | str | Path | MappedFile | Sequence[Recording | str | Path | MappedFile] = (),
+    column_map: ColumnMap | str | Path | None = None,
+    map_set: Sequence[str] = (),
     max_rate: float = 15.0,
     max_acceleration: float = 20.0,
     duration: float = 60.0,
@@ -54,6 +59,10 @@ def design(
         Take the effects of an ambiguous verdict (``verdict.json``, or the folder that holds it).
     run : Recording, path, or sequence of these
         Recordings at hand, to be diagnosed together with the new one.
+    column_map : ColumnMap, str or Path, optional
+        What the columns of these are, where they are foreign files: a map, its name or TOML file (``--map``).
+    map_set : sequence of str
+        Keys of that map to set, such as ``"time.unit=ms"`` (``--map-set``); without a map they are all of it.
     max_rate, max_acceleration : float
         Largest rate, rad/s, and angular acceleration, rad/s², of the table.
     duration : float
@@ -87,7 +96,7 @@ def design(
     """
     import numpy as np
 
-    from gfimu.commands.opened import as_runs, as_twin
+    from gfimu.commands.opened import as_runs, as_twin, by_map
     from gfimu.diagnosis.data.run import prepare_run
     from gfimu.diagnosis.design.ambiguity import open_effects
     from gfimu.diagnosis.design.design import MOUNTINGS, Limits
@@ -104,9 +113,9 @@ def design(
         prepare_run(
             item if isinstance(item, Recording) else open_recording(item, array=model.array),
             model,
-            name=str(item) if isinstance(item, str | Path) else f"run {number}",
+            name=str(item) if isinstance(item, str | os.PathLike) else f"run {number}",
         )
-        for number, item in enumerate(as_runs(run), start=1)
+        for number, item in enumerate((by_map(one, column_map, map_set) for one in as_runs(run)), start=1)
     ]
     proposal = propose(
         model,

@@ -32,8 +32,10 @@ def diagnose(
     held_out: Recording | str | Path | MappedFile | Sequence[Recording | str | Path | MappedFile] = (),
     calibration: Calibration | str | Path | None = None,
     column_map: ColumnMap | str | Path | None = None,
+    map_set: Sequence[str] = (),
     reference: str | Path | None = None,
     reference_map: ColumnMap | str | Path | None = None,
+    reference_map_set: Sequence[str] = (),
     names: Sequence[str] | None = None,
     report: Callable[[float, str], None] | None = None,
     grammar: bool = False,
@@ -55,10 +57,14 @@ def diagnose(
         Calibration of the unit, applied first.
     column_map : ColumnMap, str or Path, optional
         What the columns of a foreign file are: a map, its name or TOML file (``--map``); see `gfimu.inspect`.
+    map_set : sequence of str
+        Keys of that map to set, such as ``"time.unit=ms"`` (``--map-set``); without a map they are all of it.
     reference : str or Path, optional
         Reference of the first run on a clock of its own; it is aligned first, as by `gfimu.join`.
     reference_map : ColumnMap, str or Path, optional
         What the columns of that file are.
+    reference_map_set : sequence of str
+        Keys of that map to set.
     names : sequence of str, optional
         Names of the runs, for people; those of their files by default.
     report : callable, optional
@@ -80,7 +86,7 @@ def diagnose(
     from gfimu.commands.opened import as_calibration, as_runs, as_twin, by_map
     from gfimu.diagnosis.diagnose import diagnose as explain
 
-    runs, unseen = ([by_map(run, column_map) for run in as_runs(group)] for group in (recordings, held_out))
+    runs, unseen = ([by_map(run, column_map, map_set) for run in as_runs(group)] for group in (recordings, held_out))
     model = as_twin(twin)
     model = model.searching(wide=True) if grammar else model
     unit = None if calibration is None else as_calibration(calibration)
@@ -92,7 +98,10 @@ def diagnose(
         from gfimu.commands.join import join
 
         first, *others = read
-        read = [join(first, reference, reference_map=reference_map).recording, *others]
+        read = [
+            join(first, reference, reference_map=reference_map, reference_map_set=reference_map_set).recording,
+            *others,
+        ]
     found = explain(read, model, held_out=kept, names=labels, report=report)
     if out is not None:
         if report is not None:

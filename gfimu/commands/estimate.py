@@ -56,6 +56,7 @@ def estimate(
     rest_bias: bool = False,
     calibration: Calibration | str | Path | None = None,
     column_map: ColumnMap | str | Path | None = None,
+    map_set: Sequence[str] = (),
     axis: TurningAxis | str | Sequence[float] | None = None,
     axis_point: Sequence[float] = (0.0, 0.0, 0.0),
     hub: str = "fixed",
@@ -92,6 +93,8 @@ def estimate(
         Calibration to apply first.
     column_map : ColumnMap, str or Path, optional
         What the columns of a foreign file are: a map, its name or TOML file (``--map``); see `gfimu.inspect`.
+    map_set : sequence of str
+        Keys of that map to set, such as ``"time.unit=ms"`` (``--map-set``); without a map they are all of it.
     axis : TurningAxis, str or sequence of float, optional
         The axis about which alone the array turns, body frame: x, y, z, or three numbers. Few chips then suffice. By
         default the array's own, where it can't see all six motions.
@@ -131,6 +134,7 @@ def estimate(
         rest_bias=rest_bias,
         calibration=calibration,
         column_map=column_map,
+        map_set=map_set,
         axis=turning_axis(axis, axis_point, hub, inclination_rad),
         method=method,
         form=form,
@@ -154,6 +158,7 @@ def estimate_run(
     rest_bias: bool = False,
     calibration: Calibration | str | Path | None = None,
     column_map: ColumnMap | str | Path | None = None,
+    map_set: Sequence[str] = (),
     axis: TurningAxis | None = None,
     **options: Any,
 ) -> EstimatedRun:
@@ -168,7 +173,7 @@ def estimate_run(
     from gfimu.motion.estimation import estimate as solve
     from gfimu.motion.rest_bias import estimate_from_rest
 
-    run, geometry = _opened(by_map(recording, column_map), array, calibration)
+    run, geometry = _opened(by_map(recording, column_map, map_set), array, calibration)
     turning = _turning(axis, geometry)
     if turning is not None:
         found = _about_axis(run, geometry, turning, rest_bias=rest_bias, **options)

@@ -38,6 +38,8 @@ def inspect(file: str | Path, *, table: str = "", out: str | Path | None = None)
     found = inspect_file(file, table=table)
     if out is not None:
         if found.column_map is None:
+            if found.is_own:
+                raise InputError(f"{file}: {found.reasons[0]}; no map was written")
             raise InputError(f"{file}: no three columns that look like accelerations; no map was written")
         write_text(out, found.map_text())
     return found

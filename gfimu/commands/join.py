@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,6 +27,8 @@ def join(
     array: AccelerometerArray | str | Path | None = None,
     column_map: ColumnMap | str | Path | None = None,
     reference_map: ColumnMap | str | Path | None = None,
+    map_set: Sequence[str] = (),
+    reference_map_set: Sequence[str] = (),
     most_rate_error: float = 0.02,
     force: bool = False,
 ) -> Joined:
@@ -43,6 +46,8 @@ def join(
         The array of the channels; the recording's own by default.
     column_map, reference_map : ColumnMap, str or Path, optional
         What the columns of a foreign file are, of the channels (``--map``) and of the reference.
+    map_set, reference_map_set : sequence of str
+        Keys of these maps to set, such as ``"time.unit=ms"`` (``--map-set``); without a map they are all of it.
     most_rate_error : float
         Largest rate error between the clocks that is searched, a ratio.
     force : bool
@@ -54,16 +59,21 @@ def join(
         If a file can't be read, the reference does not change, or the two don't seem to belong together.
     """
     from gfimu.commands.opened import as_array, by_map
+    from gfimu.importing import load_map
     from gfimu.joining import ReferenceSeries, join_reference, open_reference
     from gfimu.recording import Recording
     from gfimu.recording.formats import open_recording
 
     drawing = None if array is None else as_array(array)
-    source = by_map(channels, column_map)
+    source = by_map(channels, column_map, map_set)
     recording = source if isinstance(source, Recording) else open_recording(source, array=drawing)
     if drawing is not None:
         recording = recording.carrying(drawing)
-    series = reference if isinstance(reference, ReferenceSeries) else open_reference(reference, reference_map)
+    if isinstance(reference, ReferenceSeries):
+        series = reference
+    else:
+        given = reference_map is not None or reference_map_set
+        series = open_reference(reference, load_map(reference_map, reference_map_set) if given else None)
     joined = join_reference(recording, series, most_rate_error=most_rate_error, force=force)
     if out is not None:
         joined.recording.write(out)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -25,6 +26,7 @@ def noise(
     rest_threshold: float | None = None,
     calibration: Calibration | str | Path | None = None,
     column_map: ColumnMap | str | Path | None = None,
+    map_set: Sequence[str] = (),
     kalibr: str | Path | None = None,
     picture: str | Path | None = None,
 ) -> RecordingNoise:
@@ -42,6 +44,8 @@ def noise(
         Calibration to apply first.
     column_map : ColumnMap, str or Path, optional
         What the columns of a foreign file are: a map, its name or TOML file (``--map``); see `gfimu.inspect`.
+    map_set : sequence of str
+        Keys of that map to set, such as ``"time.unit=ms"`` (``--map-set``); without a map they are all of it.
     kalibr : str or Path, optional
         Kalibr ``imu.yaml`` to write.
     picture : str or Path, optional
@@ -59,7 +63,7 @@ def noise(
     from gfimu.sensor_noise import kalibr_yaml, recording_noise
 
     unit = None if calibration is None else as_calibration(calibration)
-    source = by_map(recording, column_map)
+    source = by_map(recording, column_map, map_set)
     if isinstance(source, Recording):
         run = source if unit is None else unit.apply(source)
     else:

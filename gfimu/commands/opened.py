@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
@@ -70,35 +71,59 @@ def as_run(
     return open_run(recording, drawing)
 
 
-def by_map(recording: _Source, column_map: ColumnMap | str | Path | None) -> _Source | MappedFile:
+def by_map(
+    recording: _Source, column_map: ColumnMap | str | Path | None, map_set: Sequence[str] = ()
+) -> _Source | MappedFile:
     """Return a recording or its file as it is; a foreign file with its column map, where one is given.
+
+    Parameters
+    ----------
+    recording : Recording, str, Path or MappedFile
+        The recording, or its file.
+    column_map : ColumnMap, str or Path, optional
+        The map, its name or file.
+    map_set : sequence of str
+        Keys of the map to set (``--map-set``); without a map they are all of it.
 
     Raises
     ------
     InputError
-        If there is no such map.
+        If there is no such map, or a key is wrong.
     """
-    if column_map is None or not isinstance(recording, str | Path):
+    from gfimu.recording.mapped import MappedFile
+
+    if isinstance(recording, str | Path):
+        if column_map is None and not map_set:
+            return recording
+        return files_by_map([recording], column_map, map_set=map_set)
+    if not map_set:
         return recording
-    return files_by_map([recording], column_map)
+    if isinstance(recording, MappedFile):
+        from gfimu.importing import load_map
+
+        return replace(recording, column_map=load_map(recording.column_map, map_set))
+    raise InputError("a map is for a file, and this recording has been read already; give its file")
 
 
 def files_by_map(
-    files: Sequence[str | Path], column_map: ColumnMap | str | Path, table: str | None = None
+    files: Sequence[str | Path],
+    column_map: ColumnMap | str | Path | None,
+    table: str | None = None,
+    map_set: Sequence[str] = (),
 ) -> MappedFile:
     """Return files of chips on one clock with their column map, and the table of each that is meant.
 
     Raises
     ------
     InputError
-        If there is no such map.
+        If there is no such map, or a key is wrong.
     """
     import msgspec
 
     from gfimu.importing import load_map
     from gfimu.recording.mapped import MappedFile
 
-    chosen = load_map(column_map)
+    chosen = load_map(column_map, map_set)
     if table is not None:
         chosen = msgspec.structs.replace(chosen, table=table)
     first, *others = (Path(file) for file in files)

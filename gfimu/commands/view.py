@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,6 +21,7 @@ def view(
     *,
     array: AccelerometerArray | str | Path | None = None,
     column_map: ColumnMap | str | Path | None = None,
+    map_set: Sequence[str] = (),
     out: str | Path | None = None,
     on_picture: Callable[[Path], None] | None = None,
 ) -> Path:
@@ -34,6 +35,8 @@ def view(
         The array, its name or file; the recording's own by default.
     column_map : ColumnMap, str or Path, optional
         What the columns of a foreign file are: a map, its name or TOML file (``--map``).
+    map_set : sequence of str
+        Keys of that map to set, such as ``"time.unit=ms"`` (``--map-set``); without a map they are all of it.
     out : str or Path, optional
         Write the ``.rrd`` here and don't open it.
     on_picture : callable, optional
@@ -61,7 +64,7 @@ def view(
         return source
     picture = picture_path(source) if out is None else Path(out)
     check_outputs([("out", picture, RERUN)], [source])
-    picture_of(by_map(source, column_map), picture, array=None if array is None else as_array(array))
+    picture_of(by_map(source, column_map, map_set), picture, array=None if array is None else as_array(array))
     if on_picture is not None:
         on_picture(picture)
     if out is None:

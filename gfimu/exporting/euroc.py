@@ -69,6 +69,6 @@ def _sensor(stream: ChipStream, recording: Recording) -> str:
     ]
     if array is not None:
         part = Part.load(stream.chip.part, array.part_files)
-        density = float(np.mean(part.noise_std_100_hz)) / np.sqrt(50.0)
+        density = float(np.mean(part.noise_std_100_hz)) / np.sqrt(100.0)  # of a sample: density · √rate
         lines.append(f"accelerometer_noise_density: {density:.6g}  # m/s^2/sqrt(Hz), data sheet")
     return "\n".join(lines) + "\n"

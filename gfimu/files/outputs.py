@@ -102,7 +102,7 @@ class OutputFolder:
 Output = OutputFile | OutputFolder
 
 RECORDING = OutputFile("a recording", (".csv", ".parquet"))
-EXPORT = OutputFile("a recording", (".csv", ".parquet", ".mcap", ".euroc"))
+EXPORT = OutputFile("what is converted", (".csv", ".parquet", ".mcap", ".euroc", ".yaml", ".yml"))
 ESTIMATE = OutputFile("an estimate", (".csv", ".parquet"))
 RERUN = OutputFile("a rerun recording", (".rrd",))
 TRACE = OutputFile("a trace", (".vcd", ".rrd"))

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from bisect import bisect_left
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -13,10 +15,11 @@ from gfimu.importing.column_map import TimeSpec
 from gfimu.importing.notation import factor_of
 from gfimu.importing.raw_table import RawTable
 
-__all__ = ["Times", "times_of"]
+__all__ = ["Times", "increasing_times", "times_of"]
 
 _FAR = 100.0  # s: times beyond count from the first sample; they keep their digits, and pictures begin there
 _MOST_DROPPED = 0.02  # of the rows, whose time does not increase
+_LONGEST = 1e12  # s: a time beyond is none
 
 
 @dataclass(frozen=True)
@@ -33,16 +36,30 @@ class Times:
         Time on the file's own clock at which ``t_s`` is zero, s.
     notes : tuple of str
         What was left out.
+    dropped : mapping of str to int
+        How many rows were left out: ``duplicates``, ``unordered``, ``untimed``.
     """
 
     t_s: NDArray[np.float64]
     rows: NDArray[np.bool_]
     origin_s: float
     notes: tuple[str, ...]
+    dropped: Mapping[str, int] = field(default_factory=dict)
 
 
-def times_of(table: RawTable, spec: TimeSpec, source: str) -> Times:
+def times_of(table: RawTable, spec: TimeSpec, source: str, *, drop: Collection[str] = ()) -> Times:
     """Return the times of a table's rows.
+
+    Parameters
+    ----------
+    table : RawTable
+        The table.
+    spec : TimeSpec
+        Its column of times, or its rate.
+    source : str
+        The file, for messages.
+    drop : collection of str
+        Rows that are left out however many they are: ``duplicates``, ``unordered`` (see `increasing_times`).
 
     Raises
     ------
@@ -60,7 +77,7 @@ def times_of(table: RawTable, spec: TimeSpec, source: str) -> Times:
     else:
         factor = spec.scale * factor_of(spec.unit, "time", where=f"{source}: time")
         steps, origin = _counts(table.columns[name], factor, spec.wrap, name, source)
-    return _increasing(steps, origin, name, source)
+    return increasing_times(steps, origin, f"{source}: column {name}", drop=drop)
 
 
 def _counts(
@@ -98,23 +115,76 @@ def _dates(values: NDArray[Any], name: str, source: str) -> tuple[NDArray[np.flo
     return steps, float(first.astype("int64")) * 1e-9
 
 
-def _increasing(t: NDArray[np.float64], origin: float, name: str, source: str) -> Times:
-    """Leave out rows without a time, or with one that was reached before; many of them are an error."""
-    known = np.isfinite(t)
-    highest = np.maximum.accumulate(np.where(known, t, -np.inf))
-    kept = known & (t > np.concatenate([[-np.inf], highest[:-1]]))
-    lost, notes = int(known.sum() - kept.sum()), []
-    if lost > max(_MOST_DROPPED * len(t), 1):
-        row = int(np.flatnonzero(known & ~kept)[0])
+def increasing_times(t: NDArray[np.float64], origin: float, where: str, *, drop: Collection[str] = ()) -> Times:
+    """Leave out as few rows as possible so that the times of the others increase.
+
+    A row is a duplicate where another row that stays has its time, else it is unordered. So one wild time costs one
+    row, and a block that was written twice costs its second copy.
+
+    Parameters
+    ----------
+    t : ndarray, shape (n,)
+        Times from the first one on, s; NaN where a row has none.
+    origin : float
+        Time on the file's clock at which ``t`` is zero, s.
+    where : str
+        File and column, for messages.
+    drop : collection of str
+        ``duplicates`` or ``unordered``: such rows are left out however many they are. Without that more than 2 % of
+        the rows are an error.
+
+    Raises
+    ------
+    InputError
+        If too many times do not increase.
+    """
+    known = np.isfinite(t) & (np.abs(t) <= _LONGEST)
+    kept = known.copy()
+    if np.any(np.diff(t[known]) <= 0.0):
+        kept[known] = _longest_increasing(t[known])
+    lost = known & ~kept
+    repeated = lost & np.isin(t, t[kept])
+    rows = {"duplicates": repeated, "unordered": lost & ~repeated, "untimed": ~known}
+    refused = sum(int(found.sum()) for kind, found in rows.items() if kind not in {"untimed", *drop})
+    if refused > max(_MOST_DROPPED * len(t), 1):
+        row = int(np.flatnonzero(known)[1:][np.diff(t[known]) <= 0.0][0])
         raise InputError(
-            f"{source}: column {name}: {lost} of {len(t)} times do not increase, the first in row {row + 1} "
-            f"({t[row]:.9g} s); a counter that starts anew needs wrap, rounded times rate_hz in place of the column"
+            f"{where}: {int(lost.sum())} of {len(t)} times do not increase, the first in row {row + 1} "
+            f"({t[row]:.9g} s); a counter that starts anew needs wrap, rounded times rate_hz in place of the column; "
+            f"drop = [{', '.join(repr(kind) for kind in ('duplicates', 'unordered') if rows[kind].any())}] leaves the "
+            "rows out"
         )
-    if lost:
-        notes.append(f"{source}: left out {lost} rows whose time does not increase (repeated or out of order)")
-    if not known.all():
-        notes.append(f"{source}: left out {int((~known).sum())} rows without a time")
-    return Times(t[kept], kept, origin, tuple(notes))
+    said = {
+        "duplicates": "whose time does not increase (it repeats another row's)",
+        "unordered": "whose time does not increase (out of order)",
+        "untimed": "without a time",
+    }
+    counts = {kind: int(found.sum()) for kind, found in rows.items() if found.any()}
+    source = where.partition(": column ")[0]
+    notes = tuple(f"{source}: left out {count} rows {said[kind]}" for kind, count in counts.items())
+    return Times(t[kept], kept, origin, notes, counts)
+
+
+def _longest_increasing(t: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Mark the largest number of rows whose times increase strictly; of equal times the first."""
+    ends: list[float] = []  # least last time of a chain, by its length
+    places: list[int] = []  # where that chain ends
+    before = np.full(len(t), -1)
+    for place, time in enumerate(t.tolist()):
+        length = bisect_left(ends, time)
+        if length:
+            before[place] = places[length - 1]
+        if length == len(ends):
+            ends.append(time)
+            places.append(place)
+        elif time < ends[length]:
+            ends[length], places[length] = time, place
+    kept = np.zeros(len(t), dtype=bool)
+    place = places[-1] if places else -1
+    while place >= 0:
+        kept[place] = True
+        place = int(before[place])
+    return kept
 
 
 def _listed(table: RawTable) -> str:

@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal, get_args
 
 import msgspec
 
 from gfimu.errors import InputError
 from gfimu.files.model_files import find_model, list_models, read_toml
+from gfimu.importing.map_keys import FOR_ALL, complete, set_key
 from gfimu.importing.notation import factor_of
 
-__all__ = ["ColumnMap", "ColumnSpec", "TextSpec", "TimeSpec", "list_maps", "load_map", "map_toml"]
+__all__ = ["ColumnMap", "ColumnSpec", "DropKind", "TextSpec", "TimeSpec", "list_maps", "load_map", "map_toml"]
 
 _Meta = msgspec.Meta
+
+DropKind = Literal["corrupt", "out_of_range", "missing", "duplicates", "unordered"]
+"""Rows that a map can leave out; see `gfimu.recording.filtered`."""
 
 REFERENCE_KINDS = {
     "tacho_rad_s": "rate",
@@ -56,6 +61,10 @@ class TimeSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     scale: Annotated[float, _Meta(description="What one step of the number is, in that unit.", gt=0)] = 1.0
     rate_hz: Annotated[_Positive | None, _Meta(description="Sample rate, Hz, where there is no column.")] = None
     wrap: Annotated[_Positive | None, _Meta(description="Number at which the counter of the times starts anew.")] = None
+    start_s: Annotated[
+        Annotated[float, _Meta(ge=0)] | None, _Meta(description="Begin so many seconds after the first sample.")
+    ] = None
+    stop_s: Annotated[_Positive | None, _Meta(description="End so many seconds after the first sample.")] = None
 
 
 class TextSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -88,15 +97,33 @@ class ColumnMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     reference: Annotated[dict[str, ColumnSpec], _Meta(description="References by their name in a recording.")] = {}
     optional: Annotated[tuple[str, ...], _Meta(description="Channels or references that a file may lack.")] = ()
     missing: Annotated[tuple[float, ...], _Meta(description="Numbers that stand for a missing value.")] = ()
+    skip_rows: Annotated[int, _Meta(description="Rows of samples to leave out at the start.", ge=0)] = 0
+    drop: Annotated[
+        tuple[DropKind, ...],
+        _Meta(description="Rows to leave out; each kind is counted and reported."),
+    ] = ()
     keep_other: Annotated[bool, _Meta(description="Keep other columns, as raw_<name>.")] = True
     text: Annotated[TextSpec, _Meta(description="Layout of a text file.")] = TextSpec()
 
+    @property
+    def is_own(self) -> bool:
+        """Whether it names no columns: the file is a recording of gfimu's, of which rows are left out."""
+        return not (self.channels or self.reference or self.time.column is not None or self.time.rate_hz is not None)
+
     def check(self, source: str) -> None:
         """Raise `InputError` for a unit or reference that is not known, or a map without times."""
+        if self.time.start_s is not None and self.time.stop_s is not None and self.time.stop_s <= self.time.start_s:
+            raise InputError(f"{source}: time.stop_s = {self.time.stop_s:g} must be later than time.start_s")
+        if self.is_own:
+            self._check_own(source)
+            return
         if self.time.column is None and self.time.rate_hz is None:
             raise InputError(f"{source}: time has neither a column nor rate_hz; give one")
         if not self.channels and not self.reference:
-            raise InputError(f"{source}: neither channels nor references; name one column at least")
+            raise InputError(
+                f"{source}: neither channels nor references; name one column at least, as channels.a11 = "
+                '{ column = "ax", unit = "g" }'
+            )
         if self.time.unit != "datetime":
             factor_of(self.time.unit, "time", where=f"{source}: time")
         for name, spec in self.channels.items():
@@ -111,6 +138,16 @@ class ColumnMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             from gfimu.geometry.array import AccelerometerArray
 
             AccelerometerArray.load(self.array, beside=Path(source).parent)
+
+    def _check_own(self, source: str) -> None:
+        """Raise `InputError` for keys that say nothing without columns."""
+        kept = ColumnMap(self.name, summary=self.summary, skip_rows=self.skip_rows, drop=self.drop)
+        time = TimeSpec(start_s=self.time.start_s, stop_s=self.time.stop_s)
+        if self != msgspec.structs.replace(kept, time=time) or (kept == ColumnMap(self.name) and time == TimeSpec()):
+            raise InputError(
+                f'{source}: no columns; add time.column (or time.rate_hz) and channels, as a11 = {{column = "ax", '
+                'unit = "g"}; gfimu inspect prints a map to start from'
+            )
 
     def is_required(self, name: str) -> bool:
         """Whether a file must have a channel or reference."""
@@ -160,28 +197,53 @@ def list_maps() -> list[str]:
     return list_models("maps")
 
 
-def load_map(name: str | Path | ColumnMap) -> ColumnMap:
-    """Return a map given as such, by the name of one that comes with gfimu, or as a TOML file.
+def load_map(name: str | Path | ColumnMap | None, changes: Sequence[str] = ()) -> ColumnMap:
+    """Return a map given as such, by the name of one that comes with gfimu, or as a TOML file, with changed keys.
+
+    Parameters
+    ----------
+    name : str, Path, ColumnMap or None
+        The map; None begins with an empty one.
+    changes : sequence of str
+        Keys to set, such as ``"time.unit=ms"`` (see `gfimu.importing.map_keys`).
 
     Raises
     ------
     InputError
-        If there is no such map, or the file has an unknown key, unit or reference; the message names it.
+        If there is no such map, or it has an unknown key, unit or reference; the message names it.
     """
-    if isinstance(name, ColumnMap):
+    if isinstance(name, ColumnMap) and not changes:
         return name
-    path = find_model("maps", name)
+    if name is None or isinstance(name, ColumnMap):
+        source, beside, data = "the column map", None, {"name": "options"} if name is None else name.to_dict()
+    else:
+        path = find_model("maps", name)
+        source, beside, data = str(path), path.parent, {"name": path.stem, **read_toml(path)}
+    for change in changes:
+        set_key(data, change)
+    if changes and not isinstance(name, ColumnMap):
+        source = "--map-set" if name is None else f"{source} with --map-set"
     try:
-        found = msgspec.convert({"name": path.stem, **read_toml(path)}, ColumnMap)
+        found = msgspec.convert(complete(data), ColumnMap)
     except msgspec.ValidationError as error:
-        raise InputError(f"{path}: {_plain_words(str(error))}; correct the map") from None
-    found.check(str(path))
+        raise InputError(f"{source}: {_plain_words(str(error))}; correct the map") from None
+    if beside is not None and found.array.endswith(".toml") and (beside / found.array).is_file():
+        found = msgspec.structs.replace(found, array=str(beside / found.array))
+    found.check(source)
     return found
 
 
 def _plain_words(text: str) -> str:
-    """Return a message of the schema with the place in the file instead of a JSON path."""
+    """Return a message of the schema with the place in the file instead of a JSON path, and the keys valid there."""
     reason, _, place = text.partition(" - at ")
-    where = place.strip("`").removeprefix("$.")
-    words = reason.replace("Object", "the map") if not where else reason
-    return f"{where}: {words}" if where and where != "$" else words
+    where = place.strip("`").removeprefix("$").removeprefix(".").replace("[...]", " of a column")
+    words = reason.replace("`object`", "a table of keys").replace("Object", "the table" if where else "the map")
+    if "unknown field" in words:
+        table = {"time": TimeSpec, "text": TextSpec, "": ColumnMap}.get(where, ColumnSpec)
+        keys = (*table.__struct_fields__, *(FOR_ALL if table is ColumnMap else ()))
+        words = words.replace("contains unknown field", "has no key") + f"; valid: {', '.join(keys)}"
+    elif "Invalid enum value" in words and where.startswith("drop"):
+        words += f"; valid: {', '.join(get_args(DropKind))}"
+    elif where.startswith("drop"):
+        words += f"; give one or more of {', '.join(get_args(DropKind))}"
+    return f"{where}: {words}" if where else words

@@ -38,6 +38,8 @@ NEAR = 0.08  # relative, of gravity at rest: gains of parts lie within
 _LOW_COUNTS = 20.0  # below that counts per g would be too coarse for any part
 _FASTEST_RAD_S = 40.0  # rad/s: beyond the range of nearly all gyros (2000 °/s is 35 rad/s)
 _ROUND = 0.03  # relative scatter of the poses about a sphere: gains of the axes differ by less
+_LEAST_WRAP = 256.0  # a counter of one byte
+_NEAR_WRAP = 0.02  # of the wrap, by which a step back may miss it: samples lost there
 _POSES = 9  # rest poses from which offset and scale of raw counts follow
 
 
@@ -112,8 +114,7 @@ def _as_time(name: str, values: NDArray[Any]) -> tuple[TimeSpec, float, str] | N
         return None
     forward = float(np.mean(steps > 0))
     usual = float(np.median(steps[steps > 0]))
-    back = steps[steps < 0]
-    wrap = float(2.0 ** math.ceil(math.log2(-back.min()))) if 0 < len(back) <= 0.01 * len(steps) else None
+    wrap = _wrap(steps, usual)
     if forward < 0.9 or float(np.mean(steps < 0)) > 0.01:
         return None
     plain, unit = bracketed_unit(name)
@@ -131,6 +132,16 @@ def _as_time(name: str, values: NDArray[Any]) -> tuple[TimeSpec, float, str] | N
             why = f"{name} increases by {usual:.6g} per row, which in {candidate} is {rate:.4g} Hz"
             return TimeSpec(name, candidate, wrap=wrap), score, why
     return None
+
+
+def _wrap(steps: NDArray[np.float64], usual: float) -> float | None:
+    """Return the number at which a counter starts anew, a power of two; None where times merely go back."""
+    back = steps[steps < 0]
+    if not 0 < len(back) <= 0.01 * len(steps) or np.any(steps != np.round(steps)):
+        return None
+    wrap = float(2.0 ** math.ceil(math.log2(-back.min())))
+    near = wrap + back <= max(3.0 * usual, _NEAR_WRAP * wrap)
+    return wrap if wrap >= _LEAST_WRAP and near.all() else None
 
 
 def find_triads(table: RawTable, taken: Sequence[str] = ()) -> list[Triad]:

@@ -23,7 +23,8 @@ from gfimu.importing.notation import bracketed_unit, kind_of
 from gfimu.importing.oddities import oddities
 from gfimu.importing.raw_table import RawFile, RawTable
 from gfimu.importing.readers import read_foreign
-from gfimu.importing.recognise import fitting_maps
+from gfimu.importing.recognise import fitting_maps, own_chips
+from gfimu.units import REFERENCE_UNITS
 
 __all__ = ["ColumnView", "Inspection", "inspect_file"]
 
@@ -82,6 +83,8 @@ class Inspection:
         By the times; NaN if unknown.
     chips : int
         Triads of accelerations.
+    is_own : bool
+        Whether it is a recording of gfimu's, which needs no map.
     """
 
     source: str
@@ -96,6 +99,7 @@ class Inspection:
     findings: tuple[str, ...] = ()
     sample_rate_hz: float = float("nan")
     chips: int = 0
+    is_own: bool = False
 
     def map_text(self) -> str:
         """Return the suggested map as a TOML file with the reasons as comments."""
@@ -143,6 +147,9 @@ def inspect_file(path: str | Path, *, table: str = "", text: TextSpec = TextSpec
     chosen = raw.table(table) if table else _most_promising(raw)
     time = find_time(chosen)
     taken = [str(time[0].column)] if time else []
+    own = own_chips(list(chosen.columns))
+    if own:
+        return _own_recording(raw, chosen, own)
     triads = find_triads(chosen, taken)
     forces = [one.columns for one in triads if one.kind == "acceleration"]
     rates = [one.columns for one in triads if one.kind == "rate"]
@@ -166,7 +173,6 @@ def inspect_file(path: str | Path, *, table: str = "", text: TextSpec = TextSpec
     times, findings = _times(chosen, spec, raw.source)
     findings += [note.removeprefix(f"{raw.source}: ") for note in chosen.notes]
     findings += oddities({name: chosen.numbers(name) for three in forces for name in three})
-    rate = 1.0 / float(np.median(np.diff(times.t_s))) if times is not None and len(times.t_s) > 1 else float("nan")
     return Inspection(
         raw.source,
         raw.format,
@@ -178,9 +184,43 @@ def inspect_file(path: str | Path, *, table: str = "", text: TextSpec = TextSpec
         suggested,
         tuple(reasons),
         tuple(findings),
-        rate,
+        _rate(times),
         len(forces),
     )
+
+
+def _own_recording(raw: RawFile, table: RawTable, chips: dict[str, list[str]]) -> Inspection:
+    """Return what a recording in gfimu's own columns holds; it needs no map."""
+    channels = [name for names in chips.values() for name in names]
+    roles = {name: f"{name.partition('_')[0]}, {name.partition('_')[2]}" for name in channels} | {"t_s": "time"}
+    roles |= {name: "reference" for name in table.columns if _is_reference(name) and name != "t_s"}
+    times, findings = _times(table, TimeSpec("t_s"), raw.source, drop=("duplicates", "unordered"))
+    if times is not None and times.dropped:
+        findings.append("with such rows it is refused; gfimu convert --drop duplicates,unordered leaves them out")
+    findings += oddities({name: table.numbers(name) for name in channels})
+    return Inspection(
+        raw.source,
+        raw.format,
+        table.name,
+        (f"{table.name or 'the file'} ({len(table)} rows)",),
+        len(table),
+        tuple(_view(table, name, roles.get(name, "")) for name in table.columns),
+        (),
+        None,
+        ("its columns carry their units: a recording of gfimu's, which needs no column map",),
+        tuple(findings),
+        _rate(times),
+        len(chips),
+        True,
+    )
+
+
+def _is_reference(name: str) -> bool:
+    return any(name == f"{quantity}_{unit}" for quantity, units in REFERENCE_UNITS.items() for unit in units)
+
+
+def _rate(times: Times | None) -> float:
+    return 1.0 / float(np.median(np.diff(times.t_s))) if times is not None and len(times.t_s) > 1 else float("nan")
 
 
 def _map_name(path: str | Path) -> str:
@@ -269,10 +309,10 @@ def _view(table: RawTable, name: str, role: str) -> ColumnView:
     return ColumnView(name, float(known.min()), float(known.max()), float(np.median(known)), missing, role)
 
 
-def _times(table: RawTable, spec: TimeSpec, source: str) -> tuple[Times | None, list[str]]:
+def _times(table: RawTable, spec: TimeSpec, source: str, *, drop: Sequence[str] = ()) -> tuple[Times | None, list[str]]:
     """Return the times of a table, and what is odd about them."""
     try:
-        times = times_of(table, spec, source)
+        times = times_of(table, spec, source, drop=drop)
     except InputError as error:
         return None, [str(error).removeprefix(f"{source}: ")]
     found = [note.removeprefix(f"{source}: ") for note in times.notes]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -13,9 +15,21 @@ from gfimu.importing.guess import NEAR, RATES, rest_windows
 from gfimu.importing.notation import factor_of
 from gfimu.importing.raw_table import RawFile, RawTable
 from gfimu.importing.readers import read_foreign
-from gfimu.units import STANDARD_GRAVITY
+from gfimu.units import READING_UNITS, STANDARD_GRAVITY
 
-__all__ = ["fitting_maps", "map_hint"]
+__all__ = ["fitting_maps", "map_hint", "own_chips"]
+
+_CHANNEL = re.compile(rf"([A-Za-z]+[0-9]*)[0-9]_({'|'.join(READING_UNITS)})")
+
+
+def own_chips(columns: Sequence[str]) -> dict[str, list[str]]:
+    """Return the channels of each chip where columns are named as in a recording of gfimu's (t_s, a11_m_s2 …)."""
+    chips: dict[str, list[str]] = {}
+    for name in columns if "t_s" in columns else ():
+        found = _CHANNEL.fullmatch(name)
+        if found is not None:
+            chips.setdefault(found[1], []).append(name)
+    return chips
 
 
 def map_hint(path: str | Path) -> str:

@@ -45,6 +45,7 @@ __all__ = ["Estimate", "estimate"]
 FORMAT_VERSION = 1
 _AXES = ("x", "y", "z")
 _LEVEL_SECONDS = 1.0
+_FOR_STEP = 20_000  # numerical: samples in which the step of the readings is looked for
 
 
 @dataclass(frozen=True)
@@ -312,7 +313,8 @@ def _with_sensor_errors(method: RateMethod, problem: RateProblem) -> RateSolutio
     """Run a method of `gfimu.rate.methods` with the sensors' errors from their data sheets."""
     problem, names = _of_living_channels(problem)
     rate = 1.0 / float(np.median(np.diff(problem.t_s)))
-    errors = SensorErrors.from_parts(problem.array, rate, noise_std=problem.noise_std)
+    step = _step_of(problem.readings)
+    errors = SensorErrors.from_parts(problem.array, rate, step=step, noise_std=problem.noise_std)
     settings = FilterSettings(start_omega=problem.omega0)
     found = estimate_rate(
         problem.array, problem.t_s, problem.readings, errors, method=method.name, settings=settings,
@@ -334,6 +336,16 @@ def _with_sensor_errors(method: RateMethod, problem: RateProblem) -> RateSolutio
             consistency = replace(consistency, worst_channel=names[consistency.worst_channel])
         remarks["consistency"] = None if consistency is None else consistency.to_dict()
     return RateSolution(found.omega, np.where(np.isfinite(found.std), found.std, np.nan), found.rest, remarks)
+
+
+def _step_of(readings: NDArray[np.float64]) -> float:
+    """Return the step of the readings (n, c), m/s²: the least difference of two values, the median of the channels."""
+    steps = []
+    for column in readings[:_FOR_STEP].T:
+        values = np.unique(column[np.isfinite(column)])
+        if len(values) > 1:
+            steps.append(float(np.diff(values).min()))
+    return float(np.median(steps)) if steps else 0.0
 
 
 def _of_living_channels(problem: RateProblem) -> tuple[RateProblem, dict[str, str]]:

@@ -31,6 +31,7 @@ __all__ = ["ChannelTables", "SensorErrors"]
 
 _RANK_TOLERANCE = 1e-9
 _WEAK = 0.1  # products seen more weakly than this share of the best are not used to clean α
+_LEAST_NOISE_LSB = 0.3  # LSB: below that equal readings prove nothing
 _EQUAL_READINGS = 1e-7  # probability per sample at which equal readings count as a stuck channel
 
 
@@ -97,11 +98,14 @@ class SensorErrors:
         return cls(noise, bias, **others)
 
     @classmethod
-    def from_parts(cls, array: AccelerometerArray, sample_rate: float, **others: Any) -> SensorErrors:
+    def from_parts(
+        cls, array: AccelerometerArray, sample_rate: float, *, step: float = 0.0, **others: Any
+    ) -> SensorErrors:
         """Take the errors from the data sheets of the array's parts (``models/parts``).
 
         White noise is the part's (`gfimu.parts.part.white_noise_std`), with the quantisation step's Δ²/12 added;
-        bias is the typical deviation at switch-on. Other fields by name; ``noise_std`` is the white part.
+        bias is the typical deviation at switch-on. Other fields by name; ``noise_std`` is the white part. ``step``,
+        m/s², is that of the readings, where it is coarser than the parts'.
 
         Raises
         ------
@@ -119,13 +123,13 @@ class SensorErrors:
             bias.append(np.array(part["offset_std_m_s2"])[:axes])
             limit.append(np.full(axes, float(part["full_range_m_s2"]) - lsb))
             steps.append(np.full(axes, lsb))
-        step = np.concatenate(steps)
-        noise = [np.sqrt(rms**2 + step**2 / 12.0)]
-        stuck = _equal_run(float((rms / step).min()))
+        each = np.maximum(np.concatenate(steps), step)
+        noise = [np.sqrt(rms**2 + each**2 / 12.0)]
+        stuck = _equal_run(float((rms / each).min()))
         fields: dict[str, Any] = {"full_range": np.concatenate(limit), "stuck_after": stuck} | others
         if "noise_std" in fields:
             white = np.broadcast_to(np.asarray(fields.pop("noise_std"), dtype=float), (array.n_channels,))
-            noise = [np.sqrt(white**2 + step**2 / 12.0)]
+            noise = [np.sqrt(white**2 + each**2 / 12.0)]
         if "bias_std" in fields:
             bias = [np.broadcast_to(np.asarray(fields.pop("bias_std"), dtype=float), (array.n_channels,))]
         return cls(np.concatenate(noise), np.concatenate(bias), **fields)
@@ -137,7 +141,12 @@ class SensorErrors:
 
 
 def _equal_run(noise_in_lsb: float) -> int:
-    """Count equal readings in a row that noise of this size, rounded to whole LSB, hardly ever gives."""
+    """Count equal readings in a row that noise of this size, rounded to whole LSB, hardly ever gives; 0 for no limit.
+
+    At rest in the middle of a step that is coarse beside the noise, a channel reads the same for as long as it likes.
+    """
+    if noise_in_lsb < _LEAST_NOISE_LSB:
+        return 0
     # Two readings round to the same count with a probability of about 1/(2 √π σ), σ in LSB (at most near 1).
     probability = min(0.9, 1.0 / (2.0 * np.sqrt(np.pi) * max(noise_in_lsb, 1e-3)))
     return int(np.ceil(np.log(_EQUAL_READINGS) / np.log(probability))) + 1

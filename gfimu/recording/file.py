@@ -294,5 +294,6 @@ def _check_times(table: ColumnFile, times: NDArray[np.float64], first_row: int, 
         previous = times[row - 1] if row else before
         raise InputError(
             f"{table.file}: {table.place(first_row + row)}: t_s does not increase "
-            f"({previous:.9g} s, then {times[row]:.9g} s); sort by time or drop the repeated samples"
+            f"({previous:.9g} s, then {times[row]:.9g} s); sort by time or drop the repeated samples "
+            "(gfimu convert --drop duplicates,unordered)"
         )

@@ -26,6 +26,7 @@ from gfimu.importing.readers import read_foreign
 from gfimu.importing.readers.tables import arrow_table
 from gfimu.importing.recognise import fitting_maps
 from gfimu.recording.carried_array import array_metadata
+from gfimu.recording.filtered import filtered_recording, rows_between, without_rows
 from gfimu.recording.recording import Recording
 
 __all__ = ["MappedFile", "mapped_recording", "mapped_reference"]
@@ -57,8 +58,15 @@ class MappedFile(os.PathLike[str]):
     def __str__(self) -> str:
         return str(self.path)
 
-    def read(self, array: AccelerometerArray | None = None) -> Recording:
-        """Return the recording; see `mapped_recording`."""
+    def read(self, array: AccelerometerArray | None = None, *, unit: str | None = "m_s2") -> Recording:
+        """Return the recording; see `mapped_recording`, and `gfimu.recording.filtered` for a map without columns.
+
+        ``unit`` holds for a map without columns: ``lsb`` keeps raw counts, None keeps them where the file has them.
+        """
+        if self.column_map.is_own:
+            if self.others:
+                raise InputError(f"{self.others[0]}: several files need a map of their columns (--map)")
+            return filtered_recording(self.path, self.column_map, array=array, unit=unit)
         return mapped_recording([self.path, *self.others], self.column_map, array=array)
 
 
@@ -98,6 +106,8 @@ def mapped_recording(
         If the file can't be read, lacks a column of the map, or its times do not increase.
     """
     chosen = load_map(column_map)
+    if chosen.is_own and not isinstance(source, list | tuple):
+        return filtered_recording(source, chosen, array=array)  # type: ignore[arg-type]
     if not chosen.channels:
         raise InputError(f"map {chosen.name!r} has references only; a recording needs [channels]")
     if isinstance(source, str | Path):
@@ -108,7 +118,7 @@ def mapped_recording(
         table = TableColumns(source)
         pieces = [_piece(RawFile(table.file, "table", {"": _as_raw(source)}), chosen)]
     geometry = array or (AccelerometerArray.load(chosen.array) if chosen.array and len(pieces) == 1 else None)
-    merged = _merged(pieces)
+    merged = _between(_merged(pieces), chosen)
     for note in merged.times.notes:
         warnings.warn(note, RecordingWarning, stacklevel=2)
     return _recording(merged, chosen, geometry, [one.source for one in pieces])
@@ -133,7 +143,7 @@ def mapped_reference(
     InputError
         As `mapped_recording`; also if the map names no reference that the file has.
     """
-    piece = _piece(read_foreign(path, column_map.format, column_map.text), column_map)
+    piece = _between(_piece(read_foreign(path, column_map.format, column_map.text), column_map), column_map)
     if not piece.reference:
         raise InputError(
             f"{path}: map {column_map.name!r} gives no reference; add one under [reference], as tacho_rad_s"
@@ -150,8 +160,8 @@ def _as_raw(source: Any) -> RawTable:
 
 def _piece(raw: RawFile, chosen: ColumnMap) -> _Piece:
     """Return the columns of one file in SI units."""
-    table = _table(raw, chosen)
-    times = times_of(table, chosen.time, raw.source)
+    table = _without_first(_table(raw, chosen), chosen.skip_rows, raw.source)
+    times = times_of(table, chosen.time, raw.source, drop=chosen.drop)
     if not len(times.t_s):
         raise InputError(f"{raw.source}: no samples; record again or give another file")
     used = {table.find(chosen.time.column)} if chosen.time.column is not None else set()
@@ -190,6 +200,26 @@ def _piece(raw: RawFile, chosen: ColumnMap) -> _Piece:
         reference,
         {name: values[times.rows] for name, values in rest.items()},
     )
+
+
+def _without_first(table: RawTable, rows: int, source: str) -> RawTable:
+    """Return a table without its first rows."""
+    if not rows:
+        return table
+    if rows >= len(table):
+        raise InputError(f"{source}: skip_rows = {rows} leaves none of {len(table)} rows; skip fewer")
+    return replace(table, columns={name: values[rows:] for name, values in table.columns.items()})
+
+
+def _between(piece: _Piece, chosen: ColumnMap) -> _Piece:
+    """Return the samples from the map's ``start_s`` to its ``stop_s`` after the first one."""
+    rows = rows_between(piece.times.t_s, chosen.time, piece.source)
+    if rows.all():
+        return piece
+    groups = (
+        {name: values[rows] for name, values in one.items()} for one in (piece.channels, piece.reference, piece.other)
+    )
+    return _Piece(piece.source, replace(piece.times, t_s=piece.times.t_s[rows]), *groups)
 
 
 def _table(raw: RawFile, chosen: ColumnMap) -> RawTable:
@@ -314,6 +344,10 @@ def _recording(piece: _Piece, chosen: ColumnMap, array: AccelerometerArray | Non
         metadata["time_origin_s"] = piece.times.origin_s
     if array is not None:
         metadata |= array_metadata(array)
+    if piece.times.dropped:
+        metadata["dropped_rows"] = dict(piece.times.dropped)
     table = TableColumns(pa.table(dict(columns)).replace_schema_metadata(schema_metadata(metadata)))
     table.file = piece.source
-    return Recording.read(table, array=array)  # type: ignore[arg-type]
+    recording = Recording.read(table, array=array)  # type: ignore[arg-type]
+    absent = np.column_stack([np.isnan(values) for values in piece.channels.values()])
+    return without_rows(recording, chosen.drop, absent=absent, source=piece.source, array=array)

@@ -116,6 +116,13 @@ class Recording(Tabular):
         return {str(name): count for name, count in items if isinstance(count, int)}
 
     @property
+    def dropped(self) -> dict[str, int]:
+        """How many rows were left out on request or for their times, by the reason; empty if none."""
+        counts = self.metadata.get("dropped_rows")
+        items = counts.items() if isinstance(counts, Mapping) else ()
+        return {str(kind): count for kind, count in items if isinstance(count, int)}
+
+    @property
     def mounting_rotvec(self) -> NDArray[np.float64]:
         """Rotation vector by which the cube was turned from upright before this run, rad, shape (3,)."""
         value = self.metadata.get("mounting_rotvec_rad", [0.0, 0.0, 0.0])

@@ -121,13 +121,27 @@ def _pile(
     fine = sigma > 0.5 * step
     predicted = (expected[on] > level + _CLEAR * sigma + (step if fine else _CLEAR * step)).mean() > 0.5
     again = fine and _visits(on) >= _VISITS
-    return (level, 0.0) if predicted or again else None
+    # A channel that stays once is at its rail where it came and goes without a jump; one that had stopped jumps.
+    steady = fine and not again and _joins(mine, on, level, max(sigma, step))
+    return (level, 0.0) if predicted or again or steady else None
 
 
 def _visits(on: NDArray[np.bool_]) -> int:
     """Return how many times readings stay at a level."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], on.astype(int), [0]])))
     return int(np.sum(edges[1::2] - edges[::2] >= _STAY))
+
+
+def _joins(mine: NDArray[np.float64], on: NDArray[np.bool_], level: float, scatter: float) -> bool:
+    """Return whether the readings before and after each stay at a level lead up to it, within their usual change."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], on.astype(int), [0]])))
+    for start, stop in zip(edges[::2], edges[1::2], strict=True):
+        before, after = mine[max(start - _STAY - 1, 0) : start][::-1], mine[stop : stop + _STAY + 1]
+        for outside in (before, after):
+            usual = float(np.median(np.abs(np.diff(outside)))) if len(outside) > 1 else 0.0
+            if len(outside) and abs(outside[0] - level) > _SCATTER * max(scatter, usual):
+                return False
+    return True
 
 
 def _others_follow(

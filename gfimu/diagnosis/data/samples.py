@@ -49,10 +49,6 @@ def frozen_stretches(
         usual.append(float(np.median(np.abs(np.diff(mine[alive])))) if alive.sum() > 10 else np.nan)
     # A channel that was dead all through would have changed like the quietest of the others.
     quietest = 0.0 if np.isnan(usual).all() else float(np.nanmin(usual))
-    # In the middle of a step that is coarse beside the noise a channel at rest may well read the same for long.
-    spread = np.maximum(noise, _LEAST_NOISE * quantum)
-    same = np.log(2.0 * ndtr(0.5 * quantum / spread) - 1.0)  # (c,), of one reading more
-    least = np.maximum((np.log(Policy.chance) - np.log(run.readings.size)) / same, _LONGEST_EQUAL)
     for channel in range(run.readings.shape[1]):
         mine = run.readings[:, channel]
         changes = quietest if np.isnan(usual[channel]) else usual[channel]
@@ -60,13 +56,39 @@ def frozen_stretches(
             start, stop = int(edges[channel][place]) + 1, int(edges[channel][place + 1]) + 1
             at_limit = limit is not None and abs(mine[start]) >= limit - 0.6 * quantum
             moving = float(np.ptp(prediction[start:stop, channel])) > 2.5 * quantum
-            restless = changes > 0.3 * quantum and stop - start > least[channel]
-            # Where all channels repeat themselves no single one has stopped.
-            others = np.diff(np.delete(run.readings[start:stop], channel, axis=1), axis=0)
-            alone = bool((others != 0.0).any(axis=1).mean() > 0.5)
-            if not at_limit and alone and run.valid[start:stop, channel].any() and (moving or restless):
+            if at_limit or not run.valid[start:stop, channel].any():
+                continue
+            spread = _spread_of_others(run, channel, start, stop, quantum)
+            if np.isnan(spread):
+                continue
+            # In the middle of a step that is coarse beside the noise a channel at rest may well read the same for long.
+            least = _least_equal(min(float(noise[channel]), spread), quantum, run.readings.size)
+            if moving or (changes > 0.3 * quantum and stop - start > least):
                 found.append((channel, start, stop))
     return found
+
+
+def _spread_of_others(run: Run, channel: int, start: int, stop: int, quantum: float) -> float:
+    """Return how much the other channels scatter in a stretch: median standard deviation before rounding, m/s².
+
+    NaN where they do not move either: where all repeat themselves no single one has stopped, and where they flip
+    between two counts the body is at rest and the steps are coarse beside its noise.
+    """
+    others = np.arange(run.readings.shape[1]) != channel
+    readings, valid = run.readings[start:stop, others], run.valid[start:stop, others]
+    repeated = float((np.diff(readings, axis=0) != 0.0).any(axis=1).mean()) <= 0.5
+    columns = [column[known] for column, known in zip(readings.T, valid.T, strict=True) if known.any()]
+    moved = [span for column in columns if (span := float(np.ptp(column))) > 1e-12]
+    if repeated or not moved or float(np.median(moved)) <= 1.5 * quantum:
+        return float("nan")
+    rounding = quantum**2 / 12.0  # Sheppard's correction: what the steps themselves add to a variance
+    return float(np.median([np.sqrt(max(np.var(column) - rounding, 0.0)) for column in columns]))
+
+
+def _least_equal(spread: float, quantum: float, readings: int) -> float:
+    """Return how many equal readings in a row noise of a ``spread`` leaves to chance in a run of so many readings."""
+    same = np.log(2.0 * ndtr(0.5 * quantum / max(spread, _LEAST_NOISE * quantum)) - 1.0)  # of one reading more
+    return max(float((np.log(Policy.chance) - np.log(readings)) / same), _LONGEST_EQUAL)
 
 
 def told_frozen(

@@ -132,3 +132,26 @@ def test_units_are_read_as_people_write_them():
         assert factor_of(text, "rate") == pytest.approx(np.pi / 180.0)
     with pytest.raises(UnitError, match="rpm"):
         factor_of("knots", "rate")
+
+
+def test_a_recording_of_gfimus_is_known_and_its_repeated_rows_are_said(tmp_path):
+    import gfimu
+
+    rows = [f"{k / 100},{k % 5},{k % 3},{9.8 + 0.01 * (k % 4)},{k}" for k in range(300)]
+    path = tmp_path / "run.csv"
+    path.write_text("t_s,a11_m_s2,a12_m_s2,a13_m_s2,tacho_rpm\n" + "\n".join([*rows[:200], *rows[190:]]) + "\n")
+    found = inspect_file(path)
+    assert (found.is_own, found.chips, found.column_map) == (True, 1, None)
+    assert any("left out 10 rows" in line for line in found.findings)
+    assert any("--drop duplicates" in line for line in found.findings)
+    assert [one.role for one in found.columns][-1] == "reference"
+    with pytest.raises(InputError, match="needs no column map"):
+        gfimu.inspect(path, out=tmp_path / "m.toml")
+
+
+def test_times_that_go_back_are_no_counter_that_starts_anew(tmp_path):
+    t = files.T.copy()
+    t[150:] -= 0.105
+    assert inspect_file(text_run(tmp_path, t)).column_map.time.wrap is None
+    counts = (65000 + 10 * np.arange(files.N)) % 65536
+    assert inspect_file(text_run(tmp_path, counts)).column_map.time.wrap == 65536.0

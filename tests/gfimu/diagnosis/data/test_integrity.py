@@ -200,3 +200,23 @@ def test_a_channel_in_the_middle_of_a_coarse_step_is_not_frozen():
     ((channel, start, stop),) = frozen_stretches(replace(run, readings=readings), moving, step, None, noise)
     assert (channel, start) == (7, pytest.approx(800, abs=5))
     assert stop == pytest.approx(950, abs=5)
+
+
+@pytest.mark.parametrize(("coarse", "share"), [(1.3, 0.3), (2.6, 0.3), (2.6, 0.6), (4.0, 0.6)])
+def test_chips_quieter_than_their_data_sheet_are_not_frozen_at_rest(coarse, share):
+    """Where all chips are at rest between coarse steps none has stopped; one that holds while the others move has."""
+    twin = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
+    rng = np.random.default_rng(12)
+    run = prepare_run(measure(rng, twin, [], Measurement(duration=40.0)), twin)
+    noise = twin.expected_noise(100.0).analogue
+    step = coarse * float(noise[0])
+    t = run.t[:, None]
+    moving = 300.0 * step * np.maximum(np.sin(0.5 * t), 0.0) ** 2 + rng.uniform(-step, step, 12)
+    readings = np.round((moving + share * noise * rng.standard_normal(moving.shape)) / step) * step
+    longest = max(int(np.diff(np.flatnonzero(np.diff(column) != 0.0)).max()) for column in readings.T)
+    assert longest > 100
+    assert frozen_stretches(replace(run, readings=readings), moving, step, None, noise) == []
+    readings[200:350, 7] = readings[200, 7]
+    ((channel, start, stop),) = frozen_stretches(replace(run, readings=readings), moving, step, None, noise)
+    assert (channel, start) == (7, 200)
+    assert 350 <= stop < 355

@@ -116,6 +116,26 @@ def test_the_extended_twin_clips_as_the_recording_does():
     assert (again.verdict, again.causes) == ("nothing_found", ())
 
 
+@pytest.mark.parametrize("gain", [0.93, 1.07])
+def test_a_rail_that_is_reached_once_is_no_stuck_channel(gain):
+    """577 samples at one count and 13 up to ten counts beyond, below what the simulation predicts or above."""
+    t = np.arange(-2.0, 32.0, 5e-3)
+    rate = 10.0 * np.clip((t - 6.0) / 4.0, 0.0, 1.0) * np.clip((20.0 - t) / 4.0, 0.0, 1.0)
+    motion = SplineSpin.through(t, gaussian_filter1d(rate, 40.0))
+    recording = measure(np.random.default_rng(1), TWIN, [], Measurement(duration=24.0), motion=motion)
+    readings, place = recording.readings.copy(), NAMES.index("a31")
+    counts = np.round(gain * readings[:, place] / STEP)
+    level = np.partition(counts, -590)[-590]
+    over = np.flatnonzero(counts >= level)[:590]
+    counts = np.minimum(counts, level)
+    counts[over[30::45]] += np.arange(1, 11).repeat(2)[: len(over[30::45])]
+    readings[:, place] = counts * STEP
+    run = prepare_run(replace(recording, readings=readings), TWIN)
+    report = check_integrity(TWIN, run, TWIN.predict(motion, run.t)[0])
+    assert [effect.name for effect in report.effects] == ["saturation"]
+    assert not report.run.valid[counts >= level, place].any()
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_a_channel_that_stops_at_an_ordinary_value_is_stuck(seed):
     recording, _ = swinging()

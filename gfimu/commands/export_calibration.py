@@ -1,0 +1,70 @@
+"""Under `gfimu convert` of a calibration: YAML for Kalibr and for the ROS package imu_calib."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from gfimu.errors import InputError, unknown_name
+
+if TYPE_CHECKING:
+    from gfimu.calibration.result import Calibration
+    from gfimu.geometry.array import AccelerometerArray
+    from gfimu.recording import Recording
+    from gfimu.sensor_noise import RecordingNoise
+
+__all__ = ["TARGETS", "export_calibration"]
+
+TARGETS = ("kalibr", "ros")
+"""Formats of a calibration for others."""
+
+
+def export_calibration(
+    calibration: Calibration,
+    target: str | Path | None,
+    *,
+    to: str | None,
+    array: AccelerometerArray | None,
+    lsb_m_s2: float | None,
+    chip: str | None,
+    noise: RecordingNoise | Recording | str | Path | None,
+    map_set: Sequence[str] = (),
+) -> None:
+    """Write a calibration in a format of others; arguments as `gfimu.convert`.
+
+    Raises
+    ------
+    InputError
+        If the format is not named or unknown, the target is no YAML file, or as
+        `gfimu.exporting.calibrated_chip.calibrated_chips`.
+    """
+    from gfimu.commands.noise import noise as recorded_noise
+    from gfimu.exporting import calibration_as_kalibr, calibration_as_ros
+    from gfimu.exporting.calibrated_chip import calibrated_chips
+    from gfimu.files.atomic_file import write_text
+    from gfimu.sensor_noise import RecordingNoise
+
+    if to is None:
+        raise InputError(f"a calibration is written for one of {', '.join(TARGETS)}; name it with --to")
+    if to not in TARGETS:
+        raise unknown_name("format of a calibration", to, TARGETS)
+    if target is not None and Path(target).suffix not in {".yaml", ".yml"}:
+        raise InputError(f"{target}: a calibration for {to} ends in .yaml or .yml; name it so")
+    found = noise
+    if found is not None and not isinstance(found, RecordingNoise):
+        found = recorded_noise(found, calibration=calibration, map_set=map_set)
+    chips = calibrated_chips(calibration, array, lsb_m_s2=lsb_m_s2, noise=found, chip=chip)
+    write = calibration_as_kalibr if to == "kalibr" else calibration_as_ros
+    text = write(chips, notes=_notes(calibration))
+    if target is not None:
+        write_text(target, text)
+
+
+def _notes(calibration: Calibration) -> list[str]:
+    """Return what a reader of the file should know of the calibration."""
+    from gfimu.calibration.error_model import GAUGES
+
+    made = f"gfimu calibration, method {calibration.method}, g = {calibration.gravity:.9g} m/s^2"
+    frame = f"frame of the calibrated values: {GAUGES[calibration.gauge]}"
+    return [made, frame, *calibration.statements, *(f"warning: {text}" for text in calibration.warnings)]

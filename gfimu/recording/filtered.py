@@ -1,0 +1,219 @@
+"""Recordings with rows left out on request (``drop`` of a column map), each kind counted and reported.
+
+``corrupt``: a channel has a value that can be no measurement, as 1e19. ``out_of_range``: a channel reads more than its
+part can. ``missing``: a channel has no value, as in a burst of NaN. ``duplicates``: the time of another row.
+``unordered``: a time that goes back, or a wild one. Without the request such values of `corrupt` rows alone are left
+out, `missing` ones stay missing, and a recording of gfimu's whose times do not increase is refused.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Collection, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from gfimu.errors import InputError, RecordingWarning
+from gfimu.files.column_file import ColumnFile, open_columns
+from gfimu.files.table import ArrowStream, schema_metadata
+from gfimu.files.table_columns import TableColumns
+from gfimu.geometry.array import AccelerometerArray
+from gfimu.importing.clock import increasing_times
+from gfimu.importing.column_map import ColumnMap, TimeSpec
+from gfimu.importing.recognise import map_hint
+from gfimu.parts.plausible import rails_of_array
+from gfimu.recording.mimu4444 import is_mimu4444, read_mimu4444
+from gfimu.recording.recording import Recording
+
+__all__ = ["filtered_recording", "rows_between", "without_rows"]
+
+_SAID = {
+    "corrupt": "with a value that can be no measurement",
+    "out_of_range": "with a reading beyond the range of its part",
+    "missing": "in which a channel has no value",
+}
+
+
+def filtered_recording(
+    source: str | Path | ArrowStream,
+    column_map: ColumnMap,
+    *,
+    array: AccelerometerArray | None = None,
+    unit: str | None = "m_s2",
+) -> Recording:
+    """Read a recording of gfimu's without the rows that a map without columns leaves out.
+
+    Parameters
+    ----------
+    source : str, Path or table
+        As for `gfimu.Recording.read`, or a MIMU4444 stream.
+    column_map : ColumnMap
+        Its ``drop``, ``skip_rows``, ``time.start_s`` and ``time.stop_s`` count.
+    array : AccelerometerArray, optional
+        The array whose channels must be there; the recording's own by default.
+    unit : {"m_s2", "lsb"} or None
+        Unit of the readings in memory; None keeps raw counts where the file has them.
+
+    Raises
+    ------
+    InputError
+        As `gfimu.Recording.read`; also if no rows are left.
+    """
+    if isinstance(source, str | Path) and is_mimu4444(source):
+        recording = read_mimu4444(source)
+        recording = recording.slice(min(column_map.skip_rows, len(recording)))
+        return _chosen_rows(recording, column_map, np.isnan(recording.readings), str(source), array)
+    table = open_columns(source)
+    if "t_s" not in table.names:
+        hint = map_hint(source) if isinstance(source, str | Path) else ""
+        raise InputError(f"{table.file}: column t_s is missing; every recording needs it" + (f"; {hint}" * bool(hint)))
+    whole, dropped = _ordered(table, column_map)
+    if unit is None:
+        unit = "lsb" if any(name.endswith("_lsb") for name in table.names) else "m_s2"
+    recording = Recording.read(whole, array=array, unit=unit)  # type: ignore[arg-type]
+    recording = replace(recording, metadata=_counted(recording.metadata, dropped))
+    columns = (_column_of(name, table.names) for name in recording.channels)
+    absent = np.column_stack([np.isnan(next(iter(whole.blocks([name])))[0]) for name in columns])
+    return _chosen_rows(recording, column_map, absent, str(table.file), array)
+
+
+def without_rows(
+    recording: Recording,
+    drop: Collection[str],
+    *,
+    absent: NDArray[np.bool_],
+    source: str,
+    array: AccelerometerArray | None = None,
+) -> Recording:
+    """Return a recording without rows that are corrupt, out of range or lack a value, where that is asked for.
+
+    Parameters
+    ----------
+    recording : Recording
+        As it was read: corrupt values are NaN.
+    drop : collection of str
+        ``corrupt``, ``out_of_range``, ``missing``; other kinds were left out when the times were read.
+    absent : ndarray of bool, shape (n, c)
+        Readings that the file itself had not.
+    source : str
+        The file, for messages.
+    array : AccelerometerArray, optional
+        The array whose parts state the range; the recording's own by default.
+
+    Raises
+    ------
+    InputError
+        If the range of no part is known, or no rows are left.
+    """
+    unknown = np.isnan(recording.readings)
+    rows = {"corrupt": (unknown & ~absent).any(axis=1), "missing": absent.any(axis=1)}
+    if "out_of_range" in drop:
+        rows["out_of_range"] = _out_of_range(recording, array or recording.array, source)
+    kept = np.ones(len(recording), dtype=bool)
+    counts = {}
+    for kind, said in _SAID.items():
+        found = rows.get(kind, ~kept) & kept
+        if kind not in drop or not found.any():
+            continue
+        kept &= ~found
+        counts[kind] = int(found.sum())
+        warnings.warn(f"{source}: left out {counts[kind]} rows {said}", RecordingWarning, stacklevel=3)
+    if not counts:
+        return recording
+    if not kept.any():
+        dead = [name for name, gone in zip(recording.channels, absent.T, strict=True) if gone.all()]
+        why = f"; channel {', '.join(dead)} has no value at all" if dead else ""
+        raise InputError(
+            f"{source}: no rows are left without those to drop ({', '.join(counts)}){why}; drop fewer kinds"
+        )
+    return replace(
+        recording,
+        t_s=recording.t_s[kept],
+        readings=recording.readings[kept],
+        reference={name: values[kept] for name, values in recording.reference.items()},
+        extra={name: values[kept] for name, values in recording.extra.items()},
+        metadata=_counted(recording.metadata, counts),
+    )
+
+
+def rows_between(t_s: NDArray[np.float64], spec: TimeSpec, source: str) -> NDArray[np.bool_]:
+    """Mark the samples (n,) from ``start_s`` to ``stop_s`` after the first one.
+
+    Raises
+    ------
+    InputError
+        If there are none.
+    """
+    since = t_s - t_s[0]
+    rows = np.ones(len(t_s), dtype=bool)
+    if spec.start_s is not None:
+        rows &= since >= spec.start_s - 1e-9
+    if spec.stop_s is not None:
+        rows &= since <= spec.stop_s + 1e-9
+    if not rows.any():
+        raise InputError(
+            f"{source}: no samples from time.start_s to time.stop_s; the recording lasts {since[-1]:.6g} s"
+        )
+    return rows
+
+
+def _chosen_rows(
+    recording: Recording,
+    column_map: ColumnMap,
+    absent: NDArray[np.bool_],
+    source: str,
+    array: AccelerometerArray | None,
+) -> Recording:
+    rows = np.flatnonzero(rows_between(recording.t_s, column_map.time, source))
+    first, stop = int(rows[0]), int(rows[-1]) + 1
+    taken = recording.slice(first, stop)
+    return without_rows(taken, column_map.drop, absent=absent[first:stop], source=source, array=array)
+
+
+def _ordered(table: ColumnFile, column_map: ColumnMap) -> tuple[TableColumns, Mapping[str, int]]:
+    """Return the table without its first rows and those whose times do not increase, as far as the map asks for it."""
+    found = table.read_as_found(table.names)
+    times = [block[0] for block in table.blocks(["t_s"])]
+    t = np.concatenate(times) if times else np.empty(0)
+    if column_map.skip_rows >= len(t):
+        raise InputError(f"{table.file}: no samples below the first {column_map.skip_rows}; skip fewer rows")
+    rows, dropped = slice(column_map.skip_rows, None), {}
+    kept = np.ones(len(t[rows]), dtype=bool)
+    if {"duplicates", "unordered"} & set(column_map.drop):
+        sorted_out = increasing_times(t[rows], 0.0, f"{table.file}: column t_s", drop=column_map.drop)
+        kept, dropped = sorted_out.rows, dict(sorted_out.dropped)
+        for note in sorted_out.notes:
+            warnings.warn(note, RecordingWarning, stacklevel=4)
+    columns = {name: pa.array(values[rows][kept], from_pandas=True) for name, values in found.items()}
+    whole = TableColumns(pa.table(columns).replace_schema_metadata(schema_metadata(table.metadata)))
+    whole.file = str(table.file)
+    return whole, dropped
+
+
+def _out_of_range(recording: Recording, array: AccelerometerArray | None, source: str) -> NDArray[np.bool_]:
+    """Mark the rows (n,) in which a channel reads more than its part can."""
+    if recording.unit != "m_s2" or array is None:
+        raise InputError(f"{source}: to drop out_of_range, give the array with --array; its parts state their range")
+    rails = dict(zip(array.channels, rails_of_array(array), strict=True))
+    most = np.array([rails.get(name, np.inf) for name in recording.channels])
+    if np.isinf(most).all():
+        raise InputError(f"{source}: to drop out_of_range, add full_range_m_s2 to the array's part file")
+    return np.asarray((np.abs(recording.readings) > most).any(axis=1))
+
+
+def _column_of(channel: str, names: Collection[str]) -> str:
+    return next(name for name in names if name.startswith(f"{channel}_"))
+
+
+def _counted(metadata: Mapping[str, Any], counts: Mapping[str, int]) -> dict[str, Any]:
+    """Return metadata with the counts of dropped rows added to those that are there."""
+    if not counts:
+        return dict(metadata)
+    before = metadata.get("dropped_rows")
+    known = dict(before) if isinstance(before, Mapping) else {}
+    return {**metadata, "dropped_rows": known | {kind: known.get(kind, 0) + n for kind, n in counts.items()}}
