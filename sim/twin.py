@@ -17,7 +17,7 @@ from gfimu.errors import InputError
 from gfimu.files.model_files import find_model, read_toml
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.motion.body_drive import BodyDrive
-from gfimu.parts.files import part_table
+from gfimu.parts.part_file import PartFile
 from gfimu.short_repr import short_repr
 from gfimu.units import STANDARD_GRAVITY
 from gfimu.world_model import BasisUnits, BodyModel, EffectFamily, ExpectedNoise, Spin
@@ -132,7 +132,7 @@ class Twin:
             raise InputError(f"{source}: cube_offset_m needs three finite numbers")
         part = str(sensor.get("part", array.chips[0].part))
         array, part = array.with_part_file(part, beside=beside)
-        part_table(part, array.part_files)
+        PartFile.load(part, array.part_files)
         return cls(
             array=array,
             gravity=_positive(data.get("gravity_m_s2", STANDARD_GRAVITY), f"{source}: gravity_m_s2"),
@@ -302,19 +302,19 @@ class Twin:
 
     def expected_noise(self, sample_rate: float) -> ExpectedNoise:
         """Return white noise and quantisation of the part at a sample rate, as the data sheet has them."""
-        part, _ = part_table(self.part, self.array.part_files)
-        quantum = float(part["lsb_m_s2"])
+        part = PartFile.load(self.part, self.array.part_files, needs=() if self.full_resolution else ("range_g",))
+        quantum = lsb = part.lsb_m_s2
         if not self.full_resolution:
-            quantum *= max(self.range_g / float(part["range_g"][0]), 1.0)
+            quantum *= max(self.range_g / (part.range_g or (1,))[0], 1.0)
         for effect in self.effects:
             if effect.name == "coarse_resolution":
                 quantum = effect.value("step_m_s2")
-        rms = np.array(part["noise_lsb_rms_100_hz"], dtype=float) * float(part["lsb_m_s2"])
+        rms = np.array(part.noise_lsb_rms_100_hz) * lsb
         rms = rms * math.sqrt(max(sample_rate, 100.0) / 100.0)
         axis = np.concatenate([np.arange(len(chip.axes)) for chip in self.array.chips])
         factor = math.prod(effect.value("factor", 1.0) for effect in self.effects if effect.name == "noise")
         # The data sheet's noise is that of the codes, its own quantisation included.
-        analogue = rms[axis] ** 2 - float(part["lsb_m_s2"]) ** 2 / 12.0
+        analogue = rms[axis] ** 2 - lsb**2 / 12.0
         white = np.sqrt(np.maximum(analogue, 0.0) * factor**2 + quantum**2 / 12.0)
         return ExpectedNoise(white, quantum, self.range_g * STANDARD_GRAVITY)
 

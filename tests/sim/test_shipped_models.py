@@ -11,9 +11,7 @@ KNOWN = json.loads(STORED.read_text(encoding="utf-8"))
 def differences(stored, found, place=""):
     """Places at which an object lacks what the copy holds; fields that came later are none."""
     if isinstance(stored, dict) and isinstance(found, dict):
-        return [
-            one for key, value in stored.items() for one in differences(value, found.get(key), f"{place}.{key}")
-        ]
+        return [one for key, value in stored.items() for one in differences(value, found.get(key), f"{place}.{key}")]
     if isinstance(stored, list) and isinstance(found, list) and len(stored) == len(found):
         return [
             one
