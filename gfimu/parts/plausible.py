@@ -7,13 +7,14 @@ like a missing reading. A reading at the rail of its part is a measurement and s
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
-from gfimu.parts.part_file import PartFile
+from gfimu.parts.files import part_table
 
 __all__ = ["MOST_CORRUPT", "largest_of_array", "largest_of_part", "largest_reference"]
 
@@ -30,10 +31,12 @@ def largest_of_part(part: str | None, files: Mapping[str, str] | None = None) ->
     if part is None:
         return _LARGEST
     try:
-        full_range = PartFile.load(part, files).full_range_m_s2
+        table: Mapping[str, Any] = part_table(part, files or {})[0]
     except InputError:
         return _LARGEST  # reported where the part is needed
-    return _LARGEST if full_range is None else _RANGES * full_range
+    full_range = table.get("full_range_m_s2")
+    usable = isinstance(full_range, int | float) and not isinstance(full_range, bool) and 0 < full_range < np.inf
+    return _RANGES * float(full_range) if usable else _LARGEST  # type: ignore[arg-type]
 
 
 def largest_of_array(array: AccelerometerArray) -> NDArray[np.float64]:
