@@ -79,6 +79,11 @@ class DataSheet:
 
     __repr__ = short_repr
 
+    @property
+    def shifts_with_supply(self) -> bool:
+        """Whether the data sheet has other figures at 3.3 V."""
+        return bool((self.high_supply_gain != 1.0).any() or self.high_supply_offset.any())
+
     @classmethod
     def load(cls, name: str, files: Mapping[str, str] | None = None) -> DataSheet:
         """Load the data sheet of a part by name (in ``models/parts``) or from a TOML file.

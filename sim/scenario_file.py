@@ -195,7 +195,7 @@ def scenario_fields(data: Mapping[str, Any], source: str, beside: Path | None) -
     """
     file = read(_with_motion(data), ScenarioFile, source)
     array = AccelerometerArray.load(file.array, beside=beside)
-    part = file.sensor.part
+    part = file.sensor.part or None
     if part is not None:
         array, part = array.with_part_file(part, beside=beside)
     duration = file.duration_s or file.motion.length

@@ -283,11 +283,11 @@ class Twin:
             if effect.name == "coarse_resolution":
                 quantum = effect.value("step_m_s2")
         rms = np.array(part.noise_lsb_rms_100_hz) * lsb
-        rms = rms * math.sqrt(max(sample_rate, 100.0) / 100.0)
         axis = np.concatenate([np.arange(len(chip.axes)) for chip in self.array.chips])
+        rms = rms[axis] * np.sqrt(np.maximum(self.array.output_data_rates(sample_rate), 100.0) / 100.0)
         factor = math.prod(effect.value("factor", 1.0) for effect in self.effects if effect.name == "noise")
         # The data sheet's noise is that of the codes, its own quantisation included.
-        analogue = rms[axis] ** 2 - lsb**2 / 12.0
+        analogue = rms**2 - lsb**2 / 12.0
         white = np.sqrt(np.maximum(analogue, 0.0) * factor**2 + quantum**2 / 12.0)
         return ExpectedNoise(white, quantum, self.range_g * STANDARD_GRAVITY)
 

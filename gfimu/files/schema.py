@@ -169,7 +169,7 @@ class _Place:
     def step(self, name: str, index: str, enter: bool) -> None:
         """Go on to a key, or to an item of a list; ``enter`` the table that is there."""
         if name:
-            self.info = self._of_key(name)
+            self.info = self.of_key(name)
             self.value = self.value.get(name) if isinstance(self.value, Mapping) else None
             self.key, self.key_value, self.key_info = name, self.value, self.info
         else:
@@ -186,7 +186,8 @@ class _Place:
         kinds = tagged(info)
         return kinds.get(_tag(kinds, self.value)) if kinds else None
 
-    def _of_key(self, name: str) -> types.Type:
+    def of_key(self, name: str) -> types.Type:
+        """Return the type of a key of the table that is here; that of the tag are the tags."""
         kinds = tagged(without_none(self.info)[0])
         if kinds and name == next(iter(kinds.values())).tag_field:
             return types.LiteralType(tuple(kinds))
@@ -220,7 +221,7 @@ def _explained(message: str, data: Any, kind: type[Table], source: str) -> Input
     if of_table and of_table[1] == "contains unknown":
         return InputError(f"{at.where}: {_unknown(of_table[2], _valid_keys(at.table()))}")
     if of_table:
-        return InputError(f"{at.where}: {_missing(of_table[2], at.table())}")
+        return InputError(f"{at.where}: {_missing(of_table[2], at.of_key(of_table[2]))}")
     if isinstance(at.key_value, Sequence) and not at.key_value and _is_list_of_tables(at.key_info):
         return InputError(f"{at.where}: {_no_table(at.key)}")
     return InputError(f"{at.where}: {at.key} = {_short(at.key_value)} must be {_must_be(at)}")
@@ -242,14 +243,14 @@ def _nearest(word: Any, valid: Sequence[Any]) -> str:
     return f"; did you mean {near[0]!r}?" if near else ""
 
 
-def _missing(key: str, table: types.StructType | None) -> str:
-    info = next((one.type for one in table.fields if one.name == key), types.AnyType()) if table else types.AnyType()
+def _missing(key: str, info: types.Type) -> str:
     if _is_list_of_tables(info):
         return _no_table(key)
-    examples = without_none(info)[1].get("examples")
-    return f"key {key!r} is missing; add it" + (
-        f", such as {key} = {_short(examples[0], toml=True)}" if examples else ""
-    )
+    plain, told = without_none(info)
+    remedy = f", such as {key} = {_short(told['examples'][0], toml=True)}" if told.get("examples") else ""
+    if isinstance(plain, types.LiteralType):
+        remedy = f", one of {', '.join(map(str, plain.values))}"
+    return f"key {key!r} is missing; add it{remedy}"
 
 
 def _no_table(key: str) -> str:

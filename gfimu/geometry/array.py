@@ -139,6 +139,11 @@ class AccelerometerArray:
         """Index of the chip that each channel belongs to, shape (c,)."""
         return np.repeat(np.arange(len(self.chips)), [len(chip.axes) for chip in self.chips])
 
+    def output_data_rates(self, sample_rate: float) -> NDArray[np.float64]:
+        """Return the output data rate of each channel, shape (c,), Hz: that of its chip, else ``sample_rate``."""
+        rates = np.array([chip.output_data_rate or sample_rate for chip in self.chips])
+        return rates[self.chip_of_channel]
+
     @property
     def n_channels(self) -> int:
         """Number of sensing axes."""

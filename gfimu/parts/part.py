@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -59,9 +58,10 @@ class Part:
 def white_noise_std(array: AccelerometerArray, sample_rate: float) -> NDArray[np.float64]:
     """Return the standard deviation of one sample of each channel by the data sheets, shape (c,), m/s².
 
-    The noise is white up to half the output data rate, so it grows with the square root of ``sample_rate``, Hz, from
-    100 Hz on; below that the data sheets give the figure for 100 Hz.
+    The noise is white up to half the output data rate, so it grows with the square root of that rate from 100 Hz on;
+    below that the data sheets give the figure for 100 Hz. The rate is that of the array file where a chip has one, else
+    ``sample_rate``, Hz.
     """
     parts = {chip.part: Part.load(chip.part, array.part_files) for chip in array.chips}
     at_100_hz = [parts[chip.part].noise_std_100_hz[: len(chip.axes)] for chip in array.chips]
-    return np.concatenate(at_100_hz) * math.sqrt(max(sample_rate, 100.0) / 100.0)
+    return np.concatenate(at_100_hz) * np.sqrt(np.maximum(array.output_data_rates(sample_rate), 100.0) / 100.0)
