@@ -32,10 +32,10 @@ AFTER = {
 `part` names a part of gfimu, or a part file of your own beside the array file or in the current directory. A recording
 carries the text of both.
 
-A chip's own `supply_V` and `output_data_rate_hz` go before those of a scenario: the simulation takes offset, gain, noise,
-last bit and bandwidth of that chip from them, and estimation its noise. The firmware on the emulated board sets the
-output data rate of all chips itself. `own_clock` is carried with the array and shown; the simulation samples all chips
-by the board's clock unless an effect (`channel_skew`) changes that.
+A chip's own `supply_V` and `output_data_rate_hz` go before those of a scenario: the simulation takes offset, gain,
+noise, last bit and bandwidth of that chip from them, and estimation its noise. The firmware on the emulated board sets
+the output data rate of all chips itself. `own_clock` is carried with the array and shown; the simulation samples all
+chips by the board's clock unless an effect (`channel_skew`) changes that.
 """,
     "scenario": """\
 Segments fit on a line each: `segment = [{ kind = "hold", duration_s = 3.0 }, …]` under `[motion]`.

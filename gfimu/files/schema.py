@@ -92,8 +92,9 @@ def read(data: Any, kind: type[_Table], source: str) -> _Table:
         For a key that is missing or unknown (the message has the valid keys and the nearest one), or a value of
         another type or out of its bounds.
     """
+    data = _with_default_tags(data, kind)
     try:
-        found = msgspec.convert(_with_default_tags(data, kind), kind)
+        found = msgspec.convert(data, kind)
     except msgspec.ValidationError as error:
         raise _explained(str(error), data, kind, source) from None
     for path in _not_finite(data):
@@ -205,7 +206,7 @@ def _item(info: types.Type, index: int) -> types.Type:
     info, _ = without_none(info)
     if isinstance(info, types.TupleType):
         return info.item_types[index] if index < len(info.item_types) else types.AnyType()
-    return info.item_type if isinstance(info, types.VarTupleType) else types.AnyType()
+    return info.item_type if isinstance(info, types.VarTupleType | types.ListType) else types.AnyType()
 
 
 def _explained(message: str, data: Any, kind: type[Table], source: str) -> InputError:
@@ -287,7 +288,7 @@ def _kind(info: types.Type, value: Any = None, *, many: bool = False) -> str:
         return _bound(info) or f"{a}finite number{s}" if good else f"{a}finite number{s}"
     if isinstance(info, types.TupleType):
         return f"a list of {len(info.item_types)} {_kind(info.item_types[0], many=True)}"
-    if isinstance(info, types.VarTupleType):
+    if isinstance(info, types.VarTupleType | types.ListType):
         return f"a list of {_kind(without_none(info.item_type)[0], many=True)}"
     if isinstance(info, types.BoolType):
         return "true or false"

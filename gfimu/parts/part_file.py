@@ -19,7 +19,7 @@ _NOMINAL = 256.0  # counts per g of the ADXL345, whose data sheet gives the shif
 class SupplyTable(Table, frozen=True):
     """Nominal figures at a supply of 3.3 V, where they differ from those of the file."""
 
-    sensitivity_lsb_g: Annotated[Triple, about("Nominal sensitivity, counts per g, of 256 at the file's supply.")] = (
+    sensitivity_lsb_g: Annotated[Triple, about("Nominal sensitivity, of 256 at the file's supply.", "counts/g")] = (
         _NOMINAL,
         _NOMINAL,
         _NOMINAL,
@@ -46,8 +46,9 @@ class PartFile(Table, frozen=True, forbid_unknown_fields=False):
     noise_lsb_rms_100_hz: Annotated[
         Triple,
         about(
-            "Noise of the output codes at output data rates up to 100 Hz, counts rms; √2 more per doubling of the rate "
-            "above. From a noise density: density · √(50 Hz) / lsb.",
+            "Noise of the output codes at output data rates up to 100 Hz, rms; √2 more per doubling of the rate above. "
+            "From a noise density: density · √(50 Hz) / lsb.",
+            "counts",
             example=[0.75, 0.75, 1.1],
         ),
     ]
