@@ -102,7 +102,7 @@ class PartFile(Table, frozen=True, forbid_unknown_fields=False):
     output_data_rate_max_hz: Annotated[Positive, about("Highest output data rate.", "Hz")] = 3200.0
     output_data_rate_min_hz: Annotated[
         NotNegative,
-        about("Lowest output data rate; between the two, steps of two. 0: any rate up to the highest.", "Hz"),
+        about("Lowest output data rate, where the rates are steps of two; 0: any rate up to the highest.", "Hz"),
     ] = 0.0
     bandwidth_over_output_data_rate: Annotated[
         Positive, about("−3 dB bandwidth over the output data rate, a ratio.")

@@ -1,9 +1,11 @@
 """What comes with gfimu can be listed and shown, and every file to start from works as it is."""
 
+import re
+
 import pytest
 
 from gfimu.commands.catalogue import KINDS, TEMPLATES
-from gfimu.files.model_files import list_models
+from gfimu.files.model_files import find_model, list_models
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.importing import load_map
 from gfimu.parts.part import Part
@@ -57,6 +59,20 @@ def test_an_unknown_name_is_one_line(gfimu_command, words):
     assert result.code == 2
     assert result.stderr.count("\n") == 1
     assert "nothing" in result.stderr
+
+
+@pytest.mark.parametrize("name", set(list_models("parts")) - {"generic"})
+def test_every_figure_of_a_shipped_part_says_where_it_is_from(name):
+    text = find_model("parts", name).read_text(encoding="utf-8")
+    sources = set(re.findall(r"^# (\d): ", text, flags=re.MULTILINE))
+    assert sources
+    for line in text.splitlines():
+        key = line.partition(" = ")[0]
+        if line[:1] in {"#", "[", ""} or key in {"name", "manufacturer", "source"}:
+            continue
+        (mark,) = re.findall(r"\[(unchecked|derived|\d[\d, ]*\*?)\]$", line) or [None]
+        assert mark is not None, f"{key}: no mark"
+        assert mark in {"unchecked", "derived"} or set(re.findall(r"\d", mark)) <= sources, line
 
 
 @pytest.mark.parametrize("name", list_models("parts"))
