@@ -39,8 +39,8 @@ chips by the board's clock unless an effect (`channel_skew`) changes that.
 """,
     "part": """\
 In the parts that come with gfimu each figure has a mark: `[1]` is the first source at the head of the file, `[1*]` was
-taken from it earlier and not read again, `[derived]` follows from another key, `[unchecked]` is a usual figure for which
-no source was read.
+taken from it earlier and not read again, `[derived]` follows from another key, `[unchecked]` is a usual figure for
+which no source was read.
 """,
     "scenario": """\
 Segments fit on a line each: `segment = [{ kind = "hold", duration_s = 3.0 }, …]` under `[motion]`.
