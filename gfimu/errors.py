@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import os
 from collections.abc import Iterable
 
@@ -15,6 +16,8 @@ __all__ = [
     "WriteError",
     "unknown_name",
 ]
+
+_ALIKE = 0.75  # numerical: of difflib; by choice, so that cube13 is near cube12 and nonsense near nothing
 
 
 class GfimuError(Exception):
@@ -51,5 +54,8 @@ class CorruptValueWarning(RecordingWarning):
 
 
 def unknown_name(kind: str, name: str, valid: Iterable[str]) -> InputError:
-    """Build the error for a name that is not in a list, with the list."""
-    return InputError(f"unknown {kind} {name!r}; valid: {', '.join(sorted(valid))}")
+    """Build the error for a name that is not in a list, with the list and the nearest name."""
+    names = sorted(valid)
+    near = difflib.get_close_matches(name, names, 1, _ALIKE)
+    remedy = f"; did you mean {near[0]!r}?" if near else ""
+    return InputError(f"unknown {kind} {name!r}; valid: {', '.join(names)}{remedy}")

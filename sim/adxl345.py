@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.errors import InputError
-from gfimu.geometry.array import AccelerometerArray
+from gfimu.geometry.array import AccelerometerArray, Chip
 from gfimu.short_repr import short_repr
 from sim.data_sheet import DataSheet
 
@@ -62,6 +62,16 @@ class SensorSettings:
         """Return these settings with every imperfection left out: readings are the specific force itself."""
         return replace(self, errors=False, noise=False, quantisation=False, bandwidth=False, bias_instability=0.0)
 
+    def of(self, chip: Chip) -> SensorSettings:
+        """Return the settings of a chip: its own supply and output data rate, where the array file has them."""
+        if chip.supply is None and chip.output_data_rate is None:
+            return self
+        return replace(
+            self,
+            supply=self.supply if chip.supply is None else chip.supply,
+            output_data_rate=self.output_data_rate if chip.output_data_rate is None else chip.output_data_rate,
+        )
+
     def check(self, sheet: DataSheet) -> None:
         """Raise `InputError` for a setting that the part does not have."""
         if self.range_g not in sheet.ranges_g:
@@ -69,8 +79,8 @@ class SensorSettings:
             raise InputError(f"{sheet.name}: unknown range_g {self.range_g}; valid: {valid}")
         if not self.full_resolution and not sheet.bits_reduced:
             raise InputError(f"{sheet.name}: the part has no mode without full resolution; set full_resolution = true")
-        if self.supply not in _SUPPLIES:
-            raise InputError(f"supply_V {self.supply:g}: figures exist for 2.5 and 3.3 V")
+        if sheet.shifts_with_supply and self.supply not in _SUPPLIES:
+            raise InputError(f"{sheet.name}: supply_V {self.supply:g}: figures exist for 2.5 and 3.3 V")
         steps = np.log2(sheet.rate_max / self.output_data_rate)
         if sheet.rate_min and (
             abs(steps - round(steps)) > 1e-9 or not 0 <= steps <= np.log2(sheet.rate_max / sheet.rate_min)
@@ -142,7 +152,7 @@ def draw_errors(
     sheets : dict
         Data sheets by part name.
     supply : float
-        Supply voltage, V.
+        Supply voltage of the chips that have none of their own, V.
     rng : Generator
         Source of chance.
     """
@@ -158,9 +168,10 @@ def draw_errors(
 
     bias = _cut_normal(per_axis("offset_std"), per_axis("offset_limit"), rng)
     scale = _cut_normal(per_part("sensitivity_std"), per_part("sensitivity_limit"), rng)
-    if supply > 3.0:
-        bias = bias + per_axis("high_supply_offset")
-        scale = (1 + scale) * per_axis("high_supply_gain") - 1
+    own_supply = np.array([supply if chip.supply is None else chip.supply for chip in array.chips])
+    high = own_supply[array.chip_of_channel] > 3.0
+    bias = np.where(high, bias + per_axis("high_supply_offset"), bias)
+    scale = np.where(high, (1 + scale) * per_axis("high_supply_gain") - 1, scale)
     full_range = per_part("full_range")
     return SensorErrors(
         bias=bias,
@@ -214,7 +225,7 @@ class Sensor:
         array : AccelerometerArray
             The array.
         settings : SensorSettings
-            How the chips are set up.
+            How the chips are set up; a chip's own supply and output data rate go first.
         rng : Generator
             Source of chance for the errors.
         part : str, optional
@@ -228,12 +239,13 @@ class Sensor:
         if part is not None:
             array = array.with_part(part)
         sheets = {name: DataSheet.load(name, array.part_files) for name in {chip.part for chip in array.chips}}
-        for sheet in sheets.values():
-            settings.check(sheet)
+        for chip in array.chips:
+            settings.of(chip).check(sheets[chip.part])
         errors = draw_errors(array, sheets, supply=settings.supply, rng=rng)
         of_channel, axis = _figures(array, sheets)
-        formats = [_word(sheet, settings) for sheet in of_channel]
-        noise = [_analogue_noise(sheet, settings)[j] for sheet, j in zip(of_channel, axis, strict=True)]
+        own = [settings.of(array.chips[number]) for number in array.chip_of_channel]
+        formats = [_word(sheet, mine) for sheet, mine in zip(of_channel, own, strict=True)]
+        noise = [_analogue_noise(sheet, mine)[j] for sheet, mine, j in zip(of_channel, own, axis, strict=True)]
         return cls(
             settings,
             errors if settings.errors else SensorErrors.none(array.n_channels),

@@ -8,14 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.errors import InputError
-from gfimu.parts.files import part_table
+from gfimu.parts.part_file import PartFile, SupplyTable
 from gfimu.short_repr import short_repr
-from sim.toml_table import TomlTable
 
 __all__ = ["DataSheet"]
-
-_NOMINAL_SENSITIVITY_LSB_G = 256.0
 
 
 @dataclass(frozen=True)
@@ -83,6 +79,11 @@ class DataSheet:
 
     __repr__ = short_repr
 
+    @property
+    def shifts_with_supply(self) -> bool:
+        """Whether the data sheet has other figures at 3.3 V."""
+        return bool((self.high_supply_gain != 1.0).any() or self.high_supply_offset.any())
+
     @classmethod
     def load(cls, name: str, files: Mapping[str, str] | None = None) -> DataSheet:
         """Load the data sheet of a part by name (in ``models/parts``) or from a TOML file.
@@ -99,35 +100,30 @@ class DataSheet:
         InputError
             If the part is unknown (the message lists the names) or the file is malformed.
         """
-        content, source = part_table(name, files or {})
-        table = TomlTable(content, source)
-        supply = table.table("supply_3_3_V")
-        sensitivity = supply.numbers("sensitivity_lsb_g", 3, [_NOMINAL_SENSITIVITY_LSB_G] * 3)
-        ranges = table.raw("range_g")
-        if not isinstance(ranges, list) or not ranges or not all(isinstance(value, int) for value in ranges):
-            raise InputError(f"{source}: range_g must be a list of whole numbers of g")
-        offset_std = np.array(table.numbers("offset_std_m_s2", 3))
+        part = PartFile.load(name, files, needs=("full_range_m_s2", "offset_std_m_s2", "range_g"))
+        offset_std = np.array(part.offset_std_m_s2)
+        supply = part.supply_3_3_V or SupplyTable()
         return cls(
-            name=table.text("name", name),
-            lsb=table.number("lsb_m_s2", above=0.0),
-            ranges_g=tuple(ranges),
-            bits=int(table.number("bits", 16, above=1)),
-            bits_reduced=int(table.number("bits_reduced", 0, least=0)),
-            noise_lsb=np.array(table.numbers("noise_lsb_rms_100_hz", 3)),
+            name=part.name,
+            lsb=part.lsb_m_s2,
+            ranges_g=part.range_g or (),
+            bits=part.bits,
+            bits_reduced=part.bits_reduced,
+            noise_lsb=np.array(part.noise_lsb_rms_100_hz),
             offset_std=offset_std,
-            offset_limit=np.array(table.numbers("offset_limit_m_s2", 3, (5 * offset_std).tolist())),
-            offset_tempco=np.array(table.numbers("offset_tempco_m_s2_K", 3, [0.0] * 3)),
-            sensitivity_std=table.number("sensitivity_std", 0.0, least=0.0),
-            sensitivity_limit=table.number("sensitivity_limit", 1.0, above=0.0),
-            sensitivity_tempco=table.number("sensitivity_tempco_K", 0.0, least=0.0),
-            cross_axis_std=table.number("cross_axis_std", 0.0, least=0.0),
-            misalignment_std=table.number("misalignment_std_rad", 0.0, least=0.0),
-            nonlinearity=table.number("nonlinearity_full_scale", 0.0, least=0.0),
-            full_range=table.number("full_range_m_s2", above=0.0),
-            rate_max=table.number("output_data_rate_max_hz", 3200.0, above=0.0),
-            rate_min=table.number("output_data_rate_min_hz", 0.0, least=0.0),
-            bandwidth_ratio=table.number("bandwidth_over_output_data_rate", 0.5, above=0.0),
-            zero_lsb_rate=table.number("zero_lsb_from_hz", np.finfo(float).max, above=0.0),
-            high_supply_gain=np.array(sensitivity) / _NOMINAL_SENSITIVITY_LSB_G,
-            high_supply_offset=np.array(supply.numbers("offset_m_s2", 3, [0.0] * 3)),
+            offset_limit=5 * offset_std if part.offset_limit_m_s2 is None else np.array(part.offset_limit_m_s2),
+            offset_tempco=np.array(part.offset_tempco_m_s2_K),
+            sensitivity_std=part.sensitivity_std,
+            sensitivity_limit=1.0 if part.sensitivity_limit is None else part.sensitivity_limit,
+            sensitivity_tempco=part.sensitivity_tempco_K,
+            cross_axis_std=part.cross_axis_std,
+            misalignment_std=part.misalignment_std_rad,
+            nonlinearity=part.nonlinearity_full_scale,
+            full_range=part.full_range_m_s2 or np.inf,
+            rate_max=part.output_data_rate_max_hz,
+            rate_min=part.output_data_rate_min_hz,
+            bandwidth_ratio=part.bandwidth_over_output_data_rate,
+            zero_lsb_rate=float(np.finfo(float).max) if part.zero_lsb_from_hz is None else part.zero_lsb_from_hz,
+            high_supply_gain=np.array(supply.gain),
+            high_supply_offset=np.array(supply.offset_m_s2),
         )

@@ -139,13 +139,17 @@ class Ride:
         return np.asarray(final + (start - final) * np.exp(-np.maximum(t, 0.0) / time_constant))
 
     def sensor(self, output_data_rate: float) -> Sensor:
-        """Return the sensing chain at an output data rate, Hz; the chips' errors are the same at every rate."""
+        """Return the sensing chain at an output data rate, Hz; the chips' errors are the same at every rate.
+
+        The firmware sets the rate of every chip, so that one of the array file is not used here.
+        """
         if output_data_rate not in self._sensors:
             run = self.scenario
             settings = replace(run.sensor, output_data_rate=output_data_rate)
             chips = run.chips_seed if run.chips_seed is not None else np.random.SeedSequence(self.seed).spawn(4)[0]
+            chips_of_one_rate = tuple(replace(chip, output_data_rate=None) for chip in run.array.chips)
             self._sensors[output_data_rate] = Sensor.build(
-                run.array, settings, np.random.default_rng(chips), part=run.part
+                replace(run.array, chips=chips_of_one_rate), settings, np.random.default_rng(chips), part=run.part
             )
         return self._sensors[output_data_rate]
 

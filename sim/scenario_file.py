@@ -1,29 +1,28 @@
-"""Scenario files: reading and checking their keys."""
+"""The scenario file: its schema, and the fields of a scenario from it."""
 
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
+import msgspec
 import numpy as np
 
 from gfimu.errors import InputError
 from gfimu.files.model_files import find_model, read_toml
+from gfimu.files.schema import NotNegative, Positive, Table, Triple, about, read
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.units import STANDARD_GRAVITY
 from sim.adxl345 import SensorSettings
-from sim.carried import Hand, Wheel
 from sim.data_sheet import DataSheet
-from sim.effects import Effect, make_effect
-from sim.motion import BodyMotion, SpinMotion
-from sim.pose_sequence import PoseSequence
-from sim.profiles import Chirp, Hold, Ramp, Segment, Sine, Tumble, spin_profile
-from sim.toml_table import TomlTable
+from sim.effect_table import EffectTable
+from sim.motion_file import MotionTable, ProfileTable
+from sim.twin_file import Inclination
 
-__all__ = ["ReferenceSettings", "change_key", "scenario_fields"]
+__all__ = ["ReferenceSettings", "ScenarioFile", "change_key", "scenario_fields"]
 
 _TWIN_MOTION = "paper_run"  # the motion of a twin file, which has none of its own
 
@@ -50,6 +49,137 @@ class ReferenceSettings:
     gyro_noise_std: float | None = None
 
 
+class SensorTable(Table, frozen=True):
+    """How the chips are set up, and which of their imperfections are simulated."""
+
+    part: Annotated[
+        str | None,
+        about("Part of every chip, or the path of a part file beside this file.", default="those of the array"),
+    ] = None
+    output_data_rate_hz: Annotated[
+        Positive | None,
+        about(
+            "Output data rate of every chip that has none in the array file.",
+            "Hz",
+            default="the lowest one of the part that keeps up with the sample rate",
+        ),
+    ] = None
+    range_g: Annotated[
+        Positive | None,
+        about("Range that is set, in units of standard gravity.", default="the widest one of the part"),
+    ] = None
+    full_resolution: Annotated[bool, about("Whether a count keeps its size in every range.")] = True
+    supply_V: Annotated[
+        Positive, about("Supply voltage of every chip that has none in the array file, 2.5 or 3.3.", "V")
+    ] = SensorSettings.supply
+    chips_seed: Annotated[
+        Annotated[int, msgspec.Meta(ge=0)] | None,
+        about("Which chips: the seed of their errors.", default="follows from the seed of the run"),
+    ] = None
+    errors: Annotated[bool, about("Offsets, gains, cross-axis pick-up, non-linearity, temperature.")] = True
+    noise: Annotated[bool, about("White noise.")] = True
+    quantisation: Annotated[bool, about("Rounding to counts, and the range.")] = True
+    bandwidth: Annotated[bool, about("The average over the conversions of a sample.")] = True
+    bias_instability_m_s2: Annotated[NotNegative, about("Flicker floor B of the Allan deviation; 0: none.", "m/s²")] = (
+        0.0
+    )
+    perfect: Annotated[bool, about("Readings are the specific force itself: all imperfections are left out.")] = False
+
+    def settings(self, sample_rate: float, sheet: DataSheet) -> SensorSettings:
+        """Return the settings of a part sampled at a rate, Hz; raises `InputError` for what the part does not have."""
+        lowest = _lowest_rate(sheet, sample_rate)
+        range_g = max(sheet.ranges_g) if self.range_g is None else self.range_g
+        settings = SensorSettings(
+            output_data_rate=lowest if self.output_data_rate_hz is None else self.output_data_rate_hz,
+            range_g=int(range_g) if range_g == int(range_g) else range_g,  # type: ignore[arg-type]  # refused below
+            full_resolution=self.full_resolution,
+            supply=self.supply_V,
+            errors=self.errors,
+            noise=self.noise,
+            quantisation=self.quantisation,
+            bandwidth=self.bandwidth,
+            bias_instability=self.bias_instability_m_s2,
+        )
+        settings.check(sheet)
+        return settings.perfect() if self.perfect else settings
+
+
+class DriveTable(Table, frozen=True):
+    """How the table follows its command."""
+
+    mode: Annotated[
+        Literal["prescribed", "driven"],
+        about("Whether the table moves as commanded, or a motor drives it against inertia and friction."),
+    ] = "prescribed"
+    step_s: Annotated[Positive, about("Step of the driven simulation.", "s")] = 1e-3
+    source: Annotated[str, about("Of a twin file: not used here, as a simulation drives itself.", default="none")] = ""
+
+
+class ReferenceTable(Table, frozen=True):
+    """Quality of the references."""
+
+    tacho_noise_std_rad_s: Annotated[NotNegative, about("White noise of the tachometer.", "rad/s")] = 0.0
+    tacho_resolution_rad_s: Annotated[NotNegative, about("Step of the tachometer; 0: continuous.", "rad/s")] = 0.0
+    encoder_resolution_rad: Annotated[NotNegative, about("Step of the angle encoder; 0: continuous.", "rad")] = 0.0
+    gyro_noise_std_rad_s: Annotated[
+        NotNegative | None, about("White noise of a reference gyro on the body.", "rad/s", default="no gyro")
+    ] = None
+
+    def settings(self) -> ReferenceSettings:
+        """Return the settings."""
+        return ReferenceSettings(
+            self.tacho_noise_std_rad_s,
+            self.tacho_resolution_rad_s,
+            self.encoder_resolution_rad,
+            self.gyro_noise_std_rad_s,
+        )
+
+
+class TemperatureTable(Table, frozen=True):
+    """Temperature of the board."""
+
+    start_degC: Annotated[float, about("At the start.", "°C")] = 25.0
+    final_degC: Annotated[float | None, about("In the end.", "°C", default="that of the start")] = None
+    time_constant_s: Annotated[Positive, about("Time constant between the two.", "s")] = 600.0
+
+    def course(self) -> Triple:
+        """Return start and end, °C, and the time constant, s."""
+        final = self.start_degC if self.final_degC is None else self.final_degC
+        return (self.start_degC, final, self.time_constant_s)
+
+
+class ScenarioFile(Table, frozen=True):
+    """A run to simulate: motion, array, sensors, references, and what is wrong in that world.
+
+    A twin file is a scenario too: its world, moved as in the scenario ``paper_run``.
+    """
+
+    array: Annotated[
+        str,
+        about("Name of an array (gfimu list arrays), or the path of an array file beside this file.", example="cube12"),
+    ]
+    name: Annotated[str, about("Name of the scenario.", default="the name of the file")] = ""
+    description: Annotated[str, about("One line for people.")] = ""
+    duration_s: Annotated[Positive | None, about("Length of the run.", "s", default="the length of the motion")] = None
+    sample_rate_hz: Annotated[Positive, about("Sample rate.", "Hz")] = 100.0
+    gravity_m_s2: Annotated[Positive, about("Local gravity.", "m/s²")] = STANDARD_GRAVITY
+    cube_offset_m: Annotated[
+        Triple, about("Body origin from the point of the axis at table height, table frame.", "m")
+    ] = (0.0, 0.0, 0.06)
+    mounting_rotvec_rad: Annotated[
+        Triple, about("Rotation vector by which the body was turned from upright before the run.", "rad")
+    ] = (0.0, 0.0, 0.0)
+    axis_inclination_rad: Annotated[
+        Inclination, about("Angle between the table's axis and the vertical; π/2 of a pendulum or a wheel.", "rad")
+    ] = 0.0
+    motion: Annotated[MotionTable, about("Motion of the table or of the free body.")] = ProfileTable()
+    drive: Annotated[DriveTable, about("How the table follows its command.")] = DriveTable()
+    sensor: Annotated[SensorTable, about("How the chips are set up.")] = SensorTable()
+    reference: Annotated[ReferenceTable, about("Quality of the references.")] = ReferenceTable()
+    temperature: Annotated[TemperatureTable, about("Temperature of the board.")] = TemperatureTable()
+    effect: Annotated[tuple[EffectTable, ...], about("What is wrong in this world.")] = ()
+
+
 def scenario_fields(data: Mapping[str, Any], source: str, beside: Path | None) -> dict[str, Any]:
     """Return the fields of a `sim.scenarios.Scenario` from the keys of its file.
 
@@ -67,43 +197,55 @@ def scenario_fields(data: Mapping[str, Any], source: str, beside: Path | None) -
     InputError
         For a key that is missing, unknown (the message lists the valid ones) or has a wrong value.
     """
-    if "motion" not in data and isinstance(data.get("drive"), Mapping) and "source" in data["drive"]:
-        paper = read_toml(find_model("scenarios", _TWIN_MOTION))
-        data = {"reference": paper.get("reference", {}), "motion": paper["motion"], **data}
-    table = TomlTable(data, source)
-    array = AccelerometerArray.load(table.text("array"), beside=beside)
-    sample_rate = table.number("sample_rate_hz", 100.0, above=0.0)
-    motion, length = _motion(table.table("motion"))
-    sensor, drive = table.table("sensor"), table.table("drive")
-    part = sensor.text("part", "") or None
+    file = read(_with_motion(data), ScenarioFile, source)
+    array = AccelerometerArray.load(file.array, beside=beside)
+    part = file.sensor.part or None
     if part is not None:
         array, part = array.with_part_file(part, beside=beside)
-    drive.raw("source", None)  # of a twin file; a simulation drives itself
-    fields: dict[str, Any] = {
-        "name": table.text("name", Path(source).stem),
-        "description": table.text("description", ""),
+    duration = file.duration_s or file.motion.length
+    motion = file.motion.motion()
+    if not duration:
+        raise InputError(f"{source}: key 'duration_s' is missing; add it: the motion has no length of its own")
+    if duration * file.sample_rate_hz < 2:
+        raise InputError(f"{source}: duration_s and sample_rate_hz give fewer than two samples; simulate longer")
+    sheet = DataSheet.load(part or array.chips[0].part, array.part_files)
+    return {
+        "name": file.name if "name" in data else Path(source).stem,
+        "description": file.description,
         "array": array,
         "motion": motion,
-        "duration": table.number("duration_s", length, above=0.0) if length else table.number("duration_s", above=0.0),
-        "sample_rate": sample_rate,
-        "sensor": _sensor(sensor, sample_rate, DataSheet.load(part or array.chips[0].part, array.part_files)),
+        "duration": duration,
+        "sample_rate": file.sample_rate_hz,
+        "sensor": file.sensor.settings(file.sample_rate_hz, sheet),
         "part": part,
-        "chips_seed": sensor.whole("chips_seed", None, least=0),
-        "gravity": table.number("gravity_m_s2", STANDARD_GRAVITY, above=0.0),
-        "cube_offset": _triple(table.numbers("cube_offset_m", 3, (0.0, 0.0, 0.06))),
-        "mounting_rotvec": _triple(table.numbers("mounting_rotvec_rad", 3, (0.0, 0.0, 0.0))),
-        "axis_inclination": table.number("axis_inclination_rad", 0.0, least=0.0),
-        "driven": drive.text("mode", "prescribed", choices=("prescribed", "driven")) == "driven",
-        "physics_step": drive.number("step_s", 1e-3, above=0.0),
-        "reference": _reference(table.table("reference")),
-        "effects": tuple(_effect(entry, array) for entry in table.tables("effect")),
-        "temperature": _temperature(table.table("temperature")),
+        "chips_seed": file.sensor.chips_seed,
+        "gravity": file.gravity_m_s2,
+        "cube_offset": file.cube_offset_m,
+        "mounting_rotvec": file.mounting_rotvec_rad,
+        "axis_inclination": file.axis_inclination_rad,
+        "driven": file.drive.mode == "driven",
+        "physics_step": file.drive.step_s,
+        "reference": file.reference.settings(),
+        "effects": tuple(table.effect(array, source) for table in file.effect),
+        "temperature": file.temperature.course(),
     }
-    for finished in (sensor, drive, table):
-        finished.finish()
-    if fields["duration"] * sample_rate < 2:
-        raise InputError(f"{source}: duration_s and sample_rate_hz give fewer than two samples; simulate longer")
-    return fields
+
+
+def _with_motion(data: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return the content of a scenario; a twin file is given a motion, and what is of the diagnosis only left out."""
+    if "motion" in data or not isinstance(data.get("drive"), Mapping) or "source" not in data["drive"]:
+        return data
+    paper = read_toml(find_model("scenarios", _TWIN_MOTION))
+    twin = {key: value for key, value in data.items() if key != "grammar"}
+    return {"reference": paper.get("reference", {}), "motion": paper["motion"], **twin}
+
+
+def _lowest_rate(sheet: DataSheet, sample_rate: float) -> float:
+    if sample_rate > sheet.rate_max * (1 + 1e-9):
+        raise InputError(f"sample_rate_hz {sample_rate:g}: {sheet.name} has at most {sheet.rate_max:g} Hz")
+    if not sheet.rate_min:
+        return sample_rate
+    return float(sheet.rate_max / 2.0 ** np.floor(np.log2(sheet.rate_max / sample_rate) + 1e-9))
 
 
 def change_key(data: dict[str, Any], change: str) -> None:
@@ -122,131 +264,3 @@ def change_key(data: dict[str, Any], change: str) -> None:
         if not isinstance(place, dict):
             raise InputError(f"change {change!r}: {name} is not a table of the scenario")
     place[last] = value
-
-
-def _motion(table: TomlTable) -> tuple[SpinMotion | BodyMotion, float]:
-    """Motion of the [motion] table, and its length where it has one of its own, s."""
-    kind = table.text("kind", "profile", choices=("profile", "rest", "tumble", "poses", "wheel", "hand"))
-    if kind == "poses":
-        sequence = PoseSequence(
-            table.text("poses", PoseSequence.poses),
-            table.number("rest_s", PoseSequence.rest),
-            table.number("turn_s", PoseSequence.turn),
-        )
-        table.finish()
-        return sequence, sequence.duration
-    if kind == "tumble":
-        tumble = Tumble(
-            rate=table.number("rate_rad_s", Tumble.rate),
-            inclination=table.number("inclination_rad", Tumble.inclination),
-            rest=table.number("rest_s", Tumble.rest),
-            spin_up=table.number("spin_up_s", Tumble.spin_up),
-            inertia=_triple(table.numbers("inertia", 3, Tumble.inertia)),
-            sway=_triple(table.numbers("sway_m", 3, Tumble.sway)),
-            sway_frequency=_triple(table.numbers("sway_hz", 3, Tumble.sway_frequency)),
-        )
-        table.finish()
-        return tumble, 0.0
-    if kind == "hand":
-        hand = Hand(
-            duration=table.number("duration_s", above=0.0),
-            turn=table.number("turn_rad", Hand.turn, least=0.0),
-            sway=table.number("sway_m", Hand.sway, least=0.0),
-            pace=table.number("pace_s", Hand.pace, above=0.0),
-            rest=table.number("rest_s", Hand.rest, least=0.0),
-            seed=table.whole("seed", Hand.seed) or 0,
-        )
-        table.finish()
-        return hand, hand.duration
-    wheel: dict[str, Any] = {}
-    if kind == "wheel":
-        wheel = {
-            "radius": table.number("radius_m", Wheel.radius, least=0.0),
-            "axis": _triple(table.numbers("axis", 3, Wheel.axis)),
-            "shake": table.number("shake_m_s2", Wheel.shake, least=0.0),
-            "shake_frequency": table.number("shake_hz", Wheel.shake_frequency, above=0.0),
-            "seed": table.whole("seed", Wheel.seed) or 0,
-        }
-    angle = table.number("start_angle_rad", 0.0)
-    if kind == "rest":
-        table.finish()
-        return spin_profile([Hold(1.0)], start_angle=angle), 0.0
-    rate = table.number("start_rate_rad_s", 0.0)
-    segments = [_segment(entry) for entry in table.tables("segment")]
-    table.finish()
-    spin = spin_profile(segments, start_rate=rate, start_angle=angle)
-    return Wheel(spin, **wheel) if wheel else spin, sum(segment.duration for segment in segments)
-
-
-def _segment(table: TomlTable) -> Segment:
-    """One entry of motion.segment."""
-    kind = table.text("kind", choices=("hold", "ramp", "sine", "chirp"))
-    duration = table.number("duration_s", above=0.0)
-    segment: Segment
-    if kind == "hold":
-        segment = Hold(duration)
-    elif kind == "ramp":
-        segment = Ramp(table.number("to_rad_s"), duration)
-    elif kind == "sine":
-        segment = Sine(table.number("amplitude_rad_s"), table.number("frequency_hz", above=0.0), duration)
-    else:
-        start, stop = table.number("start_hz", above=0.0), table.number("stop_hz", above=0.0)
-        segment = Chirp(table.number("amplitude_rad_s"), start, stop, duration)
-    table.finish()
-    return segment
-
-
-def _sensor(table: TomlTable, sample_rate: float, sheet: DataSheet) -> SensorSettings:
-    """Sensor settings; the output data rate is by default the lowest one that keeps up with the sample rate."""
-    settings = SensorSettings(
-        output_data_rate=table.number("output_data_rate_hz", _lowest_rate(sheet, sample_rate), above=0.0),
-        range_g=int(table.number("range_g", max(sheet.ranges_g), above=0.0)),
-        full_resolution=table.flag("full_resolution", True),
-        supply=table.number("supply_V", 2.5),
-        errors=table.flag("errors", True),
-        noise=table.flag("noise", True),
-        quantisation=table.flag("quantisation", True),
-        bandwidth=table.flag("bandwidth", True),
-        bias_instability=table.number("bias_instability_m_s2", 0.0, least=0.0),
-    )
-    settings.check(sheet)
-    return settings.perfect() if table.flag("perfect", False) else settings
-
-
-def _lowest_rate(sheet: DataSheet, sample_rate: float) -> float:
-    if sample_rate > sheet.rate_max * (1 + 1e-9):
-        raise InputError(f"sample_rate_hz {sample_rate:g}: {sheet.name} has at most {sheet.rate_max:g} Hz")
-    if not sheet.rate_min:
-        return sample_rate
-    return float(sheet.rate_max / 2.0 ** np.floor(np.log2(sheet.rate_max / sample_rate) + 1e-9))
-
-
-def _reference(table: TomlTable) -> ReferenceSettings:
-    settings = ReferenceSettings(
-        tacho_noise_std=table.number("tacho_noise_std_rad_s", 0.0, least=0.0),
-        tacho_resolution=table.number("tacho_resolution_rad_s", 0.0, least=0.0),
-        encoder_resolution=table.number("encoder_resolution_rad", 0.0, least=0.0),
-        gyro_noise_std=None if "gyro_noise_std_rad_s" not in table else table.number("gyro_noise_std_rad_s", least=0.0),
-    )
-    table.raw("gyro_noise_std_rad_s", None)
-    table.finish()
-    return settings
-
-
-def _effect(table: TomlTable, array: AccelerometerArray) -> Effect:
-    name, parameters = table.text("name"), table.raw("parameters", {})
-    table.finish()
-    TomlTable(parameters, f"effect {name!r}: parameters")
-    return make_effect(name, parameters, array)
-
-
-def _temperature(table: TomlTable) -> tuple[float, float, float]:
-    start = table.number("start_degC", 25.0)
-    values = (start, table.number("final_degC", start), table.number("time_constant_s", 600.0, above=0.0))
-    table.finish()
-    return values
-
-
-def _triple(values: Sequence[float]) -> tuple[float, float, float]:
-    x, y, z = values
-    return (x, y, z)

@@ -20,9 +20,9 @@ from gfimu.recording.carried_array import array_metadata
 from gfimu.short_repr import short_repr
 from gfimu.units import STANDARD_GRAVITY
 from sim import forward
-from sim.adxl345 import Sensor, SensorSettings, conversion_offsets
+from sim.adxl345 import Sensor, SensorSettings
 from sim.carried import Wheel
-from sim.data_sheet import DataSheet
+from sim.conversions import conversion_groups
 from sim.effects import Effect, apply_effects
 from sim.effects.unlisted import Unlisted
 from sim.motion import BodyMotion, BodyState, SpinMotion, SpinState
@@ -251,12 +251,15 @@ def _rigid_body(
     if not run.free:
         for step in (*world.motion_steps, *world.mount_steps):
             motion = step(_spin(motion), t)
-    offsets = conversion_offsets(run.sensor, DataSheet.load(run.part or run.array.chips[0].part, run.array.part_files))
+    array = run.array if run.part is None else run.array.with_part(run.part)
+    groups = conversion_groups(array, run.sensor)
     force = np.empty((len(t), run.array.n_channels))
     for first in range(0, len(t), _BLOCK):
         block = slice(first, first + _BLOCK)
-        conversions = prescribed_readings(world, motion, (offsets[:, None] + t[block]).ravel())
-        force[block] = conversions.reshape(len(offsets), -1, run.array.n_channels).mean(axis=0)
+        for offsets, columns in groups:
+            conversions = prescribed_readings(world, motion, (offsets[:, None] + t[block]).ravel())
+            mean = conversions.reshape(len(offsets), -1, run.array.n_channels).mean(axis=0)
+            force[block, columns] = mean[:, columns]
         if progress is not None:
             progress(min((first + _BLOCK) / len(t), 1.0))
     true_time = t / (1.0 + world.clock_ratio)

@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 
 from gfimu.errors import InputError
 from gfimu.files.model_files import find_model, read_toml
+from gfimu.files.schema import read
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.motion.body_drive import BodyDrive
-from gfimu.parts.files import part_table
+from gfimu.parts.part_file import PartFile
 from gfimu.short_repr import short_repr
 from gfimu.units import STANDARD_GRAVITY
 from gfimu.world_model import BasisUnits, BodyModel, EffectFamily, ExpectedNoise, Spin
@@ -33,15 +34,14 @@ from sim.effects import (
     Effect,
     added_effects,
     apply_effects,
-    make_effect,
 )
 from sim.effects.unknown import UnknownTerm
+from sim.twin_file import TwinFile
 from sim.world import World
 
 __all__ = ["Twin"]
 
 _REMEMBERED = 16  # numerical: worlds that a twin keeps
-_SOURCES = ("tacho", "angle", "command", "gyro")
 
 
 @dataclass(frozen=True)
@@ -107,52 +107,24 @@ class Twin:
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any], *, source: str = "twin", beside: Path | None = None) -> Twin:
-        """Build a twin from the keys of a twin file."""
-        _check_keys(
-            data,
-            {
-                "array",
-                "gravity_m_s2",
-                "cube_offset_m",
-                "sample_rate_hz",
-                "grammar",
-                "axis_inclination_rad",
-                "drive",
-                "sensor",
-                "effect",
-                "name",
-                "description",
-            },
-            source,
-        )
-        drive, sensor = data.get("drive", {}), data.get("sensor", {})
-        _check_keys(drive, {"source"}, f"{source}: [drive]")
-        _check_keys(sensor, {"part", "range_g", "full_resolution"}, f"{source}: [sensor]")
-        if "array" not in data:
-            raise InputError(f"{source}: key 'array' is missing; name an array, such as array = \"cube12\"")
-        array = AccelerometerArray.load(str(data["array"]), beside=beside)
-        drive_source = str(drive.get("source", "tacho"))
-        if drive_source not in _SOURCES:
-            raise InputError(f"{source}: unknown drive source {drive_source!r}; valid: {', '.join(_SOURCES)}")
-        offset = np.array(data.get("cube_offset_m", [0.0, 0.0, 0.06]), dtype=float)
-        if offset.shape != (3,) or not np.isfinite(offset).all():
-            raise InputError(f"{source}: cube_offset_m needs three finite numbers")
-        part = str(sensor.get("part", array.chips[0].part))
-        array, part = array.with_part_file(part, beside=beside)
-        part_table(part, array.part_files)
+        """Build a twin from the content of a twin file (`sim.twin_file.TwinFile`)."""
+        file = read(data, TwinFile, source)
+        array = AccelerometerArray.load(file.array, beside=beside)
+        array, part = array.with_part_file(file.sensor.part or array.chips[0].part, beside=beside)
+        PartFile.load(part, array.part_files)
         return cls(
             array=array,
-            gravity=_positive(data.get("gravity_m_s2", STANDARD_GRAVITY), f"{source}: gravity_m_s2"),
-            cube_offset=offset,
-            sample_rate=_positive(data.get("sample_rate_hz", 100.0), f"{source}: sample_rate_hz"),
-            drive_source=drive_source,
+            gravity=file.gravity_m_s2,
+            cube_offset=np.array(file.cube_offset_m),
+            sample_rate=file.sample_rate_hz,
+            drive_source=file.drive.source,
             part=part,
-            range_g=_positive(sensor.get("range_g", 16), f"{source}: range_g"),
-            full_resolution=bool(sensor.get("full_resolution", True)),
-            effects=tuple(_effect(entry, array, source) for entry in data.get("effect", [])),
-            array_name=str(data["array"]),
-            grammar=bool(data.get("grammar", False)),
-            axis_inclination=_inclination(data.get("axis_inclination_rad", 0.0), source),
+            range_g=file.sensor.range_g,
+            full_resolution=file.sensor.full_resolution,
+            effects=tuple(table.effect(array, source) for table in file.effect),
+            array_name=file.array,
+            grammar=file.grammar,
+            axis_inclination=file.axis_inclination_rad,
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -320,19 +292,19 @@ class Twin:
 
     def expected_noise(self, sample_rate: float) -> ExpectedNoise:
         """Return white noise and quantisation of the part at a sample rate, as the data sheet has them."""
-        part, _ = part_table(self.part, self.array.part_files)
-        quantum = float(part["lsb_m_s2"])
+        part = PartFile.load(self.part, self.array.part_files, needs=() if self.full_resolution else ("range_g",))
+        quantum = lsb = part.lsb_m_s2
         if not self.full_resolution:
-            quantum *= max(self.range_g / float(part["range_g"][0]), 1.0)
+            quantum *= max(self.range_g / (part.range_g or (1,))[0], 1.0)
         for effect in self.effects:
             if effect.name == "coarse_resolution":
                 quantum = effect.value("step_m_s2")
-        rms = np.array(part["noise_lsb_rms_100_hz"], dtype=float) * float(part["lsb_m_s2"])
-        rms = rms * math.sqrt(max(sample_rate, 100.0) / 100.0)
+        rms = np.array(part.noise_lsb_rms_100_hz) * lsb
         axis = np.concatenate([np.arange(len(chip.axes)) for chip in self.array.chips])
+        rms = rms[axis] * np.sqrt(np.maximum(self.array.output_data_rates(sample_rate), 100.0) / 100.0)
         factor = math.prod(effect.value("factor", 1.0) for effect in self.effects if effect.name == "noise")
         # The data sheet's noise is that of the codes, its own quantisation included.
-        analogue = rms[axis] ** 2 - float(part["lsb_m_s2"]) ** 2 / 12.0
+        analogue = rms**2 - lsb**2 / 12.0
         white = np.sqrt(np.maximum(analogue, 0.0) * factor**2 + quantum**2 / 12.0)
         return ExpectedNoise(white, quantum, self.range_g * STANDARD_GRAVITY)
 
@@ -366,25 +338,3 @@ def _own(effects: Sequence[AnyEffect]) -> list[Effect]:
         foreign = ", ".join(effect.name for effect in effects if not isinstance(effect, Effect))
         raise InputError(f"not effects of this simulation: {foreign}; build them with sim.effects.make_effect")
     return own
-
-
-def _check_keys(data: Mapping[str, Any], known: set[str], where: str) -> None:
-    if not isinstance(data, Mapping):
-        raise InputError(f"{where}: must be a table of keys")
-    for key in data:
-        if key not in known:
-            raise InputError(f"{where}: unknown key {key!r}; valid: {', '.join(sorted(known))}")
-
-
-def _positive(value: Any, where: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value) or value <= 0:
-        raise InputError(f"{where} must be a positive number, not {value!r}")
-    return float(value)
-
-
-def _effect(entry: Mapping[str, Any], array: AccelerometerArray, source: str) -> Effect:
-    _check_keys(entry, {"name", "parameters"}, f"{source}: [[effect]]")
-    try:
-        return make_effect(str(entry.get("name", "")), entry.get("parameters", {}), array)
-    except InputError as error:
-        raise InputError(f"{source}: {error}") from None

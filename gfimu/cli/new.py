@@ -21,15 +21,19 @@ def register(app: typer.Typer) -> None:
 def _new(
     kind: Annotated[str, typer.Argument(help=f"What to begin: {', '.join(TEMPLATES)}.")],
     out: Annotated[Path | None, typer.Option("--out", help="File to write (.toml); printed without it.")] = None,
+    schema: Annotated[
+        Path | None, typer.Option("--schema", help="JSON schema to write (.json), for completion in an editor.")
+    ] = None,
 ) -> None:
     """Write a commented file to edit.
 
-    Example: gfimu new array --out my_array.toml
+    Example: gfimu new array --out my_array.toml --schema array.schema.json
     """
     from gfimu.commands.catalogue import new
 
-    text = new(kind, out=out)
-    if out is None:
+    text = new(kind, out=out, schema=schema)
+    if out is None and schema is None:
         typer.echo(text, nl=False)
     else:
-        print_paths([(kind, out)])
+        written = {kind: out, "schema": schema}
+        print_paths([(what, path) for what, path in written.items() if path is not None])

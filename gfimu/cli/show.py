@@ -1,4 +1,4 @@
-"""`gfimu show`: a file that comes with gfimu."""
+"""`gfimu show`: a file that comes with gfimu or of one's own."""
 
 from __future__ import annotations
 
@@ -14,8 +14,12 @@ def register(app: typer.Typer) -> None:
     app.command(name="show")(_show)
 
 
-def _show(name: Annotated[str, typer.Argument(help="Name of an array, part, map, twin, scenario or effect.")]) -> None:
-    """Print a file that comes with gfimu.
+def _show(
+    name: Annotated[
+        str, typer.Argument(help="Name of an array, part, map, twin, scenario or effect; a file; or a recording.")
+    ],
+) -> None:
+    """Print a file that comes with gfimu, a checked file of one's own, or the array of a recording.
 
     Example: gfimu show adxl355
     """

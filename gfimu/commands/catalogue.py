@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from pathlib import Path
 
-from gfimu.files.outputs import TOML_FILE, writes
+from gfimu.commands.file_kinds import FILE_KINDS
+from gfimu.files.outputs import JSON_SCHEMA, TOML_FILE, writes
 
 __all__ = ["KINDS", "TEMPLATES", "catalogue", "new", "show"]
 
 KINDS = ("arrays", "parts", "maps", "twins", "scenarios", "effects", "formats")
 """What can be listed."""
 
-TEMPLATES = ("array", "part", "map", "twin", "scenario")
+TEMPLATES = tuple(FILE_KINDS)
 """What can be begun."""
 
 _FILES = ("arrays", "parts", "maps", "twins", "scenarios")
@@ -49,16 +51,24 @@ def catalogue(kind: str) -> dict[str, str]:
 
 
 def show(name: str) -> str:
-    """Return the file of an array, part, map, twin or scenario that comes with gfimu, or the description of an effect.
+    """Return the text of a file that comes with gfimu, of one's own, of the array in a recording, or of an effect.
+
+    Parameters
+    ----------
+    name : str
+        Name of an array, part, map, twin, scenario or effect; path of such a file, which is checked; or path of a
+        recording, whose array file is returned.
 
     Raises
     ------
     InputError
-        If nothing has that name.
+        If nothing has that name, the file is wrong, or the recording carries no array.
     """
     from gfimu.errors import unknown_name
     from gfimu.files.model_files import find_model, list_models
 
+    if Path(name).suffix in {".toml", ".csv", ".parquet"}:
+        return _shown_file(name)
     for kind in _FILES:
         if name in list_models(kind):
             return find_model(kind, name).read_text(encoding="utf-8")
@@ -68,8 +78,24 @@ def show(name: str) -> str:
     raise unknown_name("name", name, [one for kind in (*_FILES, "effects") for one in catalogue(kind)])
 
 
-@writes(out=TOML_FILE)
-def new(kind: str, *, out: str | Path | None = None) -> str:
+def _shown_file(name: str) -> str:
+    """Return the text of a file after a check by its schema, or the array file that a recording carries."""
+    from gfimu.commands.file_kinds import check_file
+    from gfimu.commands.opened import array_of
+    from gfimu.errors import InputError
+    from gfimu.files.model_files import read_toml
+    from gfimu.recording import Recording
+
+    if not Path(name).is_file():
+        raise InputError(f"{name}: no such file; give its path, or a name of gfimu list arrays")
+    if not name.endswith(".toml"):
+        return array_of(Recording.read(name)).to_toml()
+    check_file(read_toml(Path(name)), name)
+    return Path(name).read_text(encoding="utf-8")
+
+
+@writes(out=TOML_FILE, schema=JSON_SCHEMA)
+def new(kind: str, *, out: str | Path | None = None, schema: str | Path | None = None) -> str:
     """Return a commented file to edit: an array, a part, a column map, a twin or a scenario.
 
     Parameters
@@ -78,22 +104,31 @@ def new(kind: str, *, out: str | Path | None = None) -> str:
         One of `TEMPLATES`.
     out : str or Path, optional
         File to write, ``.toml``; one that is there is not replaced.
+    schema : str or Path, optional
+        JSON schema to write, ``.json``, by which an editor with taplo (Even Better TOML) completes the keys; the first
+        line of the file names it.
 
     Raises
     ------
     InputError
         If the kind is unknown, or the file is there already.
     """
+    from gfimu.commands.file_kinds import file_schema
     from gfimu.errors import InputError, unknown_name
     from gfimu.files.atomic_file import write_text
     from gfimu.files.model_files import find_model
+    from gfimu.files.schema_keys import json_schema
 
     if kind not in TEMPLATES:
         raise unknown_name("kind", kind, TEMPLATES)
     text = find_model("templates", kind).read_text(encoding="utf-8")
+    if out is not None and Path(out).exists():
+        raise InputError(f"{out}: is there already; choose another name")
+    if schema is not None:
+        write_text(schema, json_schema(file_schema(kind), kind))
+        near = os.path.relpath(schema, Path() if out is None else Path(out).parent).replace(os.sep, "/")
+        text = text.replace(f"./{kind}.schema.json", near if near.startswith(".") else f"./{near}", 1)
     if out is not None:
-        if Path(out).exists():
-            raise InputError(f"{out}: is there already; choose another name")
         write_text(out, text)
     return text
 

@@ -23,6 +23,7 @@ __all__ = [
     "COLUMN_MAP",
     "ESTIMATE",
     "EXPORT",
+    "JSON_SCHEMA",
     "KALIBR",
     "PICTURE",
     "RECORDING",
@@ -112,6 +113,7 @@ ARRAY_FILE = OutputFile("an array file", (".toml",))
 SCENARIO = OutputFile("a scenario file", (".toml",))
 TOML_FILE = OutputFile("a TOML file", (".toml",))
 KALIBR = OutputFile("a Kalibr file", (".yaml", ".yml"))
+JSON_SCHEMA = OutputFile("a JSON schema", (".json",))
 PICTURE = OutputFile("a picture", (".png", ".svg", ".pdf"))
 
 

@@ -18,6 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from gfimu.errors import InputError
 from gfimu.files.model_files import find_model, read_toml
+from gfimu.files.schema import read
+from gfimu.geometry.array_file import ArrayFile, ChipTable
 from gfimu.geometry.turning_axis import TurningAxis
 from gfimu.parts.files import add_part_file, is_part_file
 from gfimu.short_repr import joined, short_repr
@@ -44,19 +46,41 @@ class Chip:
         Unit vectors of the sensing axes in the body frame.
     part : str
         Name of the part in ``models/parts``, or of a part file of the user's.
+    supply : float or None
+        Supply voltage of this chip, V; None: that of the scenario.
+    output_data_rate : float or None
+        Output data rate that this chip is set to, Hz; None: that of the scenario.
+    own_clock : bool
+        Whether the chip samples by a clock of its own.
     """
 
     name: str
     position: NDArray[np.float64]
     axes: NDArray[np.float64]
     part: str = "adxl345"
+    supply: float | None = None
+    output_data_rate: float | None = None
+    own_clock: bool = False
 
-    __repr__ = short_repr
+    def __repr__(self) -> str:
+        return short_repr(self).replace(", own_clock=False", "")
 
     @property
     def channels(self) -> tuple[str, ...]:
         """Channel names, one per sensing axis."""
         return tuple(f"{self.name}{axis + 1}" for axis in range(len(self.axes)))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the ``[[chip]]`` table of an array file."""
+        settings = {"supply_V": self.supply, "output_data_rate_hz": self.output_data_rate}
+        return {
+            "name": self.name,
+            "part": self.part,
+            "position_m": self.position.tolist(),
+            "axes": self.axes.tolist(),
+            **{key: value for key, value in settings.items() if value is not None},
+            **({"own_clock": True} if self.own_clock else {}),
+        }
 
 
 @dataclass(frozen=True)
@@ -114,6 +138,11 @@ class AccelerometerArray:
     def chip_of_channel(self) -> NDArray[np.intp]:
         """Index of the chip that each channel belongs to, shape (c,)."""
         return np.repeat(np.arange(len(self.chips)), [len(chip.axes) for chip in self.chips])
+
+    def output_data_rates(self, sample_rate: float) -> NDArray[np.float64]:
+        """Return the output data rate of each channel, shape (c,), Hz: that of its chip, else ``sample_rate``."""
+        rates = np.array([chip.output_data_rate or sample_rate for chip in self.chips])
+        return rates[self.chip_of_channel]
 
     @property
     def n_channels(self) -> int:
@@ -200,28 +229,27 @@ class AccelerometerArray:
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any], *, source: str = "array") -> AccelerometerArray:
-        """Build an array from the keys of an array file (contract: ``name``, ``[[chip]]``)."""
-        known = {"name", "chip", "length_unit_m", "description", "turning_axis"}
-        for key in data:
-            if key not in known:
-                raise InputError(f"{source}: unknown key {key!r}; valid: {', '.join(sorted(known))}")
-        entries = data.get("chip")
-        if not isinstance(entries, list) or not entries:
-            raise InputError(f"{source}: no [[chip]] table; list at least one chip with position_m and axes")
-        chips = tuple(_chip(entry, number, source) for number, entry in enumerate(entries, start=1))
+        """Build an array from the content of an array file (`gfimu.geometry.array_file.ArrayFile`).
+
+        Raises
+        ------
+        InputError
+            If a key is missing, unknown or has a wrong value; the message names the table, the key and what is valid.
+        """
+        file = read(data, ArrayFile, source)
+        chips = tuple(_chip(entry, number, source) for number, entry in enumerate(file.chip, start=1))
         channels = [channel for chip in chips for channel in chip.channels]
         if len(set(channels)) != len(channels):
             raise InputError(f"{source}: two chips share a name; give each its own")
-        length = data.get("length_unit_m")
-        if length is None:
-            length = float(np.max(np.abs([chip.position for chip in chips]))) or 1.0
-        turning = data.get("turning_axis")
+        length = file.length_unit_m or float(np.max(np.abs([chip.position for chip in chips]))) or 1.0
         return cls(
-            str(data.get("name", Path(source).stem)),
+            file.name if "name" in data else Path(source).stem,
             chips,
-            float(length),
-            str(data.get("description", "")),
-            turning_axis=None if turning is None else TurningAxis.from_dict(turning, source=source),
+            length,
+            file.description,
+            turning_axis=None
+            if file.turning_axis is None
+            else TurningAxis.from_table(file.turning_axis, source=source),
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -232,15 +260,7 @@ class AccelerometerArray:
             "description": self.description,
             "length_unit_m": self.length_unit,
             **turning,
-            "chip": [
-                {
-                    "name": chip.name,
-                    "part": chip.part,
-                    "position_m": chip.position.tolist(),
-                    "axes": chip.axes.tolist(),
-                }
-                for chip in self.chips
-            ],
+            "chip": [chip.to_dict() for chip in self.chips],
         }
 
     def to_toml(self) -> str:
@@ -248,25 +268,24 @@ class AccelerometerArray:
         return tomli_w.dumps(self.to_dict())
 
 
-def _chip(entry: Mapping[str, Any], number: int, source: str) -> Chip:
-    """Check one ``[[chip]]`` table and build the chip."""
-    where = f"{source}: chip {number}"
-    known = {"name", "part", "position_m", "axes"}
-    for key in entry:
-        if key not in known:
-            raise InputError(f"{where}: unknown key {key!r}; valid: {', '.join(sorted(known))}")
+def _chip(table: ChipTable, number: int, source: str) -> Chip:
+    """Build the chip of a ``[[chip]]`` table."""
+    where = f"{source}: [[chip]] {number}"
     try:
-        position = np.array(entry["position_m"], dtype=float)
-        axes = np.atleast_2d(np.array(entry["axes"], dtype=float))
-    except KeyError as error:
-        raise InputError(f"{where}: key {error.args[0]!r} is missing; add it") from None
-    except (TypeError, ValueError):
-        raise InputError(f"{where}: position_m and axes must be lists of numbers") from None
-    if position.shape != (3,) or axes.ndim != 2 or axes.shape[1] != 3 or not 1 <= len(axes) <= 3:
-        raise InputError(f"{where}: position_m needs three numbers and axes one to three rows of three")
-    if not (np.isfinite(position).all() and np.isfinite(axes).all()):
-        raise InputError(f"{where}: position_m and axes must be finite numbers")
+        axes = np.atleast_2d(np.array(table.axes, dtype=float))
+    except ValueError:  # rows of different lengths
+        axes = np.empty(0)
+    if axes.ndim != 2 or axes.shape[1] != 3:
+        raise InputError(f"{where}: axes = {list(table.axes)!r} must be one to three rows of three numbers")
     norms = np.linalg.norm(axes, axis=1)
     if np.any(np.abs(norms - 1) > _AXIS_NORM_TOLERANCE):
         raise InputError(f"{where}: axes must be unit vectors; one has length {norms[np.argmax(abs(norms - 1))]:.6g}")
-    return Chip(str(entry.get("name", f"a{number}")), position, axes, str(entry.get("part", "adxl345")))
+    return Chip(
+        table.name or f"a{number}",
+        np.array(table.position_m),
+        axes,
+        table.part,
+        table.supply_V,
+        table.output_data_rate_hz,
+        table.own_clock,
+    )

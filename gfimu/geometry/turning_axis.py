@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.errors import InputError
+from gfimu.geometry.array_file import TurningAxisTable
 from gfimu.short_repr import short_repr
 
 __all__ = ["HUBS", "TurningAxis"]
 
 HUBS = ("fixed", "free")
-_KEYS = ("direction", "point_m", "hub", "inclination_rad")
 
 
 @dataclass(frozen=True)
@@ -84,21 +84,13 @@ class TurningAxis:
         return cls(vector / length, place, hub, inclination)
 
     @classmethod
-    def from_dict(cls, data: Any, *, source: str) -> TurningAxis:
+    def from_table(cls, table: TurningAxisTable, *, source: str) -> TurningAxis:
         """Return the axis of the table ``[turning_axis]`` of an array file."""
-        if not isinstance(data, Mapping) or "direction" not in data:
-            raise InputError(f"{source}: [turning_axis] needs direction, as [0, 0, 1]")
-        for key in data:
-            if key not in _KEYS:
-                raise InputError(f"{source}: [turning_axis]: unknown key {key!r}; valid: {', '.join(_KEYS)}")
-        tilt = data.get("inclination_rad")
-        if tilt is not None and (isinstance(tilt, bool) or not isinstance(tilt, int | float)):
-            raise InputError(f"{source}: [turning_axis]: inclination_rad is {tilt!r}; give a number, in rad")
         return cls.of(
-            data["direction"],
-            point=data.get("point_m", (0.0, 0.0, 0.0)),
-            hub=data.get("hub", "fixed"),
-            inclination=tilt,
+            table.direction,
+            point=table.point_m,
+            hub=table.hub,
+            inclination=table.inclination_rad,
             source=f"{source}: [turning_axis]",
         )
 

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.errors import InputError
-from gfimu.files.model_files import find_model, read_toml
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.parts.part import white_noise_std
+from gfimu.parts.part_file import PartFile
 
 __all__ = ["PartLimits"]
 
@@ -62,45 +62,36 @@ class PartLimits:
         InputError
             If a part is unknown or its file lacks a figure.
         """
-        bias, gain, full_range, lsb, gain_std, axis_std, tempco = [], [], [], [], [], [], []
-        slowest, fastest = 0.0, np.inf
-        for chip in array.chips:
-            path = find_model("parts", chip.part)
-            part, axes = read_toml(path), len(chip.axes)
-            try:
-                bias.append(_bias_limit(part)[:axes])
-                gain.append(np.full(axes, float(part.get("sensitivity_limit", _DEFAULT_GAIN))))
-                full_range.append(np.full(axes, float(part["full_range_m_s2"])))
-                lsb.append(np.full(axes, float(part["lsb_m_s2"])))
-                gain_std.append(np.full(axes, float(part.get("sensitivity_std", 0.0))))
-                aslant = float(np.hypot(part.get("cross_axis_std", 0.0), part.get("misalignment_std_rad", 0.0)))
-                axis_std.append(np.full(axes, aslant))
-                tempco.append(np.asarray(part.get("offset_tempco_m_s2_K", np.zeros(3)), dtype=float)[:axes])
-            except KeyError as error:
-                raise InputError(f"{path}: key {error.args[0]!r} is missing; add it") from None
-            slowest = max(slowest, float(part.get("output_data_rate_min_hz", 0.0)))
-            fastest = min(fastest, float(part.get("output_data_rate_max_hz", np.inf)))
-        steps = np.concatenate(lsb)
+        parts = {
+            name: PartFile.load(name, array.part_files, needs=("full_range_m_s2", "offset_std_m_s2"))
+            for name in {chip.part for chip in array.chips}
+        }
+        of_channel = [(parts[chip.part], axis) for chip in array.chips for axis in range(len(chip.axes))]
+
+        def per_part(figure: Callable[[PartFile], float]) -> NDArray[np.float64]:
+            return np.array([figure(part) for part, _ in of_channel])
+
+        steps = per_part(lambda part: part.lsb_m_s2)
         noise = np.sqrt(white_noise_std(array, sample_rate) ** 2 + steps**2 / 12.0)
         return cls(
             noise=noise,
-            bias=np.concatenate(bias),
-            gain=np.concatenate(gain),
-            full_range=np.concatenate(full_range),
+            bias=np.array([_bias_limit(part, axis) for part, axis in of_channel]),
+            gain=per_part(lambda part: _DEFAULT_GAIN if part.sensitivity_limit is None else part.sensitivity_limit),
+            full_range=per_part(lambda part: part.full_range_m_s2 or np.inf),
             lsb=steps,
-            gain_std=np.concatenate(gain_std),
-            axis_std=np.concatenate(axis_std),
-            bias_tempco=np.concatenate(tempco),
-            output_rate=(slowest, fastest),
+            gain_std=per_part(lambda part: part.sensitivity_std),
+            axis_std=per_part(lambda part: math.hypot(part.cross_axis_std, part.misalignment_std_rad)),
+            bias_tempco=np.array([part.offset_tempco_m_s2_K[axis] for part, axis in of_channel]),
+            output_rate=(
+                max(part.output_data_rate_min_hz for part in parts.values()),
+                min(part.output_data_rate_max_hz for part in parts.values()),
+            ),
         )
 
 
-def _bias_limit(part: dict[str, Any]) -> NDArray[np.float64]:
-    """Return the largest bias of each axis, shape (3,), m/s²."""
-    if "offset_limit_m_s2" in part:
-        limit = np.asarray(part["offset_limit_m_s2"], dtype=float)
-    else:
-        limit = _STANDARD_DEVIATIONS * np.asarray(part["offset_std_m_s2"], dtype=float)
-    supplies = [table for table in part.values() if isinstance(table, dict) and "offset_m_s2" in table]
-    shifts = [np.abs(supply["offset_m_s2"]) for supply in supplies]
-    return limit + np.max(shifts, axis=0, initial=0.0) if shifts else limit
+def _bias_limit(part: PartFile, axis: int) -> float:
+    """Return the largest bias of a sensing axis, m/s²."""
+    typical = part.offset_std_m_s2 or (0.0, 0.0, 0.0)
+    limit = part.offset_limit_m_s2 or tuple(_STANDARD_DEVIATIONS * value for value in typical)
+    shift = 0.0 if part.supply_3_3_V is None else abs(part.supply_3_3_V.offset_m_s2[axis])
+    return limit[axis] + shift

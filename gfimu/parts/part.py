@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
-from gfimu.parts.files import part_table
+from gfimu.parts.part_file import PartFile
 from gfimu.short_repr import short_repr
 
 __all__ = ["Part", "white_noise_std"]
@@ -53,25 +51,17 @@ class Part:
         InputError
             If the part is unknown (the message lists the names), or its file lacks a figure.
         """
-        data, source = part_table(name, files or {})
-        try:
-            lsb = float(data["lsb_m_s2"])
-            noise_lsb = np.asarray(data["noise_lsb_rms_100_hz"], dtype=float)
-        except KeyError as error:
-            raise InputError(f"{source}: key {error.args[0]!r} is missing; add it") from None
-        except (TypeError, ValueError):
-            raise InputError(f"{source}: lsb_m_s2 must be a number and noise_lsb_rms_100_hz three numbers") from None
-        if noise_lsb.shape != (3,) or not lsb > 0:
-            raise InputError(f"{source}: lsb_m_s2 must be positive and noise_lsb_rms_100_hz three numbers")
-        return cls(str(data.get("name", name)), lsb, noise_lsb * lsb)
+        part = PartFile.load(name, files)
+        return cls(part.name, part.lsb_m_s2, np.array(part.noise_lsb_rms_100_hz) * part.lsb_m_s2)
 
 
 def white_noise_std(array: AccelerometerArray, sample_rate: float) -> NDArray[np.float64]:
     """Return the standard deviation of one sample of each channel by the data sheets, shape (c,), m/s².
 
-    The noise is white up to half the output data rate, so it grows with the square root of ``sample_rate``, Hz, from
-    100 Hz on; below that the data sheets give the figure for 100 Hz.
+    The noise is white up to half the output data rate, so it grows with the square root of that rate from 100 Hz on;
+    below that the data sheets give the figure for 100 Hz. The rate is that of the array file where a chip has one, else
+    ``sample_rate``, Hz.
     """
     parts = {chip.part: Part.load(chip.part, array.part_files) for chip in array.chips}
     at_100_hz = [parts[chip.part].noise_std_100_hz[: len(chip.axes)] for chip in array.chips]
-    return np.concatenate(at_100_hz) * math.sqrt(max(sample_rate, 100.0) / 100.0)
+    return np.concatenate(at_100_hz) * np.sqrt(np.maximum(array.output_data_rates(sample_rate), 100.0) / 100.0)

@@ -23,8 +23,8 @@ from numpy.typing import ArrayLike, NDArray
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.geometry.kinematics import require_all_motions
-from gfimu.parts.files import part_table
 from gfimu.parts.part import white_noise_std
+from gfimu.parts.part_file import PartFile
 from gfimu.short_repr import short_repr
 
 __all__ = ["ChannelTables", "SensorErrors"]
@@ -115,13 +115,10 @@ class SensorErrors:
         bias, limit, steps = [], [], []
         rms = white_noise_std(array, sample_rate)
         for chip in array.chips:
-            part, source = part_table(chip.part, array.part_files)
-            missing = [key for key in ("offset_std_m_s2", "full_range_m_s2") if key not in part]
-            if missing:
-                raise InputError(f"{source}: key {missing[0]!r} is missing; add it")
-            lsb, axes = float(part["lsb_m_s2"]), len(chip.axes)
-            bias.append(np.array(part["offset_std_m_s2"])[:axes])
-            limit.append(np.full(axes, float(part["full_range_m_s2"]) - lsb))
+            part = PartFile.load(chip.part, array.part_files, needs=("offset_std_m_s2", "full_range_m_s2"))
+            lsb, axes = part.lsb_m_s2, len(chip.axes)
+            bias.append(np.array(part.offset_std_m_s2)[:axes])
+            limit.append(np.full(axes, np.array(part.full_range_m_s2) - lsb))
             steps.append(np.full(axes, lsb))
         each = np.maximum(np.concatenate(steps), step)
         noise = [np.sqrt(rms**2 + each**2 / 12.0)]

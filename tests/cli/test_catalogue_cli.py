@@ -1,9 +1,11 @@
 """What comes with gfimu can be listed and shown, and every file to start from works as it is."""
 
+import re
+
 import pytest
 
 from gfimu.commands.catalogue import KINDS, TEMPLATES
-from gfimu.files.model_files import list_models
+from gfimu.files.model_files import find_model, list_models
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.importing import load_map
 from gfimu.parts.part import Part
@@ -37,7 +39,7 @@ def test_all_of_a_kind_are_listed_with_what_they_are(gfimu_command, kind):
 def test_a_file_to_start_from_can_be_used(gfimu_command, tmp_path, kind):
     file = tmp_path / f"my_{kind}.toml"
     assert gfimu_command("new", kind, "--out", file).code == 0
-    assert file.read_text().startswith("# ")
+    assert file.read_text().startswith(f"#:schema ./{kind}.schema.json\n# ")
     LOADERS[kind](file)
     again = gfimu_command("new", kind, "--out", file)
     assert again.code == 2
@@ -59,6 +61,20 @@ def test_an_unknown_name_is_one_line(gfimu_command, words):
     assert "nothing" in result.stderr
 
 
+@pytest.mark.parametrize("name", set(list_models("parts")) - {"generic"})
+def test_every_figure_of_a_shipped_part_says_where_it_is_from(name):
+    text = find_model("parts", name).read_text(encoding="utf-8")
+    sources = set(re.findall(r"^# (\d): ", text, flags=re.MULTILINE))
+    assert sources
+    for line in text.splitlines():
+        key = line.partition(" = ")[0]
+        if line[:1] in {"#", "[", ""} or key in {"name", "manufacturer", "source"}:
+            continue
+        (mark,) = re.findall(r"\[(unchecked|derived|\d[\d, ]*\*?)\]$", line) or [None]
+        assert mark is not None, f"{key}: no mark"
+        assert mark in {"unchecked", "derived"} or set(re.findall(r"\d", mark)) <= sources, line
+
+
 @pytest.mark.parametrize("name", list_models("parts"))
 def test_every_shipped_part_has_a_sound_data_sheet(name):
     part, sheet = Part.load(name), DataSheet.load(name)
@@ -67,3 +83,37 @@ def test_every_shipped_part_has_a_sound_data_sheet(name):
     density = part.noise_std_100_hz / 50.0**0.5 / 9.80665
     assert ((density > 1e-5) & (density < 6e-3)).all()  # 10 µg/√Hz to 6 mg/√Hz
     assert (sheet.offset_std < 0.5 * sheet.full_range).all()
+
+
+def test_a_schema_is_written_beside_the_file_that_names_it(gfimu_command, tmp_path):
+    import json
+
+    (tmp_path / "editor").mkdir()
+    out, schema = tmp_path / "my_array.toml", tmp_path / "editor" / "array.json"
+    assert gfimu_command("new", "array", "--out", out, "--schema", schema).code == 0
+    assert out.read_text().startswith("#:schema ./editor/array.json\n")
+    assert "position_m" in json.loads(schema.read_text())["$defs"]["ChipTable"]["properties"]
+    alone = gfimu_command("new", "twin", "--schema", tmp_path / "twin.schema.json")
+    assert (alone.code, "[drive]" in alone.stdout) == (0, False)
+    wrong = gfimu_command("new", "twin", "--schema", tmp_path / "twin.toml")
+    assert (wrong.code, "a JSON schema ends in .json" in wrong.stderr) == (2, True)
+
+
+def test_files_and_the_array_of_a_recording_are_shown(gfimu_command, tmp_path):
+    file = tmp_path / "arm.toml"
+    file.write_text(gfimu_command("new", "array").stdout.replace("# supply_V", "supply_V").replace("# own_", "own_"))
+    assert gfimu_command("show", file).stdout == file.read_text()
+    (tmp_path / "run.toml").write_text(f'array = "{file}"\nduration_s = 0.1\n[motion]\nkind = "rest"\n')
+    run = tmp_path / "run.csv"
+    assert gfimu_command("simulate", tmp_path / "run.toml", "--out", run).code == 0
+    file.unlink()
+    shown = gfimu_command("show", run).stdout
+    assert "supply_V = 3.3" in shown
+    assert "own_clock = true" in shown
+    file.write_text(shown.replace("supply_V", "suply_V"))
+    wrong = gfimu_command("show", file)
+    assert wrong.code == 2
+    assert "[[chip]] 1: unknown key 'suply_V'" in wrong.stderr
+    assert "did you mean 'supply_V'?" in wrong.stderr
+    gone = gfimu_command("show", tmp_path / "gone.toml")
+    assert (gone.code, gone.stderr.count("\n"), "no such file" in gone.stderr) == (2, 1, True)

@@ -87,10 +87,19 @@ CHIP = {"position_m": [0.0, 0.0, 0.1], "axes": [[1, 0, 0]]}
     [
         ({}, "no \\[\\[chip\\]\\]"),
         ({"chip": [CHIP], "colour": "red"}, "unknown key 'colour'.*valid: chip"),
-        ({"chip": [CHIP | {"axis": [1, 0, 0]}]}, "chip 1: unknown key 'axis'"),
+        ({"chip": [CHIP | {"axis": [1, 0, 0]}]}, r"\[\[chip\]\] 1: unknown key 'axis'.*did you mean 'axes'\?"),
         ({"chip": [{"axes": [[1, 0, 0]]}]}, "'position_m' is missing"),
-        ({"chip": [CHIP | {"position_m": [0, 0]}]}, "three numbers"),
-        ({"chip": [CHIP | {"position_m": "here"}]}, "lists of numbers"),
+        ({"chip": [CHIP | {"position_m": [0, 0]}]}, r"position_m = \[0, 0\] must be a list of 3 finite numbers"),
+        ({"chip": [CHIP | {"position_m": "here"}]}, "position_m = 'here' must be a list of 3 finite numbers"),
+        ({"chip": [CHIP | {"axes": [[1, 0], [0, 1]]}]}, "must be one to three rows of three numbers"),
+        ({"chip": [CHIP | {"axes": [[1, 0, 0], [0, 1]]}]}, "must be one to three rows of three numbers"),
+        ({"chip": [CHIP | {"axes": "x"}]}, "axes = 'x' must be lists of numbers: one to three rows of three"),
+        ({"chip": [CHIP | {"supply_V": 0}]}, "supply_V = 0 must be greater than 0"),
+        ({"chip": [CHIP | {"own_clock": 1}]}, "own_clock = 1 must be true or false"),
+        ({"chip": CHIP}, r"must be an array of tables: \[\[chip\]\]"),
+        ({"chip": []}, r"no \[\[chip\]\] table; add at least one"),
+        ({"chip": [CHIP], "turning_axis": {"hub": "fixed"}}, r"\[turning_axis\]: key 'direction' is missing; add it"),
+        ({"chip": [CHIP], "turning_axis": {"direction": "z", "hub": "fre"}}, "one of fixed, free; did you mean 'free'"),
         ({"chip": [CHIP | {"axes": [[1, 0, 0.1]]}]}, "unit vectors.*1.00499"),
         ({"chip": [CHIP | {"position_m": [0, 0, float("nan")]}]}, "finite"),
         ({"chip": [CHIP | {"name": "a"}, CHIP | {"name": "a"}]}, "share a name"),
@@ -99,6 +108,24 @@ CHIP = {"position_m": [0.0, 0.0, 0.1], "axes": [[1, 0, 0]]}
 def test_malformed_array_says_what_and_where(data, message):
     with pytest.raises(InputError, match=f"cube.toml: .*{message}" if data.get("chip") else message):
         AccelerometerArray.from_dict(data, source="cube.toml")
+
+
+def test_a_chip_keeps_its_own_settings(tmp_path):
+    chips = [CHIP | {"supply_V": 3.3, "output_data_rate_hz": 200, "own_clock": True}, CHIP | {"name": "b"}]
+    array = AccelerometerArray.from_dict({"chip": chips}, source="arm.toml")
+    path = tmp_path / "arm.toml"
+    path.write_text(array.to_toml())
+    for found in (array, AccelerometerArray.load(path)):
+        own, usual = found.chips
+        assert (own.name, own.supply, own.output_data_rate, own.own_clock) == ("a1", 3.3, 200.0, True)
+        assert (usual.supply, usual.output_data_rate, usual.own_clock) == (None, None, False)
+        assert repr(own).endswith("supply=3.3, output_data_rate=200, own_clock=True)")
+    assert array.to_dict()["chip"][1].keys() == {"name", "part", "position_m", "axes"}
+
+
+def test_the_axes_of_a_chip_with_one_axis_may_be_one_row():
+    chip = AccelerometerArray.from_dict({"chip": [CHIP | {"axes": [0, 1, 0]}]}).chips[0]
+    np.testing.assert_array_equal(chip.axes, [[0.0, 1.0, 0.0]])
 
 
 def test_unknown_array_and_channel_list_the_names():

@@ -9,6 +9,7 @@ import pytest
 
 from gfimu import AccelerometerArray, InputError, Recording
 from gfimu.calibration.run_file import open_uncalibrated
+from gfimu.parts.limits import PartLimits
 from gfimu.parts.part import Part, white_noise_std
 from gfimu.rate.sensing import SensorErrors
 from gfimu.recording.carried_array import array_difference
@@ -85,6 +86,7 @@ def test_a_part_file_lies_beside_its_array_or_in_the_current_directory(tmp_path,
     monkeypatch.chdir(tmp_path)  # not where the part file is
     array = AccelerometerArray.load(file)
     assert Part.load(array.chips[0].part, array.part_files).lsb == 0.01
+    assert PartLimits.of(array, 100.0).full_range[0] == 400.0
     (tmp_path / "own" / "my_chip.toml").rename(tmp_path / "my_chip.toml")
     assert AccelerometerArray.load(file).part_files == {"my_chip.toml": PART}
     (tmp_path / "my_chip.toml").unlink()

@@ -1,0 +1,31 @@
+"""The ``[[effect]]`` tables of twin and scenario files."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import msgspec
+
+from gfimu.errors import InputError
+from gfimu.files.schema import Table, about
+from gfimu.geometry.array import AccelerometerArray
+from sim.effects import Effect, make_effect
+
+__all__ = ["EffectTable"]
+
+
+class EffectTable(Table, frozen=True):
+    """One thing that is so in the world (scenario), or an extension of the model (twin)."""
+
+    name: Annotated[str, about("Name of the effect (gfimu list effects).", example="table_tilt")]
+    parameters: Annotated[
+        dict[str, Any],
+        about("Its parameters by key, the unit at the end of each key (the table of effects in diagnosis.md)."),
+    ] = msgspec.field(default_factory=dict)
+
+    def effect(self, array: AccelerometerArray, where: str) -> Effect:
+        """Return the effect; raises `InputError` for an unknown name or parameter of this array."""
+        try:
+            return make_effect(self.name, self.parameters, array)
+        except InputError as error:
+            raise InputError(f"{where}: {error}") from None
