@@ -30,7 +30,7 @@ __all__ = [
 _TABLE_RADIUS = 0.15
 _TABLE_THICKNESS = 0.012
 _AXIS_LENGTH = 0.36  # of the arrow along a sensing axis, in sizes of the drawing
-_MOST_CHANNEL_NAMES = 12  # channels named in the scene; of more, the chips are, and a channel's name shows on a click
+_MOST_CHANNEL_NAMES = 6  # channels named in the scene; of more, the chips are, and a channel's name shows on a click
 
 
 def array_shapes(array: AccelerometerArray) -> Sequence[Shape]:
@@ -94,7 +94,7 @@ def channel_shapes(array: AccelerometerArray) -> Pointers:
         colours,
         array.channels,
         0.012 * size,
-        show_labels=array.n_channels <= _MOST_CHANNEL_NAMES,
+        show_labels=len(array.chips) < array.n_channels <= _MOST_CHANNEL_NAMES,
     )
 
 

@@ -91,8 +91,8 @@ one column per sensing axis. {_HUES}
 
 
 _CHIPS = (
-    "Chips are named and drawn larger than they are; thin arrows are their sensing axes. The white arrow is gravity, "
-    "the yellow one the axis of rotation, where there is one."
+    "Chips are named and drawn larger than they are; thin arrows are their sensing axes, point at one for its "
+    "channel. The white arrow is gravity, the yellow one the axis of rotation, where there is one."
 )
 _HUES = "Each chip has one hue in all pictures; its axes 1, 2, 3 are darker, as it is, and lighter."
 

@@ -106,7 +106,7 @@ def test_sensing_axes_point_along_their_axes_in_three_shades():
     assert list(arrows.labels) == list(array.channels)
     assert arrows.colours[:3] == [chip_colour(0, axis) for axis in range(3)]
     assert not arrows.show_labels  # 24 channel names would cover the board
-    assert channel_shapes(AccelerometerArray.load("cube12")).show_labels
+    assert channel_shapes(AccelerometerArray.load("one_chip")).show_labels
 
 
 def test_the_axis_of_rotation_passes_through_its_point_and_is_named():
