@@ -23,13 +23,15 @@ if TYPE_CHECKING:
 mpl.use("Agg")
 
 from matplotlib.figure import Figure
+from matplotlib.ticker import FixedLocator
 
 __all__ = ["calibration_figure", "calibration_picture", "pose_names"]
 
 _MOST_NAMED = 128  # parameters with a name each; of more, the blocks of the chips are named
 _PER_LABEL_IN = 0.125  # room for one name, inches: type of 7 points needs 0.1
+_LINEAR = 0.005  # m/s²: below it the scale of magnitudes is linear
 _NEAR_AXIS = np.cos(np.deg2rad(10.0))
-_UNITS = {"lsb": "count", "m_s2": "m/s²", "rad_s": "rad/s", "1": "1", "m": "m"}
+_UNITS = {"lsb": "count", "m_s2": "m/s²", "rad_s": "rad/s", "1": "ratio", "m": "m"}
 _KINDS = {"M": "M_ij: sensitivity of axis i to input j", "b": "b_i: bias", "r": "r_i: position"}
 
 
@@ -156,7 +158,9 @@ def _magnitudes(figure: Figure, calibration: Calibration, recording: Recording, 
             panel.plot(poses, values, "o", color=hue, markersize=4.5, label=chip)
         panel.axhspan(-rms, rms, color=colour, alpha=0.15, linewidth=0)
         panel.axhline(0.0, color=css(INK), linewidth=0.5)
-        panel.set_yscale("symlog", linthresh=0.005)
+        panel.set_yscale("symlog", linthresh=_LINEAR)
+        powers = 10.0 ** np.arange(-2, 3)
+        panel.yaxis.set_major_locator(FixedLocator([*-powers[::-1], 0.0, *powers]))
         panel.set_ylabel("|a| − g, m/s²")
         panel.set_title(f"{title}: rms {rms:.2g} m/s² (band)", fontsize=10, color=colour, loc="left")
     panels[-1].set_xticks(poses, pose_names(_up(corrected, calibration, rest)), rotation=90, fontsize=7)

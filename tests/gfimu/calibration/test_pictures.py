@@ -74,7 +74,7 @@ def test_parameters_are_named_with_units_and_their_labels_do_not_collide(chips, 
     assert collisions(panel.get_yticklabels()) == []
     units = panel.get_xlabel()
     assert "b_i: bias, m/s²" in units
-    assert "M_ij: sensitivity of axis i to input j, 1" in units
+    assert "M_ij: sensitivity of axis i to input j, ratio" in units
     assert ("r_i: position, m" in units) == positions
 
 
