@@ -174,7 +174,7 @@ def run_scene(
     if table and is_cube(array):
         return Scene(bodies)
     size = drawing_size(array)
-    return Scene(bodies, eye=start + 3.2 * size * np.array([1.1, -1.0, 0.8]), look_at=start, grid_spacing=size)
+    return Scene(bodies, eye=start + 2.6 * size * np.array([1.1, -1.0, 0.8]), look_at=start, grid_spacing=size)
 
 
 def reading_arrows(array: AccelerometerArray, t: NDArray[np.float64], readings: NDArray[np.float64]) -> SensingArrows:
