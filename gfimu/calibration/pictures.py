@@ -61,9 +61,9 @@ def calibration_figure(calibration: Calibration, recording: Recording | None = N
     if rest is None or recording is None:
         _correlation(figure.subplots(), calibration)
         return figure
-    left, right = figure.subfigures(1, 2, width_ratios=[across, side + 1.0])
-    _correlation(right.subplots(), calibration)
-    _magnitudes(left, calibration, recording, rest)
+    parts = np.asarray(figure.subfigures(1, 2, width_ratios=[across, side + 1.0]))
+    _correlation(parts[1].subplots(), calibration)
+    _magnitudes(parts[0], calibration, recording, rest)
     return figure
 
 

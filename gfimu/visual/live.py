@@ -38,7 +38,7 @@ class LivePicture:
         """Send the array, the colours and names of the lines, and the layout."""
         array, size = self._array, drawing_size(self._array)
         shapes = [*array_shapes(array), channel_shapes(array), chip_names(array), axes_shapes(array)]
-        scene = Scene([Body("array", shapes)], eye=2.6 * size * np.array([1.1, -1.0, 0.8]), look_at=(0.0, 0.0, 0.0))
+        scene = Scene([Body("array", shapes)], eye=(2.9 * size, -2.6 * size, 2.1 * size), look_at=(0.0, 0.0, 0.0))
         scene.log(stream)
         colours = [chip_colour(int(chip)) for chip in array.chip_of_channel]
         arrows = rr.Arrows3D.from_fields(

@@ -111,7 +111,7 @@ class KnownMotion:
         if found is None:
             return None
         name, t, angle = found
-        if axis is None:
+        if array is None or axis is None:
             mounted = to_rotation(about_z(angle)) * _mounting(recording)
             return cls(name, t, from_rotation(mounted), np.array([0.0, 0.0, stand_height(array)]), angle=angle)
         start = about_axis(axis, np.zeros(1))[0]

@@ -115,7 +115,7 @@ def write_run(
     write_rrd(
         path,
         title=title or str(recording.metadata.get("scenario", array.name)),
-        layout=_layout(scene.view(scene_title(array)), raw, cells),
+        layout=_layout(scene.view(scene_title(array)), raw, cells, notes_apart=bool(notes) and estimate is None),
         scene=scene,
         plots=[plot for group in (*raw, *cells) for plot in group],
         notes=f"{notes}\n\n{run_legend(array, estimate=estimate is not None, known=known)}".strip(),
@@ -214,8 +214,17 @@ def _on_table(recording: Recording, known: KnownMotion | None) -> bool:
     return any(name in recording.reference for name in ("angle_rad", "tacho_rad_s", "command_rad_s"))
 
 
-def _layout(scene: rrb.Spatial3DView, raw: Sequence[Sequence[Plot]], cells: Sequence[Sequence[Plot]]) -> rrb.Container:
-    """Scene above the raw channels on the left, everything derived in a grid on the right."""
+def _layout(
+    scene: rrb.Spatial3DView,
+    raw: Sequence[Sequence[Plot]],
+    cells: Sequence[Sequence[Plot]],
+    *,
+    notes_apart: bool = False,
+) -> rrb.Container:
+    """Scene above the raw channels on the left, everything derived in a grid on the right.
+
+    The notes are a tab beside the channels, or a view of their own where they say why something is missing.
+    """
     if len(raw) == 1:
         readings = [plot.view() for plot in raw[0]]
     else:
@@ -224,7 +233,10 @@ def _layout(scene: rrb.Spatial3DView, raw: Sequence[Sequence[Plot]], cells: Sequ
         beside = rrb.Vertical(*readings) if len(raw) == 1 else rrb.Tabs(*readings, active_tab=0)
         left = rrb.Vertical(scene, notes_view(), row_shares=[3, 1])
         return rrb.Horizontal(left, beside, column_shares=[2, 3])
-    left = rrb.Vertical(scene, rrb.Tabs(*readings, notes_view(), active_tab=0), row_shares=[3, 2])
+    if notes_apart:
+        left = rrb.Vertical(scene, notes_view(), rrb.Tabs(*readings, active_tab=0), row_shares=[5, 3, 4])
+    else:
+        left = rrb.Vertical(scene, rrb.Tabs(*readings, notes_view(), active_tab=0), row_shares=[3, 2])
     views = [cell[0].view() if len(cell) == 1 else rrb.Tabs(*[plot.view() for plot in cell]) for cell in cells]
     across = 2 if len(views) > 3 else 1
     rows = [views[first : first + across] for first in range(0, len(views), across)]

@@ -64,7 +64,7 @@ def array_figure(
         _draw(panel, array, view, spin)
         panel.set_title(title, loc="left", fontsize=10)
         panel.set_aspect("equal", adjustable="datalim")
-        panel.margins(0.12)
+        panel.margins(0.17)
     top.set_xlabel("body x, mm")
     top.set_ylabel("body y, mm")
     top.grid(color="0.93", linewidth=0.6)
@@ -91,9 +91,9 @@ def _draw(panel: Axes, array: AccelerometerArray, view: NDArray[np.float64], spi
         panel.plot(*(np.array([start, end]) @ view.T * _MM).T, color=css(NOISE_ON_PAPER), linewidth=0.6)
     if spin is not None:
         _axis_line(panel, spin, package, view, size)
-    named = array.n_channels <= _MOST_CHANNEL_NAMES
+    names_channels = array.n_channels <= _MOST_CHANNEL_NAMES
     for column, channel in enumerate(array.channels):
-        _sensing_axis(panel, array, column, view, 0.42 * _axis_length(array, size), channel if named else "")
+        _sensing_axis(panel, array, column, view, 0.42 * _axis_length(array, size), channel if names_channels else "")
     places = array.chip_positions @ view.T * _MM
     for number, place in enumerate(places):
         colour = css(chip_colour(number, on_paper=True))
@@ -102,12 +102,13 @@ def _draw(panel: Axes, array: AccelerometerArray, view: NDArray[np.float64], spi
     arrows = (
         (array.positions[:, None] + np.linspace(0.2, 1.3, 6)[:, None] * length * array.axes[:, None]) @ view.T * _MM
     )
-    drawn, named, room = [*arrows.reshape(-1, 2), *places], [], _NAME_AWAY * size * _MM
+    drawn, room = [*arrows.reshape(-1, 2), *places], _NAME_AWAY * size * _MM
+    named: list[NDArray[np.float64]] = []
     for place, text in _same_places(places, [chip.name for chip in array.chips]):
         direction = _free_direction(place, drawn, named, room)
         named.append(place + room * direction)
         panel.annotate(
-            text, place, xytext=(13.0 + 2.0 * max(len(text) - 3, 0) * abs(direction[0])) * direction,
+            text, _pair(place), xytext=_pair((13.0 + 2.0 * max(len(text) - 3, 0) * abs(direction[0])) * direction),
             textcoords="offset points", ha="center", va="center", fontweight="bold",
             fontsize=9 if len(places) <= 16 else 7, color=css(INK), zorder=6,
         )  # fmt: skip
@@ -124,13 +125,13 @@ def _sensing_axis(
         panel.plot(*start, "o" if towards else "x", color=colour, markersize=12, fillstyle="none", zorder=1)
         return
     panel.annotate(
-        "", start + along, xytext=start,
+        "", _pair(start + along), xytext=_pair(start),
         arrowprops={"arrowstyle": "-|>", "color": colour, "linestyle": style, "linewidth": 1.3, "shrinkA": 0},
     )  # fmt: skip
     panel.plot(*(start + along), alpha=0.0, marker=".")  # arrows do not count for the limits of the axes
     if name:
         panel.annotate(
-            name, start + along, xytext=10.0 * along / np.hypot(*along), textcoords="offset points",
+            name, _pair(start + along), xytext=_pair(10.0 * along / np.hypot(*along)), textcoords="offset points",
             ha="center", va="center", fontsize=8, color=colour,
         )  # fmt: skip
 
@@ -154,15 +155,15 @@ def _triad(panel: Axes, array: AccelerometerArray, gravity: NDArray[np.float64] 
     arrows = [(unit, name, css(colour)) for unit, name, colour in zip(np.eye(3), "xyz", AXES, strict=True)]
     for unit, name, colour in arrows:
         tip = corner + 0.45 * size * _OBLIQUE @ unit
-        panel.annotate("", tip, xytext=corner, arrowprops={"arrowstyle": "-|>", "color": colour, "shrinkA": 0})
-        panel.annotate(name, corner + 0.58 * size * _OBLIQUE @ unit, ha="center", va="center", fontsize=9)
+        arrow = {"arrowstyle": "-|>", "color": colour, "shrinkA": 0}
+        panel.annotate("", _pair(tip), xytext=_pair(corner), arrowprops=arrow)
+        panel.annotate(name, _pair(corner + 0.58 * size * _OBLIQUE @ unit), ha="center", va="center", fontsize=9)
     if gravity is not None:
         start = corner + np.array([0.0, 1.5 * size])
         tip = start + 0.7 * size * _OBLIQUE @ gravity
-        panel.annotate(
-            "", tip, xytext=start, arrowprops={"arrowstyle": "-|>", "color": css(INK), "lw": 2, "shrinkA": 0}
-        )
-        panel.annotate(gravity_name, start, xytext=(0, 7), textcoords="offset points", ha="center", fontsize=9)
+        arrow = {"arrowstyle": "-|>", "color": css(INK), "lw": 2, "shrinkA": 0}
+        panel.annotate("", _pair(tip), xytext=_pair(start), arrowprops=arrow)
+        panel.annotate(gravity_name, _pair(start), xytext=(0, 7), textcoords="offset points", ha="center", fontsize=9)
         panel.plot(*np.array([start + np.array([0.0, 0.2 * size]), tip]).T, alpha=0.0)
     panel.plot(*(corner - 0.15 * size), alpha=0.0)
 
@@ -217,6 +218,10 @@ def _free_direction(
         return np.array([0.0, 1.0])
     apart = np.min([weight * np.linalg.norm(targets - one, axis=1) for one, weight in weighted], axis=0)
     return np.asarray(directions[int(np.argmax(apart))])
+
+
+def _pair(point: NDArray[np.float64]) -> tuple[float, float]:
+    return float(point[0]), float(point[1])
 
 
 def _hull(points: NDArray[np.float64]) -> NDArray[np.float64]:
