@@ -21,12 +21,13 @@ from gfimu.diagnosis.criticism.views.residuals import residual_views
 from gfimu.diagnosis.diagnose import diagnose
 from gfimu.diagnosis.verdict.verdict import Diagnosis
 from gfimu.recording.mimu4444 import read_mimu4444
+from gfimu.visual.colours import AFTER_ON_PAPER, BEFORE_ON_PAPER, NOISE_ON_PAPER, css
 from sim.scenarios import Scenario, simulate
 from sim.twin import Twin
 
 ROOT = Path(__file__).resolve().parents[1]
 DATA = ROOT.parent / "shared" / "data" / "mimu4444"
-BEFORE, AFTER, INK = "#d64545", "#1f9d6b", "#8a8f98"
+BEFORE, AFTER, INK = css(BEFORE_ON_PAPER), css(AFTER_ON_PAPER), css(NOISE_ON_PAPER)
 TILT = {"x_rad": 0.015, "y_rad": -0.010}
 _TURN_REST = 480.0  # s: the poses end about here in both recordings of the board
 

@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,12 +21,24 @@ from gfimu.geometry.array import AccelerometerArray
 from gfimu.rate.live import LiveRateFilter
 from gfimu.rate.sensing import SensorErrors
 
-__all__ = ["LiveView"]
+__all__ = ["LiveView", "StreamPicture"]
 
 _VIEW_HZ = 100.0
 _TEXT_EVERY_S = 0.25
 _APPLICATION = "gfimu_record"
 _FLUSH_S = 5.0
+
+
+class StreamPicture(Protocol):
+    """What draws a stream beside its plain lines: the array and its readings, say (`gfimu.visual.live`)."""
+
+    def open(self, stream: Any) -> None:
+        """Send what does not change, before any reading."""
+        ...
+
+    def add(self, stream: Any, times: Any, readings: NDArray[np.float64]) -> None:
+        """Send readings (n, c), m/s², at the times of a rerun time column."""
+        ...
 
 
 class LiveView:
@@ -46,6 +58,8 @@ class LiveView:
         Write a rerun recording when the view is closed.
     viewer : bool
         Open the rerun viewer, which listens to this machine only, and send to it.
+    picture : StreamPicture, optional
+        Draws the array and its readings.
     """
 
     def __init__(
@@ -56,9 +70,11 @@ class LiveView:
         on_text: Callable[[str], None] | None = None,
         rrd: Path | None = None,
         viewer: bool = False,
+        picture: StreamPicture | None = None,
     ) -> None:
         self._array, self._lsb, self._on_text = array, lsb, on_text
         self._filter: LiveRateFilter | None = None
+        self._picture, self._without_rate = picture, ""
         self._sum = np.zeros(array.n_channels)
         self._times: list[float] = []
         self._group = 0
@@ -71,6 +87,9 @@ class LiveView:
         if viewer:
             self._streams.append(viewer_stream(_APPLICATION))
             self._open.callback(_flush, self._streams[-1])
+        if picture is not None:
+            for stream in self._streams:
+                picture.open(stream)
         self._batches: queue.SimpleQueue[tuple[Batch, StreamCounts] | None] = queue.SimpleQueue()
         self._thread = threading.Thread(target=self._work, name="live view", daemon=True)
         self._thread.start()
@@ -94,15 +113,21 @@ class LiveView:
             rate = (len(batch.t_s) - 1) / span
             self._group = max(1, round(rate / _VIEW_HZ))
             shown = rate / self._group
-            self._filter = LiveRateFilter(
-                self._array, SensorErrors.from_parts(self._array, float(shown)), float(1.0 / shown)
-            )
+            try:
+                errors = SensorErrors.from_parts(self._array, float(shown))
+                self._filter = LiveRateFilter(self._array, errors, float(1.0 / shown))
+            except GfimuError as error:  # an array that can't see all six motions still has readings
+                self._without_rate = f"no rate: {error}"
         times, readings = self._averaged(batch)
         if not len(times):
             return
         omega = self._estimate(times, readings)
         for stream in self._streams:
             _log(stream, self._array, times, readings, omega)
+            if self._picture is not None:
+                import rerun as rr
+
+                self._picture.add(stream, rr.TimeColumn("t", duration=times), readings)
         now = time.monotonic()
         if self._on_text is not None and now - self._text_at >= _TEXT_EVERY_S:
             self._text_at = now
@@ -123,7 +148,8 @@ class LiveView:
 
     def _estimate(self, times: NDArray[np.float64], readings: NDArray[np.float64]) -> NDArray[np.float64]:
         """Angular rate (m, 3) as far as it is ready, rad/s; the newest is kept."""
-        assert self._filter is not None
+        if self._filter is None:
+            return np.empty((0, 3))
         try:
             result = self._filter.push(times, readings)
         except GfimuError:
@@ -136,7 +162,8 @@ class LiveView:
         elapsed = float(batch.t_s[-1]) - (self._first_s or 0.0)
         rate = self._seen / elapsed if elapsed > 0 else 0.0
         omega = " ".join(f"{value:+7.3f}" for value in self.omega)
-        return f"{elapsed:8.1f} s  {rate:6.1f} Hz  lost {counts.lost}  corrupt {counts.corrupt}  ω {omega} rad/s"
+        motion = self._without_rate or f"ω {omega} rad/s"
+        return f"{elapsed:8.1f} s  {rate:6.1f} Hz  lost {counts.lost}  corrupt {counts.corrupt}  {motion}"
 
     def close(self, *, keep: bool = True) -> None:
         """Show what still waits, and write the rerun recording if it is to be kept.

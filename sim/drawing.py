@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from gfimu.visual.colours import chip_colour
+from gfimu.visual.rig import is_cube
 from gfimu.visual.scene import Box, Cylinder, Mesh, Shape
 from sim.turntable import turntable_model
 from sim.world import World
 
 __all__ = ["rig_drawing"]
 
+_FOOT = "adapter"
+_BOARD = 0.004  # half size, m: boards are larger, the packages on them smaller
 _MOVING = ("cube", "table")  # a body belongs to the first of these among its ancestors, to the base otherwise
 
 
@@ -24,9 +29,11 @@ def rig_drawing(world: World) -> Mapping[str, Sequence[Shape]]:
     Returns
     -------
     mapping
-        ``base`` in the world frame, ``table`` in the table frame, ``cube`` in the cube frame with its chips.
+        ``base`` in the world frame, ``table`` in the table frame, ``cube`` in the cube frame with its chips, each board
+        in the hue of its chip. ``cube`` is missing where the chips are not on that cube, and so is the foot under it.
     """
     model = turntable_model(world)
+    chips = {chip.name: chip_colour(number) for number, chip in enumerate(world.array.chips)}
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     shapes: dict[str, list[Shape]] = {"base": [], "table": [], "cube": []}
@@ -38,9 +45,13 @@ def rig_drawing(world: World) -> Mapping[str, Sequence[Shape]]:
             frame = Rotation.from_quat(data.xquat[body], scalar_first=True).inv()
             position, rotation = frame.apply(position - data.xpos[body]), frame * rotation
         shape = _shape(model, geom, position, rotation)
-        if shape is not None:
-            shapes[group].append(shape)
-    return shapes
+        if shape is None or (not is_cube(world.array) and model.geom(geom).name == _FOOT):
+            continue
+        colour = chips.get(str(model.body(int(model.geom_bodyid[geom])).name))
+        if colour is not None and isinstance(shape, Box) and max(shape.half_size) >= _BOARD:
+            shape = replace(shape, colour=colour)
+        shapes[group].append(shape)
+    return {name: drawn for name, drawn in shapes.items() if name != "cube" or is_cube(world.array)}
 
 
 def _group(model: mujoco.MjModel, body: int) -> str:

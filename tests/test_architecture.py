@@ -294,7 +294,7 @@ OUTSIDE = {
     "criticism": {"gfimu.geometry.kinematics"},
     "design": {"gfimu.recording", "gfimu.importing.oddities"},
     "verdict": {"gfimu.motion.attitude", "gfimu.files.model_files"},
-    "report": {"gfimu.recording", "gfimu.visual"},
+    "report": {"gfimu.recording", "gfimu.visual", "gfimu.geometry.turning_axis"},
 }
 """What of this project a single room of the diagnosis may import besides."""
 

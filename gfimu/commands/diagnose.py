@@ -115,6 +115,7 @@ def write_result(out: str | Path, found: Diagnosis, recording: Recording) -> dic
     import tomli_w
 
     from gfimu.diagnosis.report.folder import write_diagnosis
+    from gfimu.diagnosis.report.rig import DrawnRig
     from gfimu.files.model_files import list_models
     from sim.drawing import rig_drawing
     from sim.twin import Twin
@@ -134,9 +135,9 @@ def write_result(out: str | Path, found: Diagnosis, recording: Recording) -> dic
         found,
         twin_toml=tomli_w.dumps(content),
         more=more,
-        mounting=world.mount_rotvec,
-        cube_centre=world.cube_offset.tolist(),
-        shapes=None if twin.drive_source == "gyro" else rig_drawing(world),
+        rig=DrawnRig(
+            world.mount_rotvec, world.cube_offset, None if twin.drive_source == "gyro" else rig_drawing(world)
+        ),
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -184,8 +184,16 @@ def estimate_run(
     if rrd is not None:
         from gfimu.visual import write_run
 
-        write_run(rrd, run, geometry, estimate=found)
+        write_run(rrd, run, _with_axis(geometry, found), estimate=found)
     return EstimatedRun(found, run, geometry)
+
+
+def _with_axis(array: AccelerometerArray, estimate: Estimate) -> AccelerometerArray:
+    """Return the array with the axis that the estimate is about, as it was found to stand, for a picture."""
+    from gfimu.geometry.turning_axis import TurningAxis
+
+    axis = estimate.metadata.get("turning_axis")
+    return array if axis is None else replace(array, turning_axis=TurningAxis.from_dict(axis, source=array.name))
 
 
 def _opened(

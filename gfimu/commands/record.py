@@ -101,4 +101,9 @@ def _live_view(
 
     carried = AccelerometerArray.load(array or frame_format(form).array)
     lsb = Part.load(carried.chips[0].part, carried.part_files).lsb
-    return LiveView(carried, lsb, on_text=on_text, rrd=None if rrd is None else Path(rrd), viewer=view)
+    picture = None
+    if rrd is not None or view:
+        from gfimu.visual.live import LivePicture
+
+        picture = LivePicture(carried)
+    return LiveView(carried, lsb, on_text=on_text, rrd=None if rrd is None else Path(rrd), viewer=view, picture=picture)

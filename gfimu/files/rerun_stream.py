@@ -63,7 +63,8 @@ def rrd_stream(
     stream = rr.RecordingStream(application)
     content = stream.binary_stream()
     if blueprint is not None:
-        stream.send_blueprint(blueprint, make_active=False, make_default=True)
+        # Active at once: a viewer that is slow, or keeps the layout of another recording, would show its own instead.
+        stream.send_blueprint(blueprint, make_active=True, make_default=True)
     try:
         yield stream
     finally:

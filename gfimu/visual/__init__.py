@@ -7,7 +7,7 @@ from gfimu.visual.comparison import write_comparison
 from gfimu.visual.motion import ExpectedDrift, KnownMotion
 from gfimu.visual.plots import Line, Plot
 from gfimu.visual.run import write_run
-from gfimu.visual.scene import Body, Box, Cylinder, Mesh, Path, Scene, SensingArrows
+from gfimu.visual.scene import Body, Box, Cylinder, Mesh, Names, Path, Pointers, Scene, SensingArrows
 
 __all__ = [
     "Body",
@@ -17,8 +17,10 @@ __all__ = [
     "KnownMotion",
     "Line",
     "Mesh",
+    "Names",
     "Path",
     "Plot",
+    "Pointers",
     "Scene",
     "SensingArrows",
     "write_comparison",

@@ -12,16 +12,18 @@ from numpy.typing import NDArray
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
-from gfimu.visual.colours import MEASURED, PREDICTED_AFTER, PREDICTED_BEFORE, Colour
+from gfimu.visual.colours import AFTER, BEFORE, MEASURED, Colour
 from gfimu.visual.motion import KnownMotion
 from gfimu.visual.plots import Line, Plot
+from gfimu.visual.rig import drawing_size
+from gfimu.visual.rig.words import comparison_legend
 from gfimu.visual.rrd_file import notes_view, write_rrd
 from gfimu.visual.run import run_scene
 from gfimu.visual.scene import Scene, SensingArrows, Shape
 
 __all__ = ["write_comparison"]
 
-_LONGEST_ARROW = 0.1  # length of the largest residual, m
+_LONGEST_ARROW = 2.0  # length of the largest residual, in sizes of the drawing
 
 
 def write_comparison(
@@ -72,7 +74,7 @@ def write_comparison(
     for name, prediction in predictions.items():
         if prediction.shape != measured.shape:
             raise InputError(f"prediction {name!r} has shape {prediction.shape}; the readings have {measured.shape}")
-    known = known or KnownMotion.from_reference(recording)
+    known = known or KnownMotion.from_reference(recording, array)
     readings = _channel_plots(recording.t_s, array, "", {"measured": measured, **predictions})
     left_over = {name: measured - prediction for name, prediction in predictions.items()}
     residuals = _channel_plots(recording.t_s, array, "residual ", left_over, span=_common_span(left_over["before"]))
@@ -81,7 +83,9 @@ def write_comparison(
     if plots:
         tabs.append(rrb.Grid(*[plot.view() for plot in plots], name="further"))
     layout = rrb.Horizontal(
-        rrb.Vertical(scene.view("residuals along the sensing axes"), notes_view(), row_shares=[3, 2]),
+        rrb.Vertical(
+            scene.view(f"residuals along the sensing axes of array {array.name}"), notes_view(), row_shares=[3, 2]
+        ),
         rrb.Tabs(*tabs, active_tab=0),
         column_shares=[2, 3],
     )
@@ -91,14 +95,14 @@ def write_comparison(
         layout=layout,
         scene=scene,
         plots=[*residuals, *readings, *plots],
-        notes=f"{notes}\n\n{_LEGEND}".strip(),
+        notes=f"{notes}\n\n{comparison_legend(array, extended=after is not None)}".strip(),
     )
 
 
 _STYLES: Mapping[str, tuple[str, Colour, float]] = {
     "measured": ("measured", MEASURED, 2.0),
-    "before": ("predicted before", PREDICTED_BEFORE, 1.2),
-    "after": ("predicted after", PREDICTED_AFTER, 1.2),
+    "before": ("predicted before", BEFORE, 1.2),
+    "after": ("predicted after", AFTER, 1.2),
 }
 
 
@@ -145,16 +149,10 @@ def _residual_scene(
 ) -> Scene:
     """Build the scene with one arrow per channel and prediction, as long as its residual."""
     span = _common_span(left_over["before"])
-    scale = _LONGEST_ARROW / span[1] if span is not None else 1.0
+    size = drawing_size(array)
+    scale = _LONGEST_ARROW * size / span[1] if span is not None else size
     arrows = [
-        SensingArrows(array, recording.t_s, residual, scale, _STYLES[name][1]) for name, residual in left_over.items()
+        SensingArrows(array, recording.t_s, residual, scale, 0.044 * size, _STYLES[name][1])
+        for name, residual in left_over.items()
     ]
     return run_scene(arrows, array, known=known, shapes=shapes, on_table=known is None or known.angle is not None)
-
-
-_LEGEND = """\
-**3-D.** Each arrow is as long as what the prediction leaves over on that sensing axis: red before, green after the
-model was extended.
-
-**Plots.** Grey: measured. Red: predicted before. Green: predicted after. One row per chip, one column per axis.
-"""

@@ -9,13 +9,22 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from gfimu.geometry.array import AccelerometerArray
+from gfimu.geometry.turning_axis import TurningAxis
 from gfimu.motion.attitude import from_rotation, table_angle, to_rotation
 from gfimu.recording import Recording
+from gfimu.visual.rig.package import stand_height
 
-__all__ = ["ExpectedDrift", "KnownMotion", "MotionEstimate", "about_z", "table_axis"]
-
-CUBE_HEIGHT = 0.06
-"""Height of the cube's centre above the table where nothing else is known, m."""
+__all__ = [
+    "ExpectedDrift",
+    "KnownMotion",
+    "MotionEstimate",
+    "about_axis",
+    "about_z",
+    "on_hub",
+    "reference_rate",
+    "spin_axis",
+]
 
 
 class MotionEstimate(Protocol):
@@ -82,20 +91,36 @@ class KnownMotion:
     angle: NDArray[np.float64] | None = None
 
     @classmethod
-    def from_reference(cls, recording: Recording) -> KnownMotion | None:
-        """Motion of the table from its encoder or, failing that, from its tachometer; None without either."""
-        t = recording.t_s
-        for column, name in (("angle_rad", "encoder"), ("tacho_rad_s", "∫ tacho")):
-            values = recording.reference.get(column)
-            if values is None or np.isfinite(values).sum() < 2:
-                continue
-            valid = np.isfinite(values)
-            t, values = t[valid], values[valid]
-            if column == "tacho_rad_s":
-                values = table_angle(t, values[:, None] * np.array([0.0, 0.0, 1.0]))
-            mounted = to_rotation(about_z(values)) * _mounting(recording)
-            return cls(name, t, from_rotation(mounted), np.array([0.0, 0.0, CUBE_HEIGHT]), angle=values)
-        return None
+    def from_reference(
+        cls, recording: Recording, array: AccelerometerArray | None = None, estimate: MotionEstimate | None = None
+    ) -> KnownMotion | None:
+        """Motion from the encoder or, failing that, from the tachometer; None without either.
+
+        Parameters
+        ----------
+        recording : Recording
+            Its reference columns.
+        array : AccelerometerArray, optional
+            The array; it turns about its own axis where it has one, and a gyro's rate about that serves as well. By
+            default the cube, which turns about the table's axis z.
+        estimate : MotionEstimate, optional
+            Its first attitude is where a rotation about an axis of the array starts, as no reference says that.
+        """
+        axis = None if array is None else array.turning_axis
+        found = _reference_angle(recording, axis)
+        if found is None:
+            return None
+        name, t, angle = found
+        if array is None or axis is None:
+            mounted = to_rotation(about_z(angle)) * _mounting(recording)
+            return cls(name, t, from_rotation(mounted), np.array([0.0, 0.0, stand_height(array)]), angle=angle)
+        start = about_axis(axis, np.zeros(1))[0]
+        if estimate is not None and len(complete := np.flatnonzero(np.isfinite(estimate.quaternion).all(axis=1))):
+            first = complete[0]
+            turned = float(np.interp(estimate.t_s[first], t, angle))
+            start = to_rotation(estimate.quaternion[first]) * Rotation.from_rotvec(-turned * axis.direction)
+        attitude = start * Rotation.from_rotvec(np.outer(angle, axis.direction))
+        return cls(name, t, from_rotation(attitude), on_hub(array, attitude), angle=angle)
 
 
 @dataclass(frozen=True)
@@ -123,9 +148,61 @@ def about_z(angle: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.column_stack([np.cos(angle / 2), zero, zero, np.sin(angle / 2)])
 
 
-def table_axis(recording: Recording) -> NDArray[np.float64]:
-    """Direction of the table's axis in body axes, shape (3,): the cube may have been turned before the run."""
+def about_axis(axis: TurningAxis, angle: NDArray[np.float64]) -> Rotation:
+    """Attitudes, body to world, of a body turned about an axis by angles (n,), rad; its heading is a choice."""
+    upright, _ = Rotation.align_vectors([[0.0, 0.0, 1.0]], [axis.direction])
+    tilted = Rotation.from_rotvec([0.0, axis.inclination or 0.0, 0.0])
+    return tilted * Rotation.from_rotvec(np.outer(angle, [0.0, 0.0, 1.0])) * upright
+
+
+def on_hub(array: AccelerometerArray, attitude: Rotation) -> NDArray[np.float64]:
+    """Positions of the body's origin, m, (n, 3), for attitudes about the array's axis, which stands still."""
+    point = np.zeros(3) if array.turning_axis is None else array.turning_axis.point
+    return np.asarray(np.array([0.0, 0.0, stand_height(array)]) - attitude.apply(point))
+
+
+def spin_axis(recording: Recording, array: AccelerometerArray) -> NDArray[np.float64]:
+    """Direction of the axis of rotation in body axes, shape (3,): the array's own, else that of the table.
+
+    The cube may have been turned on the table before the run.
+    """
+    if array.turning_axis is not None:
+        return array.turning_axis.direction
     return np.asarray(_mounting(recording).inv().apply([0.0, 0.0, 1.0]))
+
+
+def reference_rate(recording: Recording, axis: NDArray[np.float64]) -> tuple[str, NDArray[np.float64]] | None:
+    """Name and rate about an axis, rad/s, (n,), of the tachometer or, failing that, of a gyro; None without either."""
+    tacho = recording.reference.get("tacho_rad_s")
+    if tacho is not None:
+        return "tacho", tacho
+    gyro = [recording.reference.get(f"gyro_{name}_rad_s") for name in "xyz"]
+    parts = [axis[place] * one for place, one in enumerate(gyro) if one is not None and abs(axis[place]) > 1e-9]
+    missing = any(one is None and abs(axis[place]) > 1e-9 for place, one in enumerate(gyro))
+    return None if missing else ("gyro", np.sum(parts, axis=0))
+
+
+def _reference_angle(
+    recording: Recording, axis: TurningAxis | None
+) -> tuple[str, NDArray[np.float64], NDArray[np.float64]] | None:
+    """Name, times and angle, rad, of the best reference of the rotation about one axis."""
+    candidates = []
+    if (encoder := recording.reference.get("angle_rad")) is not None:
+        candidates.append(("encoder", encoder))
+    if axis is not None:
+        rate = reference_rate(recording, axis.direction)
+        candidates += [] if rate is None else [(f"∫ {rate[0]}", rate[1])]
+    elif (tacho := recording.reference.get("tacho_rad_s")) is not None:
+        candidates.append(("∫ tacho", tacho))
+    for name, values in candidates:
+        valid = np.isfinite(values)
+        if valid.sum() < 2:
+            continue
+        t, angle = recording.t_s[valid], values[valid]
+        if name != "encoder":
+            angle = table_angle(t, angle[:, None] * np.array([0.0, 0.0, 1.0]))
+        return name, t, angle
+    return None
 
 
 def _mounting(recording: Recording) -> Rotation:

@@ -8,8 +8,10 @@ from pathlib import Path
 
 from gfimu.errors import GeometryError, InputError
 from gfimu.geometry.array import AccelerometerArray
+from gfimu.geometry.turning_axis import TurningAxis
+from gfimu.known_axis import estimate_about_axis
 from gfimu.motion.estimation import Estimate, estimate
-from gfimu.motion.rest_bias import estimate_from_rest
+from gfimu.motion.rest_bias import estimate_from_rest, rest_bias
 from gfimu.recording import Recording
 from gfimu.recording.formats import open_run
 from gfimu.recording.mapped import MappedFile
@@ -59,8 +61,39 @@ def _estimate(run: Recording, array: AccelerometerArray) -> tuple[Estimate | Non
             return estimate_from_rest(run, array), "Biases were read off the first rest, with the table taken as level."
         return estimate(run, array), ""
     except GeometryError as error:
-        return None, f"No estimate: {error}."
+        return (
+            _about_axis(run, array, array.turning_axis) if array.turning_axis is not None else (None, _missing(error))
+        )
     except InputError as error:  # nothing to read biases off: their effect stays in the picture
         if not on_table:
             raise
         return estimate(run, array), f"Biases are left in: {error}."
+
+
+def _about_axis(run: Recording, array: AccelerometerArray, axis: TurningAxis) -> tuple[Estimate | None, str]:
+    """Estimate about the array's axis, with the biases of a rest where the body then stood level."""
+    note = "Biases are left in: those of a free hub can't be read off a rest."
+    if axis.hub == "fixed":
+        try:
+            found = rest_bias(run, array)
+            beyond = found.findings()
+            if beyond:
+                note = "Biases are left in: at rest the channels do not read those of a body that stands level."
+            else:
+                run, note = found.remove(run), "Biases were read off the first rest, with the axis taken as upright."
+        except InputError as error:
+            note = f"Biases are left in: {error}."
+    try:
+        estimated = estimate_about_axis(run, array, axis)
+    except InputError as error:  # a chip on the axis itself, say
+        return None, _missing(error)
+    warned = "".join(f" Note: {warning}." for warning in estimated.metadata["warnings"])
+    return estimated, f"The array sees the rotation about its axis only, which is estimated. {note}{warned}"
+
+
+def _missing(error: InputError) -> str:
+    """Return what is missing for an estimate, and where it would go."""
+    return (
+        f"**No estimate.** {error}. The axis is read from the array file: `[turning_axis]` with "
+        "`direction = [0, 0, 1]`. The channels are drawn as they are."
+    )

@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 from gfimu.visual.colours import Colour
 from gfimu.visual.scene import TIMELINE
 
-__all__ = ["Line", "Plot"]
+__all__ = ["LONGEST_LEGEND", "Line", "Plot"]
 
-_LONGEST_LEGEND = 12  # lines; a longer legend would cover the plot
+LONGEST_LEGEND = 12
+"""Lines that a legend names; a longer one would cover the plot."""
 
 
 @dataclass(frozen=True)
@@ -92,7 +93,7 @@ class Plot:
             axis_x=rrb.TimeAxis(link=rrb.components.LinkAxis.LinkToGlobal, view_range=_whole_run(self.lines)),
             axis_y=None if self.span is None else rrb.ScalarAxis(range=self.span),
             plot_legend=rrb.PlotLegend(
-                corner=_emptiest_corner(self.lines), visible=self.legend and len(self.lines) <= _LONGEST_LEGEND
+                corner=_emptiest_corner(self.lines), visible=self.legend and len(self.lines) <= LONGEST_LEGEND
             ),
         )
 

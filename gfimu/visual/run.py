@@ -1,4 +1,4 @@
-"""The picture of a run: the rig turning with truth and estimate, and every quantity over time."""
+"""The picture of a run: the array turning with truth and estimate, and every quantity over time."""
 
 from __future__ import annotations
 
@@ -7,11 +7,39 @@ from pathlib import Path as FilePath
 
 import numpy as np
 import rerun.blueprint as rrb
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from gfimu.geometry.array import AccelerometerArray
+from gfimu.motion.attitude import from_rotation, to_rotation
 from gfimu.recording import Recording
-from gfimu.visual.motion import CUBE_HEIGHT, ExpectedDrift, KnownMotion, MotionEstimate, about_z
+from gfimu.units import STANDARD_GRAVITY
+from gfimu.visual.motion import (
+    ExpectedDrift,
+    KnownMotion,
+    MotionEstimate,
+    about_axis,
+    about_z,
+    on_hub,
+    spin_axis,
+)
 from gfimu.visual.plots import Plot
+from gfimu.visual.rig import (
+    array_shapes,
+    axes_shapes,
+    axis_shapes,
+    channel_shapes,
+    chip_names,
+    drawing_size,
+    ghost_shapes,
+    gravity_shapes,
+    is_cube,
+    post_shapes,
+    stand_height,
+    table_axis_shapes,
+    table_shapes,
+)
+from gfimu.visual.rig.words import run_legend, scene_title
 from gfimu.visual.rrd_file import notes_view, write_rrd
 from gfimu.visual.run_plots import (
     angle_plot,
@@ -19,11 +47,14 @@ from gfimu.visual.run_plots import (
     free_rate_plots,
     motion_plots,
     raw_plots,
-    table_rate_plots,
+    spin_rate_plots,
 )
-from gfimu.visual.scene import Body, Path, Scene, SensingArrows, Shape, bounding_box, ghost_shapes, rig_shapes
+from gfimu.visual.scene import Body, Path, Scene, SensingArrows, Shape
 
-__all__ = ["run_scene", "write_run"]
+__all__ = ["reading_arrows", "run_scene", "write_run"]
+
+_ARROW_PER_G = 1.2  # length of an arrow at 1 g, in sizes of the drawing
+_UNCROWDED = 6  # chips that can have arrows of that length
 
 
 def write_run(
@@ -67,26 +98,27 @@ def write_run(
         If the recording lacks a channel of the array, or the file can't be written.
     """
     readings = recording.for_array(array)
-    known = known or KnownMotion.from_reference(recording)
-    on_table = _on_table(recording, known)
-    arrows = [SensingArrows(array, recording.t_s, readings)]
-    scene = run_scene(arrows, array, estimate=estimate, known=known, shapes=shapes, on_table=on_table)
+    axis = array.turning_axis
+    known = known or KnownMotion.from_reference(recording, array, estimate)
+    spins = axis is not None or _on_table(recording, known)
+    arrows = [reading_arrows(array, recording.t_s, readings)]
+    scene = run_scene(arrows, array, estimate=estimate, known=known, shapes=shapes, on_table=spins)
     raw = raw_plots(recording.t_s, readings, array)
-    cells: list[Sequence[Plot]] = [
-        [plot] for plot in (table_rate_plots if on_table else free_rate_plots)(recording, estimate, known)
-    ]
+    about = spin_axis(recording, array)
+    rates = spin_rate_plots(recording, estimate, known, about) if spins else free_rate_plots(recording, estimate, known)
+    cells: list[Sequence[Plot]] = [[plot] for plot in rates]
     if estimate is not None:
         alpha, *force = motion_plots(estimate, known)
-        cells += [[alpha], force]
-    angle = angle_plot(recording, estimate, known) if on_table or known is not None else None
+        cells += [[alpha], force] if force else [[alpha]]
+    angle = angle_plot(estimate, known, about) if spins or known is not None else None
     cells += [[plot] for plot in (angle, drift_plot(drift) if drift is not None else None) if plot is not None]
     write_rrd(
         path,
         title=title or str(recording.metadata.get("scenario", array.name)),
-        layout=_layout(scene.view("table and cube" if on_table else "body"), raw, cells),
+        layout=_layout(scene.view(scene_title(array)), raw, cells, notes_apart=bool(notes) and estimate is None),
         scene=scene,
-        plots=[*raw, *[plot for cell in cells for plot in cell]],
-        notes=f"{notes}\n\n{_LEGEND}".strip(),
+        plots=[plot for group in (*raw, *cells) for plot in group],
+        notes=f"{notes}\n\n{run_legend(array, estimate=estimate is not None, known=known)}".strip(),
     )
 
 
@@ -110,32 +142,69 @@ def run_scene(
     on_table : bool
         Whether to draw the table.
     """
-    shapes = {**rig_shapes(array), **(shapes or {})}
-    height = np.array([0.0, 0.0, CUBE_HEIGHT])
-    if known is not None:
-        solid = Path(known.t, known.quaternion, known.position)
-    elif estimate is not None:
-        solid = Path(estimate.t_s, estimate.quaternion, height)
-    else:
-        solid = Path(np.zeros(1), np.array([[1.0, 0.0, 0.0, 0.0]]), height)
+    axis = array.turning_axis
+    solid = _solid(array, estimate, known)
+    start = np.nan_to_num(np.atleast_2d(solid.position)[0])
+    table = "table" in (shapes or {}) or (on_table and axis is None)
     bodies = []
-    if on_table:
+    if table:
+        angle = 0.0 if known is None or known.angle is None or not len(known.angle) else float(known.angle[0])
+        centre = Rotation.from_rotvec([0.0, 0.0, -angle]).apply(start)  # of the body, in the table frame
+        drawn = {**table_shapes(array, centre), **(shapes or {})}
+        if "table" in (shapes or {}):
+            drawn["table"] = [*drawn["table"], *post_shapes(array, centre)]
         turning = solid if known is None or known.angle is None else Path(known.t, about_z(known.angle))
         bodies += [
-            Body("base", shapes["base"]),
-            Body("table", shapes["table"], Path(turning.t, turning.quaternion)),
+            Body("base", drawn["base"]),
+            Body("table", drawn["table"], Path(turning.t, turning.quaternion)),
         ]
-    bodies.append(Body("cube", shapes["cube"], solid, arrows))
+    body = [
+        *(shapes or {}).get("cube", array_shapes(array)),
+        channel_shapes(array),
+        chip_names(array),
+        axes_shapes(array),
+        *([] if axis is None else axis_shapes(axis, array)),
+    ]
+    bodies.append(Body("cube" if is_cube(array) else "array", body, solid, arrows))
+    bodies.append(Body("gravity", gravity_shapes(array, start)))
+    if table and axis is None:
+        bodies.append(Body("axis", table_axis_shapes(array, start)))
     if estimate is not None and known is not None:
-        position = known.position
-        if position.ndim == 2:
-            position = np.column_stack([np.interp(estimate.t_s, known.t, column) for column in position.T])
-        bodies.append(Body("estimate", ghost_shapes(array), Path(estimate.t_s, estimate.quaternion, position)))
-    if on_table:
+        bodies.append(Body("estimate", ghost_shapes(array), _ghost_path(array, estimate, known)))
+    if table and is_cube(array):
         return Scene(bodies)
-    start = np.nan_to_num(np.atleast_2d(solid.position)[0])
-    distance = 4.0 * float(bounding_box(array)[0].max())
-    return Scene(bodies, eye=start + distance * np.array([1.1, -1.0, 0.8]), look_at=start)
+    size = drawing_size(array)
+    return Scene(bodies, eye=start + 2.6 * size * np.array([1.1, -1.0, 0.8]), look_at=start, grid_spacing=size)
+
+
+def reading_arrows(array: AccelerometerArray, t: NDArray[np.float64], readings: NDArray[np.float64]) -> SensingArrows:
+    """Return the arrows of readings (n, c), m/s²: 1 g is 1.2 sizes of the drawing, less where many chips crowd."""
+    size = drawing_size(array) * min(1.0, np.sqrt(_UNCROWDED / len(array.chips)))
+    return SensingArrows(array, t, readings, _ARROW_PER_G * size / STANDARD_GRAVITY, 0.044 * size)
+
+
+def _solid(array: AccelerometerArray, estimate: MotionEstimate | None, known: KnownMotion | None) -> Path:
+    """Return the path of the body: as known, else as estimated, else at rest."""
+    if known is not None:
+        return Path(known.t, known.quaternion, known.position)
+    height, axis = np.array([0.0, 0.0, stand_height(array)]), array.turning_axis
+    if estimate is not None:
+        place = height if axis is None else on_hub(array, to_rotation(estimate.quaternion))
+        return Path(estimate.t_s, estimate.quaternion, place)
+    if axis is None:
+        return Path(np.zeros(1), np.array([[1.0, 0.0, 0.0, 0.0]]), height)
+    attitude = about_axis(axis, np.zeros(1))
+    return Path(np.zeros(1), from_rotation(attitude), on_hub(array, attitude))
+
+
+def _ghost_path(array: AccelerometerArray, estimate: MotionEstimate, known: KnownMotion) -> Path:
+    """Return the path of the estimate's ghost, which stands where the body is known to stand."""
+    position = known.position
+    if array.turning_axis is not None and known.omega is None:
+        position = on_hub(array, to_rotation(estimate.quaternion))
+    elif position.ndim == 2:
+        position = np.column_stack([np.interp(estimate.t_s, known.t, column) for column in position.T])
+    return Path(estimate.t_s, estimate.quaternion, position)
 
 
 def _on_table(recording: Recording, known: KnownMotion | None) -> bool:
@@ -145,15 +214,29 @@ def _on_table(recording: Recording, known: KnownMotion | None) -> bool:
     return any(name in recording.reference for name in ("angle_rad", "tacho_rad_s", "command_rad_s"))
 
 
-def _layout(scene: rrb.Spatial3DView, raw: Sequence[Plot], cells: Sequence[Sequence[Plot]]) -> rrb.Container:
-    """Scene above the raw channels on the left, everything derived in a grid on the right."""
+def _layout(
+    scene: rrb.Spatial3DView,
+    raw: Sequence[Sequence[Plot]],
+    cells: Sequence[Sequence[Plot]],
+    *,
+    notes_apart: bool = False,
+) -> rrb.Container:
+    """Scene above the raw channels on the left, everything derived in a grid on the right.
+
+    The notes are a tab beside the channels, or a view of their own where they say why something is missing.
+    """
+    if len(raw) == 1:
+        readings = [plot.view() for plot in raw[0]]
+    else:
+        readings = [rrb.Vertical(*[plot.view() for plot in group], name=_group_name(group)) for group in raw]
     if not cells:
-        return rrb.Horizontal(
-            rrb.Vertical(scene, notes_view(), row_shares=[3, 1]),
-            rrb.Vertical(*[plot.view() for plot in raw]),
-            column_shares=[2, 3],
-        )
-    left = rrb.Vertical(scene, rrb.Tabs(*[plot.view() for plot in raw], notes_view(), active_tab=0), row_shares=[3, 2])
+        beside = rrb.Vertical(*readings) if len(raw) == 1 else rrb.Tabs(*readings, active_tab=0)
+        left = rrb.Vertical(scene, notes_view(), row_shares=[3, 1])
+        return rrb.Horizontal(left, beside, column_shares=[2, 3])
+    if notes_apart:
+        left = rrb.Vertical(scene, notes_view(), rrb.Tabs(*readings, active_tab=0), row_shares=[5, 3, 4])
+    else:
+        left = rrb.Vertical(scene, rrb.Tabs(*readings, notes_view(), active_tab=0), row_shares=[3, 2])
     views = [cell[0].view() if len(cell) == 1 else rrb.Tabs(*[plot.view() for plot in cell]) for cell in cells]
     across = 2 if len(views) > 3 else 1
     rows = [views[first : first + across] for first in range(0, len(views), across)]
@@ -161,13 +244,6 @@ def _layout(scene: rrb.Spatial3DView, raw: Sequence[Plot], cells: Sequence[Seque
     return rrb.Horizontal(left, right, column_shares=[2, 3])
 
 
-_LEGEND = """\
-**3-D.** Table and cube stand as they truly stand, or as the reference says; the orange outline and its pointer turn
-with the estimate. Thin lines are the sensing axes; each arrow is as long as its axis reads; 1 g is a little
-more than half the cube.
-
-**Colours.** Grey: truth. Orange: estimate, its ±2σ paler. Sky blue: tachometer or encoder. Violet: command.
-Red, green, blue: x, y, z. One hue per chip.
-
-All plots share the time axis. Drag to move, scroll to zoom, double-click to see everything.
-"""
+def _group_name(group: Sequence[Plot]) -> str:
+    """Return "raw, a1 to a8" of a group of plots with such titles."""
+    return group[0].title.rpartition(", axis")[0]

@@ -11,45 +11,60 @@ from gfimu.geometry.array import AccelerometerArray
 from gfimu.motion.attitude import table_angle, to_rotation
 from gfimu.recording import Recording
 from gfimu.visual.colours import AXES, COMMAND, ESTIMATE, ESTIMATE_BAND, TACHO, TRUTH, chip_colour
-from gfimu.visual.motion import ExpectedDrift, KnownMotion, MotionEstimate, table_axis
-from gfimu.visual.plots import Line, Plot
+from gfimu.visual.motion import ExpectedDrift, KnownMotion, MotionEstimate, reference_rate
+from gfimu.visual.plots import LONGEST_LEGEND, Line, Plot
 
-__all__ = ["angle_plot", "drift_plot", "free_rate_plots", "motion_plots", "raw_plots", "table_rate_plots"]
+__all__ = ["angle_plot", "drift_plot", "free_rate_plots", "motion_plots", "raw_plots", "spin_rate_plots"]
 
 _NAMES = ("x", "y", "z")
 _BOTH_SIDES = 2 * np.array([-1.0, 1.0])  # ±2σ
+_CHIPS_PER_GROUP = 8
 _SHOWN = 0.9  # of the errors and their band
 
 
-def raw_plots(t: NDArray[np.float64], readings: NDArray[np.float64], array: AccelerometerArray) -> list[Plot]:
-    """One plot per number of sensing axis on the chip, with one line per chip; readings (n, c), m/s²."""
+def raw_plots(t: NDArray[np.float64], readings: NDArray[np.float64], array: AccelerometerArray) -> list[list[Plot]]:
+    """Plot the readings (n, c), m/s², in groups of plots: one per number of sensing axis, one line per chip.
+
+    More chips than a legend can name are split into groups.
+    """
     axis_on_chip = np.concatenate([np.arange(len(chip.axes)) for chip in array.chips])
-    return [
-        Plot(
-            f"raw, axis {axis + 1}, m/s²",
+    count = len(array.chips)
+    size = count if count <= LONGEST_LEGEND else _CHIPS_PER_GROUP
+    groups = []
+    for first in range(0, count, size):
+        inside = (array.chip_of_channel >= first) & (array.chip_of_channel < first + size)
+        named = f"{array.chips[first].name} to {array.chips[min(first + size, count) - 1].name}, "
+        groups.append(
             [
-                Line(
-                    array.channels[column], t, readings[:, column], chip_colour(int(array.chip_of_channel[column])), 1.0
+                Plot(
+                    f"raw, {named if size < count else ''}axis {axis + 1}, m/s²",
+                    [
+                        Line(
+                            array.channels[column],
+                            t,
+                            readings[:, column],
+                            chip_colour(int(array.chip_of_channel[column])),
+                            1.0,
+                        )
+                        for column in np.flatnonzero(inside & (axis_on_chip == axis))
+                    ],
                 )
-                for column in np.flatnonzero(axis_on_chip == axis)
-            ],
+                for axis in np.unique(axis_on_chip[inside])
+            ]
         )
-        for axis in np.unique(axis_on_chip)
-    ]
+    return groups
 
 
-def table_rate_plots(recording: Recording, estimate: MotionEstimate | None, known: KnownMotion | None) -> list[Plot]:
-    """Rate about the table's axis with every reference and its ±2σ band; then its error in the same band."""
+def spin_rate_plots(
+    recording: Recording, estimate: MotionEstimate | None, known: KnownMotion | None, axis: NDArray[np.float64]
+) -> list[Plot]:
+    """Rate about an axis, shape (3,), with every reference and its ±2σ band; then its error in the same band."""
     t = recording.t_s
-    axis = table_axis(recording)
-    lines = [
-        Line(name, t, recording.reference[column], colour, width)
-        for name, column, colour, width in (
-            ("command", "command_rad_s", COMMAND, 2.0),
-            ("tacho", "tacho_rad_s", TACHO, 1.5),
-        )
-        if column in recording.reference
-    ]
+    lines = []
+    if "command_rad_s" in recording.reference:
+        lines.append(Line("command", t, recording.reference["command_rad_s"], COMMAND, 2.0))
+    if (measured := reference_rate(recording, axis)) is not None:
+        lines.append(Line(measured[0], t, measured[1], TACHO, 1.5))
     compared = (lines[-1].name, t, lines[-1].values) if lines else None
     if known is not None and known.omega is not None:
         lines.append(Line(known.name, known.t, known.omega @ axis, TRUTH, 2.5))
@@ -60,7 +75,7 @@ def table_rate_plots(recording: Recording, estimate: MotionEstimate | None, know
         lines.insert(0, Line("±2σ", estimate.t_s, rate[:, None] + spread, ESTIMATE_BAND, 1.0))
         lines.append(Line("estimate", estimate.t_s, rate, ESTIMATE))
     span = None if estimate is None else _span(rate, 1.0, margin=1.2)
-    plots = [Plot("angular rate about the table's axis, rad/s", lines, span=span)] if lines else []
+    plots = [Plot("angular rate about the axis of rotation, rad/s", lines, span=span)] if lines else []
     if estimate is not None and compared is not None:
         name, reference_t, reference = compared
         error = rate - np.interp(estimate.t_s, reference_t, reference)
@@ -101,21 +116,23 @@ def free_rate_plots(recording: Recording, estimate: MotionEstimate | None, known
 
 
 def motion_plots(estimate: MotionEstimate, known: KnownMotion | None) -> Iterator[Plot]:
-    """Yield angular acceleration, and horizontal and vertical specific force of the body origin."""
+    """Yield angular acceleration, and horizontal and vertical specific force of the body origin where it is known."""
     known_alpha, known_p = (None, None) if known is None else (known.alpha, known.p)
     for title, symbol, values, truth, axes in (
         ("angular acceleration α, rad/s²", "α", estimate.alpha, known_alpha, [0, 1, 2]),
         ("specific force p, body x and y, m/s²", "p", estimate.p, known_p, [0, 1]),
         ("p, body z, m/s²", "p", estimate.p, known_p, [2]),
     ):
+        if not np.isfinite(values[:, axes]).any():
+            continue
         lines = [Line(f"{symbol} {_NAMES[axis]}", estimate.t_s, values[:, axis], AXES[axis], 1.0) for axis in axes]
         if known is not None and truth is not None:
             lines.insert(0, Line(known.name, known.t, truth[:, axes], TRUTH, 2.5))
         yield Plot(title, lines)
 
 
-def angle_plot(recording: Recording, estimate: MotionEstimate | None, known: KnownMotion | None) -> Plot | None:
-    """Angle of the table; of a free body, the angle between the estimated attitude and the known one."""
+def angle_plot(estimate: MotionEstimate | None, known: KnownMotion | None, axis: NDArray[np.float64]) -> Plot | None:
+    """Angle about an axis, shape (3,); of a free body, the angle between the estimated attitude and the known one."""
     if known is not None and known.angle is None:
         if estimate is None:
             return None
@@ -130,9 +147,9 @@ def angle_plot(recording: Recording, estimate: MotionEstimate | None, known: Kno
     if known is not None and known.angle is not None:
         lines.append(Line(known.name, known.t, known.angle, TACHO if known.omega is None else TRUTH, 2.5))
     if estimate is not None:
-        angle = table_angle(estimate.t_s, estimate.omega, axis=table_axis(recording))
+        angle = table_angle(estimate.t_s, estimate.omega, axis=axis)
         lines.append(Line("estimate", estimate.t_s, angle, ESTIMATE))
-    return Plot("angle of the table, rad", lines) if lines else None
+    return Plot("angle about the axis of rotation, rad", lines) if lines else None
 
 
 def drift_plot(drift: ExpectedDrift) -> Plot:

@@ -1,11 +1,11 @@
-"""The 3-D scene of a recording: bodies made of boxes, cylinders and meshes that turn and move over time.
+"""The 3-D scene of a recording: bodies made of boxes, meshes, arrows and names that turn and move over time.
 
 Geometry comes as plain arrays, so that a MuJoCo model, a drawing or nothing but the array file can supply it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -15,21 +15,19 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from gfimu.geometry.array import AccelerometerArray
-from gfimu.units import STANDARD_GRAVITY
-from gfimu.visual.colours import ESTIMATE, METAL, TABLE, Colour, chip_colour
+from gfimu.visual.colours import BACKGROUND, METAL, TABLE, Colour, chip_colour
 
 __all__ = [
     "Body",
     "Box",
     "Cylinder",
     "Mesh",
+    "Names",
     "Path",
+    "Pointers",
     "Scene",
     "SensingArrows",
     "Shape",
-    "bounding_box",
-    "ghost_shapes",
-    "rig_shapes",
 ]
 
 TIMELINE = "time"
@@ -37,10 +35,6 @@ TIMELINE = "time"
 
 _MOST_POSES = 20_000  # poses of a body in one file; longer runs are thinned evenly, their plots are not
 _SIDES = 96  # of a cylinder
-_TABLE_RADIUS = 0.15
-_TABLE_THICKNESS = 0.012
-_AXIS_LENGTH = 0.36  # a sensing axis is drawn this far to both sides of its chip, in half sizes of the array
-_ARROW_PER_G = 1.2  # length of an arrow at 1 g, in half sizes of the array
 
 
 @dataclass(frozen=True)
@@ -75,7 +69,28 @@ class Mesh:
     colour: Colour = METAL
 
 
-Shape = Box | Cylinder | Mesh
+@dataclass(frozen=True)
+class Pointers:
+    """Arrows in their body's frame: starts and vectors (k, 3), m; a colour and a name for each, and their radius, m."""
+
+    origins: NDArray[np.float64]
+    vectors: NDArray[np.float64]
+    colours: Sequence[Colour]
+    labels: Sequence[str]
+    radius: float
+    show_labels: bool = True
+
+
+@dataclass(frozen=True)
+class Names:
+    """Names in their body's frame: places (k, 3), m, texts, and a colour for each."""
+
+    places: NDArray[np.float64]
+    texts: Sequence[str]
+    colours: Sequence[Colour]
+
+
+Shape = Box | Cylinder | Mesh | Pointers | Names
 
 
 @dataclass(frozen=True)
@@ -109,8 +124,10 @@ class SensingArrows:
         Time, s.
     readings : ndarray, shape (n, c)
         Reading of each channel, m/s².
-    length_per_m_s2 : float, optional
-        Length drawn for 1 m/s², m; by default 1 g is 1.2 half sizes of the array (6 cm on the cube of 10 cm).
+    length_per_m_s2 : float
+        Length drawn for 1 m/s², m.
+    radius : float
+        Of the arrows, m.
     colour : Colour, optional
         One colour for all arrows; each chip's own otherwise.
     """
@@ -118,7 +135,8 @@ class SensingArrows:
     array: AccelerometerArray
     t: NDArray[np.float64]
     readings: NDArray[np.float64]
-    length_per_m_s2: float | None = None
+    length_per_m_s2: float
+    radius: float
     colour: Colour | None = None
 
 
@@ -142,11 +160,14 @@ class Scene:
         Their names become entity paths.
     eye, look_at : sequence of float, shape (3,)
         Position of the eye and the point it looks at, m.
+    grid_spacing : float
+        Distance of the lines on the ground, m.
     """
 
     bodies: Sequence[Body]
     eye: Sequence[float] = (0.27, -0.25, 0.22)
     look_at: Sequence[float] = (0.0, 0.0, 0.04)
+    grid_spacing: float = 0.05
 
     def log(self, stream: rr.RecordingStream) -> None:
         """Write the bodies, their paths and their arrows to a rerun stream."""
@@ -165,57 +186,15 @@ class Scene:
         return rrb.Spatial3DView(
             origin="/scene",
             name=name,
-            background=[24, 26, 30],
-            line_grid=rrb.LineGrid3D(spacing=0.05, color=[90, 96, 104, 60]),
+            background=list(BACKGROUND),
+            line_grid=rrb.LineGrid3D(spacing=self.grid_spacing, color=[90, 96, 104, 60]),
             eye_controls=rrb.EyeControls3D(
                 kind=rrb.Eye3DKind.Orbital, position=list(self.eye), look_target=list(self.look_at), eye_up=[0, 0, 1]
             ),
         )
 
 
-def rig_shapes(array: AccelerometerArray) -> Mapping[str, Sequence[Shape]]:
-    """Shapes of a plain rig around an array, for when no model of it is given.
-
-    Returns
-    -------
-    mapping
-        ``base`` and ``table`` (a disc with a mark on its rim, top face at z = 0 of the table's frame) and ``cube``
-        (the smallest box around the chips, and the chips).
-    """
-    half, centre = bounding_box(array)
-    chip = max(0.06 * float(half.max()), 0.001)
-    names = [chip_.name for chip_ in array.chips]
-    chips = [
-        Box((1.6 * chip, 1.6 * chip, chip), position, colour=chip_colour(number), label=name)
-        for number, (position, name) in enumerate(zip(array.chip_positions.tolist(), names, strict=True))
-    ]
-    mark = Box((0.02, 0.004, 0.002), (_TABLE_RADIUS - 0.024, 0.0, 0.001), colour=METAL)
-    return {
-        "base": [
-            Cylinder(0.07, 0.05, (0.0, 0.0, -_TABLE_THICKNESS - 0.025), colour=(52, 58, 68)),
-            Cylinder(0.11, 0.012, (0.0, 0.0, -_TABLE_THICKNESS - 0.056), colour=(44, 50, 58)),
-        ],
-        "table": [Cylinder(_TABLE_RADIUS, _TABLE_THICKNESS, (0.0, 0.0, -_TABLE_THICKNESS / 2)), mark],
-        "cube": [Box((0.94 * half).tolist(), centre.tolist(), colour=METAL), *chips],
-    }
-
-
-def ghost_shapes(array: AccelerometerArray) -> Sequence[Shape]:
-    """Shapes of the estimate's ghost: an outline around the cube and a pointer along its x axis."""
-    half, centre = bounding_box(array)
-    length, size = 1.6 * float(half[0]), float(half.max())
-    pointer = Box((length, 0.05 * size, 0.03 * size), (centre[0] + length, 0.0, -float(half[2])), colour=ESTIMATE)
-    return [Box((1.12 * half).tolist(), centre.tolist(), colour=ESTIMATE, wireframe=True), pointer]
-
-
-def bounding_box(array: AccelerometerArray) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Half sizes and centre of the smallest box around the chips, m; flat arrays get some thickness."""
-    low, high = array.chip_positions.min(axis=0), array.chip_positions.max(axis=0)
-    half = (high - low) / 2
-    return np.maximum(half, 0.1 * max(float(half.max()), 0.005)), (low + high) / 2
-
-
-def _archetype(shape: Shape) -> rr.Boxes3D | rr.Mesh3D:
+def _archetype(shape: Shape) -> rr.Boxes3D | rr.Mesh3D | rr.Arrows3D | rr.Points3D:
     match shape:
         case Box():
             return rr.Boxes3D(
@@ -225,12 +204,25 @@ def _archetype(shape: Shape) -> rr.Boxes3D | rr.Mesh3D:
                 colors=[shape.colour],
                 radii=[0.015 * max(shape.half_size)] if shape.wireframe else None,
                 labels=[shape.label] if shape.label else None,
-                show_labels=False if shape.label else None,
+                show_labels=False if shape.label else None,  # the chips' names stand beside them
                 fill_mode="MajorWireframe" if shape.wireframe else "Solid",
             )
         case Cylinder():
             vertices, triangles = _cylinder_mesh(shape)
             return rr.Mesh3D(vertex_positions=vertices, triangle_indices=triangles, albedo_factor=shape.colour)
+        case Pointers():
+            return rr.Arrows3D(
+                origins=shape.origins,
+                vectors=shape.vectors,
+                colors=shape.colours,
+                radii=[shape.radius],
+                labels=list(shape.labels) or None,
+                show_labels=shape.show_labels if shape.labels else None,
+            )
+        case Names():
+            return rr.Points3D(
+                shape.places, colors=shape.colours, radii=[0.0], labels=list(shape.texts), show_labels=True
+            )
         case Mesh():
             return rr.Mesh3D(
                 vertex_positions=shape.vertices, triangle_indices=shape.triangles, albedo_factor=shape.colour
@@ -283,18 +275,13 @@ def _log_arrows(stream: rr.RecordingStream, entity: str, arrows: SensingArrows) 
     array = arrows.array
     keep = _thinned(len(arrows.t))
     t = arrows.t[keep]
-    size = float(bounding_box(array)[0].max())
-    scale = _ARROW_PER_G * size / STANDARD_GRAVITY if arrows.length_per_m_s2 is None else arrows.length_per_m_s2
-    lengths = np.nan_to_num(arrows.readings[keep]) * scale  # (n, c)
+    lengths = np.nan_to_num(arrows.readings[keep]) * arrows.length_per_m_s2  # (n, c)
     vectors = lengths[:, :, None] * array.axes  # (n, c, 3)
     chips = [chip_colour(int(chip)) for chip in array.chip_of_channel]
-    half = _AXIS_LENGTH * size * array.axes
-    axes = np.stack([array.positions - half, array.positions + half], axis=1)  # (c, 2, 3)
-    stream.log(f"{entity}/lines", rr.LineStrips3D(axes, colors=chips, radii=[0.01 * size]), static=True)
     still = rr.Arrows3D.from_fields(
         origins=array.positions,
         colors=chips if arrows.colour is None else [arrows.colour],
-        radii=[0.044 * size],
+        radii=[arrows.radius],
         labels=list(array.channels),
         show_labels=False,
     )

@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from gfimu import AccelerometerArray
 from gfimu.visual import Box, Cylinder
+from gfimu.visual.colours import chip_colour
 from sim.drawing import rig_drawing
 from sim.world import World
 
@@ -29,6 +30,21 @@ def test_the_cube_is_drawn_in_its_own_frame_wherever_it_is_mounted():
         assert_allclose(reach.min(axis=0), -0.05, atol=1e-9)
         for position in array.chip_positions:
             assert min(np.linalg.norm(np.asarray(box.centre) - position) for box in boxes) < 1e-9
+
+
+def test_each_board_has_the_hue_of_its_chip():
+    array = AccelerometerArray.load("cube12")
+    boxes = [shape for shape in rig_drawing(World(array))["cube"] if isinstance(shape, Box)]
+    for number, position in enumerate(array.chip_positions):
+        hues = [box.colour[:3] for box in boxes if np.linalg.norm(np.asarray(box.centre) - position) < 0.003]
+        assert chip_colour(number) in hues
+
+
+def test_another_array_stands_on_the_table_without_the_cube():
+    shapes = rig_drawing(World(AccelerometerArray.load("mimu4444")))
+    assert "cube" not in shapes
+    assert not [shape for shape in shapes["table"] if isinstance(shape, Box) and max(shape.half_size) > 0.03 + 1e-9]
+    assert any(isinstance(shape, Cylinder) for shape in shapes["table"])
 
 
 def test_the_disc_lies_in_the_table_frame_below_the_cube():

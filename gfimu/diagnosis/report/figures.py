@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import re
 import zlib
-from collections.abc import Sequence
 
 import matplotlib as mpl
 import numpy as np
@@ -22,22 +21,37 @@ from gfimu.diagnosis.criticism.views.residuals import ResidualSize, Whiteness
 from gfimu.diagnosis.criticism.views.rigid_motion import BandPower
 from gfimu.diagnosis.criticism.views.run_view import RunView
 from gfimu.diagnosis.policy import Policy
+from gfimu.geometry.array import AccelerometerArray
+from gfimu.geometry.turning_axis import TurningAxis
+from gfimu.visual.colours import (
+    AFTER_ON_PAPER,
+    BEFORE_ON_PAPER,
+    DIVERGING,
+    INK,
+    NOISE_ON_PAPER,
+    PALE,
+    chip_colour,
+    css,
+)
+from gfimu.visual.rig.figure import array_figure, channel_style
 
 __all__ = [
     "before_after_figure",
     "channels_figure",
     "dependence_figure",
     "fingerprint_figure",
+    "rig_figure",
     "rigid_figure",
     "spectrum_figure",
     "whiteness_figure",
 ]
 
-_BEFORE, _AFTER, _NOISE, _INK, _PALE = "#d64545", "#1f9d6b", "#8a8f98", "#22262e", "#c9ced6"
-_CHANNELS = ("#d98200", "#2f7fc1", "#00896b", "#b4499a")
-_DIVERGING = "RdBu_r"
+_BEFORE, _AFTER = css(BEFORE_ON_PAPER), css(AFTER_ON_PAPER)
+_NOISE, _INK, _PALE = css(NOISE_ON_PAPER), css(INK), css(PALE)
+_STRONGEST = 4  # channels drawn in colour
 _MOST_POINTS = 4000
 _MOST_FREQUENCIES = 1200
+_MOST_BAR_NAMES = 24  # of more bars, every second, third … has its name
 _DPI = 110
 _SMOOTH_S = 0.15
 _STYLE = {
@@ -71,7 +85,7 @@ def before_after_figure(run: RunView, size: ResidualSize) -> str:
         return _svg(figure)
 
 
-def channels_figure(run: RunView, size: ResidualSize) -> str:
+def channels_figure(run: RunView, size: ResidualSize, array: AccelerometerArray) -> str:
     """Draw the residual of every channel over time on one scale."""
     count = len(size.channels)
     columns = 3 if count % 3 == 0 else 4
@@ -84,7 +98,9 @@ def channels_figure(run: RunView, size: ResidualSize) -> str:
                 axis.set_axis_off()
                 continue
             _trace(axis, run, channel, size.floor[channel])
-            axis.set_title(size.channels[channel], loc="left", fontsize=9, pad=2)
+            axis.set_title(
+                size.channels[channel], loc="left", fontsize=9, pad=2, color=channel_style(array, channel)[0]
+            )
         for axis in axes[:, 0]:
             axis.set_ylabel("m/s²")
         for axis in axes[-1]:
@@ -92,24 +108,34 @@ def channels_figure(run: RunView, size: ResidualSize) -> str:
         return _svg(figure)
 
 
-def dependence_figure(dependence: Dependence, channels: Sequence[str]) -> str:
+def rig_figure(
+    array: AccelerometerArray, axis: TurningAxis | None, gravity: NDArray[np.float64] | None, gravity_name: str
+) -> str:
+    """Draw the array with its chips, sensing axes, gravity and axis of rotation; see `array_figure`."""
+    with mpl.rc_context(_STYLE):
+        return _svg(array_figure(array, axis=axis, gravity=gravity, gravity_name=gravity_name))
+
+
+def dependence_figure(dependence: Dependence, array: AccelerometerArray) -> str:
     """Draw the mean residual over one quantity, before and after, the four strongest channels in colour."""
     with mpl.rc_context(_STYLE):
         figure = Figure(figsize=(5.4, 2.3), layout="constrained")
         pair = figure.subplots(1, 2, sharey=True)
-        strongest = list(np.argsort(-dependence.amplitude_before)[: len(_CHANNELS)])
+        strongest = list(np.argsort(-dependence.amplitude_before)[:_STRONGEST])
         for axis, mean, title in zip(pair, (dependence.before, dependence.after), ("before", "after"), strict=True):
             axis.axhline(0.0, color=_NOISE, linewidth=0.6)
-            for channel in range(len(channels)):
+            for channel in range(array.n_channels):
                 if channel not in strongest:
                     axis.plot(dependence.centres[:, channel], mean[:, channel], color=_PALE, linewidth=0.8)
-            for colour, channel in zip(_CHANNELS, strongest, strict=False):
+            for channel in strongest:
+                colour, line = channel_style(array, channel)
                 axis.plot(
                     dependence.centres[:, channel],
                     mean[:, channel],
                     color=colour,
+                    linestyle=line,
                     linewidth=1.3,
-                    label=channels[channel],
+                    label=array.channels[channel],
                 )
             axis.set_title(title, loc="left", fontsize=9.5, pad=3)
             axis.set_xlabel(f"{dependence.symbol}, {dependence.unit}")
@@ -147,9 +173,11 @@ def rigid_figure(power: BandPower) -> str:
         axis = figure.subplots()
         axis.axhline(1.0, color=_NOISE, linestyle="--", label="noise")
         parts = ((power.spin, "spin"), (power.array, "whole array"), (power.chips, "single chips"))
-        for (values, label), colour in zip(parts, _CHANNELS, strict=False):
+        for number, (values, label) in enumerate(parts):
             if np.isfinite(values).any():
-                axis.plot(power.frequency, values, color=colour, linewidth=1.2, label=label)
+                axis.plot(
+                    power.frequency, values, color=css(chip_colour(number, on_paper=True)), linewidth=1.2, label=label
+                )
         axis.set_xscale("log")
         axis.set_yscale("log")
         axis.set_xlabel("frequency, Hz")
@@ -190,12 +218,12 @@ def fingerprint_figure(fingerprint: Fingerprint) -> str:
         norm = SymLogNorm(linthresh=Policy.noise_stds, vmin=-largest, vmax=largest)
         for axis, values, title in zip(pair, (fingerprint.before, fingerprint.after), ("before", "after"), strict=True):
             shown = np.where(np.abs(values) < Policy.noise_stds, 0.0, values)
-            axis.imshow(shown, cmap=_DIVERGING, norm=norm, aspect="auto", interpolation="nearest")
+            axis.imshow(shown, cmap=DIVERGING, norm=norm, aspect="auto", interpolation="nearest")
             axis.set_xticks(range(terms), fingerprint.terms, rotation=40, ha="right")
             axis.set_yticks(range(count), fingerprint.channels)
             axis.set_title(title, loc="left", fontsize=10)
             axis.tick_params(length=0)
-        bar = figure.colorbar(ScalarMappable(norm, _DIVERGING), ax=pair.tolist(), shrink=0.9, pad=0.01)
+        bar = figure.colorbar(ScalarMappable(norm, DIVERGING), ax=pair.tolist(), shrink=0.9, pad=0.01)
         ticks = [tick for tick in (3, 10, 30, 100, 1000, 10_000) if tick <= largest]
         bar.set_ticks(
             [-tick for tick in ticks[::-1]] + ticks,
@@ -246,7 +274,8 @@ def _bars(axis: Axes, size: ResidualSize) -> None:
     axis.hlines(size.floor, place - 0.45, place + 0.45, color=_INK, linewidth=1.2, label="noise")
     if np.nanmax(size.before) > 20 * np.nanmin(size.floor):
         axis.set_yscale("log")
-    axis.set_xticks(place, size.channels, rotation=60 if len(place) > 8 else 0, fontsize=8.5)
+    step = -(-len(place) // _MOST_BAR_NAMES)
+    axis.set_xticks(place[::step], size.channels[::step], rotation=60 if len(place) > 8 else 0, fontsize=8.5)
     axis.set_ylabel("m/s²")
     axis.set_title("rms per channel", loc="left", fontsize=10.5)
     axis.margins(x=0.01)

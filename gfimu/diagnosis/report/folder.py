@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import shutil
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
-
-import numpy as np
-from numpy.typing import NDArray
 
 from gfimu.diagnosis.report.page import write_report
 from gfimu.diagnosis.report.picture import write_picture
+from gfimu.diagnosis.report.rig import DrawnRig
 from gfimu.diagnosis.verdict.verdict import Diagnosis
 from gfimu.errors import InputError, WriteError
 from gfimu.files.outputs import OutputFolder, check_outputs
-from gfimu.visual.scene import Shape
 
 __all__ = ["FILES", "check_folder", "write_diagnosis"]
 
@@ -47,9 +44,7 @@ def write_diagnosis(
     *,
     twin_toml: str | None = None,
     more: Mapping[str, str] | None = None,
-    mounting: NDArray[np.float64] | None = None,
-    cube_centre: Sequence[float] = (0.0, 0.0, 0.06),
-    shapes: Mapping[str, Sequence[Shape]] | None = None,
+    rig: DrawnRig | None = None,
 ) -> dict[str, Path]:
     """Write all files of a diagnosis; what stands in the folder already is replaced only when all are made.
 
@@ -63,8 +58,8 @@ def write_diagnosis(
         Text of the twin file; the diagnosis's own twin by default.
     more : mapping of str to str, optional
         Further text files that the twin file names, by file name.
-    mounting, cube_centre, shapes
-        See `gfimu.diagnosis.report.picture.write_picture`.
+    rig : DrawnRig, optional
+        How the array stood on its table, for the pictures.
 
     Returns
     -------
@@ -84,8 +79,8 @@ def write_diagnosis(
         # Part files of the user's are named by the twin or its array, and looked up beside them.
         for name, text in {**diagnosis.twin.array.part_files, **(more or {})}.items():
             (made / name).write_text(text, encoding="utf-8")
-        write_report(made / "report.html", diagnosis)
-        write_picture(made / "diagnosis.rrd", diagnosis, mounting=mounting, cube_centre=cube_centre, shapes=shapes)
+        write_report(made / "report.html", diagnosis, rig)
+        write_picture(made / "diagnosis.rrd", diagnosis, rig=rig)
         for file in made.iterdir():
             file.replace(folder / file.name)
     except WriteError:

@@ -25,9 +25,13 @@ from gfimu.diagnosis.report.plain_words import (
     story,
     summary,
 )
+from gfimu.diagnosis.report.rig import DrawnRig
 from gfimu.diagnosis.verdict.verdict import Diagnosis, NamedCause
 from gfimu.diagnosis.verdict.wording import SAME_SHARE
 from gfimu.files.atomic_file import write_text
+from gfimu.visual.colours import INK, TONES, chip_colour, css
+from gfimu.visual.rig import package_of
+from gfimu.visual.rig.words import package_words, scene_title
 
 __all__ = ["report_html", "write_report"]
 
@@ -49,13 +53,21 @@ _VIEWS = (
 _MOST_PARAMETERS = 14
 
 
-def write_report(path: str | Path, diagnosis: Diagnosis) -> None:
-    """Write ``report.html``, whole or not at all."""
-    write_text(path, report_html(diagnosis))
+def write_report(path: str | Path, diagnosis: Diagnosis, rig: DrawnRig | None = None) -> None:
+    """Write ``report.html``, whole or not at all; arguments as `report_html`."""
+    write_text(path, report_html(diagnosis, rig))
 
 
-def report_html(diagnosis: Diagnosis) -> str:
-    """Return the report as one HTML page without references to anything outside it."""
+def report_html(diagnosis: Diagnosis, rig: DrawnRig | None = None) -> str:
+    """Return the report as one HTML page without references to anything outside it.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        The diagnosis.
+    rig : DrawnRig, optional
+        How the array stood on its table; upright at the usual height by default.
+    """
     environment = Environment(
         loader=FileSystemLoader(Path(__file__).parent / "templates"),
         autoescape=select_autoescape(default=True, default_for_string=True),
@@ -63,10 +75,10 @@ def report_html(diagnosis: Diagnosis) -> str:
         lstrip_blocks=True,
     )
     environment.filters["odds"] = odds
-    return environment.get_template("report.html.j2").render(_content(diagnosis))
+    return environment.get_template("report.html.j2").render(_content(diagnosis, rig or DrawnRig()))
 
 
-def _content(diagnosis: Diagnosis) -> Mapping[str, Any]:
+def _content(diagnosis: Diagnosis, rig: DrawnRig) -> Mapping[str, Any]:
     channels = diagnosis.twin.array.channels
     bias_instability = float(diagnosis.noise.get("bias_instability_m_s2", 0.0))
     seen = [run for run in diagnosis.runs if run.valid.any()]
@@ -77,6 +89,8 @@ def _content(diagnosis: Diagnosis) -> Mapping[str, Any]:
         "version": __version__,
         "label": label,
         "tone": tone,
+        "colours": {name: css(colour) for name, colour in TONES.items()} | {"ink": css(INK)},
+        "array": _array(diagnosis, rig),
         "headline": headline(diagnosis),
         "story": story(diagnosis),
         "sentences": diagnosis.sentences[1:],
@@ -109,8 +123,30 @@ def _content(diagnosis: Diagnosis) -> Mapping[str, Any]:
             for run, view in zip(seen, views, strict=True)
         ],
         "views": _views(diagnosis, views[0]) if views else [],
-        "channels_picture": figures.channels_figure(seen[0], views[0].size) if views else "",
+        "channels_picture": figures.channels_figure(seen[0], views[0].size, diagnosis.twin.array) if views else "",
         "fingerprint": figures.fingerprint_figure(views[0].fingerprint) if views else "",
+    }
+
+
+def _array(diagnosis: Diagnosis, rig: DrawnRig) -> dict[str, Any]:
+    """Return the picture of the array, and its chips as a table."""
+    array, run = diagnosis.twin.array, diagnosis.runs[0] if diagnosis.runs else None
+    axis, gravity, name = rig.seen_from(array, run)
+    return {
+        "title": scene_title(array),
+        "package": package_words(package_of(array)),
+        "description": array.description,
+        "picture": figures.rig_figure(array, axis, gravity, name),
+        "chips": [
+            {
+                "name": chip.name,
+                "colour": css(chip_colour(number, on_paper=True)),
+                "channels": ", ".join(chip.channels),
+                "place": ", ".join(f"{1000.0 * part + 0.0:.4g}" for part in chip.position),
+                "part": chip.part,
+            }
+            for number, chip in enumerate(array.chips)
+        ],
     }
 
 
@@ -165,12 +201,12 @@ def _cause(diagnosis: Diagnosis, cause: NamedCause) -> Mapping[str, Any]:
 
 def _views(diagnosis: Diagnosis, views: ResidualViews) -> list[Mapping[str, Any]]:
     """Return title, sentence and picture of each residual view of the first run."""
-    channels = diagnosis.twin.array.channels
+    array = diagnosis.twin.array
     shown: list[Mapping[str, Any]] = []
     for name, title in _VIEWS:
         dependence = views.by_view(name)
         if dependence is not None:
-            picture = figures.dependence_figure(dependence, channels)
+            picture = figures.dependence_figure(dependence, array)
             shown.append(
                 {"title": title, "sentence": dependence.sentence, "picture": picture, "looks": dependence.looks}
             )

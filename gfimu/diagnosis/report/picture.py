@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
@@ -13,15 +12,14 @@ from scipy.spatial.transform import Rotation
 
 from gfimu.diagnosis.criticism.views.run_view import RunView
 from gfimu.diagnosis.report.plain_words import headline, next_steps, parameter_texts, parameter_units, percent, story
+from gfimu.diagnosis.report.rig import DrawnRig
 from gfimu.diagnosis.verdict.verdict import Diagnosis
 from gfimu.recording import Recording
 from gfimu.visual import KnownMotion, Line, Plot, write_comparison
-from gfimu.visual.colours import COMMAND, MEASURED, PREDICTED_AFTER, PREDICTED_BEFORE
-from gfimu.visual.scene import Shape
+from gfimu.visual.colours import AFTER, BEFORE, COMMAND, MEASURED
 
 __all__ = ["write_picture"]
 
-_CUBE_CENTRE = (0.0, 0.0, 0.06)
 _MOST_SAMPLES = 20_000
 _PER_CHANNEL = ("white",)
 
@@ -31,9 +29,7 @@ def write_picture(
     diagnosis: Diagnosis,
     *,
     run: int = 0,
-    mounting: NDArray[np.float64] | None = None,
-    cube_centre: Sequence[float] = _CUBE_CENTRE,
-    shapes: Mapping[str, Sequence[Shape]] | None = None,
+    rig: DrawnRig | None = None,
 ) -> None:
     """Write ``diagnosis.rrd`` for one run of a diagnosis.
 
@@ -45,27 +41,23 @@ def write_picture(
         The diagnosis.
     run : int
         Which of its runs.
-    mounting : ndarray, shape (3,), optional
-        Rotation vector from the cube as it stood to the table frame, rad; upright by default.
-    cube_centre : sequence of float, shape (3,)
-        Centre of the cube in the table frame, m.
-    shapes : mapping of str to sequence of Shape, optional
-        Shapes of ``base``, ``table`` and ``cube`` of the extended rig; a plain rig otherwise.
+    rig : DrawnRig, optional
+        How the array stood on its table; upright at the usual height by default.
     """
     view, every = _thinned(diagnosis.runs[run])
     array = diagnosis.twin.array
     readings = np.where(view.valid, view.measured, np.nan)
     recording = Recording.from_arrays(view.t, readings, array)
-    turn = np.zeros(3) if mounting is None else mounting
+    stood = rig or DrawnRig()
     write_comparison(
         path,
         recording,
         array,
         view.before,
         view.after,
-        known=_motion(view, turn, np.asarray(cube_centre, dtype=float)),
+        known=_motion(view, stood.mounting, np.asarray(stood.centre, dtype=float)),
         plots=_plots(view),
-        shapes=shapes,
+        shapes=stood.shapes,
         notes=_notes(diagnosis) + (f"\n\nThe run is long: every {every}th sample is shown." if every > 1 else ""),
         title=f"diagnosis of {view.name}: {diagnosis.verdict.replace('_', ' ')}",
     )
@@ -113,8 +105,8 @@ def _plots(view: RunView) -> list[Plot]:
             "reference that drives the table",
             [
                 Line("measured", view.t, reference, MEASURED, 2.0),
-                Line("predicted before", view.t, view.reference_before, PREDICTED_BEFORE),
-                Line("predicted after", view.t, view.reference_after, PREDICTED_AFTER),
+                Line("predicted before", view.t, view.reference_before, BEFORE),
+                Line("predicted after", view.t, view.reference_after, AFTER),
             ],
         ),
         Plot("rate of the table, estimated, rad/s", [Line("ω", view.t, view.rate, COMMAND)], legend=False),

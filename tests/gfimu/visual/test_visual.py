@@ -14,6 +14,8 @@ from rerun.chunk import RrdReader
 from scipy.spatial.transform import Rotation
 
 from gfimu import AccelerometerArray, InputError, Recording, specific_force
+from gfimu.geometry.array import Chip
+from gfimu.geometry.turning_axis import TurningAxis
 from gfimu.visual import Box, Cylinder, ExpectedDrift, KnownMotion, Line, Mesh, Plot, write_comparison, write_run
 from gfimu.visual.picture import picture_of, picture_path
 from gfimu.visual.plots import _broken_at_gaps, _emptiest_corner
@@ -278,5 +280,79 @@ def test_a_picture_of_an_array_that_sees_too_little_shows_the_readings_alone(tmp
     recording.write(file)
     picture_of(file, out, array=flat)
     found = contents(out)
-    assert "No estimate" in str(found["/notes"])
+    assert "**No estimate.**" in str(found["/notes"])
+    assert "add sensing axes that do" in str(found["/notes"])
+    assert "[turning_axis]" in str(found["/notes"])
     assert any(name.startswith("/plots/raw") for name in found)
+
+
+def arm(axis: TurningAxis | None) -> AccelerometerArray:
+    return AccelerometerArray("arm", (Chip("a1", np.array([0.1, 0.0, 0.0]), np.eye(3)),), turning_axis=axis)
+
+
+def turning(array: AccelerometerArray, reference: str) -> tuple[Recording, np.ndarray]:
+    """A rest of 2 s, then a spin up about z, of chips with offsets; and the true rate."""
+    t = np.arange(600) * 0.01
+    rate = np.clip(t - 2.0, 0.0, 3.0)
+    up = np.array([0.0, 0.0, 1.0])
+    ideal = specific_force(array, 9.80665 * up + 0 * t[:, None], np.outer(np.gradient(rate, t), up), np.outer(rate, up))
+    noise = 0.01 * np.random.default_rng(0).standard_normal(ideal.shape)
+    readings = ideal + noise + np.linspace(-0.2, 0.3, array.n_channels)
+    return Recording.from_arrays(t, readings, array, reference={reference: rate}), rate
+
+
+@pytest.mark.parametrize(("reference", "name"), [("tacho_rad_s", "tacho"), ("gyro_z_rad_s", "gyro")])
+def test_a_picture_of_one_chip_on_a_known_axis_has_the_estimate_about_it(tmp_path, reference, name):
+    array = arm(TurningAxis.of("z"))
+    recording, _ = turning(array, reference)
+    file, out = tmp_path / "run.parquet", tmp_path / "run.rrd"
+    recording.write(file)
+    picture_of(file, out, array=array)
+    verify(out)
+    found = contents(out)
+    error = next(entity for entity in found if entity.endswith(f"estimate_{name}"))
+    assert np.sqrt(np.mean(numbers(found[error]["scalars"]) ** 2)) < 0.05
+    assert "/scene/table" not in found  # an arm on an axis: no turntable is known of
+    assert "Biases were read off the first rest" in str(found["/notes"])
+    assert "axis of rotation" in str([columns.get("labels") for columns in found.values()])
+    ghost, body = (numbers(found[f"/scene/{one}"]["quaternion"]) for one in ("estimate", "array"))
+    assert_allclose(np.abs(np.sum(ghost * body, axis=1)), 1.0, atol=0.01)  # both start from one heading
+
+
+def test_a_chip_on_its_axis_shows_its_channels_and_what_is_missing(tmp_path):
+    array = AccelerometerArray("on_axis", (Chip("a1", np.zeros(3), np.eye(3)),), turning_axis=TurningAxis.of("z"))
+    recording, _ = turning(array, "tacho_rad_s")
+    file, out = tmp_path / "run.parquet", tmp_path / "run.rrd"
+    recording.write(file)
+    picture_of(file, out, array=array)
+    found = contents(out)
+    assert "**No estimate.**" in str(found["/notes"])
+    assert any(entity.startswith("/plots/raw") for entity in found)
+
+
+def test_an_inclined_axis_and_a_point_beside_the_origin_are_kept():
+    axis = TurningAxis.of("z", point=[0.05, 0.0, 0.0], inclination=0.4)
+    recording, _ = turning(arm(axis), "tacho_rad_s")
+    known = KnownMotion.from_reference(recording, arm(axis))
+    attitude = Rotation.from_quat(known.quaternion, scalar_first=True)
+    assert_allclose(attitude.apply(axis.direction)[:, 2], np.cos(0.4), atol=1e-9)
+    assert np.ptp(known.position + attitude.apply(axis.point), axis=0).max() < 1e-12
+    assert known.angle[-1] == pytest.approx(0.5 * 3.0**2 + 3.0 * 0.99, abs=0.05)
+
+
+def test_many_chips_are_plotted_in_groups_that_a_legend_can_name(tmp_path):
+    chips = tuple(
+        Chip(f"c{number:02d}_", 0.01 * np.array([number, number % 3, number % 5]), np.eye(3)) for number in range(32)
+    )
+    array = AccelerometerArray("many", chips)
+    t = np.arange(30) * 0.01
+    recording = Recording.from_arrays(t, np.zeros((30, 96)), array)
+    write_run(tmp_path / "many.rrd", recording, array)
+    found = contents(tmp_path / "many.rrd")
+    plots = {name.split("/")[2] for name in found if name.startswith("/plots/raw")}
+    assert len(plots) == 12
+    assert max(len([name for name in found if name.startswith(f"/plots/{plot}/")]) for plot in plots) == 8
+    names = next(
+        c["labels"] for n, c in found.items() if n.startswith("/scene/array/") and "c31_" in str(c.get("labels"))
+    )
+    assert len(names) >= 1

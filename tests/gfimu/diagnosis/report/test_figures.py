@@ -12,8 +12,14 @@ from made_runs import PERIOD, made_view
 
 from gfimu.diagnosis.criticism.views.residuals import residual_views
 from gfimu.diagnosis.report import figures
+from gfimu.diagnosis.report.rig import DrawnRig
+from gfimu.geometry.array import AccelerometerArray, Chip
+from gfimu.visual.colours import AFTER_ON_PAPER, BEFORE_ON_PAPER, chip_colour, css
 
 CHANNELS = ("a11", "a12", "a13", "a21")
+ARRAY = AccelerometerArray(
+    "four", (Chip("a1", np.zeros(3), np.eye(3)), Chip("a2", np.array([0.1, 0.0, 0.0]), np.eye(3)[:1]))
+)
 T = PERIOD * np.arange(3000)
 RATE = 5.0 + 2.0 * np.sin(0.6 * T)
 
@@ -36,11 +42,12 @@ def drawn(views, view):
     dependence = views.by_view("rate squared")
     return {
         "before_after": figures.before_after_figure(view, views.size),
-        "channels": figures.channels_figure(view, views.size),
-        "dependence": figures.dependence_figure(dependence, CHANNELS),
+        "channels": figures.channels_figure(view, views.size, ARRAY),
+        "dependence": figures.dependence_figure(dependence, ARRAY),
         "spectrum": figures.spectrum_figure(views.spectrum),
         "whiteness": figures.whiteness_figure(views.whiteness),
         "fingerprint": figures.fingerprint_figure(views.fingerprint),
+        "rig": figures.rig_figure(ARRAY, *DrawnRig().seen_from(ARRAY, view)),
     }
 
 
@@ -54,12 +61,37 @@ def test_every_figure_is_well_formed_labelled_and_the_same_each_time(views, view
         "spectrum": {"frequency, Hz", "amplitude density, m/s²/√Hz", "before", "after", "noise"},
         "whiteness": {"frequency, Hz", "share of the power below"},
         "fingerprint": {*CHANNELS, "ω²", "standard deviations"},
+        "rig": {*CHANNELS, "a1", "a2", "gravity", "axis of rotation", "x", "y", "z", "body x, mm"},
     }
     for name, svg in first.items():
         assert labels[name] <= set(texts(svg)), name
         assert not re.search(r"<svg [^>]* (width|height)=", svg)
     names = [set(re.findall(r'\bid="([^"]+)"', svg)) for svg in first.values()]
     assert len(set().union(*names)) == sum(len(one) for one in names)  # on one page none takes another's place
+
+
+def test_before_after_and_the_chips_have_their_colours_in_every_figure(views, view):
+    found = drawn(views, view)
+    for name in ("before_after", "spectrum"):
+        assert css(BEFORE_ON_PAPER) in found[name]
+        assert css(AFTER_ON_PAPER) in found[name]
+    for name in ("channels", "dependence", "rig"):
+        for chip in range(2):
+            assert css(chip_colour(chip, on_paper=True)) in found[name], name
+
+
+def test_gravity_and_axis_follow_the_mounting_and_a_free_body_has_no_table(view):
+    lying = DrawnRig(np.array([np.pi / 2, 0.0, 0.0]), np.array([0.02, 0.0, 0.06]))  # y of the body is up
+    axis, gravity, name = lying.seen_from(ARRAY, view)
+    np.testing.assert_allclose(gravity, [0.0, -1.0, 0.0], atol=1e-12)
+    np.testing.assert_allclose(axis.direction, [0.0, 1.0, 0.0], atol=1e-12)
+    np.testing.assert_allclose(np.cross(axis.point - [-0.02, 0.0, 0.0], axis.direction), 0.0, atol=1e-12)
+    assert name == "gravity"
+    turned = np.tile([np.cos(0.5), np.sin(0.5), 0.0, 0.0], (len(T), 1))
+    axis, gravity, name = lying.seen_from(ARRAY, replace(view, attitude=turned))
+    assert axis is None
+    np.testing.assert_allclose(gravity, [0.0, -np.sin(1.0), -np.cos(1.0)], atol=1e-12)
+    assert name == "gravity at the start"
 
 
 def test_a_long_run_keeps_its_extremes():
