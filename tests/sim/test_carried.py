@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 import gfimu
 from gfimu.errors import InputError
-from gfimu.recording.axis_gyro import with_axis_gyro
+from gfimu.known_axis.axis_gyro import with_axis_gyro
 from sim.carried import Hand, Wheel
 from sim.profiles import Hold, Ramp, spin_profile
 from sim.scenarios import Scenario

@@ -14,8 +14,8 @@ from scipy.integrate import cumulative_trapezoid
 from gfimu.diagnosis.data.cosine_basis import CosineBasis, NoiseLevels
 from gfimu.diagnosis.data.rounding import COARSE, NO_STEPS, Steps
 from gfimu.diagnosis.data.run import Run, difference_noise, smooth_rate
-from gfimu.diagnosis.data.spins import JoinedSpin, ScaledSpin, State
-from gfimu.diagnosis.data.start_angle import gravity_angle
+from gfimu.diagnosis.data.table.spins import JoinedSpin, ScaledSpin, State
+from gfimu.diagnosis.data.table.start_angle import gravity_angle
 from gfimu.world_model import Effect, Spin, WorldModel, is_of_wiring
 
 __all__ = ["RunUp", "Stretch", "make_stretches"]

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import PPoly
 
-from gfimu.diagnosis.data.spins import State
+from gfimu.diagnosis.data.table.spins import State
 
 __all__ = ["PEAK_OF_RAMP", "Leg", "TableProfile"]
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import solveh_banded
 
-from gfimu.diagnosis.data.spins import State
+from gfimu.diagnosis.data.table.spins import State
 from gfimu.world_model import Spin, SpinState
 
 __all__ = ["DEGREE", "AngleSpline", "PushedSpin", "SplineSpin"]

@@ -76,7 +76,7 @@ def test_a_reference_without_a_direction_is_told_turn_by_turn(predict, stretch):
     def of(run):
         rate = run.reference
         period = run.sample_period
-        from gfimu.diagnosis.data.spins import State
+        from gfimu.diagnosis.data.table.spins import State
 
         class Tabled:
             def at(self, times):

@@ -7,8 +7,8 @@ import pytest
 
 import gfimu
 from gfimu.diagnosis.data.run import prepare_run
-from gfimu.diagnosis.data.spins import State
-from gfimu.diagnosis.data.start_angle import gravity_angle
+from gfimu.diagnosis.data.table.spins import State
+from gfimu.diagnosis.data.table.start_angle import gravity_angle
 from gfimu.diagnosis.data.stretch import make_stretches
 from sim.scenarios import Scenario
 from sim.twin import Twin

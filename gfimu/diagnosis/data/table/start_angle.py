@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gfimu.diagnosis.data.run import Run
-from gfimu.diagnosis.data.spins import State
+from gfimu.diagnosis.data.table.spins import State
 from gfimu.world_model import Effect, SpinState, WorldModel, axis_inclination
 
 __all__ = ["ANGLE_STD", "gravity_angle"]
