@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.errors import InputError
+from gfimu.geometry.axis_uncertainty import AxisUncertainty
 from gfimu.short_repr import short_repr
 
 __all__ = ["HUBS", "TurningAxis"]
 
 HUBS = ("fixed", "free")
-_KEYS = ("direction", "point_m", "hub", "inclination_rad")
+_KEYS = ("direction", "point_m", "hub", "inclination_rad", *AxisUncertainty.names())
 
 
 @dataclass(frozen=True)
@@ -32,12 +33,15 @@ class TurningAxis:
         Whether the axis stands still (a table), or moves with a body whose acceleration is not known (a wheel).
     inclination : float or None
         Angle between the axis and the vertical, rad; None if it is to be estimated.
+    uncertainty : AxisUncertainty
+        How exactly axis, places, orientations and biases of the chips are known; exactly by default.
     """
 
     direction: NDArray[np.float64]
     point: NDArray[np.float64]
     hub: str = "fixed"
     inclination: float | None = None
+    uncertainty: AxisUncertainty = field(default_factory=AxisUncertainty)
 
     __repr__ = short_repr
 
@@ -49,6 +53,7 @@ class TurningAxis:
         point: Sequence[float] | NDArray[np.float64] = (0.0, 0.0, 0.0),
         hub: str = "fixed",
         inclination: float | None = None,
+        uncertainty: AxisUncertainty | None = None,
         source: str = "axis",
     ) -> TurningAxis:
         """Return an axis given as x, y or z, or as three numbers of any length.
@@ -81,7 +86,7 @@ class TurningAxis:
             raise InputError(f"{source}: unknown hub {hub!r}; valid: {', '.join(HUBS)}")
         if inclination is not None and not 0.0 <= inclination <= np.pi:
             raise InputError(f"{source}: inclination {inclination!r} rad; give an angle from 0 (upright) to π")
-        return cls(vector / length, place, hub, inclination)
+        return cls(vector / length, place, hub, inclination, uncertainty or AxisUncertainty())
 
     @classmethod
     def from_dict(cls, data: Any, *, source: str) -> TurningAxis:
@@ -99,10 +104,12 @@ class TurningAxis:
             point=data.get("point_m", (0.0, 0.0, 0.0)),
             hub=data.get("hub", "fixed"),
             inclination=tilt,
+            uncertainty=AxisUncertainty(**{name: data[name] for name in AxisUncertainty.names() if name in data}),
             source=f"{source}: [turning_axis]",
         )
 
     def to_dict(self) -> dict[str, Any]:
         """Return the table of an array file."""
         found = {"direction": self.direction.tolist(), "point_m": self.point.tolist(), "hub": self.hub}
-        return found | ({} if self.inclination is None else {"inclination_rad": self.inclination})
+        tilt = {} if self.inclination is None else {"inclination_rad": self.inclination}
+        return found | tilt | self.uncertainty.to_dict()
