@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
     from gfimu.calibration.result import Calibration
     from gfimu.geometry.array import AccelerometerArray
+    from gfimu.geometry.axis_uncertainty import AxisUncertainty
     from gfimu.geometry.turning_axis import TurningAxis
     from gfimu.importing import ColumnMap
     from gfimu.motion.estimation import Estimate
@@ -60,6 +61,11 @@ def estimate(
     axis_point: Sequence[float] = (0.0, 0.0, 0.0),
     hub: str = "fixed",
     inclination_rad: float | None = None,
+    point_std_m: float = 0.0,
+    direction_std_rad: float = 0.0,
+    lever_std_m: float = 0.0,
+    rotation_std_rad: float = 0.0,
+    bias_std_m_s2: float = 0.0,
     unknown_start: bool = False,
     gyro: bool = False,
     position: bool = False,
@@ -101,6 +107,10 @@ def estimate(
         Whether that axis stands still (a table) or moves with a body (a wheel).
     inclination_rad : float, optional
         Angle between that axis and the vertical, rad; estimated by default.
+    point_std_m, direction_std_rad, lever_std_m, rotation_std_rad, bias_std_m_s2 : float
+        How exactly the point and the direction of that axis, and place, orientation and biases of the chips are known
+        (`gfimu.geometry.axis_uncertainty.AxisUncertainty`); what is not exact is estimated with the rotation. Where all
+        are 0, those of the array file hold.
     unknown_start : bool
         The run may start spinning (filter, smoother); the same as ``omega0=None``.
     gyro, fuse_gyro : bool
@@ -123,6 +133,8 @@ def estimate(
     GeometryError
         If the array can't see all six motions; the message names those it can't.
     """
+    from gfimu.geometry.axis_uncertainty import AxisUncertainty
+
     return estimate_run(
         recording,
         array,
@@ -132,6 +144,7 @@ def estimate(
         calibration=calibration,
         column_map=column_map,
         axis=turning_axis(axis, axis_point, hub, inclination_rad),
+        uncertainty=AxisUncertainty(point_std_m, direction_std_rad, lever_std_m, rotation_std_rad, bias_std_m_s2),
         method=method,
         form=form,
         omega0=None if unknown_start else omega0,
@@ -155,6 +168,7 @@ def estimate_run(
     calibration: Calibration | str | Path | None = None,
     column_map: ColumnMap | str | Path | None = None,
     axis: TurningAxis | None = None,
+    uncertainty: AxisUncertainty | None = None,
     **options: Any,
 ) -> EstimatedRun:
     """Estimate and keep the recording and array beside the result, for a summary; ``options`` as `estimate`.
@@ -169,7 +183,7 @@ def estimate_run(
     from gfimu.motion.rest_bias import estimate_from_rest
 
     run, geometry = _opened(by_map(recording, column_map), array, calibration)
-    turning = _turning(axis, geometry)
+    turning = _turning(axis, geometry, uncertainty)
     if turning is not None:
         found = _about_axis(run, geometry, turning, rest_bias=rest_bias, **options)
     else:
@@ -216,13 +230,19 @@ def turning_axis(
     return TurningAxis.of(axis, point=point, hub=hub, inclination=inclination_rad)
 
 
-def _turning(axis: TurningAxis | None, array: AccelerometerArray) -> TurningAxis | None:
+def _turning(
+    axis: TurningAxis | None, array: AccelerometerArray, uncertainty: AxisUncertainty | None
+) -> TurningAxis | None:
     """Return the axis to estimate about: the one given, or the array's own where it can't see all six motions."""
+    from gfimu.errors import InputError
     from gfimu.geometry.observability import unseen_motions
 
-    if axis is not None:
-        return axis
-    return array.turning_axis if unseen_motions(array) else None
+    chosen = axis if axis is not None else array.turning_axis if unseen_motions(array) else None
+    if uncertainty is None or uncertainty.exact:
+        return chosen
+    if chosen is None:
+        raise InputError(f"{next(iter(uncertainty.to_dict()))} is of a known axis; give the axis too (--axis)")
+    return replace(chosen, uncertainty=uncertainty)
 
 
 def _about_axis(

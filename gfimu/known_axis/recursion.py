@@ -145,7 +145,8 @@ def filter_axis(
             if np.isfinite(y[k, i]):
                 seen += 1
         if seen > 0:
-            prior, start = np.linalg.inv(p), x.copy()
+            prior, prior_log = _inverse(p)
+            start = x.copy()
             inverse, log_noise = whole, whole_log
             if seen < c:
                 rows = np.empty(seen, dtype=np.int64)
@@ -176,13 +177,13 @@ def filter_axis(
                     if np.isfinite(y[k, i]):
                         missed[i] = y[k, i] - predicted
                 weighted = np.ascontiguousarray(h.T) @ inverse
-                information = prior + weighted @ h
+                found, found_log = _inverse(prior + weighted @ h)  # covariance after the sample
                 gradient = weighted @ missed - prior @ (x - start)
                 if iteration == 0:
                     # Innovations: ν' S⁻¹ ν and log |S| by the matrix inversion lemma.
                     score = weighted @ missed
-                    square = float(missed @ inverse @ missed - score @ np.linalg.solve(information, score))
-                    log_size = log_noise + np.linalg.slogdet(information)[1] - np.linalg.slogdet(prior)[1]
+                    square = float(missed @ inverse @ missed - score @ (found @ score))
+                    log_size = log_noise - found_log - prior_log
                     likelihood -= 0.5 * (square + log_size + seen * np.log(2.0 * np.pi))
                     squares += square
                     count += seen
@@ -195,28 +196,36 @@ def filter_axis(
                     d += h @ v
                     through = weighted @ d
                     if iteration == 0:
-                        whitened = inverse @ missed - np.ascontiguousarray(weighted.T) @ np.linalg.solve(
-                            information, score
-                        )
+                        whitened = inverse @ (missed - h @ (found @ score))
                         gradient_of += d.T @ whitened
-                        information_of += np.ascontiguousarray(d.T) @ inverse @ d - np.ascontiguousarray(
-                            through.T
-                        ) @ np.linalg.solve(information, through)
+                        information_of += np.ascontiguousarray(d.T) @ inverse @ d - np.ascontiguousarray(through.T) @ (
+                            found @ through
+                        )
                         if hub_variance > 0.0:
-                            precision = inverse - np.ascontiguousarray(weighted.T) @ np.linalg.solve(
-                                information, weighted
-                            )
+                            precision = inverse - np.ascontiguousarray(weighted.T) @ (found @ weighted)
                             gradient_of += hub_variance * _by_size(slopes.force, force, precision, whitened)
                     else:
-                        v = v - np.linalg.solve(information, through)
-                x = x + np.linalg.solve(information, gradient)
-            p = np.linalg.inv(information)  # type: ignore[assignment]
-            p = 0.5 * (p + p.T)
+                        v = v - found @ through
+                x = x + found @ gradient
+            p = found
         states[k], covariances[k], by_constants[k] = x, p, v
     return FilterRun(
         states, covariances, before, before_covariance, by_constants, before_by_constants,
         likelihood, squares, count, gradient_of, information_of,
     )  # fmt: skip
+
+
+@njit(cache=True)  # type: ignore[misc]
+def _inverse(a: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
+    """Return the inverse of a symmetric positive matrix (3, 3) by its minors, and the log of the inverse's determinant."""
+    found = np.empty((3, 3))
+    for i in range(3):
+        for j in range(i, 3):
+            one, two, three, four = (i + 1) % 3, (i + 2) % 3, (j + 1) % 3, (j + 2) % 3
+            found[i, j] = a[one, three] * a[two, four] - a[one, four] * a[two, three]
+            found[j, i] = found[i, j]
+    size = a[0, 0] * found[0, 0] + a[0, 1] * found[0, 1] + a[0, 2] * found[0, 2]
+    return found / size, -np.log(size)
 
 
 @njit(cache=True)  # type: ignore[misc]

@@ -18,7 +18,9 @@ from numpy.typing import NDArray
 from gfimu.errors import InputError
 from gfimu.files.model_files import list_models
 from gfimu.geometry.array import AccelerometerArray
+from gfimu.geometry.observability import unseen_motions
 from gfimu.parts.limits import PartLimits
+from gfimu.recording.gravity import gravity_text
 from gfimu.recording.recording import Recording
 from gfimu.recording.rigid_evidence import Costs, Evidence, Otherwise, gather
 from gfimu.units import STANDARD_GRAVITY
@@ -151,6 +153,9 @@ def check_recording(recording: Recording, array: AccelerometerArray) -> tuple[Fi
         found += _decide(evidence, recording)
         if not found:
             found += _slow(recording, readings, limits)
+    if not found and unseen_motions(array):  # too few channels to contradict one another
+        text, refused = gravity_text(recording, array, limits)
+        found += [Finding("unit", text, refused)] if text else []
     return (*sorted(found, key=lambda one: not one.refused), *dead)
 
 
