@@ -97,7 +97,8 @@ def _estimate(
 
     Mounted by eye: the same with --lever-std-m 0.003 --rotation-std-rad 0.05 --bias-std-m-s2 0.3
     """
-    from gfimu.commands.estimate import estimate_run, turning_axis
+    from gfimu.commands.estimate import estimate_run
+    from gfimu.commands.known_axis import turning_axis
     from gfimu.geometry.axis_uncertainty import AxisUncertainty
     from gfimu.motion.estimate_summary import summarise
 

@@ -133,6 +133,7 @@ def estimate(
     GeometryError
         If the array can't see all six motions; the message names those it can't.
     """
+    from gfimu.commands.known_axis import turning_axis
     from gfimu.geometry.axis_uncertainty import AxisUncertainty
 
     return estimate_run(
@@ -216,28 +217,14 @@ def _opened(
     return open_calibrated_run(recording, unit, None if array is None else as_array(array))
 
 
-def turning_axis(
-    axis: TurningAxis | str | Sequence[float] | None,
-    point: Sequence[float],
-    hub: str,
-    inclination_rad: float | None,
-) -> TurningAxis | None:
-    """Return an axis given as such or by its numbers; None without one."""
-    from gfimu.geometry.turning_axis import TurningAxis
-
-    if axis is None or isinstance(axis, TurningAxis):
-        return axis
-    return TurningAxis.of(axis, point=point, hub=hub, inclination=inclination_rad)
-
-
 def _turning(
     axis: TurningAxis | None, array: AccelerometerArray, uncertainty: AxisUncertainty | None
 ) -> TurningAxis | None:
     """Return the axis to estimate about: the one given, or the array's own where it can't see all six motions."""
+    from gfimu.commands.known_axis import known_axis
     from gfimu.errors import InputError
-    from gfimu.geometry.observability import unseen_motions
 
-    chosen = axis if axis is not None else array.turning_axis if unseen_motions(array) else None
+    chosen = known_axis(axis, array)
     if uncertainty is None or uncertainty.exact:
         return chosen
     if chosen is None:

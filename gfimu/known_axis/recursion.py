@@ -217,7 +217,7 @@ def filter_axis(
 
 @njit(cache=True)  # type: ignore[misc]
 def _inverse(a: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
-    """Return the inverse of a symmetric positive matrix (3, 3) by its minors, and the log of the inverse's determinant."""
+    """Return the inverse of a symmetric positive matrix (3, 3), by minors, and the log of the inverse's determinant."""
     found = np.empty((3, 3))
     for i in range(3):
         for j in range(i, 3):

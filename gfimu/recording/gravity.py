@@ -63,17 +63,11 @@ def gravity_text(recording: Recording, array: AccelerometerArray, limits: PartLi
             continue
         if _ONE_G[0] < size < _ONE_G[1] or _TURNING_G[0] < turning < _TURNING_G[1]:
             how = f", and gravity turns in it by {turning:.3g} m/s²" if size >= _ONE_G[1] else ""
-            return (
-                f"{seen}{how}; gravity alone is 9.81: the file looks like it is in g: name the columns …_g, or give the "
-                "unit by --map",
-                True,
-            )
+            cause = "the file looks like it is in g: name the columns …_g, or give the unit by --map"
+            return f"{seen}{how}; gravity alone is 9.81: {cause}", True
         if size < _NO_GRAVITY:
-            return (
-                f"{seen}; gravity alone is 9.81: it has been taken out of the file; export the specific force "
-                "(calibrated acceleration, not linear acceleration)",
-                True,
-            )
+            cause = "it has been taken out of the file; export the specific force, not the linear acceleration"
+            return f"{seen}; gravity alone is 9.81: {cause}", True
         return f"{seen}; gravity alone is 9.81: check the unit, or calibrate the chip", False
     return "", False
 
