@@ -188,6 +188,7 @@ def estimate_run(
     if turning is not None:
         found = _about_axis(run, geometry, turning, rest_bias=rest_bias, **options)
     else:
+        _require_all_motions(run, geometry)
         found = (estimate_from_rest if rest_bias else solve)(run, geometry, **options)
     if out is not None:
         found.write(out)
@@ -230,6 +231,16 @@ def _turning(
     if chosen is None:
         raise InputError(f"{next(iter(uncertainty.to_dict()))} is of a known axis; give the axis too (--axis)")
     return replace(chosen, uncertainty=uncertainty)
+
+
+def _require_all_motions(recording: Recording, array: AccelerometerArray) -> None:
+    """Raise `GeometryError` for an array of low rank, with what it gives nevertheless."""
+    from gfimu.errors import GeometryError
+    from gfimu.geometry.observability import unseen_motions
+    from gfimu.motion.seen import few_motions_text
+
+    if unseen_motions(array):
+        raise GeometryError(few_motions_text(array, recording.sample_rate))
 
 
 def _about_axis(
