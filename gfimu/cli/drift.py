@@ -111,7 +111,9 @@ def _drift(
 def _print_about_axis(found: AxisDrift) -> None:
     """Print the drift about a known axis."""
     where = f"turning at {found.rate_rad_s:g} rad/s" if found.rate_rad_s else "at rest"
-    rows = [(one.name, one.size, f"{one.rate_std:.3g}", f"{one.angle_std:.3g}") for one in found.terms]
+    rows: list[tuple[str, ...]] = [
+        (one.name, one.size, f"{one.rate_std:.3g}", f"{one.angle_std:.3g}") for one in found.terms
+    ]
     rows.append(("total", "", *(f"{value:.3g}" for value in found.total)))
     print_table(
         f"Rotation about the known axis after {found.time_s:g} s, {found.array}, {where} (1 σ)",
