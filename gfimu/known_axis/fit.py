@@ -87,15 +87,24 @@ def fit_axis(
     tilt = _inclination(y, channels) if axis.inclination is None else axis.inclination
     if axis.inclination is None and np.sin(tilt) <= _LEVEL:
         tilt = 0.0 if np.cos(tilt) > 0.0 else np.pi  # upright: what is across would be biases
-    settings = Settings(2.0, 100.0, 0.0 if axis.hub == "fixed" else 1.0, tilt)
+    settings = Settings(_first_scale(axis, noise), 100.0, 0.0 if axis.hub == "fixed" else 1.0, tilt)
     tried = min(_TRIED_ON, len(t))
     covariance = np.diag(_STD_START**2)
     if at_rest:
         covariance = np.diag([_STD_START[0] ** 2, 1e-4, 1e-2])
     starts = list(_starts(y, channels, tilt, at_rest=at_rest))
     best = max(starts, key=lambda start: problem.likelihood(settings, start, covariance, tried))
-    settings = _learnt(problem, settings, axis, best, covariance)
-    best = max(starts, key=lambda start: problem.likelihood(settings, start, covariance, tried))
+    if not axis.uncertainty.exact:
+        # A mounting that is off, taken as exact, can lose the motion: begin where the filter is slow enough to keep it.
+        slower = [
+            replace(settings, noise_scale=by * settings.noise_scale, jerk=jerk)
+            for by in (1.0, 3.0, 10.0)
+            for jerk in (10.0, 100.0)
+        ]
+        settings = max(slower, key=lambda one: problem.likelihood(one, best, covariance, len(t)))
+    else:
+        settings = _learnt(problem, settings, axis, best, covariance)
+        best = max(starts, key=lambda start: problem.likelihood(settings, start, covariance, tried))
     if at_rest:
         return _with_mounting(problem, array, axis, settings, best, covariance)
     mirrored = [start for start in starts if start[1] * best[1] < 0.0] or [best * np.array([1.0, -1.0, -1.0])]
@@ -114,6 +123,13 @@ def fit_axis(
     rates = [run.states[:, 1] for run in runs]
     alike = np.median(np.abs(rates[0] - rates[1])) < 0.1 * np.median(np.abs(rates[0] + rates[1]))
     return replace(fits[0 if odds > 0.0 else 1], sign_log_odds=float("inf") if alike else abs(float(odds)))
+
+
+def _first_scale(axis: TurningAxis, noise: NDArray[np.float64]) -> float:
+    """Return the noise to begin with, over the data sheets': an uncertain mounting adds its own, at rest."""
+    doubt = axis.uncertainty
+    turned = STANDARD_GRAVITY * np.hypot(doubt.rotation_std_rad, doubt.direction_std_rad)
+    return float(max(2.0, np.hypot(doubt.bias_std_m_s2, turned) / np.median(noise)))
 
 
 def _density(fit: AxisFit, run: FilterRun) -> float:
