@@ -12,11 +12,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import tomli_w
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from gfimu.errors import InputError
 from gfimu.files.model_files import find_model, read_toml
 from gfimu.files.schema import read
 from gfimu.geometry.array import AccelerometerArray
+from gfimu.geometry.turning_axis import TurningAxis
 from gfimu.motion.body_drive import BodyDrive
 from gfimu.parts.part_file import PartFile
 from gfimu.short_repr import short_repr
@@ -41,6 +43,7 @@ from sim.world import World
 
 __all__ = ["Twin"]
 
+_UP = np.array([0.0, 0.0, 1.0])
 _REMEMBERED = 16  # numerical: worlds that a twin keeps
 
 
@@ -76,6 +79,8 @@ class Twin:
     axis_inclination : float
         Angle between the table's axis and the vertical, rad: 0 of a level table, π/2 of a wheel or a pendulum. The
         axis leans about the world's x axis; at the angle zero that is the table's x axis too.
+    axis : TurningAxis, optional
+        How the array sits on the table's axis, in place of upright by ``cube_offset``.
     """
 
     array: AccelerometerArray
@@ -90,6 +95,7 @@ class Twin:
     array_name: str = ""
     grammar: bool = False
     axis_inclination: float = 0.0
+    axis: TurningAxis | None = None
 
     __repr__ = short_repr
 
@@ -112,8 +118,9 @@ class Twin:
         array = AccelerometerArray.load(file.array, beside=beside)
         array, part = array.with_part_file(file.sensor.part or array.chips[0].part, beside=beside)
         PartFile.load(part, array.part_files)
+        axis = _axis(file, array, data, source)
         return cls(
-            array=array,
+            array=array if axis is None else replace(array, turning_axis=axis),
             gravity=file.gravity_m_s2,
             cube_offset=np.array(file.cube_offset_m),
             sample_rate=file.sample_rate_hz,
@@ -124,7 +131,8 @@ class Twin:
             effects=tuple(table.effect(array, source) for table in file.effect),
             array_name=file.array,
             grammar=file.grammar,
-            axis_inclination=file.axis_inclination_rad,
+            axis_inclination=file.axis_inclination_rad if axis is None else axis.inclination or 0.0,
+            axis=axis,
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -139,7 +147,10 @@ class Twin:
         }
         if self.grammar:
             data["grammar"] = True
-        if self.axis_inclination:
+        if self.axis is not None:
+            del data["cube_offset_m"]
+            data["mounting"] = self.axis.to_mounting()
+        elif self.axis_inclination:
             data["axis_inclination_rad"] = self.axis_inclination
         if self.effects:
             data["effect"] = [{"name": effect.name, "parameters": effect.parameters} for effect in self.effects]
@@ -166,11 +177,14 @@ class Twin:
         start : float, optional
             Board time at which the recording began, s; by default the first time asked for.
         """
-        turned = np.zeros(3) if mounting is None else mounting
+        turned, offset = np.zeros(3) if mounting is None else mounting, self.cube_offset
+        if self.axis is not None:
+            turn = Rotation.from_rotvec(turned) * Rotation.align_vectors([_UP], [self.axis.direction])[0]
+            turned, offset = turn.as_rotvec(), -turn.apply(self.axis.point)
         nominal = World(
             self.array,
             gravity=self.gravity,
-            cube_offset=self.cube_offset,
+            cube_offset=offset,
             mount_rotvec=turned,
             axis_rotvec=np.array([self.axis_inclination, 0.0, 0.0]),
             start=start,
@@ -324,11 +338,18 @@ if TYPE_CHECKING:
         return twin
 
 
-def _inclination(value: Any, source: str) -> float:
-    inclination = float(value) if isinstance(value, int | float) and not isinstance(value, bool) else math.nan
-    if not 0.0 <= inclination <= math.pi:
-        raise InputError(f"{source}: axis_inclination_rad = {value!r} must be between 0 and π rad")
-    return inclination
+def _axis(file: TwinFile, array: AccelerometerArray, data: Mapping[str, Any], source: str) -> TurningAxis | None:
+    """Return how the array sits on its axis: by the twin file, or by the array file unless the twin places it upright.
+
+    A wheel's hub moves: its twin is a free body, whose axis gives the direction of the rate alone.
+    """
+    placed = [key for key in ("cube_offset_m", "axis_inclination_rad") if key in data]
+    if file.mounting is not None:
+        if placed:
+            raise InputError(f"{source}: {placed[0]} and [mounting] both place the array; leave one out")
+        return TurningAxis.from_mounting(file.mounting, source=source)
+    own = array.turning_axis
+    return own if own is not None and own.hub == "fixed" and not placed else None
 
 
 def _own(effects: Sequence[AnyEffect]) -> list[Effect]:

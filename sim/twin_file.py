@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 import msgspec
 
 from gfimu.files.schema import Positive, Table, Triple, about
+from gfimu.geometry.array_file import MountingTable
 from gfimu.units import STANDARD_GRAVITY
 from sim.effect_table import EffectTable
 
@@ -59,6 +60,14 @@ class TwinFile(Table, frozen=True):
     axis_inclination_rad: Annotated[
         Inclination, about("Angle between the table's axis and the vertical; π/2 of a pendulum or a wheel.", "rad")
     ] = 0.0
+    mounting: Annotated[
+        MountingTable | None,
+        about(
+            "How the array sits on the axis; it replaces the array file's own axis, and with it go cube_offset_m and "
+            "axis_inclination_rad, which follow from it.",
+            default="upright, by cube_offset_m and axis_inclination_rad",
+        ),
+    ] = None
     sample_rate_hz: Annotated[Positive, about("Nominal sample rate.", "Hz")] = 100.0
     grammar: Annotated[
         bool,

@@ -1,4 +1,4 @@
-"""`gfimu drift`: how far navigation runs off, cause by cause, and a Monte Carlo beside it."""
+"""`gfimu drift`: how far navigation, or a rotation about a known axis, runs off, cause by cause."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import typer
 from gfimu.cli.output import JsonOption, print_json, print_table, print_text, progress
 
 if TYPE_CHECKING:
+    from gfimu.known_axis.drift import AxisDrift
     from gfimu.position_drift import DriftBudget
     from gfimu.position_drift.monte_carlo import DriftSample
 
@@ -36,13 +37,30 @@ def _drift(
     gravity: Annotated[float, typer.Option(help="Local gravity, m/s².")] = 9.80665,
     monte_carlo: Annotated[int, typer.Option(help="Number of nonlinear Monte Carlo runs; 0 for none.")] = 0,
     seed: Annotated[int, typer.Option(help="Seed of the Monte Carlo.")] = 0,
+    axis: Annotated[
+        str | None,
+        typer.Option("--axis", help="Axis about which alone the array turns: x, y, z or 0,0,1: drift of the angle."),
+    ] = None,
+    axis_point: Annotated[
+        tuple[float, float, float], typer.Option("--axis-point", help="A point of that axis, body frame, m.")
+    ] = (0.0, 0.0, 0.0),
+    hub: Annotated[str, typer.Option("--hub", help="With --axis: fixed (a table) or free (a wheel).")] = "fixed",
+    inclination_rad: Annotated[
+        float | None, typer.Option("--inclination-rad", help="Angle between --axis and the vertical; 0 by default.")
+    ] = None,
+    hub_noise: Annotated[
+        float, typer.Option("--hub-noise-m-s2-rthz", help="Of a free hub: density of its own force, m/s²/√Hz.")
+    ] = 0.1,
     as_json: JsonOption = False,
 ) -> None:
     """Position-drift budget of an array: closed forms, their validity limit, Monte Carlo beside.
 
     Example: `gfimu drift --array cube12 --time 0.3 --bias-mg 35 --noise-ug 290 --monte-carlo 400`
+
+    One chip on a table: `gfimu drift --array arm.toml --axis z --rate 6 --time 60 --bias-mg 5 --noise-ug 290`
     """
     from gfimu.commands.drift import drift
+    from gfimu.known_axis.drift import AxisDrift
 
     with progress("Monte Carlo", monte_carlo) as advance:
         result = drift(
@@ -57,10 +75,18 @@ def _drift(
             gravity=gravity,
             monte_carlo=monte_carlo,
             seed=seed,
+            axis=axis,
+            axis_point=axis_point,
+            hub=hub,
+            inclination_rad=inclination_rad,
+            hub_noise_m_s2_rthz=hub_noise,
             progress=advance,
         )
     if as_json:
         print_json(result.to_dict())
+        return
+    if isinstance(result, AxisDrift):
+        _print_about_axis(result)
         return
 
     budget, sample = result.budget, result.sample
@@ -80,6 +106,22 @@ def _drift(
     )
     for line in _remarks(budget, sample):
         print_text(line, style="" if budget.valid else "yellow")
+
+
+def _print_about_axis(found: AxisDrift) -> None:
+    """Print the drift about a known axis."""
+    where = f"turning at {found.rate_rad_s:g} rad/s" if found.rate_rad_s else "at rest"
+    rows: list[tuple[str, ...]] = [
+        (one.name, one.size, f"{one.rate_std:.3g}", f"{one.angle_std:.3g}") for one in found.terms
+    ]
+    rows.append(("total", "", *(f"{value:.3g}" for value in found.total)))
+    print_table(
+        f"Rotation about the known axis after {found.time_s:g} s, {found.array}, {where} (1 σ)",
+        ("cause", "size", "rate, rad/s", "angle, rad"),
+        rows,
+        left=2,
+    )
+    print_text(f"{found.remark[0].upper()}{found.remark[1:]}.")
 
 
 def _length(metres: float) -> str:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -69,6 +70,22 @@ def _estimate(
     inclination_rad: Annotated[
         float | None, typer.Option("--inclination-rad", help="Angle between --axis and the vertical; else estimated.")
     ] = None,
+    point_std: Annotated[
+        float, typer.Option("--point-std-m", help="With --axis: how exactly --axis-point is known, m; estimated then.")
+    ] = 0.0,
+    direction_std: Annotated[
+        float, typer.Option("--direction-std-rad", help="With --axis: how exactly its direction is known, rad.")
+    ] = 0.0,
+    lever_std: Annotated[
+        float, typer.Option("--lever-std-m", help="With --axis: how exactly each chip's place is known, m.")
+    ] = 0.0,
+    rotation_std: Annotated[
+        float,
+        typer.Option("--rotation-std-rad", help="With --axis: how exactly each chip's orientation is known, rad."),
+    ] = 0.0,
+    bias_std: Annotated[
+        float, typer.Option("--bias-std-m-s2", help="With --axis: standard deviation of each channel's bias, m/s².")
+    ] = 0.0,
     json: JsonOption = False,
 ) -> None:
     """Estimate p, α, ω, attitude and table angle from a recording.
@@ -78,8 +95,12 @@ def _estimate(
     One chip on a table: gfimu estimate run.csv --array arm.toml --axis z --out estimate.csv
 
     Two chips on a wheel: gfimu estimate run.csv --array wheel.toml --axis z --hub free --unknown-start --out est.csv
+
+    Mounted by eye: the same with --lever-std-m 0.003 --rotation-std-rad 0.05 --bias-std-m-s2 0.3
     """
-    from gfimu.commands.estimate import estimate_run, turning_axis
+    from gfimu.commands.estimate import estimate_run
+    from gfimu.commands.known_axis import turning_axis
+    from gfimu.geometry.turning_axis import AxisUncertainty
     from gfimu.motion.estimate_summary import summarise
 
     with progress(_describe(method, axis), total=1.0) as done:
@@ -94,6 +115,7 @@ def _estimate(
             column_map=column_map,
             map_set=map_set or [],
             axis=turning_axis(axis, axis_point, hub, inclination_rad),
+            uncertainty=AxisUncertainty(point_std, direction_std, lever_std, rotation_std, bias_std),
             omega0=None if unknown_start else (0.0, 0.0, 0.0),
             fuse_gyro=gyro,
             with_position=position,
@@ -161,3 +183,21 @@ def _print_summary(summary: EstimateSummary) -> None:
     if summary.channels_left_out:
         rows.append(("channels left out", ", ".join(summary.channels_left_out), ""))
     print_table(f"{summary.array}, method {summary.method}, {summary.form} form", ("quantity", "value", "unit"), rows)
+    if summary.mounting is not None:
+        _print_mounting(summary.mounting)
+
+
+def _print_mounting(mounting: Mapping[str, Any]) -> None:
+    """Print the constants of a mounting that were estimated, and what the data leave open."""
+    print_table(
+        "Mounting, estimated with the rotation: corrections to the array file",
+        ("constant", "value", "± std", "prior std"),
+        [
+            (one["name"], f"{one['value']:+.4g}", f"{one['std']:.2g}", f"{one['prior_std']:.2g}")
+            for one in mounting["constants"]
+        ],
+        left=1,
+        note="Units are in the names; rotations and levers in body axes.",
+    )
+    for line in mounting["undetermined_combinations_in_prior_std"]:
+        print_text(f"- not determined by these data (each in units of its prior std): {line}")

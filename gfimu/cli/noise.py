@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated
 
@@ -32,11 +33,24 @@ def _noise(
     picture: Annotated[Path | None, typer.Option("--picture", help="Picture to write (.png, .svg, .pdf).")] = None,
     column_map: MapOption = None,
     map_set: MapSetOption = None,
+    axis: Annotated[
+        str | None, typer.Option("--axis", help="Axis about which alone it turns: noise as a rate, too.")
+    ] = None,
+    axis_point: Annotated[
+        tuple[float, float, float], typer.Option("--axis-point", help="A point of that axis, body frame, m.")
+    ] = (0.0, 0.0, 0.0),
+    hub: Annotated[str, typer.Option("--hub", help="With --axis: fixed (a table) or free (a wheel).")] = "fixed",
+    speed: Annotated[float, typer.Option("--speed-rad-s", help="With --axis: rate at which that holds.")] = math.tau,
+    array: Annotated[
+        str | None, typer.Option("--array", help="With --axis: array, a name or .toml file; else the recording's own.")
+    ] = None,
     json: JsonOption = False,
 ) -> None:
     """Identify velocity random walk N, bias instability B, acceleration random walk K, quantisation Q and ramp R.
 
     Example: gfimu noise rest.parquet --kalibr imu.yaml --picture allan.png
+
+    One chip on a table: gfimu noise rest.parquet --axis z --axis-point -0.1 0 0
     """
     from gfimu.commands.noise import noise
     from gfimu.sensor_noise.identification import TERMS
@@ -50,6 +64,11 @@ def _noise(
         calibration=calibration,
         kalibr=kalibr,
         picture=picture,
+        array=array,
+        axis=axis,
+        axis_point=axis_point,
+        hub=hub,
+        speed_rad_s=speed,
     )
     written = {} if kalibr is None else {"Kalibr": kalibr}
     written |= {} if picture is None else {"picture": picture}
@@ -68,7 +87,25 @@ def _noise(
         )
         + "; <: not found, 95 % limit",
     )
+    about = result.about_axis
+    if about is not None:
+        bounds = about.bounds
+        print_table(
+            f"Rotation about the known axis at {bounds.rate_rad_s:.4g} rad/s, {bounds.axis.hub} hub",
+            ("quantity", "1 σ", "unit"),
+            [
+                ("angular acceleration, per sample", _figure(bounds.acceleration_std), "rad/s²"),
+                ("rate, per sample", _figure(bounds.sample_std), "rad/s"),
+                ("rate, of a filter that has settled", _figure(bounds.filter_std), "rad/s"),
+                ("rate, by bias instability", _figure(about.instability_rate_std), "rad/s"),
+            ],
+            note="—: one sample can't show it. How angle and rate run off with time: gfimu drift --axis.",
+        )
     print_paths(written.items())
+
+
+def _figure(value: float) -> str:
+    return f"{value:.3g}" if math.isfinite(value) else "—"
 
 
 def _times(unit: str, power: str) -> str:

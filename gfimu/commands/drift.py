@@ -1,9 +1,9 @@
-"""Under `gfimu drift`: the position-drift budget of an array, with a Monte Carlo beside it."""
+"""Under `gfimu drift`: the position-drift budget of an array, or the drift of rate and angle about a known axis."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,6 +12,8 @@ from gfimu.errors import InputError
 
 if TYPE_CHECKING:
     from gfimu.geometry.array import AccelerometerArray
+    from gfimu.geometry.turning_axis import TurningAxis
+    from gfimu.known_axis.drift import AxisDrift
     from gfimu.position_drift import DriftBudget
     from gfimu.position_drift.monte_carlo import DriftSample
 
@@ -63,9 +65,14 @@ def drift(
     gravity: float = 9.80665,
     monte_carlo: int = 0,
     seed: int = 0,
+    axis: TurningAxis | str | Sequence[float] | None = None,
+    axis_point: Sequence[float] = (0.0, 0.0, 0.0),
+    hub: str = "fixed",
+    inclination_rad: float | None = None,
+    hub_noise_m_s2_rthz: float = 0.1,
     progress: Callable[[int], None] | None = None,
-) -> Drift:
-    """Budget the position drift of an array.
+) -> Drift | AxisDrift:
+    """Budget the position drift of an array, or about a known axis the drift of its rate and angle.
 
     Parameters
     ----------
@@ -88,6 +95,17 @@ def drift(
         Number of nonlinear Monte Carlo runs; 0 for none.
     seed : int
         Seed of the Monte Carlo.
+    axis : TurningAxis, str or sequence of float, optional
+        An axis about which alone the array turns: x, y, z, or three numbers, body frame. Few chips then suffice. By
+        default the array's own, where it can't see all six motions.
+    axis_point : sequence of float
+        A point of that axis, body frame, m.
+    hub : {"fixed", "free"}
+        Whether that axis stands still (a table) or moves with a body (a wheel).
+    inclination_rad : float, optional
+        Angle between that axis and the vertical, rad; upright by default.
+    hub_noise_m_s2_rthz : float
+        Of a free hub, one-sided density of its own specific force, m/s²/√Hz.
     progress : callable, optional
         Called with the number of Monte Carlo runs done.
 
@@ -95,9 +113,12 @@ def drift(
     ------
     InputError
         If there is no error to budget, or an argument is out of range.
+    GeometryError
+        If the array can't see all six motions, and no axis is known.
     """
     import numpy as np
 
+    from gfimu.commands.known_axis import known_axis, turning_axis
     from gfimu.commands.opened import as_array
     from gfimu.position_drift import ErrorSources, drift_budget
     from gfimu.position_drift.monte_carlo import monte_carlo_drift
@@ -116,6 +137,22 @@ def drift(
             "no error to budget: give at least one of --bias-mg, --noise-ug, --walk-ug, --rate-drift-deg-h"
         )
     geometry = as_array(array)
+    turning = known_axis(turning_axis(axis, axis_point, hub, inclination_rad), geometry)
+    if turning is not None:
+        from gfimu.known_axis.drift import axis_drift
+
+        if rate_drift_deg_h or monte_carlo or any(offset):
+            raise InputError("--rate-drift-deg-h, --offset and --monte-carlo have no use with a known axis (--axis)")
+        return axis_drift(
+            geometry,
+            turning,
+            time,
+            bias=sources.bias,
+            noise_density=sources.noise_density,
+            bias_random_walk=sources.bias_random_walk,
+            rate_rad_s=rate,
+            hub_density=hub_noise_m_s2_rthz,
+        )
     budget = drift_budget(geometry, time, sources, rate=rate, offset=offset, gravity=gravity)
     sample = None
     if monte_carlo:

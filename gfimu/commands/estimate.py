@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from gfimu.calibration.result import Calibration
     from gfimu.geometry.array import AccelerometerArray
-    from gfimu.geometry.turning_axis import TurningAxis
+    from gfimu.geometry.turning_axis import AxisUncertainty, TurningAxis
     from gfimu.importing import ColumnMap
     from gfimu.motion.estimation import Estimate
     from gfimu.recording import Recording
@@ -61,6 +61,11 @@ def estimate(
     axis_point: Sequence[float] = (0.0, 0.0, 0.0),
     hub: str = "fixed",
     inclination_rad: float | None = None,
+    point_std_m: float = 0.0,
+    direction_std_rad: float = 0.0,
+    lever_std_m: float = 0.0,
+    rotation_std_rad: float = 0.0,
+    bias_std_m_s2: float = 0.0,
     unknown_start: bool = False,
     gyro: bool = False,
     position: bool = False,
@@ -104,6 +109,10 @@ def estimate(
         Whether that axis stands still (a table) or moves with a body (a wheel).
     inclination_rad : float, optional
         Angle between that axis and the vertical, rad; estimated by default.
+    point_std_m, direction_std_rad, lever_std_m, rotation_std_rad, bias_std_m_s2 : float
+        How exactly the point and the direction of that axis, and place, orientation and biases of the chips are known
+        (`gfimu.geometry.turning_axis.AxisUncertainty`); what is not exact is estimated with the rotation. Where all
+        are 0, those of the array file hold.
     unknown_start : bool
         The run may start spinning (filter, smoother); the same as ``omega0=None``.
     gyro, fuse_gyro : bool
@@ -126,6 +135,9 @@ def estimate(
     GeometryError
         If the array can't see all six motions; the message names those it can't.
     """
+    from gfimu.commands.known_axis import turning_axis
+    from gfimu.geometry.turning_axis import AxisUncertainty
+
     return estimate_run(
         recording,
         array,
@@ -136,6 +148,7 @@ def estimate(
         column_map=column_map,
         map_set=map_set,
         axis=turning_axis(axis, axis_point, hub, inclination_rad),
+        uncertainty=AxisUncertainty(point_std_m, direction_std_rad, lever_std_m, rotation_std_rad, bias_std_m_s2),
         method=method,
         form=form,
         omega0=None if unknown_start else omega0,
@@ -160,6 +173,7 @@ def estimate_run(
     column_map: ColumnMap | str | Path | None = None,
     map_set: Sequence[str] = (),
     axis: TurningAxis | None = None,
+    uncertainty: AxisUncertainty | None = None,
     **options: Any,
 ) -> EstimatedRun:
     """Estimate and keep the recording and array beside the result, for a summary; ``options`` as `estimate`.
@@ -174,10 +188,11 @@ def estimate_run(
     from gfimu.motion.rest_bias import estimate_from_rest
 
     run, geometry = _opened(by_map(recording, column_map, map_set), array, calibration)
-    turning = _turning(axis, geometry)
+    turning = _turning(axis, geometry, uncertainty)
     if turning is not None:
         found = _about_axis(run, geometry, turning, rest_bias=rest_bias, **options)
     else:
+        _require_all_motions(run, geometry)
         found = (estimate_from_rest if rest_bias else solve)(run, geometry, **options)
     if out is not None:
         found.write(out)
@@ -215,27 +230,29 @@ def _opened(
     return open_calibrated_run(recording, unit, None if array is None else as_array(array))
 
 
-def turning_axis(
-    axis: TurningAxis | str | Sequence[float] | None,
-    point: Sequence[float],
-    hub: str,
-    inclination_rad: float | None,
+def _turning(
+    axis: TurningAxis | None, array: AccelerometerArray, uncertainty: AxisUncertainty | None
 ) -> TurningAxis | None:
-    """Return an axis given as such or by its numbers; None without one."""
-    from gfimu.geometry.turning_axis import TurningAxis
-
-    if axis is None or isinstance(axis, TurningAxis):
-        return axis
-    return TurningAxis.of(axis, point=point, hub=hub, inclination=inclination_rad)
-
-
-def _turning(axis: TurningAxis | None, array: AccelerometerArray) -> TurningAxis | None:
     """Return the axis to estimate about: the one given, or the array's own where it can't see all six motions."""
-    from gfimu.geometry.observability import unseen_motions
+    from gfimu.commands.known_axis import known_axis
+    from gfimu.errors import InputError
 
-    if axis is not None:
-        return axis
-    return array.turning_axis if unseen_motions(array) else None
+    chosen = known_axis(axis, array)
+    if uncertainty is None or uncertainty.exact:
+        return chosen
+    if chosen is None:
+        raise InputError(f"{next(iter(uncertainty.to_dict()))} is of a known axis; give the axis too (--axis)")
+    return replace(chosen, uncertainty=uncertainty)
+
+
+def _require_all_motions(recording: Recording, array: AccelerometerArray) -> None:
+    """Raise `GeometryError` for an array of low rank, with what it gives nevertheless."""
+    from gfimu.errors import GeometryError
+    from gfimu.geometry.observability import unseen_motions
+    from gfimu.motion.seen import few_motions_text
+
+    if unseen_motions(array):
+        raise GeometryError(few_motions_text(array, recording.sample_rate))
 
 
 def _about_axis(

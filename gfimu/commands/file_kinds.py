@@ -52,6 +52,7 @@ def check_file(data: Mapping[str, Any], source: str) -> str:
     import msgspec
 
     from gfimu.files.schema import Table, read
+    from gfimu.importing.map_keys import complete
 
     kind = next((kind for kind, key in _MARKS.items() if key in data), None)
     if kind is None:
@@ -61,7 +62,7 @@ def check_file(data: Mapping[str, Any], source: str) -> str:
         read(data, schema, source)
         return kind
     try:
-        msgspec.convert({"name": "", **data}, schema)
+        msgspec.convert({"name": "", **complete(data)}, schema)
     except msgspec.ValidationError as error:
         raise InputError(f"{source}: {error}; correct the {kind}") from None
     return kind

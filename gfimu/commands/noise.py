@@ -1,15 +1,21 @@
-"""Under `gfimu noise`: Allan deviation and noise terms of a recording at rest."""
+"""Under `gfimu noise`: Allan deviation and noise terms of a recording at rest, also as a rate about a known axis."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gfimu.files.outputs import KALIBR, PICTURE, writes
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from gfimu.calibration.result import Calibration
+    from gfimu.geometry.array import AccelerometerArray
+    from gfimu.geometry.turning_axis import TurningAxis
     from gfimu.importing import ColumnMap
     from gfimu.recording import Recording
     from gfimu.recording.mapped import MappedFile
@@ -18,7 +24,7 @@ if TYPE_CHECKING:
 __all__ = ["noise"]
 
 
-@writes(reads=("recording", "calibration", "column_map"), kalibr=KALIBR, picture=PICTURE)
+@writes(reads=("recording", "calibration", "column_map", "array"), kalibr=KALIBR, picture=PICTURE)
 def noise(
     recording: Recording | str | Path | MappedFile,
     *,
@@ -29,6 +35,11 @@ def noise(
     map_set: Sequence[str] = (),
     kalibr: str | Path | None = None,
     picture: str | Path | None = None,
+    array: AccelerometerArray | str | Path | None = None,
+    axis: TurningAxis | str | Sequence[float] | None = None,
+    axis_point: Sequence[float] = (0.0, 0.0, 0.0),
+    hub: str = "fixed",
+    speed_rad_s: float = math.tau,
 ) -> RecordingNoise:
     """Identify velocity random walk N, bias instability B, acceleration random walk K, quantisation Q and ramp R.
 
@@ -50,11 +61,23 @@ def noise(
         Kalibr ``imu.yaml`` to write.
     picture : str or Path, optional
         Picture to write, ``.png``, ``.svg`` or ``.pdf``.
+    array : AccelerometerArray, str or Path, optional
+        The array, its name or file, for its rotation about a known axis; the recording's own by default.
+    axis : TurningAxis, str or sequence of float, optional
+        Axis about which alone the array turns, body frame: x, y, z, or three numbers; with it the result says what the
+        noise means for the rate (``about_axis``). By default the array's own, where it sees too little without.
+    axis_point : sequence of float
+        A point of that axis, body frame, m.
+    hub : {"fixed", "free"}
+        Whether that axis stands still (a table) or moves with a body (a wheel).
+    speed_rad_s : float
+        Rate at which that holds, rad/s.
 
     Raises
     ------
     InputError
-        If the recording can't be read or never rests, or an output can't be written where it is asked for.
+        If the recording can't be read or never rests, or holds counts where an axis is given, or an output can't
+        be written where it is asked for.
     """
     from gfimu.calibration.run_file import open_calibrated, open_uncalibrated
     from gfimu.commands.opened import as_calibration, by_map
@@ -69,6 +92,15 @@ def noise(
     else:
         run = open_uncalibrated(source) if unit is None else open_calibrated(source, unit)
     result = recording_noise(run, stretch=stretch, rest_threshold=rest_threshold)
+    if axis is not None or array is not None or "[turning_axis]" in str(run.metadata.get("array_toml", "")):
+        from gfimu.commands.known_axis import known_axis, turning_axis
+        from gfimu.commands.opened import as_array, as_run
+        from gfimu.known_axis.noise import axis_noise
+
+        geometry = as_run(source, None)[1] if array is None else as_array(array)
+        turning = known_axis(turning_axis(axis, axis_point, hub, None), geometry)
+        if turning is not None:
+            result = replace(result, about_axis=axis_noise(result, geometry, turning, rate_rad_s=speed_rad_s))
     if kalibr is not None:
         write_text(kalibr, kalibr_yaml(result))
     if picture is not None:

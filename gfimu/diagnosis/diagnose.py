@@ -17,8 +17,8 @@ from gfimu.diagnosis.verdict.place import with_place
 from gfimu.diagnosis.verdict.sample_notes import with_sample_notes
 from gfimu.diagnosis.verdict.verdict import Diagnosis
 from gfimu.errors import InputError
-from gfimu.recording import Recording
 from gfimu.known_axis.axis_gyro import with_axis_gyro
+from gfimu.recording import Recording
 from gfimu.recording.carried_array import warn_of_other_array
 from gfimu.world_model import WorldModel
 

@@ -247,9 +247,7 @@ class AccelerometerArray:
             chips,
             length,
             file.description,
-            turning_axis=None
-            if file.turning_axis is None
-            else TurningAxis.from_table(file.turning_axis, source=source),
+            turning_axis=_axis(file, source),
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -289,3 +287,12 @@ def _chip(table: ChipTable, number: int, source: str) -> Chip:
         table.output_data_rate_hz,
         table.own_clock,
     )
+
+
+def _axis(file: ArrayFile, source: str) -> TurningAxis | None:
+    """Return the axis of an array file, of whichever of its two tables it has."""
+    if file.turning_axis is not None and file.mounting is not None:
+        raise InputError(f"{source}: has both [turning_axis] and [mounting], which say the same; leave one out")
+    if file.mounting is not None:
+        return TurningAxis.from_mounting(file.mounting, source=source)
+    return None if file.turning_axis is None else TurningAxis.from_table(file.turning_axis, source=source)

@@ -6,9 +6,9 @@ from typing import Annotated, Literal
 
 import msgspec
 
-from gfimu.files.schema import Positive, Table, Triple, about
+from gfimu.files.schema import NotNegative, Positive, Table, Triple, about
 
-__all__ = ["ArrayFile", "ChipTable", "TurningAxisTable"]
+__all__ = ["ArrayFile", "ChipTable", "MountingTable", "TurningAxisTable"]
 
 _Row = list[float]
 
@@ -67,6 +67,35 @@ class TurningAxisTable(Table, frozen=True):
     inclination_rad: Annotated[
         float | None, about("Angle between the axis and the vertical, 0 (upright) to π.", "rad", default="estimated")
     ] = None
+    point_std_m: Annotated[
+        NotNegative, about("Standard deviation of the point, each direction across the axis; 0: exact.", "m")
+    ] = 0.0
+    direction_std_rad: Annotated[
+        NotNegative, about("Standard deviation of the direction, each of two angles; 0: exact.", "rad")
+    ] = 0.0
+    lever_std_m: Annotated[
+        NotNegative, about("Standard deviation of the place of each chip, each direction; 0: exact.", "m")
+    ] = 0.0
+    rotation_std_rad: Annotated[
+        NotNegative, about("Standard deviation of the orientation of each chip, each of three angles; 0: exact.", "rad")
+    ] = 0.0
+    bias_std_m_s2: Annotated[
+        NotNegative, about("Standard deviation of the constant bias of each channel; 0: exact.", "m/s²")
+    ] = 0.0
+
+
+class MountingTable(Table, frozen=True):
+    """The axis about which alone the body turns, in the words of the format's first version."""
+
+    axis: Annotated[Triple, about("Direction of the axis, body frame.", example=[0, 0, 1])]
+    origin_m: Annotated[Triple, about("A point of the axis, body frame.", "m")] = (0.0, 0.0, 0.0)
+    inclination_deg: Annotated[
+        float | None, about("Angle between the axis and the vertical, 0 (upright) to 180.", "°", default="estimated")
+    ] = None
+    hub: Annotated[
+        Literal["fixed", "moving"],
+        about("Whether the axis stands still (a table), or moves with a body of unknown acceleration (a wheel)."),
+    ] = "fixed"
 
 
 class ArrayFile(Table, frozen=True):
@@ -84,4 +113,7 @@ class ArrayFile(Table, frozen=True):
     ] = None
     turning_axis: Annotated[
         TurningAxisTable | None, about("The axis about which alone the body turns.", default="a free body")
+    ] = None
+    mounting: Annotated[
+        MountingTable | None, about("The same axis in other words; a file has one of the two.", default="a free body")
     ] = None

@@ -2,20 +2,73 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, fields
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.errors import InputError
-from gfimu.geometry.array_file import TurningAxisTable
+from gfimu.files.schema import read
+from gfimu.geometry.array_file import MountingTable, TurningAxisTable
 from gfimu.short_repr import short_repr
 
-__all__ = ["HUBS", "TurningAxis"]
+__all__ = ["HUBS", "AxisUncertainty", "TurningAxis"]
 
 HUBS = ("fixed", "free")
+
+
+@dataclass(frozen=True)
+class AxisUncertainty:
+    """Standard deviations of what a drawing says of chips on an axis; 0 is exact.
+
+    What is not exact is estimated together with the rotation, with these as its prior.
+
+    Parameters
+    ----------
+    point_std_m : float
+        Of the point of the axis, each direction across it, m.
+    direction_std_rad : float
+        Of the direction of the axis in the body, each of two angles, rad.
+    lever_std_m : float
+        Of the place of each chip, each direction, chips independent, m.
+    rotation_std_rad : float
+        Of the orientation of each chip, each of three angles, chips independent, rad.
+    bias_std_m_s2 : float
+        Of the constant bias of each channel, m/s².
+
+    Raises
+    ------
+    InputError
+        If one is negative or not a number.
+    """
+
+    point_std_m: float = 0.0
+    direction_std_rad: float = 0.0
+    lever_std_m: float = 0.0
+    rotation_std_rad: float = 0.0
+    bias_std_m_s2: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, value in asdict(self).items():
+            if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value < math.inf:
+                raise InputError(f"[turning_axis]: {name} is {value!r}; give a standard deviation of at least 0")
+
+    @classmethod
+    def names(cls) -> tuple[str, ...]:
+        """Return the keys of the table ``[turning_axis]`` that hold these."""
+        return tuple(one.name for one in fields(cls))
+
+    @property
+    def exact(self) -> bool:
+        """Whether nothing is uncertain."""
+        return not any(asdict(self).values())
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the keys of the table ``[turning_axis]``; those of 0 are left out."""
+        return {name: value for name, value in asdict(self).items() if value}
 
 
 @dataclass(frozen=True)
@@ -32,12 +85,15 @@ class TurningAxis:
         Whether the axis stands still (a table), or moves with a body whose acceleration is not known (a wheel).
     inclination : float or None
         Angle between the axis and the vertical, rad; None if it is to be estimated.
+    uncertainty : AxisUncertainty
+        How exactly axis, places, orientations and biases of the chips are known; exactly by default.
     """
 
     direction: NDArray[np.float64]
     point: NDArray[np.float64]
     hub: str = "fixed"
     inclination: float | None = None
+    uncertainty: AxisUncertainty = field(default_factory=AxisUncertainty)
 
     __repr__ = short_repr
 
@@ -49,6 +105,7 @@ class TurningAxis:
         point: Sequence[float] | NDArray[np.float64] = (0.0, 0.0, 0.0),
         hub: str = "fixed",
         inclination: float | None = None,
+        uncertainty: AxisUncertainty | None = None,
         source: str = "axis",
     ) -> TurningAxis:
         """Return an axis given as x, y or z, or as three numbers of any length.
@@ -81,7 +138,7 @@ class TurningAxis:
             raise InputError(f"{source}: unknown hub {hub!r}; valid: {', '.join(HUBS)}")
         if inclination is not None and not 0.0 <= inclination <= np.pi:
             raise InputError(f"{source}: inclination {inclination!r} rad; give an angle from 0 (upright) to π")
-        return cls(vector / length, place, hub, inclination)
+        return cls(vector / length, place, hub, inclination, uncertainty or AxisUncertainty())
 
     @classmethod
     def from_table(cls, table: TurningAxisTable, *, source: str) -> TurningAxis:
@@ -91,10 +148,34 @@ class TurningAxis:
             point=table.point_m,
             hub=table.hub,
             inclination=table.inclination_rad,
+            uncertainty=AxisUncertainty(**{name: getattr(table, name) for name in AxisUncertainty.names()}),
             source=f"{source}: [turning_axis]",
         )
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any], *, source: str) -> TurningAxis:
+        """Return the axis whose table `to_dict` returned."""
+        return cls.from_table(read(data, TurningAxisTable, source), source=source)
+
+    @classmethod
+    def from_mounting(cls, table: MountingTable, *, source: str) -> TurningAxis:
+        """Return the axis of the table ``[mounting]`` of an array or twin file."""
+        return cls.of(
+            table.axis,
+            point=table.origin_m,
+            hub="free" if table.hub == "moving" else "fixed",
+            inclination=None if table.inclination_deg is None else math.radians(table.inclination_deg),
+            source=f"{source}: [mounting]",
+        )
+
+    def to_mounting(self) -> dict[str, Any]:
+        """Return the table ``[mounting]`` of an array or twin file."""
+        tilt = {} if self.inclination is None else {"inclination_deg": math.degrees(self.inclination)}
+        hub = "moving" if self.hub == "free" else "fixed"
+        return {"axis": self.direction.tolist(), "origin_m": self.point.tolist(), "hub": hub} | tilt
 
     def to_dict(self) -> dict[str, Any]:
         """Return the table of an array file."""
         found = {"direction": self.direction.tolist(), "point_m": self.point.tolist(), "hub": self.hub}
-        return found | ({} if self.inclination is None else {"inclination_rad": self.inclination})
+        tilt = {} if self.inclination is None else {"inclination_rad": self.inclination}
+        return found | tilt | self.uncertainty.to_dict()

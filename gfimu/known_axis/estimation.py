@@ -13,15 +13,14 @@ from gfimu.errors import InputError
 from gfimu.geometry.array import OMEGA_PRODUCTS, AccelerometerArray
 from gfimu.geometry.turning_axis import TurningAxis
 from gfimu.known_axis.bounds import require_visible
-from gfimu.known_axis.channels import AxisChannels
 from gfimu.known_axis.fit import fit_axis
-from gfimu.known_axis.recursion import filter_axis, smooth_axis
+from gfimu.known_axis.problem import AxisProblem
+from gfimu.known_axis.recursion import smooth_axis
 from gfimu.motion.attitude import from_rotation
 from gfimu.motion.estimation import FORMAT_VERSION, Estimate
 from gfimu.parts.part import white_noise_std
 from gfimu.recording import Recording
 from gfimu.recording.clipping import without_clipped
-from gfimu.units import STANDARD_GRAVITY
 
 __all__ = ["estimate_about_axis"]
 
@@ -72,25 +71,25 @@ def estimate_about_axis(
     if len(recording) < 20:
         raise InputError("a recording of fewer than twenty samples shows no rotation; record longer")
     recording, clipped = without_clipped(recording, array)
-    channels = AxisChannels.of(array, axis)
     t, y = recording.t_s, np.ascontiguousarray(recording.for_array(array))
     noise = white_noise_std(array, recording.sample_rate) if noise_std is None else np.asarray(noise_std, dtype=float)
     noise = np.ascontiguousarray(np.broadcast_to(noise, array.n_channels))
-    fit = fit_axis(t, y, channels, axis, noise, at_rest=at_rest)
-    one = fit.settings
-    along, across = STANDARD_GRAVITY * np.cos(one.inclination), STANDARD_GRAVITY * np.sin(one.inclination)
-    states, covariances, before, before_covariance, _, squares, count = filter_axis(
-        t, y, channels.force, channels.by_acceleration, channels.by_square, along, across,
-        (one.noise_scale * noise) ** 2, one.hub**2, one.jerk, fit.start, fit.start_covariance,
-    )  # fmt: skip
-    if smooth:
-        states, covariances = smooth_axis(t, states, covariances, before, before_covariance)
+    fit = fit_axis(t, y, array, axis, noise, at_rest=at_rest)
+    one, channels, mounted = fit.settings, fit.channels, fit.mounting
+    slopes = None if mounted is None else mounted.mounting.slopes(mounted.values)
+    run = AxisProblem(t, y, channels, noise).run(one, fit.start, fit.start_covariance, slopes=slopes)
+    found = smooth_axis(t, run) if smooth else (run.states, run.covariances, run.by_constants)
     # All noises larger by one factor leave the gains as they are: the innovations say by how much.
-    spread = max(squares / max(count, 1), 1.0)
+    mean_square = run.squares / max(run.readings, 1)
+    states, variance = found[0], max(mean_square, 1.0) * found[1][:, 1, 1]
+    if mounted is not None:
+        by_rate = found[2][:, 1]  # (n, m)
+        variance = variance + np.einsum("ni,ij,nj->n", by_rate, mounted.covariance, by_rate)
     u = axis.direction
     omega, alpha = np.outer(states[:, 1], u), np.outer(states[:, 2], u)
-    std = np.sqrt(np.maximum(spread * covariances[:, 1, 1], 0.0))
-    left = y - np.outer(states[:, 2], channels.by_acceleration) - np.outer(states[:, 1] ** 2, channels.by_square)
+    std = np.sqrt(np.maximum(variance, 0.0))
+    left = y - channels.offset - np.outer(states[:, 2], channels.by_acceleration)
+    left = left - np.outer(states[:, 1] ** 2, channels.by_square)
     products = np.column_stack(
         [omega[:, "xyz".index(a)] * omega[:, "xyz".index(b)] for a, b in (tuple(pair) for pair in OMEGA_PRODUCTS)]
     )
@@ -116,7 +115,8 @@ def estimate_about_axis(
             "hub_std_m_s2": one.hub,
             "sign": sign,
             "sign_log_odds": fit.sign_log_odds if np.isfinite(fit.sign_log_odds) else None,
-            "mean_normalised_innovation_squared": squares / max(count, 1),
+            "mean_normalised_innovation_squared": mean_square,
+            **({} if mounted is None else {"mounting": mounted.to_dict()}),
             "warnings": [*(one.text for one in clipped), *([] if sign == "decided" else [undecided])],
             "channels_left_out": [],
             "mounting_rotvec_rad": recording.mounting_rotvec.tolist(),

@@ -9,40 +9,25 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
+from gfimu.geometry.array import AccelerometerArray
 from gfimu.geometry.turning_axis import TurningAxis
 from gfimu.known_axis.channels import AxisChannels
-from gfimu.known_axis.recursion import filter_axis
+from gfimu.known_axis.mounting import Mounting
+from gfimu.known_axis.mounting_fit import MountingFit, fit_mounting
+from gfimu.known_axis.problem import AxisProblem, Settings
+from gfimu.known_axis.recursion import FilterRun
 from gfimu.units import STANDARD_GRAVITY
 
-__all__ = ["AxisFit", "Settings", "fit_axis"]
+__all__ = ["AxisFit", "fit_axis"]
 
 _LEARNT_FROM = 3000  # samples: enough for four numbers
 _TRIED_ON = 600  # samples, on which starts are compared
 _PHASES = 8  # of gravity at the start
+_TURNS = 3  # of constants of the mounting and numbers of the filter, each given the other; by choice
+_SAME = 0.1  # change of the log of the noise below which another turn changes nothing that matters; by choice
+_CLEAR = 300.0  # nats: log odds of the sign with the mounting as drawn, above which the other is given up; by choice
 _LEVEL = 0.03  # rad: below it gravity across the axis shows no angle beside biases
 _STD_START = np.array([0.5, 0.3, 5.0])  # of [θ, Ω, α] at a start that was tried, rad, rad/s, rad/s²
-
-
-@dataclass(frozen=True)
-class Settings:
-    """Numbers that the filter runs with.
-
-    Parameters
-    ----------
-    noise_scale : float
-        Standard deviation of the channels over that of their data sheets.
-    jerk : float
-        Spectral density of the change of α, rad²/s⁵.
-    hub : float
-        Standard deviation of the axis's own specific force, m/s²; 0 where it stands still.
-    inclination : float
-        Angle between axis and vertical, rad.
-    """
-
-    noise_scale: float
-    jerk: float
-    hub: float
-    inclination: float
 
 
 @dataclass(frozen=True)
@@ -59,76 +44,37 @@ class AxisFit:
         Its covariance.
     sign_log_odds : float
         Log odds of the sign of the rate over the other one, nats.
+    channels : AxisChannels
+        What the channels read, with the uncertain constants at their estimates.
+    mounting : MountingFit or None
+        The constants that were uncertain; None where the mounting is exact.
     """
 
     settings: Settings
     start: NDArray[np.float64]
     start_covariance: NDArray[np.float64]
     sign_log_odds: float
-
-
-class _Problem:
-    """Readings with what is known of their channels."""
-
-    def __init__(
-        self,
-        t: NDArray[np.float64],
-        y: NDArray[np.float64],
-        channels: AxisChannels,
-        noise: NDArray[np.float64],
-    ) -> None:
-        self.t, self.y, self.channels, self.noise = t, y, channels, noise
-
-    def likelihood(
-        self, settings: Settings, start: NDArray[np.float64], covariance: NDArray[np.float64], samples: int
-    ) -> float:
-        """Return the log likelihood of the first samples."""
-        found = self.run(settings, start, covariance, samples)[4]
-        return float(found) if np.isfinite(found) else -np.inf
-
-    def run(
-        self,
-        settings: Settings,
-        start: NDArray[np.float64],
-        covariance: NDArray[np.float64],
-        samples: int | None = None,
-    ) -> tuple:  # type: ignore[type-arg]
-        rows = slice(None, samples)
-        one = self.channels
-        gravity = STANDARD_GRAVITY
-        return filter_axis(
-            self.t[rows],
-            self.y[rows],
-            one.force,
-            one.by_acceleration,
-            one.by_square,
-            gravity * np.cos(settings.inclination),
-            gravity * np.sin(settings.inclination),
-            (settings.noise_scale * self.noise) ** 2,
-            settings.hub**2,
-            settings.jerk,
-            start,
-            covariance,
-        )
+    channels: AxisChannels
+    mounting: MountingFit | None = None
 
 
 def fit_axis(
     t: NDArray[np.float64],
     y: NDArray[np.float64],
-    channels: AxisChannels,
+    array: AccelerometerArray,
     axis: TurningAxis,
     noise: NDArray[np.float64],
     *,
     at_rest: bool,
 ) -> AxisFit:
-    """Find noise, smoothness, inclination and start by the likelihood of the filter's innovations.
+    """Find noise, smoothness, inclination, start and uncertain constants by the likelihood of the filter's innovations.
 
     Parameters
     ----------
     t, y : ndarray, shapes (n,) and (n, c)
         Times, s, and readings, m/s².
-    channels : AxisChannels
-        What the channels read.
+    array : AccelerometerArray
+        The array.
     axis : TurningAxis
         The axis; a known inclination is kept.
     noise : ndarray, shape (c,)
@@ -136,30 +82,102 @@ def fit_axis(
     at_rest : bool
         Whether the body is at rest at the first sample.
     """
-    problem = _Problem(t, y, channels, noise)
+    channels = AxisChannels.of(array, axis)
+    problem = AxisProblem(t, y, channels, noise)
     tilt = _inclination(y, channels) if axis.inclination is None else axis.inclination
     if axis.inclination is None and np.sin(tilt) <= _LEVEL:
         tilt = 0.0 if np.cos(tilt) > 0.0 else np.pi  # upright: what is across would be biases
-    settings = Settings(2.0, 100.0, 0.0 if axis.hub == "fixed" else 1.0, tilt)
+    settings = Settings(_first_scale(axis, noise), 100.0, 0.0 if axis.hub == "fixed" else 1.0, tilt)
     tried = min(_TRIED_ON, len(t))
     covariance = np.diag(_STD_START**2)
     if at_rest:
         covariance = np.diag([_STD_START[0] ** 2, 1e-4, 1e-2])
     starts = list(_starts(y, channels, tilt, at_rest=at_rest))
     best = max(starts, key=lambda start: problem.likelihood(settings, start, covariance, tried))
-    settings = _learnt(problem, settings, axis, best, covariance)
-    best = max(starts, key=lambda start: problem.likelihood(settings, start, covariance, tried))
+    if not axis.uncertainty.exact:
+        # A mounting that is off, taken as exact, can lose the motion: begin where the filter is slow enough to keep it.
+        slower = [
+            replace(settings, noise_scale=by * settings.noise_scale, jerk=jerk)
+            for by in (1.0, 3.0, 10.0)
+            for jerk in (10.0, 100.0)
+        ]
+        settings = max(slower, key=lambda one: problem.likelihood(one, best, covariance, len(t)))
+    else:
+        settings = _learnt(problem, settings, axis, best, covariance)
+        best = max(starts, key=lambda start: problem.likelihood(settings, start, covariance, tried))
     if at_rest:
-        return AxisFit(settings, best, covariance, float("inf"))
+        return _with_mounting(problem, array, axis, settings, best, covariance)
     mirrored = [start for start in starts if start[1] * best[1] < 0.0] or [best * np.array([1.0, -1.0, -1.0])]
     other = max(mirrored, key=lambda start: problem.likelihood(settings, start, covariance, tried))
-    one, two = problem.run(settings, best, covariance), problem.run(settings, other, covariance)
-    odds = float(one[4] - two[4])
-    if odds < 0.0:
-        best, odds = other, -odds
+    runs = [problem.run(settings, start, covariance) for start in (best, other)]
+    spread = max(min(run.squares / max(run.readings, 1) for run in runs), 1.0)
+    ahead = (runs[0].likelihood - runs[1].likelihood) / spread
+    if not axis.uncertainty.exact and abs(ahead) > _CLEAR:
+        fit = _with_mounting(problem, array, axis, settings, best if ahead > 0.0 else other, covariance)
+        return replace(fit, sign_log_odds=float(abs(ahead)))
+    fits = [_with_mounting(problem, array, axis, settings, start, covariance) for start in (best, other)]
+    if not axis.uncertainty.exact:
+        runs = [replace(problem, channels=one.channels).run(one.settings, one.start, covariance) for one in fits]
+    odds = _density(fits[0], runs[0]) - _density(fits[1], runs[1])
     # Starts of either sign that end in one motion began where the rate was near zero: there is no other sign.
-    alike = np.median(np.abs(one[0][:, 1] - two[0][:, 1])) < 0.1 * np.median(np.abs(one[0][:, 1] + two[0][:, 1]))
-    return AxisFit(settings, best, covariance, float("inf") if alike else odds)
+    rates = [run.states[:, 1] for run in runs]
+    alike = np.median(np.abs(rates[0] - rates[1])) < 0.1 * np.median(np.abs(rates[0] + rates[1]))
+    return replace(fits[0 if odds > 0.0 else 1], sign_log_odds=float("inf") if alike else abs(float(odds)))
+
+
+def _first_scale(axis: TurningAxis, noise: NDArray[np.float64]) -> float:
+    """Return the noise to begin with, over the data sheets': an uncertain mounting adds its own, at rest."""
+    doubt = axis.uncertainty
+    turned = STANDARD_GRAVITY * np.hypot(doubt.rotation_std_rad, doubt.direction_std_rad)
+    return float(max(2.0, np.hypot(doubt.bias_std_m_s2, turned) / np.median(noise)))
+
+
+def _density(fit: AxisFit, run: FilterRun) -> float:
+    """Return what decides between starts, nats: of uncertain constants their prior counts too."""
+    return run.likelihood if fit.mounting is None else fit.mounting.density
+
+
+def _with_mounting(
+    problem: AxisProblem,
+    array: AccelerometerArray,
+    axis: TurningAxis,
+    settings: Settings,
+    start: NDArray[np.float64],
+    covariance: NDArray[np.float64],
+) -> AxisFit:
+    """Return the fit from one start, with the uncertain constants estimated in turn with the filter's numbers."""
+    if axis.uncertainty.exact:
+        return AxisFit(settings, start, covariance, float("inf"), problem.channels)
+    free = axis.inclination is None and np.sin(settings.inclination) > _LEVEL
+    mounting = Mounting.of(array, axis, settings.inclination, free_inclination=bool(free))
+    values = np.zeros(len(mounting.constants))
+    for turn in range(_TURNS):
+        settings = _enlarged(problem, settings, start, covariance)
+        found = fit_mounting(problem, mounting, settings, start, covariance, values)
+        values = found.values
+        settings = replace(settings, inclination=mounting.tilt(values))
+        problem = replace(problem, channels=mounting.channels(values))
+        if turn + 1 == _TURNS:
+            break
+        known = replace(axis, inclination=settings.inclination)
+        learnt = _learnt(problem, settings, known, start, covariance)
+        again = _enlarged(problem, learnt, start, covariance)
+        if abs(np.log(again.noise_scale / settings.noise_scale)) < _SAME:
+            break
+        settings = learnt
+    return AxisFit(settings, start, covariance, float("inf"), problem.channels, found)
+
+
+def _enlarged(
+    problem: AxisProblem, settings: Settings, start: NDArray[np.float64], covariance: NDArray[np.float64]
+) -> Settings:
+    """Return settings with all noises larger by one factor where the innovations of the whole run are larger.
+
+    The noise is learnt from the first samples; what vibrates more later would count for more than it is worth.
+    """
+    run = problem.run(settings, start, covariance)
+    by = np.sqrt(max(run.squares / max(run.readings, 1), 1.0))
+    return replace(settings, noise_scale=settings.noise_scale * by, hub=settings.hub * by, jerk=settings.jerk * by**2)
 
 
 def _inclination(y: NDArray[np.float64], channels: AxisChannels) -> float:
@@ -194,7 +212,7 @@ def _starts(
 
 
 def _learnt(
-    problem: _Problem,
+    problem: AxisProblem,
     settings: Settings,
     axis: TurningAxis,
     start: NDArray[np.float64],

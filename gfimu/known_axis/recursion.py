@@ -1,29 +1,89 @@
-"""Extended Kalman filter and smoother of the state [θ, Ω, α] for a rotation about one axis, compiled."""
+"""Extended Kalman filter and smoother of the state [θ, Ω, α] for a rotation about one axis, compiled.
+
+Beside the state run its derivatives by constants of the mounting that are not known exactly (levers, orientations,
+biases): as the innovations of a filter are linear in such constants, their gradient and information follow in one pass,
+without a place in the state (B. Friedland, Treatment of bias in recursive filtering, IEEE Trans. AC-14, 1969).
+"""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-__all__ = ["filter_axis", "smooth_axis"]
+from gfimu.known_axis.channels import Coefficients
+
+__all__ = ["FilterRun", "Slopes", "filter_axis", "smooth_axis"]
+
+
+class Slopes(NamedTuple):
+    """Derivatives of the channels' coefficients by m uncertain constants.
+
+    Parameters
+    ----------
+    force : ndarray, shape (m, c, 3)
+    by_acceleration, by_square, offset : ndarray, shape (m, c)
+        Of the fields of `Coefficients` of the same names.
+    gravity : ndarray, shape (m, 2)
+        Of gravity along the axis and across it, m/s².
+    """
+
+    force: NDArray[np.float64]
+    by_acceleration: NDArray[np.float64]
+    by_square: NDArray[np.float64]
+    offset: NDArray[np.float64]
+    gravity: NDArray[np.float64]
+
+
+class FilterRun(NamedTuple):
+    """What one pass of the filter found.
+
+    Parameters
+    ----------
+    states, covariances : ndarray, shapes (n, 3) and (n, 3, 3)
+        [θ, Ω, α] after each sample.
+    before, before_covariances : ndarray
+        The same before each sample.
+    by_constants, before_by_constants : ndarray, shape (n, 3, m)
+        Derivatives of the states by the uncertain constants.
+    likelihood : float
+        Log likelihood of the innovations.
+    squares : float
+        Sum of their normalised squares.
+    readings : int
+        Their number.
+    gradient, information : ndarray, shapes (m,) and (m, m)
+        Of the log likelihood by the uncertain constants; the information without that in the size of the innovations.
+    """
+
+    states: NDArray[np.float64]
+    covariances: NDArray[np.float64]
+    before: NDArray[np.float64]
+    before_covariances: NDArray[np.float64]
+    by_constants: NDArray[np.float64]
+    before_by_constants: NDArray[np.float64]
+    likelihood: float
+    squares: float
+    readings: int
+    gradient: NDArray[np.float64]
+    information: NDArray[np.float64]
 
 
 @njit(cache=True)  # type: ignore[misc]
 def filter_axis(
     t: NDArray[np.float64],
     y: NDArray[np.float64],
-    force: NDArray[np.float64],
-    by_acceleration: NDArray[np.float64],
-    by_square: NDArray[np.float64],
-    along: float,
-    across: float,
+    channels: Coefficients,
+    gravity: NDArray[np.float64],
     variance: NDArray[np.float64],
     hub_variance: float,
     jerk: float,
     state: NDArray[np.float64],
     covariance: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], float, float, int]:
+    slopes: Slopes,
+) -> FilterRun:
     """Run the filter over all samples.
 
     Parameters
@@ -32,9 +92,9 @@ def filter_axis(
         Times, s.
     y : ndarray, shape (n, c)
         Readings, m/s²; NaN where one is missing.
-    force, by_acceleration, by_square
-        Coefficients of `AxisChannels`.
-    along, across : float
+    channels : Coefficients
+        Coefficients of the channels.
+    gravity : ndarray, shape (2,)
         Gravity along the axis and across it, m/s².
     variance : ndarray, shape (c,)
         White noise of the channels, m²/s⁴.
@@ -44,11 +104,15 @@ def filter_axis(
         Spectral density of the change of α, rad²/s⁵.
     state, covariance
         [θ, Ω, α] before the first sample and its covariance.
-
-    Returns
-    -------
-    states (n, 3), covariances (n, 3, 3), predicted states and covariances, log likelihood, squared innovations, count
+    slopes : Slopes
+        Derivatives by the uncertain constants, of which there may be none.
     """
+    force, by_acceleration, by_square, offset = channels
+    along, across = gravity[0], gravity[1]
+    m = len(slopes.offset)
+    by_constants, before_by_constants = np.zeros((len(t), 3, m)), np.zeros((len(t), 3, m))
+    gradient_of, information_of = np.zeros(m), np.zeros((m, m))
+    v, d = np.zeros((3, m)), np.zeros((y.shape[1], m))
     n, c = y.shape
     states, covariances = np.empty((n, 3)), np.empty((n, 3, 3))
     before, before_covariance = np.empty((n, 3)), np.empty((n, 3, 3))
@@ -73,13 +137,16 @@ def filter_axis(
             q[1, 0], q[2, 0], q[2, 1] = q[0, 1], q[0, 2], q[1, 2]
             x = f @ x
             p = f @ p @ f.T + jerk * q
+            v = f @ v
+        before_by_constants[k] = v
         before[k], before_covariance[k] = x, p
         seen = 0
         for i in range(c):
             if np.isfinite(y[k, i]):
                 seen += 1
         if seen > 0:
-            prior, start = np.linalg.inv(p), x.copy()
+            prior, prior_log = _inverse(p)
+            start = x.copy()
             inverse, log_noise = whole, whole_log
             if seen < c:
                 rows = np.empty(seen, dtype=np.int64)
@@ -102,48 +169,123 @@ def filter_axis(
                 missed = np.zeros(c)
                 sine, cosine = np.sin(x[0]), np.cos(x[0])
                 for i in range(c):
-                    gravity = force[i, 0] * along + across * (force[i, 1] * cosine - force[i, 2] * sine)
+                    pull = force[i, 0] * along + across * (force[i, 1] * cosine - force[i, 2] * sine)
                     h[i, 0] = -across * (force[i, 1] * sine + force[i, 2] * cosine)
                     h[i, 1] = 2.0 * by_square[i] * x[1]
                     h[i, 2] = by_acceleration[i]
-                    predicted = gravity + by_acceleration[i] * x[2] + by_square[i] * x[1] * x[1]
+                    predicted = pull + offset[i] + by_acceleration[i] * x[2] + by_square[i] * x[1] * x[1]
                     if np.isfinite(y[k, i]):
                         missed[i] = y[k, i] - predicted
                 weighted = np.ascontiguousarray(h.T) @ inverse
-                information = prior + weighted @ h
+                found, found_log = _inverse(prior + weighted @ h)  # covariance after the sample
                 gradient = weighted @ missed - prior @ (x - start)
                 if iteration == 0:
                     # Innovations: ν' S⁻¹ ν and log |S| by the matrix inversion lemma.
                     score = weighted @ missed
-                    square = float(missed @ inverse @ missed - score @ np.linalg.solve(information, score))
-                    log_size = log_noise + np.linalg.slogdet(information)[1] - np.linalg.slogdet(prior)[1]
+                    square = float(missed @ inverse @ missed - score @ (found @ score))
+                    log_size = log_noise - found_log - prior_log
                     likelihood -= 0.5 * (square + log_size + seen * np.log(2.0 * np.pi))
                     squares += square
                     count += seen
-                x = x + np.linalg.solve(information, gradient)
-            p = np.linalg.inv(information)  # type: ignore[assignment]
-            p = 0.5 * (p + p.T)
-        states[k], covariances[k] = x, p
-    return states, covariances, before, before_covariance, likelihood, squares, count
+                if m > 0:
+                    # Of ν = y − h(x, φ): ∂ν/∂φ = −d; the force of the hub itself is in the innovations' covariance.
+                    hub = np.zeros(3)
+                    if iteration == 1 and hub_variance > 0.0:
+                        hub = hub_variance * (np.ascontiguousarray(force.T) @ (inverse @ missed))
+                    _by_constants(d, slopes, force, x, along, across, hub)
+                    d += h @ v
+                    through = weighted @ d
+                    if iteration == 0:
+                        whitened = inverse @ (missed - h @ (found @ score))
+                        gradient_of += d.T @ whitened
+                        information_of += np.ascontiguousarray(d.T) @ inverse @ d - np.ascontiguousarray(through.T) @ (
+                            found @ through
+                        )
+                        if hub_variance > 0.0:
+                            precision = inverse - np.ascontiguousarray(weighted.T) @ (found @ weighted)
+                            gradient_of += hub_variance * _by_size(slopes.force, force, precision, whitened)
+                    else:
+                        v = v - found @ through
+                x = x + found @ gradient
+            p = found
+        states[k], covariances[k], by_constants[k] = x, p, v
+    return FilterRun(
+        states, covariances, before, before_covariance, by_constants, before_by_constants,
+        likelihood, squares, count, gradient_of, information_of,
+    )  # fmt: skip
+
+
+@njit(cache=True)  # type: ignore[misc]
+def _inverse(a: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
+    """Return the inverse of a symmetric positive matrix (3, 3), by minors, and the log of the inverse's determinant."""
+    found = np.empty((3, 3))
+    for i in range(3):
+        for j in range(i, 3):
+            one, two, three, four = (i + 1) % 3, (i + 2) % 3, (j + 1) % 3, (j + 2) % 3
+            found[i, j] = a[one, three] * a[two, four] - a[one, four] * a[two, three]
+            found[j, i] = found[i, j]
+    size = a[0, 0] * found[0, 0] + a[0, 1] * found[0, 1] + a[0, 2] * found[0, 2]
+    return found / size, -np.log(size)
+
+
+@njit(cache=True)  # type: ignore[misc]
+def _by_constants(
+    d: NDArray[np.float64],
+    slopes: Slopes,
+    force: NDArray[np.float64],
+    x: NDArray[np.float64],
+    along: float,
+    across: float,
+    hub: NDArray[np.float64],
+) -> None:
+    """Write the derivatives of what the channels read by the constants, at a state, into ``d``, shape (c, m)."""
+    sine, cosine = np.sin(x[0]), np.cos(x[0])
+    at = np.array([along + hub[0], across * cosine + hub[1], -across * sine + hub[2]])
+    for j in range(d.shape[1]):
+        first, second = slopes.gravity[j, 0], slopes.gravity[j, 1]
+        for i in range(d.shape[0]):
+            total = slopes.offset[j, i] + slopes.by_acceleration[j, i] * x[2] + slopes.by_square[j, i] * x[1] * x[1]
+            for axis in range(3):
+                total += slopes.force[j, i, axis] * at[axis]
+            total += force[i, 0] * first + second * (force[i, 1] * cosine - force[i, 2] * sine)
+            d[i, j] = total
+
+
+@njit(cache=True)  # type: ignore[misc]
+def _by_size(
+    slopes: NDArray[np.float64],
+    force: NDArray[np.float64],
+    precision: NDArray[np.float64],
+    whitened: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Return the gradient that the covariance F Fᵀ of the hub's force adds, per unit of its variance, shape (m,)."""
+    found = np.zeros(len(slopes))
+    along_hub, inside = np.ascontiguousarray(force.T) @ whitened, precision @ force
+    for j in range(len(slopes)):
+        for i in range(force.shape[0]):
+            for axis in range(3):
+                found[j] += slopes[j, i, axis] * (whitened[i] * along_hub[axis] - inside[i, axis])
+    return found
 
 
 @njit(cache=True)  # type: ignore[misc]
 def smooth_axis(
-    t: NDArray[np.float64],
-    states: NDArray[np.float64],
-    covariances: NDArray[np.float64],
-    before: NDArray[np.float64],
-    before_covariance: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return smoothed states (n, 3) and covariances (n, 3, 3): Rauch, Tung and Striebel's recursion."""
+    t: NDArray[np.float64], run: FilterRun
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return smoothed states (n, 3), covariances (n, 3, 3) and derivatives by the constants (n, 3, m).
+
+    Rauch, Tung and Striebel's recursion, of the states and of their derivatives alike.
+    """
     n = len(t)
-    x, p = states.copy(), covariances.copy()
+    x, p, v = run.states.copy(), run.covariances.copy(), run.by_constants.copy()
     f = np.eye(3)
     for k in range(n - 2, -1, -1):
         dt = t[k + 1] - t[k]
         f[0, 1], f[0, 2], f[1, 2] = dt, 0.5 * dt * dt, dt
-        gain = np.linalg.solve(before_covariance[k + 1], f @ covariances[k]).T
-        x[k] = states[k] + gain @ (x[k + 1] - before[k + 1])
-        p[k] = covariances[k] + gain @ (p[k + 1] - before_covariance[k + 1]) @ gain.T
+        gain = np.ascontiguousarray(np.linalg.solve(run.before_covariances[k + 1], f @ run.covariances[k]).T)
+        x[k] = run.states[k] + gain @ (x[k + 1] - run.before[k + 1])
+        p[k] = run.covariances[k] + gain @ (p[k + 1] - run.before_covariances[k + 1]) @ gain.T
         p[k] = 0.5 * (p[k] + p[k].T)
-    return x, p
+        if v.shape[2] > 0:
+            v[k] = run.by_constants[k] + gain @ (v[k + 1] - run.before_by_constants[k + 1])
+    return x, p, v

@@ -67,6 +67,8 @@ class EstimateSummary:
         Centripetal terms against the gyro.
     consistency : mapping or None
         Of the filter's or smoother's innovations: the figures of `gfimu.rate.consistency.Consistency`.
+    mounting : mapping or None
+        About a known axis: constants of the mounting that were estimated (`gfimu.known_axis.mounting_fit`).
     channels_left_out : tuple of str
         Dead channels that the estimate goes without.
     warnings : tuple of str
@@ -90,6 +92,7 @@ class EstimateSummary:
     gyro_rmse_rad_s: float | None
     centripetal: Agreement | None
     consistency: Mapping[str, Any] | None = None
+    mounting: Mapping[str, Any] | None = None
     channels_left_out: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
 
@@ -138,6 +141,7 @@ def summarise(estimate: Estimate, recording: Recording, array: AccelerometerArra
         gyro_rmse_rad_s=None if gyro is None else _rms_difference(estimate.omega, gyro),
         centripetal=None if unseen_motions(array) else centripetal_agreement(recording, array),
         consistency=consistency,
+        mounting=estimate.metadata.get("mounting"),
         channels_left_out=tuple(estimate.metadata.get("channels_left_out", ())),
         warnings=(*estimate.metadata.get("warnings", ()), *_inconsistency(consistency)),
     )

@@ -1,7 +1,7 @@
 """Checks of a recording against its array alone: units, time, order and sign of the channels, dead channels.
 
 The array's redundant directions and gravity at rest tell whether the channels fit one rigid body
-(`gfimu.recording.rigid_evidence`). A recording is refused only where errors within the data sheets' limits can't be the
+(`gfimu.recording.evidence.rigid`). A recording is refused only where errors within the data sheets' limits can't be the
 reason and one other way to read the file explains nearly all of it; where that other way explains nearly all of a
 smaller contradiction, there is a warning; otherwise nothing is said.
 """
@@ -18,9 +18,11 @@ from numpy.typing import NDArray
 from gfimu.errors import InputError
 from gfimu.files.model_files import list_models
 from gfimu.geometry.array import AccelerometerArray
+from gfimu.geometry.observability import unseen_motions
 from gfimu.parts.limits import PartLimits
+from gfimu.recording.evidence.gravity import gravity_text
+from gfimu.recording.evidence.rigid import Costs, Evidence, Otherwise, gather
 from gfimu.recording.recording import Recording
-from gfimu.recording.rigid_evidence import Costs, Evidence, Otherwise, gather
 from gfimu.units import STANDARD_GRAVITY
 
 __all__ = ["Finding", "check_recording", "dead_channels", "noisy_channels", "refuse_or_warn", "without_dead_channels"]
@@ -151,6 +153,9 @@ def check_recording(recording: Recording, array: AccelerometerArray) -> tuple[Fi
         found += _decide(evidence, recording)
         if not found:
             found += _slow(recording, readings, limits)
+    if not found and unseen_motions(array):  # too few channels to contradict one another
+        text, refused = gravity_text(recording, array, limits)
+        found += [Finding("unit", text, refused)] if text else []
     return (*sorted(found, key=lambda one: not one.refused), *dead)
 
 

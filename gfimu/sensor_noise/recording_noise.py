@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,9 @@ from gfimu.recording import Recording
 from gfimu.recording.rest import detect_rest
 from gfimu.sensor_noise.identification import TERMS, NoiseModel, identify_noise
 from gfimu.short_repr import short_repr
+
+if TYPE_CHECKING:
+    from gfimu.known_axis.noise import AxisNoise
 
 __all__ = ["STRETCHES", "RecordingNoise", "recording_noise"]
 
@@ -36,6 +39,8 @@ class RecordingNoise:
         Sample rate, Hz.
     start_s, duration_s : float
         Stretch used, s.
+    about_axis : AxisNoise, optional
+        What it means for a rotation about a known axis (`gfimu.known_axis.noise`), where that was asked for.
     """
 
     models: Mapping[str, NoiseModel]
@@ -43,8 +48,17 @@ class RecordingNoise:
     rate: float
     start_s: float
     duration_s: float
+    about_axis: AxisNoise | None = None
 
     __repr__ = short_repr
+
+    def sample_std(self, channels: Sequence[str]) -> NDArray[np.float64]:
+        """Return the standard deviation of one sample that the white noise N gives each channel, shape (c,)."""
+        return np.array([self.models[name]["N"].value for name in channels]) * math.sqrt(self.rate)
+
+    def instability(self, channels: Sequence[str]) -> NDArray[np.float64]:
+        """Return the bias instability of each channel, by the minimum of its curve, shape (c,)."""
+        return np.array([self.models[name].allan.bias_instability for name in channels])
 
     @property
     def accelerometers(self) -> dict[str, NoiseModel]:
@@ -78,7 +92,7 @@ class RecordingNoise:
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything for machines; units stand in the keys' names of the contract's style."""
-        return {
+        return ({} if self.about_axis is None else {"about_axis": self.about_axis.to_dict()}) | {
             "unit": self.unit,
             "rate_hz": self.rate,
             "start_s": self.start_s,

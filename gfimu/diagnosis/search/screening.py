@@ -168,7 +168,8 @@ def hypotheses_of(signatures: Sequence[Signature], array: AccelerometerArray, ru
     families = list({str(signature.family.name): signature.family for signature in signatures}.values())
     out = []
     for signature in signatures:
-        patterns = signature.family.patterns(array)
+        # A pattern may be empty for few chips, as delays between chips are for one.
+        patterns = [pattern for pattern in signature.family.patterns(array) if pattern.mixing.shape[1]]
         anew = len(signature.columns) > len(signature.family.sizes(array))
         for number, pattern in enumerate(patterns):
             # The freest place is as probable as all others together, which are equally so.

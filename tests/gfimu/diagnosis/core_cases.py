@@ -13,8 +13,8 @@ from scipy.linalg import block_diag, cho_factor, cho_solve
 
 from gfimu.diagnosis.data.cosine_basis import NoiseLevels
 from gfimu.diagnosis.data.run import prepare_run
-from gfimu.diagnosis.data.table.spins import State
 from gfimu.diagnosis.data.stretch import Stretch, make_stretches
+from gfimu.diagnosis.data.table.spins import State
 from gfimu.diagnosis.terms.cause import Cause
 from gfimu.diagnosis.terms.columns import Columns
 from gfimu.diagnosis.terms.drive import Drive

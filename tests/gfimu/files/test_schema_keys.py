@@ -12,7 +12,18 @@ from gfimu.files.model_files import find_model, list_models, read_toml
 from gfimu.files.schema_keys import json_schema, table_rows
 
 OWN = [kind for kind in FILE_KINDS if kind != "map"]  # the map's schema has no units of its own
-SUFFIXES = {"m": "m", "s": "s", "rad": "rad", "hz": "Hz", "V": "V", "K": "K", "degC": "°C", "s2": "s²", "rthz": "√Hz"}
+SUFFIXES = {
+    "m": "m",
+    "s": "s",
+    "rad": "rad",
+    "hz": "Hz",
+    "V": "V",
+    "K": "K",
+    "degC": "°C",
+    "deg": "°",
+    "s2": "s²",
+    "rthz": "√Hz",
+}
 
 
 def rows(kind):

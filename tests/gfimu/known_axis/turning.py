@@ -45,6 +45,31 @@ def turned(
         lever = array.chips[chip].position - np.asarray(point)
         places = [attitude(at).apply(lever) for at in (t - h, t, t + h)]
         acceleration = (places[0] - 2.0 * places[1] + places[2]) / h**2
-        readings[:, 3 * chip : 3 * chip + 3] = attitude(t).inv().apply(acceleration + up + shake)
+        force = attitude(t).inv().apply(acceleration + up + shake)
+        readings[:, 3 * chip : 3 * chip + 3] = force @ array.chips[chip].axes.T
     readings += noise * rng.standard_normal(readings.shape)
     return Recording.from_arrays(t, readings, array), rate(t), angle(t) - angle(t[0])
+
+
+def mounted(array, doubt, rng, **world):
+    """Return a recording of an array whose places, orientations, biases and axis are off, the rate, and what was off.
+
+    The body's axis is z, as drawn; ``doubt`` holds the standard deviations of what is off, by the names of
+    `gfimu.geometry.turning_axis.AxisUncertainty`; what was off has the names of the estimate's constants.
+    """
+    off, chips = {}, []
+    for chip in array.chips:
+        lever, turn = rng.normal(size=3) * doubt.lever_std_m, rng.normal(size=3) * doubt.rotation_std_rad
+        axes = Rotation.from_rotvec(turn).apply(chip.axes)
+        chips.append(Chip(chip.name, chip.position + lever, axes, chip.part))
+        off |= {f"{chip.name}_lever_{axis}_m": value for axis, value in zip("xyz", lever, strict=True)}
+        off |= {f"{chip.name}_rotation_{axis}_rad": value for axis, value in zip("xyz", turn, strict=True)}
+    point, lean = rng.normal(size=3) * doubt.point_std_m, rng.normal(size=2) * doubt.direction_std_rad
+    off |= {f"axis_point_{axis}_m": value for axis, value in zip("xyz", point, strict=True)}
+    off |= {f"axis_direction_{axis}_rad": value for axis, value in zip("xy", lean, strict=True)}
+    u = Rotation.from_rotvec([*lean, 0.0]).apply([0.0, 0.0, 1.0])
+    recording, rate, _ = turned(AccelerometerArray("few", tuple(chips)), u, rng, point=point, **world)
+    bias = rng.normal(size=array.n_channels) * doubt.bias_std_m_s2
+    recording.readings[:] += bias
+    off |= {f"{channel}_bias_m_s2": value for channel, value in zip(array.channels, bias, strict=True)}
+    return recording, rate, off | {"inclination_rad": world.get("tilt", 0.0)}

@@ -7,9 +7,9 @@ import pytest
 
 import gfimu
 from gfimu.diagnosis.data.run import prepare_run
+from gfimu.diagnosis.data.stretch import make_stretches
 from gfimu.diagnosis.data.table.spins import State
 from gfimu.diagnosis.data.table.start_angle import gravity_angle
-from gfimu.diagnosis.data.stretch import make_stretches
 from sim.scenarios import Scenario
 from sim.twin import Twin
 

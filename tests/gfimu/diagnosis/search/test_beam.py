@@ -14,7 +14,8 @@ from gfimu.diagnosis.fit.evidence import SCALES, log_evidence
 from gfimu.diagnosis.fit.learn import starting_point
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.beam import Blocks, leading_sets
-from gfimu.diagnosis.search.screening import screen
+from gfimu.diagnosis.search.screening import Signature, hypotheses_of, screen
+from gfimu.geometry.array import AccelerometerArray
 from sim.effects import make_effect
 
 TWIN, CUBE = small_twin(), small_twin("cube12")
@@ -121,3 +122,16 @@ def test_no_exchange_of_a_member_betters_the_leader():
         for number, hypothesis in enumerate(blocks.hypotheses):
             if hypothesis.cause.name not in taken:
                 assert blocks.log_odds(sorted((*rest, number))) <= leader.log_odds + 1e-6
+
+
+def test_one_chip_has_no_hypothesis_without_a_size():
+    """Delays between chips are none for one chip: such a pattern is no hypothesis, and the search goes on."""
+    array = AccelerometerArray.load("one_adxl345")
+    twin = replace(TWIN, array=array, grammar=True)
+    signatures = [
+        Signature(family, {}, np.arange(count), 1.0)
+        for family in twin.families().values()
+        if (count := len(family.sizes(array)))
+    ]
+    assert any(not pattern.mixing.shape[1] for one in signatures for pattern in one.family.patterns(array))
+    assert all(len(one.positive) for one in hypotheses_of(signatures, array, 1))

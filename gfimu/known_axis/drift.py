@@ -1,0 +1,183 @@
+"""How far rate and angle about a known axis run off by biases and noise: the filter's own derivatives and covariance.
+
+An array that turns steadily about the axis is followed by the filter of `gfimu.known_axis.recursion` over readings
+without error. Its covariance is what white noise does. Its derivatives by a constant of each channel are what a bias
+does, and those delayed are what a bias does that walks.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from gfimu.errors import InputError
+from gfimu.geometry.array import AccelerometerArray
+from gfimu.geometry.turning_axis import TurningAxis
+from gfimu.known_axis.bounds import require_visible
+from gfimu.known_axis.channels import AxisChannels
+from gfimu.known_axis.recursion import Slopes, filter_axis
+from gfimu.units import STANDARD_GRAVITY
+
+__all__ = ["AxisDrift", "AxisDriftTerm", "axis_drift"]
+
+_MOST_SAMPLES = 20000  # numerical: longer runs are sampled more slowly, with the noise of their density
+_LEAST_PER_TURN = 60  # numerical
+_LEAST_NOISE = 1e-4  # m/s²/√Hz: of a filter that is given none; any will do, as the noise only sets its gains
+
+
+@dataclass(frozen=True)
+class AxisDriftTerm:
+    """One cause.
+
+    Parameters
+    ----------
+    name, size : str
+        Cause, and its size with its unit.
+    rate_std, angle_std : float
+        Standard deviation of rate, rad/s, and angle, rad, at the end.
+    """
+
+    name: str
+    size: str
+    rate_std: float
+    angle_std: float
+
+
+@dataclass(frozen=True)
+class AxisDrift:
+    """Drift about a known axis.
+
+    Parameters
+    ----------
+    array : str
+        Name of the array.
+    axis : TurningAxis
+        The axis.
+    time_s, rate_rad_s : float
+        Time since the known start, s, and the steady rate, rad/s.
+    terms : tuple of AxisDriftTerm
+        Cause by cause.
+    remark : str
+        What bounds the drift, or does not, in words.
+    """
+
+    array: str
+    axis: TurningAxis
+    time_s: float
+    rate_rad_s: float
+    terms: tuple[AxisDriftTerm, ...]
+    remark: str
+
+    @property
+    def total(self) -> tuple[float, float]:
+        """Standard deviations of rate, rad/s, and angle, rad, by all causes."""
+        rate = float(np.sqrt(sum(one.rate_std**2 for one in self.terms)))
+        return rate, float(np.sqrt(sum(one.angle_std**2 for one in self.terms)))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the content of ``gfimu drift --axis --json``."""
+        return {
+            "array": self.array,
+            "turning_axis": self.axis.to_dict(),
+            "time_s": self.time_s,
+            "rate_rad_s": self.rate_rad_s,
+            "terms": [vars(one) for one in self.terms],
+            "rate_std_rad_s": self.total[0],
+            "angle_std_rad": self.total[1],
+            "remark": self.remark,
+        }
+
+
+def axis_drift(
+    array: AccelerometerArray,
+    axis: TurningAxis,
+    time_s: float,
+    *,
+    bias: float = 0.0,
+    noise_density: float = 0.0,
+    bias_random_walk: float = 0.0,
+    rate_rad_s: float = 0.0,
+    hub_density: float = 0.1,
+    jerk: float = 1.0,
+) -> AxisDrift:
+    """Return how far rate and angle about a known axis run off from a known start.
+
+    Parameters
+    ----------
+    array : AccelerometerArray
+        The array.
+    axis : TurningAxis
+        The axis; without an inclination it is upright.
+    time_s : float
+        Time since the start, s.
+    bias : float
+        Standard deviation of the bias of each channel, m/s².
+    noise_density : float
+        White noise of each channel, one-sided density, m/s²/√Hz.
+    bias_random_walk : float
+        Random walk of each bias, m/s²/√s.
+    rate_rad_s : float
+        Steady rate, rad/s; 0 is at rest.
+    hub_density : float
+        Of a free hub, one-sided density of its own specific force in each direction, m/s²/√Hz.
+    jerk : float
+        Spectral density of the change of α that the filter allows for, rad²/s⁵.
+
+    Raises
+    ------
+    GeometryError
+        If the array can't see the rotation.
+    InputError
+        If the time is not positive, or so long that the turns can't be followed.
+    """
+    require_visible(array, axis)
+    if not time_s > 0.0:
+        raise InputError(f"time {time_s!r} s: give a time above 0")
+    tilt = axis.inclination or 0.0
+    count = int(max(2000, min(100.0 * time_s, _MOST_SAMPLES), _LEAST_PER_TURN * time_s * abs(rate_rad_s) / (2 * np.pi)))
+    if count > 20 * _MOST_SAMPLES:
+        raise InputError(f"{time_s:g} s at {rate_rad_s:g} rad/s are too many turns to follow; give a shorter time")
+    t = np.linspace(0.0, time_s, count)
+    dt = float(t[1])
+    channels = AxisChannels.of(array, axis)
+    c = array.n_channels
+    gravity = STANDARD_GRAVITY * np.array([np.cos(tilt), np.sin(tilt)])
+    angle = rate_rad_s * t
+    force = np.column_stack([np.full(count, gravity[0]), gravity[1] * np.cos(angle), -gravity[1] * np.sin(angle)])
+    y = force @ channels.force.T + rate_rad_s**2 * channels.by_square
+    none = np.zeros((c, c))
+    slopes = Slopes(np.zeros((c, c, 3)), none, none, np.eye(c), np.zeros((c, 2)))
+    white = max(noise_density, _LEAST_NOISE) ** 2 / (2.0 * dt)
+    hub = hub_density**2 / (2.0 * dt) if axis.hub == "free" else 0.0
+    run = filter_axis(
+        t, y, channels.coefficients, gravity, np.full(c, white), hub, jerk,
+        np.array([0.0, rate_rad_s, 0.0]), np.diag([1e-12, 1e-12, 1e-12]), slopes,
+    )  # fmt: skip
+    by_bias = run.by_constants[:, :2]  # (n, 2, c): of angle and rate
+    end = np.linalg.norm(by_bias[-1], axis=1)
+    walked = np.sqrt(dt * np.sum(by_bias**2, axis=(0, 2)))
+    terms = []
+    if bias > 0.0:
+        terms.append(AxisDriftTerm("bias", f"{bias:.3g} m/s²", bias * float(end[1]), bias * float(end[0])))
+    if noise_density > 0.0 or axis.hub == "free":
+        std = np.sqrt(np.diag(run.covariances[-1]))
+        size = f"{noise_density:.3g} m/s²/√Hz" + (f", hub {hub_density:.3g}" if axis.hub == "free" else "")
+        terms.append(AxisDriftTerm("white noise", size, float(std[1]), float(std[0])))
+    if bias_random_walk > 0.0:
+        rate, turned = bias_random_walk * float(walked[1]), bias_random_walk * float(walked[0])
+        terms.append(AxisDriftTerm("random walk of the bias", f"{bias_random_walk:.3g} m/s²/√s", rate, turned))
+    return AxisDrift(array.name, axis, time_s, rate_rad_s, tuple(terms), _remark(tilt, rate_rad_s))
+
+
+def _remark(tilt: float, rate: float) -> str:
+    """Say what corrects angle and rate."""
+    if abs(np.sin(tilt)) > 0.03:
+        return "gravity turns in the body as the axis is inclined: it corrects the angle, which does not run off"
+    if rate != 0.0:
+        return "Ω² corrects the rate; nothing corrects the angle about an upright axis, which runs off with time"
+    return (
+        "at rest about an upright axis Ω² says nothing: rate and angle are integrals of the angular acceleration "
+        "and run off with t and t²"
+    )

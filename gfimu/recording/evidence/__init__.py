@@ -1,0 +1,1 @@
+"""What readings show of units, axes and channels: by gravity in few chips, by the rigid body in many."""
