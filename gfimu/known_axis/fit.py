@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
+from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.geometry.turning_axis import TurningAxis
 from gfimu.known_axis.channels import AxisChannels
@@ -26,6 +27,7 @@ _PHASES = 8  # of gravity at the start
 _TURNS = 3  # of constants of the mounting and numbers of the filter, each given the other; by choice
 _SAME = 0.1  # change of the log of the noise below which another turn changes nothing that matters; by choice
 _CLEAR = 300.0  # nats: log odds of the sign with the mounting as drawn, above which the other is given up; by choice
+_ALONG, _UNSEEN = 2, 1e-6  # column of the force along the axis; its smallest norm that is no rounding error
 _LEVEL = 0.03  # rad: below it gravity across the axis shows no angle beside biases
 _STD_START = np.array([0.5, 0.3, 5.0])  # of [θ, Ω, α] at a start that was tried, rad, rad/s, rad/s²
 
@@ -84,7 +86,7 @@ def fit_axis(
     """
     channels = AxisChannels.of(array, axis)
     problem = AxisProblem(t, y, channels, noise)
-    tilt = _inclination(y, channels) if axis.inclination is None else axis.inclination
+    tilt = _inclination(y, channels, axis.hub) if axis.inclination is None else axis.inclination
     if axis.inclination is None and np.sin(tilt) <= _LEVEL:
         tilt = 0.0 if np.cos(tilt) > 0.0 else np.pi  # upright: what is across would be biases
     settings = Settings(_first_scale(axis, noise), 100.0, 0.0 if axis.hub == "fixed" else 1.0, tilt)
@@ -180,13 +182,31 @@ def _enlarged(
     return replace(settings, noise_scale=settings.noise_scale * by, hub=settings.hub * by, jerk=settings.jerk * by**2)
 
 
-def _inclination(y: NDArray[np.float64], channels: AxisChannels) -> float:
-    """Return the angle between axis and vertical from the mean force along the axis, rad."""
+def _inclination(y: NDArray[np.float64], channels: AxisChannels, hub: str) -> float:
+    """Return the angle between axis and vertical, rad, from the mean force along the axis.
+
+    Where no channel senses that force, it is the angle whose gravity across the axis the channels read; of that and its
+    supplement, which then read the same, the smaller one.
+
+    Raises
+    ------
+    InputError
+        If neither shows, or the hub's own acceleration is across the axis as well.
+    """
     matrix = channels.motion_matrix()
     rows = y[np.isfinite(y).all(axis=1)]
     if not len(rows):
         return 0.0
-    along = float(np.linalg.lstsq(matrix, rows.mean(axis=0), rcond=None)[0][2])
+    if np.linalg.norm(matrix[:, _ALONG]) < _UNSEEN:
+        others = np.delete(matrix, _ALONG, axis=1)
+        if hub != "fixed" or np.linalg.matrix_rank(others) < others.shape[1]:
+            raise InputError(
+                "no channel senses along the axis, so that its inclination does not show; give inclination_rad in "
+                "[turning_axis], or --inclination-rad: 0 for an upright axis, 1.5708 for a level one"
+            )
+        across = np.median(np.linalg.norm((rows @ np.linalg.pinv(others).T)[:, -2:], axis=1))
+        return float(np.arcsin(min(across / STANDARD_GRAVITY, 1.0)))
+    along = float(np.linalg.lstsq(matrix, rows.mean(axis=0), rcond=None)[0][_ALONG])
     return float(np.arccos(np.clip(along / STANDARD_GRAVITY, -1.0, 1.0)))
 
 

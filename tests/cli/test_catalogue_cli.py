@@ -61,7 +61,7 @@ def test_an_unknown_name_is_one_line(gfimu_command, words):
     assert "nothing" in result.stderr
 
 
-@pytest.mark.parametrize("name", set(list_models("parts")) - {"generic"})
+@pytest.mark.parametrize("name", sorted(set(list_models("parts")) - {"generic"}))
 def test_every_figure_of_a_shipped_part_says_where_it_is_from(name):
     text = find_model("parts", name).read_text(encoding="utf-8")
     sources = set(re.findall(r"^# (\d): ", text, flags=re.MULTILINE))

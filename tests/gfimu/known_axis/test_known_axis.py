@@ -8,7 +8,7 @@ from turning import NOISE, RATE, array_of, turned
 
 import gfimu
 from gfimu.errors import GeometryError, InputError
-from gfimu.geometry.array import AccelerometerArray
+from gfimu.geometry.array import AccelerometerArray, Chip
 from gfimu.geometry.turning_axis import TurningAxis
 from gfimu.known_axis import axis_bounds, estimate_about_axis
 from gfimu.motion.attitude import to_rotation
@@ -46,6 +46,32 @@ def test_the_rate_is_found_at_the_bound(array, axis, world):
     assert found.metadata["sign"] == "decided"
     assert found.metadata["turning_axis"]["inclination_rad"] == pytest.approx(world.get("tilt", 0.0), abs=0.02)
     assert found.angle[-1] == pytest.approx(angle[-1], abs=0.5)
+
+
+PLANE = AccelerometerArray(
+    "plane",
+    tuple(
+        Chip(f"a{n + 1}", 0.1 * np.array([np.cos(at), np.sin(at), 0.0]), np.eye(3)[:2])
+        for n, at in enumerate(np.arange(3) * 2.0 * np.pi / 3.0)
+    ),
+)
+
+
+@pytest.mark.parametrize("tilt", [0.0, 0.6])
+def test_the_inclination_of_chips_in_a_plane_is_that_of_gravity_across_the_axis(tilt):
+    """No channel senses along the axis."""
+    recording, rate, _ = turned(PLANE, (0, 0, 1), np.random.default_rng(5), tilt=tilt)
+    found = estimate_about_axis(recording, PLANE, UPRIGHT)
+    assert found.metadata["turning_axis"]["inclination_rad"] == pytest.approx(tilt, abs=0.02)
+    missed = found.omega[1000:, 2] - rate[1000:]
+    assert np.mean(np.abs(missed) < 3.0 * found.omega_std[1000:, 2]) > 0.97
+    assert np.sqrt(np.mean(missed**2)) < 0.05
+
+
+def test_the_inclination_of_a_wheel_that_nothing_shows_has_to_be_given():
+    recording, _, _ = turned(PLANE, (0, 0, 1), np.random.default_rng(5), tilt=1.57)
+    with pytest.raises(InputError, match="inclination does not show; give inclination_rad"):
+        estimate_about_axis(recording, PLANE, WHEEL)
 
 
 def test_a_smoother_is_better():

@@ -46,7 +46,7 @@ def turned(
         places = [attitude(at).apply(lever) for at in (t - h, t, t + h)]
         acceleration = (places[0] - 2.0 * places[1] + places[2]) / h**2
         force = attitude(t).inv().apply(acceleration + up + shake)
-        readings[:, 3 * chip : 3 * chip + 3] = force @ array.chips[chip].axes.T
+        readings[:, array.chip_of_channel == chip] = force @ array.chips[chip].axes.T
     readings += noise * rng.standard_normal(readings.shape)
     return Recording.from_arrays(t, readings, array), rate(t), angle(t) - angle(t[0])
 
