@@ -13,7 +13,7 @@ from gfimu.cli.output import JsonOption, print_json, print_table, print_text
 if TYPE_CHECKING:
     from gfimu.diagnosis.design.run_check import RunCheck
 
-__all__ = ["print_check", "register"]
+__all__ = ["print_check", "print_short_check", "register"]
 
 
 def register(app: typer.Typer) -> None:
@@ -39,6 +39,33 @@ def _check(
         print_json(found.to_dict())
     else:
         print_check(found)
+
+
+def print_short_check(found: RunCheck) -> None:
+    """Print what recordings can show in a few lines, to stand before a diagnosis."""
+    for one in found.runs:
+        parts = [f"{one['duration_s']:.4g} s"]
+        if "turns" in one:
+            shares = " / ".join(f"{100 * one[f'share_{way}']:.0f}" for way in ("forwards", "backwards", "at_rest"))
+            parts += [
+                f"{one['sample_rate_hz']:.4g} Hz",
+                f"up to {one['fastest_rad_s']:.3g} rad/s",
+                f"{one['turns']:.3g} turns",
+                f"forwards / backwards / at rest {shares} %",
+            ]
+        print_text(f"{one['name']}: {', '.join(parts)}.")
+    print_text("Data: " + ("; ".join(found.findings) if found.findings else "nothing odd."))
+    if found.effects:
+        alone = [one for one in found.effects if one.seen and not one.confused_with]
+        alike = [one.name for one in found.effects if one.confused_with]
+        unseen = [one.name for one in found.effects if not one.seen]
+        print_text(f"This motion shows {len(alone)} of {len(found.effects)} effects alone, each in its usual size.")
+        if alike:
+            print_text(f"Not separable from others by it: {', '.join(alike)}.")
+        if unseen:
+            print_text(f"May be missed in their usual size: {', '.join(unseen)}.")
+    for line in found.advice:
+        print_text(f"- {line}")
 
 
 def print_check(found: RunCheck) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -88,6 +90,8 @@ def _diagnose(
     from gfimu.commands.diagnose import diagnose
     from gfimu.diagnosis.report.folder import FILES
 
+    if not json:
+        _print_what_shows(runs, twin, column_map, map_set or [])
     with progress("diagnosing", total=1.0) as done:
         found = diagnose(
             runs,
@@ -109,6 +113,16 @@ def _diagnose(
         return
     print_diagnosis(found)
     print_paths(written.items())
+
+
+def _print_what_shows(runs: list[Path], twin: str, column_map: str | None, map_set: list[str]) -> None:
+    """Print the data's quality and what the motion can show, before the verdict; nothing where that can't be read."""
+    from gfimu.cli.check import print_short_check
+    from gfimu.commands.check import check as look
+
+    with warnings.catch_warnings(), contextlib.suppress(InputError):  # the diagnosis reports both itself
+        warnings.simplefilter("ignore")
+        print_short_check(look(runs, twin, column_map=column_map, map_set=map_set))
 
 
 def print_diagnosis(found: Diagnosis) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -69,6 +70,11 @@ class EffectView:
     detectability: float
     confused_with: tuple[str, ...]
     remedy: str
+
+    @property
+    def seen(self) -> bool:
+        """Whether it is found nearly always."""
+        return self.detectability >= Policy().seen
 
 
 @dataclass(frozen=True)
@@ -197,7 +203,7 @@ def _rivals(found: Distinguishability, place: int) -> list[str]:
 def _advice(facts: Sequence[dict[str, Any]], effects: Sequence[EffectView], useful: UsefulRun) -> list[str]:
     """Return what one more recording should be."""
     advice = []
-    if sum(one["duration_s"] for one in facts) < useful.duration:
+    if math.ceil(sum(one["duration_s"] for one in facts)) < useful.duration:
         advice.append(f"record longer: {useful.duration:.0f} s at least, a minute is better")
     ways = {way: any(one[f"share_{way}"] > useful.share for one in facts) for way in ("forwards", "backwards")}
     if not all(ways.values()):
@@ -207,7 +213,7 @@ def _advice(facts: Sequence[dict[str, Any]], effects: Sequence[EffectView], usef
         advice.append("make several whole turns one way: an axis out of level and ripples show once per turn")
     if not any(one["share_at_rest"] > useful.share for one in facts):
         advice.append("begin with a few seconds of rest: biases are seen there")
-    unseen = [one for one in effects if one.detectability < Policy().seen or one.confused_with]
+    unseen = [one for one in effects if not one.seen or one.confused_with]
     remedies = dict.fromkeys(one.remedy for one in unseen if one.remedy)
     advice += [f"{remedy}, for {', '.join(_of(unseen, remedy))}" for remedy in list(remedies)[:4]]
     return advice
