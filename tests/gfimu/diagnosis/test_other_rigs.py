@@ -26,9 +26,9 @@ def test_the_zero_of_a_pendulum_s_encoder_is_found():
 
 def test_a_gain_is_found_on_a_level_axis_with_a_tachometer():
     twin = replace(Twin.load("pendulum"), drive_source="tacho")
-    verdict = found("pendulum", twin, "scale_factor", {"a13": 0.02}, ["duration_s=24", "motion.start_angle_rad=1.0"])
+    verdict = found("pendulum", twin, "scale_factor", {"a11": 0.02}, ["duration_s=24", "motion.start_angle_rad=1.0"])
     assert [cause.effect for cause in verdict.causes] == ["scale_factor"]
-    assert verdict.causes[0].parameters["a13"] == pytest.approx(0.02, abs=2e-3)
+    assert verdict.causes[0].parameters["a11"] == pytest.approx(0.02, abs=2e-3)
 
 
 @pytest.mark.parametrize("side", [0.003, -0.002])
