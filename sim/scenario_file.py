@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,7 +21,7 @@ from sim.effect_table import EffectTable
 from sim.motion_file import MotionTable, ProfileTable
 from sim.twin_file import Inclination
 
-__all__ = ["ReferenceSettings", "ScenarioFile", "change_key", "scenario_fields"]
+__all__ = ["ReferenceSettings", "ScenarioFile", "scenario_fields"]
 
 _TWIN_MOTION = "paper_run"  # the motion of a twin file, which has none of its own
 
@@ -246,21 +245,3 @@ def _lowest_rate(sheet: DataSheet, sample_rate: float) -> float:
     if not sheet.rate_min:
         return sample_rate
     return float(sheet.rate_max / 2.0 ** np.floor(np.log2(sheet.rate_max / sample_rate) + 1e-9))
-
-
-def change_key(data: dict[str, Any], change: str) -> None:
-    """Set one key of a scenario, ``table.key=value`` with the value as in TOML (a bare word is a string)."""
-    key, equals, text = change.partition("=")
-    if not equals or not key.strip():
-        raise InputError(f"change {change!r}: write it as key=value, such as sensor.range_g=8")
-    try:
-        value = tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
-        value = text.strip()
-    *tables, last = key.strip().split(".")
-    place = data
-    for name in tables:
-        place = place.setdefault(name, {})
-        if not isinstance(place, dict):
-            raise InputError(f"change {change!r}: {name} is not a table of the scenario")
-    place[last] = value

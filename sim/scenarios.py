@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 import gfimu
 from gfimu import world_model
 from gfimu.errors import InputError
+from gfimu.files.keys import set_key
 from gfimu.files.model_files import find_model, read_toml
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
@@ -26,7 +27,7 @@ from sim.conversions import conversion_groups
 from sim.effects import Effect, apply_effects
 from sim.effects.unlisted import Unlisted
 from sim.motion import BodyMotion, BodyState, SpinMotion, SpinState
-from sim.scenario_file import ReferenceSettings, change_key, scenario_fields
+from sim.scenario_file import ReferenceSettings, scenario_fields
 from sim.truth import cube_state, truth_columns
 from sim.turntable import drive, prescribed_readings
 from sim.world import SampleContext, World
@@ -139,7 +140,7 @@ class Scenario:
         path = find_model("scenarios", name)
         data = read_toml(path)
         for change in changes:
-            change_key(data, change)
+            set_key(data, change, option="change", example="sensor.range_g=8")
         return cls.from_dict(data, source=str(path), beside=path.parent)
 
     @classmethod

@@ -11,7 +11,7 @@ import msgspec
 
 from gfimu.errors import InputError
 from gfimu.files.model_files import find_model, list_models, read_toml
-from gfimu.importing.map_keys import FOR_ALL, complete, set_key
+from gfimu.importing.map_keys import FOR_ALL, complete, set_map_key
 from gfimu.importing.notation import factor_of
 
 __all__ = ["ColumnMap", "ColumnSpec", "DropKind", "TextSpec", "TimeSpec", "list_maps", "load_map", "map_toml"]
@@ -220,7 +220,7 @@ def load_map(name: str | Path | ColumnMap | None, changes: Sequence[str] = ()) -
         path = find_model("maps", name)
         source, beside, data = str(path), path.parent, {"name": path.stem, **read_toml(path)}
     for change in changes:
-        set_key(data, change)
+        set_map_key(data, change)
     if changes and not isinstance(name, ColumnMap):
         source = "--map-set" if name is None else f"{source} with --map-set"
     try:

@@ -6,50 +6,27 @@ A channel may be given by its column alone, where the map has a ``unit`` (and ``
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from typing import Any
 
 from gfimu.errors import InputError
+from gfimu.files.keys import set_key
 
-__all__ = ["FOR_ALL", "complete", "set_key"]
+__all__ = ["FOR_ALL", "complete", "set_map_key"]
 
 FOR_ALL = ("unit", "scale")
 """Keys of a map that hold for each of its channels that has none of its own."""
 
 
-def set_key(data: dict[str, Any], change: str) -> None:
-    """Set one key of a map, ``table.key=value`` with the value as in TOML (a bare word is a string).
-
-    Raises
-    ------
-    InputError
-        If it is no ``key=value``, or a key within what is no table.
-    """
-    key, equals, text = change.partition("=")
-    names = [name.strip() for name in key.split(".")]
-    if not equals or not all(names):
-        raise InputError(f"--map-set {change!r}: write it as key=value, such as time.unit=ms")
-    *tables, last = names
-    place = data
-    for number, name in enumerate(tables):
-        found = place.setdefault(name, {})
-        if isinstance(found, str | int) and tables[0] in {"channels", "reference"} and number == 1:
-            found = place[name] = {"column": found}  # the short form of a column gets a further key
-        if not isinstance(found, dict):
-            raise InputError(f"--map-set {change!r}: {name} is no table; give it as a whole, {name}=value")
-        place = found
-    place[last] = _value(text, change)
+def set_map_key(data: dict[str, Any], change: str) -> None:
+    """Set one key of a map, ``table.key=value`` with the value as in TOML; raises as `gfimu.files.keys.set_key`."""
+    set_key(data, change, option="--map-set", example="time.unit=ms", as_table=_as_column)
 
 
-def _value(text: str, change: str) -> Any:
-    """Return a value as TOML has it, or the text as it stands where it is none."""
-    try:
-        return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError as error:
-        if text.lstrip()[:1] in {"{", "[", '"', "'"}:
-            raise InputError(f"--map-set {change!r}: the value is not valid TOML ({error})") from None
-        return text if text.isspace() else text.strip()
+def _as_column(value: Any, names: list[str]) -> Any:
+    """Return the short form of a column, its name or number alone, as the table that gets a further key."""
+    short = isinstance(value, str | int) and len(names) == 2 and names[0] in {"channels", "reference"}
+    return {"column": value} if short else value
 
 
 def complete(data: Mapping[str, Any]) -> dict[str, Any]:

@@ -233,7 +233,7 @@ def test_progress_reaches_one():
         (["duration_s=nan"], "must be a finite number"),
         (["drive.mode=pushed"], "must be one of driven, prescribed"),
         (["reference.tacho_noise_std_rad_s=-1"], "must be at least 0"),
-        (["effect=[{name='tilt'}]"], "unknown effect 'tilt'; valid: axis_swap"),
+        (["effect=[{name='tilt'}]"], "unknown effect 'tilt'; valid: angle_zero"),
         (["effect=[{name='table_tilt', parameters={z_rad=1}}]"], "unknown parameter 'z_rad'; valid: x_rad, y_rad"),
         (["cube_offset_m=[1, 2]"], "must be a list of 3 finite numbers"),
         (["sensor.chips_seed=-1"], "must be a whole number"),
