@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     from gfimu.commands.demo import demo as demo
     from gfimu.commands.design import design as design
     from gfimu.commands.diagnose import diagnose as diagnose
+    from gfimu.commands.drift import axis_drift as axis_drift
     from gfimu.commands.drift import drift as drift
     from gfimu.commands.estimate import estimate as estimate
     from gfimu.commands.inspect import inspect as inspect
@@ -122,6 +123,7 @@ _PUBLIC = {
     "demo": "gfimu.commands.demo",
     "design": "gfimu.commands.design",
     "diagnose": "gfimu.commands.diagnose",
+    "axis_drift": "gfimu.commands.drift",
     "drift": "gfimu.commands.drift",
     "drift_budget": "gfimu.position_drift",
     "equivalent_rate_drift": "gfimu.position_drift",

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from gfimu.cli.output import JsonOption, print_json, print_table, print_text, progress
+from gfimu.errors import InputError
 
 if TYPE_CHECKING:
     from gfimu.known_axis.drift import AxisDrift
@@ -59,9 +60,26 @@ def _drift(
 
     One chip on a table: `gfimu drift --array arm.toml --axis z --rate 6 --time 60 --bias-mg 5 --noise-ug 290`
     """
-    from gfimu.commands.drift import drift
-    from gfimu.known_axis.drift import AxisDrift
+    from gfimu.commands.drift import axis_drift, drift
+    from gfimu.commands.known_axis import known_axis, turning_axis
+    from gfimu.commands.opened import as_array
 
+    turning = known_axis(turning_axis(axis, axis_point, hub, inclination_rad), as_array(array))
+    if turning is not None:
+        if rate_drift_deg_h or monte_carlo or any(offset):
+            raise InputError("--rate-drift-deg-h, --offset and --monte-carlo have no use with a known axis (--axis)")
+        found = axis_drift(
+            array,
+            axis=turning,
+            time=time,
+            bias_mg=bias_mg,
+            noise_ug=noise_ug,
+            walk_ug=walk_ug,
+            rate=rate,
+            hub_noise_m_s2_rthz=hub_noise,
+        )
+        print_json(found.to_dict()) if as_json else _print_about_axis(found)
+        return
     with progress("Monte Carlo", monte_carlo) as advance:
         result = drift(
             array,
@@ -75,20 +93,11 @@ def _drift(
             gravity=gravity,
             monte_carlo=monte_carlo,
             seed=seed,
-            axis=axis,
-            axis_point=axis_point,
-            hub=hub,
-            inclination_rad=inclination_rad,
-            hub_noise_m_s2_rthz=hub_noise,
             progress=advance,
         )
     if as_json:
         print_json(result.to_dict())
         return
-    if isinstance(result, AxisDrift):
-        _print_about_axis(result)
-        return
-
     budget, sample = result.budget, result.sample
     rows = [
         [f"{term.name}, {term.size:.3g} {term.size_unit}", term.form, *map(_length, term.std), f"{term.share:.1%}"]

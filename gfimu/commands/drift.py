@@ -14,10 +14,10 @@ if TYPE_CHECKING:
     from gfimu.geometry.array import AccelerometerArray
     from gfimu.geometry.turning_axis import TurningAxis
     from gfimu.known_axis.drift import AxisDrift
-    from gfimu.position_drift import DriftBudget
+    from gfimu.position_drift import DriftBudget, ErrorSources
     from gfimu.position_drift.monte_carlo import DriftSample
 
-__all__ = ["Drift", "drift"]
+__all__ = ["Drift", "axis_drift", "drift"]
 
 
 @dataclass(frozen=True)
@@ -65,14 +65,9 @@ def drift(
     gravity: float = 9.80665,
     monte_carlo: int = 0,
     seed: int = 0,
-    axis: TurningAxis | str | Sequence[float] | None = None,
-    axis_point: Sequence[float] = (0.0, 0.0, 0.0),
-    hub: str = "fixed",
-    inclination_rad: float | None = None,
-    hub_noise_m_s2_rthz: float = 0.1,
     progress: Callable[[int], None] | None = None,
-) -> Drift | AxisDrift:
-    """Budget the position drift of an array, or about a known axis the drift of its rate and angle.
+) -> Drift:
+    """Budget the position drift of an array; about a known axis see `axis_drift`.
 
     Parameters
     ----------
@@ -95,17 +90,6 @@ def drift(
         Number of nonlinear Monte Carlo runs; 0 for none.
     seed : int
         Seed of the Monte Carlo.
-    axis : TurningAxis, str or sequence of float, optional
-        An axis about which alone the array turns: x, y, z, or three numbers, body frame. Few chips then suffice. By
-        default the array's own, where it can't see all six motions.
-    axis_point : sequence of float
-        A point of that axis, body frame, m.
-    hub : {"fixed", "free"}
-        Whether that axis stands still (a table) or moves with a body (a wheel).
-    inclination_rad : float, optional
-        Angle between that axis and the vertical, rad; upright by default.
-    hub_noise_m_s2_rthz : float
-        Of a free hub, one-sided density of its own specific force, m/s²/√Hz.
     progress : callable, optional
         Called with the number of Monte Carlo runs done.
 
@@ -114,45 +98,18 @@ def drift(
     InputError
         If there is no error to budget, or an argument is out of range.
     GeometryError
-        If the array can't see all six motions, and no axis is known.
+        If the array can't see all six motions.
     """
     import numpy as np
 
-    from gfimu.commands.known_axis import known_axis, turning_axis
     from gfimu.commands.opened import as_array
-    from gfimu.position_drift import ErrorSources, drift_budget
+    from gfimu.position_drift import drift_budget
     from gfimu.position_drift.monte_carlo import monte_carlo_drift
-    from gfimu.units import STANDARD_GRAVITY
 
     if monte_carlo == 1 or monte_carlo < 0:
         raise InputError(f"--monte-carlo {monte_carlo}: give 0 for none, or 2 or more runs")
-    sources = ErrorSources(
-        bias=bias_mg * 1e-3 * STANDARD_GRAVITY,
-        noise_density=noise_ug * 1e-6 * STANDARD_GRAVITY,
-        bias_random_walk=walk_ug * 1e-6 * STANDARD_GRAVITY,
-        rate_drift=math.radians(rate_drift_deg_h / 3600.0),
-    )
-    if not any(vars(sources).values()):
-        raise InputError(
-            "no error to budget: give at least one of --bias-mg, --noise-ug, --walk-ug, --rate-drift-deg-h"
-        )
+    sources = _sources(bias_mg, noise_ug, walk_ug, rate_drift_deg_h)
     geometry = as_array(array)
-    turning = known_axis(turning_axis(axis, axis_point, hub, inclination_rad), geometry)
-    if turning is not None:
-        from gfimu.known_axis.drift import axis_drift
-
-        if rate_drift_deg_h or monte_carlo or any(offset):
-            raise InputError("--rate-drift-deg-h, --offset and --monte-carlo have no use with a known axis (--axis)")
-        return axis_drift(
-            geometry,
-            turning,
-            time,
-            bias=sources.bias,
-            noise_density=sources.noise_density,
-            bias_random_walk=sources.bias_random_walk,
-            rate_rad_s=rate,
-            hub_density=hub_noise_m_s2_rthz,
-        )
     budget = drift_budget(geometry, time, sources, rate=rate, offset=offset, gravity=gravity)
     sample = None
     if monte_carlo:
@@ -168,3 +125,81 @@ def drift(
             progress=progress,
         )
     return Drift(budget, sample, seed)
+
+
+def axis_drift(
+    array: AccelerometerArray | str | Path,
+    *,
+    axis: TurningAxis | str | Sequence[float] | None = None,
+    axis_point: Sequence[float] = (0.0, 0.0, 0.0),
+    hub: str = "fixed",
+    inclination_rad: float | None = None,
+    time: float = 30.0,
+    bias_mg: float = 0.0,
+    noise_ug: float = 0.0,
+    walk_ug: float = 0.0,
+    rate: float = 0.0,
+    hub_noise_m_s2_rthz: float = 0.1,
+) -> AxisDrift:
+    """Budget the drift of rate and angle about a known axis, for as few as one chip.
+
+    Parameters
+    ----------
+    array : AccelerometerArray, str or Path
+        The array, its name or file.
+    axis : TurningAxis, str or sequence of float, optional
+        An axis about which alone the array turns: x, y, z, or three numbers, body frame. Few chips then suffice. By
+        default the array's own.
+    axis_point : sequence of float
+        A point of that axis, body frame, m.
+    hub : {"fixed", "free"}
+        Whether that axis stands still (a table) or moves with a body (a wheel).
+    inclination_rad : float, optional
+        Angle between that axis and the vertical, rad; upright by default.
+    hub_noise_m_s2_rthz : float
+        Of a free hub, one-sided density of its own specific force, m/s²/√Hz.
+    time, bias_mg, noise_ug, walk_ug, rate
+        As of `drift`; ``rate`` about the axis.
+
+    Raises
+    ------
+    InputError
+        If there is no error to budget, no axis, or an argument is out of range.
+    """
+    from gfimu.commands.known_axis import turning_axis
+    from gfimu.commands.opened import as_array
+    from gfimu.known_axis.drift import axis_drift as drift_about
+
+    sources = _sources(bias_mg, noise_ug, walk_ug)
+    geometry = as_array(array)
+    turning = turning_axis(axis, axis_point, hub, inclination_rad) or geometry.turning_axis
+    if turning is None:
+        raise InputError(f"array {geometry.name!r} has no axis of its own; give one, such as axis='z' (--axis z)")
+    return drift_about(
+        geometry,
+        turning,
+        time,
+        bias=sources.bias,
+        noise_density=sources.noise_density,
+        bias_random_walk=sources.bias_random_walk,
+        rate_rad_s=rate,
+        hub_density=hub_noise_m_s2_rthz,
+    )
+
+
+def _sources(bias_mg: float, noise_ug: float, walk_ug: float, rate_drift_deg_h: float = 0.0) -> ErrorSources:
+    """Return the errors in SI units; raises `InputError` if there is none."""
+    from gfimu.position_drift import ErrorSources
+    from gfimu.units import STANDARD_GRAVITY
+
+    found = ErrorSources(
+        bias=bias_mg * 1e-3 * STANDARD_GRAVITY,
+        noise_density=noise_ug * 1e-6 * STANDARD_GRAVITY,
+        bias_random_walk=walk_ug * 1e-6 * STANDARD_GRAVITY,
+        rate_drift=math.radians(rate_drift_deg_h / 3600.0),
+    )
+    if not any(vars(found).values()):
+        raise InputError(
+            "no error to budget: give at least one of --bias-mg, --noise-ug, --walk-ug, --rate-drift-deg-h"
+        )
+    return found
