@@ -70,3 +70,15 @@ def made_once(tmp_path_factory) -> Callable[[str, Callable[[], str]], str]:
         return path.read_text(encoding="utf-8")
 
     return text
+
+
+SLOW_TESTS = frozenset((PROJECT_ROOT / "tests" / "slow_tests.txt").read_text(encoding="utf-8").splitlines())
+"""Tests by their names in full that run as studies, so that the usual run ends within minutes."""
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark the slow tests as studies, before markers are selected by."""
+    for item in items:
+        if item.nodeid in SLOW_TESTS:
+            item.add_marker(pytest.mark.study)

@@ -429,3 +429,13 @@ def test_few_modules_are_in_no_room():
         "gfimu.units",
         "gfimu.world_model",
     }
+
+
+def test_the_slow_tests_are_there():
+    """A test that is renamed would run in the usual suite again, without a word."""
+    lines = (ROOT / "tests" / "slow_tests.txt").read_text(encoding="utf-8").splitlines()
+    names = [line for line in lines if not line.startswith("#")]
+    assert len(names) == len(set(names))
+    for name in names:
+        file, _, test = name.partition("::")
+        assert f"def {test.partition('[')[0]}(" in (ROOT / file).read_text(encoding="utf-8"), name

@@ -51,7 +51,6 @@ _NOISE, _INK, _PALE = css(NOISE_ON_PAPER), css(INK), css(PALE)
 _STRONGEST = 4  # channels drawn in colour
 _MOST_POINTS = 4000
 _MOST_FREQUENCIES = 1200
-_MOST_BAR_NAMES = 24  # of more bars, every second, third … has its name
 _DPI = 110
 _SMOOTH_S = 0.15
 _STYLE = {
@@ -274,7 +273,7 @@ def _bars(axis: Axes, size: ResidualSize) -> None:
     axis.hlines(size.floor, place - 0.45, place + 0.45, color=_INK, linewidth=1.2, label="noise")
     if np.nanmax(size.before) > 20 * np.nanmin(size.floor):
         axis.set_yscale("log")
-    step = -(-len(place) // _MOST_BAR_NAMES)
+    step = -(-len(place) // 24)  # of more bars than 24, every second, third … has its name
     axis.set_xticks(place[::step], size.channels[::step], rotation=60 if len(place) > 8 else 0, fontsize=8.5)
     axis.set_ylabel("m/s²")
     axis.set_title("rms per channel", loc="left", fontsize=10.5)

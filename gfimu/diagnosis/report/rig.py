@@ -16,8 +16,6 @@ from gfimu.visual.scene import Shape
 
 __all__ = ["DrawnRig"]
 
-_DOWN = np.array([0.0, 0.0, -1.0])
-
 
 @dataclass(frozen=True)
 class DrawnRig:
@@ -49,7 +47,12 @@ class DrawnRig:
             if not len(known):
                 return array.turning_axis, None, ""
             first = Rotation.from_quat(run.attitude[known[0]], scalar_first=True)
-            return array.turning_axis, first.inv().apply(_DOWN), "gravity at the start"
+            return array.turning_axis, first.inv().apply(_down()), "gravity at the start"
         turn = Rotation.from_rotvec(self.mounting).inv()
-        table = TurningAxis(turn.apply(-_DOWN), turn.apply(-np.asarray(self.centre, dtype=float)))
-        return array.turning_axis or table, turn.apply(_DOWN), "gravity"
+        table = TurningAxis(turn.apply(-_down()), turn.apply(-np.asarray(self.centre, dtype=float)))
+        return array.turning_axis or table, turn.apply(_down()), "gravity"
+
+
+def _down() -> NDArray[np.float64]:
+    """Return the direction of gravity in the world, (3,)."""
+    return np.array([0.0, 0.0, -1.0])

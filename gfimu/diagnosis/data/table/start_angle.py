@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -9,13 +11,29 @@ from gfimu.diagnosis.data.run import Run
 from gfimu.diagnosis.data.table.spins import State
 from gfimu.world_model import Effect, SpinState, WorldModel, axis_inclination
 
-__all__ = ["ANGLE_STD", "gravity_angle"]
+__all__ = ["AngleReading", "gravity_angle"]
 
-ANGLE_STD = 0.1
-"""Standard deviation of the angle that is found, rad: that of 0.1 g of biases across the axis. By choice."""
 
-_TURN, _LEAST = 0.5, 10  # rad that the table turns while the angle is read, and samples; numerical
-_GRID = 72  # numerical: angles that are tried first
+@dataclass(frozen=True)
+class AngleReading:
+    """How the angle at the start is read from gravity; all by choice.
+
+    Parameters
+    ----------
+    turn : float
+        Angle by which the table turns meanwhile [rad].
+    samples : int
+        Fewest samples that are read [count].
+    angles : int
+        Angles that are tried [count].
+    std : float
+        Standard deviation of the angle that is found [rad]: that of 0.1 g of biases across the axis.
+    """
+
+    turn: float = 0.5
+    samples: int = 10
+    angles: int = 72
+    std: float = 0.1
 
 
 class _Turned:
@@ -34,7 +52,7 @@ class _Turned:
 
 
 def gravity_angle(
-    model: WorldModel, run: Run, motion: State, effects: tuple[Effect, ...] = ()
+    model: WorldModel, run: Run, motion: State, effects: tuple[Effect, ...] = (), how: AngleReading = AngleReading()
 ) -> tuple[float, float] | None:
     """Return the table's angle at the first sample by gravity, and its standard deviation, rad.
 
@@ -51,6 +69,8 @@ def gravity_angle(
         Angle turned since the first sample (rad), rate and acceleration at every sample, by the reference.
     effects : tuple of Effect
         Faults that the readings have.
+    how : AngleReading
+        How long and how finely.
 
     Returns
     -------
@@ -59,8 +79,8 @@ def gravity_angle(
     """
     if not axis_inclination(model):
         return None
-    near = np.abs(motion.angle - motion.angle[0]) < _TURN
-    stop = max(int(np.argmin(near)) if not near.all() else len(near), _LEAST)
+    near = np.abs(motion.angle - motion.angle[0]) < how.turn
+    stop = max(int(np.argmin(near)) if not near.all() else len(near), how.samples)
     part = run.rows(0, stop)
     if not part.valid.any():
         return None
@@ -71,9 +91,9 @@ def gravity_angle(
         predicted, _ = model.predict(spin, part.t, effects=effects, mounting=run.mounting, start=float(run.t[0]))
         return float(np.sum(np.where(part.valid, part.readings - predicted, 0.0) ** 2))
 
-    angles = np.arange(_GRID) * (2.0 * np.pi / _GRID)
+    angles = np.arange(how.angles) * (2.0 * np.pi / how.angles)
     values = np.array([misfit(float(angle)) for angle in angles])
     # Gravity is a sine of the angle: so is the misfit, but for products that a fit of three terms leaves out.
-    waves = np.column_stack([np.ones(_GRID), np.cos(angles), np.sin(angles)])
+    waves = np.column_stack([np.ones(how.angles), np.cos(angles), np.sin(angles)])
     _, cosine, sine = np.linalg.lstsq(waves, values, rcond=None)[0]
-    return float(np.arctan2(-sine, -cosine)), ANGLE_STD
+    return float(np.arctan2(-sine, -cosine)), how.std
