@@ -90,8 +90,6 @@ def _diagnose(
     from gfimu.commands.diagnose import diagnose
     from gfimu.diagnosis.report.folder import FILES
 
-    if not json:
-        _print_what_shows(runs, twin, column_map, map_set or [])
     with progress("diagnosing", total=1.0) as done:
         found = diagnose(
             runs,
@@ -111,6 +109,7 @@ def _diagnose(
     if json:
         print_json(found.to_dict() | {"files": written})
         return
+    _print_what_shows(runs, twin, column_map, map_set or [])
     print_diagnosis(found)
     print_paths(written.items())
 
