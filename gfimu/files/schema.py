@@ -65,11 +65,11 @@ def about(
     **limits
         Bounds of `msgspec.Meta`: ``gt``, ``ge``, ``lt``, ``le``, ``min_length``, ``max_length``.
     """
-    told = {"unit": unit, "default": default, "must_be": must_be, "meaning": meaning}
+    notes = {"unit": unit, "default": default, "must_be": must_be, "meaning": meaning}
     return msgspec.Meta(
         description=f"{meaning} ({unit})" if unit else meaning,
         examples=None if example is None else [example],
-        extra={key: value for key, value in told.items() if value},
+        extra={key: value for key, value in notes.items() if value},
         **limits,
     )
 
@@ -107,16 +107,16 @@ def read(data: Any, kind: type[_Table], source: str) -> _Table:
 
 def without_none(info: types.Type) -> tuple[types.Type, dict[str, Any]]:
     """Return the type of a key without ``None`` and its wrappers, and what `about` says of it."""
-    told: dict[str, Any] = {}
+    notes: dict[str, Any] = {}
     while True:
         if isinstance(info, types.Metadata):
-            told = {"examples": (info.extra_json_schema or {}).get("examples"), **(info.extra or {}), **told}
+            notes = {"examples": (info.extra_json_schema or {}).get("examples"), **(info.extra or {}), **notes}
             info = info.type
         elif isinstance(info, types.UnionType) and any(isinstance(one, types.NoneType) for one in info.types):
             kept = tuple(one for one in info.types if not isinstance(one, types.NoneType))
             info = kept[0] if len(kept) == 1 else types.UnionType(kept)
         else:
-            return info, told
+            return info, notes
 
 
 def tagged(info: types.Type) -> dict[Any, types.StructType]:
@@ -247,8 +247,8 @@ def _nearest(word: Any, valid: Sequence[Any]) -> str:
 def _missing(key: str, info: types.Type) -> str:
     if _is_list_of_tables(info):
         return _no_table(key)
-    plain, told = without_none(info)
-    remedy = f", such as {key} = {_short(told['examples'][0], toml=True)}" if told.get("examples") else ""
+    plain, notes = without_none(info)
+    remedy = f", such as {key} = {_short(notes['examples'][0], toml=True)}" if notes.get("examples") else ""
     if isinstance(plain, types.LiteralType):
         remedy = f", one of {', '.join(map(str, plain.values))}"
     return f"key {key!r} is missing; add it{remedy}"
@@ -266,9 +266,9 @@ def _is_list_of_tables(info: types.Type) -> bool:
 
 def _must_be(at: _Place) -> str:
     """Return what the value of a key must be."""
-    info, told = without_none(at.key_info)
-    if "must_be" in told:
-        return str(told["must_be"])
+    info, notes = without_none(at.key_info)
+    if "must_be" in notes:
+        return str(notes["must_be"])
     if isinstance(info, types.LiteralType):
         return f"one of {', '.join(map(str, info.values))}{_nearest(at.key_value, info.values)}"
     if _is_list_of_tables(info):

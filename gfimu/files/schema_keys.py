@@ -143,9 +143,9 @@ def _inner(info: types.Type) -> tuple[types.StructType, ...]:
 
 
 def _row(field: types.Field, description: str) -> KeyRow:
-    plain, told = without_none(field.type)
-    meaning = str(told.get("meaning", description))
-    return KeyRow(field.name, _words(plain), str(told.get("unit", "")), _default(field, told), meaning)
+    plain, notes = without_none(field.type)
+    meaning = str(notes.get("meaning", description))
+    return KeyRow(field.name, _words(plain), str(notes.get("unit", "")), _default(field, notes), meaning)
 
 
 def _words(info: types.Type) -> str:
@@ -173,11 +173,11 @@ def _words(info: types.Type) -> str:
     return "text" if isinstance(info, types.StrType) else "table"
 
 
-def _default(field: types.Field, told: Mapping[str, Any]) -> str:
+def _default(field: types.Field, notes: Mapping[str, Any]) -> str:
     if field.required:
         return "required"
-    if told.get("default"):
-        return str(told["default"])
+    if notes.get("default"):
+        return str(notes["default"])
     value = field.default
     if value is msgspec.NODEFAULT or value is None or value in ((), ""):
         return "none"

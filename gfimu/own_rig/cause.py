@@ -26,6 +26,7 @@ _BIAS_LEFT = 0.3e-3 * STANDARD_GRAVITY  # m/s²: what a good calibration leaves
 _GAIN, _GAIN_LEFT = 0.02, 5e-4
 _LARGEST_GAIN = 0.3  # more is another unit
 _UNNAMED = 0.1  # m/s²
+_UNITS = ("rate_unit_rad_s", "acceleration_unit_rad_s2", "duration_s")
 
 
 @dataclass(frozen=True)
@@ -243,7 +244,20 @@ class UnnamedCause:
 
     def __call__(self, parameters: Mapping[str, Any]) -> Presence:
         """Return the term with its coefficients, which name their function for people and files."""
-        return Presence(self, {"dependence": self.dependence, **parameters})
+        units = dict(zip(_UNITS, (self.units.rate, self.units.acceleration, self.units.duration), strict=True))
+        return Presence(self, {"dependence": self.dependence, **units, **parameters})
+
+    @classmethod
+    def of_file(cls, parameters: Mapping[str, Any]) -> Presence:
+        """Return a term from the parameters that a twin file holds; raises `InputError` for those of no term."""
+        try:
+            units = BasisUnits(*(float(parameters[key]) for key in _UNITS))
+            dependence = str(parameters["dependence"])
+        except (KeyError, TypeError, ValueError) as error:
+            raise InputError(
+                f"effect 'unknown': {error} is missing or no number; take the file as it was written"
+            ) from None
+        return cls(dependence, units, "reference_rad_s" in parameters)(parameters)
 
     def sizes(self, array: AccelerometerArray) -> tuple[Size, ...]:
         """Return a coefficient per channel, or the one of the reference."""
@@ -253,7 +267,8 @@ class UnnamedCause:
 
     def parameter_units(self, array: AccelerometerArray) -> Mapping[str, str]:
         """Return the unit of each parameter."""
-        return {"dependence": NAME} | {one.key: one.unit for one in self.sizes(array)}
+        units = dict(zip(_UNITS, ("rad/s", "rad/s²", "s"), strict=True))
+        return {"dependence": NAME} | units | {one.key: one.unit for one in self.sizes(array)}
 
     def patterns(self, array: AccelerometerArray) -> tuple[Pattern, ...]:
         """Return one place: every coefficient free."""

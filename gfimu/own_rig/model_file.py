@@ -11,9 +11,10 @@ from types import FunctionType, ModuleType
 
 from gfimu.errors import InputError, unknown_name
 from gfimu.files.model_files import read_toml
+from gfimu.own_rig.cause import UnnamedCause
 from gfimu.own_rig.simulator import SimulatorModel
 from gfimu.plugins import plugins
-from gfimu.world_model import WorldModel
+from gfimu.world_model import Effect, WorldModel
 
 __all__ = ["load_model"]
 
@@ -58,9 +59,12 @@ def _of_file(path: Path) -> WorldModel | None:
     if model is None:
         raise InputError(f"{path}: simulator = {source!r} is no file.py:function and no installed twin")
     families = model.families()
-    effects = []
+    effects: list[Effect] = []
     for entry in content.get("effect", []):
         found = str(entry.get("name", ""))
+        if found == UnnamedCause.name:
+            effects.append(UnnamedCause.of_file(entry.get("parameters", {})))
+            continue
         if found not in families:
             raise unknown_name(f"effect in {path}:", found, families)
         effects.append(families[found](entry.get("parameters", {})))

@@ -175,6 +175,18 @@ def test_a_twin_file_with_an_unknown_effect_is_refused(tmp_path):
         load_model(file)
 
 
+def test_a_term_without_a_name_comes_back_from_its_twin_file(tmp_path):
+    pendulum = load_model(f"{PENDULUM}:twin")
+    term = pendulum.unnamed("rate²", BasisUnits(2.0, 1.0, 2.0))({"a12_m_s2": 0.4})
+    file = tmp_path / "twin.toml"
+    file.write_text(pendulum.extended([term]).to_toml())
+    again = load_model(file)
+    np.testing.assert_allclose(again.predict(Still(), T)[0], pendulum.predict(Still(), T, effects=[term])[0])
+    file.write_text(f'simulator = "{PENDULUM}:twin"\n[[effect]]\nname = "unknown"\n')
+    with pytest.raises(InputError, match="effect 'unknown'"):
+        load_model(file)
+
+
 def test_patterns_of_chips_take_their_sizes():
     array = gfimu.AccelerometerArray.load("cube12")
     every, first, *_ = chip_patterns(array, 3)
