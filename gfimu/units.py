@@ -16,6 +16,7 @@ __all__ = [
     "REFERENCE_UNITS",
     "STANDARD_GRAVITY",
     "key_name",
+    "reference_quantity",
     "split_unit",
 ]
 
@@ -35,12 +36,20 @@ REFERENCE_UNITS: dict[str, dict[str, float]] = {
     "tacho": {"rad_s": 1.0, "deg_s": math.pi / 180.0, "rpm": math.pi / 30.0},
     "command": {"rad_s": 1.0, "deg_s": math.pi / 180.0, "rpm": math.pi / 30.0},
     "angle": {"rad": 1.0, "deg": math.pi / 180.0},
+    "carriage": {"m": 1.0, "mm": 1e-3},
+    "carriage_speed": {"m_s": 1.0, "mm_s": 1e-3},
+    "carriage_acceleration": {"m_s2": 1.0, "mm_s2": 1e-3, "g": STANDARD_GRAVITY},
     "temperature": {"degC": 1.0},
     "gyro_x": {"rad_s": 1.0, "deg_s": math.pi / 180.0},
     "gyro_y": {"rad_s": 1.0, "deg_s": math.pi / 180.0},
     "gyro_z": {"rad_s": 1.0, "deg_s": math.pi / 180.0},
 }
 """Reference quantities of a recording, their units and factors; the first unit of each is the SI one."""
+
+
+def reference_quantity(column: str) -> str | None:
+    """Return the reference quantity that a column's name begins with, the longest one; None where there is none."""
+    return max((name for name in REFERENCE_UNITS if column.startswith(f"{name}_")), key=len, default=None)
 
 
 GYRO_COLUMNS = ("gyro_x_rad_s", "gyro_y_rad_s", "gyro_z_rad_s")

@@ -33,16 +33,21 @@ __all__ = [
     "axis_inclination",
     "bound_of",
     "dependence_of",
+    "is_linear",
     "is_of_one_recording",
     "is_of_wiring",
     "memory_of",
     "prior_of",
+    "reads_place",
     "shapes_to_screen",
 ]
 
 
 class SpinState(Protocol):
-    """Angle (rad), rate (rad/s) and angular acceleration (rad/s²) of the table, each of shape (n,)."""
+    """Angle (rad), rate (rad/s) and angular acceleration (rad/s²) of the table, each of shape (n,).
+
+    Of a linear axis: place (m), speed (m/s) and acceleration (m/s²) of its carriage.
+    """
 
     @property
     def angle(self) -> NDArray[np.float64]: ...  # noqa: D102
@@ -153,6 +158,16 @@ def memory_of(effect: Effect) -> float:
 def axis_inclination(model: WorldModel) -> float:
     """Return the angle between a table's axis and the vertical, rad; others than inclined tables need not say so."""
     return float(getattr(model, "axis_inclination", 0.0))
+
+
+def reads_place(model: WorldModel) -> bool:
+    """Tell whether the reference of a simulation is an angle, or the place of a carriage, and no rate."""
+    return model.drive_source in ("angle", "carriage")
+
+
+def is_linear(model: WorldModel) -> bool:
+    """Tell whether a simulation is of a linear axis, whose spin has place (m), speed (m/s) and acceleration (m/s²)."""
+    return model.drive_source in ("carriage", "carriage_speed", "carriage_acceleration")
 
 
 def acts_back(effect: Effect) -> bool:
@@ -310,7 +325,7 @@ class WorldModel(Protocol):
 
     @property
     def drive_source(self) -> str:
-        """What drives it: tacho, angle, command or gyro."""
+        """What drives it: tacho, angle, command, gyro, or of a linear axis carriage and so on (`is_linear`)."""
         ...
 
     def families(self) -> Mapping[str, EffectFamily]:

@@ -1,4 +1,4 @@
-"""Motions of bodies that are carried: a wheel on a moving hub, and a hand."""
+"""Motions of bodies that are carried: by a linear axis, a wheel on a moving hub, and a hand."""
 
 from __future__ import annotations
 
@@ -10,12 +10,37 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import make_interp_spline
 from scipy.spatial.transform import Rotation
 
+from gfimu import world_model
 from gfimu.errors import InputError
 from sim.motion import BodyState, SpinMotion
 
-__all__ = ["Hand", "Wheel"]
+__all__ = ["Carriage", "Hand", "Wheel"]
 
 _AXLE = np.array([0.0, 1.0, 0.0])  # of a wheel, in the world: it rolls along x
+
+
+@dataclass(frozen=True)
+class Carriage:
+    """A carriage on a linear axis: a printer's toolhead or bed.
+
+    Parameters
+    ----------
+    course : SpinMotion
+        Commanded place, m, speed, m/s, and acceleration, m/s², in place of angle, rate and angular acceleration.
+    axis : tuple of float
+        Direction of positive places in the world.
+    """
+
+    course: SpinMotion
+    axis: tuple[float, float, float] = (1.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        if not np.linalg.norm(self.axis) > 0:
+            raise InputError(f"carriage axis {self.axis}: give a direction, such as [1, 0, 0]")
+
+    def at(self, t: ArrayLike) -> world_model.SpinState:
+        """State of the carriage at times ``t``, s, shape (n,)."""
+        return self.course.at(t)
 
 
 @dataclass(frozen=True)

@@ -43,7 +43,7 @@ class TableGeometry:
     axes : ndarray, shape (c, 3)
         Unit vectors.
     tangential : ndarray, shape (c, 3)
-        r × θ: reading per angular acceleration, m.
+        r × θ: reading per angular acceleration, m; on a linear axis reading per acceleration along it, last column.
     centripetal : ndarray, shape (c, 6)
         Reading per product of the angular rate, m (`gfimu.geometry.array.OMEGA_PRODUCTS`).
     up : ndarray, shape (3,)
@@ -73,6 +73,10 @@ def table_geometry(world: World) -> TableGeometry:
         [chip.axes @ mount.T for chip in world.array.chips],
     )
     up = Rotation.from_rotvec(world.axis_rotvec).as_matrix()[2]
+    if world.slide is not None:
+        pushed = np.zeros((len(moved.axes), 3))
+        pushed[:, 2] = moved.axes @ (world.slide / np.linalg.norm(world.slide))
+        return TableGeometry(moved.axes, pushed, np.zeros((len(moved.axes), 6)), up, moved.positions)
     return TableGeometry(moved.axes, moved.regression_matrix[:, :3], moved.centripetal_matrix, up, moved.positions)
 
 
@@ -94,6 +98,8 @@ def rigid_readings(world: World, spin: SpinState, geometry: TableGeometry | None
         Readings of ideal sensors, m/s².
     """
     placed = table_geometry(world) if geometry is None else geometry
+    if world.slide is not None:  # nothing turns
+        return world.gravity * (placed.axes @ placed.up) + np.outer(spin.acceleration, placed.tangential[:, 2])
     theta, rate, acceleration = spin.angle, spin.rate, spin.acceleration
     cos, sin = np.cos(theta), np.sin(theta)
     stretch = 1.0 + world.stretch * rate**2 if world.stretch else 1.0

@@ -9,12 +9,13 @@ from __future__ import annotations
 from typing import Annotated, Literal
 
 from gfimu.files.schema import NotNegative, Positive, Table, Triple, about
-from sim.carried import Hand, Wheel
+from sim.carried import Carriage, Hand, Wheel
 from sim.motion import BodyMotion, SpinMotion
 from sim.pose_sequence import PoseSequence
 from sim.profiles import Chirp, Hold, Ramp, Segment, Sine, Tumble, spin_profile
 
 __all__ = [
+    "CarriageTable",
     "HandTable",
     "MotionTable",
     "PosesTable",
@@ -27,6 +28,7 @@ __all__ = [
 
 _Duration = Annotated[Positive, about("Length.", "s", example=1.0)]
 _Amplitude = Annotated[float, about("Amplitude of the rate.", "rad/s", example=1.0)]
+_Speed = Annotated[float, about("Amplitude of the speed.", "m/s", example=0.1)]
 _StartAngle = Annotated[float, about("Table angle at time zero.", "rad")]
 
 
@@ -199,6 +201,62 @@ class WheelTable(Table, frozen=True, tag_field="kind", tag="wheel"):
         return sum(table.duration_s for table in self.segment)
 
 
+class CarriageRampTable(Table, frozen=True, tag_field="kind", tag="ramp"):
+    """Change the speed along a quintic without acceleration at its ends."""
+
+    to_m_s: Annotated[float, about("Speed at the end.", "m/s", example=0.2)]
+    duration_s: _Duration
+
+    def segment(self) -> Segment:
+        """Return the piece of a profile."""
+        return Ramp(self.to_m_s, self.duration_s)
+
+
+class CarriageSineTable(Table, frozen=True, tag_field="kind", tag="sine"):
+    """Swing the speed about the one held, under a smooth window."""
+
+    amplitude_m_s: _Speed
+    frequency_hz: Annotated[Positive, about("Frequency.", "Hz", example=1.0)]
+    duration_s: _Duration
+
+    def segment(self) -> Segment:
+        """Return the piece of a profile."""
+        return Sine(self.amplitude_m_s, self.frequency_hz, self.duration_s)
+
+
+class CarriageChirpTable(Table, frozen=True, tag_field="kind", tag="chirp"):
+    """Swing the speed about the one held, the frequency moving exponentially."""
+
+    amplitude_m_s: _Speed
+    start_hz: Annotated[Positive, about("First frequency.", "Hz", example=1.0)]
+    stop_hz: Annotated[Positive, about("Last frequency.", "Hz", example=12.0)]
+    duration_s: _Duration
+
+    def segment(self) -> Segment:
+        """Return the piece of a profile."""
+        return Chirp(self.amplitude_m_s, self.start_hz, self.stop_hz, self.duration_s)
+
+
+class CarriageTable(Table, frozen=True, tag_field="kind", tag="carriage"):
+    """A carriage moves along a linear axis by a profile of its speed: a printer's toolhead or bed."""
+
+    segment: Annotated[
+        tuple[HoldTable | CarriageRampTable | CarriageSineTable | CarriageChirpTable, ...],
+        about("Pieces in a row; each begins at the speed at which the one before ends."),
+    ] = ()
+    axis: Annotated[Triple, about("Direction of positive places in the world.")] = Carriage.axis
+    start_m: Annotated[float, about("Place at time zero.", "m")] = 0.0
+
+    def motion(self) -> SpinMotion:
+        """Return the course of the carriage; raises `InputError` if there is no segment."""
+        return Carriage(spin_profile([table.segment() for table in self.segment], start_angle=self.start_m), self.axis)
+
+    @property
+    def length(self) -> float:
+        """Length of all segments, s."""
+        return sum(table.duration_s for table in self.segment)
+
+
 class HandTable(Table, frozen=True, tag_field="kind", tag="hand"):
     """A hand turns and moves a body at random, with rests at both ends."""
 
@@ -219,5 +277,5 @@ class HandTable(Table, frozen=True, tag_field="kind", tag="hand"):
         return self.duration_s
 
 
-MotionTable = ProfileTable | RestTable | TumbleTable | PosesTable | WheelTable | HandTable
+MotionTable = ProfileTable | RestTable | TumbleTable | PosesTable | WheelTable | CarriageTable | HandTable
 """The ``[motion]`` table of a scenario, by its ``kind``."""

@@ -39,13 +39,19 @@ class ReferenceSettings:
     encoder_resolution : float
         Step of the angle encoder, rad (0: continuous).
     gyro_noise_std : float or None
-        White noise of a reference gyro on the cube, rad/s; None: no gyro.
+        White noise of a reference gyro on the body, rad/s; None: no gyro.
+    carriage_noise_std : float
+        White noise of the place of a carriage, m.
+    carriage_resolution : float
+        Step of the place of a carriage, m (0: continuous).
     """
 
     tacho_noise_std: float = 0.0
     tacho_resolution: float = 0.0
     encoder_resolution: float = 0.0
     gyro_noise_std: float | None = None
+    carriage_noise_std: float = 0.0
+    carriage_resolution: float = 0.0
 
 
 class SensorTable(Table, frozen=True):
@@ -123,6 +129,10 @@ class ReferenceTable(Table, frozen=True):
     gyro_noise_std_rad_s: Annotated[
         NotNegative | None, about("White noise of a reference gyro on the body.", "rad/s", default="no gyro")
     ] = None
+    carriage_noise_std_m: Annotated[NotNegative, about("White noise of the place of a carriage.", "m")] = 0.0
+    carriage_resolution_m: Annotated[
+        NotNegative, about("Step of the place of a carriage, such as a microstep; 0: continuous.", "m")
+    ] = 0.0
 
     def settings(self) -> ReferenceSettings:
         """Return the settings."""
@@ -131,6 +141,8 @@ class ReferenceTable(Table, frozen=True):
             self.tacho_resolution_rad_s,
             self.encoder_resolution_rad,
             self.gyro_noise_std_rad_s,
+            self.carriage_noise_std_m,
+            self.carriage_resolution_m,
         )
 
 

@@ -22,9 +22,9 @@ from gfimu.short_repr import short_repr
 from gfimu.units import STANDARD_GRAVITY
 from sim import forward
 from sim.adxl345 import Sensor, SensorSettings
-from sim.carried import Wheel
+from sim.carried import Carriage, Wheel
 from sim.conversions import conversion_groups
-from sim.effects import Effect, apply_effects
+from sim.effects import NOT_OF_A_CARRIAGE, Effect, apply_effects
 from sim.effects.unlisted import Unlisted
 from sim.motion import BodyMotion, BodyState, SpinMotion, SpinState
 from sim.scenario_file import ReferenceSettings, scenario_fields
@@ -116,6 +116,7 @@ class Scenario:
             cube_offset=np.array(self.cube_offset),
             mount_rotvec=np.array(self.mounting_rotvec),
             axis_rotvec=np.array([self.axis_inclination, 0.0, 0.0]),
+            slide=np.array(self.motion.axis) if isinstance(self.motion, Carriage) else None,
         )
         return apply_effects(nominal, self.effects)
 
@@ -147,6 +148,8 @@ class Scenario:
     def from_dict(cls, data: Mapping[str, Any], *, source: str = "scenario", beside: Path | None = None) -> Scenario:
         """Build a scenario from the keys of a scenario file; raises `InputError` naming the key."""
         scenario = cls(**scenario_fields(data, source, beside))
+        if isinstance(scenario.motion, Carriage):
+            _refuse_turning(scenario, source)
         if scenario.free:
             _refuse_table_keys(scenario, source)
         return scenario
@@ -287,7 +290,9 @@ def _references(
     """Return the references by column name, each (n,)."""
     columns: dict[str, NDArray[np.float64]] = {}
     quality = run.reference
-    if not run.free:
+    if isinstance(command, Carriage):
+        columns |= _carriage(command, world, t, quality, rng)
+    elif not run.free:
         table = _spin(run.motion)
         for step in world.motion_steps:
             table = step(table, t)
@@ -307,6 +312,23 @@ def _references(
         gyro = rates @ world.gyro_matrix.T + rng.normal(size=body.omega.shape) * quality.gyro_noise_std
         columns |= {f"gyro_{axis}_rad_s": gyro[:, place] for place, axis in enumerate("xyz")}
     return columns
+
+
+def _carriage(
+    command: Carriage,
+    world: World,
+    t: NDArray[np.float64],
+    quality: ReferenceSettings,
+    rng: np.random.Generator,
+) -> dict[str, NDArray[np.float64]]:
+    """Return the commanded place, speed and acceleration of a carriage by column name, each (n,)."""
+    state = command.at(t - world.tacho_delay)
+    place = state.angle + rng.normal(size=len(t)) * quality.carriage_noise_std
+    return {
+        "carriage_m": _stepped(place, quality.carriage_resolution),
+        "carriage_speed_m_s": np.asarray(state.rate),
+        "carriage_acceleration_m_s2": np.asarray(state.acceleration),
+    }
 
 
 def _metadata(run: Scenario, sensor: Sensor, seed: int) -> dict[str, Any]:
@@ -360,6 +382,15 @@ def _nothing(n: int) -> SpinState:
 def _spin(motion: SpinMotion | BodyMotion) -> SpinMotion:
     """Narrow the type of a table's motion."""
     return motion  # type: ignore[return-value]
+
+
+def _refuse_turning(scenario: Scenario, source: str) -> None:
+    """Raise for what a linear axis can't have: a motor of the table, or effects of something that turns."""
+    if scenario.driven:
+        raise InputError(f"{source}: a linear axis moves as commanded; set drive.mode to prescribed")
+    for effect in scenario.effects:
+        if effect.name in NOT_OF_A_CARRIAGE:
+            raise InputError(f"{source}: effect {effect.name}: {NOT_OF_A_CARRIAGE[effect.name]}; leave it out")
 
 
 def _refuse_table_keys(scenario: Scenario, source: str) -> None:

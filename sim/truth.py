@@ -38,6 +38,8 @@ def cube_state(world: World, spin: SpinState) -> BodyState:
         Position, velocity and acceleration of the cube's centre in the world; rotation, rate and angular acceleration
         in cube axes. The velocity of stretching and nodding arms is left out where the forward model leaves it out.
     """
+    if world.slide is not None:
+        return _carried_state(world, spin)
     lean, omega, alpha = nodding_motion(world.nod, spin)
     turn = Rotation.from_rotvec(np.outer(spin.angle, [0.0, 0.0, 1.0]))
     arm = turn.apply(world.cube_offset) * (1.0 + world.stretch * spin.rate**2)[:, None]
@@ -53,6 +55,18 @@ def cube_state(world: World, spin: SpinState) -> BodyState:
         omega=np.einsum("nji,nj->ni", attitude, omega),
         alpha=np.einsum("nji,nj->ni", attitude, alpha),
     )
+
+
+def _carried_state(world: World, spin: SpinState) -> BodyState:
+    """Motion of an array on a linear axis: its place, and an attitude that stays."""
+    assert world.slide is not None
+    rail = Rotation.from_rotvec(world.axis_rotvec)
+    along = rail.apply(world.slide / np.linalg.norm(world.slide))
+    attitude = (rail * Rotation.from_rotvec(world.mount_rotvec)).as_matrix()
+    place, speed, push = (np.outer(part, along) for part in (spin.angle, spin.rate, spin.acceleration))
+    still = np.zeros_like(place)
+    turned = np.broadcast_to(attitude, (len(place), 3, 3))
+    return BodyState(place + rail.apply(world.cube_offset), turned, speed, push, still, still)
 
 
 def truth_columns(body: BodyState, gravity: float) -> Mapping[str, NDArray[np.float64]]:

@@ -87,7 +87,8 @@ def turntable_model(world: World) -> mujoco.MjModel:
     """Compile the turntable of ``models/mjcf/turntable.xml`` for a world.
 
     The world decides the chips, the cube's place and attitude on the table, the tilt of the axis and gravity. A
-    nodding axis gets a hinge of its own, and stretching arms a slide for each chip; prescribed motion moves both.
+    nodding axis gets a hinge of its own, and stretching arms a slide for each chip; prescribed motion moves both. On a
+    linear axis the table slides.
     """
     return _turntable(world).compile()
 
@@ -182,6 +183,9 @@ def _turntable(world: World) -> mujoco.MjSpec:
     spec = mujoco.MjSpec.from_file(str(find_model("mjcf", "turntable", suffix=".xml")))
     axis = spec.body("axis")
     axis.quat = _quaternion(Rotation.from_rotvec(world.axis_rotvec))
+    if world.slide is not None:
+        carried = spec.joint(_SPIN_JOINT)
+        carried.type, carried.axis = mujoco.mjtJoint.mjJNT_SLIDE, world.slide
     if world.nod:
         axis.add_joint(name=_NOD_JOINT, type=mujoco.mjtJoint.mjJNT_HINGE, axis=_nod_axis(world))
     mount = Rotation.from_rotvec(world.mount_rotvec)

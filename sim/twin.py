@@ -23,12 +23,13 @@ from gfimu.motion.body_drive import BodyDrive
 from gfimu.parts.part_file import PartFile
 from gfimu.short_repr import short_repr
 from gfimu.units import STANDARD_GRAVITY
-from gfimu.world_model import BasisUnits, BodyModel, EffectFamily, ExpectedNoise, Spin
+from gfimu.world_model import BasisUnits, BodyModel, EffectFamily, ExpectedNoise, Spin, is_linear, reads_place
 from gfimu.world_model import Effect as AnyEffect
 from sim import forward
 from sim.body import body_channels
 from sim.effects import (
     BODY_EFFECTS,
+    CARRIAGE_EFFECTS,
     ENCODER_EFFECTS,
     FURTHER_EFFECTS,
     INCLINED_EFFECTS,
@@ -37,6 +38,7 @@ from sim.effects import (
     added_effects,
     apply_effects,
 )
+from sim.effects.mechanical import Misalignment
 from sim.effects.unknown import UnknownTerm
 from sim.twin_file import TwinFile
 from sim.world import World
@@ -62,7 +64,8 @@ class Twin:
     sample_rate : float
         Nominal sample rate, Hz.
     drive_source : str
-        What drives the simulated table: ``tacho``, ``angle``, ``command``; ``gyro`` for a free body.
+        What drives the simulated table: ``tacho``, ``angle``, ``command``; ``gyro`` for a free body; ``carriage``,
+        ``carriage_speed``, ``carriage_acceleration`` for a linear axis.
     part : str
         Name of the sensor part.
     range_g : float
@@ -81,6 +84,8 @@ class Twin:
         axis leans about the world's x axis; at the angle zero that is the table's x axis too.
     axis : TurningAxis, optional
         How the array sits on the table's axis, in place of upright by ``cube_offset``.
+    carriage_axis : tuple of float
+        Direction of positive places of a linear axis, in the world.
     """
 
     array: AccelerometerArray
@@ -96,6 +101,7 @@ class Twin:
     grammar: bool = False
     axis_inclination: float = 0.0
     axis: TurningAxis | None = None
+    carriage_axis: tuple[float, float, float] = (1.0, 0.0, 0.0)
 
     __repr__ = short_repr
 
@@ -133,6 +139,7 @@ class Twin:
             grammar=file.grammar,
             axis_inclination=file.axis_inclination_rad if axis is None else axis.inclination or 0.0,
             axis=axis,
+            carriage_axis=file.carriage_axis,
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -152,6 +159,8 @@ class Twin:
             data["mounting"] = self.axis.to_mounting()
         elif self.axis_inclination:
             data["axis_inclination_rad"] = self.axis_inclination
+        if is_linear(self):
+            data["carriage_axis"] = list(self.carriage_axis)
         if self.effects:
             data["effect"] = [{"name": effect.name, "parameters": effect.parameters} for effect in self.effects]
         return data
@@ -187,6 +196,7 @@ class Twin:
             cube_offset=offset,
             mount_rotvec=turned,
             axis_rotvec=np.array([self.axis_inclination, 0.0, 0.0]),
+            slide=np.array(self.carriage_axis) if is_linear(self) else None,
             start=start,
         )
         return apply_effects(nominal, self._effects_with(effects))
@@ -215,7 +225,9 @@ class Twin:
         return self.gravity
 
     def families(self) -> Mapping[str, type[Effect]]:
-        """Return the library of effects: those of a table with its kind of reference, or of a free body."""
+        """Return the library of effects: of a table with its kind of reference, a linear axis, or a free body."""
+        if is_linear(self):
+            return self._of_carriage()
         own = {"gyro": BODY_EFFECTS, "angle": ENCODER_EFFECTS}.get(self.drive_source, TABLE_EFFECTS)
         added = {name: one for name, one in added_effects().items() if self.drive_source in one.drive_sources}
         inclined = INCLINED_EFFECTS if self.axis_inclination and self.drive_source == "angle" else {}
@@ -223,6 +235,12 @@ class Twin:
         if self.grammar or self.drive_source == "gyro":
             return library
         return {name: family for name, family in library.items() if name not in FURTHER_EFFECTS}
+
+    def _of_carriage(self) -> dict[str, type[Effect]]:
+        """Return the effects of a linear axis; of a single chip, axes turned on it and a turned mounting are the same."""
+        added = {name: one for name, one in added_effects().items() if self.drive_source in one.drive_sources}
+        same = {Misalignment.name} if len(self.array.chips) == 1 else set()
+        return {name: one for name, one in (CARRIAGE_EFFECTS | added).items() if name not in same}
 
     def searching(self, *, wide: bool) -> Twin:
         """Return the twin that searches the further effects and the grammar always, or only the usual effects."""
@@ -261,7 +279,7 @@ class Twin:
         readings = forward.channels(world, spin, t, temperature, geometry)
         if world.data_steps:
             readings = self._digital(readings, self._effects_with(effects), world, t)
-        if self.drive_source == "angle":
+        if reads_place(self):
             return readings, spin.at(t - world.tacho_delay).angle + world.angle_zero
         return readings, forward.reference(world, spin, t)
 
@@ -300,7 +318,7 @@ class Twin:
 
     def reference_gain(self, effects: Sequence[AnyEffect] = ()) -> float:
         """Return what the reference reads per unit of motion once effects are added, relative to the twin's own."""
-        if self.drive_source == "angle":
+        if reads_place(self):
             return 1.0
         return float(math.prod(1.0 + e.value("ratio") for e in _own(effects) if e.name == "tacho_scale"))
 

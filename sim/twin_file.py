@@ -22,10 +22,11 @@ class TwinDriveTable(Table, frozen=True):
     """What drives the simulated rig."""
 
     source: Annotated[
-        Literal["tacho", "angle", "command", "gyro"],
+        Literal["tacho", "angle", "command", "gyro", "carriage", "carriage_speed", "carriage_acceleration"],
         about(
             "Reference that drives the table: its tachometer, its encoder, the command; gyro: a free body, whose "
-            "specific force is unknown at every sample."
+            "specific force is unknown at every sample; carriage, carriage_speed, carriage_acceleration: a linear axis "
+            "and its commanded place, speed or acceleration."
         ),
     ] = "tacho"
 
@@ -60,6 +61,9 @@ class TwinFile(Table, frozen=True):
     axis_inclination_rad: Annotated[
         Inclination, about("Angle between the table's axis and the vertical; π/2 of a pendulum or a wheel.", "rad")
     ] = 0.0
+    carriage_axis: Annotated[
+        Triple, about("Direction of positive places of a linear axis, in the world as the twin believes it.")
+    ] = (1.0, 0.0, 0.0)
     mounting: Annotated[
         MountingTable | None,
         about(

@@ -167,6 +167,9 @@ class World:
         Rotation vector of the cube in the table frame, rad.
     axis_rotvec : ndarray, shape (3,)
         Rotation vector of the table's axis in the world, rad.
+    slide : ndarray, shape (3,), optional
+        Direction, axis frame, along which a carriage moves in place of the turning table. Angle, rate and angular
+        acceleration of a spin are then its place (m), speed (m/s) and acceleration (m/s²).
     angle_zero : float
         What an encoder reads at the angle zero, rad.
     nod : Nod
@@ -208,6 +211,7 @@ class World:
     cube_offset: NDArray[np.float64] = field(default_factory=lambda: np.array([0.0, 0.0, 0.06]))
     mount_rotvec: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
     axis_rotvec: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
+    slide: NDArray[np.float64] | None = None
     angle_zero: float = 0.0
     nod: Nod = Nod()
     stretch: float = 0.0

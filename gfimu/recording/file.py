@@ -19,7 +19,7 @@ from gfimu.geometry.array import AccelerometerArray
 from gfimu.parts.part import Part
 from gfimu.parts.plausible import MOST_CORRUPT, largest_of_array, largest_of_part, largest_reference
 from gfimu.recording.carried_array import carried_array
-from gfimu.units import READING_UNITS, REFERENCE_UNITS, STANDARD_GRAVITY
+from gfimu.units import READING_UNITS, REFERENCE_UNITS, STANDARD_GRAVITY, reference_quantity
 
 __all__ = ["RecordingContent", "read_recording_file"]
 
@@ -258,7 +258,7 @@ def _reference_columns(table: ColumnFile) -> list[_Column]:
     """Find the columns of references; a known quantity in an unknown unit, or twice, is an error."""
     found: dict[str, _Column] = {}
     for name in table.names:
-        quantity = next((quantity for quantity in REFERENCE_UNITS if name.startswith(f"{quantity}_")), None)
+        quantity = reference_quantity(name)
         if quantity is None or quantity == "t":
             continue
         units = REFERENCE_UNITS[quantity]

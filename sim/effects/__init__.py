@@ -3,11 +3,13 @@
 from sim.effects.base import Effect, Pattern, Size
 from sim.effects.registry import (
     BODY_EFFECTS,
+    CARRIAGE_EFFECTS,
     EFFECTS,
     ENCODER_EFFECTS,
     FURTHER_EFFECTS,
     INCLINED_EFFECTS,
     NOT_OF_A_BODY,
+    NOT_OF_A_CARRIAGE,
     NOT_OF_AN_ENCODER,
     TABLE_EFFECTS,
     added_effects,
@@ -17,12 +19,14 @@ from sim.effects.registry import (
 
 __all__ = [
     "BODY_EFFECTS",
+    "CARRIAGE_EFFECTS",
     "EFFECTS",
     "ENCODER_EFFECTS",
     "FURTHER_EFFECTS",
     "INCLINED_EFFECTS",
     "NOT_OF_AN_ENCODER",
     "NOT_OF_A_BODY",
+    "NOT_OF_A_CARRIAGE",
     "TABLE_EFFECTS",
     "Effect",
     "Pattern",

@@ -68,7 +68,8 @@ class Effect(ABC):
     """Effects that can do all that it does: beside one of them it has no size of its own."""
 
     drive_sources: ClassVar[frozenset[str]] = frozenset({"tacho", "angle", "command"})
-    """Drives of the twins that look for it, of an effect that another package adds (``gyro``: a free body)."""
+    """Drives of the twins that look for it, of an effect that another package adds (``gyro``: a free body,
+    ``carriage`` and so on: a linear axis)."""
     rarity: ClassVar[float] = 1.0
     """How many times rarer it is than a usual effect, before any data."""
 

@@ -25,6 +25,7 @@ __all__ = [
     "Gravity",
     "Misalignment",
     "MountTilt",
+    "MountTurn",
     "Resonance",
     "SensorPosition",
     "TableTilt",
@@ -155,6 +156,27 @@ class MountTilt(_TwoAxes):
         """Turn the cube in the table frame."""
         turn = Rotation.from_rotvec(self.across()) * Rotation.from_rotvec(world.mount_rotvec)
         return world.changed(mount_rotvec=turn.as_rotvec())
+
+
+class MountTurn(Effect):
+    """The array turned against a linear axis."""
+
+    name = "mount_turn"
+    summary = "the array is turned against the axis that carries it"
+    place = "geometry"
+    per_run = True
+    contained_in = frozenset({"misalignment"})
+    separated_by = "the array remounted on its side: a turned mounting changes with it, a chip's misalignment does not"
+
+    @classmethod
+    def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
+        """Rotation vector of the array in the frame of the axis."""
+        return tuple(Size(f"{axis}_rad", "rad", _DEGREE, bound=LARGEST_TURN) for axis in "xyz")
+
+    def apply(self, world: World) -> World:
+        """Turn the array on its carriage."""
+        turn = Rotation.from_rotvec(self.vector([f"{axis}_rad" for axis in "xyz"]))
+        return world.changed(mount_rotvec=(turn * Rotation.from_rotvec(world.mount_rotvec)).as_rotvec())
 
 
 class TableTilt(_TwoAxes):

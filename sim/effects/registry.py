@@ -16,12 +16,14 @@ from sim.world import World
 
 __all__ = [
     "BODY_EFFECTS",
+    "CARRIAGE_EFFECTS",
     "EFFECTS",
     "ENCODER_EFFECTS",
     "FURTHER_EFFECTS",
     "INCLINED_EFFECTS",
     "NOT_OF_AN_ENCODER",
     "NOT_OF_A_BODY",
+    "NOT_OF_A_CARRIAGE",
     "TABLE_EFFECTS",
     "added_effects",
     "apply_effects",
@@ -112,6 +114,27 @@ NOT_OF_AN_ENCODER: dict[str, str] = {
 }
 """Effects that a diagnosis of a table whose reference is an angle does not look for, and why."""
 
+NOT_OF_A_CARRIAGE: dict[str, str] = {
+    **dict.fromkeys(("eccentricity", "sensor_position"), "what does not turn reads the same at every place"),
+    **dict.fromkeys(
+        ("axis_wobble", "cogging", "centrifugal_flex", "vibration_rectification", "tacho_ripple"),
+        "a linear axis has no revolutions",
+    ),
+    "mount_tilt": "the array may be turned about all three axes: mount_turn",
+    "tacho_scale": "steps are counted, and the pitch of belt or screw is known better than the gain of a chip",
+    **dict.fromkeys(
+        (*(one.name for one in _OF_RIG if one.name not in ("chip_delay", "chip_lag", "cold_start")), *UNLISTED),
+        "an effect of a table that turns",
+    ),
+}
+"""Effects that a diagnosis of a linear axis does not look for, and why."""
+
+CARRIAGE_EFFECTS: dict[str, type[Effect]] = {
+    **{name: effect for name, effect in EFFECTS.items() if name not in NOT_OF_A_CARRIAGE},
+    mechanical.MountTurn.name: mechanical.MountTurn,
+}
+"""Every effect of an array on a linear axis, by its contract name."""
+
 TABLE_EFFECTS: dict[str, type[Effect]] = EFFECTS | FURTHER_EFFECTS
 """Every effect of a rig on its table whose reference is a rate."""
 
@@ -146,7 +169,7 @@ def make_effect(
     name: str, parameters: Mapping[str, Any] | None = None, array: AccelerometerArray | None = None
 ) -> Effect:
     """Build an effect by name; raises `InputError` for an unknown name or, given the array, an unknown key."""
-    known = TABLE_EFFECTS | BODY_EFFECTS | INCLINED_EFFECTS | {Unknown.name: Unknown}
+    known = TABLE_EFFECTS | BODY_EFFECTS | CARRIAGE_EFFECTS | INCLINED_EFFECTS | {Unknown.name: Unknown}
     if name not in known:
         known = known | added_effects()
     if name not in known:
@@ -158,7 +181,7 @@ def make_effect(
 
 
 _CHAIN = (
-    *("sensor_position", "misalignment", "mount_tilt", "eccentricity", "centrifugal_flex", "table_tilt", "axis_wobble"),
+    *("sensor_position", "misalignment", "mount_turn", "mount_tilt", "eccentricity", "centrifugal_flex", "table_tilt", "axis_wobble"),
     *("cross_axis", "scale_factor", "gain_drift", "quadratic", "vibration_rectification", "hysteresis"),
     *("bias", "bias_temperature", "warm_up", "cold_start", "interference_tone", "sensor_lag", "unknown"),
 )

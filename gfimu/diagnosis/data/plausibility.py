@@ -16,7 +16,7 @@ from gfimu.diagnosis.data.integrity import SIGNIFICANT_RMS
 from gfimu.diagnosis.data.run import REFERENCE_COLUMNS, Run
 from gfimu.errors import InputError
 from gfimu.units import STANDARD_GRAVITY
-from gfimu.world_model import WorldModel
+from gfimu.world_model import WorldModel, is_linear, reads_place
 
 __all__ = ["NOISE", "REMOVED", "refuse_implausible"]
 
@@ -49,6 +49,8 @@ _ANGLES: Mapping[str, float] = {
     "is in turns": 0.5 / np.pi,
     "has the opposite sign": -1.0,
 }
+_PLACES: Mapping[str, float] = {"is in mm": 1e3, "is in cm": 1e2, "has the opposite sign": -1.0}
+_SPEEDS: Mapping[str, float] = {"is in mm/s": 1e3, "is in mm/min": 6e4, "has the opposite sign": -1.0}
 _TURNED: Mapping[str, tuple[float, float, float]] = {
     "upright": (0.0, 0.0, 0.0),
     "upside down": (np.pi, 0.0, 0.0),
@@ -87,7 +89,8 @@ def refuse_implausible(
         return
     column = REFERENCE_COLUMNS[model.drive_source]
     _refuse_unrelated(run, prediction, expected.white, column)
-    scales = _ANGLES if model.drive_source == "angle" else _RATES
+    of_place, of_rate = (_PLACES, _SPEEDS) if is_linear(model) else (_ANGLES, _RATES)
+    scales = of_place if reads_place(model) else of_rate
     if misfit.whole < SIGNIFICANT_RMS**2:
         scales = {words: scale for words, scale in scales.items() if scale < 0.0}
     references = [
@@ -96,7 +99,7 @@ def refuse_implausible(
         for other in [replace(run, reference=run.reference / scale)]
     ]
     options = list(references)
-    if model.drive_source != "angle":
+    if not reads_place(model):
         reverse = references[list(scales).index("has the opposite sign")]
         options += _signed_in_parts(run, prediction, reverse, expected.white, predict, column)
     if misfit.whole > SIGNIFICANT_RMS**2:

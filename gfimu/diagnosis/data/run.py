@@ -8,6 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.integrate import cumulative_trapezoid
 from scipy.ndimage import gaussian_filter1d
 
 from gfimu.diagnosis.data.rounding import between_steps
@@ -29,8 +30,15 @@ __all__ = [
 
 GYRO_COLUMNS = ("gyro_x_rad_s", "gyro_y_rad_s", "gyro_z_rad_s")
 """Columns of the gyro that drives the twin of a free body."""
-REFERENCE_COLUMNS: Mapping[str, str] = {"tacho": "tacho_rad_s", "angle": "angle_rad", "command": "command_rad_s"}
-"""Column of the reference of a table, by the drive source of the twin."""
+REFERENCE_COLUMNS: Mapping[str, str] = {
+    "tacho": "tacho_rad_s",
+    "angle": "angle_rad",
+    "command": "command_rad_s",
+    "carriage": "carriage_m",
+    "carriage_speed": "carriage_speed_m_s",
+    "carriage_acceleration": "carriage_acceleration_m_s2",
+}
+"""Column of the reference of a table or a linear axis, by the drive source of the twin."""
 
 MINIMUM_DURATION = 4.0
 MINIMUM_SAMPLES = 80
@@ -327,11 +335,22 @@ def _drive(recording: Recording, model: WorldModel, name: str) -> tuple[str, NDA
             + (
                 f"set source = {others[0]!r} in the twin's [drive]"
                 if others
-                else "record a tachometer, angle or command"
+                else "record a tachometer, angle or command, or of a linear axis its commanded place or speed"
             )
         )
+    if model.drive_source == "carriage_acceleration":
+        return column, _speed(recording.t_s, np.asarray(have[column], dtype=float))
     reference = _without_repeats(np.asarray(have[column], dtype=float))
     return column, _without_holds(reference) if model.drive_source == "tacho" else reference
+
+
+def _speed(t: NDArray[np.float64], acceleration: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the speed (n,), m/s, of a commanded acceleration (n,), m/s², from rest; bridged where it has no value."""
+    known = np.isfinite(acceleration)
+    if not known.any():
+        return acceleration
+    bridged = np.interp(t, t[known], acceleration[known])
+    return np.where(known, cumulative_trapezoid(bridged, t, initial=0.0), np.nan)
 
 
 def _refuse_dead_reference(

@@ -16,7 +16,7 @@ from gfimu.diagnosis.data.rounding import COARSE, NO_STEPS, Steps
 from gfimu.diagnosis.data.run import Run, difference_noise, smooth_rate
 from gfimu.diagnosis.data.table.spins import JoinedSpin, ScaledSpin, State
 from gfimu.diagnosis.data.table.start_angle import gravity_angle
-from gfimu.world_model import Effect, Spin, WorldModel, is_of_wiring
+from gfimu.world_model import Effect, Spin, WorldModel, is_of_wiring, reads_place
 
 __all__ = ["RunUp", "Stretch", "make_stretches"]
 
@@ -113,8 +113,8 @@ class Stretch:
 
     @property
     def is_angle(self) -> bool:
-        """Whether the reference is an angle."""
-        return self.model.drive_source == "angle"
+        """Whether the reference is an angle, or a place."""
+        return reads_place(self.model)
 
     @cached_property
     def reference_spread(self) -> float:
@@ -213,7 +213,7 @@ def make_stretches(model: WorldModel, runs: Sequence[Run], known: Sequence[Seque
     """
     stretches: list[Stretch] = []
     for index, (run, faults) in enumerate(zip(runs, known, strict=True)):
-        rate = smooth_rate(run, is_angle=model.drive_source == "angle")
+        rate = smooth_rate(run, is_angle=reads_place(model))
         turned = cumulative_trapezoid(rate, run.t, initial=0.0)
         noise = difference_noise(run.reference[run.reference_valid])
         steps, _ = Steps.of_reference(run.reference[run.reference_valid], noise)

@@ -23,7 +23,7 @@ from gfimu.errors import InputError
 from gfimu.importing.oddities import oddities
 from gfimu.recording import Recording
 from gfimu.recording.checks import check_recording
-from gfimu.world_model import WorldModel
+from gfimu.world_model import WorldModel, reads_place
 
 __all__ = ["EffectView", "RunCheck", "UsefulRun", "check_runs"]
 
@@ -150,7 +150,7 @@ def _facts(run: Run, name: str, model: WorldModel, useful: UsefulRun) -> dict[st
     """Return length, rate, speeds and turns of a run."""
     known = np.isfinite(run.reference)
     t, drive = run.t[known], run.reference[known]
-    rate = np.gradient(np.unwrap(drive), t) if model.drive_source == "angle" else drive
+    rate = np.gradient(np.unwrap(drive), t) if reads_place(model) else drive
     fastest = float(np.max(np.abs(rate)))
     return {
         "name": name,

@@ -74,6 +74,12 @@ def _by_reference(stretch: Stretch, spacing: float) -> Drive:
     order = 0 if stretch.is_angle else 1
     reading = stretch.run.reference[seen]
     found = drive.by_reference(times[:, -1], reading, weights[seen], order, _REFERENCE_ROUNDS)
+    for _ in range(_HALVINGS):
+        missed = _missed_intervals(found, times[:, -1], reading, weights[seen], order)
+        closer = found.cut(missed & (found.spline.widths > 2.0 * stretch.run.sample_period))
+        if closer.spline == found.spline:
+            break
+        found = closer.by_reference(times[:, -1], reading, weights[seen], order, _REFERENCE_ROUNDS)
     if not any(effect.place == "reference" for effect in (*stretch.model.effects, *stretch.known)):
         return found
     # What the twin believes of its reference is inverted: d = reading - (predicted reading of d - d).
@@ -82,6 +88,24 @@ def _by_reference(stretch: Stretch, spacing: float) -> Drive:
         error = stretch.predict([], found.spin)[seen, -1] - (state.angle if stretch.is_angle else state.rate)
         found = drive.by_reference(times[:, -1], reading - error, weights[seen], order, _REFERENCE_ROUNDS)
     return found
+
+
+def _missed_intervals(
+    drive: Drive, t: NDArray[np.float64], values: NDArray[np.float64], std: NDArray[np.float64], order: int
+) -> NDArray[np.bool_]:
+    """Tell in which knot intervals (k,) a drive misses its own reference by more than noise; in none if it rarely does.
+
+    A reference that is faster than the knots, as the command of a printer's axis, needs closer ones before any channel
+    is looked at.
+    """
+    state = drive.spin.at(t)
+    squares = np.square((values - (state.rate if order else state.angle)) / std)
+    seen, most = np.isfinite(std), 1.0 + Policy().usual_excess
+    if squares[seen].mean() < most:
+        return np.zeros(drive.spline.intervals, dtype=bool)
+    place = drive.spline.interval(t)[0][seen]
+    counts = np.bincount(place, minlength=drive.spline.intervals)
+    return np.bincount(place, squares[seen], minlength=drive.spline.intervals) > most * counts
 
 
 def predicted_by_reference(model: WorldModel, run: Run) -> NDArray[np.float64]:
