@@ -10,11 +10,12 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from gfimu import AccelerometerArray
-from sim.effects import EFFECTS, FURTHER_EFFECTS, Effect
+from sim.effects import CARRIAGE_EFFECTS, EFFECTS, FURTHER_EFFECTS, Effect
 from sim.effects.unlisted import UNLISTED
 
 PAGE = Path(__file__).parent / "diagnosis.md"
 START, STOP = "<!-- effects: made by make_effects_table.py -->", "<!-- effects: end -->"
+CARRIAGE = ("<!-- linear axis: made by make_effects_table.py -->", "<!-- linear axis: end -->")
 FURTHER = ("<!-- further effects: made by make_effects_table.py -->", "<!-- further effects: end -->")
 GRAMMAR = ("<!-- grammar: made by make_effects_table.py -->", "<!-- grammar: end -->")
 MOST_KEYS = 4
@@ -49,7 +50,13 @@ def _keys(effect: type[Effect]) -> str:
 def with_table(page: str) -> str:
     """Return the text of the page with the present tables between their marks."""
     named = {name: effect for name, effect in FURTHER_EFFECTS.items() if name not in UNLISTED}
-    parts = (((START, STOP), effects_table()), (FURTHER, effects_table(named)), (GRAMMAR, grammar_table()))
+    linear = {name: effect for name, effect in CARRIAGE_EFFECTS.items() if EFFECTS.get(name) is not effect}
+    parts = (
+        ((START, STOP), effects_table()),
+        (CARRIAGE, effects_table(linear)),
+        (FURTHER, effects_table(named)),
+        (GRAMMAR, grammar_table()),
+    )
     for (start, stop), table in parts:
         pattern = re.compile(re.escape(start) + ".*?" + re.escape(stop), flags=re.DOTALL)
         page = pattern.sub(f"{start}\n{table}\n{stop}".replace("\\", "\\\\"), page)

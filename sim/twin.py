@@ -237,7 +237,7 @@ class Twin:
         return {name: family for name, family in library.items() if name not in FURTHER_EFFECTS}
 
     def _of_carriage(self) -> dict[str, type[Effect]]:
-        """Return the effects of a linear axis; of a single chip, axes turned on it and a turned mounting are the same."""
+        """Return the effects of a linear axis; a single chip's misalignment is that of its mounting."""
         added = {name: one for name, one in added_effects().items() if self.drive_source in one.drive_sources}
         same = {Misalignment.name} if len(self.array.chips) == 1 else set()
         return {name: one for name, one in (CARRIAGE_EFFECTS | added).items() if name not in same}

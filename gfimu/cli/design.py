@@ -40,7 +40,7 @@ def _design(
         float, typer.Option("--max-acceleration", metavar="RAD/S²", help="Largest angular acceleration of the table.")
     ] = 20.0,
     duration: Annotated[float, typer.Option("--duration", metavar="S", help="Length of the recording.")] = 60.0,
-    upright: Annotated[bool, typer.Option("--upright", help="Never propose to mount the cube differently.")] = False,
+    upright: Annotated[bool, typer.Option("--upright", help="Never propose to mount the array differently.")] = False,
     evaluations: Annotated[int, typer.Option("--evaluations", min=1, help="How many profiles to try.")] = 150,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the search.")] = 0,
     out: Annotated[Path | None, typer.Option("--out", help="Write the experiment as a scenario file (.toml).")] = None,

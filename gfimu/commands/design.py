@@ -68,7 +68,7 @@ def design(
     duration : float
         Length of the recording, s.
     upright : bool
-        Never propose to mount the cube differently.
+        Never propose to mount the array differently.
     evaluations : int
         How many profiles to try.
     seed : int
@@ -80,7 +80,7 @@ def design(
     rng : numpy.random.Generator, optional
         In place of ``seed``.
     mountings : mapping, optional
-        How else the cube may be mounted, in place of ``upright``; see `gfimu.diagnosis.design.design.MOUNTINGS`.
+        How else the array may be mounted, in place of ``upright``; see `gfimu.diagnosis.design.design.MOUNTINGS`.
     recorded : sequence of Run
         Prepared recordings at hand, beside ``run``.
     sample_rate : float, optional

@@ -124,7 +124,7 @@ class Recording(Tabular):
 
     @property
     def mounting_rotvec(self) -> NDArray[np.float64]:
-        """Rotation vector by which the cube was turned from upright before this run, rad, shape (3,)."""
+        """Rotation vector by which the array was turned from upright before this run, rad, shape (3,)."""
         value = self.metadata.get("mounting_rotvec_rad", [0.0, 0.0, 0.0])
         try:
             vector = np.asarray(value, dtype=float)

@@ -1,4 +1,4 @@
-"""Mechanical effects: geometry of the cube, its mounting, the table, gravity, and the motion itself."""
+"""Mechanical effects: geometry of the array, its mounting, the table, gravity, and the motion itself."""
 
 from __future__ import annotations
 
@@ -26,6 +26,7 @@ __all__ = [
     "Misalignment",
     "MountTilt",
     "MountTurn",
+    "RailTilt",
     "Resonance",
     "SensorPosition",
     "TableTilt",
@@ -45,7 +46,7 @@ class Misalignment(Effect):
     tolerance = float(np.deg2rad(0.02))
     place = "geometry"
     contained_in = frozenset({"cross_axis"})
-    separated_by = "the cube remounted on its side, or static poses on several sides"
+    separated_by = "the array remounted on its side, or static poses on several sides"
 
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
@@ -82,7 +83,7 @@ class SensorPosition(Effect):
     summary = "a chip is not where the drawing says"
     tolerance = 5e-5  # m
     place = "geometry"
-    separated_by = "the cube remounted on its side: an eccentric mounting changes with it, a chip's place does not"
+    separated_by = "the array remounted on its side: an eccentric mounting changes with it, a chip's place does not"
 
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
@@ -127,33 +128,33 @@ class _TwoAxes(Effect):
 
 
 class Eccentricity(_TwoAxes):
-    """The whole cube off the table's axis."""
+    """The whole array off the table's axis."""
 
     name = "eccentricity"
-    summary = "the whole cube is off the table's axis"
+    summary = "the whole array is off the table's axis"
     place = "geometry"
     unit = "m"
     prior_std = 1e-3
     bound = np.inf  # an arm may be mounted anywhere
     per_run = True
-    separated_by = "the cube remounted on its side: an eccentric mounting changes with it, a chip's place does not"
+    separated_by = "the array remounted on its side: an eccentric mounting changes with it, a chip's place does not"
 
     def apply(self, world: World) -> World:
-        """Move the cube across the axis."""
+        """Move the array across the axis."""
         return world.changed(cube_offset=world.cube_offset + self.across())
 
 
 class MountTilt(_TwoAxes):
-    """The cube not square to the table's axis."""
+    """The array not square to the table's axis."""
 
     name = "mount_tilt"
-    summary = "the cube is not square to the table's axis"
+    summary = "the array is not square to the table's axis"
     place = "geometry"
     per_run = True
-    separated_by = "the cube remounted on its side: a tilted mounting changes with it, a chip's misalignment does not"
+    separated_by = "the array remounted on its side: a tilted mounting changes with it, a chip's misalignment does not"
 
     def apply(self, world: World) -> World:
-        """Turn the cube in the table frame."""
+        """Turn the array in the table frame."""
         turn = Rotation.from_rotvec(self.across()) * Rotation.from_rotvec(world.mount_rotvec)
         return world.changed(mount_rotvec=turn.as_rotvec())
 
@@ -193,6 +194,13 @@ class TableTilt(_TwoAxes):
         """Turn the table's axis in the world."""
         turn = Rotation.from_rotvec(self.across()) * Rotation.from_rotvec(world.axis_rotvec)
         return world.changed(axis_rotvec=turn.as_rotvec())
+
+
+class RailTilt(TableTilt):
+    """A linear axis that is not where the twin has it: gravity has other parts along the array's axes."""
+
+    summary = "the linear axis is out of level: gravity has other parts along the sensing axes, the same all the time"
+    separated_by = "the array remounted on its side: an offset of a channel stays, a part of gravity changes channels"
 
 
 class AxisWobble(Effect):
@@ -244,7 +252,7 @@ class Gravity(Effect):
     name = "gravity"
     summary = "local gravity is other than assumed"
     place = "geometry"
-    separated_by = "the cube remounted on its side, so that other channels see gravity"
+    separated_by = "the array remounted on its side, so that other channels see gravity"
 
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
@@ -266,7 +274,7 @@ class CentrifugalFlex(Effect):
     name = "centrifugal_flex"
     summary = "arms stretch with the rate squared"
     place = "geometry"
-    separated_by = "the cube remounted on its side, and several high speeds"
+    separated_by = "the array remounted on its side, and several high speeds"
     other_units: ClassVar = {"moving_arms": NUMBER}
     whole = frozenset({"moving_arms"})
 
@@ -348,10 +356,10 @@ class Cogging(Effect):
 
 
 class Resonance(Effect):
-    """A torsional mode of the mounting, rung by angular acceleration."""
+    """A mode of the mounting: torsion on a table, belt and frame of a linear axis; excited by its acceleration."""
 
     name = "resonance"
-    summary = "a torsional mode of the mounting, rung by angular acceleration"
+    summary = "a mode between the drive and the array, excited by acceleration"
     place = "motion"
     separated_by = "fast ramps followed by rest, in which the mode rings down alone"
     other_units: ClassVar = {"frequency_hz": "Hz", "damping_ratio": RATIO}
@@ -389,7 +397,7 @@ class Resonance(Effect):
         return Mode(self.value("gain"), natural, self.value("damping_ratio", 0.03))
 
     def apply(self, world: World) -> World:
-        """Let the cube twist."""
+        """Let the array twist."""
         mode = self.mode
 
         def step(motion: SpinMotion, t: NDArray[np.float64]) -> SpinMotion:

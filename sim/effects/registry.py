@@ -131,7 +131,7 @@ NOT_OF_A_CARRIAGE: dict[str, str] = {
 
 CARRIAGE_EFFECTS: dict[str, type[Effect]] = {
     **{name: effect for name, effect in EFFECTS.items() if name not in NOT_OF_A_CARRIAGE},
-    mechanical.MountTurn.name: mechanical.MountTurn,
+    **{one.name: one for one in (mechanical.MountTurn, mechanical.RailTilt)},
 }
 """Every effect of an array on a linear axis, by its contract name."""
 
@@ -169,7 +169,7 @@ def make_effect(
     name: str, parameters: Mapping[str, Any] | None = None, array: AccelerometerArray | None = None
 ) -> Effect:
     """Build an effect by name; raises `InputError` for an unknown name or, given the array, an unknown key."""
-    known = TABLE_EFFECTS | BODY_EFFECTS | CARRIAGE_EFFECTS | INCLINED_EFFECTS | {Unknown.name: Unknown}
+    known = CARRIAGE_EFFECTS | TABLE_EFFECTS | BODY_EFFECTS | INCLINED_EFFECTS | {Unknown.name: Unknown}
     if name not in known:
         known = known | added_effects()
     if name not in known:
@@ -181,7 +181,16 @@ def make_effect(
 
 
 _CHAIN = (
-    *("sensor_position", "misalignment", "mount_turn", "mount_tilt", "eccentricity", "centrifugal_flex", "table_tilt", "axis_wobble"),
+    *(
+        "sensor_position",
+        "misalignment",
+        "mount_turn",
+        "mount_tilt",
+        "eccentricity",
+        "centrifugal_flex",
+        "table_tilt",
+        "axis_wobble",
+    ),
     *("cross_axis", "scale_factor", "gain_drift", "quadratic", "vibration_rectification", "hysteresis"),
     *("bias", "bias_temperature", "warm_up", "cold_start", "interference_tone", "sensor_lag", "unknown"),
 )
@@ -195,7 +204,7 @@ def _place_in_chain(effect: Effect) -> tuple[int, int]:
 def apply_effects(world: World, effects: Sequence[Effect]) -> World:
     """Apply effects in the order of the chain, whatever the order they are given in.
 
-    From the chip in the cube to the table in the world; from the proof mass (axes, gain, curvature) to the offset of
+    From the chip in the array to the table in the world; from the proof mass (axes, gain, curvature) to the offset of
     the circuit and its filter. Those that neither place nor chain tell apart keep their order.
     """
     for effect in sorted(effects, key=_place_in_chain):

@@ -76,7 +76,7 @@ class Bias(_PerChannel):
     of_pose = True
     prior_std = 20 * _MG
     bound = STANDARD_GRAVITY  # four times the 0.25 g that the ADXL345's data sheet allows along z
-    separated_by = "static poses on several sides (six-position), or the cube remounted on its side"
+    separated_by = "static poses on several sides (six-position), or the array remounted on its side"
 
     def apply(self, world: World) -> World:
         """Add the offsets to the readings."""
@@ -93,7 +93,7 @@ class ScaleFactor(_PerChannel):
     of_pose = True
     prior_std = 0.02
     bound = 0.3  # three times the ±10 % that the ADXL345's data sheet allows; the MPU-9150's ±3 % is narrower
-    separated_by = "static poses on several sides, or the cube remounted on its side and several speeds"
+    separated_by = "static poses on several sides, or the array remounted on its side and several speeds"
 
     @classmethod
     def patterns(cls, array: AccelerometerArray) -> tuple[Pattern, ...]:

@@ -1,4 +1,4 @@
-"""Dynamics between the commanded motion and the cube: torque ripple under a servo, a torsional mode."""
+"""Dynamics between the commanded motion and the array: torque ripple under a servo, a torsional mode."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ class Mode:
 
 
 class TwistingSpin:
-    """Spin of a cube on a torsion spring upon a spinning table: φ'' + 2ζω₀φ' + ω₀²φ = −α, of which a share is seen.
+    """Spin of an array on a torsion spring upon a spinning table: φ'' + 2ζω₀φ' + ω₀²φ = −α, of which a share is seen.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ class TwistingSpin:
         self._acceleration = gain * (push - natural**2 * twist - 2 * damping * natural * twist_rate)
 
     def at(self, t: ArrayLike) -> SpinState:
-        """State of the cube's spin at times (n,), s."""
+        """State of the array's spin at times (n,), s."""
         return _added(
             self._motion, np.asarray(t, dtype=float), self._grid, (self._angle, self._rate, self._acceleration)
         )

@@ -1,7 +1,7 @@
 """A grammar behind the list of effects: a place in the chain times a dependence, for what has no name of its own.
 
 A point of the grammar enters the forward model at its physical place, so that all it does downstream is computed: a
-reference that reads wrong changes no channel; a cube that leans moves its chips and turns their axes; a supply that
+reference that reads wrong changes no channel; an array that leans moves its chips and turns their axes; a supply that
 sags lowers the gain of every chip. Each is a small class: a place (its base) and a function of the motion.
 """
 
@@ -83,7 +83,7 @@ class Unlisted(Effect):
     """A point of the grammar: what it changes is its base's, what it goes with is its dependence."""
 
     grammar_place: ClassVar[str]
-    """Place in the grammar: reference, cube on the table, supply, channel."""
+    """Place in the grammar: reference, array on the table, supply, channel."""
     dependence: ClassVar[Dependence]
     separated_by = "runs at several speeds and accelerations, in both directions"
     rarity = 30.0  # by choice: all points together are as probable as one usual effect
@@ -151,10 +151,10 @@ class ReferenceCube(_OfReference):
 
 
 class _OfCube(Unlisted):
-    """The cube leans about its foot by a rotation vector across the axis that follows the motion."""
+    """The array leans about its foot by a rotation vector across the axis that follows the motion."""
 
     place = "geometry"
-    grammar_place = "cube on the table"
+    grammar_place = "array on the table"
 
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
@@ -163,7 +163,7 @@ class _OfCube(Unlisted):
         return tuple(Size(one.key(f"{axis}_rad"), one.per("rad"), usual, bound=bound) for axis in "xy")
 
     def apply(self, world: World) -> World:
-        """Let the cube lean."""
+        """Let the array lean."""
         vector = np.array([*self.vector([self.dependence.key(f"{axis}_rad") for axis in "xy"]), 0.0])
         if not vector.any():
             return world
@@ -171,34 +171,34 @@ class _OfCube(Unlisted):
 
 
 class LeanByRateSquared(_OfCube):
-    """A cube that centrifugal force leans."""
+    """An array that centrifugal force leans."""
 
     name = "lean_by_rate_squared"
-    summary = "the cube leans with the square of the rate"
+    summary = "the array leans with the square of the rate"
     dependence = RATE_SQUARED
 
 
 class LeanByRate(_OfCube):
-    """A cube that leans one way or the other with the rate."""
+    """An array that leans one way or the other with the rate."""
 
     name = "lean_by_rate"
-    summary = "the cube leans with the rate"
+    summary = "the array leans with the rate"
     dependence = RATE
 
 
 class LeanByAcceleration(_OfCube):
-    """A cube that leans when the table accelerates."""
+    """An array that leans when the table accelerates."""
 
     name = "lean_by_acceleration"
-    summary = "the cube leans with the angular acceleration"
+    summary = "the array leans with the angular acceleration"
     dependence = ACCELERATION
 
 
 class LeanByTurns(_OfCube):
-    """A cube that a cable leans as it winds up."""
+    """An array that a cable leans as it winds up."""
 
     name = "lean_by_turns"
-    summary = "the cube leans with the angle turned (a cable that winds up)"
+    summary = "the array leans with the angle turned (a cable that winds up)"
     dependence = TURNS
 
 

@@ -13,7 +13,7 @@ def test_a_proposal_is_printed_and_its_scenario_simulates(gfimu_command, tmp_pat
     out, run = tmp_path / "next.toml", tmp_path / "run.parquet"
     result = gfimu_command("design", "eccentricity", "sensor_position", *QUICK, "--out", out)
     assert result.code == 0
-    assert "Mount the cube" in result.stdout
+    assert "Mount the array" in result.stdout
     assert "ramp to" in result.stdout
     assert gfimu_command("simulate", out, "--out", run).code == 0
     recording = Recording.read(run)

@@ -53,7 +53,7 @@ def test_a_hidden_cause_is_found_told_and_written(gfimu_command, eccentric, tmp_
     out = tmp_path / "made"
     done = gfimu_command("diagnose", eccentric, "--twin", TWIN, "--out", out)
     assert done.code == 0, done.stderr
-    assert "Found what the simulation leaves out: the whole cube is off the table's axis." in " ".join(
+    assert "Found what the simulation leaves out: the whole array is off the table's axis." in " ".join(
         done.stdout.split()
     )
     assert "eccentricity" in done.stdout

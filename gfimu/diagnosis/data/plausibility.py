@@ -59,7 +59,7 @@ _TURNED: Mapping[str, tuple[float, float, float]] = {
     "on its side, turned by +90° about its y axis": (0.0, np.pi / 2, 0.0),
     "on its side, turned by -90° about its y axis": (0.0, -np.pi / 2, 0.0),
 }
-"""How a cube may lie on a table; a turn about the table's axis changes no reading."""
+"""How an array may lie on a table; a turn about the table's axis changes no reading."""
 
 
 def refuse_implausible(
@@ -203,13 +203,13 @@ def _in_units(references: Sequence[_Reading], quantum: float) -> list[_Reading]:
 
 
 def _turned(run: Run, predict: Callable[[Run], NDArray[np.float64]]) -> list[_Reading]:
-    """Return the run with the cube lying otherwise."""
+    """Return the run with the array lying otherwise."""
     found = []
     for words, rotvec in _TURNED.items():
         turned = replace(run, mounting=np.array(rotvec))
         given = ", ".join(f"{angle:.4f}" for angle in rotvec)
         text = (
-            f"the readings are those of a cube {words}, not of one mounted as the metadata say; "
+            f"the readings are those of an array {words}, not of one mounted as the metadata say; "
             f"give the run mounting_rotvec_rad: [{given}]"
         )
         found.append(_Reading(text, turned, predict(turned)))

@@ -77,7 +77,7 @@ class Run:
     temperature : ndarray or None, shape (n,)
         Board temperature, °C.
     mounting : ndarray, shape (3,)
-        Rotation vector by which the cube was turned from upright, rad.
+        Rotation vector by which the array was turned from upright, rad.
     lost : int
         Number of samples missing from the file.
     longest_gap : float

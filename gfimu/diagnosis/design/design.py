@@ -1,8 +1,8 @@
 """Design of the next experiment: the turntable profile, within limits, that best tells named effects apart.
 
 The profile that maximises the smallest D_ij (`gfimu.diagnosis.design.distinguishability`) over all ordered pairs of
-effects is searched by random starts and local search. Where no motion of an upright cube can part two effects, the
-proposal is to turn the cube onto its side.
+effects is searched by random starts and local search. Where no motion of an upright array can part two effects, the
+proposal is to turn the array onto its side.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ MOUNTINGS: Mapping[str, tuple[float, float, float]] = {
     "on its side, turned by 90° about its y axis": (0.0, np.pi / 2, 0.0),
     "upside down, turned by 180° about its x axis": (np.pi, 0.0, 0.0),
 }
-"""Remountings that a cube on a flat table allows: words and rotation vector from upright, rad."""
+"""Remountings that an array on a flat table allows: words and rotation vector from upright, rad."""
 
 _SEARCH_RATE = 50.0
 _INSEPARABLE = 1e-5
@@ -69,7 +69,7 @@ def design(
     rng : numpy.random.Generator
         Source of chance of the search.
     mountings : mapping of str to tuple
-        How else the cube may be mounted, by words; empty: upright only.
+        How else the array may be mounted, by words; empty: upright only.
     recorded : sequence of Run
         Recordings that exist already and will be diagnosed together with the new one.
     sample_rate : float

@@ -36,7 +36,7 @@ class PlannedRun:
     sample_rate : float
         Samples per second, Hz.
     mounting : ndarray, shape (3,)
-        Rotation vector by which the cube is turned from upright, rad.
+        Rotation vector by which the array is turned from upright, rad.
     reference_noise : float
         White noise of the reference at 100 Hz, rad/s (rad for an encoder).
     bias_instability : float

@@ -32,7 +32,7 @@ class Proposal:
     profile : TableProfile
         Motion of the table.
     mounting : tuple of float
-        Rotation vector by which the cube is turned from upright, rad.
+        Rotation vector by which the array is turned from upright, rad.
     upright_too : bool
         Whether the same profile has to be recorded upright as well, and both recordings diagnosed together.
     before : Distinguishability
@@ -118,15 +118,15 @@ def in_words(
         if inseparable:
             which = "; ".join(f"{one} from {other}" for one, other in inseparable)
             sentences.append(
-                f"No motion of an upright cube separates {which}: whatever one does, the other can do too."
+                f"No motion of an upright array separates {which}: whatever one does, the other can do too."
             )
         else:
-            sentences.append("The best motion of an upright cube does not suffice.")
+            sentences.append("The best motion of an upright array does not suffice.")
         where = "record the profile so" if recorded else "record the profile upright and so mounted"
-        sentences.append(f"Mount the cube {mounting}, {where}, and diagnose the recordings together.")
+        sentences.append(f"Mount the array {mounting}, {where}, and diagnose the recordings together.")
     else:
         again = ", and diagnose it together with what is recorded" if recorded else ""
-        sentences.append(f"Record the profile with the cube upright{again}.")
+        sentences.append(f"Record the profile with the array upright{again}.")
     rise = f"from {before.nats[i, j]:.3g} to {after.nats[i, j]:.3g} nats ({SEPARATED:g} needed)"
     sentences.append(f"The weakest margin, {pair}, goes {rise}.")
     if after.least_nats < SEPARATED:

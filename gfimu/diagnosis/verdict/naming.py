@@ -291,7 +291,7 @@ def _common_to_all_chips(cause: Cause, array: AccelerometerArray) -> str:
     freedom = max(np.linalg.matrix_rank(weight) - np.linalg.matrix_rank(inner), 1)
     if misfit < chi2.ppf(0.99, freedom) and total > 10 * freedom:
         return (
-            "all chips show the same: a cause common to the whole cube (its mounting on the table) is more likely "
+            "all chips show the same: a cause common to the whole array (its mounting on the table) is more likely "
             "than as many coinciding chips"
         )
     return ""

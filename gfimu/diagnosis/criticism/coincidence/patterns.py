@@ -1,8 +1,8 @@
 """Patterns that one thing upstream of all chips leaves in numbers per channel or per chip.
 
 A fault of one chip leaves numbers that nothing binds to those of the others. What is wrong before the chips (the
-reference, the motion of the table, gravity, a cube that leans) shows in all of them at once, in the ratio of the arms,
-of the shares of gravity or of the places. Arms are those of the whole cube about the vertical axis of the table.
+reference, the motion of the table, gravity, an array that leans) shows in all of them at once, in the ratio of the
+arms, of the shares of gravity or of the places. Arms are those of the whole array about the vertical axis of the table.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ def channel_patterns(array: AccelerometerArray, mounting: NDArray[np.float64]) -
         ("the share of gravity", axes[:, 2]),
         *everywhere,
         ("centripetal and tangential arm, as of one spin", np.column_stack([centripetal, tangential])),
-        ("a rigid motion of the whole cube", np.hstack([axes, np.cross(places, axes)])),
+        ("a rigid motion of the whole array", np.hstack([axes, np.cross(places, axes)])),
     ]
     each = np.eye(axis.max() + 1)[axis]  # (c, 3)
     for name, field in _fields(array, mounting, array.chip_of_channel):
@@ -100,12 +100,12 @@ def chip_patterns(array: AccelerometerArray, mounting: NDArray[np.float64], comp
         turned = np.stack([np.cross(one, centred).ravel() for one in unit], axis=1)
         flat = (centred * [1.0, 1.0, 0.0]).ravel()
         found += [
-            (f"a turn of the whole cube about {name}", column) for name, column in zip("xyz", turned.T, strict=True)
+            (f"a turn of the whole array about {name}", column) for name, column in zip("xyz", turned.T, strict=True)
         ]
         found += [
             ("the distance from the centre", centred.ravel()),
             ("the distance from the axis", flat),
-            ("a turn of the whole cube", turned),
+            ("a turn of the whole array", turned),
             ("a turn about z and the distance from the axis", np.column_stack([turned[:, 2], flat])),
         ]
     for name, field in fields[:3]:

@@ -59,9 +59,9 @@ def test_numbers_that_nothing_binds_are_no_coincidence(effect):
         ("quadratic", -np.sum(ARRAY.positions[:, :2] * ARRAY.axes[:, :2], axis=1), "the centripetal arm"),
         ("bias", ARRAY.axes[:, 2], "gravity"),
         ("sensor_position", np.tile([1.0, -0.5, 0.0], len(ARRAY.chips)), "a number per component"),
-        ("sensor_position", np.cross([0, 0, 1.0], ARRAY.chip_positions).ravel(), "a turn of the whole cube about z"),
+        ("sensor_position", np.cross([0, 0, 1.0], ARRAY.chip_positions).ravel(), "a turn of the whole array about z"),
     ],
-    ids=["as the arm", "as gravity", "the whole cube moved", "the whole cube turned"],
+    ids=["as the arm", "as gravity", "the whole array moved", "the whole array turned"],
 )
 @pytest.mark.parametrize("scatter", [0.0, 0.01])
 def test_what_one_thing_upstream_does_is_told_by_its_pattern(effect, values, pattern, scatter):

@@ -119,7 +119,7 @@ def test_the_first_screen_says_what_is_wrong_how_much_and_what_to_do(pages):
 
 
 def test_each_verdict_has_its_own_words(pages):
-    assert "can't tell which: the whole cube is off the table's axis or a chip is not where" in words_of(
+    assert "can't tell which: the whole array is off the table's axis or a chip is not where" in words_of(
         pages["ambiguous"]
     )
     assert "remounted on its side" in words_of(pages["ambiguous"])
