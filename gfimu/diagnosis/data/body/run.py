@@ -40,6 +40,8 @@ class BodyRun(Run):
         Angular rate that the gyro smoothed gives, rad/s.
     acceleration_error : float
         Error of its derivative, rad/s², as that of white noise of its greatest density.
+    rate_noise : ndarray, shape (3,)
+        White noise of the gyro, rad/s.
     gyro_valid : ndarray of bool, shape (n,)
         Samples whose rate and angular acceleration come from gyro values.
     gyro_bias : ndarray, shape (3,)
@@ -51,6 +53,7 @@ class BodyRun(Run):
     gyro: NDArray[np.float64]
     rate: NDArray[np.float64]
     acceleration_error: float
+    rate_noise: NDArray[np.float64]
     gyro_valid: NDArray[np.bool_]
     gyro_bias: NDArray[np.float64]
     rest: NDArray[np.bool_]
@@ -87,6 +90,7 @@ def prepare_body_run(recording: Recording, model: WorldModel, *, name: str = "ru
         gyro=gyro - bias,
         rate=smooth.rate,
         acceleration_error=smooth.acceleration_error,
+        rate_noise=smooth.noise,
         gyro_valid=valid,
         gyro_bias=bias,
         rest=rest,

@@ -102,6 +102,20 @@ class BodyStretch(Stretch):
         return np.where(self.run.rest, 0.0, self.change)
 
     @cached_property
+    def rate_error(self) -> NDArray[np.float64]:
+        """Error of the squared rate by the noise of the reference, 2 Ω σ, shape (n,), rad²/s²; 0 without a known axis.
+
+        A smoothed reference keeps the density of its noise at the frequencies that it passes: white noise of the
+        samples' σ is no smaller than that anywhere.
+        """
+        axis = self.model.array.turning_axis
+        if axis is None:
+            return np.zeros(len(self.run.t))
+        direction = axis.direction / np.linalg.norm(axis.direction)
+        noise = float(np.abs(direction) @ self.run.rate_noise)  # of a tachometer the same on all axes of the gyro
+        return np.asarray(2.0 * noise * np.abs(self.run.rate @ direction))
+
+    @cached_property
     def cosines(self) -> NDArray[np.float64]:
         """Cosines of slow noise at the groups, for bias instability of unit rms, shape (m, K)."""
         run = self.run

@@ -16,6 +16,7 @@ from scipy.optimize import nnls
 from gfimu.diagnosis.data.cosine_basis import NoiseLevels
 from gfimu.diagnosis.policy import Policy
 from gfimu.geometry.array import AccelerometerArray
+from gfimu.geometry.kinematics import omega_products
 
 __all__ = ["LEAST_POWER", "BodyNoise", "Projection", "learn_motion_noise", "white_from_rows"]
 
@@ -91,6 +92,10 @@ class Projection:
 
     The first three feel the angular acceleration with ``strength`` (per rad/s²), the others don't. ``sensed`` (c, 3) is
     what the channels read per specific force, where gains and cross-axis effects make that other than the axes.
+
+    About a known axis ``rate_row`` (c,) is what feels an error of the squared rate, with ``rate_strength`` (per
+    rad²/s²), of the combinations that don't feel the angular acceleration. On chips of three axes with noise alike
+    nothing of it is lost: tangential and radial differences are orthogonal.
     """
 
     predictions = 4
@@ -105,14 +110,27 @@ class Projection:
         free = basis[:, 3:]  # (c, c − 3)
         arms = array.regression_matrix[:, :3] * self.inverse[:, None]
         left, strength, turn = np.linalg.svd(free.T @ arms, full_matrices=True)
-        self.force_rows = basis[:, :3].T * self.inverse  # (3, c): what the specific force takes
         self.rows = (free @ left).T * self.inverse  # (c − 3, c): residual (m/s²) to rows
+        self.squared_rate = _per_squared_rate(array)  # (c,): what channels read per rad²/s² of the squared rate, m
+        felt = self.rows @ self.squared_rate
+        felt[:3] *= strength <= LEAST_POWER * max(strength.max(), 1e-300)
+        self.rate_strength = float(np.linalg.norm(felt))
+        self.rate_row = (felt / max(self.rate_strength, 1e-300)) @ self.rows  # (c,)
+        self.force_rows = basis[:, :3].T * self.inverse  # (3, c): what the specific force takes
         self.strength = strength  # (3,)
         self.turn = turn  # (3, 3): rows i feels strength_i · turn_i · α
         self.to_force = np.linalg.pinv(axes) * self.inverse  # (3, c)
         # Gains near −1 leave no specific force to be sensed.
         self.force_covariance = np.linalg.pinv(axes.T @ axes, hermitian=True)
         self.alive = np.flatnonzero(np.linalg.norm(self.rows, axis=1) > 0)
+
+
+def _per_squared_rate(array: AccelerometerArray) -> NDArray[np.float64]:
+    """Return what the channels read per squared rate about the array's known axis, shape (c,), m; zeros without."""
+    if array.turning_axis is None:
+        return np.zeros(array.n_channels)
+    direction = array.turning_axis.direction / np.linalg.norm(array.turning_axis.direction)
+    return np.asarray(array.centripetal_matrix @ omega_products(direction))
 
 
 def white_from_rows(

@@ -3,7 +3,8 @@
 For a sample with readings y, sensing axes A and specific force p the twin predicts y = A p + h(ω, ω̇; effects). Nothing
 is known of p, so that it takes three combinations of the channels whole; at rest |p| = g is known as well and adds one
 row. The angular acceleration is ω̇ of the gyro plus an unknown part of known variance, which takes a share of three more
-combinations. All samples have the same six combinations (`Projection`), so that with V what is taken of columns,
+combinations; about a known axis the noise δ of the rate Ω, as 2 Ω δ, takes a share of one more. The combinations of all
+samples are the same (`Projection`), so that with V what is taken of columns,
 
     G = AᵀWA − VᵀV + (row of rest),
 
@@ -35,7 +36,7 @@ __all__ = ["HandPosterior", "condition_hand"]
 _FORCE_STEPS = 6  # numerical
 _FORCE_DONE = 0.02  # numerical: of the white noise
 _BLOCK_S, _MOST_BLOCKS = 0.5, 128  # numerical: block of time, s, of the test of the noise
-_TAKEN = 6  # numerical: combinations of the channels that the drive takes
+_TAKEN = 7  # numerical: combinations of the channels that the drive takes: force, angular acceleration, rate
 
 
 @dataclass(frozen=True)
@@ -106,19 +107,20 @@ class HandPosterior:
 
     @cached_property
     def _mix(self) -> NDArray[np.float64]:
-        """The six combinations that feel the drive, shape (6, c)."""
-        return np.vstack([self.jacobian.force_rows, self.jacobian.rows[:3]])
+        """The combinations that feel the drive, shape (7, c)."""
+        return np.vstack([self.jacobian.force_rows, self.jacobian.rows[:3], self.jacobian.rate_row])
 
     @cached_property
     def _spread(self) -> NDArray[np.float64]:
-        """Variance of what the angular acceleration adds to three of them, in units of their noise, shape (3, m)."""
-        change = self.stretch.change_in_motion[self.stretch.starts]  # groups have one: at rest, or single samples
-        ratio = self.levels.lost(change) / self.levels.common(change)
-        return np.outer(self.jacobian.strength**2, ratio)
+        """Variance of what angular acceleration and rate add to four of them, in units of their noise, shape (4, m)."""
+        first = self.stretch.starts  # of groups, which have one change: they are at rest, or single samples
+        change, rate = self.stretch.change_in_motion[first], self.stretch.rate_error[first]
+        ratio = np.outer(self.jacobian.strength**2, self.levels.lost(change))
+        return np.vstack([ratio, (self.jacobian.rate_strength * rate) ** 2]) / self.levels.common(change)
 
     @cached_property
     def _share(self) -> NDArray[np.float64]:
-        """Root of the share of each combination that the drive takes, shape (6, m)."""
+        """Root of the share of each combination that the drive takes, shape (7, m)."""
         return np.vstack([np.ones((3, len(self._weight))), np.sqrt(self._spread / (1.0 + self._spread))])
 
     @cached_property
@@ -140,7 +142,7 @@ class HandPosterior:
         return self._rest[0] / np.where(self._weight > 0.0, self._weight, 1.0)[:, None]
 
     def _taken(self, columns: Columns) -> NDArray[np.float64]:
-        """Return V of columns, and last what the row of rest has of them, shape (7, m, P)."""
+        """Return V of columns, and last what the row of rest has of them, shape (8, m, P)."""
         out = np.zeros((_TAKEN + 1, len(self._weight), columns.count))
         for c, (at, part) in enumerate(zip(columns.places[:-1], columns.parts[:-1], strict=True)):
             if len(at):
@@ -151,7 +153,7 @@ class HandPosterior:
 
     @cached_property
     def _taken_of_residual(self) -> NDArray[np.float64]:
-        """The same of the residual, shape (7, m)."""
+        """The same of the residual, shape (8, m)."""
         taken = (self._mix @ self.observed.residual[:, :-1].T) * self._share
         return np.vstack([taken, self._rest[1]])
 
@@ -272,7 +274,7 @@ class HandPosterior:
 
     @cached_property
     def without_motion(self) -> NDArray[np.float64]:
-        """Residual less the angular acceleration that the gyro's samples don't hold, shape (n, c), m/s².
+        """Residual less the angular acceleration and rate that the gyro's samples don't hold, shape (n, c), m/s².
 
         That takes no part in the normal equations: estimated from the same readings, it would explain itself by longer
         arms.
@@ -283,6 +285,9 @@ class HandPosterior:
         rows = self.residual @ self.jacobian.rows[:3].T  # (n, 3)
         lost = (rows * prior * strength / (common + prior * strength**2)) @ self.jacobian.turn
         change = np.where(stretch.use[:, None], lost, 0.0) @ stretch.model.array.regression_matrix[:, :3].T
+        force, spread = self.jacobian.rate_strength, stretch.rate_error**2
+        squared = (self.residual @ self.jacobian.rate_row) * spread * force / (common[:, 0] + spread * force**2)
+        change += np.outer(np.where(stretch.use, squared, 0.0), self.jacobian.squared_rate)
         return np.where(stretch.run.valid, self._with_best_force(self.residual - change), 0.0)
 
     @cached_property
