@@ -62,7 +62,10 @@ def body_functions(stretch: BodyStretch, drive: HandDrive) -> dict[str, NDArray[
 
 
 def tone(at: HandPosterior, policy: Policy) -> LackOfFit:
-    """Test every channel for a narrow line, over the whole run and, as oscillators wander, over short windows."""
+    """Test every channel for a narrow line, over the whole run and, as oscillators wander, over short windows.
+
+    A line stands out of its neighbourhood and of what the noise of the gyro, smoothed, makes of the readings.
+    """
     stretch = at.stretch
     spread = np.sqrt(at.levels.common(stretch.change_in_motion))
     left = np.where(stretch.use[:, None], at.without_errors / spread[:, None], 0.0)[:, stretch.alive]
@@ -78,7 +81,8 @@ def tone(at: HandPosterior, policy: Policy) -> LackOfFit:
         level = np.maximum(np.median(power, axis=1, keepdims=True) / np.log(2.0), 1e-12)
         # A line stands out of its neighbourhood; a motion that is not fully followed raises whole bands.
         around = median_filter(power, size=(1, _NEIGHBOURS, 1), mode="nearest") / np.log(2.0)
-        ratio = power / np.maximum(level, around)
+        by_gyro = _gyro_power(at, spread, frequency[high], length)[:count, :, stretch.alive]
+        ratio = power / (np.maximum(level, around) + by_gyro)
         odds = ratio - np.log(ratio.size)
         window, place, channel = np.unravel_index(int(np.argmax(odds)), odds.shape)
         if odds[window, place, channel] > found.log_odds:
@@ -94,3 +98,22 @@ def tone(at: HandPosterior, policy: Policy) -> LackOfFit:
                 float(odds[window, place, channel]), text, {f"{channels[channel]}: tone at {one:.4f} Hz": amplitude}
             )
     return found
+
+
+def _gyro_power(
+    at: HandPosterior, spread: NDArray[np.float64], frequency: NDArray[np.float64], length: int
+) -> NDArray[np.float64]:
+    """Return the power that the error of the smoothed gyro has in the residual over windows, (windows, f, c).
+
+    Its derivative acts on the arms; about a known axis its product with the rate does as well (`rate_error`).
+    """
+    stretch, array = at.stretch, at.stretch.model.array
+    count = len(spread) // length
+    weight = np.where(stretch.use, 1.0 / spread, 0.0)[: count * length]
+    arms, squared = (at.beside_force(one) for one in (array.regression_matrix[:, :3].T, at.jacobian.squared_rate[None]))
+    error = stretch.run.smooth.error_power(np.pi * frequency * stretch.run.sample_period)  # (f, 3)
+    each = np.mean(weight.reshape(count, length) ** 2, axis=1)[:, None, None]
+    power = each * (((2.0 * np.pi * frequency[:, None]) ** 2 * error) @ arms**2)
+    moved = np.mean((weight * stretch.rate_error[: count * length]).reshape(count, length) ** 2, axis=1)
+    passed = error.sum(axis=1) / max(float(np.sum(stretch.run.smooth.noise**2)), 1e-300)  # (f,)
+    return np.asarray(power + moved[:, None, None] * passed[:, None] * squared**2)

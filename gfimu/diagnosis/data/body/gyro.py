@@ -36,11 +36,23 @@ class SmoothGyro:
         White noise of the gyro's samples, rad/s.
     acceleration_error : float
         Error of the angular acceleration, rad/s²: white noise of the density that the error has where it is largest.
+    cuts, orders : ndarray, shape (3,)
+        Cut-off (as 2 sin πfT) and order of the smoother of each axis.
     """
 
     rate: NDArray[np.float64]
     noise: NDArray[np.float64]
     acceleration_error: float
+    cuts: NDArray[np.float64]
+    orders: NDArray[np.float64]
+
+    def error_power(self, phase: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the spectrum of the error of the rate, shape (f, 3), rad²/s²; white noise of std σ has σ².
+
+        ``phase``, shape (f,), is πfT with the sample period T.
+        """
+        passed = 1.0 / (1.0 + (2.0 * np.sin(phase)[:, None] / self.cuts) ** (2.0 * self.orders))
+        return np.asarray(self.noise**2 * passed)
 
 
 def smooth_gyro(gyro: NDArray[np.float64], missing: NDArray[np.bool_], period: float) -> SmoothGyro:
@@ -60,6 +72,7 @@ def smooth_gyro(gyro: NDArray[np.float64], missing: NDArray[np.bool_], period: f
     """
     weight = np.where(missing, _MISSING, 1.0)
     rate, noise, densities = np.empty_like(gyro), np.empty(3), []
+    cuts, orders = np.ones(3), np.ones(3)
     phase = 2.0 * np.sin(np.pi * np.linspace(0.0, 0.5, 513))
     for axis, values in enumerate(gyro.T):
         if not np.ptp(values):  # of an axis about which a wheel doesn't turn
@@ -68,13 +81,14 @@ def smooth_gyro(gyro: NDArray[np.float64], missing: NDArray[np.bool_], period: f
         most = _LOUDER * _noise_where_quiet(values)
         fits = [_fit(values, weight, order, most) for order in _ORDERS]
         _, order, cut, noise[axis] = max(fits)
+        cuts[axis], orders[axis] = cut, order
         stiffness = cut ** (-2.0 * order)
         rate[:, axis] = cho_solve_banded((_factor(weight, order, stiffness), False), weight * values)
         passed = 1.0 / (1.0 + (phase / cut) ** (2 * order))
         # The posterior's spectrum is the noise's times what is passed.
         slope = np.linspace(0.0, np.pi, 513) / period
         densities.append(noise[axis] ** 2 * np.max(slope**2 * passed))
-    return SmoothGyro(rate, noise, float(np.sqrt(sum(densities) / 3.0)))
+    return SmoothGyro(rate, noise, float(np.sqrt(sum(densities) / 3.0)), cuts, orders)
 
 
 def _noise_where_quiet(values: NDArray[np.float64]) -> float:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation, binary_erosion, uniform_filter1d
 
-from gfimu.diagnosis.data.body.gyro import smooth_gyro
+from gfimu.diagnosis.data.body.gyro import SmoothGyro, smooth_gyro
 from gfimu.diagnosis.data.run import GYRO_COLUMNS, Run, possible_values, prepare_run
 from gfimu.diagnosis.data.time_grid import time_grid
 from gfimu.recording import Recording
@@ -40,8 +40,8 @@ class BodyRun(Run):
         Angular rate that the gyro smoothed gives, rad/s.
     acceleration_error : float
         Error of its derivative, rad/s², as that of white noise of its greatest density.
-    rate_noise : ndarray, shape (3,)
-        White noise of the gyro, rad/s.
+    smooth : SmoothGyro
+        The gyro smoothed, with the spectrum of its error.
     gyro_valid : ndarray of bool, shape (n,)
         Samples whose rate and angular acceleration come from gyro values.
     gyro_bias : ndarray, shape (3,)
@@ -53,7 +53,7 @@ class BodyRun(Run):
     gyro: NDArray[np.float64]
     rate: NDArray[np.float64]
     acceleration_error: float
-    rate_noise: NDArray[np.float64]
+    smooth: SmoothGyro
     gyro_valid: NDArray[np.bool_]
     gyro_bias: NDArray[np.float64]
     rest: NDArray[np.bool_]
@@ -85,12 +85,13 @@ def prepare_body_run(recording: Recording, model: WorldModel, *, name: str = "ru
     rest = _rest(run, gyro, model.expected_noise(1.0 / run.sample_period).white) & valid
     bias = gyro[rest].mean(axis=0) if rest.any() else np.zeros(3)
     smooth = smooth_gyro(gyro - bias, missing, run.sample_period)
+    axes = 1.0 if model.array.turning_axis is None else 3.0  # about a known axis all of the error is along that
     return BodyRun(
         **{field.name: getattr(run, field.name) for field in fields(run)},
         gyro=gyro - bias,
         rate=smooth.rate,
-        acceleration_error=smooth.acceleration_error,
-        rate_noise=smooth.noise,
+        acceleration_error=float(np.sqrt(axes)) * smooth.acceleration_error,
+        smooth=smooth,
         gyro_valid=valid,
         gyro_bias=bias,
         rest=rest,

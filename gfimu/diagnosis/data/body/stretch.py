@@ -112,7 +112,7 @@ class BodyStretch(Stretch):
         if axis is None:
             return np.zeros(len(self.run.t))
         direction = axis.direction / np.linalg.norm(axis.direction)
-        noise = float(np.abs(direction) @ self.run.rate_noise)  # of a tachometer the same on all axes of the gyro
+        noise = float(np.abs(direction) @ self.run.smooth.noise)  # of a tachometer the same on all axes of the gyro
         return np.asarray(2.0 * noise * np.abs(self.run.rate @ direction))
 
     @cached_property

@@ -288,16 +288,17 @@ class HandPosterior:
         force, spread = self.jacobian.rate_strength, stretch.rate_error**2
         squared = (self.residual @ self.jacobian.rate_row) * spread * force / (common[:, 0] + spread * force**2)
         change += np.outer(np.where(stretch.use, squared, 0.0), self.jacobian.squared_rate)
-        return np.where(stretch.run.valid, self._with_best_force(self.residual - change), 0.0)
+        return np.where(stretch.run.valid, self.beside_force(self.residual - change), 0.0)
 
     @cached_property
     def without_errors(self) -> NDArray[np.float64]:
         """Residual less the most probable errors of the motion, shape (n, c), m/s²."""
         sizes = self.nuisance_sizes[-len(self.motion_errors) :]
         change = sum((size * one for size, one in zip(sizes, self.motion_errors, strict=True)), 0.0 * self.residual)
-        return np.asarray(self.residual - self._with_best_force(change))
+        return np.asarray(self.residual - self.beside_force(change))
 
-    def _with_best_force(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def beside_force(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return changes of the readings (n, c) less what the best specific force takes of each, m/s²."""
         return np.asarray(values - (values @ self.jacobian.to_force.T) @ self.stretch.model.array.axes.T)
 
     # -- what a fit asks for ----------------------------------------------------------------------------------------
