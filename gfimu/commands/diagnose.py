@@ -136,7 +136,10 @@ def write_result(out: str | Path, found: Diagnosis, recording: Recording) -> dic
         twin_toml=tomli_w.dumps(content),
         more=more,
         rig=DrawnRig(
-            world.mount_rotvec, world.cube_offset, None if twin.drive_source == "gyro" else rig_drawing(world)
+            world.mount_rotvec,
+            world.cube_offset,
+            None if twin.drive_source == "gyro" or world.slide is not None else rig_drawing(world),
+            world.slide,
         ),
     )
 

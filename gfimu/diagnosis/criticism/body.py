@@ -67,7 +67,7 @@ def tone(at: HandPosterior, policy: Policy) -> LackOfFit:
     A line stands out of its neighbourhood and of what the noise of the gyro, smoothed, makes of the readings.
     """
     stretch = at.stretch
-    spread = np.sqrt(at.levels.common(stretch.change_in_motion))
+    spread = np.asarray(np.sqrt(at.levels.common(stretch.change_in_motion)), dtype=np.float64)
     left = np.where(stretch.use[:, None], at.without_errors / spread[:, None], 0.0)[:, stretch.alive]
     channels = [name for name, alive in zip(stretch.model.array.channels, stretch.alive, strict=True) if alive]
     found = LackOfFit(-np.inf, "", {})

@@ -26,7 +26,7 @@ from gfimu.diagnosis.terms.drive import Drive
 from gfimu.diagnosis.terms.hand.drive import HandDrive
 from gfimu.diagnosis.terms.hand.noise import BodyNoise
 from gfimu.diagnosis.terms.observed import observe
-from gfimu.world_model import Effect, is_of_one_recording
+from gfimu.world_model import Effect, is_linear, is_of_one_recording
 
 __all__ = ["Measured", "gain_of", "measure"]
 
@@ -265,8 +265,13 @@ def _seconds(values: NDArray[np.float64], stretch: Stretch) -> NDArray[np.float6
 def _motion_errors(
     nominal: Stretch, extended: Stretch, drive: Drive
 ) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Rate against the reference and position drift, with readings as they are and corrected by the extension."""
+    """Rate against the reference and position drift, with readings as they are and corrected by the extension.
+
+    On a linear axis nothing turns: there are none.
+    """
     run = extended.run
+    if is_linear(extended.model):
+        return (np.nan, np.nan), (np.nan, np.nan)
     pseudo_inverse = np.linalg.pinv(extended.model.array.regression_matrix)
     reference = smooth_rate(run, is_angle=extended.is_angle)
     believed = nominal.predict((), drive.spin)[:, :-1]

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from gfimu.diagnosis.criticism.views.run_view import RunView
@@ -55,7 +54,7 @@ def write_picture(
         array,
         view.before,
         view.after,
-        known=_motion(view, stood.mounting, np.asarray(stood.centre, dtype=float)),
+        known=_motion(view, stood),
         plots=_plots(view),
         shapes=stood.shapes,
         notes=_notes(diagnosis) + (f"\n\nThe run is long: every {every}th sample is shown." if every > 1 else ""),
@@ -76,12 +75,16 @@ def _thinned(view: RunView) -> tuple[RunView, int]:
     return replace(view, **kept), every
 
 
-def _motion(view: RunView, mounting: NDArray[np.float64], centre: NDArray[np.float64]) -> KnownMotion | None:
-    """Motion of the cube with the drive as estimated, its centre carried round by the table; a free body has none."""
+def _motion(view: RunView, stood: DrawnRig) -> KnownMotion | None:
+    """Motion of the array with the drive as estimated, carried by table or carriage; a free body has none."""
+    mounting, centre = stood.mounting, np.asarray(stood.centre, dtype=float)
     if view.attitude is not None:
         return KnownMotion("gyro, integrated", view.t, view.attitude, centre)
     if not np.isfinite(view.angle).all():
         return None
+    if stood.slide is not None:
+        still = np.tile(Rotation.from_rotvec(mounting).as_quat(scalar_first=True), (len(view.t), 1))
+        return KnownMotion("drive, estimated", view.t, still, centre + np.outer(view.angle, stood.slide))
     table = Rotation.from_rotvec(np.outer(view.angle, [0.0, 0.0, 1.0]))
     attitude = table * Rotation.from_rotvec(mounting)
     return KnownMotion(
@@ -100,17 +103,20 @@ def _plots(view: RunView) -> list[Plot]:
                 legend=False,
             ),
         ]
+    rate, acceleration = "rate of the table, rad/s", "angular acceleration, rad/s²"
+    if view.linear:
+        rate, acceleration = "speed of the carriage, m/s", "acceleration of the carriage, m/s²"
     return [
         Plot(
-            "reference that drives the table",
+            "reference that drives the twin",
             [
                 Line("measured", view.t, reference, MEASURED, 2.0),
                 Line("predicted before", view.t, view.reference_before, BEFORE),
                 Line("predicted after", view.t, view.reference_after, AFTER),
             ],
         ),
-        Plot("rate of the table, estimated, rad/s", [Line("ω", view.t, view.rate, COMMAND)], legend=False),
-        Plot("angular acceleration, estimated, rad/s²", [Line("α", view.t, view.acceleration, COMMAND)], legend=False),
+        Plot(f"{rate}, estimated", [Line("estimated", view.t, view.rate, COMMAND)], legend=False),
+        Plot(f"{acceleration}, estimated", [Line("estimated", view.t, view.acceleration, COMMAND)], legend=False),
     ]
 
 

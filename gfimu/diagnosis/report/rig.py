@@ -29,11 +29,14 @@ class DrawnRig:
         Body origin in the table frame, m.
     shapes : mapping of str to sequence of Shape, optional
         Shapes of ``base``, ``table`` and ``cube`` of the extended rig; a plain rig sized from the array otherwise.
+    slide : ndarray, shape (3,), optional
+        Direction in which a carriage moves, in place of a table that turns.
     """
 
     mounting: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
     centre: NDArray[np.float64] = field(default_factory=lambda: np.array([0.0, 0.0, 0.06]))
     shapes: Mapping[str, Sequence[Shape]] | None = None
+    slide: NDArray[np.float64] | None = None
 
     def seen_from(
         self, array: AccelerometerArray, run: RunView | None
@@ -49,6 +52,8 @@ class DrawnRig:
             first = Rotation.from_quat(run.attitude[known[0]], scalar_first=True)
             return array.turning_axis, first.inv().apply(_down()), "gravity at the start"
         turn = Rotation.from_rotvec(self.mounting).inv()
+        if self.slide is not None:
+            return array.turning_axis, turn.apply(_down()), "gravity"
         table = TurningAxis(turn.apply(-_down()), turn.apply(-np.asarray(self.centre, dtype=float)))
         return array.turning_axis or table, turn.apply(_down()), "gravity"
 

@@ -42,7 +42,7 @@ from gfimu.diagnosis.verdict.undetermined import undetermined, undetermined_sent
 from gfimu.diagnosis.verdict.verdict import Diagnosis, NamedCause, Residual, Unexplained
 from gfimu.diagnosis.verdict.wording import Notes, verdict_sentences
 from gfimu.geometry.array import AccelerometerArray
-from gfimu.world_model import Effect, Spin, WorldModel, is_of_one_recording
+from gfimu.world_model import Effect, Spin, WorldModel, is_linear, is_of_one_recording
 
 __all__ = ["Described", "conclude", "is_dominant", "is_unknown", "named_causes"]
 
@@ -407,6 +407,7 @@ def _view(prepared: PreparedRuns, number: int, stretches: Sequence[Stretch], bel
         np.concatenate([state.acceleration for state in states]),
         run.temperature,
         believed.point.levels[0].white[:-1],
+        linear=is_linear(stretches[0].model),
     )
 
 

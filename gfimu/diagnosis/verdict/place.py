@@ -13,6 +13,7 @@ from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.verdict.gate import NOT_THIS_UNIT
 from gfimu.diagnosis.verdict.likely_mistakes import likely_mistake
 from gfimu.diagnosis.verdict.verdict import Diagnosis
+from gfimu.world_model import is_linear
 
 __all__ = ["with_place"]
 
@@ -36,7 +37,7 @@ def with_place(found: Diagnosis, stretches: Sequence[Stretch], runs: Sequence[Ru
     policy : Policy
         Thresholds.
     """
-    rigid = rigid_motion(stretches, policy)
+    rigid = None if is_linear(stretches[0].model) else rigid_motion(stretches, policy)
     found = replace(found, rigid=rigid)
     if rigid is None or found.verdict != "unknown":
         return found

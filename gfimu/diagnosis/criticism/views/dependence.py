@@ -122,11 +122,13 @@ def quantities(run: RunView) -> list[Quantity]:
     since = run.t - run.t[0]
     scaled = 2 * since / max(since[-1], 1e-12) - 1
     rate, acceleration = run.rate, run.acceleration
+    word, omega, alpha, unit = ("speed", "v", "a", "m") if run.linear else ("rate", "ω", "α", "rad")
+    kind = "" if run.linear else "angular "
     found = [
         Quantity("time", "t", "s", "time", (scaled, scaled**2), since),
-        Quantity("the rate", "ω", "rad/s", "rate", (rate,), rate),
-        Quantity("the rate squared", "ω²", "rad²/s²", "rate squared", (rate**2,), rate**2),
-        Quantity("the angular acceleration", "α", "rad/s²", "acceleration", (acceleration,), acceleration),
+        Quantity(f"the {word}", omega, f"{unit}/s", "rate", (rate,), rate),
+        Quantity(f"the {word} squared", f"{omega}²", f"{unit}²/s²", "rate squared", (rate**2,), rate**2),
+        Quantity(f"the {kind}acceleration", alpha, f"{unit}/s²", "acceleration", (acceleration,), acceleration),
         Quantity(
             "its own reading (as predicted)",
             "reading",
@@ -139,7 +141,7 @@ def quantities(run: RunView) -> list[Quantity]:
     if run.temperature is not None:
         warm = run.temperature
         found.append(Quantity("the temperature", "T", "°C", "temperature", (warm - warm.mean(),), warm))
-    if np.ptp(run.angle) >= 2 * np.pi:
+    if np.ptp(run.angle) >= 2 * np.pi and not run.linear:
         turn = np.mod(run.angle, 2 * np.pi)
         for order in range(1, _HIGHEST_ORDER + 1):
             name = f"the table's angle, {_times(order)} per revolution"

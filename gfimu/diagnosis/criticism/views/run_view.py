@@ -18,7 +18,8 @@ class RunView:
 
     ``rate``, ``acceleration``, ``angle`` are the drive's posterior mean with the causes in; ``before`` is what the
     given twin predicts, ``after`` the extended one. ``white`` is the noise per channel. ``attitude``, shape (n, 4), is
-    the quaternion (w, x, y, z), body to world, of a free body, which has no ``angle``.
+    the quaternion (w, x, y, z), body to world, of a free body, which has no ``angle``. ``linear``: angle, rate and
+    acceleration are place (m), speed (m/s) and acceleration (m/s²) of a carriage.
     """
 
     name: str
@@ -36,5 +37,6 @@ class RunView:
     temperature: NDArray[np.float64] | None
     white: NDArray[np.float64]
     attitude: NDArray[np.float64] | None = None
+    linear: bool = False
 
     __repr__ = short_repr
