@@ -16,7 +16,7 @@ from gfimu.diagnosis.data.rounding import COARSE, NO_STEPS, Steps
 from gfimu.diagnosis.data.run import Run, difference_noise, smooth_rate
 from gfimu.diagnosis.data.table.spins import JoinedSpin, ScaledSpin, State
 from gfimu.diagnosis.data.table.start_angle import gravity_angle
-from gfimu.world_model import Effect, Spin, WorldModel, is_of_wiring, reads_place
+from gfimu.world_model import Effect, Spin, WorldModel, is_linear, is_of_wiring, reads_place
 
 __all__ = ["RunUp", "Stretch", "make_stretches"]
 
@@ -124,8 +124,12 @@ class Stretch:
 
     @property
     def finest(self) -> float:
-        """Noise below which a spline can't follow the reference, and which no part keeps to, rad/s or rad."""
-        return _FINEST_ANGLE if self.is_angle else _FINEST_RATE * (1.0 + self.reference_spread)
+        """Noise below which a spline can't follow the reference, and which no part keeps to, rad/s or rad.
+
+        Of a linear axis, m/s or m, it is what such an angle is at the length unit of the array.
+        """
+        length = self.model.array.length_unit if is_linear(self.model) else 1.0
+        return length * (_FINEST_ANGLE if self.is_angle else _FINEST_RATE * (1.0 + self.reference_spread))
 
     @cached_property
     def first_levels(self) -> NoiseLevels:
