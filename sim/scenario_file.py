@@ -24,6 +24,7 @@ from sim.twin_file import Inclination
 __all__ = ["ReferenceSettings", "ScenarioFile", "scenario_fields"]
 
 _TWIN_MOTION = "paper_run"  # the motion of a twin file, which has none of its own
+_CARRIAGE_MOTION = "linear_axis"  # that of a twin file of a linear axis
 
 
 @dataclass(frozen=True)
@@ -246,8 +247,11 @@ def _with_motion(data: Mapping[str, Any]) -> Mapping[str, Any]:
     """Return the content of a scenario; a twin file is given a motion, and what is of the diagnosis only left out."""
     if "motion" in data or not isinstance(data.get("drive"), Mapping) or "source" not in data["drive"]:
         return data
+    twin = {key: value for key, value in data.items() if key not in ("grammar", "carriage_axis")}
+    if str(data["drive"]["source"]).startswith("carriage"):
+        motion = read_toml(find_model("scenarios", _CARRIAGE_MOTION))["motion"]
+        return {"motion": motion | {"axis": data.get("carriage_axis", motion["axis"])}, **twin}
     paper = read_toml(find_model("scenarios", _TWIN_MOTION))
-    twin = {key: value for key, value in data.items() if key != "grammar"}
     return {"reference": paper.get("reference", {}), "motion": paper["motion"], **twin}
 
 

@@ -359,8 +359,13 @@ if TYPE_CHECKING:
 def _axis(file: TwinFile, array: AccelerometerArray, data: Mapping[str, Any], source: str) -> TurningAxis | None:
     """Return how the array sits on its axis: by the twin file, or by the array file unless the twin places it upright.
 
-    A wheel's hub moves: its twin is a free body, whose axis gives the direction of the rate alone.
+    A linear axis has none. A wheel's hub moves: its twin is a free body, whose axis gives the direction of the rate
+    alone.
     """
+    if file.drive.source.startswith("carriage"):
+        if file.mounting is not None:
+            raise InputError(f"{source}: [mounting] gives an axis that turns; a linear axis has carriage_axis")
+        return None
     placed = [key for key in ("cube_offset_m", "axis_inclination_rad") if key in data]
     if file.mounting is not None:
         if placed:

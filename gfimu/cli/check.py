@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -45,14 +46,10 @@ def print_short_check(found: RunCheck) -> None:
     """Print what recordings can show in a few lines, to stand before a diagnosis."""
     for one in found.runs:
         parts = [f"{one['duration_s']:.4g} s"]
-        if "turns" in one:
-            shares = " / ".join(f"{100 * one[f'share_{way}']:.0f}" for way in ("forwards", "backwards", "at_rest"))
-            parts += [
-                f"{one['sample_rate_hz']:.4g} Hz",
-                f"up to {one['fastest_rad_s']:.3g} rad/s",
-                f"{one['turns']:.3g} turns",
-                f"forwards / backwards / at rest {shares} %",
-            ]
+        rate, fastest, _, turns, shares = _motion(one)
+        if rate:
+            parts += [rate, f"up to {fastest}"] + ([f"{turns} turns"] if turns else [])
+            parts.append(f"forwards / backwards / at rest {shares}")
         print_text(f"{one['name']}: {', '.join(parts)}.")
     print_text("Data: " + ("; ".join(found.findings) if found.findings else "nothing odd."))
     if found.effects:
@@ -74,20 +71,7 @@ def print_check(found: RunCheck) -> None:
         (
             one["name"],
             f"{one['duration_s']:.4g} s",
-            *(
-                (
-                    f"{one['sample_rate_hz']:.4g} Hz",
-                    f"{one['fastest_rad_s']:.3g} rad/s",
-                    f"{one['largest_acceleration_rad_s2']:.3g} rad/s²",
-                    f"{one['turns']:.3g}",
-                    (
-                        f"{100 * one['share_forwards']:.0f} / {100 * one['share_backwards']:.0f} / "
-                        f"{100 * one['share_at_rest']:.0f} %"
-                    ),
-                )
-                if "turns" in one
-                else ("", "", "", "", "")
-            ),
+            *_motion(one),
         )
         for one in found.runs
     ]
@@ -107,3 +91,17 @@ def print_check(found: RunCheck) -> None:
         )
     for line in found.advice:
         print_text(f"- {line}")
+
+
+def _motion(facts: Mapping[str, Any]) -> tuple[str, str, str, str, str]:
+    """Return rate, fastest, acceleration, turns and shares of time of a run; empty where it has none."""
+    if "share_at_rest" not in facts:
+        return ("", "", "", "", "")
+    unit = "rad" if "fastest_rad_s" in facts else "m"
+    return (
+        f"{facts['sample_rate_hz']:.4g} Hz",
+        f"{facts[f'fastest_{unit}_s']:.3g} {unit}/s",
+        f"{facts[f'largest_acceleration_{unit}_s2']:.3g} {unit}/s²",
+        f"{facts['turns']:.3g}" if "turns" in facts else "",
+        " / ".join(f"{100 * facts[f'share_{way}']:.0f}" for way in ("forwards", "backwards", "at_rest")) + " %",
+    )

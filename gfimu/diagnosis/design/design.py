@@ -25,7 +25,7 @@ from gfimu.diagnosis.design.profile_search import Limits, improve, plain_profile
 from gfimu.diagnosis.design.proposal import SEPARATED, Proposal, in_words, scenario_of
 from gfimu.diagnosis.design.table_profile import TableProfile
 from gfimu.errors import InputError
-from gfimu.world_model import Effect, WorldModel
+from gfimu.world_model import Effect, WorldModel, is_linear
 
 __all__ = ["MOUNTINGS", "Limits", "Proposal", "design"]
 
@@ -89,6 +89,8 @@ def design(
         raise InputError("name at least two effects to tell apart, such as tacho_scale sensor_position")
     if model.drive_source == "gyro":
         raise InputError("the twin is a free body (drive source 'gyro'); a turntable profile needs source = \"tacho\"")
+    if is_linear(model):
+        raise InputError("the twin is a linear axis; gfimu check says what a recording of it shows")
     if limits.duration < MINIMUM_DURATION:
         raise InputError(
             f"duration {limits.duration:g} s is too short to diagnose; allow at least {MINIMUM_DURATION} s"

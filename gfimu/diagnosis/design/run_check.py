@@ -23,7 +23,7 @@ from gfimu.errors import InputError
 from gfimu.importing.oddities import oddities
 from gfimu.recording import Recording
 from gfimu.recording.checks import check_recording
-from gfimu.world_model import WorldModel, reads_place
+from gfimu.world_model import WorldModel, is_linear, reads_place
 
 __all__ = ["EffectView", "RunCheck", "UsefulRun", "check_runs"]
 
@@ -38,6 +38,8 @@ class UsefulRun:
         Length of all runs together [s]: several held-out blocks (`Policy.block_duration`).
     rate : float
         Slowest rate that counts as motion [rad/s]; a tenth of it is rest. A table turns faster, a drift of it slower.
+    speed : float
+        Slowest speed of a carriage that counts as motion [m/s]; a tenth of it is rest.
     share : float
         Share of the time in each direction, and at rest, from which it is there [1].
     turns : float
@@ -46,6 +48,7 @@ class UsefulRun:
 
     duration: float = 30.0
     rate: float = 0.5
+    speed: float = 0.01
     share: float = 0.05
     turns: float = 3.0
 
@@ -147,21 +150,23 @@ def check_runs(
 
 
 def _facts(run: Run, name: str, model: WorldModel, useful: UsefulRun) -> dict[str, Any]:
-    """Return length, rate, speeds and turns of a run."""
+    """Return length, rate, speeds and, of what turns, turns of a run."""
     known = np.isfinite(run.reference)
     t, drive = run.t[known], run.reference[known]
-    rate = np.gradient(np.unwrap(drive), t) if reads_place(model) else drive
-    fastest = float(np.max(np.abs(rate)))
+    place = drive if is_linear(model) else np.unwrap(drive)
+    rate = np.gradient(place, t) if reads_place(model) else drive
+    unit, slow = ("m", useful.speed) if is_linear(model) else ("rad", useful.rate)
+    turns = {} if is_linear(model) else {"turns": float(np.abs(np.trapezoid(rate, t)) / (2.0 * np.pi))}
     return {
         "name": name,
         "duration_s": run.duration,
         "sample_rate_hz": 1.0 / run.sample_period,
-        "fastest_rad_s": fastest,
-        "largest_acceleration_rad_s2": float(np.quantile(np.abs(np.gradient(rate, t)), 0.99)),
-        "turns": float(np.abs(np.trapezoid(rate, t)) / (2.0 * np.pi)),
-        "share_forwards": float(np.mean(rate > useful.rate)),
-        "share_backwards": float(np.mean(rate < -useful.rate)),
-        "share_at_rest": float(np.mean(np.abs(rate) < 0.1 * useful.rate)),
+        f"fastest_{unit}_s": float(np.max(np.abs(rate))),
+        f"largest_acceleration_{unit}_s2": float(np.quantile(np.abs(np.gradient(rate, t)), 0.99)),
+        **turns,
+        "share_forwards": float(np.mean(rate > slow)),
+        "share_backwards": float(np.mean(rate < -slow)),
+        "share_at_rest": float(np.mean(np.abs(rate) < 0.1 * slow)),
     }
 
 
@@ -208,8 +213,8 @@ def _advice(facts: Sequence[dict[str, Any]], effects: Sequence[EffectView], usef
     ways = {way: any(one[f"share_{way}"] > useful.share for one in facts) for way in ("forwards", "backwards")}
     if not all(ways.values()):
         missing = next(way for way, there in ways.items() if not there)
-        advice.append(f"turn {missing} as well: what goes with the rate and with its size can't be separated otherwise")
-    if max(one["turns"] for one in facts) < useful.turns:
+        advice.append(f"move {missing} as well: what goes with the rate and with its size can't be separated otherwise")
+    if max(one.get("turns", useful.turns) for one in facts) < useful.turns:
         advice.append("make several whole turns one way: an axis out of level and ripples show once per turn")
     if not any(one["share_at_rest"] > useful.share for one in facts):
         advice.append("begin with a few seconds of rest: biases are seen there")
