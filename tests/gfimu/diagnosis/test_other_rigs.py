@@ -38,8 +38,20 @@ def test_a_lever_of_a_wheel_is_found_beside_the_gain_that_can_do_the_same(side):
     assert "sensor_position" in {cause.effect, *cause.not_distinguishable_from}
 
 
-def test_nothing_is_found_on_a_wheel_whose_hub_shakes():
-    assert found("wheel", "wheel_pair").verdict == "nothing_found"
+@pytest.mark.parametrize("noise", [0.001, 0.01])
+def test_nothing_is_found_on_a_wheel_whose_hub_shakes(noise):
+    verdict = found("wheel", "wheel_pair", changes=[f"reference.tacho_noise_std_rad_s={noise}"])
+    assert verdict.verdict == "nothing_found"
+
+
+def test_a_bias_is_found_beside_a_noisy_tachometer():
+    changes = ["reference.tacho_noise_std_rad_s=0.03"]
+    verdict = found("wheel", "wheel_pair", "bias", {"a12_m_s2": 0.05}, changes)
+    (cause,) = verdict.causes
+    assert cause.effect == "bias"
+    # Of two chips only the difference shows.
+    apart = cause.parameters.get("a12_m_s2", 0.0) - cause.parameters.get("a22_m_s2", 0.0)
+    assert apart == pytest.approx(0.05, abs=5e-3)
 
 
 def test_the_encoder_s_zero_is_no_effect_of_a_level_table():

@@ -70,3 +70,15 @@ def test_samples_filled_in_do_not_draw_the_rate():
     spoilt[missing] += 0.5
     smooth = smooth_gyro(spoilt, missing, T)
     assert np.abs(smooth.rate - rate)[missing].max() < 4 * NOISE
+
+
+def test_the_spectrum_of_its_error_is_no_smaller_than_the_error_where_that_is_passed():
+    t, rate, _, gyro = swinging()
+    smooth = smooth_gyro(gyro, np.zeros(len(t), dtype=bool), T)
+    frequency = np.fft.rfftfreq(len(t), T)
+    error = np.abs(np.fft.rfft(smooth.rate - rate, axis=0)) ** 2 / len(t)
+    stated = smooth.error_power(np.pi * frequency * T)
+    slow = (frequency > 0.1) & (frequency < 0.3)
+    # Means over some twenty frequencies of an exponential distribution scatter by a fifth.
+    assert error[slow].mean() == pytest.approx(stated[slow].mean(), rel=0.6)
+    assert stated[frequency > 10.0].max() < 0.01 * NOISE**2

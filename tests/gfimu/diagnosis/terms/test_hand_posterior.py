@@ -22,6 +22,7 @@ from gfimu.diagnosis.terms.hand.learning import first_noise
 from gfimu.diagnosis.terms.hand.posterior import condition_hand
 from gfimu.diagnosis.terms.library import family_columns
 from gfimu.geometry.array import AccelerometerArray, Chip
+from gfimu.geometry.turning_axis import TurningAxis
 from gfimu.motion.body_drive import BodyDrive
 from gfimu.recording import Recording
 from sim.effects import make_effect
@@ -30,38 +31,46 @@ from sim.twin import Twin
 PLACES = {"a": [-0.05, 0.0, 0.01], "b": [0.06, 0.0, 0.0], "c": [0.0, 0.04, 0.0]}
 CHIPS = tuple(Chip(name, np.array(place), np.eye(3)) for name, place in PLACES.items())
 TWIN = Twin(array=AccelerometerArray("three", CHIPS), drive_source="gyro", array_name="three")
+PAIR = AccelerometerArray(
+    "two", tuple(Chip(n, np.array([x, 0.0, 0.0]), np.eye(3)) for n, x in (("a", -0.05), ("b", 0.07)))
+)
+PAIR = replace(PAIR, turning_axis=TurningAxis(np.array([0.0, 0.0, 1.0]), np.zeros(3)))
+WHEEL = Twin(array=PAIR, drive_source="gyro", array_name="two")
 POLICY = Policy().of_body()
 
 
-def stretch_of(*hidden, seed=1, duration=6.0):
+def stretch_of(*hidden, seed=1, duration=6.0, twin=TWIN, noise=0.002):
     """A body moved about by hand at random, never at rest."""
     rng = np.random.default_rng(seed)
     t = np.arange(0.0, duration, 0.01)
     omega, force = (size * gaussian_filter1d(rng.normal(size=(len(t), 3)), 25.0, axis=0) for size in (25.0, 30.0))
-    effects = [make_effect(name, parameters, TWIN.array) for name, parameters in hidden]
-    readings = TWIN.predict_body(BodyDrive(t, omega, force + np.array([0.0, 0.0, 9.8])), t, effects=effects)
-    readings = readings + rng.normal(size=readings.shape) * TWIN.expected_noise(100.0).white
-    gyro = {f"gyro_{axis}_rad_s": omega[:, k] + 0.002 * rng.normal(size=len(t)) for k, axis in enumerate("xyz")}
-    run = prepare_body_run(Recording.from_arrays(t, readings, TWIN.array, reference=gyro), TWIN)
-    return make_body_stretches(TWIN, [run], [[]])
+    effects = [make_effect(name, parameters, twin.array) for name, parameters in hidden]
+    readings = twin.predict_body(BodyDrive(t, omega, force + np.array([0.0, 0.0, 9.8])), t, effects=effects)
+    readings = readings + rng.normal(size=readings.shape) * twin.expected_noise(100.0).white
+    gyro = {f"gyro_{axis}_rad_s": omega[:, k] + noise * rng.normal(size=len(t)) for k, axis in enumerate("xyz")}
+    run = prepare_body_run(Recording.from_arrays(t, readings, twin.array, reference=gyro), twin)
+    return make_body_stretches(twin, [run], [[]])
 
 
-def test_blocks_give_what_a_dense_covariance_of_every_sample_gives():
-    (stretch,) = stretch_of(("bias", {"b2_m_s2": 0.3}))
+@pytest.mark.parametrize(("twin", "noise"), [(TWIN, 0.002), (WHEEL, 0.03)], ids=["any rotation", "about a known axis"])
+def test_blocks_give_what_a_dense_covariance_of_every_sample_gives(twin, noise):
+    (stretch,) = stretch_of(("bias", {"b2_m_s2": 0.3}), twin=twin, noise=noise)
     levels = replace(first_noise(stretch), agitation=1e-3, acceleration=1.5, acceleration_slope=0.02)
     at = condition_hand(stretch, HandDrive.of(stretch), [], levels)
-    families = [TWIN.families()[name] for name in ("bias", "sensor_position")]
+    families = [twin.families()[name] for name in ("bias", "sensor_position")]
     columns = Columns.together([family_columns(stretch, at.observed, at.drive, [], one, {}) for one in families])
     gram, score, _ = at.products(columns)
 
     # Rows whitened by the covariance of a sample: white noise, the lost angular acceleration, and a force of any size.
     on, (m, c) = stretch.on, stretch.mask[:, :-1].shape
     change = stretch.change_in_motion[stretch.starts]
-    arms, white = TWIN.array.regression_matrix[:, :3], levels.white[:-1]
+    arms, white = twin.array.regression_matrix[:, :3], levels.white[:-1]
     roots = []
     for row in range(m):
         noise = levels.common(change)[row] * np.diag(white**2) + levels.lost(change)[row] * arms @ arms.T
-        force = np.linalg.qr(TWIN.array.axes, mode="complete")[0][:, 3:].T  # combinations without the force
+        squared = stretch.rate_error[stretch.starts][row] * at.jacobian.squared_rate
+        noise += np.outer(squared, squared)
+        force = np.linalg.qr(twin.array.axes, mode="complete")[0][:, 3:].T  # combinations without the force
         roots.append(np.linalg.solve(np.linalg.cholesky(force @ noise @ force.T), force) * on[row])
 
     def rows(values):  # (m, c, k)
