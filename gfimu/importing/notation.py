@@ -25,8 +25,18 @@ RATE = {"rad/s": 1.0, "mrad/s": 1e-3, "deg/s": _DEGREE, "mdeg/s": 1e-3 * _DEGREE
 ANGLE = {"rad": 1.0, "mrad": 1e-3, "deg": _DEGREE, "rev": math.tau}
 TIME = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
 TEMPERATURE = {"degc": 1.0}
+LENGTH = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
+SPEED = {"m/s": 1.0, "mm/s": 1e-3, "mm/min": 1e-3 / 60.0}
 
-_KINDS = {"acceleration": ACCELERATION, "rate": RATE, "angle": ANGLE, "time": TIME, "temperature": TEMPERATURE}
+_KINDS = {
+    "acceleration": ACCELERATION,
+    "rate": RATE,
+    "angle": ANGLE,
+    "time": TIME,
+    "temperature": TEMPERATURE,
+    "length": LENGTH,
+    "speed": SPEED,
+}
 _SAME = {
     "m/s/s": "m/s2",
     "ms-2": "m/s2",
@@ -82,7 +92,7 @@ def factor_of(unit: str, kind: str, *, where: str = "") -> float:
     ----------
     unit : str
         As people write it: ``m/s^2``, ``m_s2``, ``°/s``, ``dps``, ``rad s^-1``.
-    kind : {"acceleration", "rate", "angle", "time", "temperature"}
+    kind : {"acceleration", "rate", "angle", "time", "temperature", "length", "speed"}
         What is measured.
     where : str
         What has that unit, for messages.
