@@ -173,6 +173,12 @@ class AccelerometerArray:
             ]
         )
 
+    def centripetal_about(self, direction: ArrayLike) -> NDArray[np.float64]:
+        """Return what the channels read per squared rate about a direction through the origin, shape (c,), m."""
+        unit = np.asarray(direction, dtype=float) / np.linalg.norm(direction)
+        inward = np.outer(self.positions @ unit, unit) - self.positions  # u × (u × r)
+        return np.asarray(np.sum(self.axes * inward, axis=1))
+
     def index(self, channel: str) -> int:
         """Column of a channel; raises `InputError` that lists the channels."""
         try:

@@ -15,7 +15,7 @@ from scipy.ndimage import label
 from gfimu.diagnosis.data.integrity import SIGNIFICANT_RMS
 from gfimu.diagnosis.data.run import REFERENCE_COLUMNS, Run
 from gfimu.errors import InputError
-from gfimu.units import STANDARD_GRAVITY
+from gfimu.units import REFERENCE_UNITS, STANDARD_GRAVITY
 from gfimu.world_model import WorldModel, is_linear, reads_place
 
 __all__ = ["NOISE", "REMOVED", "refuse_implausible"]
@@ -49,8 +49,6 @@ _ANGLES: Mapping[str, float] = {
     "is in turns": 0.5 / np.pi,
     "has the opposite sign": -1.0,
 }
-_PLACES: Mapping[str, float] = {"is in mm": 1e3, "is in cm": 1e2, "has the opposite sign": -1.0}
-_SPEEDS: Mapping[str, float] = {"is in mm/s": 1e3, "is in mm/min": 6e4, "has the opposite sign": -1.0}
 _TURNED: Mapping[str, tuple[float, float, float]] = {
     "upright": (0.0, 0.0, 0.0),
     "upside down": (np.pi, 0.0, 0.0),
@@ -89,8 +87,7 @@ def refuse_implausible(
         return
     column = REFERENCE_COLUMNS[model.drive_source]
     _refuse_unrelated(run, prediction, expected.white, column)
-    of_place, of_rate = (_PLACES, _SPEEDS) if is_linear(model) else (_ANGLES, _RATES)
-    scales = of_place if reads_place(model) else of_rate
+    scales = _scales(model)
     if misfit.whole < SIGNIFICANT_RMS**2:
         scales = {words: scale for words, scale in scales.items() if scale < 0.0}
     references = [
@@ -116,6 +113,15 @@ def refuse_implausible(
             found.append((left, option.text))
     if found:
         raise InputError(f"{run.name}: {min(found)[1]}")
+
+
+def _scales(model: WorldModel) -> Mapping[str, float]:
+    """Return what may be wrong with a reference as a whole, in words, and by what it is too large then."""
+    if not is_linear(model):
+        return _ANGLES if reads_place(model) else _RATES
+    units = REFERENCE_UNITS[model.drive_source]
+    words = {unit: unit.replace("_s2", "/s²").replace("_s", "/s") for unit, factor in units.items() if factor != 1.0}
+    return {**{f"is in {words[unit]}": 1.0 / units[unit] for unit in words}, "has the opposite sign": -1.0}
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,6 @@ from scipy.optimize import nnls
 from gfimu.diagnosis.data.cosine_basis import NoiseLevels
 from gfimu.diagnosis.policy import Policy
 from gfimu.geometry.array import AccelerometerArray
-from gfimu.geometry.kinematics import omega_products
 
 __all__ = ["LEAST_POWER", "BodyNoise", "Projection", "learn_motion_noise", "white_from_rows"]
 
@@ -111,7 +110,9 @@ class Projection:
         arms = array.regression_matrix[:, :3] * self.inverse[:, None]
         left, strength, turn = np.linalg.svd(free.T @ arms, full_matrices=True)
         self.rows = (free @ left).T * self.inverse  # (c − 3, c): residual (m/s²) to rows
-        self.squared_rate = _per_squared_rate(array)  # (c,): what channels read per rad²/s² of the squared rate, m
+        axis = array.turning_axis
+        # What the channels read per squared rate about the known axis, (c,), m; nothing without one.
+        self.squared_rate = np.zeros(array.n_channels) if axis is None else array.centripetal_about(axis.direction)
         felt = self.rows @ self.squared_rate
         felt[:3] *= strength <= LEAST_POWER * max(strength.max(), 1e-300)
         self.rate_strength = float(np.linalg.norm(felt))
@@ -123,14 +124,6 @@ class Projection:
         # Gains near −1 leave no specific force to be sensed.
         self.force_covariance = np.linalg.pinv(axes.T @ axes, hermitian=True)
         self.alive = np.flatnonzero(np.linalg.norm(self.rows, axis=1) > 0)
-
-
-def _per_squared_rate(array: AccelerometerArray) -> NDArray[np.float64]:
-    """Return what the channels read per squared rate about the array's known axis, shape (c,), m; zeros without."""
-    if array.turning_axis is None:
-        return np.zeros(array.n_channels)
-    direction = array.turning_axis.direction / np.linalg.norm(array.turning_axis.direction)
-    return np.asarray(array.centripetal_matrix @ omega_products(direction))
 
 
 def white_from_rows(
