@@ -23,7 +23,7 @@ from gfimu.diagnosis.terms.hand.learning import first_noise, learnt_noise
 from gfimu.diagnosis.terms.jacobian import Jacobian
 from gfimu.diagnosis.terms.slow_modes import WeighedModes, WeighedPowers
 from gfimu.diagnosis.terms.spline import PushedSpin
-from gfimu.world_model import WorldModel
+from gfimu.world_model import WorldModel, is_linear
 
 __all__ = [
     "FOLLOWED",
@@ -74,7 +74,8 @@ def _by_reference(stretch: Stretch, spacing: float) -> Drive:
     order = 0 if stretch.is_angle else 1
     reading = stretch.run.reference[seen]
     found = drive.by_reference(times[:, -1], reading, weights[seen], order, _REFERENCE_ROUNDS)
-    for _ in range(_HALVINGS):
+    # The command of a linear axis is its motion; what a table's reference does fast may be an error of the reference.
+    for _ in range(_HALVINGS if is_linear(stretch.model) else 0):
         missed = _missed_intervals(found, times[:, -1], reading, weights[seen], order)
         closer = found.cut(missed & (found.spline.widths > 2.0 * stretch.run.sample_period))
         if closer.spline == found.spline:
