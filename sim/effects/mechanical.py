@@ -174,6 +174,13 @@ class MountTurn(Effect):
         """Rotation vector of the array in the frame of the axis."""
         return tuple(Size(f"{axis}_rad", "rad", _DEGREE, bound=LARGEST_TURN) for axis in "xyz")
 
+    @classmethod
+    def patterns(cls, array: AccelerometerArray) -> tuple[Pattern, ...]:
+        """Return a turn about all axes, or about one of them, as of an array that lies flat but askew."""
+        unit = np.eye(3)
+        single = (Pattern(f"about {axis}", unit[:, [place]]) for place, axis in enumerate("xyz"))
+        return (Pattern("", unit), *single)
+
     def apply(self, world: World) -> World:
         """Turn the array on its carriage."""
         turn = Rotation.from_rotvec(self.vector([f"{axis}_rad" for axis in "xyz"]))

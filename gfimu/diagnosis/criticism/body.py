@@ -67,7 +67,7 @@ def tone(at: HandPosterior, policy: Policy) -> LackOfFit:
     A line stands out of its neighbourhood and of what the noise of the gyro, smoothed, makes of the readings.
     """
     stretch = at.stretch
-    spread = np.asarray(np.sqrt(at.levels.common(stretch.change_in_motion)), dtype=np.float64)
+    spread = np.sqrt(at.levels.common(stretch.change_in_motion))
     left = np.where(stretch.use[:, None], at.without_errors / spread[:, None], 0.0)[:, stretch.alive]
     channels = [name for name, alive in zip(stretch.model.array.channels, stretch.alive, strict=True) if alive]
     found = LackOfFit(-np.inf, "", {})
@@ -81,7 +81,9 @@ def tone(at: HandPosterior, policy: Policy) -> LackOfFit:
         level = np.maximum(np.median(power, axis=1, keepdims=True) / np.log(2.0), 1e-12)
         # A line stands out of its neighbourhood; a motion that is not fully followed raises whole bands.
         around = median_filter(power, size=(1, _NEIGHBOURS, 1), mode="nearest") / np.log(2.0)
-        by_gyro = _gyro_power(at, spread, frequency[high], length)[:count, :, stretch.alive]
+        by_gyro = _gyro_power(at, spread, np.asarray(frequency[high], dtype=np.float64), length)[
+            :count, :, stretch.alive
+        ]
         ratio = power / (np.maximum(level, around) + by_gyro)
         odds = ratio - np.log(ratio.size)
         window, place, channel = np.unravel_index(int(np.argmax(odds)), odds.shape)
