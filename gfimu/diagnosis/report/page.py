@@ -107,6 +107,7 @@ def _content(diagnosis: Diagnosis, rig: DrawnRig) -> Mapping[str, Any]:
         "steps": next_steps(diagnosis),
         "noise": diagnosis.noise,
         "noise_texts": noise_texts(diagnosis.noise),
+        "linear": any(run.linear for run in seen),
         "runs": [
             {
                 "name": run.name,

@@ -45,7 +45,7 @@ def test_nothing_is_found_on_a_wheel_whose_hub_shakes(noise):
 
 
 def test_a_bias_is_found_beside_a_noisy_tachometer():
-    changes = ["reference.tacho_noise_std_rad_s=0.03"]
+    changes = ["reference.tacho_noise_std_rad_s=0.03", "duration_s=24"]
     verdict = found("wheel", "wheel_pair", "bias", {"a12_m_s2": 0.05}, changes)
     (cause,) = verdict.causes
     assert cause.effect == "bias"

@@ -208,19 +208,21 @@ def fingerprint(
     after: NDArray[np.float64],
 ) -> Fingerprint:
     """Return the strength of each basic term in each channel before and after."""
-    terms: dict[str, NDArray[np.float64]] = {
-        "constant": np.ones_like(run.t),
-        "t": run.t - run.t.mean(),
-        "ω": run.rate,
-        "ω²": run.rate**2,
-        "ω⁴": run.rate**4,
-        "α": run.acceleration,
-        "ωα": run.rate * run.acceleration,
-        "cos θ": np.cos(run.angle),
-        "sin θ": np.sin(run.angle),
-        "cos 2θ": np.cos(2 * run.angle),
-        "sin 2θ": np.sin(2 * run.angle),
-    }
+    terms: dict[str, NDArray[np.float64]] = {"constant": np.ones_like(run.t), "t": run.t - run.t.mean()}
+    if run.linear:
+        terms |= {"v": run.rate, "v²": run.rate**2, "a": run.acceleration, "a²": run.acceleration**2, "x": run.angle}
+    else:
+        terms |= {
+            "ω": run.rate,
+            "ω²": run.rate**2,
+            "ω⁴": run.rate**4,
+            "α": run.acceleration,
+            "ωα": run.rate * run.acceleration,
+            "cos θ": np.cos(run.angle),
+            "sin θ": np.sin(run.angle),
+            "cos 2θ": np.cos(2 * run.angle),
+            "sin 2θ": np.sin(2 * run.angle),
+        }
     if run.temperature is not None and np.ptp(run.temperature) > 0:
         terms["T"] = run.temperature - run.temperature.mean()
     design = np.nan_to_num(np.column_stack(list(terms.values())))  # (n, k); a free body has no angle

@@ -228,3 +228,11 @@ def test_several_causes_are_counted_and_named():
     assert headline(both).startswith("Found two things that the simulation leaves out: ")
     assert "these put into the simulation" in story(both)
     assert any("sensor_position could imitate" in step for step in next_steps(both))
+
+
+def test_the_page_of_a_linear_axis_has_speeds_in_metres():
+    diagnosis = made_diagnosis("nothing_found")
+    linear = replace(diagnosis, runs=tuple(replace(run, linear=True) for run in diagnosis.runs))
+    words = words_of(report_html(linear))
+    assert "rad/s" not in words
+    assert "v the speed, a the acceleration" in words
