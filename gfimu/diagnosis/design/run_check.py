@@ -212,8 +212,11 @@ def _advice(facts: Sequence[dict[str, Any]], effects: Sequence[EffectView], usef
         advice.append(f"record longer: {useful.duration:.0f} s at least, a minute is better")
     ways = {way: any(one[f"share_{way}"] > useful.share for one in facts) for way in ("forwards", "backwards")}
     if not all(ways.values()):
-        missing = next(way for way, there in ways.items() if not there)
-        advice.append(f"move {missing} as well: what goes with the rate and with its size can't be separated otherwise")
+        missing = next(one for one, there in ways.items() if not there)
+        way = "turn" if "turns" in facts[0] else "move"
+        advice.append(
+            f"{way} {missing} as well: what goes with the rate and with its size can't be separated otherwise"
+        )
     if max(one.get("turns", useful.turns) for one in facts) < useful.turns:
         advice.append("make several whole turns one way: an axis out of level and ripples show once per turn")
     if not any(one["share_at_rest"] > useful.share for one in facts):
