@@ -54,7 +54,7 @@ def test_a_sound_run_is_not_refused(stretch, predict):
         (lambda run: replace(run, reference=-run.reference), "column tacho_rad_s has the opposite sign"),
         (lambda run: replace(run, reference=run.reference * 30.0 / np.pi), "column tacho_rad_s is in rev/min"),
         (lambda run: replace(run, reference=run.reference * 180.0 / np.pi), "column tacho_rad_s is in deg/s"),
-        (lambda run: replace(run, mounting=np.array([np.pi, 0.0, 0.0])), r"a cube upright, .*: \[0\.0000, 0\.0000"),
+        (lambda run: replace(run, mounting=np.array([np.pi, 0.0, 0.0])), r"an array upright, .*: \[0\.0000, 0\.0000"),
         (lambda run: replace(run, readings=np.full_like(run.readings, 3.0)), "the channels hold one value"),
         (
             lambda run: replace(run, readings=np.random.default_rng(1).standard_normal(run.readings.shape)),
