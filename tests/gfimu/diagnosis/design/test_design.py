@@ -102,7 +102,7 @@ def test_what_no_upright_run_separates_asks_for_another_mounting(off_axis):
     assert off_axis.separates
     assert off_axis.upright_too
     assert np.linalg.norm(off_axis.mounting) > 1.5
-    assert "No motion of an upright cube separates eccentricity from sensor_position" in off_axis.text
+    assert "No motion of an upright array separates eccentricity from sensor_position" in off_axis.text
     assert "upright and so mounted" in off_axis.text
 
 
