@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from gfimu.diagnosis.criticism.drive_noise import apart_from_noise
 from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.fit.evidence import SCALES, inverse
 from gfimu.diagnosis.fit.linear import Point, linearise
@@ -76,7 +77,7 @@ def functions_at(stretch: Stretch, state: SpinState, units: BasisUnits) -> Motio
 
 
 def series_products(
-    stretches: Sequence[Stretch], point: Point, values_of: ValuesOf
+    stretches: Sequence[Stretch], point: Point, values_of: ValuesOf, expected_of: ValuesOf | None = None
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return G and b of k functions on each channel and the reference; drives, slow noise and causes projected out.
 
@@ -88,6 +89,9 @@ def series_products(
         A fit.
     values_of : callable
         From a stretch and its posterior to the functions (n, k), or to those of each series (c + 1, n, k).
+    expected_of : callable, optional
+        From a stretch and its posterior to the scores (c + 1, k) that the noise of the drive makes
+        (`gfimu.diagnosis.criticism.drive_noise`); they are taken off.
 
     Returns
     -------
@@ -104,6 +108,9 @@ def series_products(
     linear = linearise(stretches, point, columns, responses=False)
     named = sum(cause.unknowns for cause in point.causes)
     gram, score = linear.gram, linear.score
+    if expected_of is not None:
+        expected = sum(expected_of(one, at) for one, at in zip(stretches, linear.posteriors, strict=True))
+        score[named:] = apart_from_noise(score[named:], np.ravel(expected))
     if not named:
         return gram, score
     # The causes are free: they have the widest prior that a fit gives them.

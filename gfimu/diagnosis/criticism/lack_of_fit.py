@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.diagnosis.criticism.body import body_functions, motion_noise, tone
+from gfimu.diagnosis.criticism.drive_noise import expected_score
 from gfimu.diagnosis.criticism.generic import (
     LEAST_INFORMATION,
     REFERENCE,
@@ -29,6 +30,7 @@ from gfimu.diagnosis.criticism.reading_curve import reading_curve
 from gfimu.diagnosis.criticism.series_tests import LackOfFit, changing_noise, jumps, lines
 from gfimu.diagnosis.data.body.stretch import BodyStretch
 from gfimu.diagnosis.data.stretch import Stretch
+from gfimu.diagnosis.data.table.spins import State
 from gfimu.diagnosis.fit.evidence import log_evidence, log_evidence_each
 from gfimu.diagnosis.fit.gauss_newton import Fit
 from gfimu.diagnosis.fit.linear import Point, linearise
@@ -39,7 +41,7 @@ from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.terms.cause import effects_of
 from gfimu.diagnosis.terms.drive import Drive
 from gfimu.generic_basis import FUNCTIONS
-from gfimu.world_model import BasisUnits, memory_of
+from gfimu.world_model import BasisUnits, SpinState, memory_of
 
 __all__ = ["JERK", "LackOfFit", "dependence_unexplained", "lack_of_fit"]
 
@@ -197,14 +199,33 @@ def _products(
     def values_of(stretch: Stretch, at: Posterior) -> NDArray[np.float64]:
         return np.asarray((functions(stretch, at.drive) - mean) * scale)
 
-    return names, *series_products(stretches, point, values_of)
+    if isinstance(stretches[0], BodyStretch):
+        return names, *series_products(stretches, point, values_of)
+
+    def expected_of(stretch: Stretch, at: Posterior) -> NDArray[np.float64]:
+        gain = stretch.gain(effects_of(point.causes, stretch.model.array, stretch.index))
+
+        def of_drive(spin: SpinState, jerk: NDArray[np.float64]) -> NDArray[np.float64]:
+            return _values(
+                stretch, State(*(one / gain for one in (spin.angle, spin.rate, spin.acceleration))), jerk / gain, units
+            )
+
+        return scale * expected_score(stretch, at, of_drive)
+
+    return names, *series_products(stretches, point, values_of, expected_of)
 
 
 def _functions(stretch: Stretch, point: Point, drive: Drive, units: BasisUnits) -> NDArray[np.float64]:
     """Return the functions at the samples of a stretch, shape (n, k)."""
-    motion = functions_at(stretch, motion_of(stretch, point, drive), units)
+    spin = motion_of(stretch, point, drive)
+    return _values(stretch, spin, np.gradient(spin.acceleration, stretch.run.sample_period), units)
+
+
+def _values(stretch: Stretch, spin: SpinState, jerk: NDArray[np.float64], units: BasisUnits) -> NDArray[np.float64]:
+    """Return the functions (n, k) of a spin and its jerk (n,), rad/s³."""
+    motion = functions_at(stretch, spin, units)
     columns = [function(motion) for function in FUNCTIONS.values()]
-    return np.column_stack([*columns, np.gradient(motion.acceleration)])
+    return np.column_stack([*columns, jerk * (stretch.run.sample_period / units.acceleration)])
 
 
 def _has_memory(stretches: Sequence[Stretch], point: Point) -> bool:

@@ -178,9 +178,13 @@ class Stretch:
         The drive is held in units of the reference: where effects change the reference's gain, the motion is the drive
         over that gain. In true units a gain would shrink the drive and its prior energy with it.
         """
-        gain = self.model.reference_gain(effects)
-        gain = float(np.copysign(max(abs(gain), _LEAST_GAIN), gain))
+        gain = self.gain(effects)
         return drive if gain == 1.0 else ScaledSpin(drive, gain)
+
+    def gain(self, effects: Sequence[Effect]) -> float:
+        """Return what the reference reads of the motion under effects, kept away from zero."""
+        gain = self.model.reference_gain(effects)
+        return float(np.copysign(max(abs(gain), _LEAST_GAIN), gain))
 
     def times(self, effects: Sequence[Effect] = ()) -> NDArray[np.float64]:
         """Return all true times that readings belong to, s."""

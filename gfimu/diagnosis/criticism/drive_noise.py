@@ -1,0 +1,104 @@
+"""The score that functions of an estimated drive have by its noise alone.
+
+A function φ of the drive x is tested on a series whose residual r = y − f(x) comes from the same estimate: what the
+estimate takes of the noise is in both. By Fisher's identity the derivative of the log marginal likelihood by the
+coefficient of φ is the mean of the complete-data score over the posterior of the drive,
+
+    E[(y − f(x))ᵀ W φ(x)] = (y − f(m))ᵀ W φ(m) − tr(W J C φ'ᵀ),
+
+with m and C its mean and covariance, J the derivative of f and φ' that of φ. So the score at the mean has the
+expectation tr(W J C φ'ᵀ) where the prior of the drive is right. Where the prior is wider than the truth (a table that
+turns steadily, below the least roughness) the residual takes less and the expectation lies between that and zero.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gfimu.diagnosis.data.stretch import Stretch
+from gfimu.diagnosis.data.table.spins import State
+from gfimu.diagnosis.fit.posterior import Posterior
+from gfimu.diagnosis.terms.spline import DEGREE
+from gfimu.world_model import SpinState
+
+__all__ = ["apart_from_noise", "drive_covariance", "expected_score"]
+
+_ORDERS = 4  # numerical: angle, rate, acceleration and jerk
+ValuesOf = Callable[[SpinState, NDArray[np.float64]], NDArray[np.float64]]
+
+
+def expected_score(stretch: Stretch, at: Posterior, values_of: ValuesOf) -> NDArray[np.float64]:
+    """Return the expectation of the score of functions of the drive on each series, by the noise of the drive.
+
+    Slow noise is taken as white here, which makes the figure a little larger.
+
+    Parameters
+    ----------
+    stretch : Stretch
+        The data.
+    at : Posterior
+        Its drive.
+    values_of : callable
+        From a spin and its jerk (n,), rad/s³, to the functions (n, k).
+
+    Returns
+    -------
+    ndarray, shape (c + 1, k)
+        tr(W J C φ'ᵀ) of every series and function.
+    """
+    spin, t = at.drive.spin.at(stretch.run.t), stretch.run.t
+    state = (spin.angle, spin.rate, spin.acceleration, np.gradient(spin.acceleration, stretch.run.sample_period))
+    shared, std = drive_covariance(at, t)  # (4, n, c + 1), (4, n)
+    out = np.zeros((shared.shape[2], values_of(spin, state[3]).shape[1]))
+    for order in range(_ORDERS):
+        size = np.maximum(std[order], 1e-12 * (1.0 + np.abs(state[order])))
+        ends = []
+        for sign in (1.0, -1.0):
+            moved = [one + sign * size if place == order else one for place, one in enumerate(state)]
+            ends.append(values_of(State(*moved[:3]), moved[3]))
+        # The slope over ± one standard deviation: the expected one, also at the kink of |ω|.
+        slope = (ends[0] - ends[1]) / (2.0 * size[:, None])  # (n, k)
+        out += np.einsum("nc,nk->ck", shared[order] * at.observed.weights, slope)
+    return out
+
+
+def drive_covariance(at: Posterior, t: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the posterior covariance of the drive with the predicted observations, and its standard deviation.
+
+    Parameters
+    ----------
+    at : Posterior
+        A drive.
+    t : ndarray, shape (n,)
+        Times of its samples, s.
+
+    Returns
+    -------
+    shared : ndarray, shape (4, n, c + 1)
+        Covariance of angle, rate, acceleration and jerk with each weighed observation of the same sample.
+    std : ndarray, shape (4, n)
+        Standard deviation of each, rad, rad/s, rad/s², rad/s³.
+    """
+    jacobian, covariance = at.jacobian, at.covariance
+    shared = np.zeros((_ORDERS, len(t), jacobian.loading.shape[1]))
+    std = np.zeros((_ORDERS, len(t)))
+    each = [at.drive.spline.rows(t, order) for order in range(_ORDERS)]
+    for rows, columns, block in jacobian.blocks:
+        moved = np.tensordot(block, covariance[columns], axes=1)  # (R, rows, m)
+        for order, (first, values) in enumerate(each):
+            places = first[rows, None] + np.arange(DEGREE + 1)
+            mine = np.take_along_axis(moved, places[None], axis=2)  # (R, rows, 5)
+            shared[order, rows] = np.einsum("rnf,nf->nr", mine, values[rows]) @ jacobian.loading
+    for order, (first, values) in enumerate(each):
+        places = first[:, None] + np.arange(DEGREE + 1)
+        own = covariance[places[:, :, None], places[:, None, :]]
+        std[order] = np.sqrt(np.maximum(np.einsum("nf,nfg,ng->n", values, own, values), 0.0))
+    return shared, std
+
+
+def apart_from_noise(score: NDArray[np.float64], expected: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return scores (p,) less what the noise of the drive may make of them: between nothing and the expected (p,)."""
+    return np.asarray(score - np.clip(score, np.minimum(expected, 0.0), np.maximum(expected, 0.0)))
