@@ -7,10 +7,12 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 
 from gfimu.errors import InputError
-from gfimu.joining.alignment import Alignment, Signals, align, uniform
+from gfimu.joining.alignment import align
 from gfimu.joining.reference_file import ReferenceSeries
+from gfimu.joining.signals import Alignment, Signals, functions_of, uniform
 from gfimu.recording import Recording
 
 __all__ = ["Joined", "join_reference"]
@@ -91,15 +93,15 @@ def join_reference(
     InputError
         If the reference does not change, the files are too short, or they don't belong together.
     """
-    signals = _signals(recording, reference)
+    signals, rate, width = _signals(recording, reference)
     found = align(signals, most_rate_error=most_rate_error)
     if found is None:
         raise InputError(
             f"{reference.source}: the reference does not change; a time can't be found from a constant rate"
         )
     over_second = float("inf") if np.isnan(found.second_offset) else found.odds_over(found.second_explained)
-    over_foreign = min(found.odds_over(one) for one in _foreign(signals))
-    levers, differ = _levers(recording, found) if signals.rate.shape[1] == 1 else ({}, [])
+    over_foreign = min(found.odds_over(one) for one in _foreign(signals, rate, width))
+    levers, differ = _levers(recording, found) if rate.shape[1] == 1 else ({}, [])
     doubts = []
     if over_foreign < _ODDS:
         doubts.append("a reversed or shuffled reference fits nearly as well")
@@ -121,43 +123,50 @@ def join_reference(
     return Joined(joined, found, over_second, over_foreign, tuple(doubts), levers)
 
 
-def _signals(recording: Recording, reference: ReferenceSeries) -> Signals:
-    """Return channels and reference on uniform grids of one step."""
+def _signals(recording: Recording, reference: ReferenceSeries) -> tuple[Signals, NDArray[np.float64], int]:
+    """Return channels and functions of the reference on uniform grids of one step; its rate; the smoothing window."""
     t_reference, rate = reference.rate()
     if len(recording) < 16:
         raise InputError("a recording of fewer than sixteen samples can't be aligned; record longer")
     longest = max(recording.duration, float(t_reference[-1] - t_reference[0]))
+    period = float(np.median(np.diff(t_reference)))
     step = max(_FINEST, recording.sample_period, longest / _MOST_ROWS)
-    coarse = max(step, float(np.median(np.diff(t_reference))) / 4.0)  # a slow reference has no finer detail
+    coarse = max(step, period / 4.0)  # a slow reference has no finer detail
     step = min(max(step, 0.25 * coarse), coarse)
-    readings = uniform(recording.t_s, recording.readings, step)
-    return Signals(step, float(recording.t_s[0]), float(t_reference[0]), readings, _smooth(t_reference, rate, step))
+    width = round(max(3.0 * period, 0.05) / step) | 1  # three samples of the reference, or a twentieth of a second
+    readings = _smooth(uniform(recording.t_s, recording.readings, step), width)
+    rate = _on_grid(t_reference, rate, step) if period > step else uniform(t_reference, rate, step)
+    functions = _smooth(functions_of(rate, step), width)
+    return Signals(step, float(recording.t_s[0]), float(t_reference[0]), readings, functions), rate, width
 
 
-def _smooth(t: NDArray[Any], rate: NDArray[Any], step: float) -> NDArray[np.float64]:
-    """Return a rate on a uniform grid, smoothed over three of its own samples or a twentieth of a second."""
-    grid = uniform(t, rate, step)
-    width = round(max(3.0 * float(np.median(np.diff(t))), 0.05) / step) | 1
+def _on_grid(t: NDArray[np.float64], rate: NDArray[np.float64], step: float) -> NDArray[np.float64]:
+    """Return a rate that comes less often than every step on a uniform grid, by a cubic spline through its samples."""
+    grid = t[0] + step * np.arange(int((t[-1] - t[0]) / step) + 1)
+    return np.asarray(CubicSpline(t, rate)(grid))
+
+
+def _smooth(values: NDArray[np.float64], width: int) -> NDArray[np.float64]:
+    """Return series (n, k) smoothed by a Hann window of some samples, an odd number."""
     window = np.hanning(width + 2)[1:-1]
     window = np.asarray(window / window.sum())
     half = width // 2
-    padded = np.pad(grid, ((half, half), (0, 0)), mode="edge")
+    padded = np.pad(values, ((half, half), (0, 0)), mode="edge")
     return np.column_stack([np.convolve(one, window, mode="valid") for one in padded.T])
 
 
-def _foreign(signals: Signals) -> list[NDArray[np.float64]]:
+def _foreign(signals: Signals, rate: NDArray[np.float64], width: int) -> list[NDArray[np.float64]]:
     """Return what references explain that can't belong to the channels: reversed, and shuffled in pieces."""
     rng = np.random.default_rng(0)
-    pieces = np.array_split(signals.rate, max(len(signals.rate) // max(int(2.0 / signals.step), 1), 4))
-    others: list[NDArray[np.float64]] = [signals.rate[::-1]]
+    pieces = np.array_split(rate, max(len(rate) // max(int(2.0 / signals.step), 1), 4))
+    others: list[NDArray[np.float64]] = [rate[::-1]]
     for _ in range(_FOREIGN):
         order = rng.permutation(len(pieces))
         others.append(np.asarray(np.concatenate([pieces[place][:: rng.choice([1, -1])] for place in order])))
     found = []
-    for rate in others:
-        times = np.arange(len(rate)) * signals.step
-        smooth = _smooth(times, np.asarray(rate), signals.step)
-        one = align(replace(signals, rate=smooth), most_rate_error=0.0, refine=False)
+    for other in others:
+        functions = _smooth(functions_of(_smooth(np.asarray(other), width), signals.step), width)
+        one = align(replace(signals, functions=functions), most_rate_error=0.0, refine=False)
         found.append(np.zeros(signals.readings.shape[1]) if one is None else one.explained)
     return found
 

@@ -7,7 +7,7 @@ import gfimu
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.joining import ReferenceSeries, join_reference, open_reference
-from gfimu.joining.alignment import functions_of
+from gfimu.joining.signals import functions_of
 from gfimu.recording import Recording
 from sim.campaign import Measurement, measure
 from sim.twin import Twin
