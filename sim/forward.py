@@ -271,7 +271,7 @@ def channels(
     for step in (*world.motion_steps, *world.mount_steps):
         motion = step(motion, t)
     geometry = table_geometry(world) if geometry is None else geometry
-    true_times = t / (1.0 + world.clock_ratio)
+    true_times = world.true_times(t)
     spin = motion.at(true_times)
     if world.chip_delay is None:
         readings = _mechanical(world, motion, true_times, geometry)

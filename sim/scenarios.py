@@ -303,7 +303,7 @@ def _references(
             table.at(t - world.tacho_delay).angle + world.angle_zero, quality.encoder_resolution
         )
     if isinstance(command, Wheel):
-        late_spin = command.spin.at(t / (1.0 + world.clock_ratio) - world.tacho_delay)
+        late_spin = command.spin.at(t - world.tacho_delay)  # a tachometer has the reference's clock, as a table's
         noise = rng.normal(size=len(t)) * quality.tacho_noise_std
         columns["tacho_rad_s"] = _stepped(late_spin.rate + noise, quality.tacho_resolution)
     if quality.gyro_noise_std is not None:

@@ -185,7 +185,7 @@ class World:
     chip_delay : ndarray, shape (k,)
         How late each chip is sampled after the time stamp, s.
     clock_ratio : float
-        The board's clock shows (1 + ratio) of the reference's time.
+        The board's clock shows (1 + ratio) of the reference's time since ``start``.
     tacho_delay : float
         How late the reference is, s.
     gyro_matrix : ndarray, shape (3, 3)
@@ -203,7 +203,7 @@ class World:
     temperature : float
         Board temperature where none is recorded, °C.
     start : float, optional
-        Board time at which the recording began (power-on), s; by default the first time asked for.
+        Board time at which the recording began (power-on), s; by default the first time asked for, of clocks zero.
     """
 
     array: AccelerometerArray
@@ -234,9 +234,14 @@ class World:
 
     __repr__ = short_repr
 
+    def true_times(self, t: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the true (reference) times of board times ``t``, s; both clocks agree when the recording begins."""
+        start = 0.0 if self.start is None else self.start
+        return start + (t - start) / (1.0 + self.clock_ratio)
+
     def chip_times(self, t: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the true (reference) times at which each chip is sampled, shape (n, k), for board times ``t``, s."""
-        true = t / (1.0 + self.clock_ratio)
+        true = self.true_times(t)
         delay = np.zeros(len(self.array.chips)) if self.chip_delay is None else self.chip_delay
         return true[:, None] + delay
 

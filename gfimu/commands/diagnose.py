@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from gfimu.calibration.result import Calibration
     from gfimu.diagnosis.verdict.verdict import Diagnosis
     from gfimu.importing import ColumnMap
+    from gfimu.joining import Joined
     from gfimu.recording import Recording
     from gfimu.recording.mapped import MappedFile
     from gfimu.world_model import WorldModel
@@ -84,7 +85,7 @@ def diagnose(
         If a recording is too short or lacks the reference that drives the twin, or the folder can't be written.
     """
     from gfimu.commands.opened import as_calibration, as_runs, as_twin, by_map
-    from gfimu.diagnosis.diagnose import diagnose as explain
+    from gfimu.joining import displaced_reference
 
     runs, unseen = ([by_map(run, column_map, map_set) for run in as_runs(group)] for group in (recordings, held_out))
     model = as_twin(twin)
@@ -94,20 +95,55 @@ def diagnose(
     if unit is not None and unit.positions:
         model = model.with_array(unit.calibrated_array(model.array))
     labels = _names(runs) if names is None else names
+    free = model.drive_source == "gyro"
+    clocks = [displaced_reference(one, rates=free) if not free or _by_tacho(one) else None for one in read]
     if reference is not None:
         from gfimu.commands.join import join
 
-        first, *others = read
-        read = [
-            join(first, reference, reference_map=reference_map, reference_map_set=reference_map_set).recording,
-            *others,
-        ]
-    found = explain(read, model, held_out=kept, names=labels, report=report)
+        clocks[0] = join(read[0], reference, reference_map=reference_map, reference_map_set=reference_map_set)
+    found, used = _explained(read, clocks, model, reference is not None, kept, labels, report)
     if out is not None:
         if report is not None:
             report(0.99, "write the report")
-        write_result(out, found, read[0])
+        write_result(out, found, used)
     return found
+
+
+def _explained(
+    read: Sequence[Recording],
+    clocks: Sequence[Joined | None],
+    model: WorldModel,
+    two_files: bool,
+    kept: Sequence[Recording],
+    labels: Sequence[str],
+    report: Callable[[float, str], None] | None,
+) -> tuple[Diagnosis, Recording]:
+    """Return the diagnosis of recordings whose references are aligned where they had another clock, and the first run.
+
+    The rate error of a clock is left in, so that it is diagnosed beside all else. Where the alignment shows one and the
+    diagnosis doesn't name it, or the model is of a free body, which has no such effect, it is taken off.
+    """
+    from gfimu.diagnosis.diagnose import diagnose as explain
+    from gfimu.diagnosis.verdict.sample_notes import with_reference_clock
+
+    def runs(own_rate: bool) -> list[Recording]:
+        return [
+            run if one is None else (one.by_own_rate if own_rate else one.recording)
+            for run, one in zip(read, clocks, strict=True)
+        ]
+
+    first = next((one for one in clocks if one is not None), None)
+    used = runs(model.drive_source != "gyro")
+    found = explain(used, model, held_out=kept, names=labels, report=report)
+    if first is None:
+        return found, used[0]
+    corrected = ["tacho_latency"] if first.is_far and not two_files else []
+    if first.has_rate_error and "clock_error" not in {cause.effect for cause in found.causes}:
+        corrected.append("clock_error")
+        if model.drive_source != "gyro":
+            used = runs(False)
+            found = explain(used, model, held_out=kept, names=labels, report=report)
+    return with_reference_clock(found, first.clock, corrected), used[0]
 
 
 def write_result(out: str | Path, found: Diagnosis, recording: Recording) -> dict[str, Path]:
@@ -142,6 +178,11 @@ def write_result(out: str | Path, found: Diagnosis, recording: Recording) -> dic
             world.slide,
         ),
     )
+
+
+def _by_tacho(recording: Recording) -> bool:
+    """Return whether a free body's rate is that of a tachometer along its axle, and not of a gyro on the body."""
+    return "tacho_rad_s" in recording.reference and "gyro_x_rad_s" not in recording.reference
 
 
 def _opened(recording: Recording | str | Path | MappedFile, model: WorldModel, unit: Calibration | None) -> Recording:

@@ -15,7 +15,7 @@ from gfimu.joining.reference_file import ReferenceSeries
 from gfimu.joining.signals import Alignment, Signals, functions_of, uniform
 from gfimu.recording import Recording
 
-__all__ = ["Joined", "join_reference"]
+__all__ = ["FAR", "Joined", "grids", "join_reference"]
 
 _MOST_ROWS = 20_000  # of the grid on which offsets are searched
 _FINEST = 0.005  # s, step of that grid
@@ -24,6 +24,11 @@ _LEVERS = 5.0  # standard deviations between the levers by ω² and by α
 _LEVER_SHARE = 0.15  # of a lever: gains, axes and a tilt of the table make it differ by so much
 _LOST = 0.2  # of the variance, on a quarter that the fit did not see
 _FOREIGN = 6  # references of shuffled pieces
+_RATE_STDS = 5.0  # standard deviations from which a rate error is no chance: the stated ones may be low by a factor
+
+
+FAR = 0.3
+"""Offset beyond which a reference is moved before a diagnosis, s: `tacho_latency` is searched up to there."""
 
 
 @dataclass(frozen=True)
@@ -45,6 +50,9 @@ class Joined:
         Why the two may not belong together; empty if they do.
     levers_m : dict of str to (float, float)
         Distance of each tri-axial chip from the axis by ω² and by α, m, for a table's reference.
+    by_own_rate : Recording
+        The same with the rate error left in: both clocks agree at the first sample of the channels, and the reference's
+        runs at its own rate from there. A diagnosis finds `clock_error` in it.
     """
 
     recording: Recording
@@ -53,6 +61,37 @@ class Joined:
     odds_over_foreign: float
     doubts: tuple[str, ...]
     levers_m: dict[str, tuple[float, float]]
+    by_own_rate: Recording
+
+    @property
+    def offset_at_start(self) -> tuple[float, float]:
+        """Time of the channels' clock less the reference's at the first sample of the channels, s, and its std."""
+        found, t = self.alignment, self.recording.t_s
+        start = float(t[0])
+        late = start - (start - found.offset) / (1.0 + found.rate_error)
+        return late, float(np.hypot(found.offset_std, found.rate_error_std * 0.5 * found.overlap_s))
+
+    @property
+    def is_far(self) -> bool:
+        """Whether the clocks are further apart at the first sample than a late reference is."""
+        return abs(self.offset_at_start[0]) > FAR
+
+    @property
+    def has_rate_error(self) -> bool:
+        """Whether the clocks run at different rates by more than chance."""
+        return abs(self.alignment.rate_error) > _RATE_STDS * self.alignment.rate_error_std
+
+    @property
+    def clock(self) -> dict[str, float]:
+        """Offset at the first sample and rate error with their standard deviations, as a diagnosis reports them."""
+        late, std = self.offset_at_start
+        found = self.alignment
+        return {
+            "offset_s": late,
+            "offset_std_s": std,
+            "rate_error": found.rate_error,
+            "rate_error_std": found.rate_error_std,
+        }
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures as JSON holds them."""
@@ -63,7 +102,7 @@ class Joined:
             "rate_error": found.rate_error,
             "rate_error_std": found.rate_error_std,
             "overlap_s": found.overlap_s,
-            "explained": dict(zip(self.recording.channels, found.explained.tolist(), strict=True)),
+            "explained": dict(zip(self.recording.channels, found.explained.tolist(), strict=False)),
             "second_offset_s": found.second_offset,
             "log_odds_over_second": self.odds_over_second,
             "log_odds_over_foreign": self.odds_over_foreign,
@@ -73,7 +112,12 @@ class Joined:
 
 
 def join_reference(
-    recording: Recording, reference: ReferenceSeries, *, most_rate_error: float = 0.02, force: bool = False
+    recording: Recording,
+    reference: ReferenceSeries,
+    *,
+    most_rate_error: float = 0.02,
+    force: bool = False,
+    seen: Recording | None = None,
 ) -> Joined:
     """Align a reference with channels of another clock and put both into one recording.
 
@@ -87,13 +131,15 @@ def join_reference(
         Largest rate error between the clocks that is searched.
     force : bool
         Join nevertheless where the two don't seem to belong together.
+    seen : Recording, optional
+        Series that are aligned in place of the channels, such as combinations of them.
 
     Raises
     ------
     InputError
         If the reference does not change, the files are too short, or they don't belong together.
     """
-    signals, rate, width = _signals(recording, reference)
+    signals, rate, width = grids(recording if seen is None else seen, reference)
     found = align(signals, most_rate_error=most_rate_error)
     if found is None:
         raise InputError(
@@ -101,7 +147,7 @@ def join_reference(
         )
     over_second = float("inf") if np.isnan(found.second_offset) else found.odds_over(found.second_explained)
     over_foreign = min(found.odds_over(one) for one in _foreign(signals, rate, width))
-    levers, differ = _levers(recording, found) if rate.shape[1] == 1 else ({}, [])
+    levers, differ = _levers(recording, found) if rate.shape[1] == 1 and seen is None else ({}, [])
     doubts = []
     if over_foreign < _ODDS:
         doubts.append("a reversed or shuffled reference fits nearly as well")
@@ -114,16 +160,19 @@ def join_reference(
             f"{100 * max(found.predicted, 0.0):.0f}% of a quarter that the fit did not see"
         )
     doubts += differ
-    joined = _joined(recording, reference, found)
+    theirs = found.offset + (1.0 + found.rate_error) * reference.t_s
+    joined = _joined(recording, reference, found, theirs)
+    start = float(recording.t_s[0])
+    own = _joined(recording, reference, found, start + (theirs - start) / (1.0 + found.rate_error))
     if doubts and not force:
         raise InputError(
             f"{reference.source}: these recordings don't seem to belong together: {'; '.join(doubts)}; "
             "--force (force=True) joins them nevertheless"
         )
-    return Joined(joined, found, over_second, over_foreign, tuple(doubts), levers)
+    return Joined(joined, found, over_second, over_foreign, tuple(doubts), levers, own)
 
 
-def _signals(recording: Recording, reference: ReferenceSeries) -> tuple[Signals, NDArray[np.float64], int]:
+def grids(recording: Recording, reference: ReferenceSeries) -> tuple[Signals, NDArray[np.float64], int]:
     """Return channels and functions of the reference on uniform grids of one step; its rate; the smoothing window."""
     t_reference, rate = reference.rate()
     if len(recording) < 16:
@@ -197,10 +246,11 @@ def _levers(recording: Recording, found: Alignment) -> tuple[dict[str, tuple[flo
     return levers, differ
 
 
-def _joined(recording: Recording, reference: ReferenceSeries, found: Alignment) -> Recording:
-    """Return the recording with the reference in the rows nearest in time."""
+def _joined(
+    recording: Recording, reference: ReferenceSeries, found: Alignment, theirs: NDArray[np.float64]
+) -> Recording:
+    """Return the recording with the reference, read at ``theirs`` (m,), s, in the rows nearest in time."""
     t = recording.t_s
-    theirs = found.offset + (1.0 + found.rate_error) * reference.t_s
     nearest = np.clip(np.searchsorted(t, theirs), 1, len(t) - 1)
     nearest = nearest - (theirs - t[nearest - 1] < t[nearest] - theirs)
     near = np.abs(t[nearest] - theirs) <= 0.75 * recording.sample_period

@@ -52,7 +52,7 @@ def refined(
             [np.bincount(block, np.sum(weight * slope * residual, axis=1), _BLOCKS) for slope in slopes]
         )
 
-    found, covariance = np.array([0.0, rate_error]), np.full((2, 2), np.nan)
+    found, spread = np.array([0.0, rate_error]), np.full(2, np.nan)
     for _ in range(_ITERATIONS if refine else 0):
         weight = _weight(fitted(found)[0])
         pull = pulls(found, weight)
@@ -60,10 +60,12 @@ def refined(
             [(pulls(found + one, weight) - pulls(found - one, weight)) / (2.0 * one.max()) for one in steps]
         )
         bend = 0.5 * (bend + bend.transpose(2, 1, 0)).transpose(1, 0, 2)  # (blocks, 2, 2)
-        covariance = _jackknife(pull, bend)
-        step = -_inverse(bend.sum(axis=0)) @ pull.sum(axis=0)
+        stationary = _inverse(bend.sum(axis=0))
+        # Where few blocks hold the changes of motion, their scatter is small by chance in some recordings.
+        spread = np.sqrt(np.maximum(_jackknife(pull, bend).diagonal(), stationary.diagonal()))
+        step = -stationary @ pull.sum(axis=0)
         found = found + step
-        if np.all(np.square(step) < _SETTLED**2 * covariance.diagonal()):
+        if np.all(np.abs(step) < _SETTLED * spread):
             break
     residual, matrix, solution = fitted(found)
     variance = np.maximum(residual.var(axis=0), 1e-18)
@@ -76,8 +78,8 @@ def refined(
     return Alignment(
         float(final),
         float(rate),
-        float(np.sqrt(covariance[0, 0])),
-        float(np.sqrt(covariance[1, 1])),
+        float(spread[0]),
+        float(spread[1]),
         1.0 - variance / scale**2,
         independent,
         solution[1:],
@@ -103,7 +105,11 @@ def _predicted(matrix: NDArray[np.float64], y: NDArray[np.float64]) -> float:
 
 
 def _weight(residual: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the weight of each channel, (c,): independent samples per sample over their variance."""
+    """Return the weight of each channel, (c,): independent samples per sample over their variance.
+
+    With it half the second derivatives of the squares are the information on shift and rate error, if the residual is
+    as large throughout.
+    """
     return _share(residual) / np.maximum(residual.var(axis=0), 1e-18)
 
 

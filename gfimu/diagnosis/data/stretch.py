@@ -188,7 +188,8 @@ class Stretch:
 
     def times(self, effects: Sequence[Effect] = ()) -> NDArray[np.float64]:
         """Return all true times that readings belong to, s."""
-        return self.model.sample_times(self.run.t, [*self.known, *effects])
+        # The clocks agree when the run begins, whatever the board's shows then.
+        return self.start + self.model.sample_times(self.run.t - self.start, [*self.known, *effects])
 
     def counted_times(self, effects: Sequence[Effect] = ()) -> NDArray[np.float64]:
         """Return the true times of the samples in which anything counts, s: beyond them no motion is known."""

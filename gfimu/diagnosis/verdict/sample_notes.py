@@ -1,14 +1,17 @@
-"""What a verdict adds on the samples themselves: time stamps that jitter and values that no sensor reads."""
+"""What a verdict adds on the samples: jitter of time stamps, impossible values, the clock of the reference."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from gfimu.diagnosis.data.run import Run
-from gfimu.diagnosis.verdict.verdict import Diagnosis
+import numpy as np
 
-__all__ = ["with_sample_notes"]
+from gfimu.diagnosis.data.run import Run
+from gfimu.diagnosis.policy import Policy
+from gfimu.diagnosis.verdict.verdict import Diagnosis, NamedCause
+
+__all__ = ["with_reference_clock", "with_sample_notes"]
 
 
 def with_sample_notes(diagnosis: Diagnosis, runs: Sequence[Run]) -> Diagnosis:
@@ -27,3 +30,55 @@ def with_sample_notes(diagnosis: Diagnosis, runs: Sequence[Run]) -> Diagnosis:
         values = "value is" if impossible == 1 else "values are"
         sentences.append(f"{impossible} {values} left out as corrupt: no sensor of this part reads that much.")
     return replace(diagnosis, sentences=tuple(sentences), noise=noise)
+
+
+def with_reference_clock(
+    diagnosis: Diagnosis, clock: Mapping[str, float], corrected: Sequence[str], policy: Policy = Policy()
+) -> Diagnosis:
+    """Return a diagnosis that reports the clock of a reference that was aligned before.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        Of the aligned recording.
+    clock : mapping
+        `Diagnosis.reference_clock`.
+    corrected : sequence of str
+        What the alignment took off the recording and therefore is no part of the extended twin: ``tacho_latency``,
+        ``clock_error``. Each becomes a cause.
+    policy : Policy
+        Threshold ``most_certain``.
+    """
+    sizes = {
+        "tacho_latency": ("delay_s", -clock["offset_s"], clock["offset_std_s"]),
+        "clock_error": ("ratio", clock["rate_error"], clock["rate_error_std"]),
+    }
+    why = "shown by the correlation of ω² and α with the channels; taken off before the rest was diagnosed"
+    causes = [
+        NamedCause(name, {key: value}, {key: std}, policy.most_certain, why=why)
+        for name, (key, value, std) in sizes.items()
+        if name in corrected
+    ]
+    offset, rate = clock["offset_s"], clock["rate_error"]
+    text = (
+        f"By the alignment of the two the channels' clock was {abs(offset):.4g} ± {clock['offset_std_s']:.2g} s "
+        f"{'ahead of' if offset >= 0.0 else 'behind'} the reference's at the first sample and is {1e2 * abs(rate):.3g} "
+        f"± {1e2 * clock['rate_error_std']:.2g} % {'fast' if rate >= 0.0 else 'slow'} against it."
+    )
+    if corrected:
+        text += " The extended twin does not hold this: it is of the aligned recording."
+    verdict = "explained" if causes and diagnosis.verdict == "nothing_found" else diagnosis.verdict
+    return replace(
+        diagnosis,
+        verdict=verdict,
+        causes=(*causes, *(_as_sure(one, clock) for one in diagnosis.causes)),
+        sentences=(text, *diagnosis.sentences) if causes else (*diagnosis.sentences, text),
+        reference_clock=dict(clock),
+    )
+
+
+def _as_sure(cause: NamedCause, clock: Mapping[str, float]) -> NamedCause:
+    """Return a cause; a clock error no surer than the alignment, as the offset that it was found at is not exact."""
+    if cause.effect != "clock_error":
+        return cause
+    return replace(cause, std={key: float(np.hypot(std, clock["rate_error_std"])) for key, std in cause.std.items()})

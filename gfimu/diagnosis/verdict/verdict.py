@@ -205,6 +205,10 @@ class Diagnosis:
         their own probabilities. NaN where no cause was inferred.
     coincidence : float
         Log odds of the likeliest pattern that binds the free numbers of the causes, nats; NaN where none can be tested.
+    reference_clock : mapping
+        Of a reference that was aligned before the diagnosis: ``offset_s`` (the channels' clock less the reference's at
+        the first sample), ``rate_error`` (seconds of the channels' clock per second of the reference's, less one), and
+        their standard deviations ``offset_std_s`` and ``rate_error_std``. Empty for all others.
     """
 
     verdict: str
@@ -221,6 +225,7 @@ class Diagnosis:
     rigid: RigidMotion | None = None
     library_probability: float = float("nan")
     coincidence: float = float("nan")
+    reference_clock: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def in_part(self) -> bool:
@@ -248,6 +253,7 @@ class Diagnosis:
             "library_probability": self.library_probability,
             "coincidence_nats": self.coincidence,
             "sentences": list(self.sentences),
+            "reference_clock": dict(self.reference_clock) or None,
             "causes": [cause.to_dict() for cause in self.causes],
             "residual": {
                 "rms_before": residual.rms_before,
