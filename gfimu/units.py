@@ -15,6 +15,7 @@ __all__ = [
     "READING_UNITS",
     "REFERENCE_UNITS",
     "STANDARD_GRAVITY",
+    "TIME_COLUMNS",
     "key_name",
     "reference_quantity",
     "split_unit",
@@ -54,6 +55,14 @@ def reference_quantity(column: str) -> str | None:
 
 GYRO_COLUMNS = ("gyro_x_rad_s", "gyro_y_rad_s", "gyro_z_rad_s")
 """Columns of a recording's gyro, body axes."""
+
+TIME_COLUMNS = {
+    "tacho_rad_s": "tacho_t_s",
+    "command_rad_s": "command_t_s",
+    "angle_rad": "angle_t_s",
+    **dict.fromkeys(GYRO_COLUMNS, "gyro_t_s"),
+}
+"""Column of a reference's own times, by the reference's; on the clock of ``t_s``, s."""
 
 RATIO, NUMBER, NAME = "ratio", "number", "name"
 """What stands in place of a unit: a small relative number (people read percent), a count or factor, words."""

@@ -10,6 +10,7 @@ from scipy.signal import savgol_coeffs, savgol_filter
 
 from gfimu.errors import InputError
 from gfimu.recording import Recording
+from gfimu.recording.reference_times import reference_on_rows
 from gfimu.recording.rest import detect_rest
 
 __all__ = ["MotionReference", "motion_reference"]
@@ -65,6 +66,7 @@ def motion_reference(recording: Recording, *, omega_std: float | None = None) ->
     InputError
         If there is neither, or nothing moves.
     """
+    recording = reference_on_rows(recording)
     names = [f"gyro_{axis}_rad_s" for axis in "xyz"]
     if all(name in recording.reference for name in names):
         omega = np.column_stack([recording.reference[name] for name in names])

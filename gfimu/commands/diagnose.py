@@ -128,7 +128,7 @@ def _explained(
 
     def runs(own_rate: bool) -> list[Recording]:
         return [
-            run if one is None else (one.by_own_rate if own_rate else one.recording)
+            run if one is None else (one.by_own_rate if own_rate else one.by_reference_clock)
             for run, one in zip(read, clocks, strict=True)
         ]
 

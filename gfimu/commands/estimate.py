@@ -186,8 +186,10 @@ def estimate_run(
     from gfimu.commands.opened import by_map
     from gfimu.motion.estimation import estimate as solve
     from gfimu.motion.rest_bias import estimate_from_rest
+    from gfimu.recording.reference_times import reference_on_rows
 
     run, geometry = _opened(by_map(recording, column_map, map_set), array, calibration)
+    run = reference_on_rows(run)
     turning = _turning(axis, geometry, uncertainty)
     if turning is not None:
         found = _about_axis(run, geometry, turning, rest_bias=rest_bias, **options)

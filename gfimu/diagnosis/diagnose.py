@@ -20,6 +20,7 @@ from gfimu.errors import InputError
 from gfimu.known_axis.axis_gyro import with_axis_gyro
 from gfimu.recording import Recording
 from gfimu.recording.carried_array import warn_of_other_array
+from gfimu.recording.reference_times import reference_on_rows
 from gfimu.world_model import WorldModel
 
 __all__ = ["diagnose", "prepare"]
@@ -92,7 +93,7 @@ def prepare(
 ) -> PreparedRuns:
     """Read recordings of a table or of a free body and find the faults of their samples."""
     if model.drive_source == "gyro":
-        recordings = [with_axis_gyro(one, model.array) for one in recordings]
+        recordings = [with_axis_gyro(reference_on_rows(one), model.array) for one in recordings]
         return prepare_bodies(recordings, model, names, spike_share=policy.body_spike_share)
     return PreparedRuns.build(recordings, model, names, predicted_by_reference)
 

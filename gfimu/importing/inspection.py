@@ -24,7 +24,7 @@ from gfimu.importing.oddities import oddities
 from gfimu.importing.raw_table import RawFile, RawTable
 from gfimu.importing.readers import read_foreign
 from gfimu.importing.recognise import fitting_maps, own_chips
-from gfimu.units import REFERENCE_UNITS
+from gfimu.units import REFERENCE_UNITS, TIME_COLUMNS
 
 __all__ = ["ColumnView", "Inspection", "inspect_file"]
 
@@ -216,7 +216,9 @@ def _own_recording(raw: RawFile, table: RawTable, chips: dict[str, list[str]]) -
 
 
 def _is_reference(name: str) -> bool:
-    return any(name == f"{quantity}_{unit}" for quantity, units in REFERENCE_UNITS.items() for unit in units)
+    return name in TIME_COLUMNS.values() or any(
+        name == f"{quantity}_{unit}" for quantity, units in REFERENCE_UNITS.items() for unit in units
+    )
 
 
 def _rate(times: Times | None) -> float:

@@ -14,6 +14,7 @@ from gfimu.joining.alignment import align
 from gfimu.joining.reference_file import ReferenceSeries
 from gfimu.joining.signals import Alignment, Signals, functions_of, uniform
 from gfimu.recording import Recording
+from gfimu.units import TIME_COLUMNS
 
 __all__ = ["FAR", "Joined", "grids", "join_reference"]
 
@@ -38,8 +39,8 @@ class Joined:
     Parameters
     ----------
     recording : Recording
-        The channels at their own times, with each value of the reference in the row nearest in time, moved to the
-        time of that row along its slope; NaN in between.
+        The channels at their own times, with each value of the reference in the row nearest in time and, in a column of
+        its own (``tacho_t_s``), the time at which it was read; NaN in between.
     alignment : Alignment
         Offset and rate error with their standard deviations.
     odds_over_second : float
@@ -53,6 +54,8 @@ class Joined:
     by_own_rate : Recording
         The same with the rate error left in: both clocks agree at the first sample of the channels, and the reference's
         runs at its own rate from there. A diagnosis finds `clock_error` in it.
+    by_reference_clock : Recording
+        The same with the channels' times on the reference's clock, which rates in rad/s are of.
     """
 
     recording: Recording
@@ -62,6 +65,7 @@ class Joined:
     doubts: tuple[str, ...]
     levers_m: dict[str, tuple[float, float]]
     by_own_rate: Recording
+    by_reference_clock: Recording
 
     @property
     def offset_at_start(self) -> tuple[float, float]:
@@ -163,13 +167,14 @@ def join_reference(
     theirs = found.offset + (1.0 + found.rate_error) * reference.t_s
     joined = _joined(recording, reference, found, theirs)
     start = float(recording.t_s[0])
-    own = _joined(recording, reference, found, start + (theirs - start) / (1.0 + found.rate_error))
+    own, rows = (start + (one - start) / (1.0 + found.rate_error) for one in (theirs, recording.t_s))
+    others = [_joined(one, reference, found, own) for one in (recording, replace(recording, t_s=rows))]
     if doubts and not force:
         raise InputError(
             f"{reference.source}: these recordings don't seem to belong together: {'; '.join(doubts)}; "
             "--force (force=True) joins them nevertheless"
         )
-    return Joined(joined, found, over_second, over_foreign, tuple(doubts), levers, own)
+    return Joined(joined, found, over_second, over_foreign, tuple(doubts), levers, *others)
 
 
 def grids(recording: Recording, reference: ReferenceSeries) -> tuple[Signals, NDArray[np.float64], int]:
@@ -249,7 +254,7 @@ def _levers(recording: Recording, found: Alignment) -> tuple[dict[str, tuple[flo
 def _joined(
     recording: Recording, reference: ReferenceSeries, found: Alignment, theirs: NDArray[np.float64]
 ) -> Recording:
-    """Return the recording with the reference, read at ``theirs`` (m,), s, in the rows nearest in time."""
+    """Return the recording with the reference, read at ``theirs`` (m,), s, in the nearest rows, and its times."""
     t = recording.t_s
     nearest = np.clip(np.searchsorted(t, theirs), 1, len(t) - 1)
     nearest = nearest - (theirs - t[nearest - 1] < t[nearest] - theirs)
@@ -257,11 +262,13 @@ def _joined(
     columns = dict(recording.reference)
     for name, values in reference.columns.items():
         known = near & np.isfinite(values)
-        moved = values + _slope(theirs, values) * (t[nearest] - theirs)
         rows, place = np.unique(nearest[known], return_inverse=True)
-        column = np.full(len(t), np.nan)
-        column[rows] = np.bincount(place, moved[known]) / np.bincount(place)
-        columns[name] = column
+        count = np.bincount(place)
+        # Of a reference that is faster than the channels a row has the mean, at the mean time.
+        for column, series in ((name, values), (TIME_COLUMNS.get(name), theirs)):
+            if column is not None:
+                columns[column] = np.full(len(t), np.nan)
+                columns[column][rows] = np.bincount(place, series[known]) / count
     facts = {
         "reference_offset_s": found.offset,
         "reference_offset_std_s": found.offset_std,
@@ -269,9 +276,3 @@ def _joined(
         "reference_rate_error_std": found.rate_error_std,
     }
     return replace(recording, reference=columns, metadata={**recording.metadata, **facts})
-
-
-def _slope(t: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the slope of a reference at its samples, between its neighbours; zero where one is missing."""
-    slope = np.gradient(values, t)
-    return np.where(np.isfinite(slope), slope, 0.0)

@@ -19,7 +19,7 @@ from gfimu.geometry.array import AccelerometerArray
 from gfimu.parts.part import Part
 from gfimu.parts.plausible import MOST_CORRUPT, largest_of_array, largest_of_part, largest_reference
 from gfimu.recording.carried_array import carried_array
-from gfimu.units import READING_UNITS, REFERENCE_UNITS, STANDARD_GRAVITY, reference_quantity
+from gfimu.units import READING_UNITS, REFERENCE_UNITS, STANDARD_GRAVITY, TIME_COLUMNS, reference_quantity
 
 __all__ = ["RecordingContent", "read_recording_file"]
 
@@ -258,6 +258,9 @@ def _reference_columns(table: ColumnFile) -> list[_Column]:
     """Find the columns of references; a known quantity in an unknown unit, or twice, is an error."""
     found: dict[str, _Column] = {}
     for name in table.names:
+        if name in TIME_COLUMNS.values():
+            found[name] = _Column(name, name, 1.0, _LONGEST_TIME)
+            continue
         quantity = reference_quantity(name)
         if quantity is None or quantity == "t":
             continue

@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.motion.attitude import from_rotation, to_rotation
 from gfimu.recording import Recording
+from gfimu.recording.reference_times import reference_on_rows
 from gfimu.units import STANDARD_GRAVITY
 from gfimu.visual.motion import (
     ExpectedDrift,
@@ -97,6 +98,7 @@ def write_run(
     InputError
         If the recording lacks a channel of the array, or the file can't be written.
     """
+    recording = reference_on_rows(recording)
     readings = recording.for_array(array)
     axis = array.turning_axis
     known = known or KnownMotion.from_reference(recording, array, estimate)

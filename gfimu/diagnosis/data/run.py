@@ -12,9 +12,11 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.ndimage import gaussian_filter1d
 
 from gfimu.diagnosis.data.rounding import between_steps
-from gfimu.diagnosis.data.time_grid import time_grid
+from gfimu.diagnosis.data.time_grid import TimeGrid, time_grid
 from gfimu.errors import InputError
 from gfimu.recording import Recording
+from gfimu.recording.reference_times import reference_times
+from gfimu.units import TIME_COLUMNS
 from gfimu.world_model import WorldModel
 
 __all__ = [
@@ -92,6 +94,8 @@ class Run:
         Rms of the time stamps about the uniform grid, s; 0 where they show none.
     impossible : int
         Number of values left out because no sensor reads them.
+    late : ndarray or None, shape (n,)
+        How long after its sample each reference value was read, s, at most half a sample period; None if not at all.
     """
 
     t: NDArray[np.float64]
@@ -108,6 +112,7 @@ class Run:
     resumed: tuple[int, ...] = ()
     jitter: float = 0.0
     impossible: int = 0
+    late: NDArray[np.float64] | None = None
 
     @property
     def sample_period(self) -> float:
@@ -144,6 +149,7 @@ class Run:
             self.unreferenced,
             jitter=self.jitter,
             impossible=self.impossible,
+            late=None if self.late is None else self.late[part],
         )
 
 
@@ -187,11 +193,7 @@ def prepare_run(recording: Recording, model: WorldModel, *, name: str = "run") -
     valid = np.zeros(full.shape, dtype=bool)
     valid[place] = np.isfinite(readings)
     full[~valid] = 0.0
-    reference = np.zeros(n)
-    reference_valid = np.zeros(n, dtype=bool)
-    reference[place] = drive
-    reference_valid[place] = np.isfinite(drive)
-    reference[~reference_valid] = 0.0
+    reference, reference_valid, late = _on_grid(recording, column, drive, grid)
     unreferenced = _unreferenced(reference_valid, period) if model.drive_source != "gyro" else np.zeros(n, dtype=bool)
     full[unreferenced] = 0.0
     left_out = float((valid & unreferenced[:, None]).any(axis=1).sum()) * period
@@ -222,7 +224,25 @@ def prepare_run(recording: Recording, model: WorldModel, *, name: str = "run") -
         resumed=tuple((np.flatnonzero(np.diff(unreferenced.astype(int)) == -1) + 1).tolist()),
         jitter=grid.jitter,
         impossible=impossible,
+        late=late,
     )
+
+
+def _on_grid(
+    recording: Recording, column: str, drive: NDArray[np.float64], grid: TimeGrid
+) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.float64] | None]:
+    """Return the reference on the grid (n,), where it counts, and how long after its sample each value was read, s."""
+    values, valid, known = np.zeros(grid.size), np.zeros(grid.size, dtype=bool), np.isfinite(drive)
+    if TIME_COLUMNS.get(column) not in recording.reference:
+        place = grid.place[known]
+        values[place], valid[place] = drive[known], True
+        return values, valid, None
+    t, read_at = grid.t, reference_times(recording, column)
+    place = np.rint((read_at - t[0]) / grid.period).astype(int)
+    known &= (place >= 0) & (place < grid.size)
+    place, late = place[known], np.zeros(grid.size)
+    values[place], valid[place], late[place] = drive[known], True, read_at[known] - t[place]
+    return values, valid, late
 
 
 def possible_values(recording: Recording, model: WorldModel) -> tuple[Recording, int]:

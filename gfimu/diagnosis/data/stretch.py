@@ -18,7 +18,7 @@ from gfimu.diagnosis.data.table.spins import JoinedSpin, ScaledSpin, State
 from gfimu.diagnosis.data.table.start_angle import gravity_angle
 from gfimu.world_model import Effect, Spin, WorldModel, is_linear, is_of_wiring, reads_place
 
-__all__ = ["RunUp", "Stretch", "make_stretches"]
+__all__ = ["RunUp", "Stretch", "make_stretches", "moved"]
 
 _DURATION = 64.0  # s, about: one drive's normal equations grow with its square
 _LOST_ANGLE_STD = 3.0  # rad: the table's angle after a gap of the reference
@@ -149,6 +149,13 @@ class Stretch:
 
     def predict(self, effects: Sequence[Effect], drive: Spin) -> NDArray[np.float64]:
         """Predict channels and reference, shape (n, c + 1), for a drive and effects besides the known ones."""
+        predicted = self._at_samples(effects, drive)
+        if self.run.late is not None:
+            predicted[:, -1] = moved(predicted[:, -1], self.run.late / self.run.sample_period)
+        return predicted
+
+    def _at_samples(self, effects: Sequence[Effect], drive: Spin) -> NDArray[np.float64]:
+        """Predict channels and reference at the times of the samples."""
         every = [*self.known, *effects]
         if self.run_up is None:
             return self._predict(every, drive, self.run.t, self.run.temperature)
@@ -189,7 +196,10 @@ class Stretch:
     def times(self, effects: Sequence[Effect] = ()) -> NDArray[np.float64]:
         """Return all true times that readings belong to, s."""
         # The clocks agree when the run begins, whatever the board's shows then.
-        return self.start + self.model.sample_times(self.run.t - self.start, [*self.known, *effects])
+        times = self.start + self.model.sample_times(self.run.t - self.start, [*self.known, *effects])
+        if self.run.late is not None:
+            times[:, -1] += self.run.late
+        return times
 
     def counted_times(self, effects: Sequence[Effect] = ()) -> NDArray[np.float64]:
         """Return the true times of the samples in which anything counts, s: beyond them no motion is known."""
@@ -274,6 +284,24 @@ def _coarse_step(model: WorldModel, run: Run, faults: Sequence[Effect]) -> float
     found = [float(one.parameters["step_m_s2"]) for one in faults if one.name == "coarse_resolution"]
     quantum = found[-1] if found else expected.quantum
     return quantum if quantum > COARSE * float(np.median(expected.analogue)) else 0.0
+
+
+def moved(values: NDArray[np.float64], share: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return smooth values (n,) moved by shares of a sample (n,), by the cubic through the four nearest.
+
+    Lagrange's form (Abramowitz and Stegun, 25.2.13); at the ends the cubic through the outermost four.
+    """
+    if len(values) < 4:
+        return values
+    first = np.clip(np.arange(len(values)) - 1, 0, len(values) - 4)
+    u = np.arange(len(values)) + share - first
+    weights = (
+        -(u - 1.0) * (u - 2.0) * (u - 3.0) / 6.0,
+        u * (u - 2.0) * (u - 3.0) / 2.0,
+        -u * (u - 1.0) * (u - 3.0) / 2.0,
+        u * (u - 1.0) * (u - 2.0) / 6.0,
+    )
+    return np.asarray(sum(weight * values[first + place] for place, weight in enumerate(weights)))
 
 
 def _known_walk(model: WorldModel) -> float:
