@@ -1,0 +1,48 @@
+"""What a verdict says of the clock of a reference that was aligned before."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import pytest
+from made_diagnoses import made_diagnosis
+
+from gfimu.diagnosis.verdict.sample_notes import with_reference_clock
+from gfimu.diagnosis.verdict.verdict import NamedCause
+
+CLOCK = {"offset_s": -3.05, "offset_std_s": 0.002, "rate_error": 0.003, "rate_error_std": 2e-5}
+
+
+def test_a_rate_error_that_was_taken_off_is_a_cause():
+    found = with_reference_clock(made_diagnosis("nothing_found"), CLOCK, ["clock_error"])
+    assert found.verdict == "explained"
+    [cause] = found.causes
+    assert (cause.effect, cause.parameters, cause.std) == ("clock_error", {"ratio": 0.003}, {"ratio": 2e-5})
+    assert found.sentences[0] == (
+        "By the alignment of the two the channels' clock was 3.05 ± 0.002 s behind the reference's at the first sample "
+        "and is 0.3 ± 0.002 % fast against it. The extended twin does not hold this: it is of the aligned recording."
+    )
+    assert json.loads(found.to_json())["reference_clock"] == CLOCK
+
+
+def test_a_displaced_reference_is_late_by_minus_the_offset():
+    found = with_reference_clock(made_diagnosis("explained"), CLOCK, ["tacho_latency"])
+    assert [cause.effect for cause in found.causes][:1] == ["tacho_latency"]
+    assert found.causes[0].parameters == {"delay_s": 3.05}
+    assert found.verdict == "explained"
+
+
+def test_an_offset_of_two_files_is_no_cause():
+    before = made_diagnosis("nothing_found")
+    found = with_reference_clock(before, CLOCK, [])
+    assert (found.verdict, found.causes) == ("nothing_found", ())
+    assert found.sentences[: len(before.sentences)] == before.sentences
+    assert json.loads(before.to_json())["reference_clock"] is None
+
+
+def test_a_clock_error_that_was_diagnosed_is_no_surer_than_the_alignment():
+    plain = made_diagnosis("nothing_found")
+    named = NamedCause("clock_error", {"ratio": 0.0031}, {"ratio": 1e-6}, 0.99)
+    found = with_reference_clock(replace(plain, verdict="explained", causes=(named,)), CLOCK, [])
+    assert found.causes[0].std["ratio"] == pytest.approx(2e-5, rel=0.01)
