@@ -143,7 +143,7 @@ def _explained(
         if model.drive_source != "gyro":
             used = runs(False)
             found = explain(used, model, held_out=kept, names=labels, report=report)
-    return with_reference_clock(found, first.clock, corrected), used[0]
+    return with_reference_clock(found, first.clock, corrected, model), used[0]
 
 
 def write_result(out: str | Path, found: Diagnosis, recording: Recording) -> dict[str, Path]:

@@ -13,20 +13,23 @@ turns steadily, below the least roughness) the residual takes less and the expec
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.data.table.spins import State
 from gfimu.diagnosis.fit.posterior import Posterior
+from gfimu.diagnosis.terms.cause import Cause, effects_of
+from gfimu.diagnosis.terms.library import cause_columns
 from gfimu.diagnosis.terms.spline import DEGREE
-from gfimu.world_model import SpinState
+from gfimu.world_model import Spin, SpinState
 
-__all__ = ["apart_from_noise", "drive_covariance", "expected_score"]
+__all__ = ["apart_from_noise", "drive_covariance", "expected_score", "expected_score_of_causes"]
 
-_ORDERS = 4  # numerical: angle, rate, acceleration and jerk
+_STATE = ("angle", "rate", "acceleration", "jerk")
 ValuesOf = Callable[[SpinState, NDArray[np.float64]], NDArray[np.float64]]
 
 
@@ -53,7 +56,7 @@ def expected_score(stretch: Stretch, at: Posterior, values_of: ValuesOf) -> NDAr
     state = (spin.angle, spin.rate, spin.acceleration, np.gradient(spin.acceleration, stretch.run.sample_period))
     shared, std = drive_covariance(at, t)  # (4, n, c + 1), (4, n)
     out = np.zeros((shared.shape[2], values_of(spin, state[3]).shape[1]))
-    for order in range(_ORDERS):
+    for order in range(len(_STATE)):
         size = np.maximum(std[order], 1e-12 * (1.0 + np.abs(state[order])))
         ends = []
         for sign in (1.0, -1.0):
@@ -62,6 +65,60 @@ def expected_score(stretch: Stretch, at: Posterior, values_of: ValuesOf) -> NDAr
         # The slope over ± one standard deviation: the expected one, also at the kink of |ω|.
         slope = (ends[0] - ends[1]) / (2.0 * size[:, None])  # (n, k)
         out += np.einsum("nc,nk->ck", shared[order] * at.observed.weights, slope)
+    return out
+
+
+class _Moved:
+    """A motion whose angle, rate or acceleration is moved by a constant."""
+
+    def __init__(self, spin: Spin, by: Sequence[float]) -> None:
+        self._spin, self._by = spin, by
+
+    @property
+    def spin(self) -> Spin:
+        """The motion itself, as of a drive."""
+        return self
+
+    @property
+    def is_learnt(self) -> bool:
+        """Whether its prior has parameters to learn."""
+        return False
+
+    def at(self, t: ArrayLike) -> SpinState:
+        """Return the state at times (n,), s."""
+        state = self._spin.at(t)
+        angle, rate, acceleration = self._by
+        return State(state.angle + angle, state.rate + rate, state.acceleration + acceleration)
+
+
+def expected_score_of_causes(stretch: Stretch, at: Posterior, causes: Sequence[Cause]) -> NDArray[np.float64]:
+    """Return the expectation of the score of each unknown of a set of causes, by the noise of the drive, shape (p,).
+
+    A size that is fitted takes it as its own: what is tested beside it has to leave it out by the same projection.
+
+    Parameters
+    ----------
+    stretch : Stretch
+        The data.
+    at : Posterior
+        Its drive.
+    causes : sequence of Cause
+        Causes at their sizes; what they do is taken to depend on angle, rate and acceleration of the same instant.
+    """
+    shared, std = drive_covariance(at, stretch.run.t)
+    effects = effects_of(causes, stretch.model.array, stretch.index)
+    out = np.zeros(sum(cause.unknowns for cause in causes))
+    for order in range(len(_STATE) - 1):
+        size = float(np.median(std[order]))
+        if size <= 0.0:
+            continue
+        for sign in (1.0, -1.0):
+            moved = _Moved(at.drive.spin, [sign * size if place == order else 0.0 for place in range(len(_STATE) - 1)])
+            seen = replace(at.observed, prediction=stretch.predict(effects, moved))
+            columns = cause_columns(stretch, seen, moved, causes)
+            for c, (places, part) in enumerate(zip(columns.places, columns.parts, strict=True)):
+                weighed = shared[order][:, c] * (at.observed.weights[c] * sign / (2.0 * size))
+                out[places] += weighed @ part
     return out
 
 
@@ -83,9 +140,9 @@ def drive_covariance(at: Posterior, t: NDArray[np.float64]) -> tuple[NDArray[np.
         Standard deviation of each, rad, rad/s, rad/s², rad/s³.
     """
     jacobian, covariance = at.jacobian, at.covariance
-    shared = np.zeros((_ORDERS, len(t), jacobian.loading.shape[1]))
-    std = np.zeros((_ORDERS, len(t)))
-    each = [at.drive.spline.rows(t, order) for order in range(_ORDERS)]
+    shared = np.zeros((len(_STATE), len(t), jacobian.loading.shape[1]))
+    std = np.zeros((len(_STATE), len(t)))
+    each = [at.drive.spline.rows(t, order) for order in range(len(_STATE))]
     for rows, columns, block in jacobian.blocks:
         moved = np.tensordot(block, covariance[columns], axes=1)  # (R, rows, m)
         for order, (first, values) in enumerate(each):

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.diagnosis.criticism.drive_noise import apart_from_noise
+from gfimu.diagnosis.criticism.drive_noise import apart_from_noise, expected_score_of_causes
 from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.fit.evidence import SCALES, inverse
 from gfimu.diagnosis.fit.linear import Point, linearise
@@ -108,15 +108,18 @@ def series_products(
     linear = linearise(stretches, point, columns, responses=False)
     named = sum(cause.unknowns for cause in point.causes)
     gram, score = linear.gram, linear.score
+    expected = np.zeros(len(score))
     if expected_of is not None:
-        expected = sum(expected_of(one, at) for one, at in zip(stretches, linear.posteriors, strict=True))
-        score[named:] = apart_from_noise(score[named:], np.ravel(expected))
+        for stretch, at in zip(stretches, linear.posteriors, strict=True):
+            expected[named:] += np.ravel(expected_of(stretch, at))
+            expected[:named] += expected_score_of_causes(stretch, at, point.causes)
     if not named:
-        return gram, score
+        return gram, apart_from_noise(score, expected)
     # The causes are free: they have the widest prior that a fit gives them.
     covariance = inverse(gram[:named, :named] + np.eye(named) / SCALES[-1] ** 2)
     gain = covariance @ gram[:named, named:]
-    return gram[named:, named:] - gram[named:, :named] @ gain, score[named:] - gain.T @ score[:named]
+    score, expected = (one[named:] - gain.T @ one[:named] for one in (score, expected))
+    return gram[named:, named:] - gram[named:, :named] @ gain, apart_from_noise(score, expected)
 
 
 def _by_series(values: NDArray[np.float64], weight: NDArray[np.float64]) -> Columns:

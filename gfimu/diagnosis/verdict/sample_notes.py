@@ -10,6 +10,7 @@ import numpy as np
 from gfimu.diagnosis.data.run import Run
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.verdict.verdict import Diagnosis, NamedCause
+from gfimu.world_model import WorldModel
 
 __all__ = ["with_reference_clock", "with_sample_notes"]
 
@@ -33,9 +34,16 @@ def with_sample_notes(diagnosis: Diagnosis, runs: Sequence[Run]) -> Diagnosis:
 
 
 def with_reference_clock(
-    diagnosis: Diagnosis, clock: Mapping[str, float], corrected: Sequence[str], policy: Policy = Policy()
+    diagnosis: Diagnosis,
+    clock: Mapping[str, float],
+    corrected: Sequence[str],
+    given: WorldModel,
+    policy: Policy = Policy(),
 ) -> Diagnosis:
     """Return a diagnosis that reports the clock of a reference that was aligned before.
+
+    A delay or a rate error that is within what the alignment is uncertain by is no cause: the next recording of the
+    same rig would have another one.
 
     Parameters
     ----------
@@ -46,8 +54,10 @@ def with_reference_clock(
     corrected : sequence of str
         What the alignment took off the recording and therefore is no part of the extended twin: ``tacho_latency``,
         ``clock_error``. Each becomes a cause.
+    given : WorldModel
+        The twin before it was extended.
     policy : Policy
-        Threshold ``most_certain``.
+        Thresholds ``most_certain`` and ``noise_stds``.
     """
     sizes = {
         "tacho_latency": ("delay_s", -clock["offset_s"], clock["offset_std_s"]),
@@ -67,14 +77,31 @@ def with_reference_clock(
     )
     if corrected:
         text += " The extended twin does not hold this: it is of the aligned recording."
+    own = [one for one in diagnosis.causes if not _is_of_alignment(one, clock, policy.noise_stds)]
+    if diagnosis.causes and not own and diagnosis.verdict in ("explained", "ambiguous"):
+        names = " or ".join(one.effect for one in diagnosis.causes)
+        said = f"Beside that nothing is wrong: {names} would be within what the alignment is uncertain by."
+        diagnosis = replace(diagnosis, verdict="nothing_found", causes=(), sentences=(said,), twin=given)
+    causes += [_as_sure(one, clock) for one in diagnosis.causes]
     verdict = "explained" if causes and diagnosis.verdict == "nothing_found" else diagnosis.verdict
     return replace(
         diagnosis,
         verdict=verdict,
-        causes=(*causes, *(_as_sure(one, clock) for one in diagnosis.causes)),
-        sentences=(text, *diagnosis.sentences) if causes else (*diagnosis.sentences, text),
+        causes=tuple(causes),
+        sentences=(text, *diagnosis.sentences) if corrected else (*diagnosis.sentences, text),
         reference_clock=dict(clock),
     )
+
+
+def _is_of_alignment(cause: NamedCause, clock: Mapping[str, float], stds: float) -> bool:
+    """Return whether a cause is one delay, or one rate error, within some standard deviations of the alignment."""
+    if len(cause.parameters) != 1:
+        return False
+    [(key, value)] = cause.parameters.items()
+    most = {"delay_s": "offset_std_s", "time_constant_s": "offset_std_s", "ratio": "rate_error_std"}.get(key)
+    if most is None or (key == "ratio" and cause.effect != "clock_error"):
+        return False
+    return abs(float(value)) <= stds * clock[most]
 
 
 def _as_sure(cause: NamedCause, clock: Mapping[str, float]) -> NamedCause:
