@@ -15,6 +15,7 @@ _BLOCKS = 20  # of the overlap, each left out once for the standard deviations
 _ITERATIONS = 12
 _STEP = 0.25  # of the grid, for derivatives
 _FLATTEST = 1e-6  # of a second derivative, in units of its diagonal
+_LEAST_FREEDOM = 4.0  # degrees, of a variance from few blocks
 _SETTLED = 0.02  # standard deviations of the last step
 
 
@@ -131,7 +132,13 @@ def _jackknife(pull: NDArray[np.float64], bend: NDArray[np.float64]) -> NDArray[
     whole = bend.sum(axis=0)
     left = np.array([_inverse(whole - one) @ mine for one, mine in zip(bend, pull, strict=True)])
     left -= left.mean(axis=0)
-    return np.asarray((len(left) - 1.0) / len(left) * left.T @ left)
+    # Few blocks may hold nearly all of it. Then it is a variance of few degrees of freedom (F. E. Satterthwaite,
+    # Biometrics Bulletin 2, 1946; of Gaussian blocks the fourth power is three times the square of the second), and
+    # what it divides has the wider spread of Student's t.
+    power = np.maximum(np.square(left), 1e-300)
+    freedom = np.maximum(3.0 * power.sum(axis=0) ** 2 / np.square(power).sum(axis=0), _LEAST_FREEDOM)
+    wider = np.sqrt(freedom / (freedom - 2.0))
+    return np.asarray((len(left) - 1.0) / len(left) * (left.T @ left) * np.outer(wider, wider))
 
 
 def _inverse(bend: NDArray[np.float64]) -> NDArray[np.float64]:
