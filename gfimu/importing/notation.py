@@ -8,7 +8,17 @@ import re
 from gfimu.errors import UnitError
 from gfimu.units import STANDARD_GRAVITY
 
-__all__ = ["ACCELERATION", "ANGLE", "RATE", "TEMPERATURE", "TIME", "bracketed_unit", "factor_of", "kind_of"]
+__all__ = [
+    "ACCELERATION",
+    "ANGLE",
+    "RATE",
+    "TEMPERATURE",
+    "TIME",
+    "bracketed_unit",
+    "factor_of",
+    "kind_of",
+    "unit_of_name",
+]
 
 _DEGREE = math.pi / 180.0
 
@@ -23,7 +33,7 @@ ACCELERATION = {
 }
 RATE = {"rad/s": 1.0, "mrad/s": 1e-3, "deg/s": _DEGREE, "mdeg/s": 1e-3 * _DEGREE, "rpm": math.pi / 30.0, "hz": math.tau}
 ANGLE = {"rad": 1.0, "mrad": 1e-3, "deg": _DEGREE, "rev": math.tau}
-TIME = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
+TIME = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0, "d": 86400.0}
 TEMPERATURE = {"degc": 1.0}
 LENGTH = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
 SPEED = {"m/s": 1.0, "mm/s": 1e-3, "mm/min": 1e-3 / 60.0}
@@ -54,6 +64,22 @@ _SAME = {
     "deg/sec": "deg/s",
     "deg_s": "deg/s",
     "dps": "deg/s",
+    "mdps": "mdeg/s",
+    "rads": "rad/s",
+    "rads/s": "rad/s",
+    "rps": "hz",
+    "rev/s": "hz",
+    "ms2": "m/s2",
+    "mps2": "m/s2",
+    "cm_s2": "cm/s2",
+    "gal": "cm/s2",
+    "days": "d",
+    "day": "d",
+    "millis": "ms",
+    "micros": "us",
+    "min-1": "rpm",
+    "u/min": "rpm",
+    "r/min": "rpm",
     "1/min": "rpm",
     "degrees": "deg",
     "degree": "deg",
@@ -72,7 +98,9 @@ _SAME = {
     "c": "degc",
     "celsius": "degc",
 }
-_BRACKETS = re.compile(r"\s*[\[({]\s*([^\])}]+?)\s*[\])}]\s*$")
+_ENDS = re.compile(r"^(.*?[A-Za-z0-9\]])[_ ,.]+(m_s2|mm_s2|cm_s2|rad_s|deg_s|[A-Za-zµ°/²^]+[0-9]?)$")
+_WORDS = {"g", "s", "h", "d", "c", "min", "gs", "day", "hz", "rev", "turn", "turns", "second", "gal"}
+_BRACKETS = re.compile(r"\s*[\[({]\s*((?:[^\[\](){}]|\([^\[\](){}]*\))+?)\s*[\])}]\s*$")
 
 
 def _plain(text: str) -> str:
@@ -81,7 +109,7 @@ def _plain(text: str) -> str:
         text.strip().lower().replace("²", "2").replace("µ", "u").replace("μ", "u").replace("⁻¹", "-1").replace("⁻", "-")
     )
     short = short.replace("°c", "degc").replace("°", "deg").replace("^", "").replace("*", "").replace("·", "")
-    short = short.replace(" ", "")
+    short = re.sub(r"[\s()]", "", short)
     return _SAME.get(short, short)
 
 
@@ -122,3 +150,18 @@ def bracketed_unit(name: str) -> tuple[str, str]:
     if found is None or not kind_of(found[1]):
         return name.strip(), ""
     return name[: found.start()].strip(), found[1]
+
+
+def unit_of_name(name: str) -> tuple[str, str]:
+    """Split the name of a column into the name and its unit, in brackets or as its last word; empty without one.
+
+    ``acc_x_mg``, ``omega_dps`` and ``time_ms`` carry a unit; a last word that may mean anything else, as the s of
+    ``acc_s``, counts only in brackets.
+    """
+    plain, unit = bracketed_unit(name)
+    if unit:
+        return plain, unit
+    found = _ENDS.match(name.strip())
+    if found is None or found[2].lower() in _WORDS or not kind_of(found[2]):
+        return plain, ""
+    return found[1], found[2]

@@ -29,12 +29,15 @@ class RawTable:
         What was left out on reading, one line each.
     named : bool
         Whether the file itself names its columns.
+    preamble : tuple of str
+        Lines before the samples, where something may be stated about them.
     """
 
     name: str
     columns: Mapping[str, NDArray[Any]]
     notes: tuple[str, ...] = ()
     named: bool = True
+    preamble: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values()), ()))

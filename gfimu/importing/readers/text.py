@@ -19,14 +19,17 @@ from gfimu.errors import InputError
 from gfimu.importing.column_map import TextSpec
 from gfimu.importing.raw_table import RawFile, RawTable
 from gfimu.importing.readers.text_layout import COMMENT_MARKS, Layout, layout_of
+from gfimu.importing.readers.text_lines import plain_lines
 
 __all__ = ["is_text", "read_text", "table_of_text"]
 
 _NUMERIC = r"^[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?$"
 _INTEGER = r"^[+-]?(\d{1,18}|[1-8]\d{18})$"  # of 64 bits
+_THOUSANDS = r"\.(\d{3})"  # a point between groups of digits, where a comma is the decimal mark
 _NO_NUMBER = ["", "nan", "-nan", "+nan", "na", "n/a", "null", "none", "-"]
 _INFINITE = r"^[+-]?inf(inity)?$"
 _IS_NUMBERS = 0.5  # of the filled cells of a column
+_MOST_PREAMBLE = 100  # lines
 
 
 def read_text(path: Path, text: TextSpec = TextSpec()) -> RawFile:
@@ -51,7 +54,7 @@ def table_of_text(data: bytes, source: str, text: TextSpec = TextSpec()) -> RawT
     content = _decoded(data, source)
     if not content.strip():
         raise InputError(f"{source}: empty file; record again or give another file")
-    lines = content.split("\n")
+    lines = plain_lines(content.split("\n"))
     layout = layout_of(lines, separator=text.separator, decimal=text.decimal, skip=text.skip_lines, names=text.columns)
     if layout is None:
         raise InputError(
@@ -88,7 +91,15 @@ def table_of_text(data: bytes, source: str, text: TextSpec = TextSpec()) -> RawT
         columns[name] = values
         if unreadable:
             notes.append(f"{source}: column {name}: {unreadable} cells are no numbers and count as missing")
-    return RawTable("", columns, tuple(notes), layout.named)
+    return RawTable("", columns, tuple(notes), layout.named, _preamble(lines, layout))
+
+
+def _preamble(lines: list[str], layout: Layout) -> tuple[str, ...]:
+    """Return what stands before the numbers and in comments, for a sample rate that is stated there."""
+    head = [line.strip() for line in lines[: layout.first]]
+    rest = lines[layout.first : layout.first + _MOST_PREAMBLE]
+    comments = [line.strip() for line in rest if line.strip() and line.lstrip()[0] in COMMENT_MARKS]
+    return tuple(line for line in [*head, *comments] if line)[:_MOST_PREAMBLE]
 
 
 def _decoded(data: bytes, source: str) -> str:
@@ -123,7 +134,7 @@ def _values(cells: pa.Array, decimal: str) -> tuple[NDArray[Any] | None, int]:
         # Cells that say "nan" are missing numbers; a column without a single sign is none.
         return (np.full(len(cells), np.nan), 0) if pc.any(pc.not_equal(plain, "")).as_py() else (None, 0)
     if decimal == ",":
-        plain = pc.replace_substring(plain, ",", ".")
+        plain = pc.replace_substring(pc.replace_substring_regex(plain, _THOUSANDS, r"\1"), ",", ".")
     infinite = pc.match_substring_regex(low, _INFINITE)
     good = pc.match_substring_regex(plain, _NUMERIC)
     count = pc.sum(good).as_py() + pc.sum(infinite).as_py()

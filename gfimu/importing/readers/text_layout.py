@@ -7,6 +7,8 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from gfimu.importing.notation import kind_of, unit_of_name
+
 __all__ = ["COMMENT_MARKS", "Layout", "cells_of", "layout_of"]
 
 COMMENT_MARKS = "#;%/*"
@@ -14,9 +16,10 @@ _LOOKED_AT = 400  # lines
 _SEPARATORS = {"comma": ",", "semicolon": ";", "tab": "\t", "space": " "}
 _NUMBER = {
     ".": re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE),
-    ",": re.compile(r"[+-]?(\d+,?\d*|,\d+)([eE][+-]?\d+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE),
+    ",": re.compile(r"[+-]?(\d{1,3}(\.\d{3})+,\d+|\d+,?\d*|,\d+)([eE][+-]?\d+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE),
 }
 _LEAST_NUMBERS = 0.5  # of the cells of a line of data
+_NO_UNITS = {"", "-", "1", "raw", "cal", "counts", "lsb", "%", "mv", "v", "ut", "gauss", "hpa", "pa", "local_flux", "no units"}
 
 
 @dataclass(frozen=True)
@@ -84,7 +87,7 @@ def cells_of(line: str, separator: str) -> list[str]:
     """Split a line; a space stands for any number of spaces and tabs, and a last ``;`` closes the line."""
     if separator == " ":
         return line.split()
-    closed = line.rstrip()
+    closed = line.rstrip(" \r\n")
     if separator != ";":
         closed = closed.rstrip(";")
     return [cell.strip().strip('"') for cell in closed.split(separator)]
@@ -106,17 +109,46 @@ def _data_lines(lines: Sequence[str], separator: str, decimal: str, skip: int) -
 
 
 def _header(before: Sequence[str], separator: str, width: int) -> tuple[str, ...] | None:
-    """Return the names in the last line before the numbers, if it has one for each cell."""
+    """Return the names in the last line before the numbers, if it has one for each cell; with a line of units below."""
+    units: list[str] = []
     for line in reversed(before):
         if not line.strip():
             continue
-        cells = cells_of(line.lstrip().lstrip(COMMENT_MARKS).lstrip(), separator)
-        if len(cells) == width + 1:  # the line says what it is: ";Headers, time, Ax"
-            cells = cells[1:]
-        if len(cells) < width - 1 or len(cells) > width:
-            return None
-        cells += [""] * (width - len(cells))
-        names = [cell or f"column_{place}" for place, cell in enumerate(cells, start=1)]
-        repeated = Counter(names)
-        return tuple(f"{name}_{place}" if repeated[name] > 1 else name for place, name in enumerate(names, start=1))
-    return None
+        cells = _named_cells(line, separator, width)
+        if cells is None:
+            break
+        if not units and _are_units(cells):
+            units = cells
+            continue
+        return _names(cells, units)
+    return _names(units, []) if units else None
+
+
+def _named_cells(line: str, separator: str, width: int) -> list[str] | None:
+    """Return the cells of a line of names, one for each cell of a line of numbers; None where the numbers differ."""
+    cells = cells_of(line.lstrip().lstrip(COMMENT_MARKS).lstrip(), separator)
+    if len(cells) == width + 1:  # the line says what it is: ";Headers, time, Ax"; or it ends in a separator
+        cells = cells[1:] if cells[-1] else cells[:-1]
+    if len(cells) < width - 1 or len(cells) > width:
+        return None
+    return cells + [""] * (width - len(cells))
+
+
+def _are_units(cells: Sequence[str]) -> bool:
+    """Tell whether cells hold units: ``ms``, ``[mg]``, ``deg/s``; all that are filled, and not numbers of axes."""
+    plain = [cell.strip(" []()*").lower() for cell in cells]
+    known = [bool(kind_of(cell)) for cell in plain]
+    return sum(known) >= 2 and all(one or cell in _NO_UNITS for one, cell in zip(known, plain, strict=True))
+
+
+def _names(cells: Sequence[str], units: Sequence[str]) -> tuple[str, ...]:
+    """Return names of the columns, each only once, with their units in brackets where a line of them stands below."""
+    names = [cell or f"column_{place}" for place, cell in enumerate(cells, start=1)]
+    if units:
+        below = [unit.strip(" []()*") for unit in units]
+        names = [
+            f"{name} [{unit}]" if kind_of(unit) and not unit_of_name(name)[1] else name
+            for name, unit in zip(names, below, strict=True)
+        ]
+    repeated = Counter(names)
+    return tuple(f"{name}_{place}" if repeated[name] > 1 else name for place, name in enumerate(names, start=1))
