@@ -5,6 +5,7 @@ from __future__ import annotations
 from bisect import bisect_left
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -12,14 +13,16 @@ from numpy.typing import NDArray
 
 from gfimu.errors import InputError
 from gfimu.importing.column_map import TimeSpec
+from gfimu.importing.dates import nanoseconds_of
 from gfimu.importing.notation import factor_of
 from gfimu.importing.raw_table import RawTable
 
-__all__ = ["Times", "increasing_times", "times_of"]
+__all__ = ["Times", "increasing_times", "parts_of", "times_of"]
 
 _FAR = 100.0  # s: times beyond count from the first sample; they keep their digits, and pictures begin there
 _MOST_DROPPED = 0.02  # of the rows, whose time does not increase
 _LONGEST = 1e12  # s: a time beyond is none
+_LEAST_PART = 20  # rows of a part after a restart
 
 
 @dataclass(frozen=True)
@@ -72,12 +75,65 @@ def times_of(table: RawTable, spec: TimeSpec, source: str, *, drop: Collection[s
     name = table.find(spec.column)
     if name is None:
         raise InputError(f"{source}: column {spec.column!r} of the time is missing; the file has {_listed(table)}")
-    if spec.unit == "datetime" or table.columns[name].dtype.kind == "M":
-        steps, origin = _dates(table.columns[name], name, source)
+    values = table.columns[name]
+    if spec.unit == "datetime" or values.dtype.kind == "M":
+        steps, origin = _dates(values, name, source)
+    elif spec.rate_hz is not None:
+        steps, origin = _counts(values, spec.scale / spec.rate_hz, spec.wrap, name, source)[0], 0.0
     else:
         factor = spec.scale * factor_of(spec.unit, "time", where=f"{source}: time")
-        steps, origin = _counts(table.columns[name], factor, spec.wrap, name, source)
-    return increasing_times(steps, origin, f"{source}: column {name}", drop=drop)
+        steps, origin = _counts(values, factor, spec.wrap, name, source)
+    return _of_part(steps, origin, spec.part, f"{source}: column {name}", drop)
+
+
+def parts_of(t: NDArray[np.float64]) -> list[slice]:
+    """Return the rows of each part of a recording whose clock starts anew, as after a restart of the logger.
+
+    A part begins where the time goes back by more than half of what the part before it lasted and goes on from there;
+    both have at least 20 rows. A counter of a fixed number of bits is another case (``wrap``).
+
+    Parameters
+    ----------
+    t : ndarray, shape (n,)
+        Times, s; NaN where a row has none.
+    """
+    rows = np.flatnonzero(np.isfinite(t))
+    back = np.flatnonzero(np.diff(t[rows]) < 0.0)
+    if len(back) > len(rows) // _LEAST_PART:
+        return [slice(0, len(t))]
+    starts = [0]
+    for place in back.tolist():
+        before, after = t[rows[starts[-1] : place + 1]], t[rows[place + 1 : place + 1 + _LEAST_PART]]
+        lasted = float(before.max() - before[0])
+        goes_on = len(after) == _LEAST_PART and bool(np.all(np.diff(after) >= 0.0)) and after[-1] < before.max()
+        if len(before) >= _LEAST_PART and goes_on and before[-1] - after[0] > 0.5 * lasted:
+            starts.append(place + 1)
+    edges = [0, *(int(rows[place]) for place in starts[1:]), len(t)]
+    return [slice(first, last) for first, last in pairwise(edges)]
+
+
+def _of_part(t: NDArray[np.float64], origin: float, part: int | None, where: str, drop: Collection[str]) -> Times:
+    """Return the increasing times of the part that is asked for; of all where the clock starts only once."""
+    parts = parts_of(t)
+    if (len(parts) == 1 and part in {None, 1}) or (part is None and {"duplicates", "unordered"} & set(drop)):
+        return increasing_times(t, origin, where, drop=drop)
+    sizes = ", ".join(str(one.stop - one.start) for one in parts)
+    if part is None:
+        row = parts[1].start
+        raise InputError(
+            f"{where}: the clock starts anew in row {row + 1} ({t[row - 1]:.9g} s, then {t[row]:.9g} s), as after a "
+            f"restart: {len(parts)} parts of {sizes} rows; time.part = 1 takes the first (--map-set time.part=1)"
+        )
+    if part > len(parts):
+        raise InputError(f"{where}: time.part = {part}, but the clock starts {len(parts)} times; give a lower number")
+    taken = parts[part - 1]
+    found = increasing_times(t[taken], origin, where, drop=drop)
+    rows = np.zeros(len(t), dtype=bool)
+    rows[taken] = found.rows
+    source = where.partition(": column ")[0]
+    note = f"{source}: took part {part} of {len(parts)}, {taken.stop - taken.start} of {len(t)} rows"
+    first = float(found.t_s[0]) if len(found.t_s) else 0.0
+    return Times(found.t_s - first, rows, found.origin_s + first, (note, *found.notes), found.dropped)
 
 
 def _counts(
@@ -103,16 +159,19 @@ def _counts(
 
 
 def _dates(values: NDArray[Any], name: str, source: str) -> tuple[NDArray[np.float64], float]:
-    try:
-        stamps = values.astype("datetime64[ns]")
-    except (ValueError, TypeError):
+    """Return times of dates or times of day from the first one on, s, and the first one."""
+    if values.dtype.kind == "M":
+        stamps = values.astype("datetime64[ns]").astype(np.int64)
+        known = ~np.isnat(values)
+    else:
+        stamps, known = nanoseconds_of(values)
+    if not known.any():
         raise InputError(
-            f"{source}: column {name} holds {str(values[0])[:40]!r}, no date as 2024-05-17 12:00:00.000"
-        ) from None
-    known = ~np.isnat(stamps)
-    first = stamps[known][0] if known.any() else stamps[0]
-    steps = np.where(known, (stamps - first).astype("int64") * 1e-9, np.nan)
-    return steps, float(first.astype("int64")) * 1e-9
+            f"{source}: column {name} holds {str(values[0])[:40]!r}, no date as 2024-05-17 12:00:00.000 and no time of "
+            "day as 12:00:00.000"
+        )
+    first = int(stamps[known][0])
+    return np.where(known, (stamps - first) * 1e-9, np.nan), first * 1e-9
 
 
 def increasing_times(t: NDArray[np.float64], origin: float, where: str, *, drop: Collection[str] = ()) -> Times:

@@ -55,15 +55,23 @@ class ColumnSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class TimeSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """When the samples were taken: a column of times or counts, or a constant rate."""
+    """When the samples were taken: a column of times, a column that counts samples of a rate, or a rate alone."""
 
     column: Annotated[_Column | None, _Meta(description="Column of the times; none where only the rate is known.")] = (
         None
     )
-    unit: Annotated[str, _Meta(description="s, ms, us, ns, min, h, or datetime for a date with a time of day.")] = "s"
+    unit: Annotated[
+        str, _Meta(description="s, ms, us, ns, min, h, d, or datetime for dates and times of day as texts.")
+    ] = "s"
     scale: Annotated[float, _Meta(description="What one step of the number is, in that unit.", gt=0)] = 1.0
-    rate_hz: Annotated[_Positive | None, _Meta(description="Sample rate, Hz, where there is no column.")] = None
+    rate_hz: Annotated[
+        _Positive | None, _Meta(description="Sample rate, Hz, where there is no column, or the column counts samples.")
+    ] = None
     wrap: Annotated[_Positive | None, _Meta(description="Number at which the counter of the times starts anew.")] = None
+    part: Annotated[
+        Annotated[int, _Meta(ge=1)] | None,
+        _Meta(description="Which part to take, from 1, where the clock starts anew as after a restart of the logger."),
+    ] = None
     start_s: Annotated[
         Annotated[float, _Meta(ge=0)] | None, _Meta(description="Begin so many seconds after the first sample.")
     ] = None
@@ -95,6 +103,9 @@ class ColumnMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         str, _Meta(description="text, parquet, zip, matlab, hdf5, ulog, mcap, rosbag; else by content.")
     ] = ""
     table: Annotated[str, _Meta(description="Table of the file that holds the channels, where it has several.")] = ""
+    split_by: Annotated[
+        str, _Meta(description="Column that says which chip a row is of; each of its values is a table, sensor=1 say.")
+    ] = ""
     array: Annotated[str, _Meta(description="Array that is assumed where none is given.")] = ""
     time: Annotated[TimeSpec, _Meta(description="When the samples were taken.")] = TimeSpec()
     reference: Annotated[dict[str, ColumnSpec], _Meta(description="References by their name in a recording.")] = {}

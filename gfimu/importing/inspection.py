@@ -11,15 +11,8 @@ import numpy as np
 
 from gfimu.errors import InputError
 from gfimu.importing.clock import Times, times_of
-from gfimu.importing.column_map import REFERENCE_KINDS, ColumnMap, ColumnSpec, TextSpec, TimeSpec, map_toml
-from gfimu.importing.guess import (
-    TriadUnit,
-    find_time,
-    find_triads,
-    unit_of_acceleration,
-    unit_of_rate,
-)
-from gfimu.importing.notation import bracketed_unit, kind_of
+from gfimu.importing.column_map import ColumnMap, TextSpec, TimeSpec, map_toml
+from gfimu.importing.guessing.suggestion import suggest, with_shipped
 from gfimu.importing.oddities import oddities
 from gfimu.importing.raw_table import RawFile, RawTable
 from gfimu.importing.readers import read_foreign
@@ -27,10 +20,6 @@ from gfimu.importing.recognise import fitting_maps, own_chips
 from gfimu.units import REFERENCE_UNITS, TIME_COLUMNS
 
 __all__ = ["ColumnView", "Inspection", "inspect_file"]
-
-_TACHO = ("tacho", "rpm", "omega", "speed")
-_ANGLE = ("angle", "theta", "encoder")
-_TEMPERATURE = ("temperature", "temp_", "degc")
 
 
 @dataclass(frozen=True)
@@ -144,48 +133,34 @@ def inspect_file(path: str | Path, *, table: str = "", text: TextSpec = TextSpec
         If the file can't be read at all.
     """
     raw = read_foreign(path, text=text)
-    chosen = raw.table(table) if table else _most_promising(raw)
-    time = find_time(chosen)
-    taken = [str(time[0].column)] if time else []
-    own = own_chips(list(chosen.columns))
+    plain = raw.table(table) if table else next(iter(raw.tables.values()))
+    own = own_chips(list(plain.columns))
     if own:
-        return _own_recording(raw, chosen, own)
-    triads = find_triads(chosen, taken)
-    forces = [one.columns for one in triads if one.kind == "acceleration"]
-    rates = [one.columns for one in triads if one.kind == "rate"]
-    reasons = [time[1] if time else "no column of times was found: rate_hz is a guess to correct"]
-    channels, roles = _channels(chosen, forces, reasons)
-    reference = _reference(chosen, rates, reasons, roles)
-    if time:
-        roles[str(time[0].column)] = "time"
-    spec = time[0] if time else TimeSpec(rate_hz=100.0)
-    suggested = None
-    if channels or reference:
-        suggested = ColumnMap(
-            _map_name(path),
-            channels,
-            time=spec,
-            reference=reference,
-            text=_layout(chosen, text),
-            table=chosen.name if len(raw.tables) > 1 else "",
-            format="" if raw.format == "text" else raw.format,
-        )
-    times, findings = _times(chosen, spec, raw.source)
-    findings += [note.removeprefix(f"{raw.source}: ") for note in chosen.notes]
-    findings += oddities({name: chosen.numbers(name) for three in forces for name in three})
+        return _own_recording(raw, plain, own)
+    found = suggest(raw, table=table, name=_map_name(path), text=text)
+    fitting = tuple(fitting_maps(raw))
+    suggested, reasons = found.column_map, found.reasons
+    time, is_rate_known = found.time.spec, found.time.is_rate_known
+    if suggested is not None and len(fitting) == 1 and fitting_maps(raw, fully=True):
+        suggested, differences = with_shipped(found, suggested, fitting[0])
+        reasons = (f"the map {fitting[0]} that comes with gfimu fits: columns, rate, gravity at rest", *differences)
+        time, is_rate_known = suggested.time, True
+    times, findings = _times(found.table, time, raw.source)
+    findings += [note.removeprefix(f"{raw.source}: ") for note in found.table.notes]
+    findings += oddities({name: one.numbers(name) for one, triad in found.chips for name in triad.columns})
     return Inspection(
         raw.source,
         raw.format,
-        chosen.name,
-        tuple(f"{name or 'the file'} ({len(one)} rows)" for name, one in raw.tables.items()),
-        len(chosen),
-        tuple(_view(chosen, name, roles.get(name, "")) for name in chosen.columns),
-        tuple(fitting_maps(raw)),
+        found.table.name,
+        tuple(f"{name or 'the file'} ({len(one)} rows)" for name, one in found.raw.tables.items()),
+        len(found.table),
+        tuple(_view(found.table, name, found.roles.get(name, "")) for name in found.table.columns),
+        fitting,
         suggested,
-        tuple(reasons),
+        reasons,
         tuple(findings),
-        _rate(times),
-        len(forces),
+        _rate(times) if is_rate_known else float("nan"),
+        len(found.chips),
     )
 
 
@@ -227,79 +202,6 @@ def _rate(times: Times | None) -> float:
 
 def _map_name(path: str | Path) -> str:
     return Path(path).name.partition(".")[0] or "map"
-
-
-def _layout(table: RawTable, text: TextSpec) -> TextSpec:
-    return text if table.named or text.columns else TextSpec(columns=tuple(table.columns))
-
-
-def _most_promising(raw: RawFile) -> RawTable:
-    """Return the table with the most triads of accelerations, the longest of those."""
-
-    def worth(table: RawTable) -> tuple[int, int]:
-        return sum(one.kind == "acceleration" for one in find_triads(table)), len(table)
-
-    return max(raw.tables.values(), key=worth)
-
-
-def _channels(
-    table: RawTable, forces: Sequence[tuple[str, str, str]], reasons: list[str]
-) -> tuple[dict[str, ColumnSpec], dict[str, str]]:
-    """Return the channels of a map, and the roles of their columns."""
-    channels, roles = {}, {}
-    for chip, columns in enumerate(forces, start=1):
-        unit = unit_of_acceleration(table, columns)
-        reasons.append(f"chip a{chip} ({', '.join(columns)}): {unit.why}{'' if unit.sure else ' (check this)'}")
-        for axis, name in enumerate(columns, start=1):
-            channels[f"a{chip}{axis}"] = _spec(name, unit, axis - 1)
-            roles[name] = f"a{chip}{axis}, {_scaled(unit)}"
-    return channels, roles
-
-
-def _reference(
-    table: RawTable, rates: Sequence[tuple[str, str, str]], reasons: list[str], roles: dict[str, str]
-) -> dict[str, ColumnSpec]:
-    """Return the first gyro, and a tachometer, angle and temperature by their names."""
-    reference = {}
-    for columns in rates[:1]:
-        unit = unit_of_rate(table, columns)
-        reasons.append(f"gyro ({', '.join(columns)}): {unit.why}{'' if unit.sure else ' (check this)'}")
-        for axis, name in zip("xyz", columns, strict=True):
-            reference[f"gyro_{axis}_rad_s"] = _spec(name, unit, 0)
-            roles[name] = f"gyro {axis}, {_scaled(unit)}"
-    for name in table.columns:
-        known = _known_reference(name)
-        if known is None or name in roles or known[0] in reference or table.columns[name].dtype == object:
-            continue
-        key, by_name = known
-        reference[key] = ColumnSpec(name, by_name)
-        roles[name] = f"{key.partition('_')[0]}, {by_name}"
-        reasons.append(f"{key.partition('_')[0]} ({name}): {by_name}, by its name (check this)")
-    return reference
-
-
-def _known_reference(name: str) -> tuple[str, str] | None:
-    """Return the reference that a column is by its name, and its unit; None if it is none."""
-    plain, bracketed = bracketed_unit(name.lower())
-    words = {"tacho_rad_s": _TACHO, "angle_rad": _ANGLE, "temperature_degC": _TEMPERATURE}
-    for key, marks in words.items():
-        if any(mark in plain for mark in marks):
-            if bracketed:
-                return (key, bracketed) if kind_of(bracketed) == REFERENCE_KINDS[key] else None
-            if key == "temperature_degC":
-                return key, "degC"
-            degrees = "deg" in plain
-            usual = "rpm" if "rpm" in plain else "deg/s" if degrees else "rad/s"
-            return key, usual if key == "tacho_rad_s" else "deg" if degrees else "rad"
-    return None
-
-
-def _spec(name: str, unit: TriadUnit, axis: int) -> ColumnSpec:
-    return ColumnSpec(name, unit.unit, unit.scale, unit.offset[axis])
-
-
-def _scaled(unit: TriadUnit) -> str:
-    return unit.unit if unit.scale == 1.0 else f"1/{1.0 / unit.scale:.5g} {unit.unit}"
 
 
 def _view(table: RawTable, name: str, role: str) -> ColumnView:

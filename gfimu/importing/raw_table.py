@@ -86,6 +86,10 @@ class RawFile:
     format: str
     tables: Mapping[str, RawTable] = field(default_factory=dict)
 
+    def has(self, name: str) -> bool:
+        """Whether there is a table of that name, or exactly one whose name ends so."""
+        return name in self.tables or sum(_plain(key).endswith(_plain(name)) for key in self.tables) == 1
+
     def table(self, name: str) -> RawTable:
         """Return a table by its name or the end of it.
 

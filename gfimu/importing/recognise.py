@@ -11,14 +11,17 @@ import numpy as np
 from gfimu.errors import GfimuError, InputError
 from gfimu.importing.clock import times_of
 from gfimu.importing.column_map import ColumnMap, list_maps, load_map
-from gfimu.importing.guess import NEAR, RATES, rest_windows
-from gfimu.importing.notation import factor_of
+from gfimu.importing.guessing.times import RATES
+from gfimu.importing.guessing.units import NEAR, rest_windows
+from gfimu.importing.notation import bracketed_unit, factor_of, kind_of
 from gfimu.importing.raw_table import RawFile, RawTable
 from gfimu.importing.readers import read_foreign
 from gfimu.units import READING_UNITS, STANDARD_GRAVITY
 
 __all__ = ["fitting_maps", "map_hint", "own_chips"]
 
+_FULLY = 3  # rate and gravity
+_FAR = 20.0  # times gravity, or its inverse, at rest by a map: the units are others
 _CHANNEL = re.compile(rf"([A-Za-z]+[0-9]*)[0-9]_({'|'.join(READING_UNITS)})")
 
 
@@ -46,8 +49,12 @@ def map_hint(path: str | Path) -> str:
     return f"gfimu inspect {path} shows what it holds and prints a column map for --map"
 
 
-def fitting_maps(raw: RawFile) -> list[str]:
-    """Return the shipped maps that a file has all columns of and that give the most plausible rate and gravity."""
+def fitting_maps(raw: RawFile, *, fully: bool = False) -> list[str]:
+    """Return the shipped maps that a file has all columns of and that give the most plausible rate and gravity.
+
+    A map that makes gravity at rest wrong by a factor of twenty, as one in counts does of readings in g, fits none.
+    ``fully``: only maps that make both the rate and gravity right.
+    """
     found = []
     for name in list_maps():
         column_map = load_map(name)
@@ -55,9 +62,12 @@ def fitting_maps(raw: RawFile) -> list[str]:
             continue
         tables = [one for key, one in raw.tables.items() if not column_map.table or key == column_map.table]
         score = max((_score(table, column_map) for table in tables), default=0)
-        if score:
-            found.append((_plausibility(raw, column_map), score, name))
+        plausible = _plausibility(raw, column_map) if score else None
+        if plausible is not None:
+            found.append((plausible, score, name))
     best = max((plausible for plausible, *_ in found), default=0)
+    if fully and best < _FULLY:
+        return []
     return [name for plausible, _, name in sorted(found, key=lambda one: (-one[1], one[2])) if plausible == best]
 
 
@@ -78,8 +88,8 @@ def _score(table: RawTable, column_map: ColumnMap) -> int:
     return 0 if missing or not has_time else len(present) + 1
 
 
-def _plausibility(raw: RawFile, column_map: ColumnMap) -> int:
-    """Return how many of rate, gravity and range of the gyro are as they should be by a map."""
+def _plausibility(raw: RawFile, column_map: ColumnMap) -> int | None:
+    """Return how well rate (1) and gravity (2) are as they should be by a map; None where gravity is far off."""
     for found in raw.tables.values():
         table = found
         if column_map.text.columns and len(found.columns) == len(column_map.text.columns):
@@ -87,11 +97,11 @@ def _plausibility(raw: RawFile, column_map: ColumnMap) -> int:
         three = [(table.find(spec.column), spec) for spec in list(column_map.channels.values())[:3]]
         if any(name is None for name, _ in three):
             continue
-        try:
-            t = times_of(table, column_map.time, raw.source).t_s
-        except InputError:
-            return 0
-        rate = 1.0 / float(np.median(np.diff(t))) if len(t) > 1 else 0.0
+        units = [bracketed_unit(str(name))[1] for name, _ in three]
+        if any(
+            unit and _step(unit) != spec.scale * _step(spec.unit) for unit, (_, spec) in zip(units, three, strict=True)
+        ):
+            return None
         values = np.column_stack(
             [
                 (table.numbers(str(name)) - spec.offset) * spec.scale * factor_of(spec.unit, "acceleration")
@@ -100,6 +110,19 @@ def _plausibility(raw: RawFile, column_map: ColumnMap) -> int:
         )
         windows = rest_windows(values)
         length = float(np.median(np.linalg.norm(windows, axis=1))) if len(windows) else 0.0
+        if length and not 1.0 / _FAR < length / STANDARD_GRAVITY < _FAR:
+            return None
         gravity = abs(length / STANDARD_GRAVITY - 1.0) < NEAR
+        if column_map.text.columns and not gravity:
+            return None  # without names gravity alone speaks for a map
+        try:
+            t = times_of(table, column_map.time, raw.source).t_s
+        except InputError:
+            return 2 * gravity
+        rate = 1.0 / float(np.median(np.diff(t))) if len(t) > 1 else 0.0
         return 2 * gravity + (RATES[0] <= rate <= RATES[1])
     return 0
+
+
+def _step(unit: str) -> float:
+    return factor_of(unit, "acceleration") if kind_of(unit) == "acceleration" else 0.0

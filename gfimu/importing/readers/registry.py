@@ -10,6 +10,7 @@ from gfimu.errors import InputError, unknown_name
 from gfimu.importing.column_map import TextSpec
 from gfimu.importing.raw_table import RawFile
 from gfimu.importing.readers.logs import read_bag, read_mcap, read_ulog
+from gfimu.importing.readers.records import is_workbook, read_excel, read_json
 from gfimu.importing.readers.tables import read_archive, read_hdf5, read_matlab, read_parquet
 from gfimu.importing.readers.text import is_text, read_text
 from gfimu.plugins import plugins
@@ -42,6 +43,8 @@ READERS: Mapping[str, Reader] = {
     "text": Reader(read_text, (b"\x1f\x8b\x08",)),
     "parquet": Reader(read_parquet, (b"PAR1",)),
     "zip": Reader(read_archive, (b"PK\x03\x04",)),
+    "excel": Reader(read_excel, ()),
+    "json": Reader(read_json, (b'{"', b"{\n", b"{\r", b'[{"', b"[\n", b"[\r", b"[[")),
     "matlab": Reader(read_matlab, (b"MATL",)),
     "hdf5": Reader(read_hdf5, (b"\x89HDF",)),
     "ulog": Reader(read_ulog, (b"ULog",)),
@@ -78,9 +81,10 @@ def format_of(path: Path) -> str:
     if not head:
         raise InputError(f"{path}: empty file; record again or give another file")
     known = readers()
+    plain = head.removeprefix(b"\xef\xbb\xbf").lstrip() if head.lstrip()[:1] in {b"{", b"["} else head
     for name, reader in known.items():
-        if head.startswith(reader.marks):
-            return name
+        if reader.marks and plain.startswith(reader.marks):
+            return "excel" if name == "zip" and is_workbook(path) else name
     if is_text(head):
         return "text"
     raise InputError(f"{path}: a binary file of unknown format; known are {', '.join(known)}")

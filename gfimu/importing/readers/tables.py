@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import zipfile
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -52,7 +53,7 @@ def read_archive(path: Path, text: TextSpec = TextSpec()) -> RawFile:
     try:
         with zipfile.ZipFile(path) as archive:
             members = [one for one in archive.namelist() if Path(one).suffix.lower() in {".csv", ".txt", ".tsv"}]
-            tables = {one: _member(archive.read(one), f"{path}/{one}", text) for one in members}
+            tables = {one: _member(archive.read(one), path, one, text) for one in members}
     except (zipfile.BadZipFile, OSError, RuntimeError) as error:
         raise InputError(f"{path}: damaged archive ({error}); copy it again") from None
     found = {name: table for name, table in tables.items() if table is not None}
@@ -61,9 +62,9 @@ def read_archive(path: Path, text: TextSpec = TextSpec()) -> RawFile:
     return RawFile(str(path), "zip", found)
 
 
-def _member(data: bytes, source: str, text: TextSpec) -> RawTable | None:
+def _member(data: bytes, path: Path, name: str, text: TextSpec) -> RawTable | None:
     try:
-        return table_of_text(data, source, text)
+        return replace(table_of_text(data, f"{path}/{name}", text), name=name)
     except InputError:
         return None  # a description, not a table
 

@@ -21,7 +21,7 @@ from gfimu.importing.raw_table import RawFile, RawTable
 from gfimu.importing.readers.text_layout import COMMENT_MARKS, Layout, layout_of
 from gfimu.importing.readers.text_lines import plain_lines
 
-__all__ = ["is_text", "read_text", "table_of_text"]
+__all__ = ["cell_values", "is_text", "read_text", "table_of_text"]
 
 _NUMERIC = r"^[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?$"
 _INTEGER = r"^[+-]?(\d{1,18}|[1-8]\d{18})$"  # of 64 bits
@@ -60,7 +60,7 @@ def table_of_text(data: bytes, source: str, text: TextSpec = TextSpec()) -> RawT
         raise InputError(
             f"{source}: no line holds numbers; give a recording, or the separator in a map (text.separator)"
         )
-    body = _body(lines[layout.first :], layout)
+    body, repeated = _body(lines[layout.first :], layout, lines[: layout.first])
     skipped = []
 
     def skip(row: Any) -> str:
@@ -83,9 +83,10 @@ def table_of_text(data: bytes, source: str, text: TextSpec = TextSpec()) -> RawT
             f"{source}: no line has the {len(layout.names)} cells of the columns {', '.join(layout.names[:6])}"
         )
     notes = [f"{source}: left out {len(skipped)} lines with another number of cells"] if skipped else []
+    notes += [f"{source}: left out {repeated} lines that repeat one before the numbers"] if repeated else []
     columns: dict[str, NDArray[Any]] = {}
     for name in layout.names:
-        values, unreadable = _values(table.column(name).combine_chunks(), layout.decimal)
+        values, unreadable = cell_values(table.column(name).combine_chunks(), layout.decimal)
         if values is None:
             continue  # an empty column, as after a separator that closes each line
         columns[name] = values
@@ -114,17 +115,20 @@ def _decoded(data: bytes, source: str) -> str:
     return content.replace("\r\n", "\n").replace("\r", "\n")
 
 
-def _body(lines: list[str], layout: Layout) -> str:
-    """Return the lines of numbers in one piece, without comments among them."""
-    kept = [line for line in lines if line.strip() and line.lstrip()[0] not in COMMENT_MARKS]
+def _body(lines: list[str], layout: Layout, before: list[str]) -> tuple[str, int]:
+    """Return the lines of numbers in one piece, without comments among them and without repeated headers."""
+    filled = [line for line in lines if line.strip() and line.lstrip()[0] not in COMMENT_MARKS]
+    head = {line.strip() for line in before}
+    kept = [line for line in filled if line.strip() not in head]
+    repeated = len(filled) - len(kept)
     if layout.separator == " ":
-        return "\n".join(" ".join(line.split()) for line in kept) + "\n"
+        return "\n".join(" ".join(line.split()) for line in kept) + "\n", repeated
     if layout.separator != ";" and any(line.rstrip().endswith(";") for line in kept[:3]):
         kept = [line.rstrip().rstrip(";") for line in kept]
-    return "\n".join(kept) + "\n"
+    return "\n".join(kept) + "\n", repeated
 
 
-def _values(cells: pa.Array, decimal: str) -> tuple[NDArray[Any] | None, int]:
+def cell_values(cells: pa.Array, decimal: str) -> tuple[NDArray[Any] | None, int]:
     """Return the cells of a column as numbers if most are, else as text; None if all are empty."""
     plain = pc.utf8_trim_whitespace(cells)
     low = pc.utf8_lower(plain)

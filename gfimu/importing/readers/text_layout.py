@@ -16,10 +16,12 @@ _LOOKED_AT = 400  # lines
 _SEPARATORS = {"comma": ",", "semicolon": ";", "tab": "\t", "space": " "}
 _NUMBER = {
     ".": re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE),
-    ",": re.compile(r"[+-]?(\d{1,3}(\.\d{3})+,\d+|\d+,?\d*|,\d+)([eE][+-]?\d+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE),
+    ",": re.compile(
+        r"[+-]?(\d{1,3}(\.\d{3})+,\d+|\d+,?\d*|,\d+)([eE][+-]?\d+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE
+    ),
 }
 _LEAST_NUMBERS = 0.5  # of the cells of a line of data
-_NO_UNITS = {"", "-", "1", "raw", "cal", "counts", "lsb", "%", "mv", "v", "ut", "gauss", "hpa", "pa", "local_flux", "no units"}
+_NO_UNITS = {"", "-", "1", "raw", "cal", "counts", "lsb", "%", "mv", "v", "ut", "gauss", "hpa", "pa", "local_flux"}
 
 
 @dataclass(frozen=True)
@@ -75,7 +77,9 @@ def layout_of(
             (width, lines_so), *_ = Counter(count for _, count in counted).most_common(1)
             first = next(number for number, count in counted if count == width) if skip is None else skip
             header = _header(looked[:first], mark, width) if not names else None
-            known = tuple(names) or header or tuple(f"column_{place}" for place in range(1, width + 1))
+            numbered = tuple(f"column_{place}" for place in range(1, width + 1))
+            # Names may end before the cells do, as where a separator closes each line.
+            known = tuple(names) + numbered[len(names) :] if names else header or numbered
             score = (lines_so, width)
             # A point is the usual decimal mark: a comma has to read more lines, or more cells of them.
             if best is None or score > best[0]:

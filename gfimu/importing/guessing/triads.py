@@ -1,0 +1,150 @@
+"""Triads of an unknown table: columns that belong together as x, y and z, of acceleration or of rate."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gfimu.importing.guessing.units import rest_windows, sphere_of, triad_values, unit_of_acceleration
+from gfimu.importing.notation import kind_of, unit_of_name
+from gfimu.importing.raw_table import RawTable
+
+__all__ = ["Triad", "find_triads"]
+
+_STRONG = re.compile(r"acc|force|adxl|mma\d|lis\d|bma\d|kx\d|kxrb", re.IGNORECASE)
+_WEAK = re.compile(r"^a[xyz_\d\[ ]|_a_|^a_", re.IGNORECASE)
+_GYRO = re.compile(r"gyr|omega|angular|^w[xyz_\d\[ ]|^w_|rate|rot|itg", re.IGNORECASE)
+_FREE = re.compile(r"free|lin\w* ?acc|without ?g|user ?acc", re.IGNORECASE)
+_NEITHER = re.compile(
+    r"mag(?!nitude)|^m_?[xyz]$|euler|quat|orient|^field[ _]?[xyz]|_field|angle|roll|pitch|yaw|pos|vel_|std|cov|temp|gps"
+    r"|^q_?[0-3wxyz]$|mat\[|rotm|dcm|setpoint|motor|axis[pidf]|command|gravity|uncal",
+    re.IGNORECASE,
+)
+
+
+@dataclass(frozen=True)
+class Triad:
+    """Three columns that belong together.
+
+    Parameters
+    ----------
+    columns : tuple of str
+        Names along x, y and z.
+    kind : str
+        ``acceleration``, ``rate``, or empty.
+    """
+
+    columns: tuple[str, str, str]
+    kind: str
+
+
+def find_triads(table: RawTable, taken: Sequence[str] = ()) -> list[Triad]:
+    """Return columns whose names differ in x, y, z (or 0, 1, 2 or 1, 2, 3) alone, of acceleration or rate.
+
+    Where the numbers of one triad are gravity at rest, others count as acceleration only if their names say so.
+    """
+    free = {_short(name): name for name in table.columns if name not in taken and table.columns[name].dtype != object}
+    if not table.named:
+        return _without_names(table, [name for name in free.values() if np.ptp(_known(table, name)) > 0.0])
+    found: list[tuple[Triad, bool]] = []
+    used: set[str] = set()
+    for short, name in free.items():
+        for axes in (("x", "y", "z"), ("0", "1", "2"), ("1", "2", "3")):
+            for place in (spot for spot, letter in enumerate(short) if letter == axes[0]):
+                three = [short[:place] + axis + short[place + 1 :] for axis in axes]
+                if all(one in free for one in three) and not used & set(three):
+                    used |= set(three)
+                    columns = (name, free[three[1]], free[three[2]])
+                    kind, by_name = _kind(table, columns)
+                    found.append((Triad(columns, kind), by_name))
+    return _by_gravity(table, found)
+
+
+def _known(table: RawTable, name: str) -> NDArray[np.float64]:
+    values = table.numbers(name)
+    known = values[np.isfinite(values)]
+    return known if len(known) else np.zeros(1)
+
+
+def _without_names(table: RawTable, names: Sequence[str]) -> list[Triad]:
+    """Return neighbours of which gravity is the length, and threes of what stands between those."""
+    found: list[Triad] = []
+    apart: list[str] = []
+    place = 0
+    while place < len(names):
+        three = tuple(names[place : place + 3])
+        if len(three) == 3 and _is_gravity(table, (three[0], three[1], three[2])):
+            found += _threes(table, apart)
+            found.append(Triad((three[0], three[1], three[2]), "acceleration"))
+            apart = []
+            place += 3
+        else:
+            apart.append(names[place])
+            place += 1
+    found += _threes(table, apart)
+    return _by_gravity(table, [(one, False) for one in found])
+
+
+def _is_gravity(table: RawTable, columns: tuple[str, str, str]) -> bool:
+    return _kind_by_numbers(table, columns) == "acceleration" and unit_of_acceleration(table, columns).is_gravity
+
+
+def _threes(table: RawTable, names: Sequence[str]) -> list[Triad]:
+    groups = [(names[first], names[first + 1], names[first + 2]) for first in range(0, len(names) - 2, 3)]
+    return [Triad(one, _kind_by_numbers(table, one)) for one in groups]
+
+
+def _by_gravity(table: RawTable, triads: Sequence[tuple[Triad, bool]]) -> list[Triad]:
+    """Return triads with what the gravity of one says of the others: those with no name for it are no acceleration."""
+    gravity = [one.kind == "acceleration" and unit_of_acceleration(table, one.columns).is_gravity for one, _ in triads]
+    if not any(gravity):
+        return [one for one, _ in triads]
+    return [
+        replace(one, kind="rate") if one.kind == "acceleration" and not fits and not by_name else one
+        for (one, by_name), fits in zip(triads, gravity, strict=True)
+    ]
+
+
+def _short(name: str) -> str:
+    return unit_of_name(name)[0].lower()
+
+
+def _kind(table: RawTable, columns: tuple[str, str, str]) -> tuple[str, bool]:
+    """Return what three columns measure, and whether their names say so: by unit, by name, or by their numbers."""
+    plain, unit = unit_of_name(columns[0])
+    kind = kind_of(unit) if unit else ""
+    if unit and kind not in {"acceleration", "rate"}:
+        return "", True
+    for name in (plain, table.name):
+        if _NEITHER.search(name):
+            return "", True
+        if (kind == "acceleration" or not kind) and _FREE.search(name):
+            # ROS has gravity in its linear acceleration, phones have not.
+            return ("acceleration" if unit_of_acceleration(table, columns).is_gravity else ""), True
+        if kind:
+            return kind, True
+        if _GYRO.search(name):
+            return "rate", True
+        if _STRONG.search(name):
+            return "acceleration", True
+    if _WEAK.search(plain):
+        return "acceleration", False
+    return _kind_by_numbers(table, columns), False
+
+
+def _kind_by_numbers(table: RawTable, columns: Sequence[str]) -> str:
+    """Return acceleration where the length of the vector at rest is the same in all poses, else rate near zero."""
+    values = triad_values(table, columns)
+    windows = rest_windows(values)
+    if not len(windows) or not values[np.isfinite(values)].any():
+        return ""
+    lengths = np.linalg.norm(windows, axis=1)
+    spread = float(np.std(lengths) / max(np.median(lengths), 1e-12))
+    largest = float(np.nanmax(np.abs(values)))
+    if spread < 0.1 and np.median(lengths) > 0.02 * largest:
+        return "acceleration"
+    return "acceleration" if sphere_of(windows) is not None else "rate"
