@@ -20,7 +20,7 @@ _CLOCK = (
 )
 _HALF = r"(?:\s*(?P<half>[AaPp])\.?[Mm]\.?)?"
 _ZONE = r"(?:\s*(?P<zone>Z|z|UTC|GMT|[+-]\d{2}:?\d{2}))?(?:\s+\[?[A-Za-z]+(?:/[A-Za-z_]+)?\]?)?"
-_FULL = rf'^[\s"]*(?:{_DATE})?[T _,]*{_CLOCK}{_HALF}{_ZONE}[\s"]*$'
+_FULL = rf'^[\s"]*(?:\d+ days?,? +)?(?:{_DATE})?[T _,]*{_CLOCK}{_HALF}{_ZONE}[\s"]*$'
 _MINUTES = r'^[\s"]*(?P<M>\d{1,3}):(?P<S>\d{2})(?:[.,](?P<f>\d+))?[\s"]*$'
 
 

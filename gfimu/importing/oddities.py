@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["DataRail", "oddities", "rails_of"]
+__all__ = ["DataRail", "oddities", "rails_of", "sentinels_of"]
 
 _NOISY = 3.0  # times the median noise of the channels of its kind
 _PILE = 0.002  # of the samples, at an extreme, from which it is a rail
@@ -16,6 +16,20 @@ _PILE_WIDTH = 12.0  # counts: an ADC that overshoots piles up beside the rail, t
 _AT_ONE = 0.75  # of the samples near an extreme, that are at one count on a rail
 _LEAST_VALUES = 50  # of a channel that moves
 _CORRUPT = 1e6  # times the median size
+_SENTINELS = (
+    99.0,
+    999.0,
+    9999.0,
+    99999.0,
+    999999.0,
+    32767.0,
+    32768.0,
+    8388607.0,
+    8388608.0,
+    2147483647.0,
+    2147483648.0,
+)
+_APART = 3.0  # spans of the other values, by which a number that stands for a missing one lies beyond them
 
 
 def oddities(columns: dict[str, NDArray[np.float64]]) -> list[str]:
@@ -94,3 +108,19 @@ def rails_of(values: NDArray[np.float64]) -> list[DataRail]:
             beyond = values >= pile - count if side == "most" else values <= pile + count
             found.append(DataRail(side, pile, near & beyond))
     return found
+
+
+def sentinels_of(values: NDArray[np.float64]) -> tuple[float, ...]:
+    """Return numbers of a channel, (n,), that stand for a missing value: -9999 and the like, far from all others."""
+    found: list[float] = []
+    levels = np.unique(values[np.isfinite(values)])
+    for _ in range(2):
+        if len(levels) < _LEAST_VALUES:
+            break
+        for extreme, rest in ((levels[0], levels[1:]), (levels[-1], levels[:-1])):
+            away = float(min(abs(extreme - rest[0]), abs(extreme - rest[-1])))
+            if abs(float(extreme)) in _SENTINELS and away > _APART * max(float(np.ptp(rest)), 1e-9):
+                found.append(float(extreme))
+                levels = rest
+                break
+    return tuple(found)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -12,22 +12,27 @@ from numpy.typing import NDArray
 
 from gfimu.errors import InputError
 from gfimu.importing.clock import times_of
-from gfimu.importing.column_map import REFERENCE_KINDS, ColumnMap, ColumnSpec, TextSpec, TimeSpec, load_map
+from gfimu.importing.column_map import REFERENCE_KINDS, ColumnMap, TextSpec, TimeSpec, load_map
+from gfimu.importing.guessing.parts import (
+    GYRO,
+    LEAST_ROWS,
+    chip_part,
+    force_of,
+    gyro_part,
+    other_references,
+    reason,
+    single_axes,
+)
 from gfimu.importing.guessing.times import RATES, TimeGuess, find_time
 from gfimu.importing.guessing.triads import Triad, find_triads
-from gfimu.importing.guessing.units import TriadUnit, triad_values, unit_of_acceleration, unit_of_rate
-from gfimu.importing.notation import factor_of, kind_of, unit_of_name
+from gfimu.importing.guessing.units import unit_of_acceleration
+from gfimu.importing.notation import factor_of
+from gfimu.importing.oddities import sentinels_of
 from gfimu.importing.raw_table import RawFile, RawTable
 from gfimu.importing.splitting import find_split, split_file
 
 __all__ = ["Suggestion", "suggest", "with_shipped"]
 
-_GYRO = ("gyro_x_rad_s", "gyro_y_rad_s", "gyro_z_rad_s")
-_TACHO = ("tacho", "rpm", "omega", "speed")
-_ANGLE = ("angle", "theta", "encoder")
-_TEMPERATURE = ("temperature", "temp_", "degc", "imu_temp")
-_OTHER_QUANTITY = re.compile(r"gps|ground|wind|km/?h|mph|knots|[ _]?[xyz]$|steer")
-_LEAST_ROWS = 0.2  # of the longest table: a table of another chip has as many samples
 _DIFFERENT = 0.1  # relative, by which numbers and a map may differ: gains of parts
 _EPOCH = (1e9, 4e9)  # s since 1970, from 2001 to 2096
 
@@ -89,12 +94,17 @@ def suggest(raw: RawFile, *, table: str = "", name: str = "map", text: TextSpec 
         chosen = _most_promising(raw)
         time = find_time(chosen)
         reasons.append(f"{split_by} says which chip a row is of: {', '.join(raw.tables)}")
+    missing = _missing(raw)
+    if missing:
+        raw = _without(raw, missing)
+        chosen = raw.table(chosen.name) if len(raw.tables) > 1 else next(iter(raw.tables.values()))
+        reasons.append(f"{', '.join(f'{one:g}' for one in missing)} lies far from all other readings: taken as missing")
     skipped, time = _leading_rows(chosen, time)
     if skipped:
         chosen = replace(chosen, columns={key: values[skipped:] for key, values in chosen.columns.items()})
         raw = RawFile(raw.source, raw.format, {**raw.tables, chosen.name: chosen})
         reasons.append(f"the first {skipped} rows are no readings: the time of the start and the sample rate")
-    reasons.append(_line(time.why, time.sure))
+    reasons.append(reason(time.why, time.sure))
     roles = dict.fromkeys(time.columns, "time or counter")
     roles |= {} if time.spec.column is None else {str(time.spec.column): "time"}
     triads = find_triads(chosen, time.columns)
@@ -105,15 +115,17 @@ def suggest(raw: RawFile, *, table: str = "", name: str = "map", text: TextSpec 
         for found in (own if other is chosen else _alike(other, chosen, own) if own else [])
     ]
     units = [unit_of_acceleration(one, triad.columns) for one, triad in chips]
+    singles = [] if chips else single_axes(chosen, {*roles, *(name for one in triads for name in one.columns)})
     parts = [
-        _chip(number, chosen, one, triad, unit)
+        chip_part(number, chosen, one, triad, unit)
         for number, ((one, triad), unit) in enumerate(zip(chips, units, strict=True), start=1)
     ]
+    parts += singles
     channels = {key: spec for part in parts for key, spec in part.columns.items()}
-    force = next((_force(*chip, unit) for chip, unit in zip(chips, units, strict=True) if chip[0] is chosen), None)
-    gyro = _gyro(raw, chosen, [one for one in triads if one.kind == "rate"], force, _sample_rate(chosen, time))
+    force = next((force_of(*chip, unit) for chip, unit in zip(chips, units, strict=True) if chip[0] is chosen), None)
+    gyro = gyro_part(raw, chosen, [one for one in triads if one.kind == "rate"], force, _sample_rate(chosen, time))
     taken = {*roles, *(name for part in (*parts, gyro) for name in part.roles)}
-    others = _other_references(chosen, taken)
+    others = other_references(chosen, taken)
     parts += [gyro, others]
     reference = {**gyro.columns, **others.columns}
     reasons += [line for part in parts for line in part.reasons]
@@ -124,7 +136,7 @@ def suggest(raw: RawFile, *, table: str = "", name: str = "map", text: TextSpec 
             f"{', '.join(unused[:4])}: not used; a tachometer or an angle goes under [reference], as "
             f'tacho_rad_s = {{ column = "{unused[0]}", unit = "rad/s" }}'
         )
-    if not chips:
+    if not chips and not singles:
         reasons.append(
             "no three columns look like accelerations; name them, as --map-set unit=g --map-set channels.a11=COLUMN"
         )
@@ -140,6 +152,7 @@ def suggest(raw: RawFile, *, table: str = "", name: str = "map", text: TextSpec 
             format="" if raw.format == "text" else raw.format,
             split_by=split_by or "",
             skip_rows=skipped,
+            missing=missing,
         )
     sure = tuple(key for part in parts for key in part.sure)
     return Suggestion(raw, chosen, time, suggested, tuple(chips), tuple(reasons), roles, sure)
@@ -152,7 +165,7 @@ def with_shipped(found: Suggestion, suggested: ColumnMap, fitting: str) -> tuple
     further = {
         key: spec
         for key, spec in suggested.reference.items()
-        if key not in shipped.reference and str(spec.column) not in used and key not in _GYRO
+        if key not in shipped.reference and str(spec.column) not in used and key not in GYRO
     }
     differences = []
     for key in found.sure:
@@ -170,8 +183,31 @@ def _step(column_map: ColumnMap, key: str) -> float:
     return spec.scale * factor_of(spec.unit, kind) if spec is not None else 0.0
 
 
-def _line(why: str, sure: bool) -> str:
-    return why if sure else f"{why} (check this)"
+def _missing(raw: RawFile) -> tuple[float, ...]:
+    """Return the numbers that stand for a missing reading in triads of a file."""
+    found: dict[float, None] = {}
+    for table in raw.tables.values():
+        for triad in find_triads(table):
+            for name in triad.columns:
+                found |= dict.fromkeys(sentinels_of(table.numbers(name)))
+    return tuple(found)
+
+
+def _without(raw: RawFile, missing: Collection[float]) -> RawFile:
+    """Return a file in which numbers that stand for a missing one are missing."""
+
+    def cleared(values: NDArray[Any]) -> NDArray[Any]:
+        if values.dtype.kind not in "iuf" or not np.isin(values, list(missing)).any():
+            return values
+        numbers = values.astype(float)
+        numbers[np.isin(values, list(missing))] = np.nan
+        return numbers
+
+    tables = {
+        key: replace(table, columns={name: cleared(values) for name, values in table.columns.items()})
+        for key, table in raw.tables.items()
+    }
+    return RawFile(raw.source, raw.format, tables)
 
 
 def _most_promising(raw: RawFile) -> RawTable:
@@ -200,76 +236,13 @@ def _leading_rows(table: RawTable, time: TimeGuess) -> tuple[int, TimeGuess]:
 def _alike(other: RawTable, chosen: RawTable, chips: list[tuple[RawTable, Triad]]) -> list[tuple[RawTable, Triad]]:
     """Return the accelerations of another table that has the columns of the first one, so of another chip."""
     names = {one.columns for _, one in chips}
-    if len(other) < _LEAST_ROWS * len(chosen) or not all(name in other.columns for one in names for name in one):
+    if len(other) < LEAST_ROWS * len(chosen) or not all(name in other.columns for one in names for name in one):
         return []
     return [
         (other, one)
         for one in find_triads(other)
         if one.kind == "acceleration" and one.columns in names and unit_of_acceleration(other, one.columns).is_gravity
     ]
-
-
-@dataclass(frozen=True)
-class _Part:
-    """Columns of a map that belong together, and what they rest on."""
-
-    columns: dict[str, ColumnSpec]
-    roles: dict[str, str]
-    reasons: tuple[str, ...]
-    sure: tuple[str, ...] = ()
-
-
-def _chip(number: int, chosen: RawTable, table: RawTable, triad: Triad, unit: TriadUnit) -> _Part:
-    """Return the channels of a chip."""
-    elsewhere = "" if table is chosen else table.name
-    columns = {
-        f"a{number}{axis}": msgspec.structs.replace(_spec(name, unit, axis - 1), table=elsewhere)
-        for axis, name in enumerate(triad.columns, start=1)
-    }
-    roles = {name: f"{key}, {_scaled(unit)}" for key, name in zip(columns, triad.columns, strict=True)}
-    where = f" of {elsewhere}" if elsewhere else ""
-    why = _line(f"chip a{number} ({', '.join(triad.columns)}{where}): {unit.why}", unit.sure)
-    return _Part(columns, {} if elsewhere else roles, (why,), (f"a{number}1",) if unit.sure else ())
-
-
-def _force(table: RawTable, triad: Triad, unit: TriadUnit) -> NDArray[np.float64]:
-    """Return the readings of a chip, (n, 3), m/s²."""
-    factor = unit.scale * factor_of(unit.unit, "acceleration")
-    return np.asarray((triad_values(table, triad.columns) - np.array(unit.offset)) * factor)
-
-
-def _gyro(
-    raw: RawFile, chosen: RawTable, own: list[Triad], force: NDArray[np.float64] | None, rate_hz: float | None
-) -> _Part:
-    """Return the first gyro as references: of the same table, else of another."""
-    found = [(chosen, one) for one in own]
-    if not found:
-        found = [(other, one) for other in raw.tables.values() if other is not chosen for one in _rates(other, chosen)]
-    if not found:
-        return _Part({}, {}, ())
-    table, triad = found[0]
-    values = triad_values(table, triad.columns)
-    unit = unit_of_rate(
-        values, triad.columns[0], force if force is not None and len(force) == len(values) else None, rate_hz
-    )
-    elsewhere = "" if table is chosen else table.name
-    columns = {
-        key: msgspec.structs.replace(_spec(name, unit, 0), table=elsewhere)
-        for key, name in zip(_GYRO, triad.columns, strict=True)
-    }
-    roles = {name: f"gyro {axis}, {_scaled(unit)}" for axis, name in zip("xyz", triad.columns, strict=True)}
-    where = f" of {elsewhere}" if elsewhere else ""
-    why = _line(f"gyro ({', '.join(triad.columns)}{where}): {unit.why}", unit.sure)
-    return _Part(columns, {} if elsewhere else roles, (why,), (_GYRO[0],) if unit.sure else ())
-
-
-def _rates(other: RawTable, chosen: RawTable) -> list[Triad]:
-    """Return the gyros of another table: by name, as those of a phone."""
-    if len(other) < _LEAST_ROWS * len(chosen):
-        return []
-    times = find_time(other)
-    named = re.search(r"gyr|angular|rate", other.name, re.IGNORECASE)
-    return [one for one in find_triads(other, times.columns) if one.kind == "rate" and (named or other.named)]
 
 
 def _sample_rate(table: RawTable, time: TimeGuess) -> float | None:
@@ -280,47 +253,6 @@ def _sample_rate(table: RawTable, time: TimeGuess) -> float | None:
     except InputError:
         return None
     return 1.0 / float(np.median(np.diff(t))) if len(t) > 1 else None
-
-
-def _other_references(table: RawTable, taken: Collection[str]) -> _Part:
-    """Return a tachometer, an angle and a temperature by their names."""
-    found: dict[str, ColumnSpec] = {}
-    reasons = []
-    for name in table.columns:
-        known = _known_reference(name)
-        if known is None or name in taken or known[0] in found or table.columns[name].dtype == object:
-            continue
-        key, unit = known
-        found[key] = ColumnSpec(name, unit)
-        reasons.append(_line(f"{key.partition('_')[0]} ({name}): {unit}, by its name", bool(unit_of_name(name)[1])))
-    roles = {str(spec.column): f"{key.partition('_')[0]}, {spec.unit}" for key, spec in found.items()}
-    return _Part(found, roles, tuple(reasons))
-
-
-def _known_reference(name: str) -> tuple[str, str] | None:
-    """Return the reference that a column is by its name, and its unit; None if it is none."""
-    plain, unit = unit_of_name(name.lower())
-    if _OTHER_QUANTITY.search(plain) or (not unit and re.search(r"[\[(].*[\])]\s*$", plain)):
-        return None
-    words = {"tacho_rad_s": _TACHO, "angle_rad": _ANGLE, "temperature_degC": _TEMPERATURE}
-    for key, marks in words.items():
-        if any(mark in name.lower() for mark in marks):
-            if unit:
-                return (key, unit) if kind_of(unit) == REFERENCE_KINDS[key] else None
-            if key == "temperature_degC":
-                return key, "degC"
-            degrees = "deg" in plain
-            usual = "rpm" if "rpm" in plain else "deg/s" if degrees else "rad/s"
-            return key, usual if key == "tacho_rad_s" else "deg" if degrees else "rad"
-    return None
-
-
-def _spec(name: str, unit: TriadUnit, axis: int) -> ColumnSpec:
-    return ColumnSpec(name, unit.unit, unit.scale, unit.offset[axis])
-
-
-def _scaled(unit: TriadUnit) -> str:
-    return unit.unit if unit.scale == 1.0 else f"1/{1.0 / unit.scale:.5g} {unit.unit}"
 
 
 def _layout(table: RawTable, text: TextSpec) -> TextSpec:

@@ -103,7 +103,8 @@ def _candidates(table: RawTable) -> Iterator[tuple[float, TimeGuess]]:
     for place, (name, values) in enumerate(table.columns.items()):
         is_text = values.dtype == object
         if values.dtype.kind == "M":
-            found = _of_seconds(name, values.astype("datetime64[ns]").astype(np.int64) * 1e-9)
+            stamps = values.astype("datetime64[ns]").astype(np.int64)
+            found = _of_seconds(name, np.asarray((stamps - stamps[0]) * 1e-9, dtype=np.float64))
         elif is_text:
             found = _of_texts(name, values)
         else:

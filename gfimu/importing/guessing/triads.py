@@ -13,7 +13,7 @@ from gfimu.importing.guessing.units import rest_windows, sphere_of, triad_values
 from gfimu.importing.notation import kind_of, unit_of_name
 from gfimu.importing.raw_table import RawTable
 
-__all__ = ["Triad", "find_triads"]
+__all__ = ["Triad", "find_triads", "is_acceleration"]
 
 _STRONG = re.compile(r"acc|force|adxl|mma\d|lis\d|bma\d|kx\d|kxrb", re.IGNORECASE)
 _WEAK = re.compile(r"^a[xyz_\d\[ ]|_a_|^a_", re.IGNORECASE)
@@ -57,8 +57,12 @@ def find_triads(table: RawTable, taken: Sequence[str] = ()) -> list[Triad]:
             for place in (spot for spot, letter in enumerate(short) if letter == axes[0]):
                 three = [short[:place] + axis + short[place + 1 :] for axis in axes]
                 if all(one in free for one in three) and not used & set(three):
-                    used |= set(three)
                     columns = (name, free[three[1]], free[three[2]])
+                    # More than three with numbers are axes of one each, unless gravity is their length.
+                    fourth = short[:place] + str(int(axes[2]) + 1) + short[place + 1 :] if axes[2] != "z" else ""
+                    if fourth in free and not _is_gravity(table, columns):
+                        continue
+                    used |= set(three)
                     kind, by_name = _kind(table, columns)
                     found.append((Triad(columns, kind), by_name))
     return _by_gravity(table, found)
@@ -107,6 +111,14 @@ def _by_gravity(table: RawTable, triads: Sequence[tuple[Triad, bool]]) -> list[T
         replace(one, kind="rate") if one.kind == "acceleration" and not fits and not by_name else one
         for (one, by_name), fits in zip(triads, gravity, strict=True)
     ]
+
+
+def is_acceleration(name: str) -> bool:
+    """Tell whether a column is an acceleration by its unit or its name."""
+    plain, unit = unit_of_name(name)
+    if _NEITHER.search(plain) or _GYRO.search(plain):
+        return False
+    return kind_of(unit) == "acceleration" if unit else bool(_STRONG.search(plain) or re.match(r"a_?\d", plain))
 
 
 def _short(name: str) -> str:

@@ -70,11 +70,21 @@ def _tables(content: Any, name: str) -> Iterator[tuple[str, RawTable]]:
         if by_row:
             yield from _tables({key: list(one.values()) for key, one in content.items()}, name)
             return
-        if len(plain) >= 3 and len(lengths) == 1:
-            yield name, _table(name, {key: list(one) for key, one in plain.items()}, [])
+        if len(plain) >= 2 and len(lengths) == 1:
+            yield name, _table(name, dict(_side_by_side(plain)), [])
         for key, one in content.items():
             if key not in plain or len(lengths) != 1:
                 yield from _tables(one, f"{name}.{key}".lstrip("."))
+
+
+def _side_by_side(lists: Mapping[str, list[Any]]) -> Iterator[tuple[str, list[Any]]]:
+    """Yield lists of numbers as columns, and of lists of numbers their places: ``acc[0]``."""
+    for key, one in lists.items():
+        widths = {len(row) for row in one if isinstance(row, list)}
+        if len(widths) == 1 and all(isinstance(row, list) for row in one):
+            yield from ((f"{key}[{place}]", [row[place] for row in one]) for place in range(min(widths)))
+        else:
+            yield key, one
 
 
 def _of_records(records: list[Any], name: str) -> Iterator[tuple[str, RawTable]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import re
 from collections import Counter
 from collections.abc import Sequence
@@ -13,6 +14,7 @@ __all__ = ["COMMENT_MARKS", "Layout", "cells_of", "layout_of"]
 
 COMMENT_MARKS = "#;%/*"
 _LOOKED_AT = 400  # lines
+_QUOTED_AT = 20  # of these, at the end, that show whether numbers stand in quotes
 _SEPARATORS = {"comma": ",", "semicolon": ";", "tab": "\t", "space": " "}
 _NUMBER = {
     ".": re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE),
@@ -66,10 +68,11 @@ def layout_of(
         Known names of the columns.
     """
     looked = list(lines[:_LOOKED_AT])
+    quoted = any('"' in line for line in looked[-_QUOTED_AT:])
     best: tuple[tuple[int, int], Layout] | None = None
     for mark in [_SEPARATORS.get(separator, separator)] if separator else _SEPARATORS.values():
         for point in [decimal] if decimal else [".", ","]:
-            if point == mark:
+            if point == mark and not quoted:
                 continue
             counted = [(number, len(cells)) for number, cells in _data_lines(looked, mark, point, skip or 0)]
             if not counted:
@@ -94,7 +97,9 @@ def cells_of(line: str, separator: str) -> list[str]:
     closed = line.rstrip(" \r\n")
     if separator != ";":
         closed = closed.rstrip(";")
-    return [cell.strip().strip('"') for cell in closed.split(separator)]
+    if '"' in closed:  # a cell in quotes may hold the separator
+        return [cell.strip() for cell in next(csv.reader([closed], delimiter=separator, skipinitialspace=True), [])]
+    return [cell.strip() for cell in closed.split(separator)]
 
 
 def _data_lines(lines: Sequence[str], separator: str, decimal: str, skip: int) -> list[tuple[int, list[str]]]:

@@ -1,4 +1,4 @@
-"""Lines of serial monitors made plain: a name in each cell (``ax:0.12``), samples over several lines, host times."""
+"""Lines of serial monitors and programs made plain: named cells (``ax:0.12``), brackets, checksums, host times."""
 
 from __future__ import annotations
 
@@ -11,44 +11,53 @@ __all__ = ["plain_lines"]
 _LOOKED_AT = 400  # lines
 _HOST_TIME = re.compile(r"\s*\[?(\d{1,2}:\d\d:\d\d[.,:]\d+)\]?\s*(?:->|>|\]|\|)\s*")
 _LABELLED = re.compile(r"([A-Za-z_][\w .\[\]()/°²^-]*?)\s*[:=]\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?![\d:])")
+_BRACKETED = re.compile(r"^\s*[\[({][^A-Za-z\"]*[\])}]\s*,?\s*$")
+_CHECKED = re.compile(r"\*[0-9A-Fa-f]{2}\s*$")
+_STAMP = re.compile(r"(?:\d{4}-\d\d-\d\d[T _])?\d{1,2}:\d\d:\d\d(?:[.,:]\d+)?")
 _UNIT = re.compile(r"\s*([A-Za-zµ°²%/^\d]{0,8})\s*$")
+_HOST = "host_time"
 _LEAST = 0.5  # of the filled lines
 _LEAST_OFTEN = 0.5  # of the lines of the most frequent kind
 
 
 def plain_lines(lines: Sequence[str]) -> list[str]:
-    """Return the lines of a text file with host times as a cell of their own, and named cells as a table with a header.
+    """Return the lines of a text file without brackets and checksums around them, with the time of the host as a cell.
 
-    Other lines stay as they are.
+    Named cells become a table with a header. Other lines stay as they are.
     """
-    return _without_labels(_with_host_time(list(lines)))
+    return _without_labels(_with_host_time(_without_frames(list(lines))))
+
+
+def _most(lines: Sequence[str], mark: re.Pattern[str]) -> bool:
+    """Tell whether most of the first filled lines match."""
+    looked = [line for line in lines[:_LOOKED_AT] if line.strip()]
+    return sum(mark.search(line) is not None for line in looked) > _LEAST * len(looked)
+
+
+def _without_frames(lines: list[str]) -> list[str]:
+    """Return lines as ``(0.1, 0.2, 9.8)`` and ``$IMU,0.1,0.2*5A`` without brackets and checksums."""
+    if _most(lines, _BRACKETED):
+        return [re.sub(r"[\[\](){}]", "", line) if _BRACKETED.search(line) else line for line in lines]
+    if _most(lines, _CHECKED):
+        return [_CHECKED.sub("", line) for line in lines]
+    return lines
 
 
 def _with_host_time(lines: list[str]) -> list[str]:
     """Return lines as ``10:25:14.000 -> 88,0.1,0.2`` with the time as the first cell."""
-    looked = [line for line in lines[:_LOOKED_AT] if line.strip()]
-    if sum(_HOST_TIME.match(line) is not None for line in looked) <= _LEAST * len(looked):
+    if not _most(lines, _HOST_TIME):
         return lines
     plain = []
     for line in lines:
         found = _HOST_TIME.match(line)
-        if found is None:
+        rest = line[found.end() :] if found else line
+        if found is None or _LABELLED.match(rest.strip()):
             plain.append(line)
             continue
-        rest = line[found.end() :]
         separator = next((mark for mark in "\t;," if mark in rest), " ")
-        first = rest.split(separator)[0].strip()
-        is_header = bool(re.match(r"[A-Za-z]", first)) and not re.search(r"[:=]", first)
-        stamp = "host_time" if is_header else found[1]
-        labelled = _LABELLED.match(rest.strip()) is not None
-        plain.append(f"host_time:{_seconds(stamp)}{separator}{rest}" if labelled else f"{stamp}{separator}{rest}")
+        is_header = bool(re.match(r"[A-Za-z]", rest.split(separator)[0].strip()))
+        plain.append(f"{_HOST if is_header else found[1]}{separator}{rest}")
     return plain
-
-
-def _seconds(stamp: str) -> float:
-    """Return a time of day in seconds, for lines whose cells are numbers with names."""
-    hours, minutes, rest = re.split(r":", stamp, maxsplit=2)
-    return 3600.0 * int(hours) + 60.0 * int(minutes) + float(re.sub(r"[,:]", ".", rest))
 
 
 def _without_labels(lines: list[str]) -> list[str]:
@@ -71,7 +80,10 @@ def _without_labels(lines: list[str]) -> list[str]:
             continue
         if labels == order[0] or not rows:
             rows.append({})
-        rows[-1] |= dict(zip(labels, (number for _, number in _LABELLED.findall(line)), strict=True))
+        stamp = _STAMP.search(line)
+        numbers = [number for _, number in _LABELLED.findall(line)]
+        cells = [stamp[0], *numbers] if labels[0] == _HOST and stamp else numbers
+        rows[-1] |= dict(zip(labels, cells, strict=True))
     return [";".join(names), *(";".join(row.get(name, "") for name in names) for row in rows)]
 
 
@@ -80,9 +92,13 @@ def _labels(line: str) -> tuple[str, ...]:
     found = list(_LABELLED.finditer(line))
     if not found:
         return ()
-    between = _LABELLED.sub("", line[: found[-1].end()])
+    before = line[: found[0].start()]
+    stamp = _STAMP.search(before)
+    between = _LABELLED.sub("", line[found[0].start() : found[-1].end()])
     unit = _UNIT.fullmatch(line[found[-1].end() :].strip(" ,;|\t}"))
     if re.search(r"\w", between) or unit is None:
+        return ()
+    if stamp is None and re.search(r"\w", before):
         return ()
     names: list[str] = []
     stem = ""
@@ -92,4 +108,6 @@ def _labels(line: str) -> tuple[str, ...]:
             name = f"{stem} {name}"
         stem = name[:-1].strip() if name[-1:].lower() == "x" and len(name) > 1 else stem
         names.append(name)
-    return tuple(f"{name} [{unit[1]}]" if unit[1] and len(found) <= 3 else name for name in names)
+    if unit[1] and len(found) <= 3:
+        names = [f"{name} [{unit[1]}]" for name in names]
+    return (_HOST, *names) if stamp else tuple(names)
