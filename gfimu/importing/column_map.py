@@ -202,7 +202,7 @@ def _toml(value: Any) -> str:
     if isinstance(value, list | tuple):
         return "[" + ", ".join(_toml(one) for one in value) + "]"
     if isinstance(value, float):
-        return repr(float(f"{value:.9g}"))
+        return repr(float(f"{value:.12g}"))
     return json.dumps(value, ensure_ascii=False)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from gfimu.errors import InputError
 from gfimu.importing.clock import Times, times_of
 from gfimu.importing.column_map import ColumnMap, TextSpec, TimeSpec, map_toml
-from gfimu.importing.guessing.suggestion import suggest, with_shipped
+from gfimu.importing.guessing.suggestion import roles_by_map, suggest, with_shipped
 from gfimu.importing.oddities import oddities
 from gfimu.importing.raw_table import RawFile, RawTable
 from gfimu.importing.readers import read_foreign
@@ -140,11 +140,12 @@ def inspect_file(path: str | Path, *, table: str = "", text: TextSpec = TextSpec
     found = suggest(raw, table=table, name=_map_name(path), text=text)
     fitting = tuple(fitting_maps(raw))
     suggested, reasons = found.column_map, found.reasons
-    time, is_rate_known = found.time.spec, found.time.is_rate_known
+    time, is_rate_known, roles = found.time.spec, found.time.is_rate_known, found.roles
     if suggested is not None and len(fitting) == 1 and fitting_maps(raw, fully=True):
         suggested, differences = with_shipped(found, suggested, fitting[0])
         reasons = (f"the map {fitting[0]} that comes with gfimu fits: columns, rate, gravity at rest", *differences)
         time, is_rate_known = suggested.time, True
+        roles = roles_by_map(suggested, found.table)
     times, findings = _times(found.table, time, raw.source)
     findings += [note.removeprefix(f"{raw.source}: ") for note in found.table.notes]
     findings += oddities({name: one.numbers(name) for one, triad in found.chips for name in triad.columns})
@@ -154,7 +155,7 @@ def inspect_file(path: str | Path, *, table: str = "", text: TextSpec = TextSpec
         found.table.name,
         tuple(f"{name or 'the file'} ({len(one)} rows)" for name, one in found.raw.tables.items()),
         len(found.table),
-        tuple(_view(found.table, name, found.roles.get(name, "")) for name in found.table.columns),
+        tuple(_view(found.table, name, roles.get(name, "")) for name in found.table.columns),
         fitting,
         suggested,
         reasons,

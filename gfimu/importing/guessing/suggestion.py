@@ -31,7 +31,7 @@ from gfimu.importing.oddities import sentinels_of
 from gfimu.importing.raw_table import RawFile, RawTable
 from gfimu.importing.splitting import find_split, split_file
 
-__all__ = ["Suggestion", "suggest", "with_shipped"]
+__all__ = ["Suggestion", "roles_by_map", "suggest", "with_shipped"]
 
 _DIFFERENT = 0.1  # relative, by which numbers and a map may differ: gains of parts
 _EPOCH = (1e9, 4e9)  # s since 1970, from 2001 to 2096
@@ -139,6 +139,7 @@ def suggest(raw: RawFile, *, table: str = "", name: str = "map", text: TextSpec 
     if not chips and not singles:
         reasons.append(
             "no three columns look like accelerations; name them, as --map-set unit=g --map-set channels.a11=COLUMN"
+            + ("; as a reference (gfimu join, --reference-map) the map stands" if reference else "")
         )
     suggested = None
     if channels or reference:
@@ -174,6 +175,20 @@ def with_shipped(found: Suggestion, suggested: ColumnMap, fitting: str) -> tuple
             differences.append(f"{key}: the numbers are {mine / theirs:.3g} times what the map says (check this)")
     changed = msgspec.structs.replace(shipped, name=suggested.name, reference={**shipped.reference, **further})
     return changed, differences
+
+
+def roles_by_map(column_map: ColumnMap, table: RawTable) -> dict[str, str]:
+    """Return what the columns of a table are by a map."""
+    names = dict(zip(column_map.text.columns, table.columns, strict=False)) if not table.named else {}
+    roles = {}
+    for key, spec in {**column_map.channels, **column_map.reference}.items():
+        column = names.get(str(spec.column)) or table.find(spec.column)
+        if column is not None and not spec.table:
+            per_unit = "" if spec.scale == 1.0 else f"1/{1.0 / spec.scale:.5g} "
+            roles[column] = f"{key.removesuffix('_rad_s').replace('_', ' ')}, {per_unit}{spec.unit}"
+    if column_map.time.column is not None:
+        roles |= {column: "time" for column in [table.find(column_map.time.column)] if column}
+    return roles
 
 
 def _step(column_map: ColumnMap, key: str) -> float:

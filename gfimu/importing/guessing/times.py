@@ -64,10 +64,10 @@ class TimeGuess:
 def find_time(table: RawTable) -> TimeGuess:
     """Return how the times of a table may be read: a column with its unit, else a counter, else a rate alone."""
     found = sorted(_candidates(table), key=lambda one: -one[0])
-    times = tuple(str(guess.spec.column) for score, guess in found if score >= 1.0 and guess.spec.column is not None)
+    times = tuple(str(guess.spec.column) for score, guess in found if score > 0.5 and guess.spec.column is not None)
     if found:
         best = found[0][1]
-        own = () if best.spec.column is None else (str(best.spec.column),)
+        own = best.columns if best.spec.column is None else (str(best.spec.column),)
         return TimeGuess(best.spec, best.why, best.sure, best.is_rate_known, tuple(dict.fromkeys((*own, *times))))
     rate = stated_rate(table)
     if rate is not None:
@@ -218,7 +218,7 @@ def _rounded(name: str, values: NDArray[Any], factor: float | None) -> tuple[flo
                 f"{name} is rounded, {each:.3g} rows to a time: {rate:.6g} rows per second, taken as constant; gaps "
                 "don't show"
             )
-            return 1.5, TimeGuess(spec, why, False)
+            return 1.5, TimeGuess(spec, why, False, columns=(name,))
     return None
 
 

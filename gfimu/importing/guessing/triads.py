@@ -75,7 +75,19 @@ def _known(table: RawTable, name: str) -> NDArray[np.float64]:
 
 
 def _without_names(table: RawTable, names: Sequence[str]) -> list[Triad]:
-    """Return neighbours of which gravity is the length, and threes of what stands between those."""
+    """Return threes of neighbours, begun so that gravity is the length of as many as can be.
+
+    Gravity that lies along one axis is the length of any three with that axis. So a beginning that leaves no column
+    over at the start goes before others, and what stands between triads of gravity is grouped only then anew.
+    """
+    ways = [_threes(table, names[:first]) + _threes(table, names[first:]) for first in range(3)]
+    ways.append(_one_by_one(table, names))
+    gravity = [sum(one.kind == "acceleration" and _is_gravity(table, one.columns) for one in way) for way in ways]
+    return _by_gravity(table, [(one, False) for one in ways[gravity.index(max(gravity))]])
+
+
+def _one_by_one(table: RawTable, names: Sequence[str]) -> list[Triad]:
+    """Return neighbours of which gravity is the length from the first one on, and threes of what stands between."""
     found: list[Triad] = []
     apart: list[str] = []
     place = 0
@@ -89,8 +101,7 @@ def _without_names(table: RawTable, names: Sequence[str]) -> list[Triad]:
         else:
             apart.append(names[place])
             place += 1
-    found += _threes(table, apart)
-    return _by_gravity(table, [(one, False) for one in found])
+    return found + _threes(table, apart)
 
 
 def _is_gravity(table: RawTable, columns: tuple[str, str, str]) -> bool:
