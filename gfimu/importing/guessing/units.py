@@ -173,8 +173,9 @@ def unit_of_rate(
     if unit:
         if turn is None or abs(turn / factor_of(unit, "rate") - 1.0) < 0.5:
             return TriadUnit(unit, 1.0, zero, f"the name has {unit}", True)
+        words = min(_SCALES.items(), key=lambda one: abs(_log_ratio(one[0], turn)))[1]
         ratio = turn / factor_of(unit, "rate")
-        why = f"the name has {unit}, but by the turn of gravity the rates are {ratio:.3g} times that"
+        why = f"the name has {unit}, but by the turn of gravity they are {ratio:.2g} times that, nearest to {words}"
         return TriadUnit(unit, 1.0, zero, why, False)
     if turn is not None:
         (unit, scale), words = min(_SCALES.items(), key=lambda one: abs(_log_ratio(one[0], turn)))
