@@ -17,6 +17,8 @@ __all__ = ["NEAR", "TriadUnit", "rest_windows", "sphere_of", "triad_values", "un
 
 _GRAVITY = {"m/s^2": 1.0, "g": STANDARD_GRAVITY, "mg": STANDARD_GRAVITY / 1e3, "mm/s^2": 1e-3, "cm/s^2": 1e-2}
 NEAR = 0.08  # relative, of gravity at rest: gains of parts lie within
+_BEST, _AS_QUIET = 5, 3.0  # pieces that show how quiet rest is, and how many times that still counts as rest
+_STEP_SCATTER = 1.0  # steps by which rounded readings scatter at rest
 _LOW_COUNTS = 20.0  # below that counts per g would be too coarse for any part
 _FASTEST_RAD_S = 40.0  # rad/s: beyond the range of nearly all gyros (2000 °/s is 35 rad/s)
 _ROUND = 0.03  # relative scatter of the poses about a sphere: gains of the axes differ by less
@@ -67,15 +69,23 @@ def triad_values(table: RawTable, columns: Sequence[str]) -> NDArray[np.float64]
 
 
 def rest_windows(values: NDArray[np.float64], windows: int = 400) -> NDArray[np.float64]:
-    """Return the means of the quietest fifth of equal pieces of a triad, (k, 3)."""
-    rows = values[np.isfinite(values).all(axis=1)]
+    """Return the means of the quietest of equal pieces of a triad, (k, 3): a fifth at most."""
+    rows = values[np.isfinite(values).all(axis=1) & values.any(axis=1)]  # zeros throughout: nothing measured yet
     size = max(len(rows) // windows, 8)
     count = len(rows) // size
     if count < 5:
         return rows.mean(axis=0, keepdims=True) if len(rows) else np.empty((0, 3))
     pieces = rows[: count * size].reshape(count, size, 3)
     means, scatter = pieces.mean(axis=1), pieces.std(axis=1).max(axis=1)
-    return np.asarray(means[scatter <= np.quantile(scatter, 0.2)])
+    best = float(np.sort(scatter)[min(_BEST, count) - 1])
+    still = max(_AS_QUIET * best, _STEP_SCATTER * _step(rows))
+    return np.asarray(means[scatter <= min(float(np.quantile(scatter, 0.2)), still)])
+
+
+def _step(rows: NDArray[np.float64]) -> float:
+    """Return the least step between readings, as that of counts."""
+    steps = np.diff(np.unique(rows))
+    return float(steps.min()) if len(steps) else 0.0
 
 
 def unit_of_acceleration(table: RawTable, columns: Sequence[str]) -> TriadUnit:
@@ -196,7 +206,9 @@ def unit_of_rate(
         why = f"up to {largest:.4g}: counts; 16.4 per °/s (±2000 °/s) is a guess, the data sheet has the scale"
         return TriadUnit("deg/s", 1.0 / 16.4, zero, why, False)
     if largest > _FASTEST_RAD_S:
-        return TriadUnit("deg/s", 1.0, zero, f"up to {largest:.4g}: too fast for rad/s", True)
+        whole = bool(np.all(rates[np.isfinite(rates)] == np.round(rates[np.isfinite(rates)])))
+        why = f"up to {largest:.4g}: too fast for rad/s" + ("; deg/s, or counts" if whole else "")
+        return TriadUnit("deg/s", 1.0, zero, why, not whole)
     return TriadUnit("rad/s", 1.0, zero, f"up to {largest:.4g}: rad/s, or slow motion in deg/s", False)
 
 
