@@ -21,7 +21,7 @@ def inspect(file: str | Path, *, table: str = "", out: str | Path | None = None)
     Parameters
     ----------
     file : str or Path
-        Text, Parquet, zip of text, MATLAB, HDF5, ULog, MCAP, ROS bag.
+        Text, JSON, Parquet, zip of text, Excel, MATLAB, HDF5, ULog, MCAP, ROS bag.
     table : str
         Table, topic or member to look at; by default the one with the most accelerations.
     out : str or Path, optional

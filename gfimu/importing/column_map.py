@@ -100,11 +100,11 @@ class ColumnMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     channels: Annotated[dict[str, ColumnSpec], _Meta(description="Sensing axes by the array's channel names.")] = {}
     summary: Annotated[str, _Meta(description="What writes such files, one line.")] = ""
     format: Annotated[
-        str, _Meta(description="text, parquet, zip, matlab, hdf5, ulog, mcap, rosbag; else by content.")
+        str, _Meta(description="text, parquet, zip, excel, json, matlab, hdf5, ulog, mcap, rosbag; else by content.")
     ] = ""
     table: Annotated[str, _Meta(description="Table of the file that holds the channels, where it has several.")] = ""
     split_by: Annotated[
-        str, _Meta(description="Column that says which chip a row is of; each of its values is a table, sensor=1 say.")
+        str, _Meta(description="Column that names the chip of each row; each of its values is a table, sensor=1 say.")
     ] = ""
     array: Annotated[str, _Meta(description="Array that is assumed where none is given.")] = ""
     time: Annotated[TimeSpec, _Meta(description="When the samples were taken.")] = TimeSpec()

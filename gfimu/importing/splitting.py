@@ -1,4 +1,4 @@
-"""Tables in which a column says which chip a row is of (long format), as one table per chip."""
+"""Tables in which a column names the chip of each row (long format), as one table per chip."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def split_file(raw: RawFile, column: str | int, source: str) -> RawFile:
 
 
 def find_split(table: RawTable, times: str | None) -> str | None:
-    """Return the column that says which chip a row is of; None where each row has all chips.
+    """Return the column that names the chip of each row; None where each row has all chips.
 
     It has few values, each in many rows, and the time increases within each but not over all rows; or it is called
     like a chip, its values take turns, and each of them has rows enough.

@@ -93,7 +93,7 @@ def suggest(raw: RawFile, *, table: str = "", name: str = "map", text: TextSpec 
         raw = split_file(RawFile(raw.source, raw.format, {chosen.name: chosen}), split_by, raw.source)
         chosen = _most_promising(raw)
         time = find_time(chosen)
-        reasons.append(f"{split_by} says which chip a row is of: {', '.join(raw.tables)}")
+        reasons.append(f"{split_by} names the chip of each row: {', '.join(raw.tables)}")
     missing = _missing(raw)
     if missing:
         raw = _without(raw, missing)

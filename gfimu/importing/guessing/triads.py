@@ -114,7 +114,7 @@ def _threes(table: RawTable, names: Sequence[str]) -> list[Triad]:
 
 
 def _by_gravity(table: RawTable, triads: Sequence[tuple[Triad, bool]]) -> list[Triad]:
-    """Return triads with what the gravity of one says of the others: those with no name for it are no acceleration."""
+    """Return triads; where one shows gravity, others that neither show it nor are named so are no acceleration."""
     gravity = [one.kind == "acceleration" and unit_of_acceleration(table, one.columns).is_gravity for one, _ in triads]
     if not any(gravity):
         return [one for one, _ in triads]
