@@ -24,7 +24,7 @@ def register(app: typer.Typer) -> None:
 
 def _inspect(
     file: Annotated[
-        Path, typer.Argument(help="Text, JSON, Parquet, zip of text, Excel, MATLAB, HDF5, ULog, MCAP or ROS bag, gzipped text.")
+        Path, typer.Argument(help="Text, gzipped or zipped, JSON, Parquet, Excel, MATLAB, HDF5, ULog, MCAP, ROS bag.")
     ],
     table: Annotated[str, typer.Option("--table", help="Table, topic or member to look at.")] = "",
     out: Annotated[

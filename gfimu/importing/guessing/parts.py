@@ -31,6 +31,7 @@ __all__ = [
 
 LEAST_ROWS = 0.2  # of the longest table: a table of another chip has as many samples
 GYRO = ("gyro_x_rad_s", "gyro_y_rad_s", "gyro_z_rad_s")
+_AXIS = re.compile(r"(?<![b-z])[xyz](?![a-z])")
 _TACHO = ("tacho", "rpm", "omega", "speed")
 _ANGLE = ("angle", "theta", "encoder")
 _TEMPERATURE = ("temperature", "temp_", "degc", "imu_temp")
@@ -66,19 +67,24 @@ def chip_part(number: int, chosen: RawTable, table: RawTable, triad: Triad, unit
 
 
 def single_axes(table: RawTable, taken: Collection[str]) -> list[Part]:
-    """Return columns that are accelerations by name or unit as chips of one axis each."""
+    """Return columns that are accelerations by name or unit as chips of one axis, or of two."""
     names = [
         name
         for name, values in table.columns.items()
         if name not in taken and values.dtype != object and is_acceleration(name)
     ]
+    chips: dict[str, list[str]] = {}
+    for name in names:
+        chips.setdefault(_AXIS.sub("", unit_of_name(name)[0].lower(), count=1), []).append(name)
     parts = []
-    for number, name in enumerate(names, start=1):
-        unit = unit_of_name(name)[1]
+    for number, axes in enumerate(chips.values(), start=1):
+        unit = unit_of_name(axes[0])[1]
         why = f"the name has {unit}" if unit else "m/s² holds the place, give the unit"
-        line = reason(f"chip a{number} of one axis ({name}): {why}", bool(unit))
-        key = f"a{number}1"
-        parts.append(Part({key: ColumnSpec(name, unit or "m/s^2")}, {name: f"{key}, {unit or 'unit?'}"}, (line,)))
+        number_of = "one axis" if len(axes) == 1 else f"{len(axes)} axes"
+        line = reason(f"chip a{number} of {number_of} ({', '.join(axes)}): {why}", bool(unit))
+        keys = {f"a{number}{axis}": name for axis, name in enumerate(axes, start=1)}
+        columns = {key: ColumnSpec(name, unit or "m/s^2") for key, name in keys.items()}
+        parts.append(Part(columns, {name: f"{key}, {unit or 'unit?'}" for key, name in keys.items()}, (line,)))
     return parts
 
 

@@ -28,6 +28,7 @@ _UNKNOWN_RATE_HZ = 100.0  # stands in a suggested map until the user gives the r
 _LEAST_WRAP = 256.0  # a counter of one byte
 _NEAR_WRAP = 0.02  # of the wrap, by which a step back may miss it: samples lost there
 _LOOKED_AT = 50  # texts
+_MOST_PARTS = 8  # restarts of a logger: what goes back more often is no time
 _ROUND_RATE = 2e-3  # relative, by which a rate found from rounded times is taken for a whole number
 _SAID_RATE = re.compile(
     r"(?:sampl\w*|output|update|data|logging|acq\w*)[ _-]*(?:rate|freq\w*)|\bodr\b|\bfs\b|frequency", re.IGNORECASE
@@ -148,10 +149,15 @@ def _of_numbers(table: RawTable, name: str, values: NDArray[Any]) -> tuple[float
     counter = None if word and not _COUNTERS.search(plain) else _counter(table, name, steps)
     if counter is not None:
         return counter
+    within = _within_seconds(name, known, steps)
+    if within is not None:
+        return within
     usual = float(np.median(steps[steps > 0]))
     if float(np.mean(steps > 0)) < 0.9:
         return _rounded(name, values, factor_of(unit, "time") if has_unit else None) if word else None
     if float(np.mean(steps < 0)) > 0.01:
+        return None
+    if len(parts_of(np.asarray(values, dtype=float))) > _MOST_PARTS:
         return None
     wrap = _wrap(steps, usual)
     part = None if wrap is not None else _part(np.asarray(values, dtype=float))
@@ -219,6 +225,21 @@ def _rounded(name: str, values: NDArray[Any], factor: float | None) -> tuple[flo
                 "don't show"
             )
             return 1.5, TimeGuess(spec, why, False, columns=(name,))
+    return None
+
+
+def _within_seconds(name: str, values: NDArray[Any], steps: NDArray[np.float64]) -> tuple[float, TimeGuess] | None:
+    """Return how a column can be the time that counts ms, µs or ns within each second, beside one of whole seconds."""
+    back = steps[steps < 0]
+    if values.dtype.kind not in "iu" or len(back) < 3 or values.min() < 0:
+        return None
+    usual = float(np.median(steps[steps > 0]))
+    for unit, wrap in (("ms", 1e3), ("us", 1e6), ("ns", 1e9)):
+        rate = 1.0 / (usual * TIME[unit])
+        fits = 0.9 * wrap <= float(values.max()) < wrap and bool(np.all(wrap + back <= 3.0 * usual))
+        if fits and RATES[0] <= rate <= RATES[1]:
+            why = f"{name} counts {unit} within each second, {rate:.4g} Hz; gaps of a second or more don't show"
+            return 3.0, TimeGuess(TimeSpec(name, unit, wrap=wrap), why)
     return None
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,6 +17,7 @@ __all__ = ["Triad", "find_triads", "is_acceleration"]
 
 _STRONG = re.compile(r"acc|force|adxl|mma\d|lis\d|bma\d|kx\d|kxrb", re.IGNORECASE)
 _WEAK = re.compile(r"^a[xyz_\d\[ ]|_a_|^a_", re.IGNORECASE)
+_SINGLE = re.compile(r"a_?\d|a[_ ]?[xyz](?![a-z])", re.IGNORECASE)
 _GYRO = re.compile(r"gyr|omega|angular|^w[xyz_\d\[ ]|^w_|rate|rot|itg", re.IGNORECASE)
 _FREE = re.compile(r"free|lin\w* ?acc|without ?g|user ?acc", re.IGNORECASE)
 _NEITHER = re.compile(
@@ -49,7 +50,9 @@ def find_triads(table: RawTable, taken: Sequence[str] = ()) -> list[Triad]:
     """
     free = {_short(name): name for name in table.columns if name not in taken and table.columns[name].dtype != object}
     if not table.named:
-        return _without_names(table, [name for name in free.values() if np.ptp(_known(table, name)) > 0.0])
+        return _by_gravity(
+            table, [(one, False) for run in _runs(table, free.values()) for one in _without_names(table, run)]
+        )
     found: list[tuple[Triad, bool]] = []
     used: set[str] = set()
     for short, name in free.items():
@@ -83,7 +86,18 @@ def _without_names(table: RawTable, names: Sequence[str]) -> list[Triad]:
     ways = [_threes(table, names[:first]) + _threes(table, names[first:]) for first in range(3)]
     ways.append(_one_by_one(table, names))
     gravity = [sum(one.kind == "acceleration" and _is_gravity(table, one.columns) for one in way) for way in ways]
-    return _by_gravity(table, [(one, False) for one in ways[gravity.index(max(gravity))]])
+    return ways[gravity.index(max(gravity))]
+
+
+def _runs(table: RawTable, names: Collection[str]) -> list[list[str]]:
+    """Return neighbours that vary; what never does, as a covariance or a flag, parts them. All where too few vary."""
+    runs: list[list[str]] = [[]]
+    for name in table.columns:
+        if name in names and np.ptp(_known(table, name)) > 0.0:
+            runs[-1].append(name)
+        elif runs[-1]:
+            runs.append([])
+    return runs if any(len(run) >= 3 for run in runs) else [list(names)]
 
 
 def _one_by_one(table: RawTable, names: Sequence[str]) -> list[Triad]:
@@ -116,6 +130,9 @@ def _threes(table: RawTable, names: Sequence[str]) -> list[Triad]:
 def _by_gravity(table: RawTable, triads: Sequence[tuple[Triad, bool]]) -> list[Triad]:
     """Return triads; where one shows gravity, others that neither show it nor are named so are no acceleration."""
     gravity = [one.kind == "acceleration" and unit_of_acceleration(table, one.columns).is_gravity for one, _ in triads]
+    if not any(one.kind == "acceleration" for one, _ in triads):
+        # A wheel that never rests shows no gravity; without names something has to be the acceleration.
+        return [replace(one, kind="acceleration") if one.kind and not by_name else one for one, by_name in triads]
     if not any(gravity):
         return [one for one, _ in triads]
     return [
@@ -129,7 +146,7 @@ def is_acceleration(name: str) -> bool:
     plain, unit = unit_of_name(name)
     if _NEITHER.search(plain) or _GYRO.search(plain):
         return False
-    return kind_of(unit) == "acceleration" if unit else bool(_STRONG.search(plain) or re.match(r"a_?\d", plain))
+    return kind_of(unit) == "acceleration" if unit else bool(_STRONG.search(plain) or _SINGLE.match(plain))
 
 
 def _short(name: str) -> str:

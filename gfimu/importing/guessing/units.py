@@ -22,6 +22,7 @@ _STEP_SCATTER = 1.0  # steps by which rounded readings scatter at rest
 _LOW_COUNTS = 20.0  # below that counts per g would be too coarse for any part
 _FASTEST_RAD_S = 40.0  # rad/s: beyond the range of nearly all gyros (2000 °/s is 35 rad/s)
 _ROUND = 0.03  # relative scatter of the poses about a sphere: gains of the axes differ by less
+_TURNED = 0.5  # of the radius, by which poses differ along each axis where they show a sphere
 _POSES = 9  # rest poses from which offset and scale of raw counts follow
 _SCALES = {
     ("rad/s", 1.0): "rad/s",
@@ -158,7 +159,8 @@ def sphere_of(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], float] 
     solution = np.linalg.lstsq(matrix, (scaled**2).sum(axis=1), rcond=None)[0]
     radius = math.sqrt(max(float(solution[3] + solution[:3] @ solution[:3]), 0.0))
     scatter = float(np.std(np.linalg.norm(scaled - solution[:3], axis=1)))
-    return (middle + size * solution[:3], size * radius) if radius > 0.0 and scatter < _ROUND * radius else None
+    turned = float(np.ptp(scaled, axis=0).min()) > _TURNED * radius
+    return (middle + size * solution[:3], size * radius) if turned and scatter < _ROUND * radius else None
 
 
 def unit_of_rate(

@@ -14,6 +14,9 @@ _LABELLED = re.compile(r"([A-Za-z_][\w .\[\]()/°²^-]*?)\s*[:=]\s*([+-]?(?:\d+\
 _BRACKETED = re.compile(r"^\s*[\[({][^A-Za-z\"]*[\])}]\s*,?\s*$")
 _CHECKED = re.compile(r"\*[0-9A-Fa-f]{2}\s*$")
 _STAMP = re.compile(r"(?:\d{4}-\d\d-\d\d[T _])?\d{1,2}:\d\d:\d\d(?:[.,:]\d+)?")
+_REMARK = re.compile(r"(?<=\d)\s*(?://|#)[^\"]*$")
+_COLOURS = re.compile(r"\x1b\[[\d;]*m")
+_TICK = re.compile(r"^\s*[IWEDV] \((\d+)\)")
 _UNIT = re.compile(r"\s*([A-Za-zµ°²%/^\d]{0,8})\s*$")
 _HOST = "host_time"
 _LEAST = 0.5  # of the filled lines
@@ -36,6 +39,9 @@ def _most(lines: Sequence[str], mark: re.Pattern[str]) -> bool:
 
 def _without_frames(lines: list[str]) -> list[str]:
     """Return lines as ``(0.1, 0.2, 9.8)`` and ``$IMU,0.1,0.2*5A`` without brackets and checksums."""
+    lines = [_COLOURS.sub("", line) for line in lines] if any("\x1b" in line for line in lines[:_LOOKED_AT]) else lines
+    if _most(lines, _REMARK):
+        lines = [_REMARK.sub("", line) for line in lines]
     if _most(lines, _BRACKETED):
         return [re.sub(r"[\[\](){}]", "", line) if _BRACKETED.search(line) else line for line in lines]
     if _most(lines, _CHECKED):
@@ -80,11 +86,18 @@ def _without_labels(lines: list[str]) -> list[str]:
             continue
         if labels == order[0] or not rows:
             rows.append({})
-        stamp = _STAMP.search(line)
+        stamp = _stamp(line)
         numbers = [number for _, number in _LABELLED.findall(line)]
-        cells = [stamp[0], *numbers] if labels[0] == _HOST and stamp else numbers
+        cells = [stamp, *numbers] if labels[0] == _HOST and stamp else numbers
         rows[-1] |= dict(zip(labels, cells, strict=True))
     return [";".join(names), *(";".join(row.get(name, "") for name in names) for row in rows)]
+
+
+def _stamp(text: str) -> str:
+    """Return the time in front of a line: a date or time of day, or ms since the start as an ESP32 prints them."""
+    found = _STAMP.search(text)
+    tick = _TICK.match(text)
+    return found[0] if found else tick[1] if tick else ""
 
 
 def _labels(line: str) -> tuple[str, ...]:
@@ -93,12 +106,12 @@ def _labels(line: str) -> tuple[str, ...]:
     if not found:
         return ()
     before = line[: found[0].start()]
-    stamp = _STAMP.search(before)
+    stamp = _stamp(before)
     between = _LABELLED.sub("", line[found[0].start() : found[-1].end()])
     unit = _UNIT.fullmatch(line[found[-1].end() :].strip(" ,;|\t}"))
     if re.search(r"\w", between) or unit is None:
         return ()
-    if stamp is None and re.search(r"\w", before):
+    if not stamp and re.search(r"\w", before):
         return ()
     names: list[str] = []
     stem = ""

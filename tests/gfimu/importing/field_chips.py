@@ -4,7 +4,7 @@ import json
 import zipfile
 
 import numpy as np
-from field_files import Field, G, case, hand, nanoseconds, rows, table
+from field_files import Field, G, case, hand, nanoseconds, rows, stamps, table
 
 
 @case
@@ -94,3 +94,47 @@ def single_axes(d):
     path = rows(d / "six.csv", ["t,a1,a2,a3,a4,a5,a6,rpm"], columns)
     six = np.column_stack(columns[1:7])
     return Field(path, t, (six[:, :3], six[:, 3:]), None, omega, doubt="holds the place, give the unit")
+
+
+@case
+def two_axes_per_chip(d):
+    t, chips, omega = table()
+    path = rows(
+        d / "two.csv", ["t_ms,ax1,ay1,ax2,ay2,rpm"], [1000 * t, *chips[0].T[:2], *chips[1].T[:2], omega * 30 / np.pi]
+    )
+    return Field(path, t, (chips[0][:, :2], chips[1][:, :2]), None, omega, doubt="holds the place, give the unit")
+
+
+@case
+def whole_seconds_and_milliseconds(d):
+    t, f, _ = hand()
+    times = stamps(t, "{time}")
+    columns = [[one[:-4] for one in times], np.array([int(one[-3:]) for one in times]), *f.T]
+    return Field(rows(d / "ms.csv", ["Time,ms,ax,ay,az"], columns), t, (f,))
+
+
+@case
+def ros_2_without_names(d):
+    t, f, w = hand()
+    still = [0 * t] * 9
+    columns = [nanoseconds(t) // 10**9, nanoseconds(t) % 10**9, ["imu"] * len(t), *still, *w.T, *still, *f.T, *still]
+    return Field(rows(d / "ros2.csv", [], columns), t, (f,), w)
+
+
+@case
+def log_of_an_esp32(d):
+    t, f, _ = hand()
+    lines = [
+        "\x1b[0;32mI ({:.0f}) imu: ax={:.4f}, ay={:.4f}, az={:.4f}\x1b[0m".format(1000 * a + 345, *row)
+        for a, row in zip(t, f, strict=True)
+    ]
+    (d / "esp.log").write_text("\n".join(["I (12) boot: ESP-IDF v5.1", *lines]))
+    return Field(d / "esp.log", t, (f,))
+
+
+@case
+def a_remark_behind_each_row(d):
+    t, f, _ = hand()
+    lines = ["{:.3f};{:.4f};{:.4f};{:.4f} // ok".format(a, *row) for a, row in zip(t, f, strict=True)]
+    (d / "remark.txt").write_text("\n".join(lines))
+    return Field(d / "remark.txt", t, (f,))
