@@ -138,7 +138,8 @@ def other_references(table: RawTable, taken: Collection[str]) -> Part:
             continue
         key, unit = known
         found[key] = ColumnSpec(name, unit)
-        reasons.append(reason(f"{key.partition('_')[0]} ({name}): {unit}, by its name", bool(unit_of_name(name)[1])))
+        is_sure = bool(unit_of_name(name)[1] or kind_of(name))
+        reasons.append(reason(f"{key.partition('_')[0]} ({name}): {unit}, by its name", is_sure))
     roles = {str(spec.column): f"{key.partition('_')[0]}, {spec.unit}" for key, spec in found.items()}
     return Part(found, roles, tuple(reasons))
 

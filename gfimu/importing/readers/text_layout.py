@@ -22,6 +22,7 @@ _NUMBER = {
         r"[+-]?(\d{1,3}(\.\d{3})+,\d+|\d+,?\d*|,\d+)([eE][+-]?\d+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE
     ),
 }
+_STAMP = re.compile(r"(\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4})?[T _]*(\d{1,2}:\d\d(:\d\d([.,:]\d+)?)?)?\s*([AaPp][Mm]|Z)?")
 _LEAST_NUMBERS = 0.5  # of the cells of a line of data
 _NO_UNITS = {"", "-", "1", "raw", "cal", "counts", "lsb", "%", "mv", "v", "ut", "gauss", "hpa", "pa", "local_flux"}
 
@@ -69,21 +70,22 @@ def layout_of(
     """
     looked = list(lines[:_LOOKED_AT])
     quoted = any('"' in line for line in looked[-_QUOTED_AT:])
-    best: tuple[tuple[int, int], Layout] | None = None
+    best: tuple[tuple[int, float, int], Layout] | None = None
     for mark in [_SEPARATORS.get(separator, separator)] if separator else _SEPARATORS.values():
         for point in [decimal] if decimal else [".", ","]:
             if point == mark and not quoted:
                 continue
-            counted = [(number, len(cells)) for number, cells in _data_lines(looked, mark, point, skip or 0)]
-            if not counted:
+            data = _data_lines(looked, mark, point, skip or 0)
+            if not data:
                 continue
+            counted = [(number, len(cells)) for number, cells in data]
             (width, lines_so), *_ = Counter(count for _, count in counted).most_common(1)
             first = next(number for number, count in counted if count == width) if skip is None else skip
             header = _header(looked[:first], mark, width) if not names else None
             numbered = tuple(f"column_{place}" for place in range(1, width + 1))
             # Names may end before the cells do, as where a separator closes each line.
             known = tuple(names) + numbered[len(names) :] if names else header or numbered
-            score = (lines_so, width)
+            score = (lines_so, _share_read([cells for _, cells in data if len(cells) == width], point), width)
             # A point is the usual decimal mark: a comma has to read more lines, or more cells of them.
             if best is None or score > best[0]:
                 best = score, Layout(mark, point, first, known, bool(names) or header is not None)
@@ -115,6 +117,13 @@ def _data_lines(lines: Sequence[str], separator: str, decimal: str, skip: int) -
         if numeric and numeric >= _LEAST_NUMBERS * len(filled):
             found.append((place, cells))
     return found
+
+
+def _share_read(lines: Sequence[Sequence[str]], decimal: str) -> float:
+    """Return which share of the filled cells are numbers, dates or times of day, to a hundredth."""
+    filled = [cell for cells in lines for cell in cells if cell]
+    read = sum(_NUMBER[decimal].fullmatch(cell) is not None or _STAMP.fullmatch(cell) is not None for cell in filled)
+    return round(read / max(len(filled), 1), 2)
 
 
 def _header(before: Sequence[str], separator: str, width: int) -> tuple[str, ...] | None:

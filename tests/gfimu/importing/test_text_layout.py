@@ -10,6 +10,7 @@ from gfimu.importing.readers.text import table_of_text
 LAYOUTS = {
     "comma": ("t,ax,ay\n0.0,1.5,2\n0.1,1.6,3\n", ("t", "ax", "ay")),
     "semicolon and decimal comma": ("t;ax;ay\n0,0;1,5;2\n0,1;1,6;3\n", ("t", "ax", "ay")),
+    "two decimal commas": ("t;ax;ay\n0,0;1,5;2,0\n0,1;1,6;3,0\n", ("t", "ax", "ay")),
     "tab": ("t\tax\tay\n0.0\t1.5\t2\n0.1\t1.6\t3\n", ("t", "ax", "ay")),
     "spaces of any width": ("   t    ax  ay\n 0.0   1.5   2\n 0.1  1.6    3\n", ("t", "ax", "ay")),
     "no names": ("0.0,1.5,2\n0.1,1.6,3\n", ("column_1", "column_2", "column_3")),
@@ -67,3 +68,9 @@ def test_no_numbers_are_one_line(content):
         table_of_text(content, "file")
     assert str(error.value).startswith("file: ")
     assert "\n" not in str(error.value)
+
+
+def test_a_date_beside_a_decimal_comma_is_one_cell():
+    table = table_of_text(b"Time;rpm\n2024-05-17 10:25:14.000;0,5\n2024-05-17 10:25:14.020;1,5\n", "file")
+    assert table.columns["Time"].tolist() == ["2024-05-17 10:25:14.000", "2024-05-17 10:25:14.020"]
+    assert table.columns["rpm"] == pytest.approx([0.5, 1.5])
