@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,12 +48,15 @@ class AxisProblem:
         What the channels read.
     noise : ndarray, shape (c,)
         Standard deviation of the channels by their data sheets, m/s².
+    mirrored : ndarray, shape (k,)
+        Samples before which the sign of the rate is changed (`gfimu.known_axis.mirror`), ascending.
     """
 
     t: NDArray[np.float64]
     y: NDArray[np.float64]
     channels: AxisChannels
     noise: NDArray[np.float64]
+    mirrored: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
     def likelihood(
         self, settings: Settings, start: NDArray[np.float64], covariance: NDArray[np.float64], samples: int
@@ -84,7 +87,12 @@ class AxisProblem:
             start,
             covariance,
             no_slopes(self.y.shape[1]) if slopes is None else slopes,
+            self.mirrored,
         )
+
+    def part(self, rows: slice) -> AxisProblem:
+        """Return some of the samples, in which no sign is changed."""
+        return AxisProblem(self.t[rows], self.y[rows], self.channels, self.noise)
 
 
 def no_slopes(channels: int) -> Slopes:

@@ -10,7 +10,7 @@ import gfimu
 from gfimu.errors import GeometryError, InputError
 from gfimu.geometry.turning_axis import TurningAxis
 from gfimu.known_axis.channels import AxisChannels
-from gfimu.known_axis.drift import axis_drift
+from gfimu.known_axis.accuracy.drift import axis_drift
 from gfimu.known_axis.problem import AxisProblem, Settings
 from gfimu.recording import Recording
 
