@@ -77,7 +77,7 @@ def estimate_about_axis(
     fit = fit_axis(t, y, array, axis, noise, at_rest=at_rest)
     one, channels, mounted = fit.settings, fit.channels, fit.mounting
     slopes = None if mounted is None else mounted.mounting.slopes(mounted.values)
-    run = AxisProblem(t, y, channels, noise, fit.mirrored).run(one, fit.start, fit.start_covariance, slopes=slopes)
+    run = fit.on(AxisProblem(t, y, channels, noise)).run(one, fit.start, fit.start_covariance, slopes=slopes)
     found = smooth_axis(t, run, fit.mirrored) if smooth else (run.states, run.covariances, run.by_constants)
     # All noises larger by one factor leave the gains as they are: the innovations say by how much.
     mean_square = run.squares / max(run.readings, 1)

@@ -18,15 +18,15 @@ from gfimu.known_axis.mounting import Mounting
 from gfimu.known_axis.mounting_fit import MountingFit, fit_mounting
 from gfimu.known_axis.problem import AxisProblem, Settings
 from gfimu.known_axis.recursion import FilterRun
+from gfimu.known_axis.roughness import with_roughness
 from gfimu.units import STANDARD_GRAVITY
 
-__all__ = ["AxisFit", "fit_axis"]
+__all__ = ["AxisFit", "first_settings", "first_starts", "fit_axis"]
 
 _LEARNT_FROM = 3000  # samples: enough for four numbers
 _TRIED_ON = 600  # samples, on which starts are compared
 _PHASES = 8  # of gravity at the start
 _TURNS = 3  # of constants of the mounting and numbers of the filter, each given the other; by choice
-_ROUGHER, _GAINED = 4, 5.0  # decades of roughness, and nats of a second by which one more is taken; by choice
 _SAME = 0.1  # change of the log of the noise below which another turn changes nothing that matters; by choice
 _CLEAR = 300.0  # nats: log odds of the sign with the mounting as drawn, above which the other is given up; by choice
 _ALONG, _UNSEEN = 2, 1e-6  # column of the force along the axis; its smallest norm that is no rounding error
@@ -54,6 +54,8 @@ class AxisFit:
         The constants that were uncertain; None where the mounting is exact.
     mirrored : ndarray, shape (k,)
         Samples before which the filter's rate is given the other sign (`gfimu.known_axis.mirror`).
+    roughness : ndarray, shape (n,), optional
+        How the roughness of the motion differs from that of the settings (`gfimu.known_axis.roughness`).
     """
 
     settings: Settings
@@ -63,6 +65,11 @@ class AxisFit:
     channels: AxisChannels
     mounting: MountingFit | None = None
     mirrored: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    roughness: NDArray[np.float64] | None = None
+
+    def on(self, problem: AxisProblem) -> AxisProblem:
+        """Return a problem with the channels, signs and roughness that were found."""
+        return replace(problem, channels=self.channels, mirrored=self.mirrored, roughness=self.roughness)
 
 
 def fit_axis(
@@ -91,15 +98,9 @@ def fit_axis(
     """
     channels = AxisChannels.of(array, axis)
     problem = AxisProblem(t, y, channels, noise)
-    tilt = _inclination(y, channels, axis.hub) if axis.inclination is None else axis.inclination
-    if axis.inclination is None and np.sin(tilt) <= _LEVEL:
-        tilt = 0.0 if np.cos(tilt) > 0.0 else np.pi  # upright: what is across would be biases
-    settings = Settings(_first_scale(axis, noise), 100.0, 0.0 if axis.hub == "fixed" else 1.0, tilt)
-    tried = min(_TRIED_ON, len(t))
-    covariance = np.diag(_STD_START**2)
-    if at_rest:
-        covariance = np.diag([_STD_START[0] ** 2, 1e-4, 1e-2])
-    starts = list(_starts(y, channels, tilt, at_rest=at_rest))
+    settings, covariance = first_settings(y, channels, axis, noise, at_rest=at_rest)
+    tilt, tried = settings.inclination, min(_TRIED_ON, len(t))
+    starts = list(first_starts(y, channels, tilt, at_rest=at_rest))
     best = max(starts, key=lambda start: problem.likelihood(settings, start, covariance, tried))
     exact = axis.uncertainty.exact
     if exact:
@@ -119,7 +120,7 @@ def fit_axis(
         return replace(_with_own_signs(problem, array, axis, fit), sign_log_odds=float(abs(ahead)))
     fits = [_with_mounting(problem, array, axis, settings, start, covariance) for start in (best, other)]
     if not exact:
-        runs = [replace(problem, channels=one.channels).run(one.settings, one.start, covariance) for one in fits]
+        runs = [one.on(problem).run(one.settings, one.start, covariance) for one in fits]
     odds = _density(fits[0], runs[0]) - _density(fits[1], runs[1])
     found = _with_own_signs(problem, array, axis, fits[0 if odds > 0.0 else 1])
     return replace(found, sign_log_odds=float("inf") if _alike(runs) else abs(float(odds)))
@@ -129,6 +130,28 @@ def _alike(runs: Sequence[FilterRun]) -> bool:
     """Return whether starts of either sign end in one motion: they began near zero, and there is no other sign."""
     rates = [run.states[:, 1] for run in runs]
     return bool(np.median(np.abs(rates[0] - rates[1])) < 0.1 * np.median(np.abs(rates[0] + rates[1])))
+
+
+def first_settings(
+    y: NDArray[np.float64],
+    channels: AxisChannels,
+    axis: TurningAxis,
+    noise: NDArray[np.float64],
+    *,
+    at_rest: bool,
+) -> tuple[Settings, NDArray[np.float64]]:
+    """Return the numbers that a filter begins with, and the covariance (3, 3) of the state that it begins with.
+
+    Raises
+    ------
+    InputError
+        If the inclination of the axis is not given and does not show.
+    """
+    tilt = _inclination(y, channels, axis.hub) if axis.inclination is None else axis.inclination
+    if axis.inclination is None and np.sin(tilt) <= _LEVEL:
+        tilt = 0.0 if np.cos(tilt) > 0.0 else np.pi  # upright: what is across would be biases
+    settings = Settings(_first_scale(axis, noise), 100.0, 0.0 if axis.hub == "fixed" else 1.0, tilt)
+    return settings, np.diag([_STD_START[0] ** 2, 1e-4, 1e-2] if at_rest else _STD_START**2)
 
 
 def _slower(
@@ -171,10 +194,7 @@ def _from_rest(
     toggled = np.setxor1d(signed.mirrored[signed.mirrored <= starts[0]], starts[:1]).astype(np.int64)
     other = with_signs(replace(problem, mirrored=toggled), settings, start, covariance, first_kept=True)
     fits = [fit, _with_mounting(other, array, axis, settings, start, covariance)]
-    runs = [
-        replace(problem, channels=one.channels, mirrored=one.mirrored).run(one.settings, start, covariance)
-        for one in fits
-    ]
+    runs = [one.on(problem).run(one.settings, start, covariance) for one in fits]
     odds = _density(fits[0], runs[0]) - _density(fits[1], runs[1])
     found = _with_own_signs(problem, array, axis, fits[0 if odds > 0.0 else 1])
     return replace(found, sign_log_odds=float("inf") if _alike(runs) else abs(float(odds)))
@@ -186,13 +206,12 @@ def _with_own_signs(problem: AxisProblem, array: AccelerometerArray, axis: Turni
     A sign that was changed before the constants were known may have mirrored a drift at rest.
     """
     for _ in range(_TURNS):
-        bare = replace(problem, channels=fit.channels)
+        bare = replace(fit.on(problem), mirrored=problem.mirrored)
         found = with_signs(bare, fit.settings, fit.start, fit.start_covariance)
         if np.array_equal(found.mirrored, fit.mirrored):
             break
-        known = None if fit.mounting is None else fit.mounting.beside_inclination()
         signed = replace(problem, mirrored=found.mirrored)
-        again = _with_mounting(signed, array, axis, fit.settings, fit.start, fit.start_covariance, known)
+        again = _with_mounting(signed, array, axis, fit.settings, fit.start, fit.start_covariance, fit.mounting)
         fit = replace(again, sign_log_odds=fit.sign_log_odds)
     return fit
 
@@ -216,17 +235,19 @@ def _with_mounting(
     settings: Settings,
     start: NDArray[np.float64],
     covariance: NDArray[np.float64],
-    first: NDArray[np.float64] | None = None,
+    known: MountingFit | None = None,
 ) -> AxisFit:
     """Return the fit from one start, with the uncertain constants estimated in turn with the filter's numbers.
 
-    ``first`` (m,) are values of the constants to begin with; zero by default.
+    ``known`` holds values of the constants to begin with; zero by default.
     """
     if axis.uncertainty.exact:
-        return AxisFit(settings, start, covariance, float("inf"), problem.channels, mirrored=problem.mirrored)
+        return AxisFit(
+            settings, start, covariance, float("inf"), problem.channels, None, problem.mirrored, problem.roughness
+        )
     free = axis.inclination is None and np.sin(settings.inclination) > _LEVEL
     mounting = Mounting.of(array, axis, settings.inclination, free_inclination=bool(free))
-    values = np.zeros(len(mounting.constants)) if first is None else first
+    values = np.zeros(len(mounting.constants)) if known is None else known.values_of(mounting)
     problem = replace(problem, channels=mounting.channels(values))
     for turn in range(_TURNS):
         settings = _enlarged(problem, settings, start, covariance)
@@ -236,13 +257,16 @@ def _with_mounting(
         problem = replace(problem, channels=mounting.channels(values))
         if turn + 1 == _TURNS:
             break
-        known = replace(axis, inclination=settings.inclination)
-        learnt = _rough_enough(problem, _learnt(problem, settings, known, start, covariance), start, covariance)
+        stood = replace(axis, inclination=settings.inclination)
+        learnt = _learnt(problem, settings, stood, start, covariance)
+        problem = with_roughness(problem, learnt, start, covariance)
         again = _enlarged(problem, learnt, start, covariance)
         if abs(np.log(again.noise_scale / settings.noise_scale)) < _SAME:
             break
         settings = learnt
-    return AxisFit(settings, start, covariance, float("inf"), problem.channels, found, problem.mirrored)
+    return AxisFit(
+        settings, start, covariance, float("inf"), problem.channels, found, problem.mirrored, problem.roughness
+    )
 
 
 def _enlarged(
@@ -255,26 +279,6 @@ def _enlarged(
     run = problem.run(settings, start, covariance)
     by = np.sqrt(max(run.squares / max(run.readings, 1), 1.0))
     return replace(settings, noise_scale=settings.noise_scale * by, hub=settings.hub * by, jerk=settings.jerk * by**2)
-
-
-def _rough_enough(
-    problem: AxisProblem, settings: Settings, start: NDArray[np.float64], covariance: NDArray[np.float64]
-) -> Settings:
-    """Return settings with the density of the change of α of the roughest second.
-
-    One density for the whole run is too small where the speed changes, and these stretches say most of the levers. Too
-    large a density costs little.
-    """
-    block = max(int(round(1.0 / np.median(np.diff(problem.t)))), 1)
-    edges = np.arange(0, len(problem.t), block)
-    before = np.add.reduceat(problem.run(settings, start, covariance).likelihoods, edges)
-    for _ in range(_ROUGHER):
-        rougher = replace(settings, jerk=10.0 * settings.jerk)
-        after = np.add.reduceat(problem.run(rougher, start, covariance).likelihoods, edges)
-        if not np.max(after - before) > _GAINED:
-            break
-        settings, before = rougher, after
-    return settings
 
 
 def _inclination(y: NDArray[np.float64], channels: AxisChannels, hub: str) -> float:
@@ -305,7 +309,7 @@ def _inclination(y: NDArray[np.float64], channels: AxisChannels, hub: str) -> fl
     return float(np.arccos(np.clip(along / STANDARD_GRAVITY, -1.0, 1.0)))
 
 
-def _starts(
+def first_starts(
     y: NDArray[np.float64], channels: AxisChannels, tilt: float, *, at_rest: bool
 ) -> Iterator[NDArray[np.float64]]:
     """Yield states to start from: the phase of gravity, and either sign of the rate that the first samples show."""

@@ -47,10 +47,10 @@ class MountingFit:
         """Standard deviations, shape (m,)."""
         return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
 
-    def beside_inclination(self) -> NDArray[np.float64]:
-        """Return the values with that of the inclination zero: corrections to an inclination that contains it."""
-        free = np.array([one.kind == "inclination" for one in self.mounting.constants], dtype=bool)
-        return np.where(free, 0.0, self.values)
+    def values_of(self, mounting: Mounting) -> NDArray[np.float64]:
+        """Return the values for the constants of another mounting, whose inclination contains that found here."""
+        found = {one.name: value for one, value in zip(self.mounting.constants, self.values, strict=True)}
+        return np.array([0.0 if one.kind == "inclination" else found.get(one.name, 0.0) for one in mounting.constants])
 
     def undetermined(self) -> list[str]:
         """Return the combinations of which more than half of the prior variance remains, one line each.

@@ -82,11 +82,12 @@ def filter_axis(
     gravity: NDArray[np.float64],
     variance: NDArray[np.float64],
     hub_variance: float,
-    jerk: float,
+    jerk: NDArray[np.float64],
     state: NDArray[np.float64],
     covariance: NDArray[np.float64],
     slopes: Slopes,
     mirrored: NDArray[np.int64],
+    first_by_constants: NDArray[np.float64],
 ) -> FilterRun:
     """Run the filter over all samples.
 
@@ -104,21 +105,23 @@ def filter_axis(
         White noise of the channels, m²/s⁴.
     hub_variance : float
         Variance of the axis's own specific force beyond gravity, each direction, m²/s⁴.
-    jerk : float
-        Spectral density of the change of α, rad²/s⁵.
+    jerk : ndarray, shape (n,)
+        Spectral density of the change of α before each sample, rad²/s⁵.
     state, covariance
         [θ, Ω, α] before the first sample and its covariance.
     slopes : Slopes
         Derivatives by the uncertain constants, of which there may be none.
     mirrored : ndarray, shape (k,)
         Samples before which the sign of the rate is changed, ascending.
+    first_by_constants : ndarray, shape (3, m)
+        Derivatives of the state before the first sample by the uncertain constants.
     """
     force, by_acceleration, by_square, offset = channels
     along, across = gravity[0], gravity[1]
     m = len(slopes.offset)
     by_constants, before_by_constants = np.zeros((len(t), 3, m)), np.zeros((len(t), 3, m))
     gradient_of, information_of = np.zeros(m), np.zeros((m, m))
-    v, d = np.zeros((3, m)), np.zeros((y.shape[1], m))
+    v, d = first_by_constants.copy(), np.zeros((y.shape[1], m))
     n, c = y.shape
     states, covariances = np.empty((n, 3)), np.empty((n, 3, 3))
     before, before_covariance = np.empty((n, 3)), np.empty((n, 3, 3))
@@ -143,7 +146,7 @@ def filter_axis(
             q[1, 1], q[1, 2], q[2, 2] = dt**3 / 3.0, dt * dt / 2.0, dt
             q[1, 0], q[2, 0], q[2, 1] = q[0, 1], q[0, 2], q[1, 2]
             x = f @ x
-            p = f @ p @ f.T + jerk * q
+            p = f @ p @ f.T + jerk[k] * q
             v = f @ v
         if turned < len(mirrored) and mirrored[turned] == k:
             turned += 1

@@ -16,8 +16,8 @@ from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.geometry.turning_axis import TurningAxis
 from gfimu.known_axis.accuracy.bounds import require_visible
-from gfimu.known_axis.channels import AxisChannels
 from gfimu.known_axis.accuracy.predicted_readings import gravity_of, readings_of
+from gfimu.known_axis.channels import AxisChannels
 from gfimu.known_axis.recursion import Slopes, filter_axis
 
 __all__ = ["AxisDrift", "AxisDriftTerm", "axis_drift"]
@@ -149,8 +149,9 @@ def axis_drift(
     white = max(noise_density, _LEAST_NOISE) ** 2 / (2.0 * dt)
     hub = hub_density**2 / (2.0 * dt) if axis.hub == "free" else 0.0
     run = filter_axis(
-        t, y, channels.coefficients, gravity_of(tilt), np.full(c, white), hub, jerk,
-        np.array([0.0, rate_rad_s, 0.0]), np.diag([1e-12, 1e-12, 1e-12]), slopes, np.zeros(0, dtype=np.int64),
+        t, y, channels.coefficients, gravity_of(tilt), np.full(c, white), hub, np.full(count, jerk),
+        np.array([0.0, rate_rad_s, 0.0]), np.diag([1e-12, 1e-12, 1e-12]), slopes,
+        np.zeros(0, dtype=np.int64), np.zeros((3, c)),
     )  # fmt: skip
     by_bias = run.by_constants[:, :2]  # (n, 2, c): of angle and rate
     end = np.linalg.norm(by_bias[-1], axis=1)
