@@ -109,8 +109,8 @@ def score(
             continue
         doubt = about.uncertainty if uncertainty is None or uncertainty.exact else uncertainty
         tilt = about.inclination if inclination_rad is None else inclination_rad
-        about = replace(about, uncertainty=doubt, inclination=tilt)
-        found.append(_about_axis(array, about, run, speed_rad_s, noise_m_s2))
+        stands = replace(about, uncertainty=doubt, inclination=tilt)
+        found.append(_about_axis(array, stands, run, speed_rad_s, noise_m_s2))
     if uncertainty is not None and not uncertainty.exact and not any(isinstance(one, AxisBounds) for one in found):
         raise InputError(f"{next(iter(uncertainty.to_dict()))} is of a known axis; give the axis too (--axis)")
     return found

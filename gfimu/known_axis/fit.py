@@ -157,7 +157,7 @@ def first_settings(
 def _slower(
     problem: AxisProblem, settings: Settings, start: NDArray[np.float64], covariance: NDArray[np.float64]
 ) -> Settings:
-    """Return numbers of a filter that is slow enough to keep a motion that an uncertain mounting, as drawn, can lose."""
+    """Return numbers of a filter slow enough to keep a motion that an uncertain mounting, as drawn, can lose."""
     tried = [
         replace(settings, noise_scale=by * settings.noise_scale, jerk=jerk)
         for by in (1.0, 3.0, 10.0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,7 +43,7 @@ class LiveAxisSettings:
 
     start_s: float = 1.0
     memory_s: float = 5.0
-    test: MirrorTest = MirrorTest()
+    test: MirrorTest = field(default_factory=MirrorTest)
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ readings up to the next zero better, the sign is changed there.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -102,7 +103,7 @@ def _stretches(run: FilterRun, test: MirrorTest) -> list[slice]:
     rate, std = run.states[:, 1], np.sqrt(np.maximum(run.covariances[:, 1, 1], 0.0))
     state = np.where(np.abs(rate) > test.clear * std, np.sign(rate), 0.0)
     edges = np.concatenate([[0], np.flatnonzero(np.diff(state)) + 1, [len(state)]])
-    found = [slice(int(first), int(last)) for first, last in zip(edges[:-1], edges[1:], strict=True)]
+    found = [slice(int(first), int(last)) for first, last in pairwise(edges)]
     return [rows for rows in found if state[rows.start] != 0.0 and rows.stop - rows.start >= test.shortest]
 
 

@@ -1,4 +1,4 @@
-"""Readings without error of an array that turns about an axis with a given motion: what predictions run the filter on."""
+"""Readings without error of an array that turns about an axis: what predictions run the filter on."""
 
 from __future__ import annotations
 

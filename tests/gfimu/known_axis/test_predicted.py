@@ -123,7 +123,7 @@ def test_a_rate_that_a_bias_mirrored_is_turned_back():
     channels = AxisChannels.of(ONE, axis)
     t = np.arange(0.0, 20.0, 1.0 / RATE)
     angle, rate, acceleration = spun_up(t, SPEED)
-    readings = readings_of(channels, 0.0, angle, rate, acceleration) + [0.0, -0.15, 0.0]
+    readings = readings_of(channels, 0.0, angle, rate, acceleration) + np.array([0.0, -0.15, 0.0])
     readings += NOISE * np.random.default_rng(2).standard_normal(readings.shape)
     problem = AxisProblem(t, readings, channels, np.full(3, NOISE))
     settings, start, covariance = Settings(10.0, 1.0, 0.0, 0.0), np.zeros(3), np.diag([0.25, 1e-4, 1e-2])
