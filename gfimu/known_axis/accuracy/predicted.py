@@ -149,7 +149,7 @@ def predicted_estimate(
     steady = slice(len(t) // 2, None)
     noise_variance = float(np.mean(found.covariances[steady, 1, 1]))
     by_rate = found.by_constants[steady, 1]  # (n, m)
-    remaining = np.linalg.inv(information)
+    remaining = np.asarray(np.linalg.inv(information), dtype=np.float64)
     mounting_variance = float(np.mean(np.einsum("ni,ij,nj->n", by_rate, remaining, by_rate)))
     return PredictedEstimate(
         run,
