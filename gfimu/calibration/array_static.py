@@ -23,7 +23,7 @@ from gfimu.calibration.result import Calibration, parameter_names
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
 
-__all__ = ["apparent_alpha", "array_static", "body_specific_force", "disagreement", "same_specific_force"]
+__all__ = ["apparent_alpha", "array_static", "body_specific_force", "disagreement", "same_specific_force", "seen_alpha"]
 
 Floats = NDArray[np.float64]
 
@@ -103,9 +103,30 @@ def array_static(observations: Observations, array: AccelerometerArray, *, gravi
         "disagreement_rms_m_s2": disagreement(body),
         "input": observations.kind,
     }
+    seen = seen_alpha(array)
     for axis, value in zip("xyz", np.sqrt(np.mean(alpha**2, axis=0)), strict=True):
-        statistics[f"apparent_alpha_{axis}_rms_rad_s2"] = float(value)
-    return replace(result, statistics=statistics)
+        if axis in seen:
+            statistics[f"apparent_alpha_{axis}_rms_rad_s2"] = float(value)
+    return replace(result, statistics=statistics, warnings=(*result.warnings, *_unseen_text(array, seen)))
+
+
+def seen_alpha(array: AccelerometerArray) -> str:
+    """Return the axes, of x, y and z, about which the array observes an angular acceleration at rest."""
+    share = np.diag(np.linalg.pinv(array.regression_matrix) @ array.regression_matrix)[:3]
+    return "".join(axis for axis, one in zip("xyz", share, strict=True) if one > 1.0 - 1e-6)
+
+
+def _unseen_text(array: AccelerometerArray, seen: str) -> tuple[str, ...]:
+    """Return what poses at rest can't show of an array with few channels, in one line; nothing for others."""
+    unseen = [axis for axis in "xyz" if axis not in seen]
+    if not unseen:
+        return ()
+    text = (
+        f"array {array.name!r} does not observe the angular acceleration about {', '.join(unseen)}: its apparent value "
+        "at rest, which checks the chips against one another, can't be stated, nor can these poses show where the "
+        "chips are; a run with a reference of the rotation shows places"
+    )
+    return (text,)
 
 
 def disagreement(body: Floats) -> float:

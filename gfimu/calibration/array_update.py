@@ -14,7 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri
 
-from gfimu.calibration.array_static import apparent_alpha, body_specific_force, disagreement, same_specific_force
+from gfimu.calibration.array_static import (
+    apparent_alpha,
+    body_specific_force,
+    disagreement,
+    same_specific_force,
+    seen_alpha,
+)
 from gfimu.calibration.observations import Observations
 from gfimu.calibration.result import Calibration
 from gfimu.errors import InputError, UnitError
@@ -148,5 +154,6 @@ def _statistics(
         alpha = apparent_alpha(array, body)
         statistics[f"disagreement_rms_{when}_m_s2"] = disagreement(body)
         for axis, value in zip("xyz", np.sqrt(np.mean(alpha**2, axis=0)), strict=True):
-            statistics[f"apparent_alpha_{axis}_rms_{when}_rad_s2"] = float(value)
+            if axis in seen_alpha(array):
+                statistics[f"apparent_alpha_{axis}_rms_{when}_rad_s2"] = float(value)
     return statistics

@@ -11,7 +11,7 @@ from gfimu.cli.output import JsonOption, print_json, print_table, print_text, pr
 from gfimu.errors import InputError
 
 if TYPE_CHECKING:
-    from gfimu.known_axis.drift import AxisDrift
+    from gfimu.known_axis.accuracy.drift import AxisDrift
     from gfimu.position_drift import DriftBudget
     from gfimu.position_drift.monte_carlo import DriftSample
 

@@ -40,6 +40,20 @@ def _live(
     ] = None,
     unknown_start: Annotated[bool, typer.Option("--unknown-start", help="The body may be spinning already.")] = False,
     gyro: Annotated[bool, typer.Option("--gyro", help="Fuse the stream's gyro columns.")] = False,
+    axis: Annotated[
+        str | None,
+        typer.Option(
+            "--axis", help="Axis about which alone the array turns: x, y, z or 0,0,1. One chip then suffices."
+        ),
+    ] = None,
+    axis_point: Annotated[
+        tuple[float, float, float], typer.Option("--axis-point", help="A point of that axis, body frame, m.")
+    ] = (0.0, 0.0, 0.0),
+    hub: Annotated[str, typer.Option("--hub", help="With --axis: fixed (a table) or free (a wheel).")] = "fixed",
+    inclination_rad: Annotated[
+        float | None,
+        typer.Option("--inclination-rad", help="Angle between --axis and the vertical; else from the first second."),
+    ] = None,
 ) -> None:
     """Estimate the angular rate while samples arrive: CSV lines in, one JSON line per sample out.
 
@@ -50,6 +64,8 @@ def _live(
     Example: gfimu live --from run.parquet --follow
 
     Example: ssh pi cat /data/run.csv | gfimu live --array cube12 --rate 100
+
+    A wheel by two chips: gfimu live --from socket://pi:4000 --array wheel.toml --axis z --hub free --unknown-start
     """
     from gfimu.commands.live import live
 
@@ -62,6 +78,10 @@ def _live(
         bias_std=bias_std,
         unknown_start=unknown_start,
         gyro=gyro,
+        axis=axis,
+        axis_point=axis_point,
+        hub=hub,
+        inclination_rad=inclination_rad,
     ):
         sys.stdout.write(line + "\n")
         sys.stdout.flush()

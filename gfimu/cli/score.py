@@ -45,6 +45,36 @@ def _score(
     ] = (0.0, 0.0, 0.0),
     hub: Annotated[str, typer.Option("--hub", help="With --axis: fixed (a table) or free (a wheel).")] = "fixed",
     sample_rate_hz: Annotated[float, typer.Option("--sample-rate-hz", help="With --axis: sample rate, Hz.")] = 100.0,
+    inclination_rad: Annotated[
+        float | None,
+        typer.Option("--inclination-rad", help="Angle between --axis and the vertical; else 0, or π/2 of a free hub."),
+    ] = None,
+    point_std: Annotated[
+        float, typer.Option("--point-std-m", help="With --axis: how exactly --axis-point is known, m.")
+    ] = 0.0,
+    direction_std: Annotated[
+        float, typer.Option("--direction-std-rad", help="With --axis: how exactly its direction is known, rad.")
+    ] = 0.0,
+    lever_std: Annotated[
+        float, typer.Option("--lever-std-m", help="With --axis: how exactly each chip's place is known, m.")
+    ] = 0.0,
+    rotation_std: Annotated[
+        float,
+        typer.Option("--rotation-std-rad", help="With --axis: how exactly each chip's orientation is known, rad."),
+    ] = 0.0,
+    bias_std: Annotated[
+        float, typer.Option("--bias-std-m-s2", help="With --axis: standard deviation of each channel's bias, m/s².")
+    ] = 0.0,
+    duration: Annotated[
+        float, typer.Option("--duration-s", help="With --axis: length of the run that the estimate is predicted for.")
+    ] = 60.0,
+    hub_std: Annotated[
+        float,
+        typer.Option("--hub-std-m-s2", help="With a free hub: standard deviation of its own acceleration, m/s²."),
+    ] = 0.7,
+    jerk: Annotated[
+        float, typer.Option("--jerk-rad2-s5", help="With --axis: spectral density of the change of α, rad²/s⁵.")
+    ] = 1.0,
     as_json: JsonOption = False,
 ) -> None:
     """Score array geometries: condition number, GDOP, errors per axis, what ω² leaves, what ω can be seen.
@@ -52,9 +82,13 @@ def _score(
     Example: gfimu score cube12 p3_three_plus_one --speed-rad-s 10
 
     Two chips on a wheel: gfimu score wheel.toml --axis z --hub free --speed-rad-s 12
+
+    Mounted by eye: the same with --lever-std-m 0.003 --rotation-std-rad 0.05 --bias-std-m-s2 0.2
     """
     from gfimu.commands.score import score
+    from gfimu.geometry.turning_axis import AxisUncertainty
     from gfimu.known_axis import AxisBounds
+    from gfimu.known_axis.accuracy.predicted import PredictedRun
 
     scores = score(
         arrays,
@@ -65,20 +99,20 @@ def _score(
         axis=axis,
         axis_point=axis_point,
         hub=hub,
-        sample_rate_hz=sample_rate_hz,
+        inclination_rad=inclination_rad,
+        uncertainty=AxisUncertainty(point_std, direction_std, lever_std, rotation_std, bias_std),
+        run=PredictedRun(duration, sample_rate_hz, hub_std, jerk),
     )
     bounds = [entry for entry in scores if isinstance(entry, AxisBounds)]
-    if bounds:
-        if as_json:
-            print_json({"arrays": [entry.to_dict() for entry in bounds]})
-        else:
-            _print_bounds(bounds, noise, sample_rate_hz)
-        return
     figures = [entry for entry in scores if not isinstance(entry, AxisBounds)]
     if as_json:
-        print_json({"length_unit_m": figures[0].length_unit_m, "arrays": [entry.to_dict() for entry in figures]})
+        units = {"length_unit_m": figures[0].length_unit_m} if figures else {}
+        print_json(units | {"arrays": [entry.to_dict() for entry in scores]})
         return
-    _print_scores(figures, f"{speed:.4g} rad/s about {spin_axis} and channel noise {noise:.4g} m/s²")
+    if figures:
+        _print_scores(figures, f"{speed:.4g} rad/s about {spin_axis} and channel noise {noise:.4g} m/s²")
+    if bounds:
+        _print_bounds(bounds, noise, sample_rate_hz)
 
 
 def _optimize(
@@ -198,11 +232,12 @@ def _print_scores(scores: list[Score], condition: str) -> None:
 
 def _print_bounds(bounds: list[AxisBounds], noise: float, sample_rate_hz: float) -> None:
     print_table(
-        f"Rotation about one known axis, {bounds[0].axis.hub} hub",
-        ["array", "σ_α, rad/s²", "σ of Ω², rad²/s²", "σ_Ω per sample, rad/s", "σ_Ω of a filter, rad/s"],
+        "Rotation about one known axis: bounds with an exact mounting",
+        ["array", "hub", "σ_α, rad/s²", "σ of Ω², rad²/s²", "σ_Ω per sample, rad/s", "σ_Ω of a filter, rad/s"],
         [
             [
                 entry.array,
+                entry.axis.hub,
                 _number(entry.acceleration_std, ".4g"),
                 _number(entry.square_std, ".4g"),
                 _number(entry.sample_std, ".3g"),
@@ -210,9 +245,37 @@ def _print_bounds(bounds: list[AxisBounds], noise: float, sample_rate_hz: float)
             ]
             for entry in bounds
         ],
-        note=f"At {bounds[0].rate_rad_s:.4g} rad/s, channel noise {noise:.4g} m/s², {sample_rate_hz:g} Hz; —: the "
-        "array can't tell. A filter is at this bound with biases known and white noise.",
+        note=f"At {bounds[0].rate_rad_s:.4g} rad/s, channel noise {noise:.4g} m/s², {sample_rate_hz:g} Hz; —: not "
+        "observable. A filter is at this bound with biases known, white noise and any motion.",
     )
+    predicted = [(entry, entry.predicted) for entry in bounds if entry.predicted is not None]
+    if not predicted:
+        return
+    run = predicted[0][1].run
+    print_table(
+        f"What gfimu estimate reaches at {bounds[0].rate_rad_s:.4g} rad/s, in a run of {run.duration_s:g} s from rest",
+        ["array", "inclination, rad", "σ_Ω by noise, rad/s", "by the mounting, rad/s", "σ_Ω, rad/s"],
+        [
+            [
+                entry.array,
+                f"{found.inclination_rad:.3g}",
+                _number(found.noise_std, ".3g"),
+                "exact" if entry.axis.uncertainty.exact else _number(found.mounting_std, ".3g"),
+                _number(found.std, ".3g"),
+            ]
+            for entry, found in predicted
+        ],
+        note="Gravity, which turns in an inclined body, counts too; the uncertain constants of the mounting are "
+        f"estimated in that run. Change of α of density {run.jerk_rad2_s5:g} rad²/s⁵"
+        + (
+            f", acceleration of a free hub {run.hub_std_m_s2:g} m/s²."
+            if any(entry.axis.hub == "free" for entry in bounds)
+            else "."
+        ),
+    )
+    for entry, found in predicted:
+        if found.undetermined:
+            print_text(f"{entry.array}: such a run does not determine {'; '.join(found.undetermined)}.")
 
 
 def _names_of(scores: list[Score], length: float) -> str:

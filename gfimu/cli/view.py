@@ -26,6 +26,17 @@ def _view(
     ] = None,
     column_map: MapOption = None,
     map_set: MapSetOption = None,
+    axis: Annotated[
+        str | None,
+        typer.Option("--axis", help="Axis about which alone the array turns: x, y, z or 0,0,1; else the array's own."),
+    ] = None,
+    axis_point: Annotated[
+        tuple[float, float, float], typer.Option("--axis-point", help="A point of that axis, body frame, m.")
+    ] = (0.0, 0.0, 0.0),
+    hub: Annotated[str, typer.Option("--hub", help="With --axis: fixed (a table) or free (a wheel).")] = "fixed",
+    inclination_rad: Annotated[
+        float | None, typer.Option("--inclination-rad", help="Angle between --axis and the vertical; else estimated.")
+    ] = None,
     out: Annotated[Path | None, typer.Option("--out", help="Write the .rrd here and don't open it.")] = None,
 ) -> None:
     """Open a run in the rerun viewer: the rig in 3-D, raw channels, and the estimate over time.
@@ -33,6 +44,8 @@ def _view(
     A recording of readings is estimated first; its picture goes beside it as FILE.view.rrd.
 
     Example: gfimu view run.parquet
+
+    One chip on a table: gfimu view run.csv --array arm.toml --axis z
     """
     from gfimu.commands.view import view
 
@@ -41,6 +54,10 @@ def _view(
         array=array,
         column_map=column_map,
         map_set=map_set or [],
+        axis=axis,
+        axis_point=axis_point,
+        hub=hub,
+        inclination_rad=inclination_rad,
         out=out,
         on_picture=lambda picture: print_paths([("rerun recording", picture)]),
     )

@@ -13,7 +13,7 @@ from gfimu.errors import InputError
 if TYPE_CHECKING:
     from gfimu.geometry.array import AccelerometerArray
     from gfimu.geometry.turning_axis import TurningAxis
-    from gfimu.known_axis.drift import AxisDrift
+    from gfimu.known_axis.accuracy.drift import AxisDrift
     from gfimu.position_drift import DriftBudget, ErrorSources
     from gfimu.position_drift.monte_carlo import DriftSample
 
@@ -168,7 +168,7 @@ def axis_drift(
     """
     from gfimu.commands.known_axis import turning_axis
     from gfimu.commands.opened import as_array
-    from gfimu.known_axis.drift import axis_drift as drift_about
+    from gfimu.known_axis.accuracy.drift import axis_drift as drift_about
 
     sources = _sources(bias_mg, noise_ug, walk_ug)
     geometry = as_array(array)

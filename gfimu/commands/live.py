@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,6 +11,7 @@ from gfimu.errors import InputError
 
 if TYPE_CHECKING:
     from gfimu.geometry.array import AccelerometerArray
+    from gfimu.geometry.turning_axis import TurningAxis
 
 __all__ = ["live"]
 
@@ -25,6 +26,10 @@ def live(
     bias_std: float | None = None,
     unknown_start: bool = False,
     gyro: bool = False,
+    axis: TurningAxis | str | Sequence[float] | None = None,
+    axis_point: Sequence[float] = (0.0, 0.0, 0.0),
+    hub: str = "fixed",
+    inclination_rad: float | None = None,
 ) -> Iterator[str]:
     """Estimate the angular rate while samples arrive: CSV lines in, one JSON line per sample out.
 
@@ -47,11 +52,21 @@ def live(
         Whether the body may be spinning already.
     gyro : bool
         Whether to fuse the stream's gyro columns.
+    axis : TurningAxis, str or sequence of float, optional
+        The axis about which alone the array turns: x, y, z, or three numbers, body frame; one chip then suffices. By
+        default the array's own, where it can't see all six motions.
+    axis_point : sequence of float
+        A point of that axis, body frame, m.
+    hub : {"fixed", "free"}
+        Whether that axis stands still (a table) or moves with a body (a wheel).
+    inclination_rad : float, optional
+        Angle between that axis and the vertical, rad; by default from the first second.
 
     Returns
     -------
     iterator of str
-        JSON lines, as `gfimu.rate.stream.filter_stream`; an estimate comes two samples after its own.
+        JSON lines, as `gfimu.rate.stream.filter_stream`; an estimate comes two samples after its own. About an axis as
+        `gfimu.known_axis.live.axis_stream`; the first estimates come after a second.
 
     Raises
     ------
@@ -61,6 +76,7 @@ def live(
     """
     import numpy as np
 
+    from gfimu.commands.known_axis import known_axis, turning_axis
     from gfimu.commands.opened import as_array
     from gfimu.rate.kalman import FilterSettings
     from gfimu.rate.sensing import SensorErrors
@@ -77,6 +93,13 @@ def live(
         raise InputError("--rate is missing, and the stream does not state its sample rate; give it")
     if not isinstance(rate, int | float) or not rate > 0:
         raise InputError(f"--rate {rate}: must be positive, Hz")
+    about = known_axis(turning_axis(axis, axis_point, hub, inclination_rad), geometry)
+    if about is not None:
+        from gfimu.known_axis.live import axis_stream
+
+        if gyro or scale_std or bias_std is not None:
+            raise InputError("--gyro, --scale-std and --bias-std have no use with a known axis; leave them out")
+        return axis_stream(lines, geometry, about, rate, at_rest=not unknown_start)
     biases = {} if bias_std is None else {"bias_std": bias_std}
     errors = SensorErrors.from_parts(geometry, rate, scale_std=scale_std, **biases)
     settings = FilterSettings(start_omega=None) if unknown_start else FilterSettings(start_omega=np.zeros(3))

@@ -95,7 +95,7 @@ def noise(
     if axis is not None or array is not None or "[turning_axis]" in str(run.metadata.get("array_toml", "")):
         from gfimu.commands.known_axis import known_axis, turning_axis
         from gfimu.commands.opened import as_array, as_run
-        from gfimu.known_axis.noise import axis_noise
+        from gfimu.known_axis.accuracy.noise import axis_noise
 
         geometry = as_run(source, None)[1] if array is None else as_array(array)
         turning = known_axis(turning_axis(axis, axis_point, hub, None), geometry)

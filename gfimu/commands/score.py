@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,8 +13,9 @@ if TYPE_CHECKING:
 
     from gfimu.geometry.array import AccelerometerArray
     from gfimu.geometry.scoring import Score
-    from gfimu.geometry.turning_axis import TurningAxis
+    from gfimu.geometry.turning_axis import AxisUncertainty, TurningAxis
     from gfimu.known_axis import AxisBounds
+    from gfimu.known_axis.accuracy.predicted import PredictedRun
 
 __all__ = ["score"]
 
@@ -32,8 +34,13 @@ def score(
     axis_point: Sequence[float] = (0.0, 0.0, 0.0),
     hub: str = "fixed",
     sample_rate_hz: float = 100.0,
-) -> list[Score] | list[AxisBounds]:
+    inclination_rad: float | None = None,
+    uncertainty: AxisUncertainty | None = None,
+    run: PredictedRun | None = None,
+) -> list[Score | AxisBounds]:
     """Score the geometry of one or several arrays.
+
+    An array that can't see all six motions is scored about its own axis, if its file names one.
 
     Parameters
     ----------
@@ -59,6 +66,12 @@ def score(
         Whether that axis stands still (a table) or moves with a body (a wheel).
     sample_rate_hz : float
         Sample rate at which the bound of a filter about that axis holds.
+    inclination_rad : float, optional
+        Angle between that axis and the vertical, rad; by default a fixed one is upright, a free one level.
+    uncertainty : AxisUncertainty, optional
+        How exactly axis, places, orientations and biases of the chips are known; that of the array file by default.
+    run : PredictedRun, optional
+        The run for which the estimate's standard deviation is predicted; its sample rate holds for all bounds.
 
     Raises
     ------
@@ -67,11 +80,14 @@ def score(
     InputError
         If an array is unknown or an argument is out of range.
     """
+    from gfimu.commands.known_axis import known_axis, turning_axis
     from gfimu.commands.opened import as_array
-    from gfimu.errors import unknown_name
+    from gfimu.errors import InputError, unknown_name
     from gfimu.geometry.array import AccelerometerArray
     from gfimu.geometry.observability import seeing_arrays
     from gfimu.geometry.scoring import score as score_arrays
+    from gfimu.known_axis import AxisBounds
+    from gfimu.known_axis.accuracy.predicted import PredictedRun
 
     if spin_axis not in _AXES:
         raise unknown_name("axis", spin_axis, _AXES)
@@ -79,18 +95,33 @@ def score(
         given = [arrays] if isinstance(arrays, AccelerometerArray | str | Path) else list(arrays)
     else:  # boxes of one or two chips see less than a rigid body's motion
         given = list(seeing_arrays())
-    if axis is not None:
-        from gfimu.geometry.turning_axis import TurningAxis
-        from gfimu.known_axis import axis_bounds
-
-        turning = axis if isinstance(axis, TurningAxis) else TurningAxis.of(axis, point=axis_point, hub=hub)
-        return [
-            axis_bounds(
-                as_array(item), turning, rate_rad_s=speed_rad_s, noise_std=noise_m_s2, sample_rate_hz=sample_rate_hz
-            )
-            for item in given
-        ]
+    turning = turning_axis(axis, axis_point, hub, inclination_rad)
+    run = PredictedRun(sample_rate_hz=sample_rate_hz) if run is None else run
     omega = [speed_rad_s * component for component in _AXES[spin_axis]] if omega_rad_s is None else omega_rad_s
-    return score_arrays(
-        [as_array(item) for item in given], length_unit_m=length_unit_m, omega_rad_s=omega, noise_m_s2=noise_m_s2
-    )
+    given_axes = [(array, known_axis(turning, array)) for array in map(as_array, given)]
+    seeing = [array for array, about in given_axes if about is None]
+    options = {"length_unit_m": length_unit_m, "omega_rad_s": omega, "noise_m_s2": noise_m_s2}
+    scores = iter(score_arrays(seeing, **options) if seeing else [])
+    found: list[Score | AxisBounds] = []
+    for array, about in given_axes:
+        if about is None:
+            found.append(next(scores))
+            continue
+        doubt = about.uncertainty if uncertainty is None or uncertainty.exact else uncertainty
+        tilt = about.inclination if inclination_rad is None else inclination_rad
+        stands = replace(about, uncertainty=doubt, inclination=tilt)
+        found.append(_about_axis(array, stands, run, speed_rad_s, noise_m_s2))
+    if uncertainty is not None and not uncertainty.exact and not any(isinstance(one, AxisBounds) for one in found):
+        raise InputError(f"{next(iter(uncertainty.to_dict()))} is of a known axis; give the axis too (--axis)")
+    return found
+
+
+def _about_axis(
+    array: AccelerometerArray, axis: TurningAxis, run: PredictedRun, rate_rad_s: float, noise_std: float
+) -> AxisBounds:
+    """Return the bounds of a rotation about an axis, with what the estimate reaches in a run."""
+    from gfimu.known_axis import axis_bounds
+    from gfimu.known_axis.accuracy.predicted import predicted_estimate
+
+    bounds = axis_bounds(array, axis, rate_rad_s=rate_rad_s, noise_std=noise_std, sample_rate_hz=run.sample_rate_hz)
+    return replace(bounds, predicted=predicted_estimate(array, axis, run, rate_rad_s=rate_rad_s, noise_std=noise_std))

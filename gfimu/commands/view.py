@@ -10,6 +10,7 @@ from gfimu.files.outputs import RERUN, check_outputs, writes
 
 if TYPE_CHECKING:
     from gfimu.geometry.array import AccelerometerArray
+    from gfimu.geometry.turning_axis import TurningAxis
     from gfimu.importing import ColumnMap
 
 __all__ = ["view"]
@@ -22,6 +23,10 @@ def view(
     array: AccelerometerArray | str | Path | None = None,
     column_map: ColumnMap | str | Path | None = None,
     map_set: Sequence[str] = (),
+    axis: TurningAxis | str | Sequence[float] | None = None,
+    axis_point: Sequence[float] = (0.0, 0.0, 0.0),
+    hub: str = "fixed",
+    inclination_rad: float | None = None,
     out: str | Path | None = None,
     on_picture: Callable[[Path], None] | None = None,
 ) -> Path:
@@ -37,6 +42,15 @@ def view(
         What the columns of a foreign file are: a map, its name or TOML file (``--map``).
     map_set : sequence of str
         Keys of that map to set, such as ``"time.unit=ms"`` (``--map-set``); without a map they are all of it.
+    axis : TurningAxis, str or sequence of float, optional
+        The axis about which alone the array turns, body frame: x, y, z, or three numbers; by default the array's own,
+        where it can't see all six motions.
+    axis_point : sequence of float
+        A point of that axis, body frame, m.
+    hub : {"fixed", "free"}
+        Whether that axis stands still (a table) or moves with a body (a wheel).
+    inclination_rad : float, optional
+        Angle between that axis and the vertical, rad; estimated by default.
     out : str or Path, optional
         Write the ``.rrd`` here and don't open it.
     on_picture : callable, optional
@@ -54,6 +68,7 @@ def view(
     GfimuError
         If this machine has no display, or the viewer fails; the message says what to do instead.
     """
+    from gfimu.commands.known_axis import turning_axis
     from gfimu.commands.opened import as_array, by_map
     from gfimu.visual.picture import picture_of, picture_path
     from gfimu.visual.viewer import open_viewer
@@ -64,7 +79,12 @@ def view(
         return source
     picture = picture_path(source) if out is None else Path(out)
     check_outputs([("out", picture, RERUN)], [source])
-    picture_of(by_map(source, column_map, map_set), picture, array=None if array is None else as_array(array))
+    picture_of(
+        by_map(source, column_map, map_set),
+        picture,
+        array=None if array is None else as_array(array),
+        axis=turning_axis(axis, axis_point, hub, inclination_rad),
+    )
     if on_picture is not None:
         on_picture(picture)
     if out is None:

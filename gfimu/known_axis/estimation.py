@@ -12,7 +12,7 @@ from gfimu import __version__
 from gfimu.errors import InputError
 from gfimu.geometry.array import OMEGA_PRODUCTS, AccelerometerArray
 from gfimu.geometry.turning_axis import TurningAxis
-from gfimu.known_axis.bounds import require_visible
+from gfimu.known_axis.accuracy.bounds import require_visible
 from gfimu.known_axis.fit import fit_axis
 from gfimu.known_axis.problem import AxisProblem
 from gfimu.known_axis.recursion import smooth_axis
@@ -77,8 +77,8 @@ def estimate_about_axis(
     fit = fit_axis(t, y, array, axis, noise, at_rest=at_rest)
     one, channels, mounted = fit.settings, fit.channels, fit.mounting
     slopes = None if mounted is None else mounted.mounting.slopes(mounted.values)
-    run = AxisProblem(t, y, channels, noise).run(one, fit.start, fit.start_covariance, slopes=slopes)
-    found = smooth_axis(t, run) if smooth else (run.states, run.covariances, run.by_constants)
+    run = fit.on(AxisProblem(t, y, channels, noise)).run(one, fit.start, fit.start_covariance, slopes=slopes)
+    found = smooth_axis(t, run, fit.mirrored) if smooth else (run.states, run.covariances, run.by_constants)
     # All noises larger by one factor leave the gains as they are: the innovations say by how much.
     mean_square = run.squares / max(run.readings, 1)
     states, variance = found[0], max(mean_square, 1.0) * found[1][:, 1, 1]

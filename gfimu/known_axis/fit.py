@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,13 +13,15 @@ from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.geometry.turning_axis import TurningAxis
 from gfimu.known_axis.channels import AxisChannels
+from gfimu.known_axis.mirror import clear_starts, first_odds, with_signs
 from gfimu.known_axis.mounting import Mounting
 from gfimu.known_axis.mounting_fit import MountingFit, fit_mounting
 from gfimu.known_axis.problem import AxisProblem, Settings
 from gfimu.known_axis.recursion import FilterRun
+from gfimu.known_axis.roughness import with_roughness
 from gfimu.units import STANDARD_GRAVITY
 
-__all__ = ["AxisFit", "fit_axis"]
+__all__ = ["AxisFit", "first_settings", "first_starts", "fit_axis"]
 
 _LEARNT_FROM = 3000  # samples: enough for four numbers
 _TRIED_ON = 600  # samples, on which starts are compared
@@ -50,6 +52,10 @@ class AxisFit:
         What the channels read, with the uncertain constants at their estimates.
     mounting : MountingFit or None
         The constants that were uncertain; None where the mounting is exact.
+    mirrored : ndarray, shape (k,)
+        Samples before which the filter's rate is given the other sign (`gfimu.known_axis.mirror`).
+    roughness : ndarray, shape (n,), optional
+        How the roughness of the motion differs from that of the settings (`gfimu.known_axis.roughness`).
     """
 
     settings: Settings
@@ -58,6 +64,12 @@ class AxisFit:
     sign_log_odds: float
     channels: AxisChannels
     mounting: MountingFit | None = None
+    mirrored: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    roughness: NDArray[np.float64] | None = None
+
+    def on(self, problem: AxisProblem) -> AxisProblem:
+        """Return a problem with the channels, signs and roughness that were found."""
+        return replace(problem, channels=self.channels, mirrored=self.mirrored, roughness=self.roughness)
 
 
 def fit_axis(
@@ -86,45 +98,122 @@ def fit_axis(
     """
     channels = AxisChannels.of(array, axis)
     problem = AxisProblem(t, y, channels, noise)
-    tilt = _inclination(y, channels, axis.hub) if axis.inclination is None else axis.inclination
-    if axis.inclination is None and np.sin(tilt) <= _LEVEL:
-        tilt = 0.0 if np.cos(tilt) > 0.0 else np.pi  # upright: what is across would be biases
-    settings = Settings(_first_scale(axis, noise), 100.0, 0.0 if axis.hub == "fixed" else 1.0, tilt)
-    tried = min(_TRIED_ON, len(t))
-    covariance = np.diag(_STD_START**2)
-    if at_rest:
-        covariance = np.diag([_STD_START[0] ** 2, 1e-4, 1e-2])
-    starts = list(_starts(y, channels, tilt, at_rest=at_rest))
+    settings, covariance = first_settings(y, channels, axis, noise, at_rest=at_rest)
+    tilt, tried = settings.inclination, min(_TRIED_ON, len(t))
+    starts = list(first_starts(y, channels, tilt, at_rest=at_rest))
     best = max(starts, key=lambda start: problem.likelihood(settings, start, covariance, tried))
-    if not axis.uncertainty.exact:
-        # A mounting that is off, taken as exact, can lose the motion: begin where the filter is slow enough to keep it.
-        slower = [
-            replace(settings, noise_scale=by * settings.noise_scale, jerk=jerk)
-            for by in (1.0, 3.0, 10.0)
-            for jerk in (10.0, 100.0)
-        ]
-        settings = max(slower, key=lambda one: problem.likelihood(one, best, covariance, len(t)))
-    else:
+    exact = axis.uncertainty.exact
+    if exact:
         settings = _learnt(problem, settings, axis, best, covariance)
         best = max(starts, key=lambda start: problem.likelihood(settings, start, covariance, tried))
+    else:
+        settings = _slower(problem, settings, best, covariance)
     if at_rest:
-        return _with_mounting(problem, array, axis, settings, best, covariance)
+        return _from_rest(problem, array, axis, settings, best, covariance)
     mirrored = [start for start in starts if start[1] * best[1] < 0.0] or [best * np.array([1.0, -1.0, -1.0])]
     other = max(mirrored, key=lambda start: problem.likelihood(settings, start, covariance, tried))
     runs = [problem.run(settings, start, covariance) for start in (best, other)]
     spread = max(min(run.squares / max(run.readings, 1) for run in runs), 1.0)
     ahead = (runs[0].likelihood - runs[1].likelihood) / spread
-    if not axis.uncertainty.exact and abs(ahead) > _CLEAR:
+    if not exact and abs(ahead) > _CLEAR:
         fit = _with_mounting(problem, array, axis, settings, best if ahead > 0.0 else other, covariance)
-        return replace(fit, sign_log_odds=float(abs(ahead)))
+        return replace(_with_own_signs(problem, array, axis, fit), sign_log_odds=float(abs(ahead)))
     fits = [_with_mounting(problem, array, axis, settings, start, covariance) for start in (best, other)]
-    if not axis.uncertainty.exact:
-        runs = [replace(problem, channels=one.channels).run(one.settings, one.start, covariance) for one in fits]
+    if not exact:
+        runs = [one.on(problem).run(one.settings, one.start, covariance) for one in fits]
     odds = _density(fits[0], runs[0]) - _density(fits[1], runs[1])
-    # Starts of either sign that end in one motion began where the rate was near zero: there is no other sign.
+    found = _with_own_signs(problem, array, axis, fits[0 if odds > 0.0 else 1])
+    return replace(found, sign_log_odds=float("inf") if _alike(runs) else abs(float(odds)))
+
+
+def _alike(runs: Sequence[FilterRun]) -> bool:
+    """Return whether starts of either sign end in one motion: they began near zero, and there is no other sign."""
     rates = [run.states[:, 1] for run in runs]
-    alike = np.median(np.abs(rates[0] - rates[1])) < 0.1 * np.median(np.abs(rates[0] + rates[1]))
-    return replace(fits[0 if odds > 0.0 else 1], sign_log_odds=float("inf") if alike else abs(float(odds)))
+    return bool(np.median(np.abs(rates[0] - rates[1])) < 0.1 * np.median(np.abs(rates[0] + rates[1])))
+
+
+def first_settings(
+    y: NDArray[np.float64],
+    channels: AxisChannels,
+    axis: TurningAxis,
+    noise: NDArray[np.float64],
+    *,
+    at_rest: bool,
+) -> tuple[Settings, NDArray[np.float64]]:
+    """Return the numbers that a filter begins with, and the covariance (3, 3) of the state that it begins with.
+
+    Raises
+    ------
+    InputError
+        If the inclination of the axis is not given and does not show.
+    """
+    tilt = _inclination(y, channels, axis.hub) if axis.inclination is None else axis.inclination
+    if axis.inclination is None and np.sin(tilt) <= _LEVEL:
+        tilt = 0.0 if np.cos(tilt) > 0.0 else np.pi  # upright: what is across would be biases
+    settings = Settings(_first_scale(axis, noise), 100.0, 0.0 if axis.hub == "fixed" else 1.0, tilt)
+    return settings, np.diag([_STD_START[0] ** 2, 1e-4, 1e-2] if at_rest else _STD_START**2)
+
+
+def _slower(
+    problem: AxisProblem, settings: Settings, start: NDArray[np.float64], covariance: NDArray[np.float64]
+) -> Settings:
+    """Return numbers of a filter slow enough to keep a motion that an uncertain mounting, as drawn, can lose."""
+    tried = [
+        replace(settings, noise_scale=by * settings.noise_scale, jerk=jerk)
+        for by in (1.0, 3.0, 10.0)
+        for jerk in (10.0, 100.0)
+    ]
+    return max(tried, key=lambda one: problem.likelihood(one, start, covariance, len(problem.t)))
+
+
+def _from_rest(
+    problem: AxisProblem,
+    array: AccelerometerArray,
+    axis: TurningAxis,
+    settings: Settings,
+    start: NDArray[np.float64],
+    covariance: NDArray[np.float64],
+) -> AxisFit:
+    """Return the fit of a run that begins at rest, in which the filter may take the mirrored rate.
+
+    Of an uncertain mounting, both signs that the body may have gone off with are fitted, unless one is clear.
+    """
+    signed = with_signs(problem, settings, start, covariance)
+    if axis.uncertainty.exact:
+        if len(signed.mirrored):
+            settings = _learnt(signed, settings, axis, start, covariance)
+            signed = with_signs(signed, settings, start, covariance)
+        return _with_mounting(signed, array, axis, settings, start, covariance)
+    if len(signed.mirrored):
+        settings = _slower(signed, settings, start, covariance)
+    fit = _with_mounting(signed, array, axis, settings, start, covariance)
+    run = signed.run(settings, start, covariance)
+    starts = clear_starts(run)
+    if not starts or first_odds(signed, settings, run) > _CLEAR:
+        return _with_own_signs(problem, array, axis, fit)
+    toggled = np.setxor1d(signed.mirrored[signed.mirrored <= starts[0]], starts[:1]).astype(np.int64)
+    other = with_signs(replace(problem, mirrored=toggled), settings, start, covariance, first_kept=True)
+    fits = [fit, _with_mounting(other, array, axis, settings, start, covariance)]
+    runs = [one.on(problem).run(one.settings, start, covariance) for one in fits]
+    odds = _density(fits[0], runs[0]) - _density(fits[1], runs[1])
+    found = _with_own_signs(problem, array, axis, fits[0 if odds > 0.0 else 1])
+    return replace(found, sign_log_odds=float("inf") if _alike(runs) else abs(float(odds)))
+
+
+def _with_own_signs(problem: AxisProblem, array: AccelerometerArray, axis: TurningAxis, fit: AxisFit) -> AxisFit:
+    """Return the fit again with the signs that its own numbers and constants show, where these are others.
+
+    A sign that was changed before the constants were known may have mirrored a drift at rest.
+    """
+    for _ in range(_TURNS):
+        bare = replace(fit.on(problem), mirrored=problem.mirrored)
+        found = with_signs(bare, fit.settings, fit.start, fit.start_covariance)
+        if np.array_equal(found.mirrored, fit.mirrored):
+            break
+        signed = replace(problem, mirrored=found.mirrored)
+        again = _with_mounting(signed, array, axis, fit.settings, fit.start, fit.start_covariance, fit.mounting)
+        fit = replace(again, sign_log_odds=fit.sign_log_odds)
+    return fit
 
 
 def _first_scale(axis: TurningAxis, noise: NDArray[np.float64]) -> float:
@@ -146,13 +235,20 @@ def _with_mounting(
     settings: Settings,
     start: NDArray[np.float64],
     covariance: NDArray[np.float64],
+    known: MountingFit | None = None,
 ) -> AxisFit:
-    """Return the fit from one start, with the uncertain constants estimated in turn with the filter's numbers."""
+    """Return the fit from one start, with the uncertain constants estimated in turn with the filter's numbers.
+
+    ``known`` holds values of the constants to begin with; zero by default.
+    """
     if axis.uncertainty.exact:
-        return AxisFit(settings, start, covariance, float("inf"), problem.channels)
+        return AxisFit(
+            settings, start, covariance, float("inf"), problem.channels, None, problem.mirrored, problem.roughness
+        )
     free = axis.inclination is None and np.sin(settings.inclination) > _LEVEL
     mounting = Mounting.of(array, axis, settings.inclination, free_inclination=bool(free))
-    values = np.zeros(len(mounting.constants))
+    values = np.zeros(len(mounting.constants)) if known is None else known.values_of(mounting)
+    problem = replace(problem, channels=mounting.channels(values))
     for turn in range(_TURNS):
         settings = _enlarged(problem, settings, start, covariance)
         found = fit_mounting(problem, mounting, settings, start, covariance, values)
@@ -161,13 +257,16 @@ def _with_mounting(
         problem = replace(problem, channels=mounting.channels(values))
         if turn + 1 == _TURNS:
             break
-        known = replace(axis, inclination=settings.inclination)
-        learnt = _learnt(problem, settings, known, start, covariance)
+        stood = replace(axis, inclination=settings.inclination)
+        learnt = _learnt(problem, settings, stood, start, covariance)
+        problem = with_roughness(problem, learnt, start, covariance)
         again = _enlarged(problem, learnt, start, covariance)
         if abs(np.log(again.noise_scale / settings.noise_scale)) < _SAME:
             break
         settings = learnt
-    return AxisFit(settings, start, covariance, float("inf"), problem.channels, found)
+    return AxisFit(
+        settings, start, covariance, float("inf"), problem.channels, found, problem.mirrored, problem.roughness
+    )
 
 
 def _enlarged(
@@ -210,7 +309,7 @@ def _inclination(y: NDArray[np.float64], channels: AxisChannels, hub: str) -> fl
     return float(np.arccos(np.clip(along / STANDARD_GRAVITY, -1.0, 1.0)))
 
 
-def _starts(
+def first_starts(
     y: NDArray[np.float64], channels: AxisChannels, tilt: float, *, at_rest: bool
 ) -> Iterator[NDArray[np.float64]]:
     """Yield states to start from: the phase of gravity, and either sign of the rate that the first samples show."""

@@ -11,9 +11,9 @@ from scipy.linalg import qr
 
 from gfimu.known_axis.mounting import Mounting
 from gfimu.known_axis.problem import AxisProblem, Settings
-from gfimu.known_axis.recursion import Slopes
+from gfimu.known_axis.recursion import FilterRun, Slopes
 
-__all__ = ["MountingFit", "fit_mounting"]
+__all__ = ["MountingFit", "fit_mounting", "mounting_information"]
 
 _STEPS = 15  # of Gauss and Newton; numerical
 _SETTLED = 0.02  # posterior standard deviations: a step below it ends the search; numerical
@@ -46,6 +46,11 @@ class MountingFit:
     def std(self) -> NDArray[np.float64]:
         """Standard deviations, shape (m,)."""
         return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+
+    def values_of(self, mounting: Mounting) -> NDArray[np.float64]:
+        """Return the values for the constants of another mounting, whose inclination contains that found here."""
+        found = {one.name: value for one, value in zip(self.mounting.constants, self.values, strict=True)}
+        return np.array([0.0 if one.kind == "inclination" else found.get(one.name, 0.0) for one in mounting.constants])
 
     def undetermined(self) -> list[str]:
         """Return the combinations of which more than half of the prior variance remains, one line each.
@@ -112,17 +117,9 @@ def fit_mounting(
     precision = np.diag(1.0 / mounting.prior_std**2)
 
     def run(values: NDArray[np.float64]) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]:
-        slopes = mounting.slopes(values)
-        channels = mounting.channels(values)
-        found = replace(problem, channels=channels).run(
-            replace(settings, inclination=mounting.tilt(values)), start, covariance, slopes=slopes
-        )
-        samples = found.readings / max(problem.y.shape[1], 1)
-        information = found.information + samples * _by_size(
-            slopes, channels.force, settings.hub, settings.noise_scale * problem.noise
-        )
+        found, information = mounting_information(problem, mounting, settings, start, covariance, values)
         density = found.likelihood - 0.5 * float(values @ precision @ values)
-        return density, found.gradient - precision @ values, information + precision
+        return density, found.gradient - precision @ values, information
 
     values = first
     density, gradient, information = run(values)
@@ -140,6 +137,27 @@ def fit_mounting(
         else:
             break
     return MountingFit(mounting, values, np.asarray(np.linalg.inv(information), dtype=np.float64), density)
+
+
+def mounting_information(
+    problem: AxisProblem,
+    mounting: Mounting,
+    settings: Settings,
+    start: NDArray[np.float64],
+    covariance: NDArray[np.float64],
+    values: NDArray[np.float64],
+) -> tuple[FilterRun, NDArray[np.float64]]:
+    """Return the filter's run with the constants at given values, and the information on them with their priors (m, m).
+
+    Arguments as those of `fit_mounting`.
+    """
+    slopes, channels = mounting.slopes(values), mounting.channels(values)
+    found = replace(problem, channels=channels).run(
+        replace(settings, inclination=mounting.tilt(values)), start, covariance, slopes=slopes
+    )
+    samples = found.readings / max(problem.y.shape[1], 1)
+    by_size = _by_size(slopes, channels.force, settings.hub, settings.noise_scale * problem.noise)
+    return found, found.information + samples * by_size + np.diag(1.0 / mounting.prior_std**2)
 
 
 def _by_size(slopes: Slopes, force: NDArray[np.float64], hub: float, noise: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +35,11 @@ class Settings:
     hub: float
     inclination: float
 
+    @property
+    def gravity(self) -> NDArray[np.float64]:
+        """Gravity along the axis and across it, shape (2,), m/s²."""
+        return STANDARD_GRAVITY * np.array([np.cos(self.inclination), np.sin(self.inclination)])
+
 
 @dataclass(frozen=True)
 class AxisProblem:
@@ -48,12 +53,19 @@ class AxisProblem:
         What the channels read.
     noise : ndarray, shape (c,)
         Standard deviation of the channels by their data sheets, m/s².
+    mirrored : ndarray, shape (k,)
+        Samples before which the sign of the rate is changed (`gfimu.known_axis.mirror`), ascending.
+    roughness : ndarray, shape (n,), optional
+        How many times rougher than `Settings.jerk` the motion is before each sample (`gfimu.known_axis.roughness`);
+        everywhere as rough by default.
     """
 
     t: NDArray[np.float64]
     y: NDArray[np.float64]
     channels: AxisChannels
     noise: NDArray[np.float64]
+    mirrored: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    roughness: NDArray[np.float64] | None = None
 
     def likelihood(
         self, settings: Settings, start: NDArray[np.float64], covariance: NDArray[np.float64], samples: int
@@ -72,19 +84,25 @@ class AxisProblem:
         samples: int | None = None,
     ) -> FilterRun:
         """Return the filter's run over the first samples, or all."""
-        tilt = settings.inclination
         return filter_axis(
             self.t[:samples],
             self.y[:samples],
             self.channels.coefficients,
-            STANDARD_GRAVITY * np.array([np.cos(tilt), np.sin(tilt)]),
+            settings.gravity,
             (settings.noise_scale * self.noise) ** 2,
             settings.hub**2,
-            settings.jerk,
+            settings.jerk * (np.ones(len(self.t)) if self.roughness is None else self.roughness)[:samples],
             start,
             covariance,
             no_slopes(self.y.shape[1]) if slopes is None else slopes,
+            self.mirrored,
+            np.zeros((3, 0 if slopes is None else len(slopes.offset))),
         )
+
+    def part(self, rows: slice) -> AxisProblem:
+        """Return some of the samples, in which no sign is changed."""
+        rough = None if self.roughness is None else self.roughness[rows]
+        return AxisProblem(self.t[rows], self.y[rows], self.channels, self.noise, roughness=rough)
 
 
 def no_slopes(channels: int) -> Slopes:

@@ -50,6 +50,8 @@ class FilterRun(NamedTuple):
         Derivatives of the states by the uncertain constants.
     likelihood : float
         Log likelihood of the innovations.
+    likelihoods : ndarray, shape (n,)
+        The same of those of each sample.
     squares : float
         Sum of their normalised squares.
     readings : int
@@ -65,6 +67,7 @@ class FilterRun(NamedTuple):
     by_constants: NDArray[np.float64]
     before_by_constants: NDArray[np.float64]
     likelihood: float
+    likelihoods: NDArray[np.float64]
     squares: float
     readings: int
     gradient: NDArray[np.float64]
@@ -79,10 +82,12 @@ def filter_axis(
     gravity: NDArray[np.float64],
     variance: NDArray[np.float64],
     hub_variance: float,
-    jerk: float,
+    jerk: NDArray[np.float64],
     state: NDArray[np.float64],
     covariance: NDArray[np.float64],
     slopes: Slopes,
+    mirrored: NDArray[np.int64],
+    first_by_constants: NDArray[np.float64],
 ) -> FilterRun:
     """Run the filter over all samples.
 
@@ -100,25 +105,29 @@ def filter_axis(
         White noise of the channels, m²/s⁴.
     hub_variance : float
         Variance of the axis's own specific force beyond gravity, each direction, m²/s⁴.
-    jerk : float
-        Spectral density of the change of α, rad²/s⁵.
+    jerk : ndarray, shape (n,)
+        Spectral density of the change of α before each sample, rad²/s⁵.
     state, covariance
         [θ, Ω, α] before the first sample and its covariance.
     slopes : Slopes
         Derivatives by the uncertain constants, of which there may be none.
+    mirrored : ndarray, shape (k,)
+        Samples before which the sign of the rate is changed, ascending.
+    first_by_constants : ndarray, shape (3, m)
+        Derivatives of the state before the first sample by the uncertain constants.
     """
     force, by_acceleration, by_square, offset = channels
     along, across = gravity[0], gravity[1]
     m = len(slopes.offset)
     by_constants, before_by_constants = np.zeros((len(t), 3, m)), np.zeros((len(t), 3, m))
     gradient_of, information_of = np.zeros(m), np.zeros((m, m))
-    v, d = np.zeros((3, m)), np.zeros((y.shape[1], m))
+    v, d = first_by_constants.copy(), np.zeros((y.shape[1], m))
     n, c = y.shape
     states, covariances = np.empty((n, 3)), np.empty((n, 3, 3))
     before, before_covariance = np.empty((n, 3)), np.empty((n, 3, 3))
     x: NDArray[np.float64] = state.copy()
     p: NDArray[np.float64] = covariance.copy()
-    likelihood, squares, count = 0.0, 0.0, 0
+    likelihoods, squares, count = np.zeros(n), 0.0, 0
     f, q, h = np.eye(3), np.zeros((3, 3)), np.zeros((c, 3))
     noise = np.zeros((c, c))
     for i in range(c):
@@ -128,6 +137,7 @@ def filter_axis(
         noise[i, i] += variance[i]
     whole = np.ascontiguousarray(np.linalg.inv(noise))
     whole_log = np.linalg.slogdet(noise)[1]
+    turned = 0
     for k in range(n):
         if k > 0:
             dt = t[k] - t[k - 1]
@@ -136,8 +146,14 @@ def filter_axis(
             q[1, 1], q[1, 2], q[2, 2] = dt**3 / 3.0, dt * dt / 2.0, dt
             q[1, 0], q[2, 0], q[2, 1] = q[0, 1], q[0, 2], q[1, 2]
             x = f @ x
-            p = f @ p @ f.T + jerk * q
+            p = f @ p @ f.T + jerk[k] * q
             v = f @ v
+        if turned < len(mirrored) and mirrored[turned] == k:
+            turned += 1
+            x[1] = -x[1]
+            v[1] = -v[1]
+            p[1] = -p[1]
+            p[:, 1] = -p[:, 1]
         before_by_constants[k] = v
         before[k], before_covariance[k] = x, p
         seen = 0
@@ -184,7 +200,7 @@ def filter_axis(
                     score = weighted @ missed
                     square = float(missed @ inverse @ missed - score @ (found @ score))
                     log_size = log_noise - found_log - prior_log
-                    likelihood -= 0.5 * (square + log_size + seen * np.log(2.0 * np.pi))
+                    likelihoods[k] = -0.5 * (square + log_size + seen * np.log(2.0 * np.pi))
                     squares += square
                     count += seen
                 if m > 0:
@@ -211,7 +227,7 @@ def filter_axis(
         states[k], covariances[k], by_constants[k] = x, p, v
     return FilterRun(
         states, covariances, before, before_covariance, by_constants, before_by_constants,
-        likelihood, squares, count, gradient_of, information_of,
+        likelihoods.sum(), likelihoods, squares, count, gradient_of, information_of,
     )  # fmt: skip
 
 
@@ -270,18 +286,23 @@ def _by_size(
 
 @njit(cache=True)  # type: ignore[misc]
 def smooth_axis(
-    t: NDArray[np.float64], run: FilterRun
+    t: NDArray[np.float64], run: FilterRun, mirrored: NDArray[np.int64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Return smoothed states (n, 3), covariances (n, 3, 3) and derivatives by the constants (n, 3, m).
 
-    Rauch, Tung and Striebel's recursion, of the states and of their derivatives alike.
+    Rauch, Tung and Striebel's recursion, of the states and of their derivatives alike; ``mirrored`` as in
+    `filter_axis`.
     """
     n = len(t)
     x, p, v = run.states.copy(), run.covariances.copy(), run.by_constants.copy()
     f = np.eye(3)
+    turned = len(mirrored) - 1
     for k in range(n - 2, -1, -1):
         dt = t[k + 1] - t[k]
-        f[0, 1], f[0, 2], f[1, 2] = dt, 0.5 * dt * dt, dt
+        f[0, 1], f[0, 2], f[1, 1], f[1, 2] = dt, 0.5 * dt * dt, 1.0, dt
+        if turned >= 0 and mirrored[turned] == k + 1:
+            turned -= 1
+            f[1] = -f[1]
         gain = np.ascontiguousarray(np.linalg.solve(run.before_covariances[k + 1], f @ run.covariances[k]).T)
         x[k] = run.states[k] + gain @ (x[k + 1] - run.before[k + 1])
         p[k] = run.covariances[k] + gain @ (p[k + 1] - run.before_covariances[k + 1]) @ gain.T

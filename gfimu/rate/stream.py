@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gfimu.errors import InputError
 from gfimu.files.column_file import head_line
@@ -22,7 +23,26 @@ from gfimu.rate.result import RateEstimate
 from gfimu.rate.sensing import SensorErrors
 from gfimu.units import GYRO_COLUMNS, READING_UNITS
 
-__all__ = ["StreamLayout", "filter_stream", "read_head"]
+__all__ = ["StreamLayout", "StreamSample", "filter_stream", "read_head", "stream_samples"]
+
+
+@dataclass(frozen=True)
+class StreamSample:
+    """One sample of a stream.
+
+    Parameters
+    ----------
+    t_s : float
+        Its time, s.
+    readings : ndarray, shape (c,)
+        Specific force of the array's channels, m/s²; NaN where one is missing.
+    gyro : ndarray, shape (3,), or None
+        Gyro readings, rad/s, where they were asked for.
+    """
+
+    t_s: float
+    readings: NDArray[np.float64]
+    gyro: NDArray[np.float64] | None
 
 
 @dataclass(frozen=True)
@@ -166,25 +186,13 @@ def filter_stream(
         If the first line doesn't name the columns.
     """
     live = LiveRateFilter(array, errors, period, settings, gyro=fuse_gyro)
-    layout: StreamLayout | None = None
-    largest = largest_of_array(array)
     reported: dict[str, Any] = live.report.to_dict()
-    metadata, stream = read_head(lines)
-    for line in stream:
-        if not line.strip() or line.startswith("#"):
-            continue
-        cells = next(csv.reader([line]))
-        if layout is None:
-            layout = StreamLayout.from_header(cells, array, metadata)
-            if fuse_gyro and not layout.gyro:
-                raise InputError(f"the stream lacks {', '.join(GYRO_COLUMNS)}; send them, or leave --gyro out")
+    for sample in stream_samples(lines, array, gyro=fuse_gyro):
+        if isinstance(sample, str):
+            yield json.dumps({"fault": sample})
             continue
         try:
-            values = _numbers(cells, layout)
-            readings = values[list(layout.channels)] * layout.factors
-            readings[np.abs(readings) > largest] = np.nan  # a corrupt value counts as missing
-            gyro = values[list(layout.gyro)] if fuse_gyro else None
-            found = live.push(values[layout.time], readings, gyro)
+            found = live.push(sample.t_s, sample.readings, sample.gyro)
         except InputError as error:
             yield json.dumps({"fault": str(error)})
             continue
@@ -193,6 +201,47 @@ def filter_stream(
         reported = faults
         yield from _lines(found, news)
     yield from _lines(live.finish(), {})
+
+
+def stream_samples(
+    lines: Iterable[str], array: AccelerometerArray, *, gyro: bool = False
+) -> Iterator[StreamSample | str]:
+    """Yield the samples of a stream of CSV lines; of a line that can't be read a sentence that says why.
+
+    Parameters
+    ----------
+    lines : iterable of str
+        The stream, as `filter_stream` takes it.
+    array : AccelerometerArray
+        The array.
+    gyro : bool
+        Whether the stream's gyro columns are needed.
+
+    Raises
+    ------
+    InputError
+        If the first line doesn't name the columns.
+    """
+    layout: StreamLayout | None = None
+    largest = largest_of_array(array)
+    metadata, stream = read_head(lines)
+    for line in stream:
+        if not line.strip() or line.startswith("#"):
+            continue
+        cells = next(csv.reader([line]))
+        if layout is None:
+            layout = StreamLayout.from_header(cells, array, metadata)
+            if gyro and not layout.gyro:
+                raise InputError(f"the stream lacks {', '.join(GYRO_COLUMNS)}; send them, or leave --gyro out")
+            continue
+        try:
+            values = _numbers(cells, layout)
+        except InputError as error:
+            yield str(error)
+            continue
+        readings = values[list(layout.channels)] * layout.factors
+        readings[np.abs(readings) > largest] = np.nan  # a corrupt value counts as missing
+        yield StreamSample(float(values[layout.time]), readings, values[list(layout.gyro)] if gyro else None)
 
 
 def _numbers(cells: list[str], layout: StreamLayout) -> np.ndarray:

@@ -17,7 +17,7 @@ from gfimu.sensor_noise.identification import TERMS, NoiseModel, identify_noise
 from gfimu.short_repr import short_repr
 
 if TYPE_CHECKING:
-    from gfimu.known_axis.noise import AxisNoise
+    from gfimu.known_axis.accuracy.noise import AxisNoise
 
 __all__ = ["STRETCHES", "RecordingNoise", "recording_noise"]
 
@@ -40,7 +40,7 @@ class RecordingNoise:
     start_s, duration_s : float
         Stretch used, s.
     about_axis : AxisNoise, optional
-        What it means for a rotation about a known axis (`gfimu.known_axis.noise`), where that was asked for.
+        What it means for a rotation about a known axis (`gfimu.known_axis.accuracy.noise`), where that was asked for.
     """
 
     models: Mapping[str, NoiseModel]

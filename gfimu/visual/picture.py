@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 
 from gfimu.errors import GeometryError, InputError
@@ -28,7 +29,9 @@ def picture_path(recording: Path) -> Path:
     return Path(tempfile.mkdtemp(prefix="gfimu-")) / name
 
 
-def picture_of(recording: Path | MappedFile, out: Path, *, array: AccelerometerArray | None = None) -> None:
+def picture_of(
+    recording: Path | MappedFile, out: Path, *, array: AccelerometerArray | None = None, axis: TurningAxis | None = None
+) -> None:
     """Write the rerun recording of a recording file, with its estimate where the array sees all six motions.
 
     Parameters
@@ -39,6 +42,8 @@ def picture_of(recording: Path | MappedFile, out: Path, *, array: AccelerometerA
         File to write, ``.rrd``.
     array : AccelerometerArray, optional
         The array; the recording's own otherwise.
+    axis : TurningAxis, optional
+        The axis about which alone it turns; the array's own otherwise, where it can't see all six motions.
 
     Raises
     ------
@@ -49,7 +54,11 @@ def picture_of(recording: Path | MappedFile, out: Path, *, array: AccelerometerA
     if name.suffix == ".rrd":
         raise InputError(f"{recording}: already a rerun recording; open it without --out")
     run, geometry = open_run(recording, array)
-    found, note = _estimate(run, geometry)
+    if axis is not None:
+        geometry = replace(geometry, turning_axis=axis)
+        found, note = _about_axis(run, geometry, axis)
+    else:
+        found, note = _estimate(run, geometry)
     write_run(out, run, geometry, estimate=found, notes=note, title=name.stem)
 
 
@@ -88,7 +97,7 @@ def _about_axis(run: Recording, array: AccelerometerArray, axis: TurningAxis) ->
     except InputError as error:  # a chip on the axis itself, say
         return None, _missing(error)
     warned = "".join(f" Note: {warning}." for warning in estimated.metadata["warnings"])
-    return estimated, f"The array sees the rotation about its axis only, which is estimated. {note}{warned}"
+    return estimated, f"The rotation about the known axis alone is estimated. {note}{warned}"
 
 
 def _missing(error: InputError) -> str:

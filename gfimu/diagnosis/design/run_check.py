@@ -66,7 +66,7 @@ class EffectView:
     confused_with : tuple of str
         Effects that explain it as well: expected evidence below `SEPARATED`.
     remedy : str
-        What would tell it apart.
+        What would separate it.
     """
 
     name: str

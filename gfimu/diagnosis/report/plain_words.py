@@ -81,7 +81,7 @@ def headline(diagnosis: Diagnosis) -> str:
             contested = [cause for cause in diagnosis.causes if cause.not_distinguishable_from] or diagnosis.causes
             names = dict.fromkeys(name for one in contested for name in (one.effect, *one.not_distinguishable_from))
             candidates = _joined([_words(diagnosis, name) for name in names], "or")
-            text = f"Something is missing in the simulation, but this recording can't tell which: {candidates}."
+            text = f"Something is missing in the simulation, but this recording does not show which: {candidates}."
             certain = [_short(diagnosis, cause) for cause in diagnosis.causes if cause not in contested]
             return f"Found: {_joined(certain)}. {text.replace('Something', 'Something else', 1)}" if certain else text
         case _ if diagnosis.in_part:
@@ -168,7 +168,7 @@ def _on_unseen_data(diagnosis: Diagnosis) -> str:
 
 
 def _in_library(diagnosis: Diagnosis) -> str:
-    """Return how likely it is that what is named is true and imitates nothing that the library lacks."""
+    """Return how likely it is that what is named is true and confounded with nothing that the library lacks."""
     share = diagnosis.library_probability
     if not math.isfinite(share):
         return ""
@@ -281,7 +281,7 @@ def _by_verdict(diagnosis: Diagnosis) -> list[str]:
             return [step]
         case "ambiguous":
             remedies = dict.fromkeys(one.would_be_separated_by for one in diagnosis.causes if one.would_be_separated_by)
-            apart = [f"To tell the candidates apart, record: {remedy}." for remedy in remedies]
+            apart = [f"To separate the candidates, record: {remedy}." for remedy in remedies]
             return [*apart, "Give both recordings to one call of gfimu diagnose; it fits them together."]
         case "unknown":
             steps = ["Look at the residual views of the report for where the discrepancy sits."]
@@ -300,7 +300,7 @@ def _to_be_sure(cause: NamedCause) -> str:
     """Return the step that rules out a coincidence of other effects."""
     others = _joined(list(cause.not_distinguishable_from), "or")
     remedy = f" To be sure, record: {cause.would_be_separated_by}." if cause.would_be_separated_by else ""
-    return f"{cause.effect} is the simplest story; by a coincidence {others} could imitate it here.{remedy}"
+    return f"{cause.effect} is the simplest explanation; by a coincidence of values it is confounded with {others} here.{remedy}"
 
 
 def percent(share: float) -> str:

@@ -1,6 +1,6 @@
 """Whether the library holds the truth: how far a named cause is to be believed when reality may be outside of it.
 
-The probability of a cause by evidence is one among the effects of the library. Free numbers imitate much that is not
+The probability of a cause by evidence is one among the effects of the library. Free numbers fit much that is not
 in it. What gives an imitation away can be seen in the fit: numbers bound by a pattern that nothing should bind, sizes
 that hardly stand out from their uncertainty, and something that stays unexplained beside the causes.
 """
@@ -156,6 +156,6 @@ def with_wider_library(found: Diagnosis) -> Diagnosis:
 
 
 def _sentence(least: float, evidence: LibraryEvidence) -> str:
-    """Say how likely it is that the truth is among the effects that were tried, and what would tell."""
-    told = f"That what is named is the truth and imitates nothing outside the library has a probability of {least:.0%}"
+    """Say how likely it is that the truth is among the effects that were tried, and what would test it."""
+    told = f"That what is named is the truth and is confounded with nothing outside the library has a probability of {least:.0%}"
     return told if evidence.confirmed else f"{told}; another recording, with another motion, would test it (--held-out)"

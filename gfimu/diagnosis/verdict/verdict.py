@@ -49,7 +49,7 @@ class NamedCause:
     not_distinguishable_from : tuple of str
         Effects that explain these data as well.
     would_be_separated_by : str
-        Excitation that would tell them apart.
+        Excitation that would separate them.
     why : str
         One sentence: where and how it shows.
     log_odds : float
@@ -201,7 +201,7 @@ class Diagnosis:
     rigid : RigidMotion, optional
         Whether the residual of the given simulation is a motion of the whole array; None for a free body.
     library_probability : float
-        Probability that the causes are the truth and imitate nothing outside the library, the least of them; it is in
+        Probability that the causes are the truth and are confounded with nothing outside the library, the least of them; it is in
         their own probabilities. NaN where no cause was inferred.
     coincidence : float
         Log odds of the likeliest pattern that binds the free numbers of the causes, nats; NaN where none can be tested.

@@ -70,10 +70,10 @@ def verdict_sentences(
 
 
 def _coincidences(verdict: str, causes: Sequence[NamedCause]) -> list[str]:
-    """Say which effects could stand for a cause; an ambiguous verdict says it of all."""
+    """State which effects a cause is confounded with; an ambiguous verdict says it of all."""
     return [
-        f"{', '.join(cause.not_distinguishable_from)} could imitate {cause.effect} in this data but would need "
-        f"a coincidence; {cause.would_be_separated_by} would settle it."
+        f"{cause.effect} is confounded with {', '.join(cause.not_distinguishable_from)} in these data, by a "
+        f"coincidence of values only; {cause.would_be_separated_by} would separate them."
         for cause in causes
         if cause.not_distinguishable_from and verdict != "ambiguous"
     ]
@@ -167,7 +167,7 @@ def _headline(verdict: str, causes: Sequence[NamedCause], unexplained: Unexplain
         contested = [cause for cause in causes if cause.not_distinguishable_from]
         by = next((cause.would_be_separated_by for cause in contested if cause.would_be_separated_by), "")
         which = _listed([cause.effect for cause in contested])
-        return f"The simulation is wrong, but this data cannot tell {which} apart; {by} would."
+        return f"The simulation is wrong, but these data do not separate {which}; {by} would."
     return f"The simulation is wrong in a way that nothing in the library explains: {unexplained.signature}."
 
 

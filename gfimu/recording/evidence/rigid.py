@@ -26,6 +26,7 @@ from gfimu.geometry.array import AccelerometerArray
 from gfimu.geometry.kinematics import omega_products
 from gfimu.parts.limits import PartLimits
 from gfimu.rate.integration import integrate_samples
+from gfimu.recording.evidence.rotation_normal import rotation_normal
 from gfimu.recording.recording import Recording
 from gfimu.recording.rest import detect_rest
 from gfimu.units import STANDARD_GRAVITY
@@ -341,25 +342,20 @@ def _unexplained(
     """
     count = len(t)
     weight = np.concatenate([np.zeros(3), prior])
-    centred = z - z.mean(axis=0)
+    centred, turned = np.ascontiguousarray(z - z.mean(axis=0)), np.ascontiguousarray(turned)
     point = start
     best, damping = np.inf, 1e-6
     kept = point
     normal, pull = np.zeros((6, 6)), np.zeros(6)
     with np.errstate(over="ignore", invalid="ignore"):
         for _ in range(_ITERATIONS):
-            omega = _rates(turned, t, point)
-            seen = omega_products(omega) @ matrices.sensitivity.T
-            residual = centred - (seen - seen.mean(axis=0))
-            energy = float(np.sum(residual**2) + weight @ point**2) / count
+            square, slopes, inner = rotation_normal(centred, turned, t, matrices.sensitivity, point)
+            energy = float(square + weight @ point**2) / count
             if np.isfinite(energy) and energy < best:
                 done = best - energy < 1e-4 * energy
                 best, kept, damping = energy, point, 0.2 * damping
-                by_omega = matrices.sensitivity @ _slopes(omega)  # (m, d, 3)
-                slope = np.concatenate([by_omega, -t[:, None, None] * by_omega], axis=2)
-                slope = (slope - slope.mean(axis=0)).reshape(-1, 6)
-                normal = slope.T @ slope + np.diag(weight)
-                pull = slope.T @ residual.ravel() - weight * point
+                normal = slopes + np.diag(weight)
+                pull = inner - weight * point
                 if done:
                     break
             else:
@@ -371,11 +367,6 @@ def _unexplained(
                 break
             point = kept + np.linalg.lstsq(lifted, pull, rcond=None)[0]
     return best, kept
-
-
-def _rates(turned: NDArray[np.float64], t: NDArray[np.float64], point: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return ω (m, 3) from the integral of α, the rate at the start and the bias of α."""
-    return np.asarray(turned + point[:3] - t[:, None] * point[3:])
 
 
 def _slopes(omega: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -9,8 +9,8 @@ from turning import NOISE, RATE, array_of, turned
 import gfimu
 from gfimu.errors import GeometryError, InputError
 from gfimu.geometry.turning_axis import TurningAxis
+from gfimu.known_axis.accuracy.drift import axis_drift
 from gfimu.known_axis.channels import AxisChannels
-from gfimu.known_axis.drift import axis_drift
 from gfimu.known_axis.problem import AxisProblem, Settings
 from gfimu.recording import Recording
 

@@ -119,7 +119,7 @@ def test_the_first_screen_says_what_is_wrong_how_much_and_what_to_do(pages):
 
 
 def test_each_verdict_has_its_own_words(pages):
-    assert "can't tell which: the whole array is off the table's axis or a chip is not where" in words_of(
+    assert "does not show which: the whole array is off the table's axis or a chip is not where" in words_of(
         pages["ambiguous"]
     )
     assert "remounted on its side" in words_of(pages["ambiguous"])
@@ -227,7 +227,7 @@ def test_several_causes_are_counted_and_named():
     both = replace(diagnosis, causes=(*diagnosis.causes, second))
     assert headline(both).startswith("Found two things that the simulation leaves out: ")
     assert "these put into the simulation" in story(both)
-    assert any("sensor_position could imitate" in step for step in next_steps(both))
+    assert any("confounded with sensor_position" in step for step in next_steps(both))
 
 
 def test_the_page_of_a_linear_axis_has_speeds_in_metres():

@@ -62,7 +62,7 @@ def test_a_verdict_has_the_product_and_says_so():
     assert doubted.library_probability == pytest.approx(
         library_probability(LibraryEvidence(coincidence=3.0), standing_out(before, ()), RULE, POLICY)
     )
-    assert "imitates nothing outside the library" in doubted.sentences[-1]
+    assert "confounded with nothing outside the library" in doubted.sentences[-1]
     assert "--held-out" in doubted.sentences[-1]
     assert doubted.to_dict()["library_probability"] == doubted.library_probability
 

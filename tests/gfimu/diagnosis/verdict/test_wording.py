@@ -66,11 +66,11 @@ def test_ambiguous_and_confounded():
     ]
     words = told("ambiguous", pair)
     assert words[0] == (
-        "The simulation is wrong, but this data cannot tell eccentricity and sensor_position apart; "
+        "The simulation is wrong, but these data do not separate eccentricity and sensor_position; "
         "the cube turned over would."
     )
     assert not any("coincidence" in one for one in words)
-    assert any("sensor_position could imitate eccentricity" in one for one in told("explained", pair[:1]))
+    assert any("eccentricity is confounded with sensor_position" in one for one in told("explained", pair[:1]))
 
 
 def test_unknown():

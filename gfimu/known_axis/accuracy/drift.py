@@ -15,10 +15,10 @@ import numpy as np
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.geometry.turning_axis import TurningAxis
-from gfimu.known_axis.bounds import require_visible
+from gfimu.known_axis.accuracy.bounds import require_visible
+from gfimu.known_axis.accuracy.predicted_readings import gravity_of, readings_of
 from gfimu.known_axis.channels import AxisChannels
 from gfimu.known_axis.recursion import Slopes, filter_axis
-from gfimu.units import STANDARD_GRAVITY
 
 __all__ = ["AxisDrift", "AxisDriftTerm", "axis_drift"]
 
@@ -143,17 +143,15 @@ def axis_drift(
     dt = float(t[1])
     channels = AxisChannels.of(array, axis)
     c = array.n_channels
-    gravity = STANDARD_GRAVITY * np.array([np.cos(tilt), np.sin(tilt)])
-    angle = rate_rad_s * t
-    force = np.column_stack([np.full(count, gravity[0]), gravity[1] * np.cos(angle), -gravity[1] * np.sin(angle)])
-    y = force @ channels.force.T + rate_rad_s**2 * channels.by_square
+    y = readings_of(channels, tilt, rate_rad_s * t, np.full(count, rate_rad_s), np.zeros(count))
     none = np.zeros((c, c))
     slopes = Slopes(np.zeros((c, c, 3)), none, none, np.eye(c), np.zeros((c, 2)))
     white = max(noise_density, _LEAST_NOISE) ** 2 / (2.0 * dt)
     hub = hub_density**2 / (2.0 * dt) if axis.hub == "free" else 0.0
     run = filter_axis(
-        t, y, channels.coefficients, gravity, np.full(c, white), hub, jerk,
+        t, y, channels.coefficients, gravity_of(tilt), np.full(c, white), hub, np.full(count, jerk),
         np.array([0.0, rate_rad_s, 0.0]), np.diag([1e-12, 1e-12, 1e-12]), slopes,
+        np.zeros(0, dtype=np.int64), np.zeros((3, c)),
     )  # fmt: skip
     by_bias = run.by_constants[:, :2]  # (n, 2, c): of angle and rate
     end = np.linalg.norm(by_bias[-1], axis=1)

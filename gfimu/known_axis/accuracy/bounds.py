@@ -9,7 +9,7 @@ tri-axial chips ρ apart with white noise σ these are σ / (√2 ρ |Ω|) and (
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,6 +18,9 @@ from gfimu.errors import GeometryError
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.geometry.turning_axis import TurningAxis
 from gfimu.known_axis.channels import AxisChannels
+
+if TYPE_CHECKING:
+    from gfimu.known_axis.accuracy.predicted import PredictedEstimate
 
 __all__ = ["AxisBounds", "axis_bounds", "require_visible"]
 
@@ -38,6 +41,8 @@ class AxisBounds:
         σ_α, rad/s², and σ_s, rad²/s², of one sample; infinite where the array can't tell.
     sample_std, filter_std : float
         Standard deviation of the rate from one sample, and of a filter that has settled, rad/s.
+    predicted : PredictedEstimate, optional
+        What the estimate reaches in a run, with the uncertain mounting estimated.
     """
 
     array: str
@@ -47,6 +52,7 @@ class AxisBounds:
     square_std: float
     sample_std: float
     filter_std: float
+    predicted: PredictedEstimate | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Return the bounds as JSON holds them."""
@@ -58,6 +64,7 @@ class AxisBounds:
             "sigma_rate_squared_rad2_s2": self.square_std,
             "sigma_rate_sample_rad_s": self.sample_std,
             "sigma_rate_filter_rad_s": self.filter_std,
+            **({} if self.predicted is None else {"estimate": self.predicted.to_dict()}),
         }
 
 

@@ -8,7 +8,7 @@ from typing import Any
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.geometry.turning_axis import TurningAxis
-from gfimu.known_axis.bounds import AxisBounds, axis_bounds, require_visible
+from gfimu.known_axis.accuracy.bounds import AxisBounds, axis_bounds, require_visible
 from gfimu.sensor_noise import RecordingNoise
 
 __all__ = ["AxisNoise", "axis_noise"]
