@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -100,8 +100,9 @@ def score(
     omega = [speed_rad_s * component for component in _AXES[spin_axis]] if omega_rad_s is None else omega_rad_s
     given_axes = [(array, known_axis(turning, array)) for array in map(as_array, given)]
     seeing = [array for array, about in given_axes if about is None]
-    options = {"length_unit_m": length_unit_m, "omega_rad_s": omega, "noise_m_s2": noise_m_s2}
-    scores = iter(score_arrays(seeing, **options) if seeing else [])
+    scores: Iterator[Score] = iter(())
+    if seeing:
+        scores = iter(score_arrays(seeing, length_unit_m=length_unit_m, omega_rad_s=omega, noise_m_s2=noise_m_s2))
     found: list[Score | AxisBounds] = []
     for array, about in given_axes:
         if about is None:

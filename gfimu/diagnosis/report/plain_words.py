@@ -300,7 +300,8 @@ def _to_be_sure(cause: NamedCause) -> str:
     """Return the step that rules out a coincidence of other effects."""
     others = _joined(list(cause.not_distinguishable_from), "or")
     remedy = f" To be sure, record: {cause.would_be_separated_by}." if cause.would_be_separated_by else ""
-    return f"{cause.effect} is the simplest explanation; by a coincidence of values it is confounded with {others} here.{remedy}"
+    why = f"by a coincidence of values it is confounded with {others} here"
+    return f"{cause.effect} is the simplest explanation; {why}.{remedy}"
 
 
 def percent(share: float) -> str:

@@ -157,5 +157,9 @@ def with_wider_library(found: Diagnosis) -> Diagnosis:
 
 def _sentence(least: float, evidence: LibraryEvidence) -> str:
     """Say how likely it is that the truth is among the effects that were tried, and what would test it."""
-    told = f"That what is named is the truth and is confounded with nothing outside the library has a probability of {least:.0%}"
-    return told if evidence.confirmed else f"{told}; another recording, with another motion, would test it (--held-out)"
+    stated = (
+        f"What is named is the truth, confounded with nothing outside the library, with a probability of {least:.0%}"
+    )
+    if evidence.confirmed:
+        return stated
+    return f"{stated}; another recording, with another motion, would test it (--held-out)"

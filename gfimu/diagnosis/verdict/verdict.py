@@ -201,8 +201,8 @@ class Diagnosis:
     rigid : RigidMotion, optional
         Whether the residual of the given simulation is a motion of the whole array; None for a free body.
     library_probability : float
-        Probability that the causes are the truth and are confounded with nothing outside the library, the least of them; it is in
-        their own probabilities. NaN where no cause was inferred.
+        Probability that the causes are the truth and are confounded with nothing outside the library, the least of
+        them; it is in their own probabilities. NaN where no cause was inferred.
     coincidence : float
         Log odds of the likeliest pattern that binds the free numbers of the causes, nats; NaN where none can be tested.
     reference_clock : mapping
