@@ -1,0 +1,375 @@
+"""The monitor of channels: finds the faulty one, takes it out, goes on, and takes it in again when it behaves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gfimu.errors import InputError
+from gfimu.geometry.array import AccelerometerArray
+from gfimu.integrity.blocks import Blocks, block_means, scatter
+from gfimu.integrity.fault import ChannelFault, ChannelHealth
+from gfimu.integrity.isolation import Margins, deflate, isolate, strongest
+from gfimu.integrity.kinds import name_kinds
+from gfimu.integrity.policy import MonitorPolicy
+from gfimu.integrity.prediction import omega_products, prediction_row
+from gfimu.integrity.recursion import MonitorState, MonitorTables, MonitorTuning, advance, model_errors
+from gfimu.rate.sensing import ChannelTables, SensorErrors
+
+__all__ = ["ChannelMonitor", "watch_channels"]
+
+_LARGEST_FAULT = 100.0  # m/s², prior standard deviation of a fault's size: a limit that no fault reaches
+_SOUND_SCATTER = 2.0  # of the stated variance, up to which a channel counts as quiet again
+
+
+@dataclass
+class _Suspicion:
+    """A fault that is seen and not isolated yet."""
+
+    since: int  # block
+    rivals: NDArray[np.int64]
+
+
+class ChannelMonitor:
+    """Watches the channels of an array block by block.
+
+    Parameters
+    ----------
+    array : AccelerometerArray
+        An array that sees all six motions, with c channels.
+    errors : SensorErrors
+        Errors of its channels; ``scale_std`` and ``placement_std`` say how well it is calibrated.
+    period : float
+        Sample period, s.
+    omega0 : array_like, shape (3,)
+        Angular rate at the start, rad/s.
+    omega0_std : float
+        Its standard deviation, rad/s.
+    policy : MonitorPolicy, optional
+        Thresholds.
+
+    Raises
+    ------
+    GeometryError
+        If the array can't see all six motions.
+    """
+
+    def __init__(
+        self,
+        array: AccelerometerArray,
+        errors: SensorErrors,
+        period: float,
+        *,
+        omega0: ArrayLike = (0.0, 0.0, 0.0),
+        omega0_std: float = 1e-3,
+        policy: MonitorPolicy | None = None,
+    ) -> None:
+        self.array = array
+        self.policy = policy or MonitorPolicy()
+        self.samples = self.policy.samples(period)
+        self._period = self.samples * period
+        self._errors = errors
+        self._tables = ChannelTables(array, errors)
+        c = array.n_channels
+        policy = self.policy
+        self.threshold = policy.threshold(c, self._period)
+        self._tuning = MonitorTuning(
+            samples=self.samples,
+            period=self._period,
+            threshold=self.threshold,
+            oldest=policy.oldest_s / self._period,
+            walk=policy.bias_walk,
+            forget=min(1.0, self._period / policy.range_memory_s),
+            scale_std=errors.scale_std,
+            placement_std=errors.placement_std,
+            floor=policy.bias_std,
+        )
+        self._margins = Margins(policy.isolation, policy.unexplained, policy.relative, 0.6 * self.threshold)
+        covariance = np.zeros((3 + c, 3 + c))
+        covariance[range(3), range(3)] = omega0_std**2
+        covariance[range(3, 3 + c), range(3, 3 + c)] = np.maximum(errors.bias_std, policy.bias_std) ** 2
+        slots = policy.slots
+        self._state = MonitorState(
+            omega=np.array(omega0, dtype=float),
+            bias=np.zeros(c),
+            covariance=covariance,
+            last=np.zeros(c),
+            low=np.zeros(c),
+            high=np.zeros(c),
+            ages=np.zeros(slots),
+            signature=np.zeros((slots, 3 + c, c)),
+            information=np.zeros((slots, c, c)),
+            score=np.zeros((slots, c)),
+            started=np.zeros(1, dtype=np.bool_),
+        )
+        self._length_scale = np.array([array.length_unit] * 3 + [1.0] * 3)
+        self.watched = np.ones(c, dtype=np.bool_)
+        self.faults: list[ChannelFault] = []
+        self._open: dict[int, tuple[int, int]] = {}  # channel: its fault's number, block from which it is judged
+        self._patience = np.full(c, policy.readmission_s)
+        self._suspicion: _Suspicion | None = None
+        self.largest_statistic = 0.0
+
+    def run(self, blocks: Blocks) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
+        """Take all blocks; returns ω (m, 3), its std (m, 3) and where a fault was seen that nothing explains (m,)."""
+        count = len(blocks)
+        omega = np.full((count, 3), np.nan)
+        std = np.full((count, 3), np.nan)
+        nis = np.zeros(count)
+        unexplained = np.zeros(count, dtype=np.bool_)
+        steps = np.diff(blocks.t, prepend=blocks.t[0] - self._period) if count else np.zeros(0)
+        place = 0
+        while place < count:
+            sets = self._sets(blocks)
+            tables = self._compiled_tables()
+            noisy, levels, channel = self._scatter(blocks, place)
+            end = min(count, noisy + 1)
+            if self._open:
+                end = min(end, place + max(1, round(1.0 / self._period)))
+            place, slot = advance(
+                tables, self._tuning, self._state, blocks.means, steps, sets, levels, self.watched,
+                omega, std, nis, place, end,
+            )  # fmt: skip
+            if slot >= 0:
+                unexplained[place - 1] = self._judge(blocks, place, slot)
+            elif place == noisy + 1:
+                self._exclude_noisy(blocks, place, channel)
+            else:
+                self._suspicion = None
+            self._readmit(blocks, place, omega)
+        return omega, std, unexplained
+
+    def _sets(self, blocks: Blocks) -> NDArray[np.int64]:
+        """Return the set of channels of each block, in the tables; those that can't see α keep none."""
+        bits = np.int64(1) << np.arange(self.array.n_channels, dtype=np.int64)
+        masks = ((blocks.missing | ~self.watched) * bits).sum(axis=1)
+        unique, inverse = np.unique(masks, return_inverse=True)
+        return np.array([self._tables.index(int(mask)) for mask in unique], dtype=np.int64)[inverse]
+
+    def _compiled_tables(self) -> MonitorTables:
+        tables = self._tables
+        return MonitorTables(
+            tables.alpha_rows, tables.alpha_leak, tables.null_rows, tables.null_sensitivity,
+            np.maximum(tables.null_count, 0), tables.alpha_noise,
+        )  # fmt: skip
+
+    def _scatter(self, blocks: Blocks, first: int) -> tuple[int, NDArray[np.float64], int]:
+        """Return the first block from here at which a channel is seen to be noisy, all levels, and that channel."""
+        from scipy.signal import lfilter
+
+        missing = int(np.sum((~self.watched) * (np.int64(1) << np.arange(self.array.n_channels, dtype=np.int64))))
+        null_rows = self._tables.null_rows[self._tables.index(missing)]
+        levels = np.ones(len(blocks))
+        ratios, freedom = scatter(blocks, slice(first, None), null_rows)
+        seen = self.watched & (np.sum(null_rows**2, axis=0) > 0.0)
+        if not seen.any():
+            return len(blocks), levels, -1
+        whole = ~blocks.missing[first:].any(axis=1, keepdims=True)
+        ratios = np.minimum(np.where(whole, ratios, 1.0), 1e4)[:, seen]
+        forget = min(1.0, self._period / self.policy.noise_memory_s)
+        smooth, _ = lfilter([forget], [1.0, forget - 1.0], ratios, axis=0, zi=np.full((1, ratios.shape[1]), 1 - forget))
+        common = np.maximum(1.0, np.median(smooth, axis=1))
+        levels[first:] = common
+        count = np.minimum(np.arange(len(smooth)) + 1, 2.0 / forget - 1.0) * freedom
+        excess = np.maximum(smooth / common[:, None], 1.0)
+        statistic = count[:, None] * (excess - 1.0 - np.log(excess))
+        if statistic.shape[1] < 2:
+            return len(blocks), levels, -1
+        largest = np.partition(statistic, -2, axis=1)
+        enough = np.arange(len(smooth)) * self._period > 0.3
+        found = enough & (largest[:, -1] > self.threshold)
+        found &= largest[:, -1] - largest[:, -2] > self.policy.isolation
+        if not found.any():
+            return len(blocks), levels, -1
+        at = int(np.argmax(found))
+        return first + at, levels, int(np.flatnonzero(seen)[np.argmax(statistic[at])])
+
+    def _judge(self, blocks: Blocks, place: int, slot: int) -> bool:
+        """Isolate the fault that is seen in a slot, or wait; returns whether nothing explains it."""
+        state = self._state
+        std = np.empty(self.array.n_channels)
+        model_errors(state, self._tuning, std)
+        information, score = deflate(state.information[slot], state.score[slot], std)
+        self.largest_statistic = max(self.largest_statistic, strongest(information, score, self.watched)[1])
+        channels, isolated, statistic = isolate(
+            information, score, self.watched, self.array.chip_of_channel, self._margins
+        )
+        if len(channels) == 0:
+            self._suspicion = None
+            return True
+        if not isolated:
+            if self._suspicion is None:
+                self._suspicion = _Suspicion(place, channels)
+            if (place - self._suspicion.since) * self._period < self.policy.wait_s:
+                return False
+        if not self._may_exclude(channels):
+            return True
+        self._exclude(blocks, place, slot, channels, isolated, statistic, information, score)
+        return False
+
+    def _may_exclude(self, channels: NDArray[np.int64]) -> bool:
+        """Whether the rest sees all six motions and can still check itself."""
+        kept = self.watched.copy()
+        kept[channels] = False
+        rank = np.linalg.matrix_rank(self.array.regression_matrix[kept] / self._length_scale, tol=1e-6)
+        return bool(rank == 6 and kept.sum() - 6 >= self.policy.fewest_null)
+
+    def _exclude(
+        self,
+        blocks: Blocks,
+        place: int,
+        slot: int,
+        channels: NDArray[np.int64],
+        isolated: bool,
+        statistic: float,
+        information: NDArray[np.float64],
+        score: NDArray[np.float64],
+    ) -> None:
+        """Take channels out, and what their fault did to the state since its onset."""
+        state = self._state
+        block = information[np.ix_(channels, channels)]
+        spread = np.linalg.inv(block + np.eye(len(channels)) / _LARGEST_FAULT**2)
+        sizes = spread @ score[channels]
+        effect = state.signature[slot][:, channels]  # (3 + c, m)
+        move = effect @ sizes
+        state.omega[:] -= move[:3]
+        state.bias[:] -= move[3:]
+        state.covariance[:] += effect @ spread @ effect.T
+        onset = float(blocks.t[place - 1] - (state.ages[slot] - 0.5) * self._period)
+        self._add(
+            blocks, place, channels,
+            ChannelFault(
+                tuple(self.array.channels[i] for i in channels), "unknown", bool(isolated), onset,
+                float(blocks.t[place - 1] + 0.5 * self._period), np.inf,
+                tuple(sizes.tolist()), tuple(np.sqrt(np.diag(spread)).tolist()), float(statistic),
+            ),
+        )  # fmt: skip
+
+    def _exclude_noisy(self, blocks: Blocks, place: int, channel: int) -> None:
+        """Take a noisy channel out."""
+        channels = np.array([channel])
+        if not self._may_exclude(channels):
+            return
+        found = float(blocks.t[place - 1] + 0.5 * self._period)
+        onset = found - self.policy.noise_memory_s
+        self._add(
+            blocks, place, channels,
+            ChannelFault(
+                (self.array.channels[channel],), "noise", True, onset, found, np.inf, (np.nan,), (np.nan,), np.nan
+            ),
+        )  # fmt: skip
+
+    def _add(self, blocks: Blocks, place: int, channels: NDArray[np.int64], fault: ChannelFault) -> None:
+        self.watched[channels] = False
+        self._state.ages[:] = 0.0
+        self._suspicion = None
+        for channel in channels:
+            self._open[int(channel)] = (len(self.faults), place)
+        self.faults.append(fault)
+
+    def _readmit(self, blocks: Blocks, place: int, omega: NDArray[np.float64]) -> None:
+        """Take channels in again that have agreed with the others for long enough."""
+        for channel, (number, since) in list(self._open.items()):
+            length = round(self._patience[channel] / self._period)
+            if place - since < length or not self._behaves(blocks, slice(place - length, place), omega, channel):
+                continue
+            self._patience[channel] *= 2.0
+            del self._open[channel]
+            self.watched[channel] = True
+            self._state.ages[:] = 0.0
+            if not any(other == number for other, _ in self._open.values()):
+                end = float(blocks.t[place - 1] + 0.5 * self._period)
+                self.faults[number] = replace(self.faults[number], end_s=end)
+
+    def _behaves(self, blocks: Blocks, rows: slice, omega: NDArray[np.float64], channel: int) -> bool:
+        """Whether an excluded channel has the readings that the others predict."""
+        if blocks.missing[rows].any():
+            return False
+        row = prediction_row(self.array, channel, self.watched)
+        state = self._state
+        centred = blocks.means[rows] - state.bias
+        residual = centred @ row - omega_products(omega[rows]) @ (row @ self.array.centripetal_matrix)
+        samples = blocks.samples
+        noise = float(np.sum(row**2 * self._errors.noise_std**2))
+        std = np.empty(self.array.n_channels)
+        model_errors(state, self._tuning, std)
+        bias = float(row @ state.covariance[3:, 3:] @ row) + std[channel] ** 2
+        second = max(1, round(1.0 / self._period))
+        means = residual[: len(residual) // second * second].reshape(-1, second).mean(axis=1)
+        near = np.abs(means) < 3.0 * np.sqrt(noise / (samples * second) + bias)
+        inner = blocks.readings[rows] @ row
+        spread = float(np.mean(np.var(inner, axis=1, ddof=1)))
+        return bool(near.all() and spread < _SOUND_SCATTER * noise)
+
+
+def watch_channels(
+    array: AccelerometerArray,
+    t: ArrayLike,
+    readings: ArrayLike,
+    errors: SensorErrors,
+    *,
+    omega0: ArrayLike = (0.0, 0.0, 0.0),
+    omega0_std: float = 1e-3,
+    policy: MonitorPolicy | None = None,
+) -> ChannelHealth:
+    """Find the faulty channels of a recording.
+
+    Parameters
+    ----------
+    array : AccelerometerArray
+        An array that sees all six motions, with c channels.
+    t : array_like, shape (n,)
+        Sample times, s.
+    readings : array_like, shape (n, c)
+        Specific force, m/s²; NaN where missing.
+    errors : SensorErrors
+        Errors of the channels.
+    omega0, omega0_std : array_like, float
+        Angular rate at the first sample and its standard deviation, rad/s.
+    policy : MonitorPolicy, optional
+        Thresholds.
+
+    Raises
+    ------
+    InputError
+        If the shapes don't fit or time does not increase.
+    GeometryError
+        If the array can't see all six motions.
+    """
+    times = np.asarray(t, dtype=float)
+    rows = np.asarray(readings, dtype=float)
+    if times.ndim != 1 or rows.shape != (len(times), array.n_channels):
+        raise InputError(
+            f"times have shape {times.shape} and readings {rows.shape}; array {array.name!r} needs one "
+            f"row of {array.n_channels} per time"
+        )
+    if not np.isfinite(times).all() or np.any(np.diff(times) <= 0):
+        raise InputError("sample times must be finite and increase; drop repeated or reordered samples")
+    period = float(np.median(np.diff(times)))
+    monitor = ChannelMonitor(array, errors, period, omega0=omega0, omega0_std=omega0_std, policy=policy)
+    blocks = block_means(times, rows, errors.limits, monitor.samples)
+    omega, _, odd = monitor.run(blocks)
+    faults = name_kinds(
+        array,
+        errors,
+        times,
+        rows,
+        np.array([np.interp(times, blocks.t, omega[:, axis]) for axis in range(3)]).T
+        if len(blocks)
+        else np.zeros((len(times), 3)),
+        tuple(monitor.faults),
+    )
+    excluded = np.zeros(rows.shape, dtype=np.bool_)
+    half = 0.5 * monitor.samples * period
+    for fault in faults:
+        inside = (times >= fault.onset_s - half) & (times < fault.end_s)
+        for name in fault.channels:
+            excluded[inside, array.channels.index(name)] = True
+    unexplained = np.zeros(len(times), dtype=np.bool_)
+    unexplained[: len(odd) * monitor.samples] = np.repeat(odd, monitor.samples)
+    return ChannelHealth(
+        tuple(array.channels), faults, excluded, unexplained, monitor.largest_statistic,
+        monitor.threshold,
+    )  # fmt: skip
