@@ -64,7 +64,7 @@ def block_means(
 def scatter(blocks: Blocks, rows: slice, null_rows: NDArray[np.float64]) -> tuple[NDArray[np.float64], int]:
     """Return the variance within blocks along each channel's direction in the null space, over the stated one.
 
-    A mean and a slope are taken out of each block; what remains has B − 2 degrees of freedom.
+    Mean, slope and curvature are taken out of each block, as a fast turn has them; B − 3 degrees of freedom remain.
 
     Parameters
     ----------
@@ -82,9 +82,10 @@ def scatter(blocks: Blocks, rows: slice, null_rows: NDArray[np.float64]) -> tupl
     """
     samples = blocks.samples
     place = np.arange(samples) - (samples - 1) / 2.0
-    keep = np.eye(samples) - 1.0 / samples - np.outer(place, place) / (place @ place)
+    motion, _ = np.linalg.qr(np.column_stack([np.ones(samples), place, place**2]))
+    keep = np.eye(samples) - motion @ motion.T
     white = keep @ (blocks.readings[rows] @ null_rows.T)  # (m, B, d)
     length = np.sum(null_rows**2, axis=0)  # (c,)
     along = white @ null_rows  # (m, B, c)
-    energy = np.sum(along**2, axis=1) / (samples - 2)
-    return np.where(length > 0.0, energy / np.maximum(length, 1e-30), 0.0), samples - 2
+    energy = np.sum(along**2, axis=1) / (samples - 3)
+    return np.where(length > 0.0, energy / np.maximum(length, 1e-30), 0.0), samples - 3

@@ -26,7 +26,6 @@ class Margins(NamedTuple):
 
     isolation: float
     unexplained: float
-    relative: float
     second: float  # that a second channel must add to a first
 
 
@@ -131,62 +130,86 @@ def _beside(information, score, members, watched):  # type: ignore[no-untyped-de
 
 
 @njit(**COMPILE)
-def _best_pairs(information, score, watched):  # type: ignore[no-untyped-def]
-    """Return the two pairs that explain most, shape (2, 2), and how much, shape (2,)."""
-    c = len(score)
-    pairs = np.full((2, 2), -1)
-    values = np.zeros(2)
-    pair = np.zeros(2, dtype=np.int64)
-    for a in range(c):
-        if not watched[a] or information[a, a] <= _VISIBLE:
-            continue
-        for b in range(a + 1, c):
-            if not watched[b] or information[b, b] <= _VISIBLE:
-                continue
-            pair[0] = a
-            pair[1] = b
-            value = _explained(information, score, pair)
-            if value > values[0]:
-                values[1] = values[0]
-                pairs[1] = pairs[0]
-                values[0] = value
-                pairs[0] = pair
-            elif value > values[1]:
-                values[1] = value
-                pairs[1] = pair
-    return pairs, values
+def _values_of_singles(information, score, watched):  # type: ignore[no-untyped-def]
+    """Return what each channel explains alone at its best onset, shape (c,), and that slot, shape (c,)."""
+    slots, c = score.shape
+    values = np.zeros(c)
+    places = np.zeros(c, dtype=np.int64)
+    for s in range(slots):
+        for i in range(c):
+            if watched[i] and information[s, i, i] > _VISIBLE:
+                value = score[s, i] * score[s, i] / information[s, i, i]
+                if value > values[i]:
+                    values[i] = value
+                    places[i] = s
+    return values, places
 
 
 @njit(**COMPILE)
-def _best_chips(information, score, watched, chips):  # type: ignore[no-untyped-def]
-    """Return the chip whose watched channels explain most, how much, and how much the next chip's do."""
-    best = -1
-    first = 0.0
-    second = 0.0
-    for chip in range(chips.max() + 1):
+def _values_of_pairs(information, score, watched):  # type: ignore[no-untyped-def]
+    """Return what each pair explains at its best onset, shape (c, c), upper triangle, and that slot."""
+    slots, c = score.shape
+    values = np.zeros((c, c))
+    places = np.zeros((c, c), dtype=np.int64)
+    pair = np.zeros(2, dtype=np.int64)
+    for s in range(slots):
+        for a in range(c):
+            if not watched[a] or information[s, a, a] <= _VISIBLE:
+                continue
+            for b in range(a + 1, c):
+                if not watched[b] or information[s, b, b] <= _VISIBLE:
+                    continue
+                pair[0] = a
+                pair[1] = b
+                value = _explained(information[s], score[s], pair)
+                if value > values[a, b]:
+                    values[a, b] = value
+                    places[a, b] = s
+    return values, places
+
+
+@njit(**COMPILE)
+def _values_of_chips(information, score, watched, chips):  # type: ignore[no-untyped-def]
+    """Return what the watched channels of each chip explain at their best onset, and that slot."""
+    count = chips.max() + 1
+    values = np.zeros(count)
+    places = np.zeros(count, dtype=np.int64)
+    for chip in range(count):
         members = np.flatnonzero((chips == chip) & watched)
         if len(members) < 2:
             continue
-        value = _explained(information, score, members)
-        if value > first:
-            second = first
-            first = value
-            best = chip
-        elif value > second:
-            second = value
-    return best, first, second
+        for s in range(score.shape[0]):
+            value = _explained(information[s], score[s], members)
+            if value > values[chip]:
+                values[chip] = value
+                places[chip] = s
+    return values, places
 
 
 @njit(**COMPILE)
-def isolate(information, score, watched, chips, margins):  # type: ignore[no-untyped-def]
-    """Find the channels to blame.
+def _two_largest(values):  # type: ignore[no-untyped-def]
+    """Return the place of the largest value, it, and the second largest; of an array of any shape, flattened."""
+    flat = values.ravel()
+    best = int(np.argmax(flat))
+    second = 0.0
+    for m in range(len(flat)):
+        if m != best and flat[m] > second:
+            second = flat[m]
+    return best, flat[best], second
+
+
+@njit(**COMPILE)
+def isolate(information, score, shares, watched, chips, margins):  # type: ignore[no-untyped-def]
+    """Find the channels to blame, each set of them at the onset that suits it best.
 
     Parameters
     ----------
-    information : ndarray, shape (c, c)
-        C, with the errors of the model taken out (`deflate`).
-    score : ndarray, shape (c,)
+    information : ndarray, shape (slots, c, c)
+        C of each onset, with the errors of the model taken out (`deflate`).
+    score : ndarray, shape (slots, c)
         d, likewise.
+    shares : ndarray, shape (slots,)
+        Share of a statistic by which the signature of that onset may be wrong.
     watched : ndarray of bool, shape (c,)
         Channels in use.
     chips : ndarray of int, shape (c,)
@@ -196,39 +219,49 @@ def isolate(information, score, watched, chips, margins):  # type: ignore[no-unt
 
     Returns
     -------
-    tuple of (ndarray of int, bool, float)
-        Channels to blame, whether that is beyond doubt, and what they explain. In doubt they are the channels of all
-        sets of that size within the margin; none if no set of one, two, or a chip explains the innovations.
+    tuple of (ndarray of int, bool, float, int)
+        Channels to blame, whether that is beyond doubt, what they explain, and the slot of their onset. In doubt they
+        are the channels of all sets of that size within the margin; none if no set of one, two, or a chip explains the
+        innovations.
     """
-    share = margins.relative
-    one, first, second = strongest(information, score, watched)
+    c = len(watched)
+    singles, single_slots = _values_of_singles(information, score, watched)
+    one, first, second = _two_largest(singles)
     single = np.array([one])
-    if _beside(information, score, single, watched) < max(margins.unexplained, share * first):
+    place = single_slots[one]
+    share = shares[place]
+    if _beside(information[place], score[place], single, watched) < max(margins.unexplained, share * first):
         needed = max(margins.isolation, share * first)
         if first - second > needed:
-            return single, True, first
-        rivals = np.zeros(len(score), dtype=np.bool_)
-        for i in range(len(score)):
-            if watched[i] and information[i, i] > _VISIBLE:
-                rivals[i] = first - score[i] * score[i] / information[i, i] <= needed
-        return np.flatnonzero(rivals), False, first
-    pairs, values = _best_pairs(information, score, watched)
-    chip, chip_first, chip_second = _best_chips(information, score, watched, chips)
-    if chip >= 0 and chip_first - values[0] > max(margins.unexplained, share * chip_first):
+            return single, True, first, place
+        return np.flatnonzero(singles >= first - needed), False, first, place
+    pairs, pair_slots = _values_of_pairs(information, score, watched)
+    best, two, next_two = _two_largest(pairs)
+    values, chip_slots = _values_of_chips(information, score, watched, chips)
+    chip, three, next_three = _two_largest(values)
+    share = shares[chip_slots[chip]]
+    if three - two > max(margins.unexplained, share * three):
         members = np.flatnonzero((chips == chip) & watched)
-        alone = chip_first - chip_second > max(margins.isolation, share * chip_first)
-        rest = _beside(information, score, members, watched)
-        if alone and rest < max(margins.unexplained, share * chip_first):
-            return members, True, chip_first
-    pair = pairs[0].copy()
-    if pair[0] < 0 or values[0] - first < max(margins.second, share * values[0]):
-        return single[:0], False, first
-    if _beside(information, score, pair, watched) > max(margins.unexplained, share * values[0]):
-        return single[:0], False, values[0]
-    if values[0] - values[1] > max(margins.isolation, share * values[0]):
-        return pair, True, values[0]
-    both = np.zeros(len(score), dtype=np.bool_)
-    for m in range(2):
-        both[pairs[0, m]] = True
-        both[pairs[1, m]] = True
-    return np.flatnonzero(both), False, values[0]
+        place = chip_slots[chip]
+        rest = _beside(information[place], score[place], members, watched)
+        alone = three - next_three > max(margins.isolation, share * three)
+        return members if rest < max(margins.unexplained, share * three) else single[:0], alone, three, place
+    pair = np.array([best // c, best % c])
+    place = pair_slots[pair[0], pair[1]]
+    share = shares[place]
+    more = max(margins.second, share * two)
+    rest = _beside(information[place], score[place], pair, watched)
+    if two - first < more or rest > max(margins.unexplained, share * two) or three - two > margins.isolation:
+        return single[:0], False, two, place
+    needed = max(margins.isolation, share * two)
+    by_chip = chips == chip
+    covered = by_chip[pair[0]] and by_chip[pair[1]]
+    if two - next_two > needed and (covered or two - three > needed):
+        return pair, True, two, place
+    rivals = by_chip & watched & (not covered and two - three <= needed)
+    for a in range(c):
+        for b in range(a + 1, c):
+            if pairs[a, b] >= two - needed and pairs[a, b] > 0.0:
+                rivals[a] = True
+                rivals[b] = True
+    return np.flatnonzero(rivals), False, two, place

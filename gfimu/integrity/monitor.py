@@ -21,6 +21,9 @@ from gfimu.rate.sensing import ChannelTables, SensorErrors
 __all__ = ["ChannelMonitor", "watch_channels"]
 
 _LARGEST_FAULT = 100.0  # m/s², prior standard deviation of a fault's size: a limit that no fault reaches
+_FIRST_BLOCK = 0.25  # of one block's evidence, which an onset in the middle of the block spoils at most
+_ONSET_STD = 0.29  # blocks: of a value spread evenly over one
+_LARGEST_SCATTER = 6.0  # of the stated variance, counted in one block: a step inside it is no noise
 _SOUND_SCATTER = 2.0  # of the stated variance, up to which a channel counts as quiet again
 
 
@@ -86,7 +89,7 @@ class ChannelMonitor:
             placement_std=errors.placement_std,
             floor=policy.bias_std,
         )
-        self._margins = Margins(policy.isolation, policy.unexplained, policy.relative, 0.6 * self.threshold)
+        self._margins = Margins(policy.isolation, policy.unexplained, 0.6 * self.threshold)
         covariance = np.zeros((3 + c, 3 + c))
         covariance[range(3), range(3)] = omega0_std**2
         covariance[range(3, 3 + c), range(3, 3 + c)] = np.maximum(errors.bias_std, policy.bias_std) ** 2
@@ -133,7 +136,7 @@ class ChannelMonitor:
                 omega, std, nis, place, end,
             )  # fmt: skip
             if slot >= 0:
-                unexplained[place - 1] = self._judge(blocks, place, slot)
+                unexplained[place - 1] = self._judge(blocks, place)
             elif place == noisy + 1:
                 self._exclude_noisy(blocks, place, channel)
             else:
@@ -167,7 +170,7 @@ class ChannelMonitor:
         if not seen.any():
             return len(blocks), levels, -1
         whole = ~blocks.missing[first:].any(axis=1, keepdims=True)
-        ratios = np.minimum(np.where(whole, ratios, 1.0), 1e4)[:, seen]
+        ratios = np.minimum(np.where(whole, ratios, 1.0), _LARGEST_SCATTER)[:, seen]
         forget = min(1.0, self._period / self.policy.noise_memory_s)
         smooth, _ = lfilter([forget], [1.0, forget - 1.0], ratios, axis=0, zi=np.full((1, ratios.shape[1]), 1 - forget))
         common = np.maximum(1.0, np.median(smooth, axis=1))
@@ -186,16 +189,21 @@ class ChannelMonitor:
         at = int(np.argmax(found))
         return first + at, levels, int(np.flatnonzero(seen)[np.argmax(statistic[at])])
 
-    def _judge(self, blocks: Blocks, place: int, slot: int) -> bool:
-        """Isolate the fault that is seen in a slot, or wait; returns whether nothing explains it."""
+    def _judge(self, blocks: Blocks, place: int) -> bool:
+        """Isolate the fault that is seen, or wait; returns whether nothing explains it."""
         state = self._state
         std = np.empty(self.array.n_channels)
         model_errors(state, self._tuning, std)
-        information, score = deflate(state.information[slot], state.score[slot], std)
-        self.largest_statistic = max(self.largest_statistic, strongest(information, score, self.watched)[1])
-        channels, isolated, statistic = isolate(
-            information, score, self.watched, self.array.chip_of_channel, self._margins
-        )
+        used = np.flatnonzero(state.ages >= 2.0)
+        cleaned = [deflate(state.information[s], state.score[s], std) for s in used]
+        self.largest_statistic = max(self.largest_statistic, max(strongest(*pair, self.watched)[1] for pair in cleaned))
+        channels, isolated, statistic, place_of_slot = isolate(
+            np.stack([pair[0] for pair in cleaned]), np.stack([pair[1] for pair in cleaned]),
+            self.policy.relative + _FIRST_BLOCK / state.ages[used], self.watched,
+            self.array.chip_of_channel, self._margins,
+        )  # fmt: skip
+        slot = int(used[place_of_slot])
+        information, score = cleaned[place_of_slot]
         if len(channels) == 0:
             self._suspicion = None
             return True
@@ -236,7 +244,8 @@ class ChannelMonitor:
         move = effect @ sizes
         state.omega[:] -= move[:3]
         state.bias[:] -= move[3:]
-        state.covariance[:] += effect @ spread @ effect.T
+        within = _ONSET_STD / float(state.ages[slot])  # the onset lies anywhere within its block
+        state.covariance[:] += effect @ spread @ effect.T + within**2 * np.outer(move, move)
         onset = float(blocks.t[place - 1] - (state.ages[slot] - 0.5) * self._period)
         self._add(
             blocks, place, channels,

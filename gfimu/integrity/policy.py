@@ -19,7 +19,7 @@ class MonitorPolicy:
     Parameters
     ----------
     block_s : float
-        Length of the blocks of which means are taken, s; at least 4 samples. Shorter blocks find large faults sooner
+        Length of the blocks of which means are taken, s; at least 6 samples. Shorter blocks find large faults sooner
         and cost more time.
     false_alarms_per_hour : float
         How often a sound array may be called faulty.
@@ -32,8 +32,8 @@ class MonitorPolicy:
     unexplained : float
         Largest statistic of another channel that may remain beside the explanation; χ²(1) gives 14 once in 5000.
     relative : float
-        The two above, as shares of the explained statistic: an onset inside a block and the linearisation spoil the
-        signature of a large fault by about that much.
+        The two above, as shares of the explained statistic: linearisation and block means spoil the signature of a
+        large fault by about that much. An onset inside a block adds 0.25 over the age in blocks.
     wait_s : float
         A fault that is seen and not isolated for so long is stated as one of several, s.
     slots : int
@@ -60,7 +60,7 @@ class MonitorPolicy:
     tests_per_channel: float = 0.62
     isolation: float = 10.0
     unexplained: float = 14.0
-    relative: float = 0.04
+    relative: float = 0.02
     wait_s: float = 2.0
     slots: int = 8
     oldest_s: float = 20.0
@@ -78,7 +78,7 @@ class MonitorPolicy:
 
     def samples(self, period: float) -> int:
         """Return the samples of a block at this sample period, s."""
-        return max(4, round(self.block_s / period))
+        return max(6, round(self.block_s / period))
 
     def threshold(self, n_channels: int, block_s: float) -> float:
         """Return the statistic from which a fault is believed: χ²(1) at the stated rate of false alarms."""
