@@ -1,4 +1,4 @@
-"""What a faulty channel does: step, drift, gain, noise, freeze or spikes, by its difference from the others' prediction.
+"""What a faulty channel does: step, drift, gain, noise, freeze or spikes.
 
 The difference r of a channel from what the other channels predict is fitted from the onset of the fault to shortly
 after it was found. Each kind is a model of r with at most one size,

@@ -22,7 +22,8 @@ __all__ = ["ChannelMonitor", "watch_channels"]
 
 _LARGEST_FAULT = 100.0  # m/s², prior standard deviation of a fault's size: a limit that no fault reaches
 _FIRST_BLOCK = 0.25  # of one block's evidence, which an onset in the middle of the block spoils at most
-_ONSET_STD = 0.29  # blocks: of a value spread evenly over one
+_LEAST_AGE = 3.0  # blocks, of an onset from which a fault is isolated
+_MARGIN = 2  # blocks before the onset, from which on the channels are not used
 _LARGEST_SCATTER = 6.0  # of the stated variance, counted in one block: a step inside it is no noise
 _SOUND_SCATTER = 2.0  # of the stated variance, up to which a channel counts as quiet again
 
@@ -94,6 +95,7 @@ class ChannelMonitor:
         covariance[range(3), range(3)] = omega0_std**2
         covariance[range(3, 3 + c), range(3, 3 + c)] = np.maximum(errors.bias_std, policy.bias_std) ** 2
         slots = policy.slots
+        history = int(2.0 * self._tuning.oldest) + _MARGIN + 1
         self._state = MonitorState(
             omega=np.array(omega0, dtype=float),
             bias=np.zeros(c),
@@ -106,6 +108,10 @@ class ChannelMonitor:
             information=np.zeros((slots, c, c)),
             score=np.zeros((slots, c)),
             started=np.zeros(1, dtype=np.bool_),
+            past_rate=np.zeros((history, 3)),
+            past_bias=np.zeros((history, c)),
+            past_covariance=np.zeros((history, 3 + c, 3 + c)),
+            past_means=np.zeros((history, 3, c)),
         )
         self._length_scale = np.array([array.length_unit] * 3 + [1.0] * 3)
         self.watched = np.ones(c, dtype=np.bool_)
@@ -135,13 +141,18 @@ class ChannelMonitor:
                 tables, self._tuning, self._state, blocks.means, steps, sets, levels, self.watched,
                 omega, std, nis, place, end,
             )  # fmt: skip
+            back = place
             if slot >= 0:
-                unexplained[place - 1] = self._judge(blocks, place)
+                back, unexplained[place - 1] = self._judge(blocks, place)
             elif place == noisy + 1:
-                self._exclude_noisy(blocks, place, channel)
+                back = self._exclude_noisy(blocks, place, channel)
             else:
                 self._suspicion = None
-            self._readmit(blocks, place, omega)
+            if back < place:  # again from before the onset, without the channels
+                place = back
+                self._state.go_back(place)
+            else:
+                self._readmit(blocks, place, omega)
         return omega, std, unexplained
 
     def _sets(self, blocks: Blocks) -> NDArray[np.int64]:
@@ -189,14 +200,14 @@ class ChannelMonitor:
         at = int(np.argmax(found))
         return first + at, levels, int(np.flatnonzero(seen)[np.argmax(statistic[at])])
 
-    def _judge(self, blocks: Blocks, place: int) -> bool:
-        """Isolate the fault that is seen, or wait; returns whether nothing explains it."""
+    def _judge(self, blocks: Blocks, place: int) -> tuple[int, bool]:
+        """Isolate the fault that is seen, or wait; returns the block to go on with, and whether nothing explains it."""
         state = self._state
         std = np.empty(self.array.n_channels)
         model_errors(state, self._tuning, std)
-        used = np.flatnonzero(state.ages >= 2.0)
+        used = np.flatnonzero(state.ages >= 1.0)
         cleaned = [deflate(state.information[s], state.score[s], std) for s in used]
-        self.largest_statistic = max(self.largest_statistic, max(strongest(*pair, self.watched)[1] for pair in cleaned))
+        self.largest_statistic = max(self.largest_statistic, *(strongest(*pair, self.watched)[1] for pair in cleaned))
         channels, isolated, statistic, place_of_slot = isolate(
             np.stack([pair[0] for pair in cleaned]), np.stack([pair[1] for pair in cleaned]),
             self.policy.relative + _FIRST_BLOCK / state.ages[used], self.watched,
@@ -204,18 +215,19 @@ class ChannelMonitor:
         )  # fmt: skip
         slot = int(used[place_of_slot])
         information, score = cleaned[place_of_slot]
+        if state.ages[slot] < _LEAST_AGE:  # the onset may be later still
+            return place, False
         if len(channels) == 0:
             self._suspicion = None
-            return True
+            return place, True
         if not isolated:
             if self._suspicion is None:
                 self._suspicion = _Suspicion(place, channels)
             if (place - self._suspicion.since) * self._period < self.policy.wait_s:
-                return False
+                return place, False
         if not self._may_exclude(channels):
-            return True
-        self._exclude(blocks, place, slot, channels, isolated, statistic, information, score)
-        return False
+            return place, True
+        return self._exclude(blocks, place, slot, channels, isolated, statistic, information, score), False
 
     def _may_exclude(self, channels: NDArray[np.int64]) -> bool:
         """Whether the rest sees all six motions and can still check itself."""
@@ -234,18 +246,12 @@ class ChannelMonitor:
         statistic: float,
         information: NDArray[np.float64],
         score: NDArray[np.float64],
-    ) -> None:
-        """Take channels out, and what their fault did to the state since its onset."""
+    ) -> int:
+        """Take channels out; returns the block before their fault began, from which to go on."""
         state = self._state
         block = information[np.ix_(channels, channels)]
         spread = np.linalg.inv(block + np.eye(len(channels)) / _LARGEST_FAULT**2)
         sizes = spread @ score[channels]
-        effect = state.signature[slot][:, channels]  # (3 + c, m)
-        move = effect @ sizes
-        state.omega[:] -= move[:3]
-        state.bias[:] -= move[3:]
-        within = _ONSET_STD / float(state.ages[slot])  # the onset lies anywhere within its block
-        state.covariance[:] += effect @ spread @ effect.T + within**2 * np.outer(move, move)
         onset = float(blocks.t[place - 1] - (state.ages[slot] - 0.5) * self._period)
         self._add(
             blocks, place, channels,
@@ -255,12 +261,13 @@ class ChannelMonitor:
                 tuple(sizes.tolist()), tuple(np.sqrt(np.diag(spread)).tolist()), float(statistic),
             ),
         )  # fmt: skip
+        return max(0, place - int(state.ages[slot]) - _MARGIN)
 
-    def _exclude_noisy(self, blocks: Blocks, place: int, channel: int) -> None:
-        """Take a noisy channel out."""
+    def _exclude_noisy(self, blocks: Blocks, place: int, channel: int) -> int:
+        """Take a noisy channel out; returns the block from which to go on."""
         channels = np.array([channel])
         if not self._may_exclude(channels):
-            return
+            return place
         found = float(blocks.t[place - 1] + 0.5 * self._period)
         onset = found - self.policy.noise_memory_s
         self._add(
@@ -269,10 +276,10 @@ class ChannelMonitor:
                 (self.array.channels[channel],), "noise", True, onset, found, np.inf, (np.nan,), (np.nan,), np.nan
             ),
         )  # fmt: skip
+        return max(0, place - round(self.policy.noise_memory_s / self._period) - _MARGIN)
 
     def _add(self, blocks: Blocks, place: int, channels: NDArray[np.int64], fault: ChannelFault) -> None:
         self.watched[channels] = False
-        self._state.ages[:] = 0.0
         self._suspicion = None
         for channel in channels:
             self._open[int(channel)] = (len(self.faults), place)

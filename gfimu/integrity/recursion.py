@@ -77,10 +77,20 @@ class MonitorState(NamedTuple):
     information: NDArray[np.float64]  # (slots, c, c) C
     score: NDArray[np.float64]  # (slots, c) d
     started: NDArray[np.bool_]  # (1,)
+    past_rate: NDArray[np.float64]  # (h, 3) before each of the last blocks, rings; block k at k mod h
+    past_bias: NDArray[np.float64]  # (h, c)
+    past_covariance: NDArray[np.float64]  # (h, 3 + c, 3 + c)
+    past_means: NDArray[np.float64]  # (h, 3, c) last mean readings, low, high
 
-    def copy(self) -> MonitorState:
-        """Return a state that shares nothing with this one."""
-        return MonitorState._make(field.copy() for field in self)
+    def go_back(self, block: int) -> None:
+        """Return to the state before a block; it must be one of the last h."""
+        place = block % len(self.past_rate)
+        self.omega[:] = self.past_rate[place]
+        self.bias[:] = self.past_bias[place]
+        self.covariance[:] = self.past_covariance[place]
+        self.last[:], self.low[:], self.high[:] = self.past_means[place]
+        self.ages[:] = 0.0
+        self.started[0] = block > 0
 
 
 @njit(**COMPILE)
@@ -99,6 +109,7 @@ def advance(tables, tuning, state, means, steps, sets, levels, watched, omega, s
     model_std = np.empty(c)
     k = first
     while k < last:
+        _keep(state, k)
         place = sets[k]
         level = levels[k]
         whole = steps[k] < 1.5 * tuning.period
@@ -137,6 +148,18 @@ def model_errors(state, tuning, std):  # type: ignore[no-untyped-def]
         gain = 0.5 * tuning.scale_std * (state.high[i] - state.low[i])
         place = tuning.placement_std * square
         std[i] = np.sqrt(gain * gain + place * place + tuning.floor * tuning.floor)
+
+
+@njit(**COMPILE)
+def _keep(state, block):  # type: ignore[no-untyped-def]
+    """Keep the state before a block."""
+    place = block % len(state.past_rate)
+    state.past_rate[place] = state.omega
+    state.past_bias[place] = state.bias
+    state.past_covariance[place] = state.covariance
+    state.past_means[place, 0] = state.last
+    state.past_means[place, 1] = state.low
+    state.past_means[place, 2] = state.high
 
 
 @njit(**COMPILE)
@@ -385,7 +408,7 @@ def _strongest_slot(state, tuning, model_std, watched):  # type: ignore[no-untyp
         if state.ages[s] < 2.0:
             continue
         raw = strongest(state.information[s], state.score[s], watched)[1]
-        if raw <= _SCREEN * tuning.threshold:
+        if not _SCREEN * tuning.threshold < raw < np.inf:
             continue
         information, score = deflate(state.information[s], state.score[s], model_std)
         value = strongest(information, score, watched)[1]
