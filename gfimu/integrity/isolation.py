@@ -18,6 +18,7 @@ from gfimu.rate.recursion_data import COMPILE
 __all__ = ["Margins", "Verdict", "deflate", "isolate", "strongest"]
 
 _VISIBLE = 1e-9  # numerical: information below this is none
+_FIRST_BLOCK = 0.25  # of one block's evidence, which an onset in the middle of the block spoils at most
 _SEPARATE = 1e-3  # of a channel's information that must remain beside others, for it to count as another channel
 
 
@@ -27,6 +28,8 @@ class Margins(NamedTuple):
     isolation: float
     unexplained: float
     second: float  # that a second channel must add to a first
+    relative: float
+    settled: float  # blocks, from which on imperfect signatures are allowed for
 
 
 class Verdict(NamedTuple):
@@ -130,6 +133,20 @@ def _beside(information, score, members, watched):  # type: ignore[no-untyped-de
 
 
 @njit(**COMPILE)
+def _share(age, margins):  # type: ignore[no-untyped-def]
+    """Return the share of a statistic by which a signature is wrong at most."""
+    return margins.relative + _FIRST_BLOCK / age
+
+
+@njit(**COMPILE)
+def _allowed(statistic, age, margins):  # type: ignore[no-untyped-def]
+    """Return what may remain for a further channel beside an explanation."""
+    if age < margins.settled:
+        return margins.unexplained
+    return max(margins.unexplained, _share(age, margins) * statistic)
+
+
+@njit(**COMPILE)
 def _values_of_singles(information, score, watched):  # type: ignore[no-untyped-def]
     """Return what each channel explains alone at its best onset, shape (c,), and that slot, shape (c,)."""
     slots, c = score.shape
@@ -199,7 +216,7 @@ def _two_largest(values):  # type: ignore[no-untyped-def]
 
 
 @njit(**COMPILE)
-def isolate(information, score, shares, watched, chips, margins):  # type: ignore[no-untyped-def]
+def isolate(information, score, ages, watched, chips, margins):  # type: ignore[no-untyped-def]
     """Find the channels to blame, each set of them at the onset that suits it best.
 
     Parameters
@@ -208,8 +225,8 @@ def isolate(information, score, shares, watched, chips, margins):  # type: ignor
         C of each onset, with the errors of the model taken out (`deflate`).
     score : ndarray, shape (slots, c)
         d, likewise.
-    shares : ndarray, shape (slots,)
-        Share of a statistic by which the signature of that onset may be wrong.
+    ages : ndarray, shape (slots,)
+        Blocks since each onset.
     watched : ndarray of bool, shape (c,)
         Channels in use.
     chips : ndarray of int, shape (c,)
@@ -229,8 +246,8 @@ def isolate(information, score, shares, watched, chips, margins):  # type: ignor
     one, first, second = _two_largest(singles)
     single = np.array([one])
     place = single_slots[one]
-    share = shares[place]
-    if _beside(information[place], score[place], single, watched) < max(margins.unexplained, share * first):
+    share = _share(ages[place], margins)
+    if _beside(information[place], score[place], single, watched) < _allowed(first, ages[place], margins):
         needed = max(margins.isolation, share * first)
         if first - second > needed:
             return single, True, first, place
@@ -239,19 +256,19 @@ def isolate(information, score, shares, watched, chips, margins):  # type: ignor
     best, two, next_two = _two_largest(pairs)
     values, chip_slots = _values_of_chips(information, score, watched, chips)
     chip, three, next_three = _two_largest(values)
-    share = shares[chip_slots[chip]]
+    share = _share(ages[chip_slots[chip]], margins)
     if three - two > max(margins.unexplained, share * three):
         members = np.flatnonzero((chips == chip) & watched)
         place = chip_slots[chip]
         rest = _beside(information[place], score[place], members, watched)
         alone = three - next_three > max(margins.isolation, share * three)
-        return members if rest < max(margins.unexplained, share * three) else single[:0], alone, three, place
+        return members if rest < _allowed(three, ages[place], margins) else single[:0], alone, three, place
     pair = np.array([best // c, best % c])
     place = pair_slots[pair[0], pair[1]]
-    share = shares[place]
+    share = _share(ages[place], margins)
     more = max(margins.second, share * two)
     rest = _beside(information[place], score[place], pair, watched)
-    if two - first < more or rest > max(margins.unexplained, share * two) or three - two > margins.isolation:
+    if two - first < more or rest > _allowed(two, ages[place], margins) or three - two > margins.isolation:
         return single[:0], False, two, place
     needed = max(margins.isolation, share * two)
     by_chip = chips == chip

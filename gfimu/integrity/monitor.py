@@ -21,7 +21,6 @@ from gfimu.rate.sensing import ChannelTables, SensorErrors
 __all__ = ["ChannelMonitor", "watch_channels"]
 
 _LARGEST_FAULT = 100.0  # m/s², prior standard deviation of a fault's size: a limit that no fault reaches
-_FIRST_BLOCK = 0.25  # of one block's evidence, which an onset in the middle of the block spoils at most
 _LEAST_AGE = 3.0  # blocks, of an onset from which a fault is isolated
 _MARGIN = 2  # blocks before the onset, from which on the channels are not used
 _LARGEST_SCATTER = 6.0  # of the stated variance, counted in one block: a step inside it is no noise
@@ -90,7 +89,9 @@ class ChannelMonitor:
             placement_std=errors.placement_std,
             floor=policy.bias_std,
         )
-        self._margins = Margins(policy.isolation, policy.unexplained, 0.6 * self.threshold)
+        self._margins = Margins(
+            policy.isolation, policy.unexplained, 0.6 * self.threshold, policy.relative, policy.settled_s / self._period
+        )
         covariance = np.zeros((3 + c, 3 + c))
         covariance[range(3), range(3)] = omega0_std**2
         covariance[range(3, 3 + c), range(3, 3 + c)] = np.maximum(errors.bias_std, policy.bias_std) ** 2
@@ -210,7 +211,7 @@ class ChannelMonitor:
         self.largest_statistic = max(self.largest_statistic, *(strongest(*pair, self.watched)[1] for pair in cleaned))
         channels, isolated, statistic, place_of_slot = isolate(
             np.stack([pair[0] for pair in cleaned]), np.stack([pair[1] for pair in cleaned]),
-            self.policy.relative + _FIRST_BLOCK / state.ages[used], self.watched,
+            state.ages[used], self.watched,
             self.array.chip_of_channel, self._margins,
         )  # fmt: skip
         slot = int(used[place_of_slot])

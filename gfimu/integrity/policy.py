@@ -34,6 +34,8 @@ class MonitorPolicy:
     relative : float
         The two above, as shares of the explained statistic: linearisation and block means spoil the signature of a
         large fault by about that much. An onset inside a block adds 0.25 over the age in blocks.
+    settled_s : float
+        Age of an onset from which on such imperfect signatures are allowed for, s; before, the monitor waits.
     wait_s : float
         A fault that is seen and not isolated for so long is stated as one of several, s.
     slots : int
@@ -61,6 +63,7 @@ class MonitorPolicy:
     isolation: float = 10.0
     unexplained: float = 14.0
     relative: float = 0.02
+    settled_s: float = 0.8
     wait_s: float = 2.0
     slots: int = 8
     oldest_s: float = 20.0
@@ -69,7 +72,7 @@ class MonitorPolicy:
     range_memory_s: float = 2.0
     noise_memory_s: float = 0.5
     readmission_s: float = 5.0
-    fewest_null: int = 2
+    fewest_null: int = 3
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
