@@ -1,8 +1,7 @@
-"""Which channels explain the innovations: one, two, or a whole chip, each against its rivals.
+"""Which channels may explain the innovations: one, two, or a whole chip, each at the onset that suits it best.
 
 All functions work on the information C (c, c) and the score d (c,) of faults on every channel from one onset. A set S
-explains T_S = d_Sᵀ C_SS⁻¹ d_S. A fault is isolated if its set exceeds the next one of its kind by a margin and no
-further channel is needed beside it.
+explains T_S = d_Sᵀ C_SS⁻¹ d_S of the sum of squared innovations.
 """
 
 from __future__ import annotations
@@ -15,32 +14,18 @@ from numpy.typing import NDArray
 
 from gfimu.rate.recursion_data import COMPILE
 
-__all__ = ["Margins", "Verdict", "deflate", "isolate", "strongest"]
+__all__ = ["Explanation", "deflate", "explanations", "strongest"]
 
 _VISIBLE = 1e-9  # numerical: information below this is none
-_FIRST_BLOCK = 0.25  # of one block's evidence, which an onset in the middle of the block spoils at most
 _SEPARATE = 1e-3  # of a channel's information that must remain beside others, for it to count as another channel
 
 
-class Margins(NamedTuple):
-    """By how much an explanation must exceed its rivals (`gfimu.integrity.policy.MonitorPolicy`)."""
-
-    isolation: float
-    unexplained: float
-    second: float  # that a second channel must add to a first
-    relative: float
-    settled: float  # blocks, from which on imperfect signatures are allowed for
-
-
-class Verdict(NamedTuple):
-    """Channels that explain a fault.
-
-    ``channels`` are those to blame; with ``isolated`` false they are all of the sets that can't be separated.
-    """
+class Explanation(NamedTuple):
+    """A set of channels that may be at fault, at the onset that suits it best."""
 
     channels: NDArray[np.int64]
-    isolated: bool
     statistic: float
+    slot: int
 
 
 @njit(**COMPILE)
@@ -104,49 +89,6 @@ def _explained(information, score, members):  # type: ignore[no-untyped-def]
 
 
 @njit(**COMPILE)
-def _beside(information, score, members, watched):  # type: ignore[no-untyped-def]
-    """Return the most that one further channel explains beside a set."""
-    size = len(members)
-    c = len(score)
-    block = np.empty((size, size))
-    right = np.empty((size, c + 1))
-    for m in range(size):
-        for q in range(size):
-            block[m, q] = information[members[m], members[q]]
-        block[m, m] += _VISIBLE
-        for i in range(c):
-            right[m, i] = information[members[m], i]
-        right[m, c] = score[members[m]]
-    solved = np.linalg.solve(block, right)
-    most = 0.0
-    for i in range(c):
-        if not watched[i] or information[i, i] <= _VISIBLE:
-            continue
-        own = information[i, i]
-        rest = score[i]
-        for m in range(size):
-            own -= information[i, members[m]] * solved[m, i]
-            rest -= information[i, members[m]] * solved[m, c]
-        if own > _SEPARATE * information[i, i]:
-            most = max(most, rest * rest / own)
-    return most
-
-
-@njit(**COMPILE)
-def _share(age, margins):  # type: ignore[no-untyped-def]
-    """Return the share of a statistic by which a signature is wrong at most."""
-    return margins.relative + _FIRST_BLOCK / age
-
-
-@njit(**COMPILE)
-def _allowed(statistic, age, margins):  # type: ignore[no-untyped-def]
-    """Return what may remain for a further channel beside an explanation."""
-    if age < margins.settled:
-        return margins.unexplained
-    return max(margins.unexplained, _share(age, margins) * statistic)
-
-
-@njit(**COMPILE)
 def _values_of_singles(information, score, watched):  # type: ignore[no-untyped-def]
     """Return what each channel explains alone at its best onset, shape (c,), and that slot, shape (c,)."""
     slots, c = score.shape
@@ -203,21 +145,14 @@ def _values_of_chips(information, score, watched, chips):  # type: ignore[no-unt
     return values, places
 
 
-@njit(**COMPILE)
-def _two_largest(values):  # type: ignore[no-untyped-def]
-    """Return the place of the largest value, it, and the second largest; of an array of any shape, flattened."""
-    flat = values.ravel()
-    best = int(np.argmax(flat))
-    second = 0.0
-    for m in range(len(flat)):
-        if m != best and flat[m] > second:
-            second = flat[m]
-    return best, flat[best], second
-
-
-@njit(**COMPILE)
-def isolate(information, score, ages, watched, chips, margins):  # type: ignore[no-untyped-def]
-    """Find the channels to blame, each set of them at the onset that suits it best.
+def explanations(
+    information: NDArray[np.float64],
+    score: NDArray[np.float64],
+    watched: NDArray[np.bool_],
+    chips: NDArray[np.int64],
+    most: int,
+) -> tuple[list[Explanation], list[Explanation], list[Explanation]]:
+    """Return the channels, the pairs and the chips that explain most, each list from the largest on.
 
     Parameters
     ----------
@@ -225,60 +160,23 @@ def isolate(information, score, ages, watched, chips, margins):  # type: ignore[
         C of each onset, with the errors of the model taken out (`deflate`).
     score : ndarray, shape (slots, c)
         d, likewise.
-    ages : ndarray, shape (slots,)
-        Blocks since each onset.
     watched : ndarray of bool, shape (c,)
         Channels in use.
     chips : ndarray of int, shape (c,)
         Chip of each channel.
-    margins : Margins
-        What an explanation must bring.
-
-    Returns
-    -------
-    tuple of (ndarray of int, bool, float, int)
-        Channels to blame, whether that is beyond doubt, what they explain, and the slot of their onset. In doubt they
-        are the channels of all sets of that size within the margin; none if no set of one, two, or a chip explains the
-        innovations.
+    most : int
+        Length of each list, at most.
     """
-    c = len(watched)
-    singles, single_slots = _values_of_singles(information, score, watched)
-    one, first, second = _two_largest(singles)
-    single = np.array([one])
-    place = single_slots[one]
-    share = _share(ages[place], margins)
-    if _beside(information[place], score[place], single, watched) < _allowed(first, ages[place], margins):
-        needed = max(margins.isolation, share * first)
-        if first - second > needed:
-            return single, True, first, place
-        return np.flatnonzero(singles >= first - needed), False, first, place
-    pairs, pair_slots = _values_of_pairs(information, score, watched)
-    best, two, next_two = _two_largest(pairs)
-    values, chip_slots = _values_of_chips(information, score, watched, chips)
-    chip, three, next_three = _two_largest(values)
-    share = _share(ages[chip_slots[chip]], margins)
-    if three - two > max(margins.unexplained, share * three):
-        members = np.flatnonzero((chips == chip) & watched)
-        place = chip_slots[chip]
-        rest = _beside(information[place], score[place], members, watched)
-        alone = three - next_three > max(margins.isolation, share * three)
-        return members if rest < _allowed(three, ages[place], margins) else single[:0], alone, three, place
-    pair = np.array([best // c, best % c])
-    place = pair_slots[pair[0], pair[1]]
-    share = _share(ages[place], margins)
-    more = max(margins.second, share * two)
-    rest = _beside(information[place], score[place], pair, watched)
-    if two - first < more or rest > _allowed(two, ages[place], margins) or three - two > margins.isolation:
-        return single[:0], False, two, place
-    needed = max(margins.isolation, share * two)
-    by_chip = chips == chip
-    covered = by_chip[pair[0]] and by_chip[pair[1]]
-    if two - next_two > needed and (covered or two - three > needed):
-        return pair, True, two, place
-    rivals = by_chip & watched & (not covered and two - three <= needed)
-    for a in range(c):
-        for b in range(a + 1, c):
-            if pairs[a, b] >= two - needed and pairs[a, b] > 0.0:
-                rivals[a] = True
-                rivals[b] = True
-    return np.flatnonzero(rivals), False, two, place
+    singles, slots = _values_of_singles(information, score, watched)
+    one = [Explanation(np.array([i]), float(singles[i]), int(slots[i])) for i in np.argsort(-singles)[:most]]
+    pairs, slots = _values_of_pairs(information, score, watched)
+    two = []
+    for place in np.argsort(-pairs, axis=None)[:most]:
+        a, b = divmod(int(place), len(watched))
+        two.append(Explanation(np.array([a, b]), float(pairs[a, b]), int(slots[a, b])))
+    values, slots = _values_of_chips(information, score, watched, chips)
+    whole = [
+        Explanation(np.flatnonzero((chips == chip) & watched), float(values[chip]), int(slots[chip]))
+        for chip in np.argsort(-values)[:most]
+    ]
+    return tuple([entry for entry in kind if entry.statistic > 0.0] for kind in (one, two, whole))

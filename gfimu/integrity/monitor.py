@@ -11,7 +11,7 @@ from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.integrity.blocks import Blocks, block_means, scatter
 from gfimu.integrity.fault import ChannelFault, ChannelHealth
-from gfimu.integrity.isolation import Margins, deflate, isolate, strongest
+from gfimu.integrity.isolation import Explanation, deflate, explanations, strongest
 from gfimu.integrity.kinds import name_kinds
 from gfimu.integrity.policy import MonitorPolicy
 from gfimu.integrity.prediction import omega_products, prediction_row
@@ -21,7 +21,9 @@ from gfimu.rate.sensing import ChannelTables, SensorErrors
 __all__ = ["ChannelMonitor", "watch_channels"]
 
 _LARGEST_FAULT = 100.0  # m/s², prior standard deviation of a fault's size: a limit that no fault reaches
-_LEAST_AGE = 3.0  # blocks, of an onset from which a fault is isolated
+_LEAST_AGE = 3  # blocks, of an onset from which a fault is isolated: it may be later still
+_TRIED = 4  # sets of each kind of which it is tried whether they explain a fault
+_FIRST_BLOCK = 0.25  # of one block's evidence, which an onset in the middle of the block spoils at most
 _MARGIN = 2  # blocks before the onset, from which on the channels are not used
 _LARGEST_SCATTER = 6.0  # of the stated variance, counted in one block: a step inside it is no noise
 _SOUND_SCATTER = 2.0  # of the stated variance, up to which a channel counts as quiet again
@@ -32,7 +34,8 @@ class _Suspicion:
     """A fault that is seen and not isolated yet."""
 
     since: int  # block
-    rivals: NDArray[np.int64]
+    next_trial: int  # block
+    unexplained: bool = False
 
 
 class ChannelMonitor:
@@ -89,9 +92,6 @@ class ChannelMonitor:
             placement_std=errors.placement_std,
             floor=policy.bias_std,
         )
-        self._margins = Margins(
-            policy.isolation, policy.unexplained, 0.6 * self.threshold, policy.relative, policy.settled_s / self._period
-        )
         covariance = np.zeros((3 + c, 3 + c))
         covariance[range(3), range(3)] = omega0_std**2
         covariance[range(3, 3 + c), range(3, 3 + c)] = np.maximum(errors.bias_std, policy.bias_std) ** 2
@@ -132,7 +132,7 @@ class ChannelMonitor:
         steps = np.diff(blocks.t, prepend=blocks.t[0] - self._period) if count else np.zeros(0)
         place = 0
         while place < count:
-            sets = self._sets(blocks)
+            sets = self._sets(blocks, self.watched, slice(None))
             tables = self._compiled_tables()
             noisy, levels, channel = self._scatter(blocks, place)
             end = min(count, noisy + 1)
@@ -156,10 +156,10 @@ class ChannelMonitor:
                 self._readmit(blocks, place, omega)
         return omega, std, unexplained
 
-    def _sets(self, blocks: Blocks) -> NDArray[np.int64]:
-        """Return the set of channels of each block, in the tables; those that can't see α keep none."""
+    def _sets(self, blocks: Blocks, watched: NDArray[np.bool_], rows: slice) -> NDArray[np.int64]:
+        """Return the set of channels of each block in ``rows``, in the tables."""
         bits = np.int64(1) << np.arange(self.array.n_channels, dtype=np.int64)
-        masks = ((blocks.missing | ~self.watched) * bits).sum(axis=1)
+        masks = ((blocks.missing[rows] | ~watched) * bits).sum(axis=1)
         unique, inverse = np.unique(masks, return_inverse=True)
         return np.array([self._tables.index(int(mask)) for mask in unique], dtype=np.int64)[inverse]
 
@@ -203,63 +203,97 @@ class ChannelMonitor:
 
     def _judge(self, blocks: Blocks, place: int) -> tuple[int, bool]:
         """Isolate the fault that is seen, or wait; returns the block to go on with, and whether nothing explains it."""
-        state = self._state
+        if self._suspicion is None:
+            self._suspicion = _Suspicion(place, place + _LEAST_AGE - 1)
+        suspicion = self._suspicion
+        if place < suspicion.next_trial:
+            return place, suspicion.unexplained
+        waited = place - suspicion.since
+        suspicion.next_trial = place + max(1, waited // 4)
+        used, information, score = self._evidence(self._state)
+        self.largest_statistic = max(
+            self.largest_statistic,
+            *(strongest(*pair, self.watched)[1] for pair in zip(information, score, strict=True)),
+        )
+        late = waited * self._period >= self.policy.wait_s
+        for kind in explanations(information, score, self.watched, self.array.chip_of_channel, _TRIED):
+            passing = [entry for entry in kind if self._explains(blocks, place, used, entry)]
+            if not passing:
+                continue
+            best = passing[0]
+            age = float(self._state.ages[used[best.slot]])
+            needed = max(self.policy.isolation, (self.policy.relative + _FIRST_BLOCK / age) * best.statistic)
+            rivals = [entry for entry in passing if entry.statistic > best.statistic - needed]
+            if len(rivals) > 1 and not late:
+                return place, False
+            blamed = np.unique(np.concatenate([entry.channels for entry in rivals]))
+            if not self._may_exclude(blamed):
+                break
+            chosen = Explanation(blamed, best.statistic, best.slot)
+            return self._exclude(blocks, place, used, chosen, len(rivals) == 1, information, score), False
+        suspicion.unexplained = True
+        return place, True
+
+    def _evidence(self, state: MonitorState) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+        """Return the slots in use, and C (s, c, c) and d (s, c) of each with the errors of the model taken out."""
         std = np.empty(self.array.n_channels)
         model_errors(state, self._tuning, std)
         used = np.flatnonzero(state.ages >= 1.0)
         cleaned = [deflate(state.information[s], state.score[s], std) for s in used]
-        self.largest_statistic = max(self.largest_statistic, *(strongest(*pair, self.watched)[1] for pair in cleaned))
-        channels, isolated, statistic, place_of_slot = isolate(
-            np.stack([pair[0] for pair in cleaned]), np.stack([pair[1] for pair in cleaned]),
-            state.ages[used], self.watched,
-            self.array.chip_of_channel, self._margins,
-        )  # fmt: skip
-        slot = int(used[place_of_slot])
-        information, score = cleaned[place_of_slot]
-        if state.ages[slot] < _LEAST_AGE:  # the onset may be later still
-            return place, False
-        if len(channels) == 0:
-            self._suspicion = None
-            return place, True
-        if not isolated:
-            if self._suspicion is None:
-                self._suspicion = _Suspicion(place, channels)
-            if (place - self._suspicion.since) * self._period < self.policy.wait_s:
-                return place, False
-        if not self._may_exclude(channels):
-            return place, True
-        return self._exclude(blocks, place, slot, channels, isolated, statistic, information, score), False
+        return used, np.stack([pair[0] for pair in cleaned]), np.stack([pair[1] for pair in cleaned])
 
-    def _may_exclude(self, channels: NDArray[np.int64]) -> bool:
+    def _explains(self, blocks: Blocks, place: int, used: NDArray[np.int64], entry: Explanation) -> bool:
+        """Whether nothing is left to explain if these channels had not been used since before their onset."""
+        age = int(self._state.ages[used[entry.slot]])
+        if age < _LEAST_AGE or not self._may_exclude(entry.channels, fewest=1):
+            return False
+        first = max(0, place - age - _MARGIN)
+        watched = self.watched.copy()
+        watched[entry.channels] = False
+        state = self._state.copy()
+        state.go_back(first)
+        rows = slice(first, place)
+        sets = self._sets(blocks, watched, rows)
+        count = place - first
+        steps = np.diff(blocks.t[rows], prepend=blocks.t[first] - self._period)
+        advance(
+            self._compiled_tables(), self._tuning._replace(threshold=np.inf), state, blocks.means[rows], steps, sets,
+            np.ones(count), watched, np.empty((count, 3)), np.empty((count, 3)), np.empty(count), 0, count,
+        )  # fmt: skip
+        _, information, score = self._evidence(state)
+        rest = max(strongest(*pair, watched)[1] for pair in zip(information, score, strict=True))
+        return bool(np.isfinite(state.omega).all() and rest < self.policy.unexplained)
+
+    def _may_exclude(self, channels: NDArray[np.int64], fewest: int | None = None) -> bool:
         """Whether the rest sees all six motions and can still check itself."""
         kept = self.watched.copy()
         kept[channels] = False
         rank = np.linalg.matrix_rank(self.array.regression_matrix[kept] / self._length_scale, tol=1e-6)
-        return bool(rank == 6 and kept.sum() - 6 >= self.policy.fewest_null)
+        return bool(rank == 6 and kept.sum() - 6 >= (self.policy.fewest_null if fewest is None else fewest))
 
     def _exclude(
         self,
         blocks: Blocks,
         place: int,
-        slot: int,
-        channels: NDArray[np.int64],
+        used: NDArray[np.int64],
+        chosen: Explanation,
         isolated: bool,
-        statistic: float,
         information: NDArray[np.float64],
         score: NDArray[np.float64],
     ) -> int:
         """Take channels out; returns the block before their fault began, from which to go on."""
-        state = self._state
-        block = information[np.ix_(channels, channels)]
+        state, channels = self._state, chosen.channels
+        slot = used[chosen.slot]
+        block = information[chosen.slot][np.ix_(channels, channels)]
         spread = np.linalg.inv(block + np.eye(len(channels)) / _LARGEST_FAULT**2)
-        sizes = spread @ score[channels]
+        sizes = spread @ score[chosen.slot][channels]
         onset = float(blocks.t[place - 1] - (state.ages[slot] - 0.5) * self._period)
         self._add(
             blocks, place, channels,
             ChannelFault(
-                tuple(self.array.channels[i] for i in channels), "unknown", bool(isolated), onset,
+                tuple(self.array.channels[i] for i in channels), "unknown", isolated, onset,
                 float(blocks.t[place - 1] + 0.5 * self._period), np.inf,
-                tuple(sizes.tolist()), tuple(np.sqrt(np.diag(spread)).tolist()), float(statistic),
+                tuple(sizes.tolist()), tuple(np.sqrt(np.diag(spread)).tolist()), chosen.statistic,
             ),
         )  # fmt: skip
         return max(0, place - int(state.ages[slot]) - _MARGIN)

@@ -30,12 +30,10 @@ class MonitorPolicy:
         By how much the best explanation must exceed the next one of the same kind, in units of 2 log likelihood:
         10 is odds of 150 to 1.
     unexplained : float
-        Largest statistic of another channel that may remain beside the explanation; χ²(1) gives 14 once in 5000.
+        Largest statistic of another channel that may remain after the exclusion; χ²(1) gives 14 once in 5000.
     relative : float
-        The two above, as shares of the explained statistic: linearisation and block means spoil the signature of a
-        large fault by about that much. An onset inside a block adds 0.25 over the age in blocks.
-    settled_s : float
-        Age of an onset from which on such imperfect signatures are allowed for, s; before, the monitor waits.
+        The margin of isolation as a share of the explained statistic: linearisation and block means spoil the signature
+        of a large fault by about that much. An onset inside a block adds 0.25 over the age in blocks.
     wait_s : float
         A fault that is seen and not isolated for so long is stated as one of several, s.
     slots : int
@@ -63,7 +61,6 @@ class MonitorPolicy:
     isolation: float = 10.0
     unexplained: float = 14.0
     relative: float = 0.02
-    settled_s: float = 0.8
     wait_s: float = 2.0
     slots: int = 8
     oldest_s: float = 20.0

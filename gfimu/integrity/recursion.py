@@ -82,6 +82,10 @@ class MonitorState(NamedTuple):
     past_covariance: NDArray[np.float64]  # (h, 3 + c, 3 + c)
     past_means: NDArray[np.float64]  # (h, 3, c) last mean readings, low, high
 
+    def copy(self) -> MonitorState:
+        """Return a state that shares nothing with this one."""
+        return MonitorState._make(field.copy() for field in self)
+
     def go_back(self, block: int) -> None:
         """Return to the state before a block; it must be one of the last h."""
         place = block % len(self.past_rate)
