@@ -223,11 +223,12 @@ class ChannelMonitor:
             best = passing[0]
             age = float(self._state.ages[used[best.slot]])
             needed = max(self.policy.isolation, (self.policy.relative + _FIRST_BLOCK / age) * best.statistic)
-            rivals = [entry for entry in passing if entry.statistic > best.statistic - needed]
+            several = len(best.channels) > 1  # two equal faults may look exactly like two others at first
+            rivals = [entry for entry in passing if several or entry.statistic > best.statistic - needed]
             if len(rivals) > 1 and not late:
                 return place, False
             blamed = np.unique(np.concatenate([entry.channels for entry in rivals]))
-            if not self._may_exclude(blamed):
+            if not self._may_exclude(blamed, fewest=None if len(rivals) == 1 else 0):
                 break
             chosen = Explanation(blamed, best.statistic, best.slot)
             return self._exclude(blocks, place, used, chosen, len(rivals) == 1, information, score), False
