@@ -50,7 +50,7 @@ def block_means(
     used = count * samples
     rows = readings[:used]
     absent = ~(np.abs(rows) < limits)  # NaN is not below either
-    missing = absent.reshape(count, samples, -1).any(axis=1)
+    missing: NDArray[np.bool_] = np.asarray(absent.reshape(count, samples, -1).any(axis=1))
     whole = np.where(absent, 0.0, rows).reshape(count, samples, -1)
     return Blocks(
         samples,

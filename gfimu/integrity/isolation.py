@@ -179,4 +179,8 @@ def explanations(
         Explanation(np.flatnonzero((chips == chip) & watched), float(values[chip]), int(slots[chip]))
         for chip in np.argsort(-values)[:most]
     ]
-    return tuple([entry for entry in kind if entry.statistic > 0.0] for kind in (one, two, whole))
+    return _positive(one), _positive(two), _positive(whole)
+
+
+def _positive(entries: list[Explanation]) -> list[Explanation]:
+    return [entry for entry in entries if entry.statistic > 0.0]

@@ -109,6 +109,7 @@ class ChannelMonitor:
             information=np.zeros((slots, c, c)),
             score=np.zeros((slots, c)),
             started=np.zeros(1, dtype=np.bool_),
+            largest=np.zeros(1),
             past_rate=np.zeros((history, 3)),
             past_bias=np.zeros((history, c)),
             past_covariance=np.zeros((history, 3 + c, 3 + c)),
@@ -120,7 +121,11 @@ class ChannelMonitor:
         self._open: dict[int, tuple[int, int]] = {}  # channel: its fault's number, block from which it is judged
         self._patience = np.full(c, policy.readmission_s)
         self._suspicion: _Suspicion | None = None
-        self.largest_statistic = 0.0
+
+    @property
+    def largest_statistic(self) -> float:
+        """Largest statistic of a channel so far; those far below the threshold are not followed."""
+        return float(self._state.largest[0])
 
     def run(self, blocks: Blocks) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
         """Take all blocks; returns ω (m, 3), its std (m, 3) and where a fault was seen that nothing explains (m,)."""
@@ -211,10 +216,6 @@ class ChannelMonitor:
         waited = place - suspicion.since
         suspicion.next_trial = place + max(1, waited // 4)
         used, information, score = self._evidence(self._state)
-        self.largest_statistic = max(
-            self.largest_statistic,
-            *(strongest(*pair, self.watched)[1] for pair in zip(information, score, strict=True)),
-        )
         late = waited * self._period >= self.policy.wait_s
         for kind in explanations(information, score, self.watched, self.array.chip_of_channel, _TRIED):
             passing = [entry for entry in kind if self._explains(blocks, place, used, entry)]

@@ -45,7 +45,7 @@ class MonitorTables(NamedTuple):
     leak: NDArray[np.float64]  # (sets, 3, 6)
     null: NDArray[np.float64]  # (sets, d, c)
     sensitivity: NDArray[np.float64]  # (sets, d, 6)
-    count: NDArray[np.int64]  # (sets,)
+    null_count: NDArray[np.int64]  # (sets,)
     noise: NDArray[np.float64]  # (sets, 3, 3) of α, per sample
 
 
@@ -77,6 +77,7 @@ class MonitorState(NamedTuple):
     information: NDArray[np.float64]  # (slots, c, c) C
     score: NDArray[np.float64]  # (slots, c) d
     started: NDArray[np.bool_]  # (1,)
+    largest: NDArray[np.float64]  # (1,) statistic of a channel so far, beyond what model errors explain
     past_rate: NDArray[np.float64]  # (h, 3) before each of the last blocks, rings; block k at k mod h
     past_bias: NDArray[np.float64]  # (h, c)
     past_covariance: NDArray[np.float64]  # (h, 3 + c, 3 + c)
@@ -343,7 +344,7 @@ def _update(tables, tuning, state, mean, place, level):  # type: ignore[no-untyp
     slope = np.zeros(3)
     hg = np.zeros(c)
     total = 0.0
-    for j in range(tables.count[place]):
+    for j in range(tables.null_count[place]):
         z_row = tables.null[place, j]
         m_row = tables.sensitivity[place, j]
         _slope(m_row, before, slope)
@@ -416,6 +417,7 @@ def _strongest_slot(state, tuning, model_std, watched):  # type: ignore[no-untyp
             continue
         information, score = deflate(state.information[s], state.score[s], model_std)
         value = strongest(information, score, watched)[1]
+        state.largest[0] = max(state.largest[0], value)
         if value > best:
             best = value
             found = s
