@@ -30,16 +30,22 @@ class Explanation(NamedTuple):
 
 @njit(**COMPILE)
 def deflate(information, score, std):  # type: ignore[no-untyped-def]
-    """Take out of C and d what constant errors of all channels, with these standard deviations, may explain."""
+    """Take out of C and d what constant errors of all channels, with these standard deviations m, may explain.
+
+    (1 + C M²)⁻¹ [C, d], written as M⁻¹ (1 + M C M)⁻¹ M [C, d], whose matrix is positive definite.
+    """
     c = len(score)
     left = np.eye(c)
     right = np.empty((c, c + 1))
     for i in range(c):
         for j in range(c):
-            left[i, j] += information[i, j] * std[j] * std[j]
-            right[i, j] = information[i, j]
-        right[i, c] = score[i]
+            left[i, j] += std[i] * information[i, j] * std[j]
+            right[i, j] = std[i] * information[i, j]
+        right[i, c] = std[i] * score[i]
     solved = np.linalg.solve(left, right)
+    for i in range(c):
+        for j in range(c + 1):
+            solved[i, j] /= std[i]
     return solved[:, :c].copy(), solved[:, c].copy()
 
 

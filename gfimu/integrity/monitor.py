@@ -20,6 +20,7 @@ from gfimu.rate.sensing import ChannelTables, SensorErrors
 
 __all__ = ["ChannelMonitor", "watch_channels"]
 
+_RAN_AWAY = 1e9  # numerical: rate, score and information of a filter that follows stay far below
 _LARGEST_FAULT = 100.0  # m/s², prior standard deviation of a fault's size: a limit that no fault reaches
 _LEAST_AGE = 3  # blocks, of an onset from which a fault is isolated: it may be later still
 _TRIED = 4  # sets of each kind of which it is tried whether they explain a fault
@@ -147,6 +148,9 @@ class ChannelMonitor:
                 tables, self._tuning, self._state, blocks.means, steps, sets, levels, self.watched,
                 omega, std, nis, place, end,
             )  # fmt: skip
+            if _lost(self._state):
+                unexplained[place - 1 :] = True
+                break
             back = place
             if slot >= 0:
                 back, unexplained[place - 1] = self._judge(blocks, place)
@@ -262,9 +266,11 @@ class ChannelMonitor:
             self._compiled_tables(), self._tuning._replace(threshold=np.inf), state, blocks.means[rows], steps, sets,
             np.ones(count), watched, np.empty((count, 3)), np.empty((count, 3)), np.empty(count), 0, count,
         )  # fmt: skip
+        if _lost(state):
+            return False
         _, information, score = self._evidence(state)
         rest = max(strongest(*pair, watched)[1] for pair in zip(information, score, strict=True))
-        return bool(np.isfinite(state.omega).all() and rest < self.policy.unexplained)
+        return bool(rest < self.policy.unexplained)
 
     def _may_exclude(self, channels: NDArray[np.int64], fewest: int | None = None) -> bool:
         """Whether the rest sees all six motions and can still check itself."""
@@ -355,6 +361,13 @@ class ChannelMonitor:
         inner = blocks.readings[rows] @ row
         spread = float(np.mean(np.var(inner, axis=1, ddof=1)))
         return bool(near.all() and spread < _SOUND_SCATTER * noise)
+
+
+def _lost(state: MonitorState) -> bool:
+    """Whether the filter ran away: too few channels, or none of them as stated."""
+    used = state.ages >= 1.0
+    parts = (state.omega, state.score[used], state.information[used])
+    return not all(np.all(np.abs(part) < _RAN_AWAY) for part in parts)  # NaN is not smaller either
 
 
 def watch_channels(

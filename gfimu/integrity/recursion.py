@@ -35,6 +35,7 @@ from gfimu.rate.recursion_data import COMPILE
 __all__ = ["MonitorState", "MonitorTables", "MonitorTuning", "advance"]
 
 _TINY = 1e-14  # numerical: least variance kept on the diagonal of the covariance
+_LARGEST = 1e12  # numerical: statistics of a filter that has run away
 _SCREEN = 0.6  # of the threshold: below it the statistic is not corrected for model errors, which only lower it
 
 
@@ -413,7 +414,7 @@ def _strongest_slot(state, tuning, model_std, watched):  # type: ignore[no-untyp
         if state.ages[s] < 2.0:
             continue
         raw = strongest(state.information[s], state.score[s], watched)[1]
-        if not _SCREEN * tuning.threshold < raw < np.inf:
+        if not _SCREEN * tuning.threshold < raw < _LARGEST:
             continue
         information, score = deflate(state.information[s], state.score[s], model_std)
         value = strongest(information, score, watched)[1]
