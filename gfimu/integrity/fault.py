@@ -99,6 +99,9 @@ class ChannelHealth:
         Largest statistic of a channel in the run; a sound array stays below the threshold.
     threshold : float
         The threshold.
+    model_factor : float
+        By how much the errors of gains, axes and positions had to be taken larger than stated for the channels to
+        agree. Above 1, a calibration would let smaller faults be seen.
     """
 
     channels: tuple[str, ...]
@@ -107,6 +110,7 @@ class ChannelHealth:
     unexplained: NDArray[np.bool_]
     largest_statistic: float
     threshold: float
+    model_factor: float = 1.0
 
     __repr__ = short_repr
 
@@ -122,4 +126,5 @@ class ChannelHealth:
             "share_unexplained": float(self.unexplained.mean()) if len(self.unexplained) else 0.0,
             "largest_statistic": self.largest_statistic,
             "threshold": self.threshold,
+            "model_factor": self.model_factor,
         }

@@ -7,18 +7,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
-from gfimu.integrity.blocks import Blocks, block_means, scatter
-from gfimu.integrity.fault import ChannelFault, ChannelHealth
+from gfimu.integrity.blocks import Blocks, scatter
+from gfimu.integrity.fault import ChannelFault
 from gfimu.integrity.isolation import Explanation, deflate, explanations, strongest
-from gfimu.integrity.kinds import name_kinds
 from gfimu.integrity.policy import MonitorPolicy
 from gfimu.integrity.prediction import omega_products, prediction_row
 from gfimu.integrity.recursion import MonitorState, MonitorTables, MonitorTuning, advance, model_errors
 from gfimu.rate.sensing import ChannelTables, SensorErrors
 
-__all__ = ["ChannelMonitor", "watch_channels"]
+__all__ = ["ChannelMonitor"]
 
 _RAN_AWAY = 1e9  # numerical: rate, score and information of a filter that follows stay far below
 _LARGEST_FAULT = 100.0  # m/s², prior standard deviation of a fault's size: a limit that no fault reaches
@@ -124,6 +122,16 @@ class ChannelMonitor:
         self._suspicion: _Suspicion | None = None
 
     @property
+    def block_s(self) -> float:
+        """Length of a block, s."""
+        return self._period
+
+    @property
+    def null_count(self) -> int:
+        """Directions of the null space with all channels."""
+        return self._tables.n_null
+
+    @property
     def largest_statistic(self) -> float:
         """Largest statistic of a channel so far; those far below the threshold are not followed."""
         return float(self._state.largest[0])
@@ -164,6 +172,20 @@ class ChannelMonitor:
             else:
                 self._readmit(blocks, place, omega)
         return omega, std, unexplained
+
+    def innovations(self, blocks: Blocks) -> NDArray[np.float64]:
+        """Return the normalised innovation squared per degree of freedom of each block, without looking for faults."""
+        count = len(blocks)
+        state = self._state.copy()
+        nis = np.zeros(count)
+        sets = self._sets(blocks, self.watched, slice(None))
+        steps = np.diff(blocks.t, prepend=blocks.t[0] - self._period) if count else np.zeros(0)
+        tables = self._compiled_tables()
+        advance(
+            tables, self._tuning._replace(threshold=np.inf), state, blocks.means, steps, sets, np.ones(count),
+            self.watched, np.empty((count, 3)), np.empty((count, 3)), nis, 0, count,
+        )  # fmt: skip
+        return np.asarray(nis / np.maximum(tables.null_count[sets], 1))
 
     def _sets(self, blocks: Blocks, watched: NDArray[np.bool_], rows: slice) -> NDArray[np.int64]:
         """Return the set of channels of each block in ``rows``, in the tables."""
@@ -368,74 +390,3 @@ def _lost(state: MonitorState) -> bool:
     used = state.ages >= 1.0
     parts = (state.omega, state.score[used], state.information[used])
     return not all(np.all(np.abs(part) < _RAN_AWAY) for part in parts)  # NaN is not smaller either
-
-
-def watch_channels(
-    array: AccelerometerArray,
-    t: ArrayLike,
-    readings: ArrayLike,
-    errors: SensorErrors,
-    *,
-    omega0: ArrayLike = (0.0, 0.0, 0.0),
-    omega0_std: float = 1e-3,
-    policy: MonitorPolicy | None = None,
-) -> ChannelHealth:
-    """Find the faulty channels of a recording.
-
-    Parameters
-    ----------
-    array : AccelerometerArray
-        An array that sees all six motions, with c channels.
-    t : array_like, shape (n,)
-        Sample times, s.
-    readings : array_like, shape (n, c)
-        Specific force, m/s²; NaN where missing.
-    errors : SensorErrors
-        Errors of the channels.
-    omega0, omega0_std : array_like, float
-        Angular rate at the first sample and its standard deviation, rad/s.
-    policy : MonitorPolicy, optional
-        Thresholds.
-
-    Raises
-    ------
-    InputError
-        If the shapes don't fit or time does not increase.
-    GeometryError
-        If the array can't see all six motions.
-    """
-    times = np.asarray(t, dtype=float)
-    rows = np.asarray(readings, dtype=float)
-    if times.ndim != 1 or rows.shape != (len(times), array.n_channels):
-        raise InputError(
-            f"times have shape {times.shape} and readings {rows.shape}; array {array.name!r} needs one "
-            f"row of {array.n_channels} per time"
-        )
-    if not np.isfinite(times).all() or np.any(np.diff(times) <= 0):
-        raise InputError("sample times must be finite and increase; drop repeated or reordered samples")
-    period = float(np.median(np.diff(times)))
-    monitor = ChannelMonitor(array, errors, period, omega0=omega0, omega0_std=omega0_std, policy=policy)
-    blocks = block_means(times, rows, errors.limits, monitor.samples)
-    omega, _, odd = monitor.run(blocks)
-    faults = name_kinds(
-        array,
-        errors,
-        times,
-        rows,
-        np.array([np.interp(times, blocks.t, omega[:, axis]) for axis in range(3)]).T
-        if len(blocks)
-        else np.zeros((len(times), 3)),
-        tuple(monitor.faults),
-    )
-    excluded = np.zeros(rows.shape, dtype=np.bool_)
-    half = 0.5 * monitor.samples * period
-    for fault in faults:
-        inside = (times >= fault.onset_s - half) & (times < fault.end_s)
-        for name in fault.channels:
-            excluded[inside, array.channels.index(name)] = True
-    unexplained = np.zeros(len(times), dtype=np.bool_)
-    unexplained[: len(odd) * monitor.samples] = np.repeat(odd, monitor.samples)
-    return ChannelHealth(
-        tuple(array.channels), faults, excluded, unexplained, monitor.largest_statistic,
-        monitor.threshold,
-    )  # fmt: skip
