@@ -4,7 +4,7 @@ from gfimu.integrity.detectable import DetectableFaults, detectable_faults
 from gfimu.integrity.fault import ChannelFault, ChannelHealth
 from gfimu.integrity.monitor import ChannelMonitor
 from gfimu.integrity.policy import MonitorPolicy
-from gfimu.integrity.watch import watch_channels
+from gfimu.integrity.watch import watch_channels, watch_from_rest
 
 __all__ = [
     "ChannelFault",
@@ -14,4 +14,5 @@ __all__ = [
     "MonitorPolicy",
     "detectable_faults",
     "watch_channels",
+    "watch_from_rest",
 ]

@@ -1,10 +1,10 @@
 """The least fault that the monitor of channels detects and isolates, per channel, in closed form.
 
 A constant fault f on channel i puts f Z_i into each of N samples of the whitened null space, so after N samples its
-statistic is the square of a normal variable with the mean f √(N C_ii), C = ZᵀZ. It exceeds the threshold h with a
-probability of 95 % from
+statistic is the square of a normal variable with the mean f √(N C_ii), C = ZᵀZ. A bias that is known to m only counts
+as noise that no time reduces. The statistic exceeds the threshold h with a probability of 95 % from
 
-    f_i = (√h + 1.65)/√(N C_ii)                                                                          (1)
+    f_i = (√h + 1.65) √(1/(N C_ii) + m²)                                                                 (1)
 
 on. Channel j explains the share cos²_ij = C_ij²/(C_ii C_jj) of it; the fault is isolated where what the others leave,
 N C_ii (1 − max cos²) f², exceeds the margin m by its own spread,
@@ -110,7 +110,9 @@ def detectable_faults(
     block_s = policy.samples(1.0 / sample_rate) / sample_rate
     threshold = policy.threshold(array.n_channels, block_s)
     with np.errstate(divide="ignore", invalid="ignore"):
-        detected = np.where(visible, (np.sqrt(threshold) + _QUANTILE) / np.sqrt(samples * own), np.inf)  # (1)
+        detected = np.where(
+            visible, (np.sqrt(threshold) + _QUANTILE) * np.sqrt(1.0 / (samples * own) + policy.bias_std**2), np.inf
+        )  # (1)
         square = information**2 / np.outer(own, own)
     square[~np.outer(visible, visible)] = 0.0
     np.fill_diagonal(square, 0.0)

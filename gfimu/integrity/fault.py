@@ -119,6 +119,31 @@ class ChannelHealth:
         """Whether no fault was seen."""
         return not (self.faults or self.unexplained.any())
 
+    def codes(self) -> NDArray[np.int8]:
+        """Return the health of each channel at each sample, shape (n, c): 0 used, 1 in doubt, 2 not used.
+
+        In doubt are all channels while they contradict each other and no channel, pair or chip explains it.
+        """
+        codes = np.where(self.unexplained[:, None], np.int8(1), np.int8(0)) * np.ones(len(self.channels), dtype=np.int8)
+        codes[self.excluded] = 2
+        return codes
+
+    def sentences(self) -> list[str]:
+        """Return what was found in words, one sentence per finding; empty if nothing was."""
+        found = [f"{fault.sentence()}" for fault in self.faults]
+        if self.unexplained.any():
+            share = float(self.unexplained.mean())
+            found.append(
+                f"in {share:.1%} of the samples the channels contradict each other, and no channel, pair or chip alone "
+                "explains it: nothing was left out for it; calibrate the array (gfimu calibrate)"
+            )
+        if self.model_factor > 1.0:
+            found.append(
+                f"the channels disagree as if gains, axes and positions were {self.model_factor:.0f} times less exact "
+                "than a good calibration leaves them; smaller faults are not seen: calibrate the array"
+            )
+        return found
+
     def to_dict(self) -> dict[str, Any]:
         """Return faults and statistic as JSON can hold them."""
         return {

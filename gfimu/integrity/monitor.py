@@ -16,14 +16,17 @@ from gfimu.integrity.prediction import omega_products, prediction_row
 from gfimu.integrity.recursion import MonitorState, MonitorTables, MonitorTuning, advance, model_errors
 from gfimu.rate.sensing import ChannelTables, SensorErrors
 
-__all__ = ["ChannelMonitor"]
+__all__ = ["MARGIN", "ChannelMonitor"]
 
 _RAN_AWAY = 1e9  # numerical: rate, score and information of a filter that follows stay far below
 _LARGEST_FAULT = 100.0  # m/s², prior standard deviation of a fault's size: a limit that no fault reaches
 _LEAST_AGE = 3  # blocks, of an onset from which a fault is isolated: it may be later still
 _TRIED = 4  # sets of each kind of which it is tried whether they explain a fault
 _FIRST_BLOCK = 0.25  # of one block's evidence, which an onset in the middle of the block spoils at most
-_MARGIN = 2  # blocks before the onset, from which on the channels are not used
+MARGIN = 2
+"""Blocks before the onset of a fault, from which on its channels are not used."""
+
+
 _LARGEST_SCATTER = 6.0  # of the stated variance, counted in one block: a step inside it is no noise
 _SOUND_SCATTER = 2.0  # of the stated variance, up to which a channel counts as quiet again
 
@@ -95,7 +98,7 @@ class ChannelMonitor:
         covariance[range(3), range(3)] = omega0_std**2
         covariance[range(3, 3 + c), range(3, 3 + c)] = np.maximum(errors.bias_std, policy.bias_std) ** 2
         slots = policy.slots
-        history = int(2.0 * self._tuning.oldest) + _MARGIN + 1
+        history = int(2.0 * self._tuning.oldest) + MARGIN + 1
         self._state = MonitorState(
             omega=np.array(omega0, dtype=float),
             bias=np.zeros(c),
@@ -198,7 +201,7 @@ class ChannelMonitor:
         tables = self._tables
         return MonitorTables(
             tables.alpha_rows, tables.alpha_leak, tables.null_rows, tables.null_sensitivity,
-            np.maximum(tables.null_count, 0), tables.alpha_noise,
+            tables.null_count, tables.alpha_noise,
         )  # fmt: skip
 
     def _scatter(self, blocks: Blocks, first: int) -> tuple[int, NDArray[np.float64], int]:
@@ -275,7 +278,7 @@ class ChannelMonitor:
         age = int(self._state.ages[used[entry.slot]])
         if age < _LEAST_AGE or not self._may_exclude(entry.channels, fewest=1):
             return False
-        first = max(0, place - age - _MARGIN)
+        first = max(0, place - age - MARGIN)
         watched = self.watched.copy()
         watched[entry.channels] = False
         state = self._state.copy()
@@ -326,7 +329,7 @@ class ChannelMonitor:
                 tuple(sizes.tolist()), tuple(np.sqrt(np.diag(spread)).tolist()), chosen.statistic,
             ),
         )  # fmt: skip
-        return max(0, place - int(state.ages[slot]) - _MARGIN)
+        return max(0, place - int(state.ages[slot]) - MARGIN)
 
     def _exclude_noisy(self, blocks: Blocks, place: int, channel: int) -> int:
         """Take a noisy channel out; returns the block from which to go on."""
@@ -341,7 +344,7 @@ class ChannelMonitor:
                 (self.array.channels[channel],), "noise", True, onset, found, np.inf, (np.nan,), (np.nan,), np.nan
             ),
         )  # fmt: skip
-        return max(0, place - round(self.policy.noise_memory_s / self._period) - _MARGIN)
+        return max(0, place - round(self.policy.noise_memory_s / self._period) - MARGIN)
 
     def _add(self, blocks: Blocks, place: int, channels: NDArray[np.int64], fault: ChannelFault) -> None:
         self.watched[channels] = False
@@ -380,9 +383,8 @@ class ChannelMonitor:
         second = max(1, round(1.0 / self._period))
         means = residual[: len(residual) // second * second].reshape(-1, second).mean(axis=1)
         near = np.abs(means) < 3.0 * np.sqrt(noise / (samples * second) + bias)
-        inner = blocks.readings[rows] @ row
-        spread = float(np.mean(np.var(inner, axis=1, ddof=1)))
-        return bool(near.all() and spread < _SOUND_SCATTER * noise)
+        ratios, _ = scatter(blocks, rows, row[None] / np.sqrt(noise))
+        return bool(near.all() and ratios[:, channel].mean() < _SOUND_SCATTER)
 
 
 def _lost(state: MonitorState) -> bool:

@@ -43,6 +43,10 @@ class MonitorPolicy:
     bias_std : float
         Least uncertainty of a channel's bias, m/s². A bias that is said to be known better makes the monitor exclude
         sound channels: 0.2 mg for a true 3 mg gave 10 wrong exclusions in 6 min.
+    gain_std : float
+        Least uncertainty of gains and axes, a ratio: what a calibration of 0.05 % and 0.5 mrad leaves.
+    place_std : float
+        Least uncertainty of the positions, m.
     bias_walk : float
         Growth of the variance of a bias, (m/s²)²/s: covers an instability of 0.15 mg.
     range_memory_s : float
@@ -65,6 +69,8 @@ class MonitorPolicy:
     slots: int = 8
     oldest_s: float = 20.0
     bias_std: float = 3e-3
+    gain_std: float = 9e-4
+    place_std: float = 1e-4
     bias_walk: float = 1.5e-6
     range_memory_s: float = 2.0
     noise_memory_s: float = 0.5

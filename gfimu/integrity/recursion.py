@@ -46,7 +46,7 @@ class MonitorTables(NamedTuple):
     leak: NDArray[np.float64]  # (sets, 3, 6)
     null: NDArray[np.float64]  # (sets, d, c)
     sensitivity: NDArray[np.float64]  # (sets, d, 6)
-    null_count: NDArray[np.int64]  # (sets,)
+    null_count: NDArray[np.int64]  # (sets,) directions of the null space; −1 where α can't be seen
     noise: NDArray[np.float64]  # (sets, 3, 3) of α, per sample
 
 
@@ -113,20 +113,28 @@ def advance(tables, tuning, state, means, steps, sets, levels, watched, omega, s
     """
     c = means.shape[1]
     model_std = np.empty(c)
+    pending = 0.0
     k = first
     while k < last:
         _keep(state, k)
         place = sets[k]
         level = levels[k]
-        whole = steps[k] < 1.5 * tuning.period
         transition = np.zeros((3, 3))
         _follow_range(state, means[k], tuning.forget)
-        step = steps[k]
+        step = steps[k] + pending
+        if tables.null_count[place] < 0:  # too few channels: a gap
+            pending = step
+            omega[k] = state.omega
+            std[k] = np.inf
+            state.ages[:] = 0.0
+            k += 1
+            continue
+        pending = 0.0
         if not state.started[0]:  # from the first sample to the middle of the first block
             state.last[:] = means[k]
             step = 0.5 * tuning.period * (1.0 - 1.0 / tuning.samples)
         _predict(tables, tuning, state, means[k], step, place, level, transition)
-        if not whole:
+        if step > 1.5 * tuning.period:
             state.ages[:] = 0.0
         _new_slot(state, tuning.oldest)
         _carry_signatures(tables, state, transition, step, place)

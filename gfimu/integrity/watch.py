@@ -13,11 +13,12 @@ from gfimu.geometry.array import AccelerometerArray
 from gfimu.integrity.blocks import Blocks, block_means
 from gfimu.integrity.fault import ChannelHealth
 from gfimu.integrity.kinds import name_kinds
-from gfimu.integrity.monitor import ChannelMonitor
+from gfimu.integrity.monitor import MARGIN, ChannelMonitor
 from gfimu.integrity.policy import MonitorPolicy
+from gfimu.integrity.start import leading_rest_bias
 from gfimu.rate.sensing import SensorErrors
 
-__all__ = ["watch_channels"]
+__all__ = ["watch_channels", "watch_from_rest"]
 
 _QUARTER = 0.25  # of the seconds of a recording must be free of faults for the errors of the model to be measured
 _LEAST_SCALE = 1e-4  # a ratio, where gains and axes are stated as exact
@@ -89,15 +90,52 @@ def watch_channels(
         rate = np.column_stack([np.interp(times, blocks.t, column) for column in omega.T])
     faults = name_kinds(array, errors, times, rows, rate, monitor.faults)
     excluded = np.zeros(rows.shape, dtype=np.bool_)
-    half = 0.5 * samples * period
+    before = (MARGIN + 0.5) * monitor.block_s
     for fault in faults:
-        inside = (times >= fault.onset_s - half) & (times < fault.end_s)
-        excluded[np.ix_(inside, [array.channels.index(name) for name in fault.channels])] = True
+        inside = (times >= fault.onset_s - before) & (times < fault.end_s)
+        for name in fault.channels:
+            excluded[inside, array.channels.index(name)] = True
     unexplained = np.zeros(len(times), dtype=np.bool_)
     unexplained[: len(odd) * samples] = np.repeat(odd, samples)
     return ChannelHealth(
         tuple(array.channels), faults, excluded, unexplained, monitor.largest_statistic, monitor.threshold, factor
     )
+
+
+def watch_from_rest(
+    array: AccelerometerArray,
+    t: ArrayLike,
+    readings: ArrayLike,
+    errors: SensorErrors,
+    *,
+    policy: MonitorPolicy | None = None,
+) -> ChannelHealth | None:
+    """Find the faulty channels of a recording that starts at rest, with the biases that this rest shows taken off.
+
+    Parameters are those of `watch_channels`; errors of gains and positions are taken as at least those that a good
+    calibration leaves. None where the recording doesn't begin with a rest, or the array has too few channels for a
+    fault to be isolated.
+
+    Raises
+    ------
+    InputError
+        As `watch_channels`.
+    """
+    settings = policy or MonitorPolicy()
+    if array.n_channels - 7 < settings.fewest_null:
+        return None
+    times = np.asarray(t, dtype=float)
+    rows = np.asarray(readings, dtype=float)
+    bias = leading_rest_bias(array, float(np.median(np.diff(times))), rows, errors)
+    if bias is None:
+        return None
+    left = replace(
+        errors,
+        bias_std=np.full(array.n_channels, settings.bias_std),
+        scale_std=max(errors.scale_std, settings.gain_std),
+        placement_std=max(errors.placement_std, settings.place_std),
+    )
+    return watch_channels(array, times, rows - bias, left, policy=settings)
 
 
 def _larger(errors: SensorErrors, factor: float) -> SensorErrors:
