@@ -1,15 +1,18 @@
 """The least fault that the monitor of channels detects and isolates, per channel, in closed form.
 
 A constant fault f on channel i puts f Z_i into each of N samples of the whitened null space, so after N samples its
-statistic is the square of a normal variable with the mean f √(N C_ii), C = ZᵀZ. A bias that is known to m only counts
-as noise that no time reduces. The statistic exceeds the threshold h with a probability of 95 % from
+statistic is the square of a normal variable with the mean f √(N C_ii), C = ZᵀZ. A bias that is known to m only, and
+walks, counts as noise that no time reduces. The statistic exceeds the threshold h with a probability of 95 % from
 
-    f_i = (√h + 1.65) √(1/(N C_ii) + m²)                                                                 (1)
+    f_i = (√h + 1.65) √(1/(N C_ii) + m² + q T/2)                                                         (1)
 
 on. Channel j explains the share cos²_ij = C_ij²/(C_ii C_jj) of it; the fault is isolated where what the others leave,
 N C_ii (1 − max cos²) f², exceeds the margin m by its own spread,
 
     N C_ii (1 − max cos²) f² ≥ m + 2 · 1.65 √m + 1.65².                                                   (2)
+
+This is the limit of a test that knows the onset and the bias before it. The monitor, which knows neither, found 1.3 times
+f_i within 1 s in 16 of 24 runs of the cube at rest and within 3 s in 23; 1.5 times f_i in 20 and 24.
 
 ω is taken as known: at rest, or carried by the filter. With ``unknown_rate`` the products of ω are unknown in every
 sample, and only what of Z lies across M (z = M s(ω)) remains: that is all that a test of single samples (the parity
@@ -38,7 +41,7 @@ _RANK = 1e-6  # numerical: of the products' strengths, below which one is not se
 
 @dataclass(frozen=True)
 class DetectableFaults:
-    """Least constant fault of each channel that is found within a time, with 95 % probability.
+    """Least constant fault of each channel that can be found within a time, with 95 % probability.
 
     Parameters
     ----------
@@ -109,9 +112,10 @@ def detectable_faults(
     samples = max(1.0, duration * sample_rate)
     block_s = policy.samples(1.0 / sample_rate) / sample_rate
     threshold = policy.threshold(array.n_channels, block_s)
+    bias = policy.bias_std**2 + 0.5 * policy.bias_walk * duration
     with np.errstate(divide="ignore", invalid="ignore"):
         detected = np.where(
-            visible, (np.sqrt(threshold) + _QUANTILE) * np.sqrt(1.0 / (samples * own) + policy.bias_std**2), np.inf
+            visible, (np.sqrt(threshold) + _QUANTILE) * np.sqrt(1.0 / (samples * own) + bias), np.inf
         )  # (1)
         square = information**2 / np.outer(own, own)
     square[~np.outer(visible, visible)] = 0.0

@@ -14,7 +14,7 @@ MG = 1e-3 * GRAVITY
 
 def test_figures_of_the_cube():
     faults = detectable_faults(CUBE, CALIBRATED, 100.0)
-    np.testing.assert_allclose(faults.detected / MG, [4.0, 4.0, 4.8] * 4, atol=0.1)
+    np.testing.assert_allclose(faults.detected / MG, [4.1, 4.1, 4.8] * 4, atol=0.1)
     np.testing.assert_allclose(faults.alpha_error * MG, 0.035, atol=5e-4)
     assert np.isinf(detectable_faults(CUBE, CALIBRATED, 100.0, unknown_rate=True).detected).all()
 
@@ -38,20 +38,20 @@ def test_chips_with_two_axes_can_not_be_told_from_their_partners():
 
 
 def test_four_times_the_time_halves_the_fault():
-    exact = MonitorPolicy(bias_std=1e-9)
+    exact = MonitorPolicy(bias_std=1e-9, bias_walk=1e-18)
     one, four = (detectable_faults(CUBE, CALIBRATED, 100.0, duration=time, policy=exact) for time in (1.0, 4.0))
     np.testing.assert_allclose(one.detected, 2.0 * four.detected)
 
 
-def test_the_monitor_finds_what_the_formula_says():
-    size = detectable_faults(CUBE, CALIBRATED, 100.0, duration=2.0).detected
+def test_the_monitor_is_not_far_from_the_formula():
+    size = 1.5 * detectable_faults(CUBE, CALIBRATED, 100.0).isolated  # the bias before is not known exactly either
     found = 0
     for seed in range(12):
         t, y, _ = readings("rest", 50 + seed)
         y[t >= 15.0, seed] += size[seed]
         health = watch_channels(CUBE, t, y, CALIBRATED)
-        found += any(fault.channels == (CUBE.channels[seed],) for fault in health.faults)
-    assert found >= 10
+        found += any(f.channels == (CUBE.channels[seed],) and f.found_s < 18.0 for f in health.faults)
+    assert found >= 11
 
 
 def test_bad_figures_are_refused():
