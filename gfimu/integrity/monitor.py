@@ -130,6 +130,11 @@ class ChannelMonitor:
         return self._period
 
     @property
+    def noise_of_means(self) -> NDArray[np.float64]:
+        """Standard deviation that white noise gives the mean of a block, shape (c,), m/s²."""
+        return np.asarray(self._errors.noise_std / np.sqrt(self.samples))
+
+    @property
     def null_count(self) -> int:
         """Directions of the null space with all channels."""
         return self._tables.n_null

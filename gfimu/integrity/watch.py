@@ -21,6 +21,8 @@ from gfimu.rate.sensing import SensorErrors
 __all__ = ["watch_channels", "watch_from_rest"]
 
 _QUARTER = 0.25  # of the seconds of a recording must be free of faults for the errors of the model to be measured
+_MOVING = 15.0  # range of a channel's block means within a second, in their noise, from which the array moves
+_FEWEST_SECONDS = 8  # of motion, or of rest, that are judged by themselves
 _LEAST_SCALE = 1e-4  # a ratio, where gains and axes are stated as exact
 _LEAST_PLACE = 2e-5  # m, the same of positions
 _LARGEST_FACTOR = 64.0
@@ -150,11 +152,16 @@ def _larger(errors: SensorErrors, factor: float) -> SensorErrors:
 
 
 def _agrees(monitor: ChannelMonitor, blocks: Blocks) -> bool:
-    """Whether a quarter of all seconds have innovations that the stated errors explain."""
+    """Whether a quarter of all seconds of motion, and of rest, have innovations that the stated errors explain."""
     per_second = max(1, round(1.0 / monitor.block_s))
     count = len(blocks) // per_second
     freedom = monitor.null_count * per_second
     if count == 0 or freedom == 0:
         return True
-    nis = monitor.innovations(blocks)[: count * per_second].reshape(count, per_second).mean(axis=1)
-    return bool(np.quantile(nis, _QUARTER) <= chi2.ppf(1.0 - _QUARTER, freedom) / freedom)
+    whole = slice(0, count * per_second)
+    nis = monitor.innovations(blocks)[whole].reshape(count, per_second).mean(axis=1)
+    spread = np.ptp(blocks.means[whole].reshape(count, per_second, -1), axis=1) / monitor.noise_of_means
+    moving = spread.max(axis=1) > _MOVING
+    limit = chi2.ppf(1.0 - _QUARTER, freedom) / freedom
+    parts = [nis[part] for part in (moving, ~moving) if part.sum() >= min(count, _FEWEST_SECONDS)]
+    return all(bool(np.quantile(part, _QUARTER) <= limit) for part in parts)
