@@ -14,7 +14,7 @@ MG = 1e-3 * GRAVITY
 
 def test_figures_of_the_cube():
     faults = detectable_faults(CUBE, CALIBRATED, 100.0)
-    np.testing.assert_allclose(faults.detected / MG, [4.1, 4.1, 4.8] * 4, atol=0.1)
+    np.testing.assert_allclose(faults.detected / MG, [4.0, 4.0, 4.7] * 4, atol=0.06)
     np.testing.assert_allclose(faults.alpha_error * MG, 0.035, atol=5e-4)
     assert np.isinf(detectable_faults(CUBE, CALIBRATED, 100.0, unknown_rate=True).detected).all()
 
