@@ -11,8 +11,8 @@ N C_ii (1 − max cos²) f², exceeds the margin m by its own spread,
 
     N C_ii (1 − max cos²) f² ≥ m + 2 · 1.65 √m + 1.65².                                                   (2)
 
-This is the limit of a test that knows the onset and the bias before it. The monitor, which knows neither, found 1.3 times
-f_i within 1 s in 16 of 24 runs of the cube at rest and within 3 s in 23; 1.5 times f_i in 20 and 24.
+This is the limit of a test that knows the onset and the bias before it. The monitor, which knows neither, found 1.3
+times f_i within 1 s in 16 of 24 runs of the cube at rest and within 3 s in 23; 1.5 times f_i in 20 and 24.
 
 ω is taken as known: at rest, or carried by the filter. With ``unknown_rate`` the products of ω are unknown in every
 sample, and only what of Z lies across M (z = M s(ω)) remains: that is all that a test of single samples (the parity

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gfimu.geometry.array import AccelerometerArray
+from gfimu.integrity.block_noise import BlockNoise, block_noise
 from gfimu.integrity.blocks import Blocks, scatter
 from gfimu.integrity.fault import ChannelFault
 from gfimu.integrity.isolation import Explanation, deflate, explanations, strongest
@@ -27,7 +28,6 @@ MARGIN = 2
 """Blocks before the onset of a fault, from which on its channels are not used."""
 
 
-_LARGEST_SCATTER = 6.0  # of the stated variance, counted in one block: a step inside it is no noise
 _SOUND_SCATTER = 2.0  # of the stated variance, up to which a channel counts as quiet again
 
 
@@ -120,6 +120,7 @@ class ChannelMonitor:
         self._length_scale = np.array([array.length_unit] * 3 + [1.0] * 3)
         self.watched = np.ones(c, dtype=np.bool_)
         self.faults: list[ChannelFault] = []
+        self._noise: dict[int, BlockNoise] = {}
         self._open: dict[int, tuple[int, int]] = {}  # channel: its fault's number, block from which it is judged
         self._patience = np.full(c, policy.readmission_s)
         self._suspicion: _Suspicion | None = None
@@ -156,12 +157,13 @@ class ChannelMonitor:
         while place < count:
             sets = self._sets(blocks, self.watched, slice(None))
             tables = self._compiled_tables()
-            noisy, levels, channel = self._scatter(blocks, place)
+            noise = self._noise_of(blocks)
+            noisy, channel = noise.first_from(place)
             end = min(count, noisy + 1)
             if self._open:
                 end = min(end, place + max(1, round(1.0 / self._period)))
             place, slot = advance(
-                tables, self._tuning, self._state, blocks.means, steps, sets, levels, self.watched,
+                tables, self._tuning, self._state, blocks.means, steps, sets, noise.levels, self.watched,
                 omega, std, nis, place, end,
             )  # fmt: skip
             if _lost(self._state):
@@ -209,36 +211,16 @@ class ChannelMonitor:
             tables.null_count, tables.alpha_noise,
         )  # fmt: skip
 
-    def _scatter(self, blocks: Blocks, first: int) -> tuple[int, NDArray[np.float64], int]:
-        """Return the first block from here at which a channel is seen to be noisy, all levels, and that channel."""
-        from scipy.signal import lfilter
+    def _excluded_bits(self) -> int:
+        return sum(1 << int(channel) for channel in np.flatnonzero(~self.watched))
 
-        missing = int(np.sum((~self.watched) * (np.int64(1) << np.arange(self.array.n_channels, dtype=np.int64))))
-        null_rows = self._tables.null_rows[self._tables.index(missing)]
-        levels = np.ones(len(blocks))
-        ratios, freedom = scatter(blocks, slice(first, None), null_rows)
-        seen = self.watched & (np.sum(null_rows**2, axis=0) > 0.0)
-        if not seen.any():
-            return len(blocks), levels, -1
-        whole = ~blocks.missing[first:].any(axis=1, keepdims=True)
-        ratios = np.minimum(np.where(whole, ratios, 1.0), _LARGEST_SCATTER)[:, seen]
-        forget = min(1.0, self._period / self.policy.noise_memory_s)
-        smooth, _ = lfilter([forget], [1.0, forget - 1.0], ratios, axis=0, zi=np.full((1, ratios.shape[1]), 1 - forget))
-        common = np.maximum(1.0, np.median(smooth, axis=1))
-        levels[first:] = common
-        count = np.minimum(np.arange(len(smooth)) + 1, 2.0 / forget - 1.0) * freedom
-        excess = np.maximum(smooth / common[:, None], 1.0)
-        statistic = count[:, None] * (excess - 1.0 - np.log(excess))
-        if statistic.shape[1] < 2:
-            return len(blocks), levels, -1
-        largest = np.partition(statistic, -2, axis=1)
-        enough = np.arange(len(smooth)) * self._period > 0.3
-        found = enough & (largest[:, -1] > self.threshold)
-        found &= largest[:, -1] - largest[:, -2] > self.policy.isolation
-        if not found.any():
-            return len(blocks), levels, -1
-        at = int(np.argmax(found))
-        return first + at, levels, int(np.flatnonzero(seen)[np.argmax(statistic[at])])
+    def _noise_of(self, blocks: Blocks) -> BlockNoise:
+        """Return the noise of all blocks with the channels that are watched now; kept per set of channels."""
+        missing = self._excluded_bits()
+        if missing not in self._noise:
+            null_rows = self._tables.null_rows[self._tables.index(missing)]
+            self._noise[missing] = block_noise(blocks, null_rows, self.block_s, self.threshold, self.policy)
+        return self._noise[missing]
 
     def _judge(self, blocks: Blocks, place: int) -> tuple[int, bool]:
         """Isolate the fault that is seen, or wait; returns the block to go on with, and whether nothing explains it."""
@@ -342,14 +324,15 @@ class ChannelMonitor:
         if not self._may_exclude(channels):
             return place
         found = float(blocks.t[place - 1] + 0.5 * self._period)
-        onset = found - self.policy.noise_memory_s
+        first = self._noise_of(blocks).onset(channel, place - 1)
+        onset = float(blocks.t[first] - 0.5 * self._period)
         self._add(
             blocks, place, channels,
             ChannelFault(
                 (self.array.channels[channel],), "noise", True, onset, found, np.inf, (np.nan,), (np.nan,), np.nan
             ),
         )  # fmt: skip
-        return max(0, place - round(self.policy.noise_memory_s / self._period) - MARGIN)
+        return max(0, first - MARGIN)
 
     def _add(self, blocks: Blocks, place: int, channels: NDArray[np.int64], fault: ChannelFault) -> None:
         self.watched[channels] = False

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from scipy.stats import chi2
 
 from gfimu.errors import InputError
@@ -15,10 +15,10 @@ from gfimu.integrity.fault import ChannelHealth
 from gfimu.integrity.kinds import name_kinds
 from gfimu.integrity.monitor import MARGIN, ChannelMonitor
 from gfimu.integrity.policy import MonitorPolicy
-from gfimu.integrity.start import leading_rest_bias
+from gfimu.rate.rest_test import RestTest, constant_readings
 from gfimu.rate.sensing import SensorErrors
 
-__all__ = ["watch_channels", "watch_from_rest"]
+__all__ = ["leading_rest_bias", "watch_channels", "watch_from_rest"]
 
 _QUARTER = 0.25  # of the seconds of a recording must be free of faults for the errors of the model to be measured
 _MOVING = 15.0  # range of a channel's block means within a second, in their noise, from which the array moves
@@ -26,6 +26,7 @@ _FEWEST_SECONDS = 8  # of motion, or of rest, that are judged by themselves
 _LEAST_SCALE = 1e-4  # a ratio, where gains and axes are stated as exact
 _LEAST_PLACE = 2e-5  # m, the same of positions
 _LARGEST_FACTOR = 64.0
+_LEAST_REST_S = 1.0  # shortest rest that shows the biases well enough
 
 
 def watch_channels(
@@ -165,3 +166,34 @@ def _agrees(monitor: ChannelMonitor, blocks: Blocks) -> bool:
     limit = chi2.ppf(1.0 - _QUARTER, freedom) / freedom
     parts = [nis[part] for part in (moving, ~moving) if part.sum() >= min(count, _FEWEST_SECONDS)]
     return all(bool(np.quantile(part, _QUARTER) <= limit) for part in parts)
+
+
+def leading_rest_bias(
+    array: AccelerometerArray, period: float, readings: NDArray[np.float64], errors: SensorErrors
+) -> NDArray[np.float64] | None:
+    """Return what the mean readings at the start say of the biases, shape (c,), m/s²; None without a rest there.
+
+    Of the mean reading, the specific force p that fits it best is taken off: that is gravity. What of a bias looks like
+    a specific force stays unknown, and changes neither α nor the null space.
+
+    Parameters
+    ----------
+    array : AccelerometerArray
+        An array that sees all six motions, with c channels.
+    period : float
+        Sample period, s.
+    readings : ndarray, shape (n, c)
+        Specific force, m/s²; NaN where missing.
+    errors : SensorErrors
+        Noise of the channels.
+    """
+    constant = constant_readings(array, readings, errors.noise_std, period)
+    length = len(constant) if constant.all() else int(np.argmin(constant))
+    window = RestTest().window(period)
+    if length < len(constant):
+        length -= window  # the last block may be the start of a slow motion
+    if length * period < _LEAST_REST_S:
+        return None
+    mean = np.mean(readings[:length], axis=0)
+    gravity = array.regression_matrix[:, 3:]
+    return np.asarray(mean - gravity @ np.linalg.lstsq(gravity, mean, rcond=None)[0])
