@@ -253,8 +253,16 @@ ROOMS = {
         "gfimu.recording",
         "gfimu.sensor_noise",
     },
+    "gfimu.integrity": {"gfimu.geometry.array", "gfimu.rate"},
     "gfimu.joining": {"gfimu.files", "gfimu.importing", "gfimu.recording"},
-    "gfimu.motion": {"gfimu.files", "gfimu.geometry", "gfimu.parts", "gfimu.rate", "gfimu.recording"},
+    "gfimu.motion": {
+        "gfimu.files",
+        "gfimu.geometry",
+        "gfimu.integrity",
+        "gfimu.parts",
+        "gfimu.rate",
+        "gfimu.recording",
+    },
     "gfimu.own_rig": {"gfimu.files", "gfimu.geometry.array", "gfimu.generic_basis", "gfimu.world_model"},
     "gfimu.position_drift": {"gfimu.geometry", "gfimu.motion", "gfimu.rate.integration"},
 }

@@ -52,6 +52,9 @@ def _estimate(
     force: Annotated[
         bool, typer.Option("--force", help="Go on where the checks of units, time, array and channels refuse the file.")
     ] = False,
+    keep_faulty: Annotated[
+        bool, typer.Option("--keep-faulty", help=f"Use channels that contradict the others, too ({_RECURSIVE}).")
+    ] = False,
     rrd: Annotated[Path | None, typer.Option("--rrd", help="Rerun recording to write.")] = None,
     column_map: MapOption = None,
     map_set: MapSetOption = None,
@@ -120,6 +123,7 @@ def _estimate(
             fuse_gyro=gyro,
             with_position=position,
             force=force,
+            keep_faulty=keep_faulty,
             progress=lambda share: done(share, f"estimating by {method}"),
             rrd=rrd,
         )

@@ -71,6 +71,7 @@ def estimate(
     position: bool = False,
     rrd: str | Path | None = None,
     force: bool = False,
+    keep_faulty: bool = False,
     progress: Callable[[float], None] | None = None,
     omega0: ArrayLike | None = (0.0, 0.0, 0.0),
     quaternion0: ArrayLike | None = None,
@@ -123,6 +124,8 @@ def estimate(
         Rerun recording to write.
     force : bool
         Go on, with a warning in the estimate, where the checks of the recording would refuse it.
+    keep_faulty : bool
+        Use every channel, without looking for faulty ones (``--keep-faulty``).
     progress : callable, optional
         Called with the share done, 0 to 1.
     omega0, quaternion0, noise_std
@@ -157,6 +160,7 @@ def estimate(
         fuse_gyro=gyro or fuse_gyro,
         with_position=position or with_position,
         force=force,
+        keep_faulty=keep_faulty,
         progress=progress,
     ).estimate
 

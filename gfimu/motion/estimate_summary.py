@@ -69,6 +69,8 @@ class EstimateSummary:
         Of the filter's or smoother's innovations: the figures of `gfimu.rate.consistency.Consistency`.
     mounting : mapping or None
         About a known axis: constants of the mounting that were estimated (`gfimu.known_axis.mounting_fit`).
+    health : mapping or None
+        Faults of channels that were found and left out (`gfimu.integrity.fault.ChannelHealth`), where it was looked.
     channels_left_out : tuple of str
         Dead channels that the estimate goes without.
     warnings : tuple of str
@@ -93,6 +95,7 @@ class EstimateSummary:
     centripetal: Agreement | None
     consistency: Mapping[str, Any] | None = None
     mounting: Mapping[str, Any] | None = None
+    health: Mapping[str, Any] | None = None
     channels_left_out: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
 
@@ -142,6 +145,7 @@ def summarise(estimate: Estimate, recording: Recording, array: AccelerometerArra
         centripetal=None if unseen_motions(array) else centripetal_agreement(recording, array),
         consistency=consistency,
         mounting=estimate.metadata.get("mounting"),
+        health=estimate.metadata.get("health"),
         channels_left_out=tuple(estimate.metadata.get("channels_left_out", ())),
         warnings=(*estimate.metadata.get("warnings", ()), *_inconsistency(consistency)),
     )

@@ -22,6 +22,7 @@ from gfimu.files.column_file import open_columns, write_columns
 from gfimu.files.table import ArrowStream, Tabular
 from gfimu.geometry.array import OMEGA_PRODUCTS, AccelerometerArray
 from gfimu.geometry.linear_solution import linear_solution
+from gfimu.integrity.fault import ChannelHealth
 from gfimu.motion.attitude import from_rotation, integrate_attitude, table_angle, to_rotation
 from gfimu.motion.navigation import level, navigate
 from gfimu.motion.rest_navigation import navigate_with_rest
@@ -71,6 +72,9 @@ class Estimate(Tabular):
         deviation, rad²/s²; NaN where the array doesn't see one.
     velocity, position : ndarray, shape (n, 3), optional
         Velocity, m/s, and position, m, of the body origin in the world, where asked for.
+    health : mapping of str to ndarray, optional
+        For each channel by name its health at each sample, shape (n,): 0 used, 1 in doubt, 2 not used
+        (`gfimu.integrity.fault.ChannelHealth`); where the channels were watched.
     metadata : mapping
         Array, method, form, format and software version.
     """
@@ -86,6 +90,7 @@ class Estimate(Tabular):
     omega_products_std: NDArray[np.float64]
     velocity: NDArray[np.float64] | None = None
     position: NDArray[np.float64] | None = None
+    health: Mapping[str, NDArray[Any]] | None = None
     metadata: Mapping[str, Any] = field(default_factory=dict)
 
     def __len__(self) -> int:
@@ -95,14 +100,15 @@ class Estimate(Tabular):
         names = [str(self.metadata[key]) for key in ("array", "method") if key in self.metadata]
         return joined(self, [*names, timing(self.t_s), "with position" if self.position is not None else ""])
 
-    def to_columns(self) -> dict[str, NDArray[np.float64]]:
+    def to_columns(self) -> dict[str, NDArray[Any]]:
         """Return the columns of the Estimate file, by name with unit."""
-        columns = {"t_s": self.t_s}
+        columns: dict[str, NDArray[Any]] = {"t_s": self.t_s}
         for attribute, names in _VECTOR_COLUMNS.items():
             values = getattr(self, attribute)
             if values is not None:
                 columns |= {name: values[:, place] for place, name in enumerate(names)}
-        return columns | {"angle_rad": self.angle}
+        health = {f"{_HEALTH}{name}": values for name, values in (self.health or {}).items()}
+        return columns | {"angle_rad": self.angle} | health
 
     def write(self, path: str | Path) -> None:
         """Write the Estimate file, ``.csv`` or ``.parquet``, whole or not at all."""
@@ -127,7 +133,8 @@ class Estimate(Tabular):
             attribute for attribute in ("velocity", "position") if _VECTOR_COLUMNS[attribute][0] not in table.names
         }
         vectors = {attribute: names for attribute, names in _VECTOR_COLUMNS.items() if attribute not in optional}
-        wanted = ["t_s", "angle_rad", *(name for names in vectors.values() for name in names)]
+        watched = [name for name in table.names if name.startswith(_HEALTH)]
+        wanted = ["t_s", "angle_rad", *(name for names in vectors.values() for name in names), *watched]
         missing = [name for name in wanted if name not in table.names]
         if missing:
             raise InputError(f"{table.file}: column {missing[0]} is missing; give a file that gfimu estimate wrote")
@@ -138,10 +145,13 @@ class Estimate(Tabular):
         return cls(
             t_s=values["t_s"],
             angle=values["angle_rad"],
+            health={name.removeprefix(_HEALTH): values[name].astype(np.int8) for name in watched} or None,
             metadata=table.metadata,
             **{attribute: np.column_stack([values[name] for name in names]) for attribute, names in vectors.items()},
         )
 
+
+_HEALTH = "health_"
 
 _VECTOR_COLUMNS: dict[str, tuple[str, ...]] = {
     "p": tuple(f"p_{axis}_m_s2" for axis in _AXES),
@@ -168,6 +178,7 @@ def estimate(
     with_position: bool = False,
     fuse_gyro: bool = False,
     force: bool = False,
+    keep_faulty: bool = False,
     findings: Sequence[Finding] | None = None,
     progress: Callable[[float], object] | None = None,
 ) -> Estimate:
@@ -196,6 +207,9 @@ def estimate(
         Whether ``filter`` and ``smoother`` use the recording's gyro as well.
     force : bool
         Whether to go on with a recording that its checks refuse; what they found is kept as a warning.
+    keep_faulty : bool
+        Use every channel, without looking for faulty ones. By default ``filter`` and ``smoother`` leave out channels
+        that contradict the others, while they do so (`gfimu.integrity`); that needs a rest at the start.
     findings : sequence of Finding, optional
         What `gfimu.recording.checks.check_recording` found, if it was run already.
     progress : callable, optional
@@ -230,6 +244,11 @@ def estimate(
         raise InputError(f"omega0 is {omega0!r}; it must hold three finite numbers, in rad/s")
     noise = white_noise_std(array, recording.sample_rate) if noise_std is None else np.asarray(noise_std, dtype=float)
     noise = np.broadcast_to(noise, array.n_channels)
+    health = None
+    if chosen.recursive and not keep_faulty and rate0 is not None and not rate0.any():
+        health = _watch(recording, array, readings, noise)
+    if health is not None:
+        readings = np.where(health.excluded, np.nan, readings)
     linear = linear_solution(array, readings, noise, form=form)
     usable = np.isfinite(linear.motion).all(axis=1)
     if not usable.any():
@@ -275,18 +294,30 @@ def estimate(
         omega_products_std=linear.omega_products_std,
         velocity=None if travelled is None else travelled.velocity,
         position=None if travelled is None else travelled.position,
+        health=None if health is None else dict(zip(health.channels, health.codes().T, strict=True)),
         metadata={
             "array": array.name,
             "method": method,
             "form": linear.form,
             **rate.remarks,
-            "warnings": [finding.text for finding in found],
+            "warnings": [finding.text for finding in found] + ([] if health is None else health.sentences()),
+            "health": None if health is None else health.to_dict(),
             "channels_left_out": dead,
             "mounting_rotvec_rad": recording.mounting_rotvec.tolist(),
             "format_version": FORMAT_VERSION,
             "software_version": __version__,
         },
     )
+
+
+def _watch(
+    recording: Recording, array: AccelerometerArray, readings: NDArray[np.float64], noise: NDArray[np.float64]
+) -> ChannelHealth | None:
+    """Look for faulty channels; None where that can't be done."""
+    from gfimu.integrity.watch import watch_from_rest
+
+    errors = SensorErrors.from_parts(array, recording.sample_rate, step=_step_of(readings), noise_std=noise)
+    return watch_from_rest(array, recording.t_s, readings, errors)
 
 
 def _integrate(problem: RateProblem) -> RateSolution:

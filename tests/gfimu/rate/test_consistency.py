@@ -103,13 +103,27 @@ def noise(readings, rng, late):
 def test_a_fault_in_mid_run_is_flagged_and_its_channel_named(spoil, channel, seed):
     run = paper_run(seed, gain_std=0.01)
     spoil(run.readings, np.random.default_rng(seed), run.t_s >= 15.0)
-    found = estimate_from_rest(run, CUBE, method="filter")
+    found = estimate_from_rest(run, CUBE, method="filter", keep_faulty=True)
     judged = found.metadata["consistency"]
     assert not judged["consistent"]
     assert judged["worst_channel"] == channel
     assert judged["nis_without_worst"] < 1.2
     (warning,) = summarise(found, run, CUBE).warnings
     assert channel in warning
+
+
+@pytest.mark.parametrize(
+    ("spoil", "channel"),
+    [(step(0.020 * STANDARD_GRAVITY), "a11"), (step(1.0), "a11"), (gain, "a31"), (noise, "a22")],
+    ids=["20 mg", "1 m/s²", "gain", "noise"],
+)
+@pytest.mark.parametrize("seed", [0, 1])
+def test_without_the_faulty_channel_the_filter_is_consistent(spoil, channel, seed):
+    run = paper_run(seed, gain_std=0.01)
+    spoil(run.readings, np.random.default_rng(seed), run.t_s >= 15.0)
+    found = estimate_from_rest(run, CUBE, method="filter")
+    assert {name for fault in found.metadata["health"]["faults"] for name in fault["channels"]} == {channel}
+    assert found.metadata["consistency"]["consistent"]
 
 
 @pytest.mark.parametrize("seed", range(12))

@@ -1,0 +1,18 @@
+"""Which channels of an array are faulty: detection, isolation and exclusion from the other channels alone."""
+
+from gfimu.integrity.detectable import DetectableFaults, detectable_faults
+from gfimu.integrity.fault import ChannelFault, ChannelHealth
+from gfimu.integrity.monitor import ChannelMonitor
+from gfimu.integrity.policy import MonitorPolicy
+from gfimu.integrity.watch import watch_channels, watch_from_rest
+
+__all__ = [
+    "ChannelFault",
+    "ChannelHealth",
+    "ChannelMonitor",
+    "DetectableFaults",
+    "MonitorPolicy",
+    "detectable_faults",
+    "watch_channels",
+    "watch_from_rest",
+]

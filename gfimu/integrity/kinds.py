@@ -1,0 +1,145 @@
+"""What a faulty channel does: step, drift, gain, noise, freeze or spikes.
+
+The difference r of a channel from what the other channels predict is fitted from the onset of the fault to shortly
+after it was found. Each kind is a model of r with at most one size,
+
+    step r = f,   drift r = f (t − t₀),   gain r = f s (s the predicted reading),   noise r ~ N(0, σ²),
+
+and the one with the least Bayesian information criterion is named. A channel that repeats one value is frozen; noise of
+which a few samples hold most is spikes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gfimu.geometry.array import AccelerometerArray
+from gfimu.integrity.fault import ChannelFault
+from gfimu.integrity.prediction import omega_products, prediction_row
+from gfimu.rate.sensing import SensorErrors
+
+__all__ = ["kind_of_fault", "name_kinds"]
+
+_DECIDED = 6.0  # by which the best kind must exceed the next in 2 log likelihood, else the simpler: odds of 20 to 1
+_SPIKES = 0.1  # of the samples that hold most of the squares, for spikes
+_NOISY = 1.5  # of the stated variance, from which noise is part of a fault
+_FEWEST = 8  # samples
+_BEFORE_S = 2.0  # from which the bias before the onset is taken
+_AFTER_S = 2.0  # behind the time at which a fault was found, that are fitted
+
+
+def kind_of_fault(
+    t: NDArray[np.float64],
+    readings: NDArray[np.float64],
+    difference: NDArray[np.float64],
+    noise_std: float,
+) -> str:
+    """Name what a channel does.
+
+    Parameters
+    ----------
+    t : ndarray, shape (n,)
+        Times from the onset on, s.
+    readings : ndarray, shape (n,)
+        Readings of the channel, m/s².
+    difference : ndarray, shape (n,)
+        Readings less the prediction by the other channels, with the bias from before the onset taken off, m/s².
+    noise_std : float
+        Standard deviation of one sample of ``difference`` from a sound channel, m/s².
+
+    Returns
+    -------
+    str
+        "step", "drift", "gain", "noise", "freeze", "spikes" or "unknown".
+    """
+    valid = np.isfinite(readings) & np.isfinite(difference)
+    t, readings, difference = t[valid], readings[valid], difference[valid]
+    if len(t) < _FEWEST:
+        return "unknown"
+    if np.ptp(readings[len(readings) // 4 :]) == 0.0:
+        return "freeze"
+    predicted = readings - difference
+    columns = {
+        "step": np.ones(len(t)),
+        "drift": t - t[0],
+        "gain": predicted,
+    }
+    removed = {}
+    for name, column in columns.items():
+        length = float(column @ column)
+        removed[name] = float(column @ difference) ** 2 / length / noise_std**2 if length > 0.0 else 0.0
+    best = max(removed, key=lambda name: removed[name])
+    if removed["step"] >= removed[best] - _DECIDED:  # a gain at rest looks like a step, and is called one
+        best = "step"
+    column = columns[best]
+    rest = difference - column * float(column @ difference) / float(column @ column)
+    variance = float(rest @ rest) / (len(t) - 1) / noise_std**2
+    energy = len(t) * (variance - 1.0 - np.log(max(variance, 1e-12))) if variance > _NOISY else 0.0
+    if energy > removed[best]:
+        share = np.sort(rest**2)[::-1].cumsum()
+        few = max(1, int(_SPIKES * len(t)))
+        return "spikes" if share[few - 1] > 0.9 * share[-1] else "noise"
+    if removed[best] < 0.5 * float(difference @ difference) / noise_std**2 - len(t):
+        return "unknown"
+    return best
+
+
+def name_kinds(
+    array: AccelerometerArray,
+    errors: SensorErrors,
+    t: NDArray[np.float64],
+    readings: NDArray[np.float64],
+    omega: NDArray[np.float64],
+    faults: Sequence[ChannelFault],
+) -> tuple[ChannelFault, ...]:
+    """Name the kind of each isolated fault of a recording; several channels of one fault share it or are "unknown".
+
+    ``t`` (n,), ``readings`` (n, c) and ``omega`` (n, 3) are the recording and the rate found in it, rad/s.
+    """
+    named = []
+    for fault in faults:
+        if not fault.isolated:
+            named.append(fault)
+            continue
+        used = np.ones(array.n_channels, dtype=np.bool_)
+        for other in faults:
+            if other.onset_s < fault.found_s + _AFTER_S and other.end_s > fault.onset_s - _BEFORE_S:
+                used[[array.channels.index(name) for name in other.channels]] = False
+        kinds = {
+            _kind(array, errors, t, readings, omega, fault, array.channels.index(name), used) for name in fault.channels
+        }
+        named.append(replace(fault, kind=kinds.pop() if len(kinds) == 1 else "unknown"))
+    return tuple(named)
+
+
+def _kind(
+    array: AccelerometerArray,
+    errors: SensorErrors,
+    t: NDArray[np.float64],
+    readings: NDArray[np.float64],
+    omega: NDArray[np.float64],
+    fault: ChannelFault,
+    channel: int,
+    used: NDArray[np.bool_],
+) -> str:
+    """Name the kind of a fault on one of its channels."""
+    if (
+        np.linalg.matrix_rank(array.regression_matrix[used] / np.array([array.length_unit] * 3 + [1.0] * 3), tol=1e-6)
+        < 6
+    ):
+        return "unknown"
+    row = prediction_row(array, channel, used)
+    near = (t >= fault.onset_s - _BEFORE_S) & (t <= min(fault.found_s + _AFTER_S, fault.end_s))
+    part = np.where(np.isfinite(readings[near]) | (row != 0.0), readings[near], 0.0)
+    difference = part @ row - omega_products(omega[near]) @ (row @ array.centripetal_matrix)
+    times = t[near]
+    before = (times < fault.onset_s - 0.1) & np.isfinite(difference)
+    if before.any():
+        difference = difference - float(np.mean(difference[before]))
+    after = times >= fault.onset_s
+    noise = float(np.sqrt(np.sum((row * errors.noise_std) ** 2)))
+    return kind_of_fault(times[after], readings[near][after, channel], difference[after], noise)

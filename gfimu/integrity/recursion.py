@@ -1,0 +1,433 @@
+"""The recursion of the monitor of channels, compiled: an extended Kalman filter and the signatures of faults in it.
+
+State x = [ω (3); b (c)], b the biases of the channels. From the mean readings ȳ of one block to the next, T later,
+
+    ω ← ω + T (A (ȳ_m − b) − L s(ω)),      ȳ_m the mean of both blocks                                   (1)
+
+and the null space is the measurement, one whitened row after the other,
+
+    z_j = Z_j (ȳ − b) = M_j s(ω) + noise of variance 1/B,                                                (2)
+
+with s the products of ω and B the samples of a block. Within a block in which ω changes by α T the mean of ω_i ω_j is
+larger by α_i α_j T²/12.
+
+A constant fault of one unit on channel i from block k₀ on makes the state wrong by column i of G and the innovations
+by h (Willsky and Jones, IEEE Trans. Automatic Control 21, 1976):
+
+    G_ω ← Φ_ω G_ω + T A (e − G_b)      (half of the first block lies behind the onset)
+    h_j = Z_j − H_j G,   G ← G + K_j h_j,   C ← C + h_jᵀ h_j/S_j,   d ← d + h_jᵀ ν_j/S_j                   (3)
+
+C is the information on faults of all channels at once, shape (c, c), and d the score: a set S of channels with that
+onset has the most likely sizes f = C_SS⁻¹ d_S and explains T_S = d_Sᵀ f of the sum of squared innovations.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from gfimu.integrity.isolation import deflate, strongest
+from gfimu.rate.recursion_data import COMPILE
+
+__all__ = ["MonitorState", "MonitorTables", "MonitorTuning", "advance"]
+
+_TINY = 1e-14  # numerical: least variance kept on the diagonal of the covariance
+_LARGEST = 1e12  # numerical: statistics of a filter that has run away
+_SCREEN = 0.6  # of the threshold: below it the statistic is not corrected for model errors, which only lower it
+
+
+class MonitorTables(NamedTuple):
+    """Matrices per set of channels (`gfimu.rate.sensing.ChannelTables`), stacked."""
+
+    alpha: NDArray[np.float64]  # (sets, 3, c)
+    leak: NDArray[np.float64]  # (sets, 3, 6)
+    null: NDArray[np.float64]  # (sets, d, c)
+    sensitivity: NDArray[np.float64]  # (sets, d, 6)
+    null_count: NDArray[np.int64]  # (sets,) directions of the null space; −1 where α can't be seen
+    noise: NDArray[np.float64]  # (sets, 3, 3) of α, per sample
+
+
+class MonitorTuning(NamedTuple):
+    """Numbers that stay the same over a run."""
+
+    samples: int  # per block
+    period: float  # of the blocks, s
+    threshold: float  # of a fault
+    oldest: float  # blocks
+    walk: float  # (m/s²)²/s
+    forget: float  # of the range of readings, per block
+    scale_std: float  # of gains and axes, a ratio
+    placement_std: float  # m
+    floor: float  # m/s²
+
+
+class MonitorState(NamedTuple):
+    """What is carried from one block to the next."""
+
+    omega: NDArray[np.float64]  # (3,)
+    bias: NDArray[np.float64]  # (c,)
+    covariance: NDArray[np.float64]  # (3 + c, 3 + c)
+    last: NDArray[np.float64]  # (c,) mean readings of the block before
+    low: NDArray[np.float64]  # (c,) range of the readings
+    high: NDArray[np.float64]  # (c,)
+    ages: NDArray[np.float64]  # (slots,) blocks since the onset, oldest first; 0: unused
+    signature: NDArray[np.float64]  # (slots, 3 + c, c) G
+    information: NDArray[np.float64]  # (slots, c, c) C
+    score: NDArray[np.float64]  # (slots, c) d
+    started: NDArray[np.bool_]  # (1,)
+    largest: NDArray[np.float64]  # (1,) statistic of a channel so far, beyond what model errors explain
+    past_rate: NDArray[np.float64]  # (h, 3) before each of the last blocks, rings; block k at k mod h
+    past_bias: NDArray[np.float64]  # (h, c)
+    past_covariance: NDArray[np.float64]  # (h, 3 + c, 3 + c)
+    past_means: NDArray[np.float64]  # (h, 3, c) last mean readings, low, high
+
+    def copy(self) -> MonitorState:
+        """Return a state that shares nothing with this one."""
+        return MonitorState._make(field.copy() for field in self)
+
+    def go_back(self, block: int) -> None:
+        """Return to the state before a block; it must be one of the last h."""
+        place = block % len(self.past_rate)
+        self.omega[:] = self.past_rate[place]
+        self.bias[:] = self.past_bias[place]
+        self.covariance[:] = self.past_covariance[place]
+        self.last[:], self.low[:], self.high[:] = self.past_means[place]
+        self.ages[:] = 0.0
+        self.started[0] = block > 0
+
+
+@njit(**COMPILE)
+def advance(tables, tuning, state, means, steps, sets, levels, watched, omega, std, nis, first, last):  # type: ignore[no-untyped-def]
+    """Take the blocks ``first`` to ``last − 1``; stop behind one in which a fault is seen.
+
+    ``means`` (n, c), ``steps`` (n,) s since the block before, ``sets`` (n,) of channels, ``levels`` (n,) measured
+    variance of the null space over the stated one. ``omega``, ``std`` (n, 3) and ``nis`` (n,) are filled.
+
+    Returns
+    -------
+    tuple of (int, int)
+        The next block, and the slot of the fault; −1 if none was seen.
+    """
+    c = means.shape[1]
+    model_std = np.empty(c)
+    pending = 0.0
+    k = first
+    while k < last:
+        _keep(state, k)
+        place = sets[k]
+        level = levels[k]
+        transition = np.zeros((3, 3))
+        _follow_range(state, means[k], tuning.forget)
+        step = steps[k] + pending
+        if tables.null_count[place] < 0:  # too few channels: a gap
+            pending = step
+            omega[k] = state.omega
+            std[k] = np.inf
+            state.ages[:] = 0.0
+            k += 1
+            continue
+        pending = 0.0
+        if not state.started[0]:  # from the first sample to the middle of the first block
+            state.last[:] = means[k]
+            step = 0.5 * tuning.period * (1.0 - 1.0 / tuning.samples)
+        _predict(tables, tuning, state, means[k], step, place, level, transition)
+        if step > 1.5 * tuning.period:
+            state.ages[:] = 0.0
+        _new_slot(state, tuning.oldest)
+        _carry_signatures(tables, state, transition, step, place)
+        nis[k] = _update(tables, tuning, state, means[k], place, level)
+        omega[k] = state.omega
+        for a in range(3):
+            std[k, a] = np.sqrt(max(state.covariance[a, a], 0.0))
+        state.last[:] = means[k]
+        state.started[0] = True
+        k += 1
+        model_errors(state, tuning, model_std)
+        slot = _strongest_slot(state, tuning, model_std, watched)
+        if slot >= 0:
+            return k, slot
+    return k, -1
+
+
+@njit(**COMPILE)
+def model_errors(state, tuning, std):  # type: ignore[no-untyped-def]
+    """Fill in how large a constant fault the errors of gain, axes and position may feign on each channel, m/s²."""
+    square = 0.0
+    for a in range(3):
+        square += state.omega[a] * state.omega[a]
+    for i in range(len(std)):
+        gain = 0.5 * tuning.scale_std * (state.high[i] - state.low[i])
+        place = tuning.placement_std * square
+        std[i] = np.sqrt(gain * gain + place * place + tuning.floor * tuning.floor)
+
+
+@njit(**COMPILE)
+def _keep(state, block):  # type: ignore[no-untyped-def]
+    """Keep the state before a block."""
+    place = block % len(state.past_rate)
+    state.past_rate[place] = state.omega
+    state.past_bias[place] = state.bias
+    state.past_covariance[place] = state.covariance
+    state.past_means[place, 0] = state.last
+    state.past_means[place, 1] = state.low
+    state.past_means[place, 2] = state.high
+
+
+@njit(**COMPILE)
+def _follow_range(state, mean, forget):  # type: ignore[no-untyped-def]
+    """Follow the range of each channel's readings, with a memory."""
+    for i in range(len(mean)):
+        if not state.started[0]:
+            state.low[i] = mean[i]
+            state.high[i] = mean[i]
+        state.low[i] = min(mean[i], state.low[i] + forget * (mean[i] - state.low[i]))
+        state.high[i] = max(mean[i], state.high[i] + forget * (mean[i] - state.high[i]))
+
+
+@njit(**COMPILE)
+def _products(w):  # type: ignore[no-untyped-def]
+    return np.array([w[0] * w[0], w[1] * w[1], w[2] * w[2], w[0] * w[1], w[0] * w[2], w[1] * w[2]])
+
+
+@njit(**COMPILE)
+def _slope(row, w, out):  # type: ignore[no-untyped-def]
+    """Fill in the derivative of ``row`` s(ω) by ω."""
+    out[0] = 2.0 * w[0] * row[0] + w[1] * row[3] + w[2] * row[4]
+    out[1] = 2.0 * w[1] * row[1] + w[0] * row[3] + w[2] * row[5]
+    out[2] = 2.0 * w[2] * row[2] + w[0] * row[4] + w[1] * row[5]
+
+
+@njit(**COMPILE)
+def _predict(tables, tuning, state, mean, step, place, level, transition):  # type: ignore[no-untyped-def]
+    """Carry state and covariance over to the next block, (1); ``transition`` becomes Φ_ω − 1."""
+    alpha_rows = tables.alpha[place]
+    leak = tables.leak[place]
+    c = len(mean)
+    n = 3 + c
+    p = state.covariance
+    alpha = np.zeros(3)
+    for a in range(3):
+        for i in range(c):
+            alpha[a] += alpha_rows[a, i] * (0.5 * (mean[i] + state.last[i]) - state.bias[i])
+    leaky = False
+    for a in range(3):
+        for j in range(6):
+            leaky = leaky or leak[a, j] != 0.0
+    if leaky:  # products of ω remain in α: implicit midpoint
+        middle = state.omega.copy()
+        for _ in range(3):
+            s = _products(middle)
+            for a in range(3):
+                total = alpha[a]
+                for j in range(6):
+                    total -= leak[a, j] * s[j]
+                middle[a] = state.omega[a] + 0.5 * step * total
+        s = _products(middle)
+        slope = np.zeros(3)
+        for a in range(3):
+            for j in range(6):
+                alpha[a] -= leak[a, j] * s[j]
+            _slope(leak[a], middle, slope)
+            for b in range(3):
+                transition[a, b] = -step * slope[b]
+    rows = np.zeros((3, n))  # of F P, F = [1 + transition, −T A; 0, 1]
+    for a in range(3):
+        state.omega[a] += step * alpha[a]
+        for m in range(n):
+            total = p[a, m]
+            for b in range(3):
+                total += transition[a, b] * p[b, m]
+            for i in range(c):
+                total -= step * alpha_rows[a, i] * p[3 + i, m]
+            rows[a, m] = total
+    for a in range(3):
+        for b in range(3):
+            total = rows[a, b]
+            for m in range(3):
+                total += rows[a, m] * transition[b, m]
+            for i in range(c):
+                total -= rows[a, 3 + i] * step * alpha_rows[b, i]
+            p[a, b] = total + level * step * step * tables.noise[place, a, b] / tuning.samples
+        for i in range(c):
+            p[a, 3 + i] = rows[a, 3 + i]
+            p[3 + i, a] = rows[a, 3 + i]
+    if step > 1.5 * tuning.period:  # a gap, over which α is unknown but for its size
+        size = 0.0
+        for a in range(3):
+            size += alpha[a] * alpha[a]
+        for a in range(3):
+            p[a, a] += (size + 1.0) * step * step
+    for i in range(c):
+        change = abs(mean[i] - state.last[i]) * (state.high[i] - state.low[i])
+        p[3 + i, 3 + i] += tuning.walk * step + 0.5 * tuning.scale_std * tuning.scale_std * change
+
+
+@njit(**COMPILE)
+def _new_slot(state, oldest):  # type: ignore[no-untyped-def]
+    """Begin an onset with this block; of too many the one goes whose neighbours are nearest, on a scale of log age."""
+    ages = state.ages
+    used = 0
+    for s in range(len(ages)):
+        if ages[s] > 0.0:
+            used += 1
+    if used == len(ages):
+        drop = 0
+        least = np.inf
+        for s in range(used):
+            if s == 0:
+                gap = 1e8 if ages[0] < oldest else -1.0
+            else:
+                younger = ages[s + 1] if s < used - 1 else 0.0
+                gap = (ages[s - 1] - younger) / (ages[s] + 1.0)
+            if gap < least:
+                least = gap
+                drop = s
+        for s in range(drop, used - 1):
+            state.signature[s] = state.signature[s + 1]
+            state.information[s] = state.information[s + 1]
+            state.score[s] = state.score[s + 1]
+            ages[s] = ages[s + 1]
+        used -= 1
+    state.signature[used] = 0.0
+    state.information[used] = 0.0
+    state.score[used] = 0.0
+    ages[used] = 0.5  # half of the step before lies behind the onset; set to 1 after this block
+
+
+@njit(**COMPILE)
+def _carry_signatures(tables, state, transition, step, place):  # type: ignore[no-untyped-def]
+    """Carry the effect of every fault on the state over to this block, (3)."""
+    alpha_rows = tables.alpha[place]
+    c = alpha_rows.shape[1]
+    moved = np.zeros((3, c))
+    for s in range(len(state.ages)):
+        age = state.ages[s]
+        if age == 0.0:
+            continue
+        g = state.signature[s]
+        if age == 0.5:
+            for a in range(3):
+                for i in range(c):
+                    g[a, i] = 0.5 * step * alpha_rows[a, i]
+            state.ages[s] = 1.0
+            continue
+        for a in range(3):
+            for i in range(c):
+                moved[a, i] = g[a, i] + step * alpha_rows[a, i]
+            for j in range(c):
+                weight = step * alpha_rows[a, j]
+                if weight != 0.0:
+                    for i in range(c):
+                        moved[a, i] -= weight * g[3 + j, i]
+            for b in range(3):
+                weight = transition[a, b]
+                if weight != 0.0:
+                    for i in range(c):
+                        moved[a, i] += weight * g[b, i]
+        g[:3] = moved
+        state.ages[s] = age + 1.0
+
+
+@njit(**COMPILE)
+def _update(tables, tuning, state, mean, place, level):  # type: ignore[no-untyped-def]
+    """Measure the null space row by row, (2), with all signatures, (3); returns the normalised innovation squared."""
+    c = len(mean)
+    n = 3 + c
+    p = state.covariance
+    before = state.omega.copy()
+    products = _products(before)
+    alpha = np.zeros(3)
+    for a in range(3):  # the change of ω within the block
+        for i in range(c):
+            alpha[a] += tables.alpha[place, a, i] * (mean[i] - state.bias[i])
+    span = tuning.period * tuning.period / 12.0
+    pairs = _products(alpha)
+    for j in range(6):
+        products[j] += span * pairs[j]
+    noise = level / tuning.samples
+    h = np.zeros(n)
+    ph = np.zeros(n)
+    slope = np.zeros(3)
+    hg = np.zeros(c)
+    total = 0.0
+    for j in range(tables.null_count[place]):
+        z_row = tables.null[place, j]
+        m_row = tables.sensitivity[place, j]
+        _slope(m_row, before, slope)
+        innovation = 0.0
+        for a in range(6):
+            innovation -= m_row[a] * products[a]
+        for a in range(3):
+            h[a] = slope[a]
+            innovation -= slope[a] * (state.omega[a] - before[a])
+        for i in range(c):
+            h[3 + i] = z_row[i]
+            innovation += z_row[i] * (mean[i] - state.bias[i])
+        variance = noise
+        for m in range(n):
+            value = 0.0
+            for q in range(n):
+                value += p[m, q] * h[q]
+            ph[m] = value
+        for m in range(n):
+            variance += h[m] * ph[m]
+        inverse = 1.0 / variance
+        total += innovation * innovation * inverse
+        for m in range(n):
+            gain = ph[m] * inverse
+            if m < 3:
+                state.omega[m] += gain * innovation
+            else:
+                state.bias[m - 3] += gain * innovation
+            for q in range(m + 1):
+                value = p[m, q] - gain * ph[q]
+                p[m, q] = value
+                p[q, m] = value
+            p[m, m] = max(p[m, m], _TINY)
+        for s in range(len(state.ages)):
+            if state.ages[s] == 0.0:
+                continue
+            g = state.signature[s]
+            for i in range(c):
+                hg[i] = z_row[i]
+            for m in range(n):
+                weight = h[m]
+                if weight != 0.0:
+                    for i in range(c):
+                        hg[i] -= weight * g[m, i]
+            for m in range(n):
+                weight = ph[m] * inverse
+                if weight != 0.0:
+                    for i in range(c):
+                        g[m, i] += weight * hg[i]
+            information = state.information[s]
+            score = state.score[s]
+            for m in range(c):
+                weight = hg[m] * inverse
+                score[m] += weight * innovation
+                for i in range(c):
+                    information[m, i] += weight * hg[i]
+    return total
+
+
+@njit(**COMPILE)
+def _strongest_slot(state, tuning, model_std, watched):  # type: ignore[no-untyped-def]
+    """Return the slot in which a channel exceeds the threshold most, beyond what model errors explain; −1 if none."""
+    found = -1
+    best = tuning.threshold
+    for s in range(len(state.ages)):
+        if state.ages[s] < 2.0:
+            continue
+        raw = strongest(state.information[s], state.score[s], watched)[1]
+        if not _SCREEN * tuning.threshold < raw < _LARGEST:
+            continue
+        information, score = deflate(state.information[s], state.score[s], model_std)
+        value = strongest(information, score, watched)[1]
+        state.largest[0] = max(state.largest[0], value)
+        if value > best:
+            best = value
+            found = s
+    return found

@@ -1,0 +1,56 @@
+"""`gfimu.estimate` leaves out a channel that contradicts the others, says so, and writes its health."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import gfimu
+from gfimu.geometry.array import AccelerometerArray
+from gfimu.motion.estimation import Estimate
+
+
+@pytest.fixture(scope="module")
+def run():
+    return gfimu.simulate("paper_run", seed=1)
+
+
+def faulty(run, size):
+    readings = run.for_array(AccelerometerArray.load("cube12")).copy()
+    readings[run.t_s >= 15.0, 0] += size
+    return replace(run, readings=readings)
+
+
+def error(estimate, run):
+    late = run.t_s > 15.0
+    return np.sqrt(np.nanmean((estimate.omega[late, 2] - run.reference["tacho_rad_s"][late]) ** 2))
+
+
+@pytest.mark.parametrize("method", ["filter", "smoother"])
+def test_a_step_on_one_channel_hardly_harms(run, method):
+    bad = faulty(run, 0.2)
+    left_out = gfimu.estimate(bad, method=method, rest_bias=True)
+    kept = gfimu.estimate(bad, method=method, rest_bias=True, keep_faulty=True)
+    assert error(kept, run) > 3 * error(left_out, run)
+    assert error(left_out, run) < 0.03
+    (fault,) = left_out.metadata["health"]["faults"]
+    assert fault["channels"] == ["a11"]
+    assert any("a11: step" in warning for warning in left_out.metadata["warnings"])
+    assert kept.health is None
+
+
+def test_health_is_in_the_file(run, tmp_path):
+    found = gfimu.estimate(faulty(run, 0.2), method="filter", rest_bias=True)
+    assert set(np.unique(found.health["a11"])) == {0, 2}
+    assert not any(codes.any() for name, codes in found.health.items() if name != "a11")
+    for name in ("e.csv", "e.parquet"):
+        found.write(tmp_path / name)
+        again = Estimate.read(tmp_path / name)
+        np.testing.assert_array_equal(again.health["a11"], found.health["a11"])
+
+
+def test_a_sound_run_is_estimated_as_before(run):
+    found = gfimu.estimate(run, method="filter", rest_bias=True)
+    kept = gfimu.estimate(run, method="filter", rest_bias=True, keep_faulty=True)
+    np.testing.assert_array_equal(found.omega, kept.omega)
+    assert found.metadata["health"]["faults"] == []
