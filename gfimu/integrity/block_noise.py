@@ -62,8 +62,8 @@ def block_noise(
 ) -> BlockNoise:
     """Return the noise of all blocks.
 
-    A channel is noisy where 2 log LR = ν (q − 1 − ln q) exceeds the threshold and that of the next channel by the margin
-    of isolation; q is its variance over the level, averaged with a memory, and ν the degrees of freedom in that memory.
+    A channel is noisy where 2 log LR = ν (q − 1 − ln q) exceeds the threshold, and that of the next channel by the
+    margin of isolation; q is its variance over the level, averaged with a memory, and ν the degrees of freedom in it.
 
     Parameters
     ----------
