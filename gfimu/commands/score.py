@@ -35,8 +35,14 @@ def score(
     hub: str = "fixed",
     sample_rate_hz: float = 100.0,
     inclination_rad: float | None = None,
-    uncertainty: AxisUncertainty | None = None,
-    run: PredictedRun | None = None,
+    point_std_m: float = 0.0,
+    direction_std_rad: float = 0.0,
+    lever_std_m: float = 0.0,
+    rotation_std_rad: float = 0.0,
+    bias_std_m_s2: float = 0.0,
+    duration_s: float = 60.0,
+    hub_std_m_s2: float = 0.7,
+    jerk_rad2_s5: float = 1.0,
 ) -> list[Score | AxisBounds]:
     """Score the geometry of one or several arrays.
 
@@ -68,10 +74,12 @@ def score(
         Sample rate at which the bound of a filter about that axis holds.
     inclination_rad : float, optional
         Angle between that axis and the vertical, rad; by default a fixed one is upright, a free one level.
-    uncertainty : AxisUncertainty, optional
-        How exactly axis, places, orientations and biases of the chips are known; that of the array file by default.
-    run : PredictedRun, optional
-        The run for which the estimate's standard deviation is predicted; its sample rate holds for all bounds.
+    point_std_m, direction_std_rad, lever_std_m, rotation_std_rad, bias_std_m_s2 : float
+        How exactly axis, places, orientations and biases of the chips are known
+        (`gfimu.geometry.turning_axis.AxisUncertainty`); where all are 0, those of the array file hold.
+    duration_s, hub_std_m_s2, jerk_rad2_s5 : float
+        The run for which the estimate's standard deviation is predicted
+        (`gfimu.known_axis.accuracy.predicted.PredictedRun`).
 
     Raises
     ------
@@ -86,6 +94,7 @@ def score(
     from gfimu.geometry.array import AccelerometerArray
     from gfimu.geometry.observability import seeing_arrays
     from gfimu.geometry.scoring import score as score_arrays
+    from gfimu.geometry.turning_axis import AxisUncertainty
     from gfimu.known_axis import AxisBounds
     from gfimu.known_axis.accuracy.predicted import PredictedRun
 
@@ -96,7 +105,8 @@ def score(
     else:  # boxes of one or two chips see less than a rigid body's motion
         given = list(seeing_arrays())
     turning = turning_axis(axis, axis_point, hub, inclination_rad)
-    run = PredictedRun(sample_rate_hz=sample_rate_hz) if run is None else run
+    run = PredictedRun(duration_s, sample_rate_hz, hub_std_m_s2, jerk_rad2_s5)
+    uncertainty = AxisUncertainty(point_std_m, direction_std_rad, lever_std_m, rotation_std_rad, bias_std_m_s2)
     omega = [speed_rad_s * component for component in _AXES[spin_axis]] if omega_rad_s is None else omega_rad_s
     given_axes = [(array, known_axis(turning, array)) for array in map(as_array, given)]
     seeing = [array for array, about in given_axes if about is None]
@@ -108,11 +118,11 @@ def score(
         if about is None:
             found.append(next(scores))
             continue
-        doubt = about.uncertainty if uncertainty is None or uncertainty.exact else uncertainty
+        doubt = about.uncertainty if uncertainty.exact else uncertainty
         tilt = about.inclination if inclination_rad is None else inclination_rad
         stands = replace(about, uncertainty=doubt, inclination=tilt)
         found.append(_about_axis(array, stands, run, speed_rad_s, noise_m_s2))
-    if uncertainty is not None and not uncertainty.exact and not any(isinstance(one, AxisBounds) for one in found):
+    if not uncertainty.exact and not any(isinstance(one, AxisBounds) for one in found):
         raise InputError(f"{next(iter(uncertainty.to_dict()))} is of a known axis; give the axis too (--axis)")
     return found
 

@@ -97,6 +97,9 @@ def uniform(
         times = np.bincount(place[known], t[known] - first, count)
         numbers = np.bincount(place[known], minlength=count)
         filled = numbers > 0
+        if not filled.any():  # a dead channel: constant, as one that is stuck
+            grid[:, column] = 0.0
+            continue
         at = times[filled] / numbers[filled]
         grid[:, column] = np.interp(np.arange(count) * step, at, sums[filled] / numbers[filled])
     return grid

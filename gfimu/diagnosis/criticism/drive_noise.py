@@ -30,6 +30,7 @@ from gfimu.world_model import Spin, SpinState
 __all__ = ["apart_from_noise", "drive_covariance", "expected_score", "expected_score_of_causes"]
 
 _STATE = ("angle", "rate", "acceleration", "jerk")
+_RANK = 1e-9  # numerical: of G, whose functions may depend on each other
 ValuesOf = Callable[[SpinState, NDArray[np.float64]], NDArray[np.float64]]
 
 
@@ -156,6 +157,15 @@ def drive_covariance(at: Posterior, t: NDArray[np.float64]) -> tuple[NDArray[np.
     return shared, std
 
 
-def apart_from_noise(score: NDArray[np.float64], expected: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return scores (p,) less what the noise of the drive may make of them: between nothing and the expected (p,)."""
-    return np.asarray(score - np.clip(score, np.minimum(expected, 0.0), np.maximum(expected, 0.0)))
+def apart_from_noise(
+    score: NDArray[np.float64], expected: NDArray[np.float64], gram: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return scores b (p,) less the share λ of the expected ones e (p,) with 0 ≤ λ ≤ 1 that leaves least in bᵀG⁺b.
+
+    One share for all: taken off one by one, the scores of functions that resemble each other would contradict.
+    """
+    weights = np.linalg.lstsq(gram, expected, rcond=_RANK)[0]
+    size = float(expected @ weights)
+    if not size > 0.0:
+        return score
+    return np.asarray(score - min(1.0, max(0.0, float(score @ weights) / size)) * expected)

@@ -114,12 +114,13 @@ def series_products(
             expected[named:] += np.ravel(expected_of(stretch, at))
             expected[:named] += expected_score_of_causes(stretch, at, point.causes)
     if not named:
-        return gram, apart_from_noise(score, expected)
+        return gram, apart_from_noise(score, expected, gram)
     # The causes are free: they have the widest prior that a fit gives them.
     covariance = inverse(gram[:named, :named] + np.eye(named) / SCALES[-1] ** 2)
     gain = covariance @ gram[:named, named:]
     score, expected = (one[named:] - gain.T @ one[:named] for one in (score, expected))
-    return gram[named:, named:] - gram[named:, :named] @ gain, apart_from_noise(score, expected)
+    gram = gram[named:, named:] - gram[named:, :named] @ gain
+    return gram, apart_from_noise(score, expected, gram)
 
 
 def _by_series(values: NDArray[np.float64], weight: NDArray[np.float64]) -> Columns:

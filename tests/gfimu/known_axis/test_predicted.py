@@ -112,7 +112,7 @@ def test_score_uses_the_axis_of_the_file_beside_other_arrays(tmp_path):
     assert full.gdop == pytest.approx(1.0607, abs=1e-4)
     assert arm.predicted.mounting_std > 0.0
     with pytest.raises(InputError, match="give the axis too"):
-        gfimu.score("cube12", uncertainty=AxisUncertainty(lever_std_m=0.002))
+        gfimu.score("cube12", lever_std_m=0.002)
     with pytest.raises(InputError, match="samples"):
         PredictedRun(1e6)
 

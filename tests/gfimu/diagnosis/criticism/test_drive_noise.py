@@ -57,7 +57,18 @@ def test_the_covariance_is_that_of_the_spline():
     np.testing.assert_allclose(shared[1, 500], seen[500], rtol=1e-9, atol=1e-12 * np.abs(seen[500]).max())
 
 
-def test_what_noise_may_make_is_taken_off():
-    score = np.array([-5.0, -15.0, 3.0, 4.0, 0.0])
-    expected = np.array([-10.0, -10.0, -10.0, 1.0, 2.0])
-    assert apart_from_noise(score, expected) == pytest.approx([0.0, -5.0, 3.0, 3.0, 0.0])
+def test_what_noise_may_make_is_taken_off_in_one_share():
+    rng = np.random.default_rng(3)
+    columns = rng.standard_normal((40, 5))
+    gram, expected = columns.T @ columns, rng.standard_normal(5)
+
+    def size(score):
+        return score @ np.linalg.solve(gram, score)
+
+    assert apart_from_noise(0.6 * expected, expected, gram) == pytest.approx(np.zeros(5), abs=1e-12)
+    assert apart_from_noise(-expected, expected, gram) == pytest.approx(-expected)
+    assert apart_from_noise(3.0 * expected, expected, gram) == pytest.approx(2.0 * expected)
+    for _ in range(20):
+        score = rng.standard_normal(5)
+        assert size(apart_from_noise(score, expected, gram)) <= size(score) * (1 + 1e-12)
+    assert apart_from_noise(score, np.zeros(5), gram) is score
