@@ -173,6 +173,9 @@ def _print_summary(summary: EstimateSummary) -> None:
         rows.append(("innovations", verdict, ""))
         if found["worst_channel"] is not None:
             rows.append(("channel that disagrees most", found["worst_channel"], ""))
+    if summary.health is not None:
+        faulty = dict.fromkeys(name for fault in summary.health["faults"] for name in fault["channels"])
+        rows.append(("channels that contradict the others", ", ".join(faulty) or "none", ""))
     if summary.channels_left_out:
         rows.append(("channels left out", ", ".join(summary.channels_left_out), ""))
     print_table(f"{summary.array}, method {summary.method}, {summary.form} form", ("quantity", "value", "unit"), rows)
