@@ -79,9 +79,7 @@ def _score(
     Mounted by eye: the same with --lever-std-m 0.003 --rotation-std-rad 0.05 --bias-std-m-s2 0.2
     """
     from gfimu.commands.score import score
-    from gfimu.geometry.turning_axis import AxisUncertainty
     from gfimu.known_axis import AxisBounds
-    from gfimu.known_axis.accuracy.predicted import PredictedRun
 
     scores = score(
         arrays,
@@ -93,8 +91,15 @@ def _score(
         axis_point=axis_point,
         hub=hub,
         inclination_rad=inclination_rad,
-        uncertainty=AxisUncertainty(point_std, direction_std, lever_std, rotation_std, bias_std),
-        run=PredictedRun(duration, sample_rate_hz, hub_std, jerk),
+        point_std_m=point_std,
+        direction_std_rad=direction_std,
+        lever_std_m=lever_std,
+        rotation_std_rad=rotation_std,
+        bias_std_m_s2=bias_std,
+        sample_rate_hz=sample_rate_hz,
+        duration_s=duration,
+        hub_std_m_s2=hub_std,
+        jerk_rad2_s5=jerk,
     )
     bounds = [entry for entry in scores if isinstance(entry, AxisBounds)]
     figures = [entry for entry in scores if not isinstance(entry, AxisBounds)]
