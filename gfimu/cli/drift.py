@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from gfimu.cli.axis_options import AxisOption, AxisPointOption, HubOption, InclinationOption
 from gfimu.cli.output import JsonOption, print_json, print_table, print_text, progress
 from gfimu.errors import InputError
 
@@ -38,17 +39,10 @@ def _drift(
     gravity: Annotated[float, typer.Option(help="Local gravity, m/s².")] = 9.80665,
     monte_carlo: Annotated[int, typer.Option(help="Number of nonlinear Monte Carlo runs; 0 for none.")] = 0,
     seed: Annotated[int, typer.Option(help="Seed of the Monte Carlo.")] = 0,
-    axis: Annotated[
-        str | None,
-        typer.Option("--axis", help="Axis about which alone the array turns: x, y, z or 0,0,1: drift of the angle."),
-    ] = None,
-    axis_point: Annotated[
-        tuple[float, float, float], typer.Option("--axis-point", help="A point of that axis, body frame, m.")
-    ] = (0.0, 0.0, 0.0),
-    hub: Annotated[str, typer.Option("--hub", help="With --axis: fixed (a table) or free (a wheel).")] = "fixed",
-    inclination_rad: Annotated[
-        float | None, typer.Option("--inclination-rad", help="Angle between --axis and the vertical; 0 by default.")
-    ] = None,
+    axis: AxisOption = None,
+    axis_point: AxisPointOption = (0.0, 0.0, 0.0),
+    hub: HubOption = "fixed",
+    inclination_rad: InclinationOption = None,
     hub_noise: Annotated[
         float, typer.Option("--hub-noise-m-s2-rthz", help="Of a free hub: density of its own force, m/s²/√Hz.")
     ] = 0.1,

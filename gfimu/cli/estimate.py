@@ -8,6 +8,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from gfimu.cli.axis_options import (
+    AxisOption,
+    AxisPointOption,
+    BiasStdOption,
+    DirectionStdOption,
+    HubOption,
+    InclinationOption,
+    LeverStdOption,
+    PointStdOption,
+    RotationStdOption,
+)
 from gfimu.cli.mapped import MapOption, MapSetOption
 from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, print_text, progress
 from gfimu.rate.registry import RATE_METHODS, rate_method, recursive_methods
@@ -58,37 +69,15 @@ def _estimate(
     rrd: Annotated[Path | None, typer.Option("--rrd", help="Rerun recording to write.")] = None,
     column_map: MapOption = None,
     map_set: MapSetOption = None,
-    axis: Annotated[
-        str | None,
-        typer.Option(
-            "--axis", help="Axis about which alone the array turns: x, y, z or 0,0,1. Few chips then suffice."
-        ),
-    ] = None,
-    axis_point: Annotated[
-        tuple[float, float, float], typer.Option("--axis-point", help="A point of that axis, body frame, m.")
-    ] = (0.0, 0.0, 0.0),
-    hub: Annotated[
-        str, typer.Option("--hub", help="With --axis: fixed (a table) or free (a wheel on a moving body).")
-    ] = "fixed",
-    inclination_rad: Annotated[
-        float | None, typer.Option("--inclination-rad", help="Angle between --axis and the vertical; else estimated.")
-    ] = None,
-    point_std: Annotated[
-        float, typer.Option("--point-std-m", help="With --axis: how exactly --axis-point is known, m; estimated then.")
-    ] = 0.0,
-    direction_std: Annotated[
-        float, typer.Option("--direction-std-rad", help="With --axis: how exactly its direction is known, rad.")
-    ] = 0.0,
-    lever_std: Annotated[
-        float, typer.Option("--lever-std-m", help="With --axis: how exactly each chip's place is known, m.")
-    ] = 0.0,
-    rotation_std: Annotated[
-        float,
-        typer.Option("--rotation-std-rad", help="With --axis: how exactly each chip's orientation is known, rad."),
-    ] = 0.0,
-    bias_std: Annotated[
-        float, typer.Option("--bias-std-m-s2", help="With --axis: standard deviation of each channel's bias, m/s².")
-    ] = 0.0,
+    axis: AxisOption = None,
+    axis_point: AxisPointOption = (0.0, 0.0, 0.0),
+    hub: HubOption = "fixed",
+    inclination_rad: InclinationOption = None,
+    point_std: PointStdOption = 0.0,
+    direction_std: DirectionStdOption = 0.0,
+    lever_std: LeverStdOption = 0.0,
+    rotation_std: RotationStdOption = 0.0,
+    bias_std: BiasStdOption = 0.0,
     json: JsonOption = False,
 ) -> None:
     """Estimate p, α, ω, attitude and table angle from a recording.
@@ -184,6 +173,9 @@ def _print_summary(summary: EstimateSummary) -> None:
         rows.append(("innovations", verdict, ""))
         if found["worst_channel"] is not None:
             rows.append(("channel that disagrees most", found["worst_channel"], ""))
+    if summary.health is not None:
+        faulty = dict.fromkeys(name for fault in summary.health["faults"] for name in fault["channels"])
+        rows.append(("channels that contradict the others", ", ".join(faulty) or "none", ""))
     if summary.channels_left_out:
         rows.append(("channels left out", ", ".join(summary.channels_left_out), ""))
     print_table(f"{summary.array}, method {summary.method}, {summary.form} form", ("quantity", "value", "unit"), rows)

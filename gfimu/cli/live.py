@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from gfimu.cli.axis_options import AxisOption, AxisPointOption, HubOption, InclinationOption
+
 __all__ = ["register"]
 
 
@@ -40,20 +42,10 @@ def _live(
     ] = None,
     unknown_start: Annotated[bool, typer.Option("--unknown-start", help="The body may be spinning already.")] = False,
     gyro: Annotated[bool, typer.Option("--gyro", help="Fuse the stream's gyro columns.")] = False,
-    axis: Annotated[
-        str | None,
-        typer.Option(
-            "--axis", help="Axis about which alone the array turns: x, y, z or 0,0,1. One chip then suffices."
-        ),
-    ] = None,
-    axis_point: Annotated[
-        tuple[float, float, float], typer.Option("--axis-point", help="A point of that axis, body frame, m.")
-    ] = (0.0, 0.0, 0.0),
-    hub: Annotated[str, typer.Option("--hub", help="With --axis: fixed (a table) or free (a wheel).")] = "fixed",
-    inclination_rad: Annotated[
-        float | None,
-        typer.Option("--inclination-rad", help="Angle between --axis and the vertical; else from the first second."),
-    ] = None,
+    axis: AxisOption = None,
+    axis_point: AxisPointOption = (0.0, 0.0, 0.0),
+    hub: HubOption = "fixed",
+    inclination_rad: InclinationOption = None,
 ) -> None:
     """Estimate the angular rate while samples arrive: CSV lines in, one JSON line per sample out.
 

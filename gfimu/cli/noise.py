@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from gfimu.cli.axis_options import AxisOption, AxisPointOption, HubOption
 from gfimu.cli.mapped import MapOption, MapSetOption
 from gfimu.cli.output import JsonOption, print_json, print_paths, print_table
 
@@ -33,13 +34,9 @@ def _noise(
     picture: Annotated[Path | None, typer.Option("--picture", help="Picture to write (.png, .svg, .pdf).")] = None,
     column_map: MapOption = None,
     map_set: MapSetOption = None,
-    axis: Annotated[
-        str | None, typer.Option("--axis", help="Axis about which alone it turns: noise as a rate, too.")
-    ] = None,
-    axis_point: Annotated[
-        tuple[float, float, float], typer.Option("--axis-point", help="A point of that axis, body frame, m.")
-    ] = (0.0, 0.0, 0.0),
-    hub: Annotated[str, typer.Option("--hub", help="With --axis: fixed (a table) or free (a wheel).")] = "fixed",
+    axis: AxisOption = None,
+    axis_point: AxisPointOption = (0.0, 0.0, 0.0),
+    hub: HubOption = "fixed",
     speed: Annotated[float, typer.Option("--speed-rad-s", help="With --axis: rate at which that holds.")] = math.tau,
     array: Annotated[
         str | None, typer.Option("--array", help="With --axis: array, a name or .toml file; else the recording's own.")

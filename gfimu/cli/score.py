@@ -9,6 +9,17 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from gfimu.cli.axis_options import (
+    AxisOption,
+    AxisPointOption,
+    BiasStdOption,
+    DirectionStdOption,
+    HubOption,
+    InclinationOption,
+    LeverStdOption,
+    PointStdOption,
+    RotationStdOption,
+)
 from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, print_text, progress
 
 if TYPE_CHECKING:
@@ -37,34 +48,16 @@ def _score(
     noise: Annotated[
         float, typer.Option("--noise-m-s2", help="Standard deviation of a channel, m/s²: 0.0287 is ADXL345 at 100 Hz.")
     ] = 0.0287,
-    axis: Annotated[
-        str | None, typer.Option("--axis", help="Bounds of a rotation about this axis alone: x, y, z or 0,0,1.")
-    ] = None,
-    axis_point: Annotated[
-        tuple[float, float, float], typer.Option("--axis-point", help="A point of that axis, body frame, m.")
-    ] = (0.0, 0.0, 0.0),
-    hub: Annotated[str, typer.Option("--hub", help="With --axis: fixed (a table) or free (a wheel).")] = "fixed",
+    axis: AxisOption = None,
+    axis_point: AxisPointOption = (0.0, 0.0, 0.0),
+    hub: HubOption = "fixed",
     sample_rate_hz: Annotated[float, typer.Option("--sample-rate-hz", help="With --axis: sample rate, Hz.")] = 100.0,
-    inclination_rad: Annotated[
-        float | None,
-        typer.Option("--inclination-rad", help="Angle between --axis and the vertical; else 0, or π/2 of a free hub."),
-    ] = None,
-    point_std: Annotated[
-        float, typer.Option("--point-std-m", help="With --axis: how exactly --axis-point is known, m.")
-    ] = 0.0,
-    direction_std: Annotated[
-        float, typer.Option("--direction-std-rad", help="With --axis: how exactly its direction is known, rad.")
-    ] = 0.0,
-    lever_std: Annotated[
-        float, typer.Option("--lever-std-m", help="With --axis: how exactly each chip's place is known, m.")
-    ] = 0.0,
-    rotation_std: Annotated[
-        float,
-        typer.Option("--rotation-std-rad", help="With --axis: how exactly each chip's orientation is known, rad."),
-    ] = 0.0,
-    bias_std: Annotated[
-        float, typer.Option("--bias-std-m-s2", help="With --axis: standard deviation of each channel's bias, m/s².")
-    ] = 0.0,
+    inclination_rad: InclinationOption = None,
+    point_std: PointStdOption = 0.0,
+    direction_std: DirectionStdOption = 0.0,
+    lever_std: LeverStdOption = 0.0,
+    rotation_std: RotationStdOption = 0.0,
+    bias_std: BiasStdOption = 0.0,
     duration: Annotated[
         float, typer.Option("--duration-s", help="With --axis: length of the run that the estimate is predicted for.")
     ] = 60.0,
@@ -86,9 +79,7 @@ def _score(
     Mounted by eye: the same with --lever-std-m 0.003 --rotation-std-rad 0.05 --bias-std-m-s2 0.2
     """
     from gfimu.commands.score import score
-    from gfimu.geometry.turning_axis import AxisUncertainty
     from gfimu.known_axis import AxisBounds
-    from gfimu.known_axis.accuracy.predicted import PredictedRun
 
     scores = score(
         arrays,
@@ -100,8 +91,15 @@ def _score(
         axis_point=axis_point,
         hub=hub,
         inclination_rad=inclination_rad,
-        uncertainty=AxisUncertainty(point_std, direction_std, lever_std, rotation_std, bias_std),
-        run=PredictedRun(duration, sample_rate_hz, hub_std, jerk),
+        point_std_m=point_std,
+        direction_std_rad=direction_std,
+        lever_std_m=lever_std,
+        rotation_std_rad=rotation_std,
+        bias_std_m_s2=bias_std,
+        sample_rate_hz=sample_rate_hz,
+        duration_s=duration,
+        hub_std_m_s2=hub_std,
+        jerk_rad2_s5=jerk,
     )
     bounds = [entry for entry in scores if isinstance(entry, AxisBounds)]
     figures = [entry for entry in scores if not isinstance(entry, AxisBounds)]

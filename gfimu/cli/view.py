@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from gfimu.cli.axis_options import AxisOption, AxisPointOption, HubOption, InclinationOption
 from gfimu.cli.mapped import MapOption, MapSetOption
 from gfimu.cli.output import print_paths
 
@@ -26,17 +27,10 @@ def _view(
     ] = None,
     column_map: MapOption = None,
     map_set: MapSetOption = None,
-    axis: Annotated[
-        str | None,
-        typer.Option("--axis", help="Axis about which alone the array turns: x, y, z or 0,0,1; else the array's own."),
-    ] = None,
-    axis_point: Annotated[
-        tuple[float, float, float], typer.Option("--axis-point", help="A point of that axis, body frame, m.")
-    ] = (0.0, 0.0, 0.0),
-    hub: Annotated[str, typer.Option("--hub", help="With --axis: fixed (a table) or free (a wheel).")] = "fixed",
-    inclination_rad: Annotated[
-        float | None, typer.Option("--inclination-rad", help="Angle between --axis and the vertical; else estimated.")
-    ] = None,
+    axis: AxisOption = None,
+    axis_point: AxisPointOption = (0.0, 0.0, 0.0),
+    hub: HubOption = "fixed",
+    inclination_rad: InclinationOption = None,
     out: Annotated[Path | None, typer.Option("--out", help="Write the .rrd here and don't open it.")] = None,
 ) -> None:
     """Open a run in the rerun viewer: the rig in 3-D, raw channels, and the estimate over time.

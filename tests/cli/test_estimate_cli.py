@@ -3,10 +3,12 @@
 import gzip
 import json
 import struct
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+import gfimu
 from gfimu import AccelerometerArray, Estimate, Recording, specific_force
 from gfimu.units import STANDARD_GRAVITY
 
@@ -189,3 +191,18 @@ def test_the_first_call_of_the_filter_says_that_it_compiles(monkeypatch):
     if forward.signatures:
         assert not first_call.must_compile()
         assert command._describe("smoother") == "estimating by smoother"
+
+
+def test_a_faulty_channel_is_named_in_table_and_json(gfimu_command, tmp_path):
+    recording = gfimu.simulate("paper_run", seed=1)
+    readings = recording.for_array(CUBE).copy()
+    readings[recording.t_s >= 15.0, 4] += 0.3
+    replace(recording, readings=readings).write(tmp_path / "bad.parquet")
+    how = ("estimate", tmp_path / "bad.parquet", "--method", "filter", "--rest-bias", "--out", tmp_path / "e.csv")
+    result = gfimu_command(*how)
+    assert result.code == 0
+    assert "contradict the others" in result.stdout
+    assert "a22: step" in result.stdout + result.stderr
+    figures = json.loads(gfimu_command(*how, "--json").stdout)
+    assert [fault["channels"] for fault in figures["health"]["faults"]] == [["a22"]]
+    assert gfimu_command(*how, "--keep-faulty", "--json").code == 0
