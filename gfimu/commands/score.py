@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from gfimu.geometry.array import AccelerometerArray
     from gfimu.geometry.scoring import Score
-    from gfimu.geometry.turning_axis import AxisUncertainty, TurningAxis
+    from gfimu.geometry.turning_axis import TurningAxis
     from gfimu.known_axis import AxisBounds
     from gfimu.known_axis.accuracy.predicted import PredictedRun
 
