@@ -154,7 +154,7 @@ def advance(tables, tuning, state, means, steps, sets, levels, watched, omega, s
 
 @njit(**COMPILE)
 def model_errors(state, tuning, std):  # type: ignore[no-untyped-def]
-    """Fill in how large a constant fault the errors of gain, axes and position may feign on each channel, m/s²."""
+    """Fill in how large a constant fault the errors of gain, axes and position resemble on each channel, m/s²."""
     square = 0.0
     for a in range(3):
         square += state.omega[a] * state.omega[a]

@@ -30,7 +30,6 @@ from gfimu.world_model import Spin, SpinState
 __all__ = ["apart_from_noise", "drive_covariance", "expected_score", "expected_score_of_causes"]
 
 _STATE = ("angle", "rate", "acceleration", "jerk")
-_RANK = 1e-9  # numerical: of G, whose functions may depend on each other
 ValuesOf = Callable[[SpinState, NDArray[np.float64]], NDArray[np.float64]]
 
 
@@ -164,7 +163,7 @@ def apart_from_noise(
 
     One share for all: taken off one by one, the scores of functions that resemble each other would contradict.
     """
-    weights = np.linalg.lstsq(gram, expected, rcond=_RANK)[0]
+    weights = np.linalg.lstsq(gram, expected, rcond=1e-9)[0]  # the functions may depend on each other
     size = float(expected @ weights)
     if not size > 0.0:
         return score

@@ -29,7 +29,7 @@ def test_eight_chips_protect_better_than_four_and_need_no_rate():
     assert (single.detected > known.detected).all()
 
 
-def test_chips_with_two_axes_can_not_be_told_from_their_partners():
+def test_chips_with_two_axes_are_not_separated_from_their_partners():
     array = AccelerometerArray.load("nap_3_2_2_2")
     faults = detectable_faults(array, SensorErrors.from_parts(array, 100.0), 100.0)
     assert np.isfinite(faults.isolated[:3]).all()
