@@ -62,7 +62,7 @@ def body_functions(stretch: BodyStretch, drive: HandDrive) -> dict[str, NDArray[
 
 
 def tone(at: HandPosterior, policy: Policy) -> LackOfFit:
-    """Test every channel for a narrow line, over the whole run and, as oscillators wander, over short windows.
+    """Test every channel for a narrow line, over the whole run and, as frequencies drift, over short windows.
 
     A line stands out of its neighbourhood and of what the noise of the gyro, smoothed, makes of the readings.
     """

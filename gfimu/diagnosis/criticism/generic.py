@@ -91,7 +91,7 @@ def series_products(
         From a stretch and its posterior to the functions (n, k), or to those of each series (c + 1, n, k).
     expected_of : callable, optional
         From a stretch and its posterior to the scores (c + 1, k) that the noise of the drive makes
-        (`gfimu.diagnosis.criticism.drive_noise`); they are taken off.
+        (`gfimu.diagnosis.criticism.drive_noise`); a share of them is taken off.
 
     Returns
     -------

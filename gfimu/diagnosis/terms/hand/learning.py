@@ -45,8 +45,8 @@ def _fast_noise(stretch: BodyStretch, residual: NDArray[np.float64]) -> BodyNois
     """Return white noise and what grows with the motion, from a residual (n, c), m/s²."""
     array = stretch.model.array
     expected = stretch.model.expected_noise(1.0 / stretch.run.sample_period)
-    felt = np.hstack([array.axes, array.regression_matrix[:, :3] / array.length_unit]) * stretch.alive[:, None]
-    projector = (np.eye(len(felt)) - felt @ np.linalg.pinv(felt)) * stretch.alive
+    sensed = np.hstack([array.axes, array.regression_matrix[:, :3] / array.length_unit]) * stretch.alive[:, None]
+    projector = (np.eye(len(sensed)) - sensed @ np.linalg.pinv(sensed)) * stretch.alive
     white = white_from_rows(residual @ projector, projector, stretch.change, stretch.use, expected.white)
     white = np.where(stretch.alive, np.maximum(white, expected.quantum / np.sqrt(12)), np.inf)
     projection = Projection(array, white)

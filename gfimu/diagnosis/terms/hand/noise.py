@@ -89,7 +89,7 @@ class Projection:
 
     Whitened combinations of the channels that the specific force can't move.
 
-    The first three feel the angular acceleration with ``strength`` (per rad/s²), the others don't. ``sensed`` (c, 3) is
+    The first three sense the angular acceleration with ``strength`` (per rad/s²), the others don't. ``sensed`` (c, 3) is
     what the channels read per specific force, where gains and cross-axis effects make that other than the axes.
 
     About a known axis ``rate_row`` (c,) is what feels an error of the squared rate, with ``rate_strength`` (per
@@ -113,10 +113,10 @@ class Projection:
         axis = array.turning_axis
         # What the channels read per squared rate about the known axis, (c,), m; nothing without one.
         self.squared_rate = np.zeros(array.n_channels) if axis is None else array.centripetal_about(axis.direction)
-        felt = self.rows @ self.squared_rate
-        felt[:3] *= strength <= LEAST_POWER * max(strength.max(), 1e-300)
-        self.rate_strength = float(np.linalg.norm(felt))
-        self.rate_row = (felt / max(self.rate_strength, 1e-300)) @ self.rows  # (c,)
+        by_rate = self.rows @ self.squared_rate
+        by_rate[:3] *= strength <= LEAST_POWER * max(strength.max(), 1e-300)
+        self.rate_strength = float(np.linalg.norm(by_rate))
+        self.rate_row = (by_rate / max(self.rate_strength, 1e-300)) @ self.rows  # (c,)
         self.force_rows = basis[:, :3].T * self.inverse  # (3, c): what the specific force takes
         self.strength = strength  # (3,)
         self.turn = turn  # (3, 3): rows i feels strength_i · turn_i · α
