@@ -89,10 +89,10 @@ class Projection:
 
     Whitened combinations of the channels that the specific force can't move.
 
-    The first three sense the angular acceleration with ``strength`` (per rad/s²), the others don't. ``sensed`` (c, 3) is
-    what the channels read per specific force, where gains and cross-axis effects make that other than the axes.
+    The first three sense the angular acceleration with ``strength`` (per rad/s²), the others don't. ``sensed`` (c, 3)
+    is what the channels read per specific force, where gains and cross-axis effects make that other than the axes.
 
-    About a known axis ``rate_row`` (c,) is what feels an error of the squared rate, with ``rate_strength`` (per
+    About a known axis ``rate_row`` (c,) is what senses an error of the squared rate, with ``rate_strength`` (per
     rad²/s²), of the combinations that don't feel the angular acceleration. On chips of three axes with noise alike
     nothing of it is lost: tangential and radial differences are orthogonal.
     """
