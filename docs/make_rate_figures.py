@@ -12,7 +12,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.bounds import alpha_std, rate_bound_isotropic, steady_rate_bound
+from gfimu.bounds.sample import alpha_std, rate_bound_isotropic, steady_rate_bound
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.motion.estimation import Estimate
 from gfimu.motion.rest_bias import estimate_from_rest, rest_bias

@@ -31,8 +31,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     # What type checkers and editors see; at run time names load on first use (`_PUBLIC`).
-    from gfimu.bounds import posterior_rate_bound as posterior_rate_bound
-    from gfimu.bounds import rate_bound as rate_bound
+    from gfimu.bounds.posterior import posterior_rate_bound as posterior_rate_bound
+    from gfimu.bounds.sample import rate_bound as rate_bound
     from gfimu.calibration.array_calibration import calibrate_array as calibrate_array
     from gfimu.calibration.array_calibration import update_array_calibration as update_array_calibration
     from gfimu.calibration.result import Calibration as Calibration
@@ -148,9 +148,9 @@ _PUBLIC = {
     "null_space": "gfimu.geometry.kinematics",
     "open_recording": "gfimu.recording.formats",
     "optimize": "gfimu.commands.optimize",
-    "posterior_rate_bound": "gfimu.bounds",
+    "posterior_rate_bound": "gfimu.bounds.posterior",
     "pseudo_inverse": "gfimu.geometry.kinematics",
-    "rate_bound": "gfimu.bounds",
+    "rate_bound": "gfimu.bounds.sample",
     "read_mimu4444": "gfimu.recording.mimu4444",
     "record": "gfimu.commands.record",
     "recording_noise": "gfimu.sensor_noise",

@@ -10,32 +10,10 @@ import traceback
 import typer
 
 import gfimu
+from gfimu.cli.command_group import CommandGroup
 from gfimu.errors import GfimuError, InputError
 
 __all__ = ["main", "program"]
-
-COMMAND_FILES = (
-    "demo",
-    "score",
-    "simulate",
-    "estimate",
-    "live",
-    "inspect",
-    "convert",
-    "join",
-    "check",
-    "diagnose",
-    "drift",
-    "design",
-    "calibrate",
-    "noise",
-    "record",
-    "firmware",
-    "view",
-    "list",
-    "show",
-    "new",
-)
 
 _DEBUG = "--debug"
 _DEBUG_VARIABLE = "GFIMU_DEBUG"
@@ -65,15 +43,15 @@ def program() -> typer.Typer:
     """Return the program with all its commands."""
     app = typer.Typer(
         name="gfimu",
+        cls=CommandGroup,
         help="A gyro-free IMU in software: simulate, estimate, calibrate, diagnose.",
+        epilog="gfimu COMMAND --help shows the options of a command, with examples.",
         no_args_is_help=True,
         add_completion=False,
         pretty_exceptions_enable=False,
-        rich_markup_mode="markdown",
+        rich_markup_mode=None,  # plain text: the list of commands must not wait for rich
     )
     app.callback()(_options)
-    for name in COMMAND_FILES:
-        importlib.import_module(f"gfimu.cli.{name}").register(app)
     return app
 
 

@@ -24,7 +24,7 @@ from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, p
 
 if TYPE_CHECKING:
     from gfimu.geometry.scoring import Score
-    from gfimu.known_axis import AxisBounds
+    from gfimu.known_axis.accuracy.bounds import AxisBounds
 
 __all__ = ["register"]
 
@@ -79,7 +79,7 @@ def _score(
     Mounted by eye: the same with --lever-std-m 0.003 --rotation-std-rad 0.05 --bias-std-m-s2 0.2
     """
     from gfimu.commands.score import score
-    from gfimu.known_axis import AxisBounds
+    from gfimu.geometry.scoring import Score
 
     scores = score(
         arrays,
@@ -101,8 +101,8 @@ def _score(
         hub_std_m_s2=hub_std,
         jerk_rad2_s5=jerk,
     )
-    bounds = [entry for entry in scores if isinstance(entry, AxisBounds)]
-    figures = [entry for entry in scores if not isinstance(entry, AxisBounds)]
+    bounds = [entry for entry in scores if not isinstance(entry, Score)]
+    figures = [entry for entry in scores if isinstance(entry, Score)]
     if as_json:
         units = {"length_unit_m": figures[0].length_unit_m} if figures else {}
         print_json(units | {"arrays": [entry.to_dict() for entry in scores]})

@@ -266,7 +266,7 @@ def _about_axis(
 ) -> Estimate:
     """Estimate about a known axis, with the biases read off a level rest first where that is asked for."""
     from gfimu.errors import InputError
-    from gfimu.known_axis import estimate_about_axis
+    from gfimu.known_axis.estimation import estimate_about_axis
     from gfimu.rate.registry import rate_method
     from gfimu.recording.checks import check_recording, refuse_or_warn, without_dead_channels
 

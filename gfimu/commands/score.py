@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from gfimu.geometry.array import AccelerometerArray
     from gfimu.geometry.scoring import Score
     from gfimu.geometry.turning_axis import TurningAxis
-    from gfimu.known_axis import AxisBounds
+    from gfimu.known_axis.accuracy.bounds import AxisBounds
     from gfimu.known_axis.accuracy.predicted import PredictedRun
 
 __all__ = ["score"]
@@ -95,8 +95,6 @@ def score(
     from gfimu.geometry.observability import seeing_arrays
     from gfimu.geometry.scoring import score as score_arrays
     from gfimu.geometry.turning_axis import AxisUncertainty
-    from gfimu.known_axis import AxisBounds
-    from gfimu.known_axis.accuracy.predicted import PredictedRun
 
     if spin_axis not in _AXES:
         raise unknown_name("axis", spin_axis, _AXES)
@@ -105,7 +103,6 @@ def score(
     else:  # boxes of one or two chips see less than a rigid body's motion
         given = list(seeing_arrays())
     turning = turning_axis(axis, axis_point, hub, inclination_rad)
-    run = PredictedRun(duration_s, sample_rate_hz, hub_std_m_s2, jerk_rad2_s5)
     uncertainty = AxisUncertainty(point_std_m, direction_std_rad, lever_std_m, rotation_std_rad, bias_std_m_s2)
     omega = [speed_rad_s * component for component in _AXES[spin_axis]] if omega_rad_s is None else omega_rad_s
     given_axes = [(array, known_axis(turning, array)) for array in map(as_array, given)]
@@ -114,6 +111,10 @@ def score(
     if seeing:
         scores = iter(score_arrays(seeing, length_unit_m=length_unit_m, omega_rad_s=omega, noise_m_s2=noise_m_s2))
     found: list[Score | AxisBounds] = []
+    if len(seeing) < len(given_axes):  # the others don't wait for a compiler
+        from gfimu.known_axis.accuracy.predicted import PredictedRun
+
+        run = PredictedRun(duration_s, sample_rate_hz, hub_std_m_s2, jerk_rad2_s5)
     for array, about in given_axes:
         if about is None:
             found.append(next(scores))
@@ -122,7 +123,7 @@ def score(
         tilt = about.inclination if inclination_rad is None else inclination_rad
         stands = replace(about, uncertainty=doubt, inclination=tilt)
         found.append(_about_axis(array, stands, run, speed_rad_s, noise_m_s2))
-    if not uncertainty.exact and not any(isinstance(one, AxisBounds) for one in found):
+    if not uncertainty.exact and len(seeing) == len(given_axes):
         raise InputError(f"{next(iter(uncertainty.to_dict()))} is of a known axis; give the axis too (--axis)")
     return found
 
@@ -131,7 +132,7 @@ def _about_axis(
     array: AccelerometerArray, axis: TurningAxis, run: PredictedRun, rate_rad_s: float, noise_std: float
 ) -> AxisBounds:
     """Return the bounds of a rotation about an axis, with what the estimate reaches in a run."""
-    from gfimu.known_axis import axis_bounds
+    from gfimu.known_axis.accuracy.bounds import axis_bounds
     from gfimu.known_axis.accuracy.predicted import predicted_estimate
 
     bounds = axis_bounds(array, axis, rate_rad_s=rate_rad_s, noise_std=noise_std, sample_rate_hz=run.sample_rate_hz)

@@ -16,13 +16,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from gfimu.errors import GeometryError, InputError
 from gfimu.geometry.array import AccelerometerArray
-from gfimu.geometry.observability import MOTION_NAMES, RANK_TOLERANCE, require_all_motions, unseen_motions
+from gfimu.geometry.observability import MOTION_NAMES, RANK_TOLERANCE, null_rows, require_all_motions, unseen_motions
 from gfimu.short_repr import short_repr
 
 __all__ = [
@@ -214,10 +212,12 @@ def closed_form(
     GeometryError
         If the array is another geometry.
     """
+    from gfimu.geometry.kernels.alternate_corners import sum_alternate_corners
+
     half_edge, columns, signs = _cube_of_alternate_corners(array)
     rows = _reading_matrix(array, readings)
     motion = np.empty((len(rows), 6)) if out is None else out
-    _sum_alternate_corners(rows, columns, signs / (8.0 * half_edge), signs / 4.0, motion)
+    sum_alternate_corners(rows, columns, signs / (8.0 * half_edge), signs / 4.0, motion)
     covariance = np.diag([1.0 / (8.0 * half_edge**2)] * 3 + [1.0 / 4.0] * 3)
     return MotionEstimate(motion[:, :3], motion[:, 3:], covariance)
 
@@ -313,7 +313,7 @@ def null_space(array: AccelerometerArray) -> NullSpace:
     """
     require_all_motions(array)
     scale = np.array([array.length_unit] * 3 + [1.0] * 3)
-    basis = scipy.linalg.null_space((array.regression_matrix / scale).T, rcond=RANK_TOLERANCE).T  # (c - 6, c)
+    basis = null_rows((array.regression_matrix / scale).T)  # (c - 6, c)
     if len(basis) == 0:
         return NullSpace(basis, np.empty((0, 6)), 0)
     rotation, strengths, products = np.linalg.svd(basis @ array.centripetal_matrix)
@@ -411,29 +411,3 @@ def _cube_of_alternate_corners(array: AccelerometerArray) -> tuple[float, NDArra
     ):
         raise GeometryError(remedy)
     return half_edge, columns, signs
-
-
-@njit(cache=True)
-def _sum_alternate_corners(
-    rows: NDArray[np.float64],
-    columns: NDArray[np.intp],
-    per_arm: NDArray[np.float64],
-    per_chip: NDArray[np.float64],
-    motion: NDArray[np.float64],
-) -> None:
-    # rows (n, 12), motion (n, 6); x1 is the specific force of chip 1 along body x but for the sign of its axis.
-    jx, jy, jz = columns[0], columns[1], columns[2]
-    ax, ay, az = per_arm[0], per_arm[1], per_arm[2]
-    px, py, pz = per_chip[0], per_chip[1], per_chip[2]
-    for i in range(rows.shape[0]):
-        x1, x2, x3, x4 = rows[i, jx], rows[i, 3 + jx], rows[i, 6 + jx], rows[i, 9 + jx]
-        y1, y2, y3, y4 = rows[i, jy], rows[i, 3 + jy], rows[i, 6 + jy], rows[i, 9 + jy]
-        z1, z2, z3, z4 = rows[i, jz], rows[i, 3 + jz], rows[i, 6 + jz], rows[i, 9 + jz]
-        # Eq. 29: α = Σ r_i × f_i / (8 h²), every coordinate of r_i being ±h.
-        motion[i, 0] = az * ((z1 - z2) + (z3 - z4)) - ay * ((y1 - y2) - (y3 - y4))
-        motion[i, 1] = ax * ((x1 - x2) - (x3 - x4)) - az * ((z1 + z2) - (z3 + z4))
-        motion[i, 2] = ay * ((y1 + y2) - (y3 + y4)) - ax * ((x1 - x2) + (x3 - x4))
-        # Eq. 28: p is the mean of the four chips.
-        motion[i, 3] = px * ((x1 + x2) + (x3 + x4))
-        motion[i, 4] = py * ((y1 + y2) + (y3 + y4))
-        motion[i, 5] = pz * ((z1 + z2) + (z3 + z4))

@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 import numpy as np
-import scipy.linalg
 from numpy.typing import NDArray
 
 from gfimu.errors import GeometryError
 from gfimu.files.model_files import list_models
 from gfimu.geometry.array import AccelerometerArray
 
-__all__ = ["MOTION_NAMES", "RANK_TOLERANCE", "require_all_motions", "seeing_arrays", "unseen_motions"]
+__all__ = ["MOTION_NAMES", "RANK_TOLERANCE", "null_rows", "require_all_motions", "seeing_arrays", "unseen_motions"]
 
 MOTION_NAMES = ("alpha_x", "alpha_y", "alpha_z", "p_x", "p_y", "p_z")
 """Order of the columns of J and of the rows of its left inverse."""
 
 RANK_TOLERANCE = 1e-9
 """Relative size of a singular value that counts as zero, with lengths in the array's length unit."""
+
+
+def null_rows(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Orthonormal rows that a matrix maps to zero, shape (d, columns), by its singular values (`RANK_TOLERANCE`)."""
+    _, strengths, rows = np.linalg.svd(matrix)
+    return rows[int(np.sum(strengths > RANK_TOLERANCE * strengths.max(initial=0.0))) :]
 
 
 def unseen_motions(array: AccelerometerArray) -> tuple[str, ...]:
@@ -26,12 +31,14 @@ def unseen_motions(array: AccelerometerArray) -> tuple[str, ...]:
     """
     scale = np.array([array.length_unit] * 3 + [1.0] * 3)
     columns = array.regression_matrix / scale  # (c, 6), all columns of order one
-    free = scipy.linalg.null_space(columns, rcond=RANK_TOLERANCE)  # (6, d)
-    if free.shape[1] == 0:
+    free = null_rows(columns)  # (d, 6)
+    if len(free) == 0:
         return ()
+    import scipy.linalg  # for the arrays alone that need a known axis
+
     # The basis with ones at d chosen components has the most zeros and reads best.
-    *_, pivots = scipy.linalg.qr(free.T, pivoting=True, mode="economic")
-    basis = np.linalg.solve(free[pivots[: free.shape[1]]].T, free.T)  # (d, 6)
+    *_, pivots = scipy.linalg.qr(free, pivoting=True, mode="economic")
+    basis = np.linalg.solve(free[:, pivots[: len(free)]], free)  # (d, 6)
     return tuple(_motion_in_words(motion / scale) for motion in basis)
 
 

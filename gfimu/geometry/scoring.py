@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gfimu.bounds import rate_bound
+from gfimu.bounds.sample import rate_bound
 from gfimu.errors import InputError
 from gfimu.geometry.array import OMEGA_PRODUCTS, AccelerometerArray
 from gfimu.geometry.dilution import gdop, gdop_lower_bound

@@ -20,7 +20,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from gfimu.bounds import omega_products_jacobian
+from gfimu.bounds.sample import omega_products_jacobian
 from gfimu.errors import GeometryError
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.rate.maximum_likelihood import rate_of_null_space

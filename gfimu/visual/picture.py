@@ -10,7 +10,7 @@ from pathlib import Path
 from gfimu.errors import GeometryError, InputError
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.geometry.turning_axis import TurningAxis
-from gfimu.known_axis import estimate_about_axis
+from gfimu.known_axis.estimation import estimate_about_axis
 from gfimu.motion.estimation import Estimate, estimate
 from gfimu.motion.rest_bias import estimate_from_rest, rest_bias
 from gfimu.recording import Recording

@@ -3,14 +3,56 @@
 import subprocess
 import sys
 
-from gfimu.cli.app import COMMAND_FILES, program
+import pytest
+import typer
+
+from gfimu.cli.app import program
+from gfimu.cli.command_list import COMMANDS
 
 
 def test_a_second_call_finds_the_program_as_the_first_did(gfimu_command):
     first = gfimu_command("--help").stdout
-    assert len(program().registered_commands) == len(program().registered_commands)
     assert gfimu_command("--help").stdout == first
-    assert set(COMMAND_FILES) <= set(first.split())
+    assert set(COMMANDS) <= set(first.split())
+
+
+@pytest.mark.parametrize("name", sorted(COMMANDS))
+def test_the_list_of_commands_prints_the_first_line_of_each_ones_help(name):
+    command = typer.main.get_command(program()).commands[name]
+    assert command.name == name
+    assert COMMANDS[name].help == command.help.splitlines()[0]
+
+
+def test_the_list_of_commands_imports_none_of_them():
+    code = """
+import sys
+from gfimu.cli.app import main
+sys.argv = ["gfimu", "--help"]
+try:
+    main()
+except SystemExit:
+    pass
+names = [name for name in sys.modules if name.startswith(("gfimu.commands", "gfimu.cli.score", "rich"))]
+assert not names, names
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def test_a_score_waits_for_no_compiler():
+    code = """
+import sys
+from gfimu.cli.app import main
+sys.argv = ["gfimu", "score"]
+try:
+    main()
+except SystemExit:
+    pass
+print(*{name.split(".")[0] for name in sys.modules} & {"numba", "scipy", "pyarrow"}, file=sys.stderr)
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert "cube12" in done.stdout
+    assert done.stderr.strip() == ""
 
 
 HEAVY = ("numpy", "scipy", "numba", "pyarrow", "mujoco", "rerun", "matplotlib", "sim", "firmware_bridge")

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from gfimu.bounds import alpha_std, omega_products_jacobian, rate_bound, rate_bound_isotropic, rate_information
+from gfimu.bounds.sample import alpha_std, omega_products_jacobian, rate_bound, rate_bound_isotropic, rate_information
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.geometry.kinematics import omega_products, specific_force

@@ -10,7 +10,8 @@ import gfimu
 from gfimu.errors import GeometryError, InputError
 from gfimu.geometry.array import AccelerometerArray, Chip
 from gfimu.geometry.turning_axis import TurningAxis
-from gfimu.known_axis import axis_bounds, estimate_about_axis
+from gfimu.known_axis.accuracy.bounds import axis_bounds
+from gfimu.known_axis.estimation import estimate_about_axis
 from gfimu.motion.attitude import to_rotation
 from gfimu.recording.mapped import mapped_recording
 

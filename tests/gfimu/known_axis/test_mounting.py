@@ -11,8 +11,8 @@ from turning import NOISE, array_of, mounted
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.geometry.turning_axis import AxisUncertainty, TurningAxis
-from gfimu.known_axis import estimate_about_axis
 from gfimu.known_axis.channels import AxisChannels
+from gfimu.known_axis.estimation import estimate_about_axis
 from gfimu.known_axis.mounting import Mounting
 from gfimu.known_axis.problem import AxisProblem, Settings
 from gfimu.recording import Recording

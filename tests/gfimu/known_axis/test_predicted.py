@@ -7,10 +7,11 @@ from turning import NOISE, RATE, array_of
 import gfimu
 from gfimu.errors import InputError
 from gfimu.geometry.turning_axis import AxisUncertainty, TurningAxis
-from gfimu.known_axis import axis_bounds, estimate_about_axis
+from gfimu.known_axis.accuracy.bounds import axis_bounds
 from gfimu.known_axis.accuracy.predicted import PredictedRun, predicted_estimate
 from gfimu.known_axis.accuracy.predicted_readings import readings_of, spun_up
 from gfimu.known_axis.channels import AxisChannels
+from gfimu.known_axis.estimation import estimate_about_axis
 from gfimu.known_axis.mirror import with_signs
 from gfimu.known_axis.mounting import Mounting
 from gfimu.known_axis.problem import AxisProblem, Settings

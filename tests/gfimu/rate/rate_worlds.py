@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from gfimu.bounds import posterior_rate_bound
+from gfimu.bounds.posterior import posterior_rate_bound
 from gfimu.geometry.array import AccelerometerArray, Chip
 from gfimu.rate.filter import filter_rate
 from gfimu.rate.rest_test import RestTest

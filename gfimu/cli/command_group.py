@@ -1,0 +1,64 @@
+"""The group of all commands: a command's file is imported when the command is called, not before."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Iterator, MutableMapping
+from typing import Any
+
+import typer
+from typer.core import TyperGroup
+
+from gfimu.cli.command_list import COMMANDS, JOBS
+
+__all__ = ["CommandGroup"]
+
+_INDENT = 6  # columns that a list of help takes beside its two texts
+
+
+class CommandGroup(TyperGroup):
+    """The program: commands that load on their first use, listed by job."""
+
+    def __init__(self, **settings: Any) -> None:
+        super().__init__(**settings)
+        self.commands = _Commands()
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write the commands of each job, without importing any."""
+        del ctx
+        width = max(map(len, COMMANDS))
+        for job, entries in JOBS.items():
+            with formatter.section(job):
+                formatter.write_dl([(entry.name.ljust(width), entry.help) for entry in entries])
+
+
+class _Commands(MutableMapping[str, Any]):
+    """Commands by name, each made when it is asked for."""
+
+    def __init__(self) -> None:
+        self._loaded: dict[str, Any] = {}
+
+    def __getitem__(self, name: str) -> Any:
+        if name not in self._loaded:
+            app = typer.Typer(rich_markup_mode="markdown")
+            app.callback()(_no_options)  # a group even where a file registers one command
+            importlib.import_module(f"gfimu.cli.{COMMANDS[name].file}").register(app)
+            group = typer.main.get_command(app)
+            self._loaded |= group.commands  # type: ignore[attr-defined]
+        return self._loaded[name]
+
+    def __setitem__(self, name: str, command: Any) -> None:
+        self._loaded[name] = command
+
+    def __delitem__(self, name: str) -> None:
+        del self._loaded[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(COMMANDS)
+
+    def __len__(self) -> int:
+        return len(COMMANDS)
+
+
+def _no_options() -> None:
+    """Take no options."""

@@ -1,0 +1,117 @@
+"""The commands of the program by job, each with the file that holds it and its line of help.
+
+The table stands here, and not in the files, so that ``gfimu --help`` imports none of them and a command only its own.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+__all__ = ["COMMANDS", "JOBS", "Entry"]
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One command: its name, its line of help, and the file of `gfimu.cli` that registers it."""
+
+    name: str
+    help: str
+    file: str
+
+
+JOBS: dict[str, tuple[Entry, ...]] = {
+    "First steps": (
+        Entry(
+            "demo",
+            "Run the paper's experiment in simulation: geometry, recording, estimate, drift, picture, diagnosis.",
+            "demo",
+        ),
+        Entry("list", "List what comes with gfimu.", "list"),
+        Entry(
+            "show",
+            "Print a file that comes with gfimu, a checked file of one's own, or the array of a recording.",
+            "show",
+        ),
+        Entry("new", "Write a commented file to edit.", "new"),
+    ),
+    "Bring a recording": (
+        Entry(
+            "inspect",
+            "Show what a file holds (columns, units, rate, gaps, rails, corrupt values, chips) and a column map "
+            "to start from.",
+            "inspect",
+        ),
+        Entry(
+            "convert",
+            "Convert a recording between CSV and Parquet, or import a MIMU4444 stream or a foreign file. Readings "
+            "become m/s².",
+            "convert",
+        ),
+        Entry(
+            "join",
+            "Find the offset and the rate error between two clocks, and put channels and reference into one recording.",
+            "join",
+        ),
+        Entry("record", "Record from a board (real or virtual), with the angular rate shown as it comes.", "record"),
+    ),
+    "Calibrate and estimate": (
+        Entry(
+            "calibrate",
+            "Calibrate the accelerometers of a recording, each parameter with its standard deviation.",
+            "calibrate",
+        ),
+        Entry(
+            "noise",
+            "Identify velocity random walk N, bias instability B, acceleration random walk K, "
+            "quantisation Q and ramp R.",
+            "noise",
+        ),
+        Entry("estimate", "Estimate p, α, ω, attitude and table angle from a recording.", "estimate"),
+        Entry(
+            "live",
+            "Estimate the angular rate while samples arrive: CSV lines in, one JSON line per sample out.",
+            "live",
+        ),
+        Entry(
+            "view", "Open a run in the rerun viewer: the rig in 3-D, raw channels, and the estimate over time.", "view"
+        ),
+    ),
+    "Find what a simulation gets wrong": (
+        Entry(
+            "check",
+            "Look at recordings before a diagnosis: quality of the data, effects their motion separates, what to "
+            "record next.",
+            "check",
+        ),
+        Entry(
+            "diagnose",
+            "Show what a simulation gets wrong against recordings, name the cause, extend the simulation, measure the "
+            "gain.",
+            "diagnose",
+        ),
+        Entry("design", "Propose the table profile, or the mounting, that best separates effects.", "design"),
+    ),
+    "Design and simulate": (
+        Entry(
+            "score",
+            "Score array geometries: condition number, GDOP, errors per axis, what ω² leaves, what ω can be seen.",
+            "score",
+        ),
+        Entry("optimize", "Search the geometry of least GDOP for a number of chips in a box.", "score"),
+        Entry(
+            "drift",
+            "Position-drift budget of an array: closed forms, their validity limit, Monte Carlo beside.",
+            "drift",
+        ),
+        Entry(
+            "simulate",
+            "Simulate a scenario on the MuJoCo turntable and write what the board would have recorded.",
+            "simulate",
+        ),
+        Entry("firmware", "The LPC1768 image in the emulator: run, build, selftest, trace, faults.", "firmware"),
+    ),
+}
+"""Commands by job, in the order of the help."""
+
+COMMANDS: dict[str, Entry] = {entry.name: entry for entries in JOBS.values() for entry in entries}
+"""Commands by name."""
