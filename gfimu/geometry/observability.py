@@ -9,7 +9,15 @@ from gfimu.errors import GeometryError
 from gfimu.files.model_files import list_models
 from gfimu.geometry.array import AccelerometerArray
 
-__all__ = ["MOTION_NAMES", "RANK_TOLERANCE", "null_rows", "require_all_motions", "seeing_arrays", "unseen_motions"]
+__all__ = [
+    "MOTION_NAMES",
+    "RANK_TOLERANCE",
+    "null_rows",
+    "require_all_motions",
+    "seeing_arrays",
+    "sees_all_motions",
+    "unseen_motions",
+]
 
 MOTION_NAMES = ("alpha_x", "alpha_y", "alpha_z", "p_x", "p_y", "p_z")
 """Order of the columns of J and of the rows of its left inverse."""
@@ -42,9 +50,15 @@ def unseen_motions(array: AccelerometerArray) -> tuple[str, ...]:
     return tuple(_motion_in_words(motion / scale) for motion in basis)
 
 
+def sees_all_motions(array: AccelerometerArray) -> bool:
+    """Whether J has rank 6."""
+    scale = np.array([array.length_unit] * 3 + [1.0] * 3)
+    return len(null_rows(array.regression_matrix / scale)) == 0
+
+
 def seeing_arrays() -> list[str]:
     """Return the names of the shipped arrays that see all six motions; the others need a known axis."""
-    return [name for name in list_models("arrays") if not unseen_motions(AccelerometerArray.load(name))]
+    return [name for name in list_models("arrays") if sees_all_motions(AccelerometerArray.load(name))]
 
 
 def require_all_motions(array: AccelerometerArray) -> None:
