@@ -73,6 +73,9 @@ if TYPE_CHECKING:
     from gfimu.geometry.kinematics import pseudo_inverse as pseudo_inverse
     from gfimu.geometry.kinematics import specific_force as specific_force
     from gfimu.motion.attitude import integrate_attitude as integrate_attitude
+    from gfimu.motion.earth import EarthRotation as EarthRotation
+    from gfimu.motion.equivalent_errors import equivalent_p_bias as equivalent_p_bias
+    from gfimu.motion.equivalent_errors import equivalent_rate_drift as equivalent_rate_drift
     from gfimu.motion.estimate_summary import centripetal_agreement as centripetal_agreement
     from gfimu.motion.estimate_summary import summarise as summarise
     from gfimu.motion.estimation import Estimate as Estimate
@@ -80,7 +83,6 @@ if TYPE_CHECKING:
     from gfimu.motion.navigation import navigate as navigate
     from gfimu.motion.rest_bias import estimate_from_rest as estimate_from_rest
     from gfimu.position_drift import drift_budget as drift_budget
-    from gfimu.position_drift import equivalent_rate_drift as equivalent_rate_drift
     from gfimu.position_drift.closed_forms import ErrorSources as ErrorSources
     from gfimu.position_drift.monte_carlo import monte_carlo_drift as monte_carlo_drift
     from gfimu.rate.integration import integrate_rate as integrate_rate
@@ -99,6 +101,7 @@ __version__ = "0.1.0"
 
 _PUBLIC = {
     "AccelerometerArray": "gfimu.geometry.array",
+    "EarthRotation": "gfimu.motion.earth",
     "Calibration": "gfimu.calibration.result",
     "Chip": "gfimu.geometry.array",
     "ErrorSources": "gfimu.position_drift.closed_forms",
@@ -126,7 +129,8 @@ _PUBLIC = {
     "axis_drift": "gfimu.commands.drift",
     "drift": "gfimu.commands.drift",
     "drift_budget": "gfimu.position_drift",
-    "equivalent_rate_drift": "gfimu.position_drift",
+    "equivalent_p_bias": "gfimu.motion.equivalent_errors",
+    "equivalent_rate_drift": "gfimu.motion.equivalent_errors",
     "estimate": "gfimu.commands.estimate",
     "estimate_from_rest": "gfimu.motion.rest_bias",
     "estimate_rate": "gfimu.rate.methods",

@@ -14,6 +14,8 @@ from gfimu.errors import InputError
 from gfimu.files.model_files import find_model, read_toml
 from gfimu.files.schema import NotNegative, Positive, Table, Triple, about, read
 from gfimu.geometry.array import AccelerometerArray
+from gfimu.geometry.gravity import local_gravity
+from gfimu.motion.earth import EarthRotation
 from gfimu.units import STANDARD_GRAVITY
 from sim.adxl345 import SensorSettings
 from sim.data_sheet import DataSheet
@@ -22,6 +24,9 @@ from sim.motion_file import MotionTable, ProfileTable
 from sim.twin_file import Inclination
 
 __all__ = ["ReferenceSettings", "ScenarioFile", "scenario_fields"]
+
+Latitude = Annotated[float, msgspec.Meta(ge=-90.0, le=90.0)]
+"""Geodetic latitude, degrees."""
 
 _TWIN_MOTION = "paper_run"  # the motion of a twin file, which has none of its own
 _CARRIAGE_MOTION = "linear_axis"  # that of a twin file of a linear axis
@@ -174,7 +179,17 @@ class ScenarioFile(Table, frozen=True):
     description: Annotated[str, about("One line for people.")] = ""
     duration_s: Annotated[Positive | None, about("Length of the run.", "s", default="the length of the motion")] = None
     sample_rate_hz: Annotated[Positive, about("Sample rate.", "Hz")] = 100.0
-    gravity_m_s2: Annotated[Positive, about("Local gravity.", "m/s²")] = STANDARD_GRAVITY
+    gravity_m_s2: Annotated[
+        Positive | None,
+        about("Local gravity.", "m/s²", default="9.80665, or with a latitude the normal gravity there"),
+    ] = None
+    latitude_deg: Annotated[
+        Latitude | None,
+        about("Latitude: the world turns with the Earth.", "°", default="the world does not turn"),
+    ] = None
+    north_rad: Annotated[
+        float, about("With a latitude: direction of north from the world's x-axis, about up.", "rad")
+    ] = 0.0
     cube_offset_m: Annotated[
         Triple, about("Body origin from the point of the axis at table height, table frame.", "m")
     ] = (0.0, 0.0, 0.06)
@@ -231,7 +246,8 @@ def scenario_fields(data: Mapping[str, Any], source: str, beside: Path | None) -
         "sensor": file.sensor.settings(file.sample_rate_hz, sheet),
         "part": part,
         "chips_seed": file.sensor.chips_seed,
-        "gravity": file.gravity_m_s2,
+        "gravity": _gravity(file),
+        "earth": None if file.latitude_deg is None else EarthRotation(file.latitude_deg, file.north_rad),
         "cube_offset": file.cube_offset_m,
         "mounting_rotvec": file.mounting_rotvec_rad,
         "axis_inclination": file.axis_inclination_rad,
@@ -241,6 +257,13 @@ def scenario_fields(data: Mapping[str, Any], source: str, beside: Path | None) -
         "effects": tuple(table.effect(array, source) for table in file.effect),
         "temperature": file.temperature.course(),
     }
+
+
+def _gravity(file: ScenarioFile) -> float:
+    """Return the gravity of the file, or that of its latitude, m/s²."""
+    if file.gravity_m_s2 is not None:
+        return file.gravity_m_s2
+    return STANDARD_GRAVITY if file.latitude_deg is None else local_gravity(file.latitude_deg)
 
 
 def _with_motion(data: Mapping[str, Any]) -> Mapping[str, Any]:

@@ -16,6 +16,7 @@ from gfimu.errors import InputError
 from gfimu.files.keys import set_key
 from gfimu.files.model_files import find_model, read_toml
 from gfimu.geometry.array import AccelerometerArray
+from gfimu.motion.earth import EarthRotation
 from gfimu.recording import Recording
 from gfimu.recording.carried_array import array_metadata
 from gfimu.short_repr import short_repr
@@ -24,6 +25,7 @@ from sim import forward
 from sim.adxl345 import Sensor, SensorSettings
 from sim.carried import Carriage, Wheel
 from sim.conversions import conversion_groups
+from sim.earth import earth_in_body
 from sim.effects import NOT_OF_A_CARRIAGE, Effect, apply_effects
 from sim.effects.unlisted import Unlisted
 from sim.motion import BodyMotion, BodyState, SpinMotion, SpinState
@@ -61,6 +63,8 @@ class Scenario:
         Which chips: the seed of their errors; by default it follows from the seed of the run.
     gravity : float
         Local gravity, m/s².
+    earth : EarthRotation, optional
+        The Earth's rotation at the place; without it the world does not turn.
     cube_offset : tuple of float
         Cube centre from the point of the axis at table height, table frame, m.
     mounting_rotvec : tuple of float
@@ -90,6 +94,7 @@ class Scenario:
     part: str | None = None
     chips_seed: int | None = None
     gravity: float = STANDARD_GRAVITY
+    earth: EarthRotation | None = None
     cube_offset: tuple[float, float, float] = (0.0, 0.0, 0.06)
     mounting_rotvec: tuple[float, float, float] = (0.0, 0.0, 0.0)
     axis_inclination: float = 0.0
@@ -113,6 +118,7 @@ class Scenario:
         nominal = World(
             self.array,
             gravity=self.gravity,
+            earth_rate=None if self.earth is None else self.earth.rate,
             cube_offset=np.array(self.cube_offset),
             mount_rotvec=np.array(self.mounting_rotvec),
             axis_rotvec=np.array([self.axis_inclination, 0.0, 0.0]),
@@ -309,6 +315,8 @@ def _references(
     if quality.gyro_noise_std is not None:
         late = command.at(t / (1.0 + world.clock_ratio) - world.tacho_delay) if run.free else body
         rates = late.omega if isinstance(late, BodyState) else body.omega
+        if world.earth_rate is not None:  # a gyro measures the rate against the stars
+            rates = rates + earth_in_body(world.earth_rate, late if isinstance(late, BodyState) else body)
         gyro = rates @ world.gyro_matrix.T + rng.normal(size=body.omega.shape) * quality.gyro_noise_std
         columns |= {f"gyro_{axis}_rad_s": gyro[:, place] for place, axis in enumerate("xyz")}
     return columns
@@ -342,6 +350,7 @@ def _metadata(run: Scenario, sensor: Sensor, seed: int) -> dict[str, Any]:
         "seed": seed,
         "software_version": gfimu.__version__,
         "mounting_rotvec_rad": list(run.mounting_rotvec),
+        **({} if run.earth is None else run.earth.to_dict()),
         "lsb_m_s2": float(sensor.lsb[0]),
         "effects": [{"name": effect.name, "parameters": effect.parameters} for effect in run.effects],
         "truth_bias_m_s2": errors,

@@ -24,8 +24,10 @@ from gfimu.errors import InputError
 from gfimu.files.model_files import find_model
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.short_repr import short_repr
+from sim.earth import earth_readings
 from sim.forward import arm_growth, lean_states
 from sim.motion import BodyMotion, BodyState, SpinMotion, SpinState, SplineSpin
+from sim.truth import cube_state
 from sim.world import Nod, World
 
 __all__ = ["DrivenRun", "drive", "free_model", "prescribed_readings", "turntable_model"]
@@ -128,7 +130,12 @@ def prescribed_readings(world: World, motion: SpinMotion | BodyMotion, t: NDArra
         times = chip_times[:, int(np.argmax(together))]
         imposed = _imposed(world, model, motion, times)
         channels = together[world.array.chip_of_channel]
-        readings[:, channels] = _inverse(model, *imposed, gravity=_gravity(world, motion, times))[:, channels]
+        ideal = _inverse(model, *imposed, gravity=_gravity(world, motion, times))
+        if world.earth_rate is not None:
+            state = motion.at(times)
+            body = state if isinstance(state, BodyState) else cube_state(world, state)
+            ideal += earth_readings(world.array, world.earth_rate, body)
+        readings[:, channels] = ideal[:, channels]
     return readings
 
 

@@ -161,6 +161,9 @@ class World:
         True geometry of the chips in the cube frame.
     gravity : float
         Local gravity, m/s².
+    earth_rate : ndarray, shape (3,), optional
+        Rate of the world against the stars, world axes, rad/s; MuJoCo's readings hold it (`sim.earth`), the analytic
+        ones do not.
     cube_offset : ndarray, shape (3,)
         Cube centre from the point of the axis at table height, table frame, m.
     mount_rotvec : ndarray, shape (3,)
@@ -208,6 +211,7 @@ class World:
 
     array: AccelerometerArray
     gravity: float = STANDARD_GRAVITY
+    earth_rate: NDArray[np.float64] | None = None
     cube_offset: NDArray[np.float64] = field(default_factory=lambda: np.array([0.0, 0.0, 0.06]))
     mount_rotvec: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
     axis_rotvec: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))

@@ -22,11 +22,12 @@ from gfimu.cli.axis_options import (
 from gfimu.cli.mapped import MapOption, MapSetOption
 from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, print_text, progress
 from gfimu.rate.registry import RATE_METHODS, rate_method, recursive_methods
+from gfimu.units import STANDARD_GRAVITY
 
 if TYPE_CHECKING:
     import numpy as np
 
-    from gfimu.motion.estimate_summary import EstimateSummary
+    from gfimu.motion.estimate_summary import EstimateSummary, PositionSummary
 
 __all__ = ["register"]
 
@@ -60,6 +61,14 @@ def _estimate(
     ] = False,
     gyro: Annotated[bool, typer.Option("--gyro", help=f"Fuse the recording's gyro ({_RECURSIVE}).")] = False,
     position: Annotated[bool, typer.Option("--position", help="Integrate to velocity and position too.")] = False,
+    latitude: Annotated[
+        float | None,
+        typer.Option("--latitude", help="Latitude, degrees: the Earth's rotation and the local gravity from it."),
+    ] = None,
+    north_rad: Annotated[
+        float | None,
+        typer.Option("--north-rad", help="With --latitude: north from the x-axis at the start, about up, rad; else 0."),
+    ] = None,
     force: Annotated[
         bool, typer.Option("--force", help="Go on where the checks of units, time, array and channels refuse the file.")
     ] = False,
@@ -111,6 +120,8 @@ def _estimate(
             omega0=None if unknown_start else (0.0, 0.0, 0.0),
             fuse_gyro=gyro,
             with_position=position,
+            latitude=latitude,
+            north_rad=north_rad,
             force=force,
             keep_faulty=keep_faulty,
             progress=lambda share: done(share, f"estimating by {method}"),
@@ -179,8 +190,29 @@ def _print_summary(summary: EstimateSummary) -> None:
     if summary.channels_left_out:
         rows.append(("channels left out", ", ".join(summary.channels_left_out), ""))
     print_table(f"{summary.array}, method {summary.method}, {summary.form} form", ("quantity", "value", "unit"), rows)
+    if summary.position is not None:
+        _print_position(summary.position)
     if summary.mounting is not None:
         _print_mounting(summary.mounting)
+
+
+def _print_position(position: PositionSummary) -> None:
+    """Print where navigation ends, and the constant errors that would explain it."""
+    bias_mg = 1e3 * position.equivalent_p_bias_m_s2 / STANDARD_GRAVITY
+    rows = [
+        ("position x y z", "  ".join(f"{value:.4g}" for value in position.position_m), "m"),
+        ("equivalent bias of p, x y z: 2 r/t²", "  ".join(f"{value:.4g}" for value in bias_mg), "mg"),
+        ("equivalent drift of ω: 6 r/(g t³)", f"{position.equivalent_rate_drift_deg_h:.4g}", "°/h"),
+    ]
+    if position.earth_horizontal_rate_deg_h is not None:
+        rows.append(("Earth's horizontal rate, taken off", f"{position.earth_horizontal_rate_deg_h:.4g}", "°/h"))
+    print_table(
+        f"Position in the world after {position.after_s:.4g} s",
+        ("quantity", "value", "unit"),
+        rows,
+        note="The equivalent errors hold for a body that ends where it started: r is then all error. The drift is that "
+        "of the horizontal part.",
+    )
 
 
 def _print_mounting(mounting: Mapping[str, Any]) -> None:

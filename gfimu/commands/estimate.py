@@ -69,6 +69,8 @@ def estimate(
     unknown_start: bool = False,
     gyro: bool = False,
     position: bool = False,
+    latitude: float | None = None,
+    north_rad: float | None = None,
     rrd: str | Path | None = None,
     force: bool = False,
     keep_faulty: bool = False,
@@ -120,6 +122,12 @@ def estimate(
         Fuse the recording's gyro (filter, smoother); two names of one argument.
     position, with_position : bool
         Integrate to velocity and position as well; two names of one argument.
+    latitude : float, optional
+        Latitude, degrees: the Earth's rotation and the local gravity from it are taken into account
+        (`gfimu.motion.earth`). By default the recording's own (metadata ``latitude_deg``), or none.
+    north_rad : float, optional
+        Direction of north from the world's x-axis (for a levelled body: from its own at the start), about up, rad.
+        By default the recording's own (metadata ``north_rad``), or 0.
     rrd : str or Path, optional
         Rerun recording to write.
     force : bool
@@ -159,6 +167,8 @@ def estimate(
         noise_std=noise_std,
         fuse_gyro=gyro or fuse_gyro,
         with_position=position or with_position,
+        latitude=latitude,
+        north_rad=north_rad,
         force=force,
         keep_faulty=keep_faulty,
         progress=progress,
@@ -178,6 +188,8 @@ def estimate_run(
     map_set: Sequence[str] = (),
     axis: TurningAxis | None = None,
     uncertainty: AxisUncertainty | None = None,
+    latitude: float | None = None,
+    north_rad: float | None = None,
     **options: Any,
 ) -> EstimatedRun:
     """Estimate and keep the recording and array beside the result, for a summary; ``options`` as `estimate`.
@@ -188,6 +200,7 @@ def estimate_run(
         As `estimate`.
     """
     from gfimu.commands.opened import by_map
+    from gfimu.errors import InputError
     from gfimu.motion.estimation import estimate as solve
     from gfimu.motion.rest_bias import estimate_from_rest
     from gfimu.recording.reference_times import reference_on_rows
@@ -196,9 +209,12 @@ def estimate_run(
     run = reference_on_rows(run)
     turning = _turning(axis, geometry, uncertainty)
     if turning is not None:
+        if latitude is not None:
+            raise InputError("--latitude has no use with --axis: the rate about one axis is all that is estimated")
         found = _about_axis(run, geometry, turning, rest_bias=rest_bias, **options)
     else:
         _require_all_motions(run, geometry)
+        options |= _place(run, latitude, north_rad)
         found = (estimate_from_rest if rest_bias else solve)(run, geometry, **options)
     if out is not None:
         found.write(out)
@@ -207,6 +223,21 @@ def estimate_run(
 
         write_run(rrd, run, _with_axis(geometry, found), estimate=found)
     return EstimatedRun(found, run, geometry)
+
+
+def _place(recording: Recording, latitude: float | None, north_rad: float | None) -> dict[str, Any]:
+    """Return the Earth's rotation and the gravity of a place, given or of the recording, as options of the estimate."""
+    from gfimu.errors import InputError
+    from gfimu.geometry.gravity import local_gravity
+    from gfimu.motion.earth import EarthRotation
+
+    place = recording.metadata.get("latitude_deg") if latitude is None else latitude
+    if place is None:
+        if north_rad is not None:
+            raise InputError("the direction of north has no use without a latitude; give that too (--latitude)")
+        return {}
+    north = float(recording.metadata.get("north_rad", 0.0)) if north_rad is None else north_rad
+    return {"earth": EarthRotation(float(place), north), "gravity": local_gravity(float(place))}
 
 
 def _with_axis(array: AccelerometerArray, estimate: Estimate) -> AccelerometerArray:

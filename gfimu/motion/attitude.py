@@ -183,7 +183,7 @@ def _propagate_by_rotation_vectors(t, omega, alpha, q0, coning, fourth_order):  
     n = len(t)
     result = np.empty((n, 4))
     w, x, y, z = q0[0], q0[1], q0[2], q0[3]
-    result[:1] = q0
+    result[0, 0], result[0, 1], result[0, 2], result[0, 3] = w, x, y, z  # a slice would compile five times as long
     for i in range(n - 1):
         h = t[i + 1] - t[i]
         ax, ay, az = omega[i, 0], omega[i, 1], omega[i, 2]
@@ -240,7 +240,7 @@ def _propagate_by_runge_kutta(t, omega, q0):  # type: ignore[no-untyped-def]
     n = len(t)
     result = np.empty((n, 4))
     w, x, y, z = q0[0], q0[1], q0[2], q0[3]
-    result[:1] = q0
+    result[0, 0], result[0, 1], result[0, 2], result[0, 3] = w, x, y, z  # a slice would compile five times as long
     for i in range(n - 1):
         h = t[i + 1] - t[i]
         ax, ay, az = omega[i, 0], omega[i, 1], omega[i, 2]

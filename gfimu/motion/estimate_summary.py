@@ -14,11 +14,13 @@ from scipy.spatial.transform import Rotation
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.geometry.kinematics import null_space, omega_products
 from gfimu.geometry.observability import unseen_motions
+from gfimu.motion.earth import EarthRotation
+from gfimu.motion.equivalent_errors import equivalent_p_bias, equivalent_rate_drift
 from gfimu.motion.estimation import Estimate
 from gfimu.recording import Recording
 from gfimu.short_repr import short_repr
 
-__all__ = ["Agreement", "EstimateSummary", "centripetal_agreement", "summarise"]
+__all__ = ["Agreement", "EstimateSummary", "PositionSummary", "centripetal_agreement", "summarise"]
 
 _AXES = ("x", "y", "z")
 _TURNING_RATE = 2.0
@@ -41,6 +43,32 @@ class Agreement:
     slope: float
     correlation: float
     samples: int
+
+
+@dataclass(frozen=True)
+class PositionSummary:
+    """Where navigation ends, and the constant errors that would explain it if the body had stayed where it was.
+
+    Parameters
+    ----------
+    after_s : float
+        Time since the start of navigation, s.
+    position_m : ndarray, shape (3,)
+        Position of the body origin at the end, world axes, m.
+    equivalent_p_bias_m_s2 : ndarray, shape (3,)
+        Constant bias of p, world axes, m/s² (`gfimu.motion.equivalent_errors.equivalent_p_bias`).
+    equivalent_rate_drift_deg_h : float
+        Constant drift of the rate that explains the horizontal part, °/h
+        (`gfimu.motion.equivalent_errors.equivalent_rate_drift`).
+    earth_horizontal_rate_deg_h : float or None
+        Horizontal part of the Earth's rate at the place, °/h: the drift of a unit that does not take it into account.
+    """
+
+    after_s: float
+    position_m: NDArray[np.float64]
+    equivalent_p_bias_m_s2: NDArray[np.float64]
+    equivalent_rate_drift_deg_h: float
+    earth_horizontal_rate_deg_h: float | None
 
 
 @dataclass(frozen=True)
@@ -69,6 +97,8 @@ class EstimateSummary:
         Of the filter's or smoother's innovations: the figures of `gfimu.rate.consistency.Consistency`.
     mounting : mapping or None
         About a known axis: constants of the mounting that were estimated (`gfimu.known_axis.mounting_fit`).
+    position : PositionSummary or None
+        Where navigation ends, where the position was asked for.
     health : mapping or None
         Faults of channels that were found and left out (`gfimu.integrity.fault.ChannelHealth`), where it was looked.
     channels_left_out : tuple of str
@@ -95,6 +125,7 @@ class EstimateSummary:
     centripetal: Agreement | None
     consistency: Mapping[str, Any] | None = None
     mounting: Mapping[str, Any] | None = None
+    position: PositionSummary | None = None
     health: Mapping[str, Any] | None = None
     channels_left_out: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
@@ -145,9 +176,31 @@ def summarise(estimate: Estimate, recording: Recording, array: AccelerometerArra
         centripetal=None if unseen_motions(array) else centripetal_agreement(recording, array),
         consistency=consistency,
         mounting=estimate.metadata.get("mounting"),
+        position=_position(estimate),
         health=estimate.metadata.get("health"),
         channels_left_out=tuple(estimate.metadata.get("channels_left_out", ())),
         warnings=(*estimate.metadata.get("warnings", ()), *_inconsistency(consistency)),
+    )
+
+
+def _position(estimate: Estimate) -> PositionSummary | None:
+    """Sum up the position at the last sample that has one."""
+    if estimate.position is None:
+        return None
+    known = np.flatnonzero(np.isfinite(estimate.position).all(axis=1))
+    if len(known) < 2:
+        return None
+    end = estimate.position[known[-1]]
+    after = float(estimate.t_s[known[-1]] - estimate.t_s[known[0]])
+    latitude = estimate.metadata.get("latitude_deg")
+    return PositionSummary(
+        after_s=after,
+        position_m=end,
+        equivalent_p_bias_m_s2=equivalent_p_bias(end, after),
+        equivalent_rate_drift_deg_h=float(equivalent_rate_drift(math.hypot(end[0], end[1]), after)),
+        earth_horizontal_rate_deg_h=None
+        if latitude is None
+        else math.degrees(EarthRotation(float(latitude)).horizontal_rate) * 3600.0,
     )
 
 

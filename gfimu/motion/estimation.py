@@ -24,6 +24,7 @@ from gfimu.geometry.array import OMEGA_PRODUCTS, AccelerometerArray
 from gfimu.geometry.linear_solution import linear_solution
 from gfimu.integrity.fault import ChannelHealth
 from gfimu.motion.attitude import from_rotation, integrate_attitude, table_angle, to_rotation
+from gfimu.motion.earth import EarthRotation
 from gfimu.motion.navigation import level, navigate
 from gfimu.motion.rest_navigation import navigate_with_rest
 from gfimu.parts.part import white_noise_std
@@ -40,6 +41,7 @@ from gfimu.recording import Recording
 from gfimu.recording.checks import Finding, check_recording, refuse_or_warn, without_dead_channels
 from gfimu.recording.clipping import without_clipped
 from gfimu.short_repr import joined, timing
+from gfimu.units import STANDARD_GRAVITY
 
 __all__ = ["Estimate", "estimate"]
 
@@ -176,6 +178,8 @@ def estimate(
     quaternion0: ArrayLike | None = None,
     noise_std: ArrayLike | None = None,
     with_position: bool = False,
+    earth: EarthRotation | None = None,
+    gravity: float = STANDARD_GRAVITY,
     fuse_gyro: bool = False,
     force: bool = False,
     keep_faulty: bool = False,
@@ -203,6 +207,11 @@ def estimate(
         Standard deviation of one sample of each channel, m/s²; by default from the parts' data sheets.
     with_position : bool
         Whether to integrate p to velocity and position as well, from rest at the origin.
+    earth : EarthRotation, optional
+        The Earth's rotation at the place: a body that starts at rest turns with it, and attitude, angle, velocity and
+        position are those in the world that turns. ω stays what the array measures, the rate against the stars.
+    gravity : float
+        Local gravity for the position, m/s².
     fuse_gyro : bool
         Whether ``filter`` and ``smoother`` use the recording's gyro as well.
     force : bool
@@ -258,6 +267,9 @@ def estimate(
     temperature = recording.reference.get("temperature_degC")
     problem = RateProblem(array, recording.t_s, readings, noise, linear, rate0, gyro, temperature, progress)
     dead = [name for finding in found if finding.kind == "dead" for name in finding.channels]
+    if earth is not None and rate0 is not None and not rate0.any():  # at rest a body turns with the Earth
+        first = _initial_attitude(recording, linear.motion, np.zeros((len(readings), 3)), quaternion0)
+        problem = replace(problem, omega0=earth.in_body(first))
     try:
         rate = _solve_rate(chosen, problem)
     except InputError as error:
@@ -267,21 +279,21 @@ def estimate(
         raise InputError(f"without the dead {names}: {error}; --method filter may do without it") from None
     motion = linear.with_omega(rate.omega)
     alpha, p = motion[:, :3], motion[:, 3:]
-    start = (
-        _initial_attitude(recording, motion, rate.omega)
-        if quaternion0 is None
-        else np.asarray(quaternion0, dtype=float)
-    )
+    start = _initial_attitude(recording, motion, rate.omega, quaternion0)
     quaternion = integrate_attitude(recording.t_s, rate.omega, alpha, start)
+    turning = rate.omega
+    if earth is not None:
+        quaternion = earth.attitude_in_world(recording.t_s, quaternion)
+        turning = rate.omega - earth.in_body(quaternion)
     mounting = Rotation.from_rotvec(recording.mounting_rotvec)
     axis = mounting.inv().apply([0.0, 0.0, 1.0])  # the table's axis in body axes
     travelled = None
     if rate.rest is not None and rate.rest.any():  # gravity shows the tilt there, and the velocity is zero
-        levelled = navigate_with_rest(recording.t_s, p, quaternion, rate.rest)
+        levelled = navigate_with_rest(recording.t_s, p, quaternion, rate.rest, gravity=gravity, earth=earth)
         quaternion = levelled.quaternion
         travelled = levelled if with_position else None
     elif with_position:
-        travelled = navigate(recording.t_s, p, quaternion)
+        travelled = navigate(recording.t_s, p, quaternion, gravity=gravity, earth=earth)
     return Estimate(
         t_s=recording.t_s,
         p=p,
@@ -289,7 +301,7 @@ def estimate(
         omega=rate.omega,
         omega_std=rate.omega_std,
         quaternion=quaternion,
-        angle=table_angle(recording.t_s, rate.omega, axis=axis),
+        angle=table_angle(recording.t_s, turning, axis=axis),
         omega_products=linear.omega_products,
         omega_products_std=linear.omega_products_std,
         velocity=None if travelled is None else travelled.velocity,
@@ -303,6 +315,7 @@ def estimate(
             "warnings": [finding.text for finding in found] + ([] if health is None else health.sentences()),
             "health": None if health is None else health.to_dict(),
             "channels_left_out": dead,
+            **({} if earth is None else earth.to_dict()),
             "mounting_rotvec_rad": recording.mounting_rotvec.tolist(),
             "format_version": FORMAT_VERSION,
             "software_version": __version__,
@@ -457,9 +470,11 @@ def _gyro(recording: Recording) -> NDArray[np.float64]:
 
 
 def _initial_attitude(
-    recording: Recording, motion: NDArray[np.float64], omega: NDArray[np.float64]
+    recording: Recording, motion: NDArray[np.float64], omega: NDArray[np.float64], given: ArrayLike | None
 ) -> NDArray[np.float64]:
-    """Attitude at the first sample: as mounted if the recording says so, else levelled."""
+    """Attitude at the first sample: as given, else as mounted if the recording says so, else levelled."""
+    if given is not None:
+        return np.asarray(given, dtype=float)
     if "mounting_rotvec_rad" in recording.metadata:
         return from_rotation(Rotation.from_rotvec(recording.mounting_rotvec))
     known = np.flatnonzero(np.isfinite(motion).all(axis=1) & np.isfinite(omega).all(axis=1))

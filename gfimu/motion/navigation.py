@@ -1,8 +1,8 @@
 """Strapdown navigation: velocity and position from specific force and attitude; levelling at rest.
 
 World: z up, gravity (0, 0, −g). In the world v̇ = R(q) p + (0, 0, −g), with p the specific force of the body origin in
-body axes. The runs last minutes at most, so Earth rotation (15 °/h) is left out: it is far below what accelerometers
-of this class resolve, and a budget of drift tells by how much (`gfimu.position_drift`).
+body axes. Where the latitude is given, the Coriolis acceleration −2 Ω × v of the turning Earth is added
+(`gfimu.motion.earth`); the attitude is that to the turning world.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from gfimu.errors import InputError
 from gfimu.motion.attitude import from_rotation, to_rotation
+from gfimu.motion.earth import EarthRotation
 from gfimu.rate.integration import integrate_samples
 from gfimu.short_repr import short_repr
 from gfimu.units import STANDARD_GRAVITY
@@ -88,6 +89,7 @@ def navigate(
     gravity: float = STANDARD_GRAVITY,
     velocity0: ArrayLike = (0.0, 0.0, 0.0),
     position0: ArrayLike = (0.0, 0.0, 0.0),
+    earth: EarthRotation | None = None,
     method: str = "runge_kutta",
 ) -> NavigationResult:
     """Integrate specific force to velocity and position (GF-IMU paper, step 10 (f)).
@@ -104,6 +106,8 @@ def navigate(
         Magnitude of gravity, m/s².
     velocity0, position0 : array_like, shape (3,)
         Velocity, m/s, and position, m, in world axes at the first valid sample.
+    earth : EarthRotation, optional
+        The Earth's rotation at the place; its Coriolis acceleration is left out by default.
     method : str
         Quadrature, as for `gfimu.rate.integration.integrate_rate`.
 
@@ -132,4 +136,7 @@ def navigate(
     acceleration[:, 2] -= gravity
     velocity = integrate_samples(times, acceleration, velocity0, method=method)
     position = integrate_samples(times, velocity, position0, method=method)
+    if earth is not None:  # to first order in Ω: the displacement without it is near enough
+        velocity = velocity + earth.coriolis(position - np.asarray(position0, dtype=float))
+        position = integrate_samples(times, velocity, position0, method=method)
     return NavigationResult(times, attitude, velocity, position)

@@ -184,7 +184,9 @@ def estimate_from_rest(
     dead = [name for finding in findings if finding.kind == "dead" for name in finding.channels]
     found = rest_bias(recording, array, gravity=gravity, without=dead)
     findings += refuse_or_warn(found.findings(), force=force)
-    result = estimate(found.remove(recording), array, method=method, findings=findings, force=force, **options)
+    result = estimate(
+        found.remove(recording), array, method=method, findings=findings, force=force, gravity=gravity, **options
+    )
     left = found.rate_std(result.t_s) if rate_method(method).open_loop else 0.0
     biases = dict(zip(array.channels, found.bias.tolist(), strict=True))
     return replace(

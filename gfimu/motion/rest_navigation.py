@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from gfimu.errors import InputError
 from gfimu.motion.attitude import from_rotation, to_rotation
+from gfimu.motion.earth import EarthRotation
 from gfimu.motion.navigation import NavigationResult, navigate
 from gfimu.units import STANDARD_GRAVITY
 
@@ -22,7 +23,13 @@ __all__ = ["navigate_with_rest"]
 
 
 def navigate_with_rest(
-    t: ArrayLike, p: ArrayLike, quaternion: ArrayLike, rest: ArrayLike, *, gravity: float = STANDARD_GRAVITY
+    t: ArrayLike,
+    p: ArrayLike,
+    quaternion: ArrayLike,
+    rest: ArrayLike,
+    *,
+    gravity: float = STANDARD_GRAVITY,
+    earth: EarthRotation | None = None,
 ) -> NavigationResult:
     """Integrate specific force to velocity and position, levelled and stopped at each rest.
 
@@ -38,6 +45,8 @@ def navigate_with_rest(
         Samples at rest, as the rate filter recognised them.
     gravity : float
         Magnitude of gravity, m/s².
+    earth : EarthRotation, optional
+        As for `gfimu.motion.navigation.navigate`.
 
     Returns
     -------
@@ -65,7 +74,7 @@ def navigate_with_rest(
         if seen.any():
             up = to_rotation(attitude[start:stop][seen]).inv().apply([0.0, 0.0, gravity])
             force[start:until] -= np.mean(force[start:stop][seen] - up, axis=0)
-    free = navigate(times, force, attitude, gravity=gravity)
+    free = navigate(times, force, attitude, gravity=gravity, earth=earth)
     velocity, position = free.velocity.copy(), free.position.copy()
     for start, stop in stretches:
         drift = velocity[stop - 1].copy()

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
@@ -36,7 +36,6 @@ __all__ = [
     "DriftTerm",
     "ErrorSources",
     "drift_budget",
-    "equivalent_rate_drift",
 ]
 
 TILT_LIMIT = 0.25
@@ -45,7 +44,6 @@ TILT_LIMIT = 0.25
 _FORMAT_VERSION = 1
 _LONGEST_SEARCH = 1000.0  # times the time asked for
 _MOST_RADIANS = 1e4
-_DEG_H = math.degrees(1.0) * 3600.0
 
 
 @dataclass(frozen=True)
@@ -177,44 +175,6 @@ class DriftBudget:
             "alpha_overtakes_p_s": self.alpha_overtakes,
             "note": self.note,
         }
-
-
-def equivalent_rate_drift(
-    position_error: ArrayLike, time: float, *, p_bias: ArrayLike = 0.0, gravity: float = STANDARD_GRAVITY
-) -> NDArray[np.float64]:
-    """Constant rate drift that explains a horizontal position error of a unit at rest, in °/h.
-
-    Parameters
-    ----------
-    position_error : array_like
-        Horizontal position error, m, of any shape.
-    time : float
-        Time since the start of navigation, s.
-    p_bias : array_like
-        Known bias of p along the same axis, m/s²; its ½bt² is taken off first.
-    gravity : float
-        Magnitude of gravity, m/s².
-
-    Returns
-    -------
-    ndarray
-        Drift d with error = ½bt² + g d t³/6, degrees per hour. An error along x stands for a drift about +y, an
-        error along y for one about −x.
-
-    Raises
-    ------
-    InputError
-        If ``time`` is not positive.
-
-    Notes
-    -----
-    The GF-IMU paper's inversion of its eq. 30 on the position error measured after 30 s (about 30 °/h). The result
-    is in the field's unit, degrees per hour, as its name for a figure of merit; everything else here is SI.
-    """
-    if not (math.isfinite(time) and time > 0):
-        raise InputError(f"time is {time} s; it must be above zero")
-    from_drift = np.asarray(position_error, dtype=float) - 0.5 * np.asarray(p_bias, dtype=float) * time**2
-    return from_drift * 6.0 / (gravity * time**3) * _DEG_H
 
 
 def drift_budget(

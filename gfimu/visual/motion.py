@@ -60,6 +60,11 @@ class MotionEstimate(Protocol):
         """Attitude (w, x, y, z), body to world, shape (n, 4)."""
         ...
 
+    @property
+    def position(self) -> NDArray[np.float64] | None:
+        """Position of the body origin in the world, m, shape (n, 3), where it was asked for."""
+        ...
+
 
 @dataclass(frozen=True)
 class KnownMotion:

@@ -12,6 +12,7 @@ from gfimu.files.outputs import RERUN
 from gfimu.files.rerun_stream import rrd_stream
 from gfimu.visual.plots import Plot
 from gfimu.visual.scene import TIMELINE, Scene
+from gfimu.visual.trace import PositionTrace
 
 __all__ = ["NOTES", "notes_view", "write_rrd"]
 
@@ -25,7 +26,7 @@ def write_rrd(
     title: str,
     layout: rrb.Container,
     scene: Scene,
-    plots: Iterable[Plot],
+    plots: Iterable[Plot | PositionTrace],
     notes: str = "",
     playback_speed: float = 1.0,
 ) -> None:
@@ -39,7 +40,7 @@ def write_rrd(
         Name that the viewer shows.
     layout : rerun.blueprint container
         Arrangement of the views.
-    scene, plots : Scene, iterable of Plot
+    scene, plots : Scene, iterable of Plot or PositionTrace
         What to write.
     notes : str
         Markdown shown in the notes view.

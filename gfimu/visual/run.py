@@ -47,10 +47,13 @@ from gfimu.visual.run_plots import (
     drift_plot,
     free_rate_plots,
     motion_plots,
+    position_plot,
     raw_plots,
     spin_rate_plots,
+    true_displacement,
 )
 from gfimu.visual.scene import Body, Path, Scene, SensingArrows, Shape
+from gfimu.visual.trace import PositionTrace
 
 __all__ = ["reading_arrows", "run_scene", "write_run"]
 
@@ -108,10 +111,13 @@ def write_run(
     raw = raw_plots(recording.t_s, readings, array)
     about = spin_axis(recording, array)
     rates = spin_rate_plots(recording, estimate, known, about) if spins else free_rate_plots(recording, estimate, known)
-    cells: list[Sequence[Plot]] = [[plot] for plot in rates]
+    cells: list[Sequence[Plot | PositionTrace]] = [[plot] for plot in rates]
     if estimate is not None:
         alpha, *force = motion_plots(estimate, known)
         cells += [[alpha], force] if force else [[alpha]]
+        place = position_plot(estimate, known)
+        if place is not None and estimate.position is not None:
+            cells.append([place, PositionTrace(estimate.t_s, estimate.position, true_displacement(known))])
     angle = angle_plot(estimate, known, about) if spins or known is not None else None
     cells += [[plot] for plot in (angle, drift_plot(drift) if drift is not None else None) if plot is not None]
     write_rrd(
@@ -219,7 +225,7 @@ def _on_table(recording: Recording, known: KnownMotion | None) -> bool:
 def _layout(
     scene: rrb.Spatial3DView,
     raw: Sequence[Sequence[Plot]],
-    cells: Sequence[Sequence[Plot]],
+    cells: Sequence[Sequence[Plot | PositionTrace]],
     *,
     notes_apart: bool = False,
 ) -> rrb.Container:

@@ -14,7 +14,16 @@ from gfimu.visual.colours import AXES, COMMAND, ESTIMATE, ESTIMATE_BAND, TACHO, 
 from gfimu.visual.motion import ExpectedDrift, KnownMotion, MotionEstimate, reference_rate
 from gfimu.visual.plots import LONGEST_LEGEND, Line, Plot
 
-__all__ = ["angle_plot", "drift_plot", "free_rate_plots", "motion_plots", "raw_plots", "spin_rate_plots"]
+__all__ = [
+    "angle_plot",
+    "drift_plot",
+    "free_rate_plots",
+    "motion_plots",
+    "position_plot",
+    "raw_plots",
+    "spin_rate_plots",
+    "true_displacement",
+]
 
 _NAMES = ("x", "y", "z")
 _BOTH_SIDES = 2 * np.array([-1.0, 1.0])  # ±2σ
@@ -150,6 +159,24 @@ def angle_plot(estimate: MotionEstimate | None, known: KnownMotion | None, axis:
         angle = table_angle(estimate.t_s, estimate.omega, axis=axis)
         lines.append(Line("estimate", estimate.t_s, angle, ESTIMATE))
     return Plot("angle about the axis of rotation, rad", lines) if lines else None
+
+
+def position_plot(estimate: MotionEstimate, known: KnownMotion | None) -> Plot | None:
+    """Position of the body origin in the world, from where it started; None where it was not estimated."""
+    if estimate.position is None or not np.isfinite(estimate.position).any():
+        return None
+    lines = [Line(name, estimate.t_s, estimate.position[:, axis], AXES[axis]) for axis, name in enumerate(_NAMES)]
+    place = true_displacement(known)
+    if known is not None and place is not None:
+        lines.insert(0, Line(known.name, known.t, place, TRUTH, 2.5))
+    return Plot("position in the world, m", lines)
+
+
+def true_displacement(known: KnownMotion | None) -> NDArray[np.float64] | None:
+    """Return how far the body origin is from where it started, as it is known to be, shape (n, 3), m."""
+    if known is None or known.omega is None or known.position.ndim != 2:
+        return None
+    return known.position - known.position[0]
 
 
 def drift_plot(drift: ExpectedDrift) -> Plot:

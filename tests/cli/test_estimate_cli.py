@@ -78,6 +78,37 @@ def test_position_and_rerun(gfimu_command, run):
     assert json.loads(result.stdout)["files"] == {"estimate": str(out), "rrd": str(rrd)}
 
 
+def test_a_position_is_summed_up_by_the_errors_that_would_explain_it(gfimu_command, run):
+    out = run.with_name("estimate.parquet")
+    result = gfimu_command("estimate", run, "--out", out, "--position", "--latitude", "35.7", "--json")
+    found = json.loads(result.stdout)["position"]
+    estimate = Estimate.read(out)
+    time, end = np.ptp(estimate.t_s), estimate.position[-1]
+    np.testing.assert_allclose(found["position_m"], end)
+    np.testing.assert_allclose(found["equivalent_p_bias_m_s2"], 2 * end / time**2)
+    drift = np.degrees(6 * np.hypot(*end[:2]) / (9.80665 * time**3)) * 3600  # GF-IMU paper, eq. 30
+    assert found["equivalent_rate_drift_deg_h"] == pytest.approx(drift)
+    assert found["earth_horizontal_rate_deg_h"] == pytest.approx(12.21, abs=0.01)  # 15.04 °/h × cos 35.7°
+    assert "equivalent bias of p" in gfimu_command("estimate", run, "--out", out, "--position").stdout
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--latitude", "91"), ["latitude 91° is outside"]),
+        (("--north-rad", "1"), ["no use without a latitude"]),
+        (("--latitude", "50", "--north-rad", "nan"), ["direction of north"]),
+        (("--latitude", "50", "--axis", "z"), ["no use with --axis"]),
+    ],
+)
+def test_a_place_that_can_not_be_is_one_line(gfimu_command, run, options, words):
+    result = gfimu_command("estimate", run, "--out", run.with_name("e.parquet"), *options)
+    assert result.code == 2
+    assert len(result.stderr.strip().splitlines()) == 1
+    assert all(word in result.stderr for word in words)
+    assert not run.with_name("e.parquet").exists()
+
+
 def test_convert_there_and_back(gfimu_command, run):
     text, back = run.with_name("run.csv"), run.with_name("back.parquet")
     assert gfimu_command("convert", run, text).code == 0

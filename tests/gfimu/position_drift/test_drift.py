@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
-from gfimu.position_drift.budget import TILT_LIMIT, drift_budget, equivalent_rate_drift, motion_covariance
+from gfimu.motion.equivalent_errors import equivalent_rate_drift
+from gfimu.position_drift.budget import TILT_LIMIT, drift_budget, motion_covariance
 from gfimu.position_drift.closed_forms import ErrorSources, position_error
 from gfimu.position_drift.monte_carlo import monte_carlo_drift
 

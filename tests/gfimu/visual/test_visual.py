@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pyarrow as pa
@@ -31,6 +31,7 @@ class Motion:
     omega: np.ndarray
     omega_std: np.ndarray
     quaternion: np.ndarray
+    position: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -104,6 +105,19 @@ def test_a_run_holds_what_went_in(tmp_path, run):
     for channel in run.array.channels:
         entity = next(name for name in found if name.startswith("/plots/raw") and name.endswith(f"_{channel}"))
         assert_allclose(numbers(found[entity]["scalars"]), run.recording.readings[:, run.array.index(channel)])
+
+
+def test_the_way_of_the_body_is_a_line_and_a_point_that_runs_along_it(tmp_path, run):
+    path = tmp_path / "run.rrd"
+    t = run.estimate.t_s
+    way = np.column_stack([t, t**2, -t])
+    write_run(path, run.recording, run.array, estimate=replace(run.estimate, position=way))
+    verify(path)
+    found = contents(path)
+    assert_allclose(numbers(found["/trace/now"]["positions"]), way, rtol=1e-6, atol=1e-6)
+    assert_allclose(numbers(found["/trace/estimate"]["strips"]), way, rtol=1e-6, atol=1e-6)
+    plotted = next(name for name in found if "position_in_the_world" in name and name.endswith("y"))
+    assert_allclose(numbers(found[plotted]["scalars"]), way[:, 1])
 
 
 def test_truth_turns_the_rig_and_the_estimate_its_ghost(tmp_path, run):
