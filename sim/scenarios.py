@@ -350,7 +350,7 @@ def _metadata(run: Scenario, sensor: Sensor, seed: int) -> dict[str, Any]:
         "seed": seed,
         "software_version": gfimu.__version__,
         "mounting_rotvec_rad": list(run.mounting_rotvec),
-        **({} if run.earth is None else run.earth.to_dict()),
+        **({} if run.earth is None else {**run.earth.to_dict(), "gravity_m_s2": run.gravity}),
         "lsb_m_s2": float(sensor.lsb[0]),
         "effects": [{"name": effect.name, "parameters": effect.parameters} for effect in run.effects],
         "truth_bias_m_s2": errors,

@@ -237,7 +237,11 @@ def _place(recording: Recording, latitude: float | None, north_rad: float | None
             raise InputError("the direction of north has no use without a latitude; give that too (--latitude)")
         return {}
     north = float(recording.metadata.get("north_rad", 0.0)) if north_rad is None else north_rad
-    return {"earth": EarthRotation(float(place), north), "gravity": local_gravity(float(place))}
+    gravity = recording.metadata.get("gravity_m_s2") if latitude is None else None
+    return {
+        "earth": EarthRotation(float(place), north),
+        "gravity": local_gravity(float(place)) if gravity is None else float(gravity),
+    }
 
 
 def _with_axis(array: AccelerometerArray, estimate: Estimate) -> AccelerometerArray:

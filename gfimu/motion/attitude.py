@@ -79,9 +79,9 @@ def integrate_attitude(
         raise unknown_name("attitude method", method, ATTITUDE_METHODS)
     if method == "fourth_order" and alpha is None:
         raise InputError("attitude method 'fourth_order' needs alpha; give it or use method='coning'")
-    times = np.asarray(t, dtype=float)
-    rate = np.asarray(omega, dtype=float)
-    acceleration = rate if alpha is None else np.asarray(alpha, dtype=float)
+    # Of one layout: each other one would be compiled anew.
+    times, rate = (np.require(values, float, ("C", "W")) for values in (t, omega))
+    acceleration = rate if alpha is None else np.require(alpha, float, ("C", "W"))
     if times.ndim != 1 or rate.shape != (len(times), 3) or acceleration.shape != rate.shape:
         raise InputError(
             f"times have shape {times.shape}, omega {rate.shape}, alpha {acceleration.shape}; "
@@ -92,7 +92,7 @@ def integrate_attitude(
     start = np.asarray(q0, dtype=float)
     if start.shape != (4,) or not np.isfinite(start).all() or not np.any(start):
         raise InputError("q0 must be four finite numbers (w, x, y, z), not all zero")
-    start = start / np.linalg.norm(start)
+    start = np.ascontiguousarray(start / np.linalg.norm(start))
 
     if method != "fourth_order":
         acceleration = rate  # not looked at, so its NaN don't matter
