@@ -11,6 +11,7 @@ from gfimu.calibration.array_static import array_static
 from gfimu.calibration.array_update import array_update
 from gfimu.calibration.faults import check_gravity, check_readings, without_moved_poses
 from gfimu.calibration.motion_reference import motion_reference
+from gfimu.calibration.nonlinearity import quadratic_std
 from gfimu.calibration.observations import Observations, averaged_poses
 from gfimu.calibration.result import Calibration
 from gfimu.errors import InputError
@@ -138,7 +139,8 @@ def _poses(
     rest = detect_rest(ordered, threshold=rest_threshold, min_duration_s=min_rest_s)
     warnings = list(check_readings(ordered, rest))
     rest, moved = without_moved_poses(ordered, rest)
-    return ordered, rest, averaged_poses(ordered, rest), [*warnings, *moved]
+    observations = replace(averaged_poses(ordered, rest), quadratic_std=quadratic_std(ordered, array))
+    return ordered, rest, observations, [*warnings, *moved]
 
 
 def _threshold(rest: Rest) -> dict[str, float | str]:
