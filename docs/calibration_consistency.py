@@ -67,7 +67,9 @@ class Poses:
     ) -> tuple[Recording, list[ErrorModel]]:
         """Return a recording of chips drawn anew, and their true models in the chips' axes."""
         sensor = Sensor.build(self.array, settings, rng)
-        if triangular:  # sensing axis x along x, y in the x-y plane: what nine parameters on known poses take for granted
+        if (
+            triangular
+        ):  # sensing axis x along x, y in the x-y plane: what nine parameters on known poses take for granted
             lower = {key: np.tril(getattr(sensor.errors, key)) for key in ("cross_axis", "misalignment")}
             sensor = replace(sensor, errors=replace(sensor.errors, **lower))
         readings = sensor.sense(self.force, np.full(len(self.t_s), 25.0), rng)
@@ -114,7 +116,9 @@ def normalised_errors(
     levelled = {"levelling_std_rad": 0.0} if "levelling_std_rad" in METHODS[method].options else {}
     names: tuple[str, ...] = ()
     for run in range(runs):
-        recording, models = poses.draw(np.random.default_rng([seed, run]), settings or SensorSettings(), triangular=triangular)
+        recording, models = poses.draw(
+            np.random.default_rng([seed, run]), settings or SensorSettings(), triangular=triangular
+        )
         drawing = poses.array if method == "array" else None
         result = calibrate(method, recording, n_parameters=parameters, array=drawing, **levelled)
         error, std = result.values - truth_of(result, poses.array, models), result.std

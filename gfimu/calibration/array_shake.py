@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
 from gfimu.calibration.array_motion import ArrayMotion, gradient, rate_derivative
 from gfimu.calibration.motion_observability import describe_null_space
@@ -34,7 +35,7 @@ _STILL_RATE = 0.01  # rad/s: of an array that the rest detection finds still
 _RANK_TOLERANCE = 1e-9
 _ITERATIONS = 15
 _BLOCK = 500
-_LEAST_RATIO, _MOST_RATIO = 1e-2, 1e3  # of vibration to noise, both as readings
+_RATIOS = (100.0, 30.0, 10.0, 3.0, 1.0, 0.3, 0.1, 0.01)  # of vibration to noise, both as readings
 
 
 @dataclass(frozen=True)
@@ -108,7 +109,11 @@ def array_shake(recording: Recording, array: AccelerometerArray, static: Calibra
     omega = np.concatenate([shake.omega for shake in found])
     k, c = len(array.chips), array.n_channels
     state = _State(
-        setup.spline.fit(omega), array.chip_positions.copy(), np.zeros(c), np.zeros(k), np.zeros(setup.doubt.shape[2]),
+        setup.spline.fit(omega),
+        array.chip_positions.copy(),
+        np.zeros(c),
+        np.zeros(k),
+        np.zeros(setup.doubt.shape[2]),
         setup.start_noise,
     )
     ratio, state = _learned_ratio(setup, state)
@@ -117,6 +122,8 @@ def array_shake(recording: Recording, array: AccelerometerArray, static: Calibra
     sigma2 = step.square / max(step.freedom, 1)
     count = 3 * k + c + k
     covariance = (step.inverse @ step.inverse.T)[:count, :count] * sigma2
+    relative = block_diag(np.eye(3 * k + c), np.eye(k) - 1.0 / k)
+    covariance = relative @ covariance @ relative.T
     null = step.null[: 3 * k + c]
     sizes = np.linalg.norm(null, axis=0)
     null = np.linalg.qr(null[:, sizes > 1e-6])[0]
@@ -192,33 +199,30 @@ def _lever(array: AccelerometerArray) -> float:
 
 
 def _learned_ratio(data: _Data, state: _State) -> tuple[float, _State]:
-    """Find the size of unresolved vibration by restricted maximum likelihood, as a ratio to the noise."""
-    ratios = np.geomspace(_LEAST_RATIO, _MOST_RATIO, 6)
+    """Find the size of unresolved vibration by restricted maximum likelihood, as a ratio to the noise.
+
+    From large to small: with much of it α does not bind the rate, and any start settles.
+    """
     best: tuple[float, float, _State] | None = None
-    low, high = 0, len(ratios) - 1
-    for index in range(high, low - 1, -1):  # from the loose end, where any start settles
-        step = _settled(data, state, float(ratios[index]), iterations=6)
+    for ratio in _RATIOS:
+        step = _settled(data, state, ratio, enough=0.1, iterations=6)
         state = step.state
         if best is None or step.minus_log_likelihood < best[0]:
-            best = step.minus_log_likelihood, float(ratios[index]), state
-        elif step.minus_log_likelihood > best[0] + 20.0:
+            best = step.minus_log_likelihood, ratio, state
+        else:
             break
     assert best is not None
-    for factor in (10**-0.5, 10**0.5):
-        step = _settled(data, best[2], best[1] * factor, iterations=4)
-        if step.minus_log_likelihood < best[0]:
-            return best[1] * factor, step.state
     return best[1], best[2]
 
 
-def _settled(data: _Data, state: _State, ratio: float, iterations: int = _ITERATIONS) -> _Step:
-    """Iterate until the positions stay."""
+def _settled(data: _Data, state: _State, ratio: float, *, enough: float = 0.01, iterations: int = _ITERATIONS) -> _Step:
+    """Iterate until the positions move by less than ``enough`` of their standard deviations."""
     for _ in range(iterations):
         step = _step(data, state, ratio)
         if not np.isfinite(step.moved):
             break
         state = step.state
-        if step.moved < 1e-2:
+        if step.moved < enough:
             return step
     if not np.isfinite(step.square):
         raise InputError("the fit of the shake does not settle; turn the array faster, from rest to rest")
@@ -279,8 +283,7 @@ def _add_rests(normal: BorderedBand, data: _Data, state: _State, omega: Floats) 
         return
     weight = state.noise / _STILL_RATE
     jacobian = np.einsum("na,ij->niaj", data.spline.basis[still], np.eye(3)).reshape(len(still), 3, 12)
-    none = np.zeros((len(still), 3, len(normal.border)))
-    normal.add(data.spline.place[still], weight * jacobian, none, -weight * omega[still])
+    normal.add(data.spline.place[still], weight * jacobian, None, -weight * omega[still])
 
 
 def _solved(solved: Solved, normal: BorderedBand, data: _Data, state: _State, log_root: float) -> _Step:
@@ -295,7 +298,7 @@ def _solved(solved: Solved, normal: BorderedBand, data: _Data, state: _State, lo
     rows = len(data.readings) * (c - 3) + 3 * int(data.still.sum())
     freedom = max(rows - 3 * data.spline.size - int(kept.sum()) + data.doubt.shape[2], 1)
     square = normal.square + state.noise**2 * float(state.doubt @ state.doubt)
-    determinant = solved.log_determinant + float(np.sum(np.log(values[kept]) - 0.0))
+    determinant = solved.log_determinant + float(np.sum(np.log(values[kept])))
     likelihood = freedom * np.log(square / freedom) + len(data.readings) * log_root + determinant
     place = np.cumsum([3 * k, c, k])
     parts = np.split(step, place)
@@ -323,9 +326,7 @@ def _residual_rms(data: _Data, state: _State) -> float:
     return float(np.sqrt(total / len(omega) / len(data.free)))
 
 
-def _statements(
-    state: _State, covariance: Floats, array: AccelerometerArray, vibration: float
-) -> tuple[str, ...]:
+def _statements(state: _State, covariance: Floats, array: AccelerometerArray, vibration: float) -> tuple[str, ...]:
     """Say what fixes the scale, how well, and what the delays are relative to."""
     k, c = len(array.chips), array.n_channels
     centred = state.positions - state.positions.mean(axis=0)

@@ -67,7 +67,8 @@ class Calibration:
         Magnitude of the true input used, m/s² (rad/s for a gyro).
     names : tuple of str
         Parameter names: ``a1_M_xy`` (sensitivity, reading unit per m/s²), ``a1_b_x`` (bias, reading unit),
-        ``a1_q_x`` (quadratic coefficient, 1 per reading unit), ``a1_r_x`` (position, m).
+        ``a1_q_x`` (quadratic coefficient, 1 per reading unit), ``a1_r_x`` (position, m),
+        ``a1_d`` (delay of the chip against the mean of all, s; not applied).
     values : ndarray, shape (p,)
         Parameter values.
     covariance : ndarray, shape (p, p)
@@ -144,7 +145,9 @@ class Calibration:
         reading, true = _READING_UNITS[self.unit]
         ratio = "1" if reading == true else f"{reading} per {true}"
         inverse = "s²/m" if reading == "m_s2" else f"1 per {reading}"
-        return tuple({"M": ratio, "b": reading, "r": "m", "q": inverse}[name.split("_")[1]] for name in self.names)
+        return tuple(
+            {"M": ratio, "b": reading, "r": "m", "q": inverse, "d": "s"}[name.split("_")[1]] for name in self.names
+        )
 
     @property
     def chips(self) -> tuple[str, ...]:

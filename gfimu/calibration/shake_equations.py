@@ -65,7 +65,7 @@ class RateSpline:
         """Coefficients (size, 3) of the smooth spline through rates (n, 3)."""
         band = BorderedBand(self.size, 0)
         jacobian = np.einsum("na,ij->niaj", self.basis, np.eye(3)).reshape(len(omega), 3, _WIDTH)
-        band.add(self.place, jacobian, np.zeros((len(omega), 3, 0)), omega)
+        band.add(self.place, jacobian, None, omega)
         band.stiffen(1e-2)
         return band.solve().spline
 
@@ -92,23 +92,26 @@ class BorderedBand:
         self.border_right = np.zeros(border)
         self.square = 0.0
 
-    def add(self, place: NDArray[np.intp], spline: Floats, border: Floats, residual: Floats) -> None:
+    def add(self, place: NDArray[np.intp], spline: Floats, border: Floats | None, residual: Floats) -> None:
         """Add whitened rows: Jacobians (n, p, 12) and (n, p, m), residuals (n, p), of samples in ascending order."""
-        normal = spline.swapaxes(1, 2) @ spline  # (n, 12, 12)
-        right = np.einsum("npa,np->na", spline, residual)
-        mixed = spline.swapaxes(1, 2) @ border  # (n, 12, m)
         starts = np.flatnonzero(np.diff(place, prepend=place[0] - 1))
         first = 3 * place[starts]
-        normal, right, mixed = (np.add.reduceat(part, starts, axis=0) for part in (normal, right, mixed))
+        turned = spline.swapaxes(1, 2)
+        normal = _summed(turned @ spline, starts)  # (s, 12, 12)
+        right = _summed((turned @ residual[:, :, None])[:, :, 0], starts)
         for a in range(_WIDTH):
             self.right[first + a] += right[:, a]
-            self.coupling[first + a] += mixed[:, a]
             for b in range(a, _WIDTH):
                 self.band[b - a, first + a] += normal[:, a, b]
+        self.square += float(np.sum(residual**2))
+        if border is None:
+            return
+        mixed = _summed(turned @ border, starts)  # (s, 12, m)
+        for a in range(_WIDTH):
+            self.coupling[first + a] += mixed[:, a]
         flat = border.reshape(residual.size, border.shape[2])
         self.border += flat.T @ flat
         self.border_right += flat.T @ residual.ravel()
-        self.square += float(np.sum(residual**2))
 
     def stiffen(self, weight: float) -> None:
         """Add the squares of second differences of neighbouring coefficients."""
@@ -130,3 +133,8 @@ class BorderedBand:
             self.border_right - self.coupling.T @ both[:, 0],
             2.0 * float(np.sum(np.log(root[0]))),
         )
+
+
+def _summed(parts: Floats, starts: NDArray[np.intp]) -> Floats:
+    """Sum the parts of samples that share their coefficients."""
+    return parts if len(starts) == len(parts) else np.asarray(np.add.reduceat(parts, starts, axis=0))

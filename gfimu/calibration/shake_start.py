@@ -22,7 +22,7 @@ Floats = NDArray[np.float64]
 _REST_KEPT_S = 0.3
 _SLOWEST = 2.0  # rad/s: below it the centripetal field of a hand-sized array is under the noise
 _SHORTEST_S = 0.5
-_MOST_SAMPLES = 12_000
+_MOST_SAMPLES = 4000
 
 
 @dataclass(frozen=True)
@@ -101,13 +101,14 @@ def _turning(readings: Floats, array: AccelerometerArray, noise: Floats) -> NDAr
 
 
 def _thinned(found: list[Shake]) -> list[Shake]:
-    """Keep the fastest shakes, so many that their samples can be adjusted together."""
+    """Keep the fastest shakes, so many that their samples can be adjusted together; a long one is cut."""
     order = sorted(found, key=lambda shake: -float(np.mean(np.sum(shake.omega**2, axis=1))))
-    chosen, total = [], 0
+    chosen, room = [], _MOST_SAMPLES
     for shake in order:
-        if not chosen or total + len(shake.t_s) <= _MOST_SAMPLES:
-            chosen.append(shake)
-            total += len(shake.t_s)
+        part = slice(0, room)
+        if room >= min(len(shake.t_s), _MOST_SAMPLES // 4):
+            chosen.append(Shake(shake.t_s[part], shake.readings[part], shake.still[part], shake.omega[part]))
+            room -= len(chosen[-1].t_s)
     return sorted(chosen, key=lambda shake: float(shake.t_s[0]))
 
 
