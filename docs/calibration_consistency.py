@@ -67,9 +67,7 @@ class Poses:
     ) -> tuple[Recording, list[ErrorModel]]:
         """Return a recording of chips drawn anew, and their true models in the chips' axes."""
         sensor = Sensor.build(self.array, settings, rng)
-        if (
-            triangular
-        ):  # sensing axis x along x, y in the x-y plane: what nine parameters on known poses take for granted
+        if triangular:  # what nine parameters on known poses take for granted
             lower = {key: np.tril(getattr(sensor.errors, key)) for key in ("cross_axis", "misalignment")}
             sensor = replace(sensor, errors=replace(sensor.errors, **lower))
         readings = sensor.sense(self.force, np.full(len(self.t_s), 25.0), rng)

@@ -167,7 +167,7 @@ def rate_derivative(omega: Floats, r: Floats) -> Floats:
 
 
 def turning_readings(y: Floats, array: AccelerometerArray, omega: Floats) -> Floats:
-    """Return the angular acceleration (n, 3) that readings (n, c) show at rates (n, 3); the sign of ω does not matter."""
+    """Return the angular acceleration (n, 3) that readings (n, c) show at rates (n, 3), of either sign."""
     still = y - _centripetal(array, omega)
     return np.asarray((still @ np.linalg.pinv(array.regression_matrix).T)[:, :3], dtype=np.float64)
 

@@ -14,15 +14,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 from scipy.linalg import block_diag
 
-from gfimu.calibration.array_motion import ArrayMotion, gradient, rate_derivative
+from gfimu.calibration.array_motion import ArrayMotion, gradient, rate_derivative, turning_readings
 from gfimu.calibration.motion_observability import describe_null_space
 from gfimu.calibration.result import Calibration
 from gfimu.calibration.shake_equations import BorderedBand, RateSpline, Solved
-from gfimu.calibration.shake_start import Shake, shakes
+from gfimu.calibration.shake_scale import scale_from_band
+from gfimu.calibration.shake_start import Shake, shakes, signed_rate
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
+from gfimu.rate.sensing import SensorErrors
 from gfimu.recording import Recording
 from gfimu.recording.rest import Rest
 
@@ -33,8 +36,13 @@ Floats = NDArray[np.float64]
 _KNOT_S = 0.016
 _STILL_RATE = 0.01  # rad/s: of an array that the rest detection finds still
 _RANK_TOLERANCE = 1e-9
-_ITERATIONS = 15
+_ITERATIONS = 8
 _BLOCK = 500
+_RESOLVED = 0.5  # with more vibration than that against the noise, α = dω/dt does not hold sample by sample
+_SCALE_BY_ALL = "from α = dω/dt"
+_SCALE_BY_BAND = (
+    "from α = dω/dt between 2 and 8 Hz, as vibration beyond the sample rate spoils it elsewhere; record faster for more"
+)
 _RATIOS = (100.0, 30.0, 10.0, 3.0, 1.0, 0.3, 0.1, 0.01)  # of vibration to noise, both as readings
 
 
@@ -117,6 +125,7 @@ def array_shake(recording: Recording, array: AccelerometerArray, static: Calibra
         setup.start_noise,
     )
     ratio, state = _learned_ratio(setup, state)
+    resolved = ratio <= _RESOLVED
     step = _settled(setup, state, ratio)
     state = step.state
     sigma2 = step.square / max(step.freedom, 1)
@@ -124,17 +133,19 @@ def array_shake(recording: Recording, array: AccelerometerArray, static: Calibra
     covariance = (step.inverse @ step.inverse.T)[:count, :count] * sigma2
     relative = block_diag(np.eye(3 * k + c), np.eye(k) - 1.0 / k)
     covariance = relative @ covariance @ relative.T
+    if not resolved:
+        state, covariance = _scaled(setup, state, covariance, found)
     null = step.null[: 3 * k + c]
     sizes = np.linalg.norm(null, axis=0)
     null = np.linalg.qr(null[:, sizes > 1e-6])[0]
     fitted = array.with_geometry(state.positions, [chip.axes for chip in array.chips])
-    vibration = ratio * np.sqrt(sigma2) / _lever(array)
+    text = _SCALE_BY_ALL if resolved else _SCALE_BY_BAND
     return ArrayMotion(
         state.positions,
         state.biases.reshape(k, -1),
         covariance,
         null,
-        (*describe_null_space(null, fitted), *_statements(state, covariance, array, vibration)),
+        (*describe_null_space(null, fitted), *_statements(state, covariance, array, text)),
         float(np.sqrt(sigma2)),
         _residual_rms(setup, replace(state, positions=array.chip_positions)),
         len(setup.readings),
@@ -205,7 +216,7 @@ def _learned_ratio(data: _Data, state: _State) -> tuple[float, _State]:
     """
     best: tuple[float, float, _State] | None = None
     for ratio in _RATIOS:
-        step = _settled(data, state, ratio, enough=0.1, iterations=6)
+        step = _settled(data, state, ratio, enough=0.3, iterations=4)
         state = step.state
         if best is None or step.minus_log_likelihood < best[0]:
             best = step.minus_log_likelihood, ratio, state
@@ -326,21 +337,38 @@ def _residual_rms(data: _Data, state: _State) -> float:
     return float(np.sqrt(total / len(omega) / len(data.free)))
 
 
-def _statements(state: _State, covariance: Floats, array: AccelerometerArray, vibration: float) -> tuple[str, ...]:
+def _scaled(data: _Data, state: _State, covariance: Floats, found: list[Shake]) -> tuple[_State, Floats]:
+    """Take the scale of the positions from the band of the shaking, in place of the tie of every sample."""
+    k, drawn = len(state.positions), data.array.chip_positions
+    centre = state.positions.mean(axis=0)
+    arms = state.positions - centre
+    arms *= np.linalg.norm(drawn - drawn.mean(axis=0)) / np.linalg.norm(arms)  # the drawing's size, to start with
+    fitted = data.array.with_geometry(centre + arms, [chip.axes for chip in data.array.chips])
+    errors = SensorErrors.uniform(data.array, data.start_noise)
+    parts = []
+    for shake in found:
+        readings = shake.readings - state.biases
+        rate = signed_rate(fitted, shake.t_s, readings, errors, shake.still)
+        parts.append((shake.t_s, turning_readings(readings, fitted, rate), CubicSpline(shake.t_s, rate)(shake.t_s, 1)))
+    scale, std = scale_from_band(parts)
+    arms *= scale
+    along = np.concatenate([arms.ravel(), np.zeros(len(covariance) - 3 * k)])
+    unit = along / np.linalg.norm(along)
+    across = np.eye(len(along)) - np.outer(unit, unit)
+    return (
+        replace(state, positions=centre + arms),
+        across @ covariance @ across + (std / scale) ** 2 * np.outer(along, along),
+    )
+
+
+def _statements(state: _State, covariance: Floats, array: AccelerometerArray, source: str) -> tuple[str, ...]:
     """Say what fixes the scale, how well, and what the delays are relative to."""
     k, c = len(array.chips), array.n_channels
     centred = state.positions - state.positions.mean(axis=0)
     along = np.concatenate([(centred / np.sum(centred**2)).ravel(), np.zeros(c + k)])
     scale = float(np.sqrt(along @ covariance @ along))
-    texts = [
-        f"the scale of the positions is known to {100.0 * scale:.2g} % (standard deviation), from α = dω/dt alone; "
-        "gravity at the rests is not used for it",
+    return (
+        f"scale of the positions: ± {100.0 * scale:.2g} % (1 standard deviation), {source}; gravity is not used for it",
         "a mirrored motion is excluded by the drawing, where the fit starts, and by the rests, where ω is zero",
         "delays of the chips are relative to their mean: a delay common to all is not determined",
-    ]
-    if vibration > 1.0:
-        texts.append(
-            f"α differs from dω/dt by {vibration:.3g} rad/s² (RMS): vibration beyond the sample rate; it is a noise of "
-            "the fit, and makes the scale less certain"
-        )
-    return tuple(texts)
+    )

@@ -22,10 +22,10 @@ def covariance_scale(
     """Factor to apply to a covariance whose rests may have errors that do not average out, and a warning.
 
     Each mean of a rest has the variance that its samples give it, times 1 + κ: κ is what does not average out (bias
-    instability between the rests, a temperature, a pose that creeps). The misfit vᵀPv is (1 + κ) χ² of ``redundancy``
-    degrees of freedom. κ is zero with a probability of 0.7, else of unknown order of magnitude (0.1 to ten times what the misfit shows); the factor is the
-    mean of 1 + κ after the data, so that few degrees of freedom give wider standard deviations (as Student's t does)
-    and many hardly touch those of clean data.
+    instability between the rests, temperature, a pose that creeps). The misfit vᵀPv is (1 + κ) times χ² of
+    ``redundancy`` degrees of freedom. κ is zero with a probability of 0.7, else of unknown order of magnitude (0.1 to
+    ten times what the misfit shows). The factor is the mean of 1 + κ after the data: few degrees of freedom give wider
+    standard deviations, as Student's t does, and many hardly touch those of clean data.
 
     Parameters
     ----------

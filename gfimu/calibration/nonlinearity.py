@@ -25,7 +25,7 @@ Floats = NDArray[np.float64]
 
 
 def quadratic_std(recording: Recording, array: AccelerometerArray | None = None) -> Floats:
-    """Standard deviation of each channel's quadratic coefficient by the data sheet of its part.
+    """Take the standard deviation of each channel's quadratic coefficient from the data sheet of its part.
 
     Parameters
     ----------
@@ -70,9 +70,8 @@ def quadratic_statement(observations: Observations) -> tuple[str, ...]:
         return ()
     at_1_g = float(observations.quadratic_prior.max() * np.ptp(observations.means, axis=0).max() ** 2 / 4.0)
     text = (
-        f"the axes are taken to bend as the data sheet has it ({at_1_g:.2g} {observations.unit} at 1 g, standard "
-        "deviation): the coefficients q are estimated with the other parameters, and what the poses do not show of them "
-        "is in the standard deviations"
+        f"non-linearity of the data sheet ({at_1_g:.2g} {observations.unit} at 1 g, standard deviation): quadratic "
+        "coefficients q are estimated with the other parameters and are in their standard deviations"
     )
     return (text,)
 

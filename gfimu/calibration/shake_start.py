@@ -15,7 +15,7 @@ from gfimu.rate.sensing import SensorErrors
 from gfimu.recording import Recording
 from gfimu.recording.rest import Rest
 
-__all__ = ["Shake", "shakes"]
+__all__ = ["Shake", "shakes", "signed_rate"]
 
 Floats = NDArray[np.float64]
 
@@ -79,18 +79,26 @@ def shakes(recording: Recording, array: AccelerometerArray, rest: Rest, noise: F
         readings, t = readings[good], t[good]
         place = np.arange(first, last)[good]
         still = (place < before) | (place >= after)
-        rate = np.nan_to_num(maximum_likelihood_rate(array, t, readings, errors, start_at_rest=False).omega)
-        rate[still] = 0.0
+        rate = signed_rate(array, t, readings, errors, still)
         moving = np.linalg.norm(rate, axis=1) > _SLOWEST
         if _turning(readings, array, noise)[~still].mean() < 0.5 or moving.sum() < _SHORTEST_S * recording.sample_rate:
             continue
-        found.append(Shake(t, readings, still, _with_signs(rate, readings, t, array)))
+        found.append(Shake(t, readings, still, rate))
     if not found:
         raise InputError(
             f"nothing between the rests turns faster than {_SLOWEST:g} rad/s for {_SHORTEST_S:g} s; shake and turn the "
             "array about all its axes, from rest to rest"
         )
     return _thinned(found)
+
+
+def signed_rate(
+    array: AccelerometerArray, t: Floats, readings: Floats, errors: SensorErrors, still: NDArray[np.bool_]
+) -> Floats:
+    """Rate of every sample by maximum likelihood, (n, 3), rad/s, with the signs that α ties together."""
+    rate = np.nan_to_num(maximum_likelihood_rate(array, t, readings, errors, start_at_rest=False).omega)
+    rate[still] = 0.0
+    return _with_signs(rate, readings, t, array)
 
 
 def _turning(readings: Floats, array: AccelerometerArray, noise: Floats) -> NDArray[np.bool_]:

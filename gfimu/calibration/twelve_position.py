@@ -168,8 +168,8 @@ def _levelling(observations: Observations, coarse: ErrorModel, gravity: float) -
     """Estimate the tilt of the faces from the residuals of the coarse solution, rad.
 
     With one pose per face, each axis leaves two degrees of freedom, in which tilts of standard deviation s put a
-    square of (4/3) s² g² on average; the noise of the means and the bend of the axes are taken off. The estimate has few degrees of freedom, so
-    that it is widened by `_LEVELLING_WIDENING`.
+    square of (4/3) s² g² on average; the noise of the means and the bend of the axes are taken off. The estimate has
+    few degrees of freedom, so that it is widened by `_LEVELLING_WIDENING`.
     """
     faces, references = face_poses(observations, gravity)
     design = np.column_stack([references, np.ones(len(references))])

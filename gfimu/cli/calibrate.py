@@ -56,7 +56,7 @@ def _calibrate(
     ] = None,
     motion: Annotated[
         Path | None,
-        typer.Option("--motion", help="array: recording with the motion, or with shakes by hand (may be RUN)."),
+        typer.Option("--motion", help="array: recording of the motion, or of shakes (may be RUN)."),
     ] = None,
     update: Annotated[
         Path | None,
