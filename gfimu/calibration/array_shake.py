@@ -10,6 +10,7 @@ slower rates give the same centripetal field. The signs are settled by it as wel
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -38,6 +39,7 @@ _STILL_RATE = 0.01  # rad/s: of an array that the rest detection finds still
 _RANK_TOLERANCE = 1e-9
 _ITERATIONS = 8
 _BLOCK = 500
+_CLUSTER_S = 0.5
 _RESOLVED = 0.5  # with more vibration than that against the noise, α = dω/dt does not hold sample by sample
 _SCALE_BY_ALL = "from α = dω/dt"
 _SCALE_BY_BAND = (
@@ -58,6 +60,7 @@ class _Data:
     free: Floats  # (c − 3, c): combinations without p
     doubt: Floats  # (c, 4, z): what the static calibration leaves open, by channel
     start_noise: float  # m/s²
+    rate: float  # Hz
 
 
 @dataclass(frozen=True)
@@ -77,6 +80,7 @@ class _Step:
     """Outcome of one linearisation."""
 
     state: _State
+    response: Floats  # (3 size, m): of the spline by the common parameters
     inverse: Floats  # (m, rank): root of the covariance for unit noise
     null: Floats  # (m, u)
     moved: float
@@ -128,7 +132,7 @@ def array_shake(recording: Recording, array: AccelerometerArray, static: Calibra
     resolved = ratio <= _RESOLVED
     step = _settled(setup, state, ratio)
     state = step.state
-    sigma2 = step.square / max(step.freedom, 1)
+    sigma2 = step.square / max(step.freedom, 1) * _block_factor(setup, state, ratio, step)
     count = 3 * k + c + k
     covariance = (step.inverse @ step.inverse.T)[:count, :count] * sigma2
     relative = block_diag(np.eye(3 * k + c), np.eye(k) - 1.0 / k)
@@ -162,7 +166,7 @@ def _data(
     still = np.concatenate([shake.still for shake in found])
     spline = RateSpline.of(found, max(_KNOT_S, recording.sample_period))
     free = np.linalg.svd(array.axes)[0][:, 3:].T
-    return _Data(readings, slopes, still, spline, array, free, _doubt(static, array), noise)
+    return _Data(readings, slopes, still, spline, array, free, _doubt(static, array), noise, recording.sample_rate)
 
 
 def _noise(recording: Recording, array: AccelerometerArray, rest: Rest) -> Floats:
@@ -245,13 +249,33 @@ def _step(data: _Data, state: _State, ratio: float) -> _Step:
     array, spline = data.array, data.spline
     k, c, z = len(array.chips), array.n_channels, data.doubt.shape[2]
     m = 4 * k + c + z
-    chip = array.chip_of_channel
     omega, alpha = spline.at_samples(state.coefficients)
-    by_alpha = np.cross(state.positions[chip], array.axes)  # (c, 3)
-    spread = np.eye(c) + (ratio / _lever(array)) ** 2 * by_alpha @ by_alpha.T
-    root = np.linalg.cholesky(data.free @ spread @ data.free.T)
-    white = np.linalg.solve(root, data.free)  # (c − 3, c)
+    white, log_root = _whitening(data, state, ratio)
     normal = BorderedBand(spline.size, m)
+    for rows, own, border, residual in _whitened_rows(data, state, white, omega, alpha):
+        normal.add(spline.place[rows], own, border, residual)
+    _add_rests(normal, data, state, omega)
+    normal.border[range(m - z, m), range(m - z, m)] += state.noise**2
+    normal.border_right[m - z :] -= state.noise**2 * state.doubt
+    return _solved(normal.solve(), normal, data, state, log_root)
+
+
+def _whitening(data: _Data, state: _State, ratio: float) -> tuple[Floats, float]:
+    """Return the root (c − 3, c) of the weight of what is free of p, and the log determinant of its inverse."""
+    array = data.array
+    by_alpha = np.cross(state.positions[array.chip_of_channel], array.axes)  # (c, 3)
+    spread = np.eye(array.n_channels) + (ratio / _lever(array)) ** 2 * by_alpha @ by_alpha.T
+    root = np.linalg.cholesky(data.free @ spread @ data.free.T)
+    return np.linalg.solve(root, data.free), 2.0 * float(np.sum(np.log(np.diag(root))))
+
+
+def _whitened_rows(
+    data: _Data, state: _State, white: Floats, omega: Floats, alpha: Floats
+) -> Iterator[tuple[slice, Floats, Floats, Floats]]:
+    """Yield whitened rows block by block: samples, Jacobians by the spline and what is common, residuals."""
+    array, spline = data.array, data.spline
+    chip = array.chip_of_channel
+    by_alpha = np.cross(state.positions[chip], array.axes)  # (c, 3)
     for first in range(0, len(omega), _BLOCK):
         rows = slice(first, first + _BLOCK)
         residual, border = _linearised(data, state, rows, omega[rows], alpha[rows])
@@ -259,12 +283,32 @@ def _step(data: _Data, state: _State, ratio: float) -> _Step:
         own = (
             by_rate[:, :, None, :] * spline.basis[rows][:, None, :, None]
             + by_alpha[None, :, None, :] * spline.slope[rows][:, None, :, None]
-        ).reshape(len(residual), c, 12)
-        normal.add(spline.place[rows], white @ own, white @ border, residual @ white.T)
-    _add_rests(normal, data, state, omega)
-    normal.border[range(m - z, m), range(m - z, m)] += state.noise**2
-    normal.border_right[m - z :] -= state.noise**2 * state.doubt
-    return _solved(normal.solve(), normal, data, state, 2.0 * float(np.sum(np.log(np.diag(root)))))
+        ).reshape(len(residual), array.n_channels, 12)
+        yield rows, white @ own, white @ border, residual @ white.T
+
+
+def _block_factor(data: _Data, state: _State, ratio: float, step: _Step) -> float:
+    """Ratio of the scatter of the scores of blocks of samples to that of independent errors, at least 1.
+
+    Vibration and the motion between samples make errors that last longer than a sample; then the scores of whole blocks
+    scatter more than the sum of squares says (as clustered standard errors do).
+    """
+    omega, alpha = data.spline.at_samples(state.coefficients)
+    white, _ = _whitening(data, state, ratio)
+    used = 3 * len(state.positions)
+    scores = []
+    for rows, own, border, residual in _whitened_rows(data, state, white, omega, alpha):
+        response = step.response.reshape(-1, 3, border.shape[2])[data.spline.place[rows][:, None] + np.arange(4)]
+        reduced = border - own @ response.reshape(len(residual), 12, -1)
+        scores.append(np.einsum("npm,np->nm", reduced, residual))
+    # What each sample contributes to the positions, in units of their standard deviations.
+    influence = np.concatenate(scores) @ step.inverse @ step.inverse[:used].T
+    influence /= np.linalg.norm(step.inverse[:used], axis=1)
+    size = max(round(_CLUSTER_S * data.rate), 2)
+    blocks = np.add.reduceat(influence, np.arange(0, len(influence), size), axis=0)
+    factor = float(np.sum(blocks**2) / np.sum(influence**2))
+    spread = np.sqrt(2.0 / len(blocks) / max(used - 3, 1))
+    return factor if factor > 1.0 + 3.0 * spread else 1.0
 
 
 def _linearised(data: _Data, state: _State, rows: slice, omega: Floats, alpha: Floats) -> tuple[Floats, Floats]:
@@ -323,7 +367,9 @@ def _solved(solved: Solved, normal: BorderedBand, data: _Data, state: _State, lo
         float(np.sqrt(square / freedom)),
     )
     moved = float(np.max(np.abs(parts[0]) / np.maximum(std, 1e-9)))
-    return _Step(new, inverse, size[:, None] * vectors[:, ~kept], moved, square, freedom, float(likelihood))
+    return _Step(
+        new, solved.response, inverse, size[:, None] * vectors[:, ~kept], moved, square, freedom, float(likelihood)
+    )
 
 
 def _residual_rms(data: _Data, state: _State) -> float:
