@@ -95,6 +95,12 @@ def truth_of(result: Calibration, array: AccelerometerArray, models: list[ErrorM
             replace(one, sensitivity=one.sensitivity @ chip.axes @ turn @ chip.axes.T)
             for chip, one in zip(array.chips, models, strict=True)
         ]
+    elif result.method == "multi-position" and result.gauge == "coarse":  # any rotation will do: the nearest one
+        turned = []
+        for chip, one in zip(array.chips, models, strict=True):
+            u, _, vt = np.linalg.svd(one.sensitivity.T @ result.models[chip.name].sensitivity)
+            turned.append(replace(one, sensitivity=one.sensitivity @ u @ vt))
+        models = turned
     elif result.gauge in {"x_axis", "z_axis"}:
         models = [one.in_gauge(result.gauge) for one in models]
     values = {}

@@ -128,9 +128,9 @@ def array_shake(recording: Recording, array: AccelerometerArray, static: Calibra
         np.zeros(setup.doubt.shape[2]),
         setup.start_noise,
     )
-    ratio, state = _learned_ratio(setup, state)
+    ratio, others = _learned_ratio(setup, state)
     resolved = ratio <= _RESOLVED
-    step = _settled(setup, state, ratio)
+    step = _settled(setup, others[-2], ratio)
     state = step.state
     sigma2 = step.square / max(step.freedom, 1) * _block_factor(setup, state, ratio, step)
     count = 3 * k + c + k
@@ -138,7 +138,7 @@ def array_shake(recording: Recording, array: AccelerometerArray, static: Calibra
     relative = block_diag(np.eye(3 * k + c), np.eye(k) - 1.0 / k)
     covariance = relative @ covariance @ relative.T
     if not resolved:
-        state, covariance = _scaled(setup, state, covariance, found)
+        state, covariance = _scaled(setup, state, covariance, found, [other.positions for other in others[-3:]])
     null = step.null[: 3 * k + c]
     sizes = np.linalg.norm(null, axis=0)
     null = np.linalg.qr(null[:, sizes > 1e-6])[0]
@@ -213,21 +213,22 @@ def _lever(array: AccelerometerArray) -> float:
     return float(np.sqrt(np.mean(np.sum(arms**2, axis=1)) / 3.0))
 
 
-def _learned_ratio(data: _Data, state: _State) -> tuple[float, _State]:
+def _learned_ratio(data: _Data, state: _State) -> tuple[float, list[_State]]:
     """Find the size of unresolved vibration by restricted maximum likelihood, as a ratio to the noise.
 
-    From large to small: with much of it α does not bind the rate, and any start settles.
+    From large to small: with much of it α does not bind the rate, and any start settles. Returned are the best ratio
+    and the states found; that of the best ratio is the last but one.
     """
-    best: tuple[float, float, _State] | None = None
+    states: list[_State] = []
+    best, least = _RATIOS[0], np.inf
     for ratio in _RATIOS:
         step = _settled(data, state, ratio, enough=0.3, iterations=4)
         state = step.state
-        if best is None or step.minus_log_likelihood < best[0]:
-            best = step.minus_log_likelihood, ratio, state
-        else:
-            break
-    assert best is not None
-    return best[1], best[2]
+        states.append(state)
+        if step.minus_log_likelihood >= least:
+            return best, states
+        best, least = ratio, step.minus_log_likelihood
+    return best, [*states, state]
 
 
 def _settled(data: _Data, state: _State, ratio: float, *, enough: float = 0.01, iterations: int = _ITERATIONS) -> _Step:
@@ -383,12 +384,17 @@ def _residual_rms(data: _Data, state: _State) -> float:
     return float(np.sqrt(total / len(omega) / len(data.free)))
 
 
-def _scaled(data: _Data, state: _State, covariance: Floats, found: list[Shake]) -> tuple[_State, Floats]:
-    """Take the scale of the positions from the band of the shaking, in place of the tie of every sample."""
-    k, drawn = len(state.positions), data.array.chip_positions
-    centre = state.positions.mean(axis=0)
-    arms = state.positions - centre
-    arms *= np.linalg.norm(drawn - drawn.mean(axis=0)) / np.linalg.norm(arms)  # the drawing's size, to start with
+def _scaled(
+    data: _Data, state: _State, covariance: Floats, found: list[Shake], others: list[Floats]
+) -> tuple[_State, Floats]:
+    """Take the scale of the positions from the band of the shaking, in place of the tie of every sample.
+
+    White vibration is then a poor model of the errors: how far the form of the array differs from ``others``, the fits
+    with three times more and less of it, is added to the covariance.
+    """
+    k, centre = len(state.positions), state.positions.mean(axis=0)
+    size = float(np.linalg.norm(data.array.chip_positions - data.array.chip_positions.mean(axis=0)))
+    arms = _of_size(state.positions, size)  # the drawing's size, to start with
     fitted = data.array.with_geometry(centre + arms, [chip.axes for chip in data.array.chips])
     errors = SensorErrors.uniform(data.array, data.start_noise)
     parts = []
@@ -397,14 +403,21 @@ def _scaled(data: _Data, state: _State, covariance: Floats, found: list[Shake]) 
         rate = signed_rate(fitted, shake.t_s, readings, errors, shake.still)
         parts.append((shake.t_s, turning_readings(readings, fitted, rate), CubicSpline(shake.t_s, rate)(shake.t_s, 1)))
     scale, std = scale_from_band(parts)
-    arms *= scale
-    along = np.concatenate([arms.ravel(), np.zeros(len(covariance) - 3 * k)])
+    rest = np.zeros(len(covariance) - 3 * k)
+    along = np.concatenate([(scale * arms).ravel(), rest])
     unit = along / np.linalg.norm(along)
     across = np.eye(len(along)) - np.outer(unit, unit)
-    return (
-        replace(state, positions=centre + arms),
-        across @ covariance @ across + (std / scale) ** 2 * np.outer(along, along),
-    )
+    total = across @ covariance @ across + (std / scale) ** 2 * np.outer(along, along)
+    for other in others:
+        apart = np.concatenate([(_of_size(other, size) - arms).ravel(), rest])
+        total = total + np.outer(apart, apart)
+    return replace(state, positions=centre + scale * arms), total
+
+
+def _of_size(positions: Floats, size: float) -> Floats:
+    """Positions about their mean, scaled to a norm."""
+    arms = positions - positions.mean(axis=0)
+    return np.asarray(arms * (size / np.linalg.norm(arms)))
 
 
 def _statements(state: _State, covariance: Floats, array: AccelerometerArray, source: str) -> tuple[str, ...]:

@@ -31,7 +31,8 @@ def scale_from_band(parts: list[tuple[Floats, Floats, Floats]]) -> tuple[float, 
     scale, std : float
         Factor for the positions, and its standard deviation from the scatter of blocks of one second.
     """
-    products, squares, blocks = [], [], []
+    products: list[Floats] = []
+    squares: list[Floats] = []
     for t, alpha, slope in parts:
         rate = (len(t) - 1) / float(t[-1] - t[0])
         band = (_BAND_HZ[0], min(_BAND_HZ[1], 0.4 * rate))
