@@ -40,6 +40,7 @@ _RANK_TOLERANCE = 1e-9
 _ITERATIONS = 8
 _BLOCK = 500
 _CLUSTER_S = 0.5
+_LEAST_SCALE = 0.2  # standard deviation of the scale beyond which the drawing says more, a ratio
 _RESOLVED = 0.5  # with more vibration than that against the noise, α = dω/dt does not hold sample by sample
 _SCALE_BY_ALL = "from α = dω/dt"
 _SCALE_BY_BAND = (
@@ -139,6 +140,12 @@ def array_shake(recording: Recording, array: AccelerometerArray, static: Calibra
     covariance = relative @ covariance @ relative.T
     if not resolved:
         state, covariance = _scaled(setup, state, covariance, found, [other.positions for other in others[-3:]])
+    scale_std = _scale_std(state, covariance)
+    if not scale_std < _LEAST_SCALE:
+        raise InputError(
+            f"this motion shows the scale of the positions to {100.0 * scale_std:.2g} % only; shake the array faster "
+            "(5 rad/s and more, about all axes, from rest to rest)"
+        )
     null = step.null[: 3 * k + c]
     sizes = np.linalg.norm(null, axis=0)
     null = np.linalg.qr(null[:, sizes > 1e-6])[0]
@@ -149,7 +156,7 @@ def array_shake(recording: Recording, array: AccelerometerArray, static: Calibra
         state.biases.reshape(k, -1),
         covariance,
         null,
-        (*describe_null_space(null, fitted), *_statements(state, covariance, array, text)),
+        (*describe_null_space(null, fitted), *_statements(state, covariance, text)),
         float(np.sqrt(sigma2)),
         _residual_rms(setup, replace(state, positions=array.chip_positions)),
         len(setup.readings),
@@ -420,14 +427,19 @@ def _of_size(positions: Floats, size: float) -> Floats:
     return np.asarray(arms * (size / np.linalg.norm(arms)))
 
 
-def _statements(state: _State, covariance: Floats, array: AccelerometerArray, source: str) -> tuple[str, ...]:
+def _scale_std(state: _State, covariance: Floats) -> float:
+    """Return the standard deviation of the common scale of the positions, a ratio."""
+    centred = (state.positions - state.positions.mean(axis=0)).ravel()
+    along = centred / np.sum(centred**2)
+    count = len(centred)
+    return float(np.sqrt(along @ covariance[:count, :count] @ along))
+
+
+def _statements(state: _State, covariance: Floats, source: str) -> tuple[str, ...]:
     """Say what fixes the scale, how well, and what the delays are relative to."""
-    k, c = len(array.chips), array.n_channels
-    centred = state.positions - state.positions.mean(axis=0)
-    along = np.concatenate([(centred / np.sum(centred**2)).ravel(), np.zeros(c + k)])
-    scale = float(np.sqrt(along @ covariance @ along))
+    scale = f"± {100.0 * _scale_std(state, covariance):.2g} % (1 standard deviation)"
     return (
-        f"scale of the positions: ± {100.0 * scale:.2g} % (1 standard deviation), {source}; gravity is not used for it",
+        f"scale of the positions: {scale}, {source}; gravity is not used for it",
         "a mirrored motion is excluded by the drawing, where the fit starts, and by the rests, where ω is zero",
         "delays of the chips are relative to their mean: a delay common to all is not determined",
     )

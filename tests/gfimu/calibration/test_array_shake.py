@@ -159,6 +159,21 @@ def test_what_is_no_shake_is_refused():
         array_shake(still, CUBE, static, rest)
 
 
+def test_a_motion_too_slow_for_positions_is_refused():
+    static, recording, rest, *_ = one_run(11, speed=6.0)
+    corrected = static.apply(recording)
+    slow = np.random.default_rng(1).normal(0, 0.4, corrected.readings.shape) * (~_still(recording, rest))[:, None]
+    with pytest.raises(InputError, match="scale of the positions to|turns faster than"):
+        array_shake(replace(corrected, readings=corrected.readings[:1] + slow), CUBE, static, rest)
+
+
+def _still(recording, rest):
+    still = np.zeros(len(recording), dtype=bool)
+    for start, stop in zip(rest.start, rest.stop, strict=True):
+        still[start:stop] = True
+    return still
+
+
 @pytest.mark.study
 def test_mimu4444_without_its_gyros(shared_data):
     """Positions within 0.5 mm of those with gyros, and consistent within the standard deviations."""
@@ -170,3 +185,4 @@ def test_mimu4444_without_its_gyros(shared_data):
         first, second = (np.array([one.positions[chip.name] for chip in board.chips]) for one in (with_gyros, alone))
         apart = (second - second.mean(axis=0)) - (first - first.mean(axis=0))
         assert np.abs(apart).max() < 0.5e-3
+        assert any("between 2 and 8 Hz" in text for text in alone.statements)
