@@ -163,7 +163,7 @@ def test_a_motion_too_slow_for_positions_is_refused():
     static, recording, rest, *_ = one_run(11, speed=6.0)
     corrected = static.apply(recording)
     slow = np.random.default_rng(1).normal(0, 0.4, corrected.readings.shape) * (~_still(recording, rest))[:, None]
-    with pytest.raises(InputError, match="scale of the positions to|turns faster than"):
+    with pytest.raises(InputError, match=r"scale of the positions to|turns faster than"):
         array_shake(replace(corrected, readings=corrected.readings[:1] + slow), CUBE, static, rest)
 
 
