@@ -7,10 +7,12 @@ from dataclasses import replace
 import numpy as np
 
 from gfimu.calibration.array_motion import ArrayMotion, array_motion
+from gfimu.calibration.array_shake import array_shake
 from gfimu.calibration.array_static import array_static
 from gfimu.calibration.array_update import array_update
 from gfimu.calibration.faults import check_gravity, check_readings, without_moved_poses
-from gfimu.calibration.motion_reference import motion_reference
+from gfimu.calibration.motion_reference import has_reference, motion_reference
+from gfimu.calibration.nonlinearity import quadratic_std
 from gfimu.calibration.observations import Observations, averaged_poses
 from gfimu.calibration.result import Calibration
 from gfimu.errors import InputError
@@ -20,6 +22,11 @@ from gfimu.recording.rest import Rest, detect_rest
 from gfimu.units import STANDARD_GRAVITY
 
 __all__ = ["calibrate_array", "update_array_calibration"]
+
+_AS_DRAWN = (
+    "positions are as drawn: they need motion with a reference of the rotation (tacho_rad_s or gyro_x/y/z_rad_s), or "
+    "shakes of the array by hand from rest to rest, given as the motion (--motion, which may be the same recording)"
+)
 
 
 def calibrate_array(
@@ -43,9 +50,10 @@ def calibrate_array(
     gravity : float
         Local gravity, m/s².
     motion : Recording, optional
-        Recording with the motion; ``recording`` itself if not given.
+        Recording with the motion; ``recording`` itself if not given. Without a reference it is taken for shakes by hand
+        between rests (`gfimu.calibration.array_shake`).
     fit_positions : bool, optional
-        Fit positions; by default when there is motion with a reference (tachometer or gyro).
+        Fit positions; by default where ``motion`` is given, or ``recording`` has a reference (tachometer or gyro).
     rest_threshold : float, optional
         Threshold of rest, reading unit squared; chosen by the data if not given.
     min_rest_s : float
@@ -54,7 +62,8 @@ def calibrate_array(
     Returns
     -------
     Calibration
-        Twelve parameters per chip, and positions ``a1_r_x`` … with a note of which combinations are not determined.
+        Twelve parameters per chip (fifteen where the part's axes bend), and positions ``a1_r_x`` … with a note of which
+        combinations are not determined; delays ``a1_d`` … from shakes.
         Biases that motion shows are reported but not applied: the ones at rest are far better known.
 
     Raises
@@ -73,6 +82,11 @@ def calibrate_array(
     moving = result.apply(ordered if motion is None else _in_array_order(motion, array))
     if fit_positions is False:
         return result
+    if not has_reference(moving):
+        if motion is None and not fit_positions:
+            return replace(result, statements=(*result.statements, _AS_DRAWN))
+        still = detect_rest(moving)
+        return _with_positions(result, array, array_shake(moving, array, result, still))
     try:
         reference = motion_reference(moving)
     except InputError as error:
@@ -138,7 +152,8 @@ def _poses(
     rest = detect_rest(ordered, threshold=rest_threshold, min_duration_s=min_rest_s)
     warnings = list(check_readings(ordered, rest))
     rest, moved = without_moved_poses(ordered, rest)
-    return ordered, rest, averaged_poses(ordered, rest), [*warnings, *moved]
+    observations = replace(averaged_poses(ordered, rest), quadratic_std=quadratic_std(ordered, array))
+    return ordered, rest, observations, [*warnings, *moved]
 
 
 def _threshold(rest: Rest) -> dict[str, float | str]:
@@ -161,15 +176,19 @@ def _in_array_order(recording: Recording, array: AccelerometerArray) -> Recordin
 def _with_positions(result: Calibration, array: AccelerometerArray, motion: ArrayMotion) -> Calibration:
     """Add the fitted positions to a static calibration."""
     static, count = len(result.names), motion.positions.size
-    covariance = np.zeros((static + count, static + count))
+    delays = np.zeros(0) if motion.delays is None else motion.delays
+    names = [f"{chip.name}_r_{axis}" for chip in array.chips for axis in "xyz"]
+    names += [f"{chip.name}_d" for chip in array.chips[: len(delays)]]
+    fitted = np.concatenate([np.arange(count), np.arange(len(motion.covariance) - len(delays), len(motion.covariance))])
+    covariance = np.zeros((static + len(fitted), static + len(fitted)))
     covariance[:static, :static] = result.covariance
-    covariance[static:, static:] = motion.covariance[:count, :count]
+    covariance[static:, static:] = motion.covariance[np.ix_(fitted, fitted)]
     undetermined = motion.null_space[:count]
     directions, sizes, _ = np.linalg.svd(undetermined, full_matrices=False)
     undetermined = directions[:, sizes > 1e-6]
-    null_space = np.zeros((static + count, result.null_space.shape[1] + undetermined.shape[1]))
+    null_space = np.zeros((len(covariance), result.null_space.shape[1] + undetermined.shape[1]))
     null_space[:static, : result.null_space.shape[1]] = result.null_space
-    null_space[static:, result.null_space.shape[1] :] = undetermined
+    null_space[static : static + count, result.null_space.shape[1] :] = undetermined
     offset = np.linalg.norm(motion.positions - array.chip_positions, axis=1)
     largest = float(np.abs(motion.biases).max())
     statement = (
@@ -178,8 +197,8 @@ def _with_positions(result: Calibration, array: AccelerometerArray, motion: Arra
     )
     return replace(
         result,
-        names=(*result.names, *(f"{chip.name}_r_{axis}" for chip in array.chips for axis in "xyz")),
-        values=np.concatenate([result.values, motion.positions.ravel()]),
+        names=(*result.names, *names),
+        values=np.concatenate([result.values, motion.positions.ravel(), delays]),
         covariance=covariance,
         null_space=null_space,
         statements=(*result.statements, *motion.statements, statement),

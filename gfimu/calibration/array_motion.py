@@ -23,7 +23,7 @@ from gfimu.errors import UnitError
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
 
-__all__ = ["ArrayMotion", "array_motion"]
+__all__ = ["ArrayMotion", "array_motion", "gradient", "rate_derivative", "turning_readings"]
 
 Floats = NDArray[np.float64]
 
@@ -41,8 +41,8 @@ class ArrayMotion:
         Positions of the chips in the body frame, m.
     biases : ndarray, shape (k, 3)
         Residual bias of each sensing axis, m/s².
-    covariance : ndarray, shape (6k, 6k)
-        Covariance of the positions (chip by chip), then the biases.
+    covariance : ndarray, shape (6k, 6k) or (7k, 7k)
+        Covariance of the positions (chip by chip), then the biases, then the delays where there are any.
     null_space : ndarray, shape (6k, m)
         Orthonormal directions (m and m/s²) that the motion does not determine.
     statements : tuple of str
@@ -53,6 +53,8 @@ class ArrayMotion:
         Samples used.
     reference : str
         Kind of reference.
+    delays : ndarray, shape (k,), optional
+        How late each chip samples against the mean of all, s; None where they were not fitted.
     """
 
     positions: Floats
@@ -64,6 +66,7 @@ class ArrayMotion:
     residual_rms_before_m_s2: float
     samples: int
     reference: str
+    delays: Floats | None = None
 
     @property
     def position_std(self) -> Floats:
@@ -143,8 +146,8 @@ def _typical_rate2(omega: Floats) -> float:
     return float(np.sqrt(np.mean(np.sum(omega**2, axis=1) ** 2)))
 
 
-def _gradient(omega: Floats, alpha: Floats) -> Floats:
-    """Γ = [α×] + ωωᵀ − |ω|² I, shape (n, 3, 3)."""
+def gradient(omega: Floats, alpha: Floats) -> Floats:
+    """Return Γ = [α×] + ωωᵀ − |ω|² I, shape (n, 3, 3)."""
     cross = np.zeros((len(omega), 3, 3))
     cross[:, 0, 1], cross[:, 0, 2], cross[:, 1, 2] = -alpha[:, 2], alpha[:, 1], -alpha[:, 0]
     cross -= cross.swapaxes(1, 2).copy()
@@ -152,8 +155,8 @@ def _gradient(omega: Floats, alpha: Floats) -> Floats:
     return np.asarray(cross + omega[:, :, None] * omega[:, None, :] - square, dtype=np.float64)
 
 
-def _rate_derivative(omega: Floats, r: Floats) -> Floats:
-    """∂(ωωᵀ r − |ω|² r)/∂ω = (ω·r) I + ω rᵀ − 2 r ωᵀ for every chip, shape (n, k, 3, 3)."""
+def rate_derivative(omega: Floats, r: Floats) -> Floats:
+    """Return ∂(ωωᵀ r − |ω|² r)/∂ω = (ω·r) I + ω rᵀ − 2 r ωᵀ for every chip, shape (n, k, 3, 3)."""
     dot = omega @ r.T  # (n, k)
     return np.asarray(
         dot[:, :, None, None] * np.eye(3)
@@ -163,20 +166,25 @@ def _rate_derivative(omega: Floats, r: Floats) -> Floats:
     )
 
 
-def _start_alpha(y: Floats, array: AccelerometerArray, reference: MotionReference) -> Floats:
-    if reference.kind == "turntable":
-        return np.column_stack([np.zeros((len(y), 2)), reference.alpha])
-    still = y - _centripetal(array, reference.omega)
+def turning_readings(y: Floats, array: AccelerometerArray, omega: Floats) -> Floats:
+    """Return the angular acceleration (n, 3) that readings (n, c) show at rates (n, 3), of either sign."""
+    still = y - _centripetal(array, omega)
     return np.asarray((still @ np.linalg.pinv(array.regression_matrix).T)[:, :3], dtype=np.float64)
 
 
+def _start_alpha(y: Floats, array: AccelerometerArray, reference: MotionReference) -> Floats:
+    if reference.kind == "turntable":
+        return np.column_stack([np.zeros((len(y), 2)), reference.alpha])
+    return turning_readings(y, array, reference.omega)
+
+
 def _centripetal(array: AccelerometerArray, omega: Floats) -> Floats:
-    gamma = _gradient(omega, np.zeros_like(omega))
+    gamma = gradient(omega, np.zeros_like(omega))
     return np.asarray(np.einsum("ci,nij,cj->nc", array.axes, gamma, array.positions), dtype=np.float64)
 
 
 def _origin_force(y: Floats, array: AccelerometerArray, positions: Floats, omega: Floats, alpha: Floats) -> Floats:
-    moved = np.einsum("nij,kj->nki", _gradient(omega, alpha), positions)[:, array.chip_of_channel]
+    moved = np.einsum("nij,kj->nki", gradient(omega, alpha), positions)[:, array.chip_of_channel]
     rest = y - np.einsum("ci,nci->nc", array.axes, moved)
     return np.asarray(rest @ np.linalg.pinv(array.axes).T, dtype=np.float64)
 
@@ -207,7 +215,7 @@ def _linearise(
     n, c = y.shape
     k = len(positions)
     chip = array.chip_of_channel
-    gamma = _gradient(omega, alpha)
+    gamma = gradient(omega, alpha)
     model = p[:, None, :] + np.einsum("nij,kj->nki", gamma, positions)  # (n, k, 3)
     residual = (y - np.einsum("ci,nci->nc", array.axes, model[:, chip]) - biases) / sigma
     design = np.zeros((n, c, 3 * k + c))
@@ -215,7 +223,7 @@ def _linearise(
     for channel in range(c):
         design[:, channel, 3 * chip[channel] : 3 * chip[channel] + 3] = by_position[:, channel]
         design[:, channel, 3 * k + channel] = 1.0
-    by_rate = np.einsum("ci,ncij->ncj", array.axes, _rate_derivative(omega, positions)[:, chip])
+    by_rate = np.einsum("ci,ncij->ncj", array.axes, rate_derivative(omega, positions)[:, chip])
     by_alpha = np.cross(positions[chip], array.axes)  # θᵀ(α × r) = α·(r × θ)
     by_force = np.broadcast_to(array.axes, (n, c, 3))
     if reference.kind == "turntable":

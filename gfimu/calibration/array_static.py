@@ -13,17 +13,26 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import null_space
+from scipy.linalg import block_diag, null_space
 
 from gfimu.calibration.coverage import check_magnitude_coverage, fit_sphere, pose_directions
 from gfimu.calibration.fit_quality import covariance_scale, odd_poses
 from gfimu.calibration.gauss_helmert import Condition, gauss_helmert
+from gfimu.calibration.nonlinearity import quadratic_statement, with_quadratic
 from gfimu.calibration.observations import Observations
-from gfimu.calibration.result import Calibration, parameter_names
+from gfimu.calibration.result import Calibration, parameter_names, quadratic_names
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
 
-__all__ = ["apparent_alpha", "array_static", "body_specific_force", "disagreement", "same_specific_force", "seen_alpha"]
+__all__ = [
+    "apparent_alpha",
+    "array_static",
+    "bias_places",
+    "body_specific_force",
+    "disagreement",
+    "same_specific_force",
+    "seen_alpha",
+]
 
 Floats = NDArray[np.float64]
 
@@ -59,21 +68,28 @@ def array_static(observations: Observations, array: AccelerometerArray, *, gravi
     check_magnitude_coverage(pose_directions(means[:, :3]))
     start = _start(means, axes, array, gravity)
     gauge = _rotation_gauge(axes)  # (3, u)
-    condition = same_specific_force(axes, gravity)
+    condition, basis = same_specific_force(axes, gravity), null_space(gauge)
+    prior: Floats | None = None
+    names = [name for chip in array.chips for name in parameter_names(chip.name, "array")]
+    if observations.bends:
+        condition = with_quadratic(condition, bias_places(len(axes)))
+        start = np.concatenate([start, np.zeros(array.n_channels)])
+        basis = block_diag(basis, np.eye(array.n_channels))
+        prior = np.concatenate([np.full(len(names), np.inf), observations.quadratic_prior])
+        names += quadratic_names(tuple(chip.name for chip in array.chips))
     adjustment = gauss_helmert(
         condition,
         start,
         observations.readings,
         observations.row_covariance,
-        basis=null_space(gauge),
+        basis=basis,
+        prior_std=prior,
         tolerance=1e-8,
     )
     scale, warnings = covariance_scale(adjustment.variance_factor, adjustment.redundancy)
     f, _, b = condition(adjustment.parameters, means)
-    spread = observations.covariance / np.bincount(observations.pose)[:, None, None]
-    weight = np.linalg.inv(b @ spread @ b.swapaxes(1, 2))
+    weight = np.linalg.inv(b @ observations.mean_covariance @ b.swapaxes(1, 2))
     misfit = np.einsum("pr,prs,ps->p", f, weight, f) / f.shape[1]
-    names = [name for chip in array.chips for name in parameter_names(chip.name, "array")]
     statement = (
         "a common rotation of all chips changes nothing at rest: the body frame is the one in which the mean rotation "
         "of the chips against the drawing is zero"
@@ -88,7 +104,7 @@ def array_static(observations: Observations, array: AccelerometerArray, *, gravi
         adjustment.parameters,
         adjustment.cofactor * scale,
         _common_rotations(adjustment.parameters, axes),
-        statements=(statement,),
+        statements=(statement, *quadratic_statement(observations)),
         warnings=(*warnings, *odd_poses(misfit, observations.start_s)),
     )
     body = body_specific_force(result, array, means)
@@ -98,6 +114,7 @@ def array_static(observations: Observations, array: AccelerometerArray, *, gravi
         "poses": float(observations.n_poses),
         "redundancy": float(adjustment.redundancy),
         "variance_factor": adjustment.variance_factor,
+        "covariance_factor": scale,
         "iterations": float(adjustment.iterations),
         "magnitude_residual_rms_m_s2": float(np.sqrt(np.mean(magnitude**2))),
         "disagreement_rms_m_s2": disagreement(body),
@@ -234,16 +251,22 @@ def same_specific_force(axes: Floats, gravity: float) -> Condition:
     return condition
 
 
+def bias_places(chips: int) -> NDArray[np.intp]:
+    """Places of the biases among the twelve parameters of every chip, shape (3k,)."""
+    return np.asarray(np.flatnonzero(np.tile(np.arange(12) >= 9, chips)), dtype=np.intp)
+
+
 def _common_rotations(parameters: Floats, axes: Floats) -> Floats:
     """Parameter changes made by common rotations of the body frame, orthonormal, shape (u, 3)."""
     columns = []
+    rest = np.zeros(len(parameters) - 12 * len(axes))
     for direction in np.eye(3):
         turn = np.cross(np.eye(3), direction)  # [δ×] up to sign
         blocks = []
         for number, a in enumerate(axes):
             m = parameters[12 * number : 12 * number + 9].reshape(3, 3)
             blocks.append(np.concatenate([(m @ a @ turn @ a.T).ravel(), np.zeros(3)]))
-        columns.append(np.concatenate(blocks))
+        columns.append(np.concatenate([*blocks, rest]))
     return np.asarray(np.linalg.qr(np.column_stack(columns))[0], dtype=np.float64)
 
 

@@ -16,11 +16,13 @@ from scipy.special import chdtri
 
 from gfimu.calibration.array_static import (
     apparent_alpha,
+    bias_places,
     body_specific_force,
     disagreement,
     same_specific_force,
     seen_alpha,
 )
+from gfimu.calibration.nonlinearity import with_quadratic
 from gfimu.calibration.observations import Observations
 from gfimu.calibration.result import Calibration
 from gfimu.errors import InputError, UnitError
@@ -74,10 +76,14 @@ def array_update(
     _check(calibration, observations, array)
     chips = len(array.chips)
     condition = same_specific_force(np.array([chip.axes for chip in array.chips]), calibration.gravity)
-    used = slice(0, _PER_CHIP * chips)
+    size_of_models = _PER_CHIP * chips
+    used = slice(0, size_of_models)
+    if f"{array.chips[0].name}_q_x" in calibration.names:  # they follow the models of all chips
+        condition = with_quadratic(condition, bias_places(chips))
+        used = slice(0, size_of_models + array.n_channels)
     values, covariance = calibration.values[used].copy(), calibration.covariance[used, used].copy()
-    per_chip = values.reshape(chips, _PER_CHIP)
-    biases = np.flatnonzero(np.tile(np.arange(_PER_CHIP) >= _PER_CHIP - 3, chips))
+    per_chip = values[:size_of_models].reshape(chips, _PER_CHIP)
+    biases = bias_places(chips)
     # Sensitivity of each chip, reading unit per m/s²: the cube root of its determinant.
     size = np.cbrt(np.abs(np.linalg.det(per_chip[:, :9].reshape(chips, 3, 3)))).repeat(3)
     covariance[biases, biases] += (turn_on_std_m_s2 * size) ** 2

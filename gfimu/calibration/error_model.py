@@ -1,4 +1,4 @@
-"""Error model of a sensor triad: l = M a + b, and its other ways of writing.
+"""Error model of a sensor triad: l = M a + b, and its other ways of writing; where the axes bend, l = b + y + q y².
 
 l is what the triad reads (counts, or m/s²), a the true input (specific force, m/s²), M the sensitivity matrix, b the
 bias. With a full M there are 12 parameters; with a triangular one there are 9, and the zeros of M fix the frame in
@@ -7,7 +7,7 @@ which a is expressed (Persian calibration paper, its two models).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -53,10 +53,13 @@ class ErrorModel:
         M, reading unit per m/s² (per rad/s for a gyro).
     bias : ndarray, shape (3,)
         b, reading unit.
+    quadratic : ndarray, shape (3,), optional
+        q of each sensing axis, 1 per reading unit: l = b + y + q y² with y = M a; zero by default.
     """
 
     sensitivity: NDArray[np.float64]
     bias: NDArray[np.float64]
+    quadratic: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
 
     def __post_init__(self) -> None:
         sensitivity = np.asarray(self.sensitivity, dtype=float)
@@ -76,12 +79,15 @@ class ErrorModel:
         return np.asarray(np.linalg.inv(self.sensitivity), dtype=np.float64)
 
     def read(self, a: ArrayLike) -> NDArray[np.float64]:
-        """Return the readings l = M a + b of true inputs ``a``, shape (..., 3)."""
-        return np.asarray(a, dtype=float) @ self.sensitivity.T + self.bias
+        """Return the readings l of true inputs ``a``, shape (..., 3): what `correct` turns back into ``a``."""
+        straight = np.asarray(a, dtype=float) @ self.sensitivity.T
+        root = np.sqrt(np.maximum(1.0 - 4.0 * self.quadratic * straight, 0.0))  # of y − q y² = M a
+        return np.asarray(2.0 * straight / (1.0 + root) + self.bias, dtype=np.float64)
 
     def correct(self, readings: ArrayLike) -> NDArray[np.float64]:
-        """Return the true inputs a = M⁻¹ (l − b) of readings, shape (..., 3)."""
-        return (np.asarray(readings, dtype=float) - self.bias) @ self.inverse.T
+        """Return the true inputs a = M⁻¹ (y − q y²) with y = l − b of readings, shape (..., 3)."""
+        y = np.asarray(readings, dtype=float) - self.bias
+        return np.asarray((y - self.quadratic * y**2 if self.quadratic.any() else y) @ self.inverse.T)
 
     @classmethod
     def nominal(cls, scale: float = 1.0, bias: float = 0.0) -> ErrorModel:
@@ -159,7 +165,7 @@ class ErrorModel:
         else:
             raise unknown_name("triangular gauge", gauge, ("x_axis", "z_axis"))
         signs = np.sign(np.diag(triangular))
-        return ErrorModel(triangular * signs, self.bias)
+        return ErrorModel(triangular * signs, self.bias, self.quadratic)
 
     def parameters(self, gauge: str) -> NDArray[np.float64]:
         """Parameter vector: the free elements of M row by row, then b; shape (12,) or (9,)."""

@@ -43,7 +43,7 @@ class Adjustment:
     variance_factor : float
         vᵀ P v / redundancy; NaN without redundancy.
     redundancy : int
-        Conditions minus determinable parameters.
+        Conditions and priors minus determinable parameters.
     null_space : ndarray, shape (u, k)
         Orthonormal directions of the parameters that the conditions do not determine.
     iterations : int
@@ -71,6 +71,7 @@ def gauss_helmert(
     covariance: ArrayLike,
     *,
     basis: ArrayLike | None = None,
+    prior_std: ArrayLike | None = None,
     minimum_norm: bool = False,
     move_observations: bool = True,
     tolerance: float = 1e-10,
@@ -90,6 +91,8 @@ def gauss_helmert(
         Covariance of each group.
     basis : array_like, shape (u, m), optional
         Columns that span the parameter changes allowed; a linear constraint is the null space of its rows.
+    prior_std : array_like, shape (u,), optional
+        Standard deviation of each parameter about zero before the observations; infinite where nothing is known.
     minimum_norm : bool
         With undetermined directions, take the step of least norm instead of refusing.
     move_observations : bool
@@ -109,17 +112,18 @@ def gauss_helmert(
     raw = np.asarray(observations, dtype=float)  # (n, d)
     q = np.asarray(covariance, dtype=float)
     span = None if basis is None else np.asarray(basis, dtype=float)
+    prior = _prior_rows(prior_std, len(x))  # (m, u)
     v: Floats | None = None
     for iteration in range(1, max_iterations + 1):
         f, a, b = condition(x, raw if v is None else raw + v)  # (n, r), (n, r, u), (n, r, d)
         w = f if v is None else f - np.einsum("nrd,nd->nr", b, v)
         bq = _times_covariance(b, q)  # (n, r, d)
         root = _whitening(bq, b)  # (B Q Bᵀ)⁻¹ = Lᵀ L, (n, r, r)
-        design = _whitened(root, a)
+        design = np.concatenate([_whitened(root, a).reshape(-1, len(x)), prior])
         if span is not None:
             design = design @ span
-        closure = _whitened(root, w[..., None]).ravel()
-        step, cofactor, null = _solve(design.reshape(len(closure), -1), closure, minimum_norm)
+        closure = np.concatenate([_whitened(root, w[..., None]).ravel(), prior @ x])
+        step, cofactor, null = _solve(design, closure, minimum_norm)
         dx = step if span is None else span @ step
         x += dx
         full = cofactor if span is None else span @ cofactor @ span.T
@@ -140,13 +144,22 @@ def gauss_helmert(
             break
         if last:
             redundancy = len(closure) - (design.shape[-1] - null.shape[1])
-            factor = float(np.sum(rest**2)) / redundancy if redundancy > 0 else np.nan
+            square = float(np.sum(rest**2)) + float(np.sum((prior @ x) ** 2))
+            factor = square / redundancy if redundancy > 0 else np.nan
             directions = np.linalg.qr(null if span is None else span @ null)[0]
             return Adjustment(x, full, new_v, factor, redundancy, directions, iteration)
     raise InputError(
         f"the adjustment did not settle in {max_iterations} iterations; the starting values are too far off, "
         "or some observations do not belong: check the poses and the gravity"
     )
+
+
+def _prior_rows(prior_std: ArrayLike | None, count: int) -> Floats:
+    """Return a row 1 / std for every parameter with a prior, shape (m, u)."""
+    if prior_std is None:
+        return np.zeros((0, count))
+    std = np.asarray(prior_std, dtype=float)
+    return np.asarray(np.eye(count)[np.isfinite(std)] / std[np.isfinite(std), None], dtype=np.float64)
 
 
 def _times_covariance(b: Floats, q: Floats) -> Floats:

@@ -14,6 +14,8 @@ from gfimu.calibration.faults import (
     scale_warning,
     without_moved_poses,
 )
+from gfimu.calibration.fit_quality import mean_factor
+from gfimu.calibration.nonlinearity import quadratic_std
 from gfimu.calibration.observations import observations_from
 from gfimu.calibration.registry import METHODS, CalibrationMethod, calibration_method
 from gfimu.calibration.result import Calibration, combine
@@ -146,14 +148,22 @@ def calibrate_triads(method: CalibrationMethod, task: CalibrationTask) -> Calibr
     warnings += check_readings(recording, rest)
     rest, moved = without_moved_poses(recording, rest)
     warnings += moved
-    observations = observations_from(recording, rest, task.input_kind)
+    observations = replace(
+        observations_from(recording, rest, task.input_kind), quadratic_std=quadratic_std(recording, task.array)
+    )
     options: dict[str, float] = {}
     if task.levelling_std_rad is not None and "levelling_std_rad" in method.options:
         options["levelling_std_rad"] = task.levelling_std_rad
     fit = method.fit
-    results = [
-        fit(observations.of_chip(chip), gravity=task.gravity, gauge=gauge, **options) for chip in observations.chips
-    ]
+
+    def fits() -> list[Calibration]:
+        each = (observations.of_chip(chip) for chip in observations.chips)
+        return [fit(one, gravity=task.gravity, gauge=gauge, **options) for one in each]
+
+    results = fits()
+    if len(results) > 1 and observations.kind == "averaged":
+        observations = replace(observations, variance_factor=_common_factor(results))
+        results = fits()
     result = combine(results)
     warnings += repeated_poses(observations.of_chip(observations.chips[0]).means)
     warnings += scale_warning(result, _nominal_scales(recording, observations.chips))
@@ -168,6 +178,15 @@ def calibrate_triads(method: CalibrationMethod, task: CalibrationTask) -> Calibr
             "noise_correlation_factor": observations.correlation_factor,
         },
     )
+
+
+def _common_factor(results: list[Calibration]) -> float | None:
+    """Learn what does not average out of the rests from the misfits of all chips together; None if nothing shows."""
+    freedom = [int(float(result.statistics["redundancy"])) for result in results]
+    misfit = [float(result.statistics["variance_factor"]) for result in results]
+    if not all(count > 0 for count in freedom):
+        return None
+    return mean_factor(float(np.average(misfit, weights=freedom)), sum(freedom))
 
 
 def calibrate_whole_array(method: CalibrationMethod, task: CalibrationTask) -> Calibration:

@@ -13,7 +13,7 @@ from gfimu.recording import Recording
 from gfimu.recording.reference_times import reference_on_rows
 from gfimu.recording.rest import detect_rest
 
-__all__ = ["MotionReference", "motion_reference"]
+__all__ = ["MotionReference", "has_reference", "motion_reference"]
 
 Floats = NDArray[np.float64]
 
@@ -50,6 +50,14 @@ class MotionReference:
     alpha_std: float
 
 
+_GYRO = tuple(f"gyro_{axis}_rad_s" for axis in "xyz")
+
+
+def has_reference(recording: Recording) -> bool:
+    """Whether a recording has a gyro of three axes or a tachometer."""
+    return all(name in recording.reference for name in _GYRO) or "tacho_rad_s" in recording.reference
+
+
 def motion_reference(recording: Recording, *, omega_std: float | None = None) -> MotionReference:
     """Take the reference of the rotation from a recording: its gyro if it has one, else its tachometer.
 
@@ -67,9 +75,8 @@ def motion_reference(recording: Recording, *, omega_std: float | None = None) ->
         If there is neither, or nothing moves.
     """
     recording = reference_on_rows(recording)
-    names = [f"gyro_{axis}_rad_s" for axis in "xyz"]
-    if all(name in recording.reference for name in names):
-        omega = np.column_stack([recording.reference[name] for name in names])
+    if all(name in recording.reference for name in _GYRO):
+        omega = np.column_stack([recording.reference[name] for name in _GYRO])
         omega = omega - _rate_at_rest(recording, omega)
         kind, alpha, alpha_std, rate_std = "gyro", np.zeros(len(omega)), np.inf, 0.05
     elif "tacho_rad_s" in recording.reference:

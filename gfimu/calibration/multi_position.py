@@ -6,6 +6,8 @@ parameters and observations together. No levelling is needed, only rest.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,12 +15,22 @@ from gfimu.calibration.coverage import check_magnitude_coverage, fit_sphere, pos
 from gfimu.calibration.error_model import ErrorModel, free_elements
 from gfimu.calibration.fit_quality import covariance_scale
 from gfimu.calibration.gauss_helmert import Adjustment, Condition, gauss_helmert
+from gfimu.calibration.nonlinearity import quadratic_statement, with_quadratic
 from gfimu.calibration.observations import Observations
-from gfimu.calibration.result import Calibration, parameter_names
+from gfimu.calibration.result import Calibration, parameter_names, quadratic_names
 from gfimu.errors import unknown_name
 from gfimu.geometry.gravity import EARTH_RATE
 
-__all__ = ["WEIGHTINGS", "magnitude_condition", "multi_position", "multi_position_gyro"]
+__all__ = [
+    "WEIGHTINGS",
+    "adjust_triad",
+    "magnitude_condition",
+    "multi_position",
+    "multi_position_gyro",
+    "pose_variance_factor",
+    "triad_model",
+    "triad_names",
+]
 
 Floats = NDArray[np.float64]
 
@@ -65,11 +77,11 @@ def multi_position(
         raise unknown_name("weighting", weighting, WEIGHTINGS)
     check_magnitude_coverage(pose_directions(observations.means))
     adjustment = _adjust(observations, gravity, gauge, weighting, start or _coarse_start(observations, gravity))
-    factor, redundancy = _pose_variance_factor(observations, adjustment, gravity, gauge)
-    scale, warnings = covariance_scale(factor, redundancy)
+    factor, redundancy = pose_variance_factor(observations, adjustment, gravity, gauge)
+    scale, warnings = covariance_scale(factor, redundancy, observations.variance_factor)
     if weighting == "uniform":
         scale, warnings = adjustment.variance_factor, ()
-    model = ErrorModel.from_parameters(adjustment.parameters, gauge)
+    model = triad_model(adjustment.parameters, gauge)
     miss = np.linalg.norm(model.correct(observations.means), axis=1) - gravity
     return Calibration(
         "multi-position",
@@ -77,17 +89,18 @@ def multi_position(
         observations.channels,
         gauge,
         gravity,
-        parameter_names(observations.chips[0], gauge),
+        triad_names(observations, gauge),
         adjustment.parameters,
         adjustment.cofactor * scale,
         adjustment.null_space,
-        statements=_rotation_statement(adjustment),
+        statements=(*_rotation_statement(adjustment), *quadratic_statement(observations)),
         warnings=warnings,
         statistics={
             "poses": float(observations.n_poses),
             "rows": float(len(observations.readings)),
             "redundancy": float(redundancy),
             "variance_factor": factor,
+            "covariance_factor": scale,
             "iterations": float(adjustment.iterations),
             "magnitude_residual_rms_m_s2": float(np.sqrt(np.mean(miss**2))),
             "input": observations.kind,
@@ -210,25 +223,84 @@ def multi_position_gyro(observations: Observations, *, earth_rate: float = EARTH
 def _adjust(observations: Observations, magnitude: float, gauge: str, weighting: str, start: ErrorModel) -> Adjustment:
     uniform = weighting == "uniform"
     begin = start.in_gauge(gauge) if gauge != "coarse" else start
-    return gauss_helmert(
+    return adjust_triad(
         magnitude_condition(magnitude, gauge, unit_weight=uniform),
         begin.parameters(gauge),
-        observations.readings,
+        observations,
         np.eye(3) if uniform else observations.row_covariance,
         minimum_norm=gauge == "coarse",
         move_observations=not uniform,
     )
 
 
-def _pose_variance_factor(
+def adjust_triad(
+    condition: Condition,
+    start: Floats,
+    observations: Observations,
+    covariance: Floats,
+    *,
+    minimum_norm: bool,
+    move_observations: bool,
+) -> Adjustment:
+    """Adjust the parameters of a triad, and the quadratic coefficients of its axes where they bend.
+
+    Parameters
+    ----------
+    condition : callable
+        Of straight readings.
+    start : ndarray, shape (u,)
+        Starting values; the last three are the bias.
+    observations : Observations
+        Rows of one triad.
+    covariance : ndarray, shape (3, 3) or (n, 3, 3)
+        Covariance of the rows.
+    minimum_norm, move_observations : bool
+        As in `gfimu.calibration.gauss_helmert.gauss_helmert`.
+    """
+    prior: Floats | None = None
+    if observations.bends:
+        condition = with_quadratic(condition, np.arange(len(start) - 3, len(start)))
+        prior = np.concatenate([np.full(len(start), np.inf), observations.quadratic_prior])
+        start = np.concatenate([start, np.zeros(3)])
+    return gauss_helmert(
+        condition,
+        start,
+        observations.readings,
+        covariance,
+        prior_std=prior,
+        minimum_norm=minimum_norm,
+        move_observations=move_observations,
+    )
+
+
+def triad_names(observations: Observations, gauge: str) -> tuple[str, ...]:
+    """Names of the parameters that `adjust_triad` adjusts."""
+    bends = quadratic_names(observations.chips) if observations.bends else ()
+    return (*parameter_names(observations.chips[0], gauge), *bends)
+
+
+def triad_model(parameters: Floats, gauge: str) -> ErrorModel:
+    """Error model of the parameters that `adjust_triad` adjusts."""
+    count = len(free_elements(gauge)) + 3
+    model = ErrorModel.from_parameters(parameters[:count], gauge)
+    return replace(model, quadratic=parameters[count:]) if len(parameters) > count else model
+
+
+def pose_variance_factor(
     observations: Observations, adjustment: Adjustment, magnitude: float, gauge: str
 ) -> tuple[float, int]:
     """Variance factor of the pose means: many samples per pose must not hide that the poses disagree."""
-    f, _, b = magnitude_condition(magnitude, gauge)(adjustment.parameters, observations.means)
-    rows = np.bincount(observations.pose)
-    variance = np.einsum("pi,pij,pj->p", b[:, 0], observations.covariance, b[:, 0]) / rows
-    redundancy = observations.n_poses - (len(adjustment.parameters) - adjustment.null_space.shape[1])
-    return (float(np.sum(f[:, 0] ** 2 / variance)) / redundancy if redundancy > 0 else float("nan")), redundancy
+    condition = magnitude_condition(magnitude, gauge)
+    count = len(free_elements(gauge)) + 3
+    square = 0.0
+    if observations.bends:
+        condition = with_quadratic(condition, np.arange(count - 3, count))
+        square = float(np.sum((adjustment.parameters[count:] / observations.quadratic_prior) ** 2))
+    f, _, b = condition(adjustment.parameters, observations.means)
+    variance = np.einsum("pi,pij,pj->p", b[:, 0], observations.mean_covariance, b[:, 0])
+    redundancy = observations.n_poses - (count - adjustment.null_space.shape[1])  # a prior for every coefficient
+    square += float(np.sum(f[:, 0] ** 2 / variance))
+    return (square / redundancy if redundancy > 0 else float("nan")), redundancy
 
 
 def _coarse_start(observations: Observations, gravity: float) -> ErrorModel:

@@ -48,6 +48,12 @@ class Observations:
         Input: one of `INPUTS`.
     correlation_factor : float
         Factor by which the variance of the means exceeds that of white noise, already in ``covariance``.
+    quadratic_std : ndarray, shape (c,), optional
+        Standard deviation of the quadratic coefficient of each channel, 1 per reading unit
+        (`gfimu.calibration.nonlinearity`); not given or zero: axes are straight.
+    variance_factor : float, optional
+        What does not average out of the means, as a factor of their covariance, if learned from more than these
+        observations (`gfimu.calibration.fit_quality`).
     """
 
     readings: Floats
@@ -58,6 +64,25 @@ class Observations:
     start_s: Floats
     kind: str = "averaged"
     correlation_factor: float = 1.0
+    quadratic_std: Floats | None = None
+    variance_factor: float | None = None
+
+    @property
+    def bends(self) -> bool:
+        """Whether the axes have quadratic coefficients to estimate."""
+        return self.quadratic_std is not None and bool((self.quadratic_std > 0.0).any())
+
+    @property
+    def quadratic_prior(self) -> Floats:
+        """Standard deviation of each quadratic coefficient, shape (c,); tiny for an axis that is straight."""
+        std = np.zeros(len(self.channels)) if self.quadratic_std is None else self.quadratic_std
+        largest = float(std.max(initial=0.0))
+        return np.where(std > 0.0, std, 1e-6 * largest)
+
+    @property
+    def mean_covariance(self) -> Floats:
+        """Covariance of the mean of each pose, shape (p, c, c)."""
+        return self.covariance / np.bincount(self.pose, minlength=self.n_poses)[:, None, None]
 
     @property
     def n_poses(self) -> int:
@@ -93,6 +118,7 @@ class Observations:
             readings=self.readings[:, columns],
             covariance=self.covariance[:, columns, columns],
             channels=self.channels[columns],
+            quadratic_std=None if self.quadratic_std is None else self.quadratic_std[columns],
         )
 
     def keep(self, poses: ArrayLike) -> Observations:

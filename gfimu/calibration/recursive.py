@@ -7,15 +7,19 @@ covariance P_n but needs no guess of P_0 and loses no digits: at the end it is t
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import block_diag
 
 from gfimu.calibration.coverage import fit_sphere
 from gfimu.calibration.error_model import ErrorModel, free_elements
 from gfimu.calibration.fit_quality import covariance_scale
 from gfimu.calibration.known_poses import face_poses
+from gfimu.calibration.nonlinearity import quadratic_statement
 from gfimu.calibration.observations import Observations
-from gfimu.calibration.result import Calibration, parameter_names
+from gfimu.calibration.result import Calibration, parameter_names, quadratic_names
 from gfimu.errors import InputError
 
 __all__ = ["RecursiveCalibrator", "recursive"]
@@ -38,16 +42,31 @@ class RecursiveCalibrator:
         Reading units per m/s², to turn the covariance of a reading into that of a specific force.
     gauge : {"poses", "x_axis", "z_axis"}
         ``poses`` estimates all 12 parameters, the others a triangular Q with 9.
+    quadratic_std : array_like, shape (3,), optional
+        Prior of the quadratic coefficients of the axes, 1 per reading unit; not given: the axes are straight.
+    centre : array_like, shape (3,)
+        Reading at zero input, about which they bend: a coarse bias.
     """
 
-    def __init__(self, nominal_scale: float, *, gauge: str = "poses") -> None:
+    def __init__(
+        self,
+        nominal_scale: float,
+        *,
+        gauge: str = "poses",
+        quadratic_std: ArrayLike | None = None,
+        centre: ArrayLike = (0.0, 0.0, 0.0),
+    ) -> None:
         if not nominal_scale > 0.0:
             raise InputError("the nominal scale must be positive: reading units per m/s²")
         self.gauge = gauge
         self.nominal_scale = nominal_scale
         self._elements = free_elements(gauge)
-        size = len(self._elements) + 3
+        self._centre = np.asarray(centre, dtype=float)
+        prior = np.empty(0) if quadratic_std is None else np.asarray(quadratic_std, dtype=float)
+        self._bends = len(prior)
+        size = len(self._elements) + 3 + self._bends
         self._root = np.zeros((size, size + 1))  # [R | R Φ]: information square root and right-hand side
+        self._root[range(size - self._bends, size), range(size - self._bends, size)] = 1.0 / prior
         self._residual_square = 0.0
         self.count = 0
 
@@ -67,7 +86,10 @@ class RecursiveCalibrator:
         h = np.zeros((3, len(self._root)))
         for column, (i, j) in enumerate(self._elements):
             h[i, column] = l[j]  # eq. 13
-        h[:, len(self._elements) :] = -np.eye(3)
+        place = len(self._elements)
+        h[:, place : place + 3] = -np.eye(3)
+        if self._bends:  # a = Q (l − q (l − b)²) − B', the bend by the nominal scale
+            h[:, place + 3 :] = -np.diag((l - self._centre) ** 2) / self.nominal_scale
         noise_root = np.linalg.cholesky(np.asarray(covariance, dtype=float)) / self.nominal_scale
         rows = np.linalg.solve(noise_root, np.column_stack([h, np.asarray(reference, dtype=float)]))
         stacked = np.asarray(np.linalg.qr(np.vstack([self._root, rows]), mode="r"), dtype=np.float64)
@@ -100,7 +122,7 @@ class RecursiveCalibrator:
     @property
     def redundancy(self) -> int:
         """Scalar readings beyond the number of parameters."""
-        return max(3 * self.count - len(self._root), 0)
+        return max(3 * self.count + self._bends - len(self._root), 0)
 
     @property
     def variance_factor(self) -> float:
@@ -115,9 +137,29 @@ class RecursiveCalibrator:
         return triangle / scale, scale
 
     def calibration(
-        self, *, unit: str, channels: tuple[str, ...], gravity: float, input_kind: str = "raw"
+        self,
+        *,
+        unit: str,
+        channels: tuple[str, ...],
+        gravity: float,
+        input_kind: str = "raw",
+        misfit: tuple[float, int, float | None] | None = None,
     ) -> Calibration:
         """Return the calibration from the readings so far.
+
+        Parameters
+        ----------
+        unit : str
+            Reading unit.
+        channels : tuple of str
+            Names of the three channels.
+        gravity : float
+            Local gravity, m/s².
+        input_kind : str
+            What the readings are.
+        misfit : tuple, optional
+            Variance factor, redundancy and learned factor for `gfimu.calibration.fit_quality.covariance_scale`; by
+            default those of the readings.
 
         Raises
         ------
@@ -125,14 +167,16 @@ class RecursiveCalibrator:
             If they don't determine it yet.
         """
         values, jacobian = self._forward_parameters()
-        scale, warnings = covariance_scale(self.variance_factor, self.redundancy)
+        factor, redundancy, learned = misfit or (self.variance_factor, self.redundancy, None)
+        scale, warnings = covariance_scale(factor, redundancy, learned)
+        bends = quadratic_names((channels[0][:-1],)) if self._bends else ()
         return Calibration(
             "recursive",
             unit,
             channels,
             self.gauge,
             gravity,
-            parameter_names(channels[0][:-1], self.gauge),
+            (*parameter_names(channels[0][:-1], self.gauge), *bends),
             values,
             jacobian @ self.covariance @ jacobian.T * scale,
             statements=(
@@ -142,8 +186,9 @@ class RecursiveCalibrator:
             warnings=warnings,
             statistics={
                 "readings": float(self.count),
-                "redundancy": float(self.redundancy),
-                "variance_factor": self.variance_factor,
+                "redundancy": float(redundancy),
+                "variance_factor": factor,
+                "covariance_factor": scale,
                 "input": input_kind,
             },
         )
@@ -154,7 +199,7 @@ class RecursiveCalibrator:
         q = np.zeros((3, 3))
         for value, (i, j) in zip(estimate, self._elements, strict=False):
             q[i, j] = value
-        offset = estimate[len(self._elements) :]
+        offset = estimate[len(self._elements) : len(self._elements) + 3]
         m = np.asarray(np.linalg.inv(q), dtype=np.float64)
         model = ErrorModel(m, m @ offset)  # a = Q (l − b) with b = Q⁻¹ B'
         columns = []
@@ -162,7 +207,8 @@ class RecursiveCalibrator:
             change = -np.outer(m[:, i], m[j])  # dM = −M dQ M
             columns.append(np.concatenate([[change[k] for k in self._elements], change @ offset]))
         columns.extend(np.concatenate([np.zeros(len(self._elements)), m[:, axis]]) for axis in range(3))
-        return model.parameters(self.gauge), np.column_stack(columns)
+        jacobian = block_diag(np.column_stack(columns), np.eye(self._bends))
+        return np.concatenate([model.parameters(self.gauge), estimate[len(estimate) - self._bends :]]), jacobian
 
 
 def recursive(
@@ -195,10 +241,35 @@ def recursive(
         If a face is missing.
     """
     kept, references_of_pose = face_poses(observations, gravity, references)
-    _, radius = fit_sphere(kept.means)
-    calibrator = RecursiveCalibrator(radius / float(np.linalg.norm(references_of_pose, axis=1).mean()), gauge=gauge)
+    centre, radius = fit_sphere(kept.means)
+    calibrator = RecursiveCalibrator(
+        radius / float(np.linalg.norm(references_of_pose, axis=1).mean()),
+        gauge=gauge,
+        quadratic_std=kept.quadratic_prior if kept.bends else None,
+        centre=centre,
+    )
     for reading, pose in zip(kept.readings, kept.pose, strict=True):
         calibrator.update(reading, references_of_pose[pose], kept.covariance[pose])
-    return calibrator.calibration(
-        unit=observations.unit, channels=observations.channels, gravity=gravity, input_kind=observations.kind
+    result = calibrator.calibration(
+        unit=observations.unit,
+        channels=observations.channels,
+        gravity=gravity,
+        input_kind=observations.kind,
+        misfit=_pose_misfit(calibrator, kept, references_of_pose, centre),
     )
+    return replace(result, statements=(*result.statements, *quadratic_statement(observations)))
+
+
+def _pose_misfit(
+    calibrator: RecursiveCalibrator, kept: Observations, references: Floats, centre: Floats
+) -> tuple[float, int, float | None]:
+    """Variance factor of the pose means and its degrees of freedom: many samples per pose must not hide that."""
+    whole = RecursiveCalibrator(
+        calibrator.nominal_scale,
+        gauge=calibrator.gauge,
+        quadratic_std=kept.quadratic_prior if kept.bends else None,
+        centre=centre,
+    )
+    for reading, reference, spread in zip(kept.means, references, kept.mean_covariance, strict=True):
+        whole.update(reading, reference, spread)
+    return whole.variance_factor, whole.redundancy, kept.variance_factor

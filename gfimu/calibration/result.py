@@ -25,7 +25,7 @@ from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
 from gfimu.short_repr import joined
 
-__all__ = ["FORMAT_VERSION", "Calibration", "combine", "load_calibration", "parameter_names"]
+__all__ = ["FORMAT_VERSION", "Calibration", "combine", "load_calibration", "parameter_names", "quadratic_names"]
 
 FORMAT = "gfimu-calibration"
 FORMAT_VERSION = 1
@@ -42,6 +42,11 @@ def parameter_names(chip: str, gauge: str) -> tuple[str, ...]:
     """Names of a triad's parameters, in the order of `ErrorModel.parameters`: ``a1_M_xx`` … ``a1_b_z``."""
     elements = [f"{chip}_M_{_AXES[i]}{_AXES[j]}" for i, j in free_elements(gauge)]
     return (*elements, *(f"{chip}_b_{axis}" for axis in _AXES))
+
+
+def quadratic_names(chips: tuple[str, ...]) -> tuple[str, ...]:
+    """Names of the quadratic coefficients of chips: ``a1_q_x`` …, three per chip."""
+    return tuple(f"{chip}_q_{axis}" for chip in chips for axis in "xyz")
 
 
 @dataclass(frozen=True)
@@ -62,7 +67,8 @@ class Calibration:
         Magnitude of the true input used, m/s² (rad/s for a gyro).
     names : tuple of str
         Parameter names: ``a1_M_xy`` (sensitivity, reading unit per m/s²), ``a1_b_x`` (bias, reading unit),
-        ``a1_r_x`` (position, m).
+        ``a1_q_x`` (quadratic coefficient, 1 per reading unit), ``a1_r_x`` (position, m),
+        ``a1_d`` (delay of the chip against the mean of all, s; not applied).
     values : ndarray, shape (p,)
         Parameter values.
     covariance : ndarray, shape (p, p)
@@ -138,7 +144,10 @@ class Calibration:
         """Unit of each parameter."""
         reading, true = _READING_UNITS[self.unit]
         ratio = "1" if reading == true else f"{reading} per {true}"
-        return tuple({"M": ratio, "b": reading, "r": "m"}[name.split("_")[1]] for name in self.names)
+        inverse = "s²/m" if reading == "m_s2" else f"1 per {reading}"
+        return tuple(
+            {"M": ratio, "b": reading, "r": "m", "q": inverse, "d": "s"}[name.split("_")[1]] for name in self.names
+        )
 
     @property
     def chips(self) -> tuple[str, ...]:
@@ -149,8 +158,13 @@ class Calibration:
     def models(self) -> dict[str, ErrorModel]:
         """Error model of each chip, by name."""
         return {
-            chip: ErrorModel.from_parameters(
-                [self.value(name) for name in parameter_names(chip, self.gauge)], self.gauge
+            chip: replace(
+                ErrorModel.from_parameters(
+                    [self.value(name) for name in parameter_names(chip, self.gauge)], self.gauge
+                ),
+                quadratic=np.array(
+                    [self.value(name) if name in self.names else 0.0 for name in quadratic_names((chip,))]
+                ),
             )
             for chip in self.chips
         }
@@ -182,7 +196,7 @@ class Calibration:
         return self.names.index(name)
 
     def apply(self, recording: Recording) -> Recording:
-        """Correct a recording: a = M⁻¹ (l − b) for every chip.
+        """Correct a recording: a = M⁻¹ (y − q y²), y = l − b, for every chip.
 
         For an array, the result is what ideal sensors along the drawing's axes would read.
 
@@ -252,7 +266,7 @@ class Calibration:
     def rows(self) -> list[tuple[str, str, str, str]]:
         """Rows of a table for people: name, value, standard deviation, unit."""
         return [
-            (name, f"{value:.6f}", f"{std:.2g}", unit)
+            (name, f"{value:.3g}" if "_q_" in name else f"{value:.6f}", f"{std:.2g}", unit)
             for name, value, std, unit in zip(self.names, self.values, self.std, self.units, strict=True)
         ]
 

@@ -14,11 +14,18 @@ from numpy.typing import NDArray
 from gfimu.calibration.coverage import check_magnitude_coverage, pose_directions
 from gfimu.calibration.error_model import ErrorModel, free_elements
 from gfimu.calibration.fit_quality import covariance_scale
-from gfimu.calibration.gauss_helmert import Adjustment, gauss_helmert
+from gfimu.calibration.gauss_helmert import Adjustment
 from gfimu.calibration.known_poses import face_poses, forward_design, levelling_covariance
-from gfimu.calibration.multi_position import magnitude_condition
+from gfimu.calibration.multi_position import (
+    adjust_triad,
+    magnitude_condition,
+    pose_variance_factor,
+    triad_model,
+    triad_names,
+)
+from gfimu.calibration.nonlinearity import quadratic_statement, with_quadratic
 from gfimu.calibration.observations import Observations
-from gfimu.calibration.result import Calibration, parameter_names
+from gfimu.calibration.result import Calibration
 from gfimu.errors import InputError
 
 __all__ = ["coarse_solution", "rotation_directions", "twelve_position"]
@@ -107,17 +114,18 @@ def twelve_position(
         )
     begin = coarse if gauge == "coarse" else coarse.in_gauge(gauge)
     condition = magnitude_condition(gravity, gauge, squared=True)
-    adjustment = gauss_helmert(
+    adjustment = adjust_triad(
         condition,
         begin.parameters(gauge),
-        observations.readings,
+        observations,
         observations.row_covariance,
         minimum_norm=gauge == "coarse",
         move_observations=False,
     )
-    scale, warnings = covariance_scale(adjustment.variance_factor, adjustment.redundancy)
-    model = ErrorModel.from_parameters(adjustment.parameters, gauge)
-    statements: tuple[str, ...] = ()
+    factor, redundancy = pose_variance_factor(observations, adjustment, gravity, gauge)
+    scale, warnings = covariance_scale(factor, redundancy, observations.variance_factor)
+    model = triad_model(adjustment.parameters, gauge)
+    statements = quadratic_statement(observations)
     covariance = adjustment.cofactor * scale
     tilt = _levelling(observations, coarse, gravity) if levelling_std_rad is None else levelling_std_rad
     if gauge == "coarse":
@@ -127,7 +135,7 @@ def twelve_position(
             "common rotations of the three sensing axes about x, y and z; they are taken from the six faces, level to "
             f"{tilt:.2g} rad (standard deviation{' estimated from the faces' if levelling_std_rad is None else ''})"
         )
-        statements = (text,)
+        statements = (text, *statements)
     miss_coarse = np.linalg.norm(coarse.correct(observations.means), axis=1) - gravity
     miss_fine = np.linalg.norm(model.correct(observations.means), axis=1) - gravity
     return Calibration(
@@ -136,7 +144,7 @@ def twelve_position(
         observations.channels,
         gauge,
         gravity,
-        parameter_names(observations.chips[0], gauge),
+        triad_names(observations, gauge),
         adjustment.parameters,
         covariance,
         adjustment.null_space,
@@ -144,8 +152,9 @@ def twelve_position(
         warnings=warnings,
         statistics={
             "poses": float(observations.n_poses),
-            "redundancy": float(adjustment.redundancy),
-            "variance_factor": adjustment.variance_factor,
+            "redundancy": float(redundancy),
+            "variance_factor": factor,
+            "covariance_factor": scale,
             "iterations": float(adjustment.iterations),
             "levelling_std_rad": float(tilt),
             "coarse_magnitude_residual_rms_m_s2": float(np.sqrt(np.mean(miss_coarse**2))),
@@ -159,8 +168,8 @@ def _levelling(observations: Observations, coarse: ErrorModel, gravity: float) -
     """Estimate the tilt of the faces from the residuals of the coarse solution, rad.
 
     With one pose per face, each axis leaves two degrees of freedom, in which tilts of standard deviation s put a
-    square of (4/3) s² g² on average; the noise of the means is taken off. The estimate has few degrees of freedom, so
-    that it is widened by `_LEVELLING_WIDENING`.
+    square of (4/3) s² g² on average; the noise of the means and the bend of the axes are taken off. The estimate has
+    few degrees of freedom, so that it is widened by `_LEVELLING_WIDENING`.
     """
     faces, references = face_poses(observations, gravity)
     design = np.column_stack([references, np.ones(len(references))])
@@ -173,6 +182,9 @@ def _levelling(observations: Observations, coarse: ErrorModel, gravity: float) -
     metric = coarse.inverse.T @ coarse.inverse
     expected = np.einsum("qp,pij,ij->", free**2, unit_tilt, metric)
     noise = np.einsum("qp,pij,ij->", free**2, spread, metric)
+    if observations.bends:
+        bend = free @ (means - coarse.bias) ** 2  # (p, 3)
+        noise = noise + np.sum(bend**2 @ (observations.quadratic_prior**2 * np.diag(metric)))
     variance = max(float(np.sum(residual**2)) - float(noise), 0.0) / float(expected)
     return float(_LEVELLING_WIDENING * np.sqrt(variance))
 
@@ -186,11 +198,13 @@ def _coarse_gauge_covariance(
     readings of each pose, which they share.
     """
     means = observations.means
-    spread = observations.covariance / np.bincount(observations.pose)[:, None, None]  # (p, 3, 3)
-    _, a, b = magnitude_condition(gravity, "coarse", squared=True)(adjustment.parameters, means)
+    spread = observations.mean_covariance  # (p, 3, 3)
+    condition = magnitude_condition(gravity, "coarse", squared=True)
+    bent = with_quadratic(condition, np.arange(9, 12)) if observations.bends else condition
+    _, a, b = bent(adjustment.parameters, means)
     weight = 1.0 / np.einsum("pri,pij,prj->p", b, spread, b)
-    fine = -(adjustment.cofactor @ (a[:, 0] * weight[:, None]).T).T[:, :, None] * b  # ∂x/∂l of each pose, (p, 12, 3)
-    rotation = adjustment.null_space @ adjustment.null_space.T
+    fine = -(adjustment.cofactor @ (a[:, 0] * weight[:, None]).T).T[:, :, None] * b  # ∂x/∂l of each pose, (p, u, 3)
+    rotation = (adjustment.null_space @ adjustment.null_space.T)[:, :12]  # of 12 parameters
     faces, references = face_poses(observations, gravity)
     design = forward_design(references, free_elements("coarse"))  # (f, 3, 12)
     inverse = np.linalg.pinv(design.reshape(-1, 12)).reshape(12, -1, 3)  # (12, f, 3)
@@ -199,6 +213,27 @@ def _coarse_gauge_covariance(
     numbers = np.searchsorted(observations.start_s, faces.start_s)
     transfer[numbers] += coarse
     covariance = np.einsum("pui,pij,pvj->uv", transfer, spread * scale, transfer)
-    model = ErrorModel.from_parameters(adjustment.parameters, "coarse")
+    model = triad_model(adjustment.parameters, "coarse")
     covariance += np.einsum("pui,pij,pvj->uv", coarse, levelling_covariance(model, references, tilt), coarse)
+    if observations.bends:
+        covariance += _quadratic_covariance(observations, adjustment, coarse, faces.means, scale)
     return np.asarray(covariance, dtype=np.float64)
+
+
+def _quadratic_covariance(
+    observations: Observations, adjustment: Adjustment, coarse: Floats, faces: Floats, scale: float
+) -> Floats:
+    """Share of the coefficients' prior: they move the fine solution as one more observation, the faces as errors.
+
+    Parameters
+    ----------
+    coarse : ndarray, shape (f, u, 3)
+        Derivative of the parameters by the readings of the faces, through the rotation.
+    faces : ndarray, shape (f, 3)
+        Readings of the faces.
+    """
+    std = observations.quadratic_prior
+    by_error = adjustment.cofactor[:, 12:] / std**2  # of the fine solution by the error of the prior, (u, 3)
+    bend = (faces - adjustment.parameters[9:12]) ** 2
+    by_error = by_error - np.einsum("fui,fi->ui", coarse, bend)  # q = 0 + error: the faces read more by −error · y²
+    return np.asarray((by_error * (std**2 * scale)) @ by_error.T, dtype=np.float64)

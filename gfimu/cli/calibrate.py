@@ -55,7 +55,8 @@ def _calibrate(
         float | None, typer.Option("--levelling-std", help="Standard deviation of a pose's tilt per axis, rad.")
     ] = None,
     motion: Annotated[
-        Path | None, typer.Option("--motion", help="array: recording with the motion, if it is another one.")
+        Path | None,
+        typer.Option("--motion", help="array: recording of the motion, or of shakes (may be RUN)."),
     ] = None,
     update: Annotated[
         Path | None,

@@ -87,7 +87,8 @@ def calibrate(
     levelling_std, levelling_std_rad : float, optional
         Standard deviation of the tilt of a pose, rad; two names of one argument.
     motion : Recording, str or Path, optional
-        For ``array``: recording with the motion, if it is another one.
+        For ``array``: recording with the motion. With a tachometer or gyro, positions are fitted to it; without, it
+        is taken for shakes by hand from rest to rest, which may be in ``recording`` itself.
     update : Calibration, str or Path, optional
         For ``array``: calibration of an earlier run to carry over.
     turn_on_std, bias_walk : float
