@@ -7,8 +7,8 @@ the motion, so it is measured sample by sample and shrunk to its neighbours,
 
     s̃² = (ν s² + 4 ⟨s²⟩)/(ν + 4),
 
-where ⟨·⟩ is the mean over the samples around with the weights exp(−|j|/1.5): the posterior mean of a variance whose prior,
-worth four degrees of freedom, is what the neighbours show. The covariance of an estimate is multiplied by s̃², the
+where ⟨·⟩ is the mean over the samples around with the weights exp(−|j|/1.5): the posterior mean of a variance whose
+prior, worth four degrees of freedom, is what the neighbours show. The covariance of an estimate is multiplied by s̃², the
 classical a posteriori variance factor (W. Baarda, A Testing Procedure for Use in Geodetic Networks, 1968) with memory.
 
 Two safeguards keep estimates as they are where the stated noise is right: s̃ is never below 1, and it is used only
@@ -19,7 +19,8 @@ sample would not have shown.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -28,8 +29,19 @@ from numpy.typing import NDArray
 from scipy.stats import norm
 
 from gfimu.rate.recursion_data import COMPILE
+from gfimu.short_repr import short_repr
 
-__all__ = ["Disagreement", "DisagreementPolicy", "measured_scale", "sum_up_disagreement"]
+__all__ = [
+    "Disagreement",
+    "DisagreementPolicy",
+    "MeasuredNoise",
+    "lasting_scale",
+    "measured_scale",
+    "sum_up_disagreement",
+]
+
+
+_ALONE = 1e9  # numerical: degrees of freedom beside which a single sample counts for nothing
 
 
 @dataclass(frozen=True)
@@ -50,6 +62,10 @@ class DisagreementPolicy:
         s̃ from which a sample is reported.
     notable_share : float
         Share of such samples from which a run is reported.
+    again_share : float
+        Share of enlarged samples from which a filter runs again with the measured noise: ten times ``false_alarm``.
+    least_parity : int
+        Combinations of readings that no motion changes, from which a single sample shows the noise.
     """
 
     prior: float = 4.0
@@ -58,6 +74,8 @@ class DisagreementPolicy:
     false_alarm: float = 1e-3
     notable_ratio: float = 2.0
     notable_share: float = 0.05
+    again_share: float = 0.01
+    least_parity: int = 3
 
 
 POLICY = DisagreementPolicy()
@@ -96,6 +114,42 @@ def measured_scale(
     counts = np.where(used, freedom, 0.0).astype(float)
     kept = np.exp(-1.0 / policy.memory), np.exp(-period / policy.long_memory_s)
     return _scale(sums, counts, *kept, policy.prior, float(norm.isf(policy.false_alarm)), causal)
+
+
+def lasting_scale(
+    squares: NDArray[np.float64],
+    freedom: NDArray[np.float64],
+    period: float,
+    *,
+    causal: bool = False,
+    policy: DisagreementPolicy = POLICY,
+) -> NDArray[np.float64]:
+    """Return s̃ of each sample by the mean over about a second around it alone, shape (n,); as `measured_scale`."""
+    smooth = replace(policy, prior=_ALONE, memory=policy.long_memory_s / period)
+    return measured_scale(squares, freedom, period, causal=causal, policy=smooth)
+
+
+@dataclass(frozen=True)
+class MeasuredNoise:
+    """Noise of a recording as measured.
+
+    Parameters
+    ----------
+    t_s : ndarray, shape (n,)
+        Sample times, s.
+    scale : ndarray, shape (n,)
+        Its standard deviation over the stated one, 1 or more.
+    """
+
+    t_s: NDArray[np.float64]
+    scale: NDArray[np.float64]
+
+    __repr__ = short_repr
+
+    def excess(self, t: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the variance over the stated one, less 1, at the samples of times ``t`` (m,), s."""
+        place = np.minimum(np.searchsorted(self.t_s, t), len(self.t_s) - 1)
+        return np.asarray(self.scale[place] ** 2 - 1.0)
 
 
 @njit(**COMPILE)
@@ -187,6 +241,28 @@ class Disagreement:
             name: None if isinstance(value, float) and not np.isfinite(value) else value
             for name, value in vars(self).items()
         }
+
+    @classmethod
+    def from_dict(cls, figures: Mapping[str, Any]) -> Disagreement:
+        """Return what `to_dict` gave."""
+        return cls(**{name: float("nan") if value is None else value for name, value in figures.items()})
+
+    def sentences(self) -> list[str]:
+        """Return the warning of a run whose channels disagree notably, in a list; else an empty one."""
+        if not self.notable:
+            return []
+        where = f"in {self.share:.0%} of the samples"
+        if np.isfinite(self.slow_times):
+            where += (
+                f"; {self.slow_times:.2g} times near {self.slow_rad_s:.2g} rad/s, {self.fast_times:.2g} times near "
+                f"{self.fast_rad_s:.2g} rad/s"
+            )
+        text = (
+            f"the channels disagree {self.times:.2g} times more than their stated noise ({where}); the stated standard "
+            "deviations are enlarged accordingly; likely causes: chips that sample at different times, calibration, "
+            "vibration; next: `gfimu calibrate array` and --calibration, or `gfimu diagnose` for the cause"
+        )
+        return [text]
 
 
 _FEWEST_TURNING = 30

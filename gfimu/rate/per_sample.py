@@ -14,11 +14,11 @@ from gfimu.rate.disagreement import measured_scale
 from gfimu.rate.null_readings import NullReadings
 from gfimu.rate.recursion_data import COMPILE
 from gfimu.rate.residual import bounded_covariance, least_curvature, residual_of
-from gfimu.rate.result import RateEstimate, SignDecision, clear_of_zero
+from gfimu.rate.result import DECIDED, RateEstimate, SignDecision, clear_of_zero
 from gfimu.rate.sensing import ChannelTables, SensorErrors
-from gfimu.rate.sign_chain import POLICY, SignSteps, sign_probabilities
+from gfimu.rate.sign_chain import SignSteps, sign_probabilities
 
-__all__ = ["KnownStart", "per_sample_estimate", "signed"]
+__all__ = ["KnownStart", "decision", "per_sample_estimate", "signed"]
 
 _UNDECIDABLE = 0.01  # numerical: a probability so near one half says nothing; the sign is carried on
 
@@ -93,7 +93,7 @@ def per_sample_estimate(
         scale=scale,
         sign_probability=probability,
     )
-    return replace(found, sign=_decision(found, known=null.rest.any() or start is not None))
+    return replace(found, sign=decision(found, known=null.rest.any() or start is not None))
 
 
 def _inverted(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -167,12 +167,12 @@ def _sides(t, alpha, omega, plus):  # type: ignore[no-untyped-def]
     return side
 
 
-def _decision(found: RateEstimate, *, known: bool) -> SignDecision:
+def decision(found: RateEstimate, *, known: bool) -> SignDecision:
     """Sum the probabilities up in one word for the run."""
     probability = found.sign_probability
     assert probability is not None
     clear = clear_of_zero(found.omega, found.std)
-    decided = clear & (probability > POLICY.decided)
+    decided = clear & (probability > DECIDED)
     if not clear.any() or not decided.any():
         return SignDecision("known" if known and not clear.any() else "undecided", 0.0)
     if np.array_equal(decided, clear):

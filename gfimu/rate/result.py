@@ -12,7 +12,10 @@ from numpy.typing import NDArray
 from gfimu.files.table import Tabular
 from gfimu.short_repr import joined, timing
 
-__all__ = ["ChannelReport", "RateEstimate", "SignDecision", "clear_of_zero", "full_covariance"]
+__all__ = ["DECIDED", "ChannelReport", "RateEstimate", "SignDecision", "clear_of_zero", "full_covariance", "undecided"]
+
+DECIDED = 0.99
+"""Probability from which the sign of a rate counts as decided."""
 
 _CLEAR = 4.0 * 22.46  # of ωᵀC⁻¹ω: four times the 99.9 % quantile of χ² with six degrees of freedom
 
@@ -165,6 +168,13 @@ class RateEstimate(Tabular):
         }
 
     @property
+    def sign_undecided(self) -> NDArray[np.bool_]:
+        """Samples whose rate has a sign that is not decided (probability of 0.99 or less), shape (n,)."""
+        if self.sign_probability is None:
+            return np.full(len(self), self.sign.state == "undecided")
+        return undecided(self.sign_probability, self.omega, self.std)
+
+    @property
     def mean_nis(self) -> float:
         """Sum of ``nis`` over the sum of its degrees of freedom: 1 for a filter whose model is right."""
         used = (self.nis_dof > 0) & np.isfinite(self.nis)
@@ -180,6 +190,16 @@ def clear_of_zero(omega: NDArray[np.float64], std: NDArray[np.float64]) -> NDArr
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray(np.sum(np.square(omega / std), axis=1) > _CLEAR)
+
+
+def undecided(
+    probability: NDArray[np.float64], omega: NDArray[np.float64], std: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """Whether the sign of each rate (n, 3) is undecided, by its probability (n,) and its ``std`` (n, 3), rad/s.
+
+    A rate that does not stand clear of zero has no sign to decide.
+    """
+    return clear_of_zero(omega, std) & ~(probability > DECIDED)
 
 
 def full_covariance(packed: NDArray[np.float64]) -> NDArray[np.float64]:

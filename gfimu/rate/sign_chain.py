@@ -45,8 +45,6 @@ class SignPolicy:
         Degrees of freedom of Student's t of a step.
     change : float
         Share of the change of α from one sample to the next by which its integral may be off, a ratio.
-    decided : float
-        Probability from which a sign counts as decided.
     window_s : float
         Length over which the power of α is averaged, s.
     noise_deviate : float
@@ -59,14 +57,13 @@ class SignPolicy:
 
     tail: float = 4.0
     change: float = 0.5
-    decided: float = 0.99
     window_s: float = 0.5
     noise_deviate: float = 5.0
     bias_square: float = 11.3
     floor: float = 1e-6
 
 
-POLICY = SignPolicy()
+_POLICY = SignPolicy()
 
 
 @dataclass(frozen=True)
@@ -112,7 +109,7 @@ class SignSteps:
     start_std: float
 
 
-def sign_probabilities(steps: SignSteps, *, causal: bool = False, policy: SignPolicy = POLICY) -> NDArray[np.float64]:
+def sign_probabilities(steps: SignSteps, *, causal: bool = False, policy: SignPolicy = _POLICY) -> NDArray[np.float64]:
     """Return the probability, shape (n,), that each sample's rate is ``omega`` and not ``−omega``; NaN without one.
 
     Parameters
