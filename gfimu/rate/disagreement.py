@@ -8,8 +8,8 @@ the motion, so it is measured sample by sample and shrunk to its neighbours,
     s̃² = (ν s² + 4 ⟨s²⟩)/(ν + 4),
 
 where ⟨·⟩ is the mean over the samples around with the weights exp(−|j|/1.5): the posterior mean of a variance whose
-prior, worth four degrees of freedom, is what the neighbours show. The covariance of an estimate is multiplied by s̃², the
-classical a posteriori variance factor (W. Baarda, A Testing Procedure for Use in Geodetic Networks, 1968) with memory.
+prior, worth four degrees of freedom, is what the neighbours show. The covariance of an estimate is multiplied by s̃²:
+the a posteriori variance factor of W. Baarda (A Testing Procedure for Use in Geodetic Networks, 1968) with a memory.
 
 Two safeguards keep estimates as they are where the stated noise is right: s̃ is never below 1, and it is used only
 where it is significant, that is above the quantile of χ² that a right model exceeds in one of a thousand samples. A
@@ -245,7 +245,8 @@ class Disagreement:
     @classmethod
     def from_dict(cls, figures: Mapping[str, Any]) -> Disagreement:
         """Return what `to_dict` gave."""
-        return cls(**{name: float("nan") if value is None else value for name, value in figures.items()})
+        values: dict[str, Any] = {name: float("nan") if value is None else value for name, value in figures.items()}
+        return cls(**values)
 
     def sentences(self) -> list[str]:
         """Return the warning of a run whose channels disagree notably, in a list; else an empty one."""

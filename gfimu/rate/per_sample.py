@@ -93,7 +93,7 @@ def per_sample_estimate(
         scale=scale,
         sign_probability=probability,
     )
-    return replace(found, sign=decision(found, known=null.rest.any() or start is not None))
+    return replace(found, sign=decision(found, known=bool(null.rest.any()) or start is not None))
 
 
 def _inverted(covariance: NDArray[np.float64]) -> NDArray[np.float64]:

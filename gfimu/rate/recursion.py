@@ -39,7 +39,7 @@ from gfimu.rate.second_order import second_order
 __all__ = ["forward"]
 
 _WALK_MEMORY = 1.0  # s, over which the wandering of α is averaged
-_HIDDEN = 0.25  # (½)²: share of the change of α by which its integral may be off, as in `gfimu.rate.sign_chain`
+_HIDDEN = 0.1  # (⅓)²: share of the change of α by which its integral may be off, squared
 _SLOW = 1e-3  # tr P above this share of |ω|² switches the second-order terms on
 
 

@@ -152,8 +152,8 @@ def _with_sign(
 def _same_sign(single: RateEstimate, found: RateEstimate) -> NDArray[np.float64]:
     """Return the probability (n,) that two estimates of a rate that is known but for its sign have the same sign."""
     spread = single.covariance + found.covariance
-    known = np.isfinite(spread).all(axis=(1, 2)) & np.isfinite(single.omega).all(axis=1)
-    along = np.zeros(len(known))
+    known = np.asarray(np.isfinite(spread).all(axis=(1, 2)) & np.isfinite(single.omega).all(axis=1))
+    along = np.zeros(len(single))
     solved = np.linalg.solve(spread[known], found.omega[known][..., None])[..., 0]
     along[known] = np.sum(single.omega[known] * solved, axis=1)
     return np.asarray(1.0 / (1.0 + np.exp(-np.clip(2.0 * along, -50.0, 50.0))))
