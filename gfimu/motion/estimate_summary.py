@@ -177,7 +177,10 @@ def _inconsistency(estimate: Estimate, consistency: Mapping[str, Any] | None) ->
         whose = "no single channel explains it: check gains (calibrate), array and sample times"
     else:
         whose = f"channel {channel} disagrees most: without it they are {consistency['nis_without_worst']:.2f}"
-    enlarged = (estimate.metadata.get("disagreement") or {}).get("enlarged", False)
+    disagreement = estimate.metadata.get("disagreement") or {}
+    if channel is None and disagreement.get("notable"):  # said already, with its size
+        return []
+    enlarged = disagreement.get("enlarged", False)
     first = "the stated errors don't explain the readings" if enlarged else "the estimate is worse than its std says"
     return [f"{first}: {what}; {whose}"]
 

@@ -442,7 +442,7 @@ def _filter_again(
     problem: RateProblem, errors: SensorErrors, found: RateEstimate
 ) -> Callable[[slice, NDArray[np.float64]], RateEstimate]:
     """Return a filter of some rows with other readings that starts as the one before did, or from what it found."""
-    stated = MeasuredNoise(problem.t_s, np.ones(len(problem.t_s)))
+    stated = MeasuredNoise.as_stated(problem.t_s)
 
     def run(rows: slice, readings: NDArray[np.float64]) -> RateEstimate:
         if rows.start == 0 and problem.omega0 is not None:

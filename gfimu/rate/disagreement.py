@@ -146,6 +146,11 @@ class MeasuredNoise:
 
     __repr__ = short_repr
 
+    @classmethod
+    def as_stated(cls, t_s: NDArray[np.float64]) -> MeasuredNoise:
+        """Noise as stated at the samples of times ``t_s`` (n,), s, so that none is measured."""
+        return cls(t_s, np.ones(len(t_s)))
+
     def excess(self, t: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the variance over the stated one, less 1, at the samples of times ``t`` (m,), s."""
         place = np.minimum(np.searchsorted(self.t_s, t), len(self.t_s) - 1)

@@ -76,8 +76,9 @@ class RateSolution:
 
     def sentences(self) -> list[str]:
         """Return what is to be said of the rate in words: disagreeing channels, samples of undecided sign."""
-        found = self.remarks.get("disagreement")
-        said = [] if found is None else Disagreement.from_dict(found).sentences()
+        found, judged = self.remarks.get("disagreement"), self.remarks.get("consistency")
+        one_channel = judged is not None and judged["worst_channel"] is not None  # said by itself, with its name
+        said = [] if found is None or one_channel else Disagreement.from_dict(found).sentences()
         count = self.remarks.get("sign_undecided_samples", 0)
         if count and self.sign_probability is not None:
             said.append(

@@ -95,7 +95,7 @@ def forward(  # type: ignore[no-untyped-def]
         noise_set = place if sensed else 0
         if inflated and sensed:
             inflation = inflation_of(data, k, state, tuning, x[0] * x[0] + x[1] * x[1] + x[2] * x[2])
-        inflation = max(inflation, data.excess[k])
+        inflation += (1.0 + inflation) * data.excess[k]
         if state.counts[STARTED] > 0:
             # Prediction, (1).
             step = data.t[k] - state.scalars[TIME]

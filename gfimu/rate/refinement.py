@@ -85,7 +85,9 @@ def noise_of_run(
 ) -> NDArray[np.float64]:
     """Return s̃ of each sample, shape (n,), by parity where the array has enough of it, else by innovations."""
     period = float(np.median(np.diff(found.t_s)))
-    scale = parity_scale(array, readings, errors, period, causal=causal)
+    scale = None
+    if errors.white_only:  # other stated errors are in the innovations' covariance, not in that of parity
+        scale = parity_scale(array, readings, errors, period, causal=causal)
     if scale is None:
         scale = lasting_scale(found.nis, found.nis_dof.astype(float), period, causal=causal)
     return scale
