@@ -58,6 +58,8 @@ class DisagreementPolicy:
         The same for small lasting disagreements, s.
     false_alarm : float
         Share of the samples of a right model whose standard deviation is enlarged.
+    long_false_alarm : float
+        The same of the mean over a second, whose excursions last as long.
     notable_ratio : float
         s̃ from which a sample is reported.
     notable_share : float
@@ -72,6 +74,7 @@ class DisagreementPolicy:
     memory: float = 1.5
     long_memory_s: float = 0.5
     false_alarm: float = 1e-3
+    long_false_alarm: float = 1e-6
     notable_ratio: float = 2.0
     notable_share: float = 0.05
     again_share: float = 0.01
@@ -113,7 +116,8 @@ def measured_scale(
     sums = np.where(used, squares, 0.0)
     counts = np.where(used, freedom, 0.0).astype(float)
     kept = np.exp(-1.0 / policy.memory), np.exp(-period / policy.long_memory_s)
-    return _scale(sums, counts, *kept, policy.prior, float(norm.isf(policy.false_alarm)), causal)
+    deviates = float(norm.isf(policy.false_alarm)), float(norm.isf(policy.long_false_alarm))
+    return _scale(sums, counts, *kept, policy.prior, *deviates, causal)
 
 
 def lasting_scale(
@@ -125,7 +129,7 @@ def lasting_scale(
     policy: DisagreementPolicy = POLICY,
 ) -> NDArray[np.float64]:
     """Return s̃ of each sample by the mean over about a second around it alone, shape (n,); as `measured_scale`."""
-    smooth = replace(policy, prior=_ALONE, memory=policy.long_memory_s / period)
+    smooth = replace(policy, prior=_ALONE, memory=policy.long_memory_s / period, false_alarm=policy.long_false_alarm)
     return measured_scale(squares, freedom, period, causal=causal, policy=smooth)
 
 
@@ -158,7 +162,7 @@ class MeasuredNoise:
 
 
 @njit(**COMPILE)
-def _scale(sums, counts, keep, keep_long, prior, deviate, causal):  # type: ignore[no-untyped-def]
+def _scale(sums, counts, keep, keep_long, prior, deviate, deviate_long, causal):  # type: ignore[no-untyped-def]
     """Scale of each sample from sums of squares (n,) and degrees of freedom (n,)."""
     n = len(sums)
     # Weighted sums of squares and degrees of freedom, and of the other samples' with squared weights.
@@ -195,7 +199,7 @@ def _scale(sums, counts, keep, keep_long, prior, deviate, causal):  # type: igno
         if level <= limit:  # not significant by itself: perhaps over a second
             total = far[k, 1] + counts[k]
             lasting = (far[k, 0] + sums[k]) / total
-            if lasting <= _limit(total * total / (far[k, 2] + counts[k]), deviate):
+            if lasting <= _limit(total * total / (far[k, 2] + counts[k]), deviate_long):
                 continue
             level = min(lasting, limit)
         if level > 1.0:
