@@ -31,7 +31,7 @@ def table(folder: Path) -> None:
     calibration = calibrate_array(read_mimu4444(folder / "exp_1.bin.gz"), drawing, gravity=9.81)
     array = calibration.calibrated_array(drawing)
     print(
-        "| recording | method | median error x, y, z, °/s | normalised | within 3 σ, % | decided, wrong of these, % |"
+        "| recording | method | median error, °/s | normalised | within 3 σ, % | decided, wrong of these, % |"
     )
     print("|---|---|---|---|---|---|")
     for name in ("exp_1", "exp_2"):

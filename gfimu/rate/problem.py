@@ -77,8 +77,9 @@ class RateSolution:
     def sentences(self) -> list[str]:
         """Return what is to be said of the rate in words: disagreeing channels, samples of undecided sign."""
         found, judged = self.remarks.get("disagreement"), self.remarks.get("consistency")
-        one_channel = judged is not None and judged["worst_channel"] is not None  # said by itself, with its name
-        said = [] if found is None or one_channel else Disagreement.from_dict(found).sentences()
+        if judged is not None and judged["worst_channel"] is not None:  # one channel is the cause of both, and named
+            return []
+        said = [] if found is None else Disagreement.from_dict(found).sentences()
         count = self.remarks.get("sign_undecided_samples", 0)
         if count and self.sign_probability is not None:
             said.append(
