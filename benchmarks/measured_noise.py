@@ -30,9 +30,7 @@ def table(folder: Path) -> None:
     drawing = AccelerometerArray.load("mimu4444")
     calibration = calibrate_array(read_mimu4444(folder / "exp_1.bin.gz"), drawing, gravity=9.81)
     array = calibration.calibrated_array(drawing)
-    print(
-        "| recording | method | median error, °/s | normalised | within 3 σ, % | decided, wrong of these, % |"
-    )
+    print("| recording | method | median error, °/s | normalised | within 3 σ, % | decided, wrong of these, % |")
     print("|---|---|---|---|---|---|")
     for name in ("exp_1", "exp_2"):
         raw = read_mimu4444(folder / f"{name}.bin.gz")

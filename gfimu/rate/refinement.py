@@ -69,7 +69,9 @@ def refined(
     if np.mean(scale > 1.0) >= POLICY.again_share:
         again = run(replace(settings, noise=MeasuredNoise(t, scale)))
         found = replace(again, nis=first.nis, nis_dof=first.nis_dof, scale=scale)
-    in_doubt = np.mean(scale > POLICY.notable_ratio) >= POLICY.notable_share
+    # Where the stated errors explain the innovations of the run as a whole, so they do its sign.
+    often = np.mean(scale > POLICY.notable_ratio) >= POLICY.notable_share
+    in_doubt = often and first.mean_nis > POLICY.notable_ratio
     if not in_doubt and found.sign.state != "undecided":
         return found
     return _with_sign(found, array, t, readings, errors, settings)
