@@ -67,7 +67,7 @@ def refined(
     scale = noise_of_run(array, readings, errors, first, causal=causal)
     found = replace(first, scale=scale)
     if np.mean(scale > 1.0) >= POLICY.again_share:
-        again = run(replace(settings, noise=MeasuredNoise(t, scale)))
+        again = _as_decided(run(replace(settings, noise=MeasuredNoise(t, scale))), first)
         found = replace(again, nis=first.nis, nis_dof=first.nis_dof, scale=scale)
     # Where the stated errors explain the innovations of the run as a whole, so they do its sign.
     often = np.mean(scale > POLICY.notable_ratio) >= POLICY.notable_share
@@ -75,6 +75,14 @@ def refined(
     if not in_doubt and found.sign.state != "undecided":
         return found
     return _with_sign(found, array, t, readings, errors, settings)
+
+
+def _as_decided(again: RateEstimate, first: RateEstimate) -> RateEstimate:
+    """Return of two undecided mirror hypotheses the one that the first pass decided for, if it decided."""
+    if again.mirrored is None or first.sign.state != "decided":
+        return again
+    alike = float(np.nansum(again.omega * first.omega)) >= 0.0
+    return replace(again if alike else again.mirrored, sign=first.sign, mirrored=None)
 
 
 def noise_of_run(
