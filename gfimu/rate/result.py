@@ -17,7 +17,7 @@ __all__ = ["DECIDED", "ChannelReport", "RateEstimate", "SignDecision", "clear_of
 DECIDED = 0.99
 """Probability from which the sign of a rate counts as decided."""
 
-_CLEAR = 4.0 * 22.46  # of ωᵀC⁻¹ω: four times the 99.9 % quantile of χ² with six degrees of freedom
+_CLEAR = 4.0 * 13.82  # of ωᵀC⁻¹ω: four times the 99.9 % quantile of χ²(2), as a fit takes two of z's freedoms at rest
 
 
 @dataclass(frozen=True)
