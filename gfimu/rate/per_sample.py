@@ -18,9 +18,10 @@ from gfimu.rate.result import DECIDED, RateEstimate, SignDecision, clear_of_zero
 from gfimu.rate.sensing import ChannelTables, SensorErrors
 from gfimu.rate.sign_chain import SignSteps, sign_probabilities
 
-__all__ = ["KnownStart", "decision", "per_sample_estimate", "signed"]
+__all__ = ["UNDECIDABLE", "KnownStart", "decision", "per_sample_estimate", "signed"]
 
-_UNDECIDABLE = 0.01  # numerical: a probability so near one half says nothing; the sign is carried on
+UNDECIDABLE = 0.01
+"""Numerical: a probability so near one half says nothing; the sign is carried on."""
 
 
 class KnownStart(NamedTuple):
@@ -159,7 +160,7 @@ def _sides(t, alpha, omega, plus):  # type: ignore[no-untyped-def]
         for a in range(3):
             along += omega[k, a] * carried[a]
             square += omega[k, a] * omega[k, a]
-        decided = plus[k] - 0.5 if abs(plus[k] - 0.5) > _UNDECIDABLE else along
+        decided = plus[k] - 0.5 if abs(plus[k] - 0.5) > UNDECIDABLE else along
         side[k] = 1.0 if decided >= 0.0 else -1.0
         drawn = min(1.0, step * np.sqrt(square))
         for a in range(3):

@@ -20,7 +20,7 @@ from gfimu.geometry.array import AccelerometerArray
 from gfimu.rate.disagreement import POLICY, MeasuredNoise, lasting_scale, measured_scale
 from gfimu.rate.kalman import FilterSettings
 from gfimu.rate.maximum_likelihood import maximum_likelihood_rate
-from gfimu.rate.per_sample import KnownStart, decision
+from gfimu.rate.per_sample import UNDECIDABLE, KnownStart, decision
 from gfimu.rate.result import RateEstimate
 from gfimu.rate.sensing import ChannelTables, SensorErrors
 
@@ -152,7 +152,7 @@ def _with_sign(
     assert chance is not None
     alike = _same_sign(single, found)
     probability = _filled(alike * chance + (1.0 - alike) * (1.0 - chance))
-    wrong = probability < 0.5
+    wrong = probability < 0.5 - UNDECIDABLE
     signed = replace(
         found,
         omega=np.where(wrong[:, None], -found.omega, found.omega),
