@@ -177,6 +177,12 @@ def _print_summary(summary: EstimateSummary) -> None:
     if summary.centripetal is not None:
         rows.append(("centripetal terms against gyro, slope", f"{summary.centripetal.slope:.4f}", ""))
         rows.append(("centripetal terms against gyro, correlation", f"{summary.centripetal.correlation:.4f}", ""))
+    if summary.disagreement is not None:
+        found = summary.disagreement
+        size = f"{found['times']:.2g} times in {found['share']:.0%} of the samples" if found["share"] else "below 2"
+        rows.append(("noise measured, times the stated", size, ""))
+    if summary.sign_undecided_samples is not None:
+        rows.append(("samples with undecided sign", summary.sign_undecided_samples, ""))
     if summary.consistency is not None:
         found = summary.consistency
         verdict = "consistent" if found["consistent"] else "INCONSISTENT"

@@ -93,6 +93,10 @@ class EstimateSummary:
         Root mean square difference of the rate from the tachometer and, over all three axes, from the gyro.
     centripetal : Agreement or None
         Centripetal terms against the gyro.
+    disagreement : mapping or None
+        How much more than stated the channels disagree: the figures of `gfimu.rate.disagreement.Disagreement`.
+    sign_undecided_samples : int or None
+        Samples whose rate has a sign that is not decided.
     consistency : mapping or None
         Of the filter's or smoother's innovations: the figures of `gfimu.rate.consistency.Consistency`.
     mounting : mapping or None
@@ -123,6 +127,8 @@ class EstimateSummary:
     tacho_rmse_rad_s: float | None
     gyro_rmse_rad_s: float | None
     centripetal: Agreement | None
+    disagreement: Mapping[str, Any] | None = None
+    sign_undecided_samples: int | None = None
     consistency: Mapping[str, Any] | None = None
     mounting: Mapping[str, Any] | None = None
     position: PositionSummary | None = None
@@ -174,12 +180,14 @@ def summarise(estimate: Estimate, recording: Recording, array: AccelerometerArra
         tacho_rmse_rad_s=None if tacho is None else _rms_difference(estimate.omega @ axis, tacho),
         gyro_rmse_rad_s=None if gyro is None else _rms_difference(estimate.omega, gyro),
         centripetal=None if unseen_motions(array) else centripetal_agreement(recording, array),
+        disagreement=estimate.metadata.get("disagreement"),
+        sign_undecided_samples=estimate.metadata.get("sign_undecided_samples"),
         consistency=consistency,
         mounting=estimate.metadata.get("mounting"),
         position=_position(estimate),
         health=estimate.metadata.get("health"),
         channels_left_out=tuple(estimate.metadata.get("channels_left_out", ())),
-        warnings=(*estimate.metadata.get("warnings", ()), *_inconsistency(consistency)),
+        warnings=(*estimate.metadata.get("warnings", ()), *_inconsistency(estimate, consistency)),
     )
 
 
@@ -204,7 +212,7 @@ def _position(estimate: Estimate) -> PositionSummary | None:
     )
 
 
-def _inconsistency(consistency: Mapping[str, Any] | None) -> list[str]:
+def _inconsistency(estimate: Estimate, consistency: Mapping[str, Any] | None) -> list[str]:
     """Return the warning of a filter whose innovations are larger than it states, if they are."""
     if consistency is None or consistency["consistent"]:
         return []
@@ -222,7 +230,12 @@ def _inconsistency(consistency: Mapping[str, Any] | None) -> list[str]:
         whose = "no single channel explains it: check gains (calibrate), array and sample times"
     else:
         whose = f"channel {channel} disagrees most: without it they are {consistency['nis_without_worst']:.2f}"
-    return [f"the estimate is worse than its standard deviation says: {what}; {whose}"]
+    disagreement = estimate.metadata.get("disagreement") or {}
+    if channel is None and disagreement.get("notable"):  # said already, with its size
+        return []
+    enlarged = disagreement.get("enlarged", False)
+    first = "the stated errors don't explain the readings" if enlarged else "the estimate is worse than its std says"
+    return [f"{first}: {what}; {whose}"]
 
 
 def centripetal_agreement(

@@ -29,13 +29,14 @@ from gfimu.motion.navigation import level, navigate
 from gfimu.motion.rest_navigation import navigate_with_rest
 from gfimu.parts.part import white_noise_std
 from gfimu.rate.consistency import judge_consistency
+from gfimu.rate.disagreement import MeasuredNoise, sum_up_disagreement
 from gfimu.rate.feedback import integrate_rate_recursively
 from gfimu.rate.integration import integrate_rate
 from gfimu.rate.kalman import FilterSettings
 from gfimu.rate.methods import estimate_rate
 from gfimu.rate.problem import RateProblem, RateSolution
 from gfimu.rate.registry import RateMethod, rate_method
-from gfimu.rate.result import RateEstimate
+from gfimu.rate.result import RateEstimate, undecided
 from gfimu.rate.sensing import SensorErrors
 from gfimu.recording import Recording
 from gfimu.recording.checks import Finding, check_recording, refuse_or_warn, without_dead_channels
@@ -64,7 +65,8 @@ class Estimate(Tabular):
     alpha : ndarray, shape (n, 3)
         Angular acceleration, body axes, rad/s².
     omega, omega_std : ndarray, shape (n, 3)
-        Angular rate and the standard deviation that the channels' white noise gives it, body axes, rad/s.
+        Angular rate and its standard deviation by the channels' white noise, enlarged where they disagree by more
+        (`gfimu.rate.disagreement`), body axes, rad/s.
     quaternion : ndarray, shape (n, 4)
         Attitude (w, x, y, z), body to world.
     angle : ndarray, shape (n,)
@@ -77,6 +79,8 @@ class Estimate(Tabular):
     health : mapping of str to ndarray, optional
         For each channel by name its health at each sample, shape (n,): 0 used, 1 in doubt, 2 not used
         (`gfimu.integrity.fault.ChannelHealth`); where the channels were watched.
+    sign_probability : ndarray, shape (n,), optional
+        Probability that ``omega`` and not ``−omega`` is the rate; one half at rest. Where the method judges it.
     metadata : mapping
         Array, method, form, format and software version.
     """
@@ -93,6 +97,7 @@ class Estimate(Tabular):
     velocity: NDArray[np.float64] | None = None
     position: NDArray[np.float64] | None = None
     health: Mapping[str, NDArray[Any]] | None = None
+    sign_probability: NDArray[np.float64] | None = None
     metadata: Mapping[str, Any] = field(default_factory=dict)
 
     def __len__(self) -> int:
@@ -110,7 +115,15 @@ class Estimate(Tabular):
             if values is not None:
                 columns |= {name: values[:, place] for place, name in enumerate(names)}
         health = {f"{_HEALTH}{name}": values for name, values in (self.health or {}).items()}
-        return columns | {"angle_rad": self.angle} | health
+        sign = {} if self.sign_probability is None else {_SIGN: self.sign_probability}
+        return columns | sign | {"angle_rad": self.angle} | health
+
+    @property
+    def sign_undecided(self) -> NDArray[np.bool_]:
+        """Samples whose rate has a sign that is not decided, shape (n,)."""
+        if self.sign_probability is None:
+            return np.zeros(len(self), dtype=np.bool_)
+        return undecided(self.sign_probability, self.omega, self.omega_std)
 
     def write(self, path: str | Path) -> None:
         """Write the Estimate file, ``.csv`` or ``.parquet``, whole or not at all."""
@@ -135,8 +148,9 @@ class Estimate(Tabular):
             attribute for attribute in ("velocity", "position") if _VECTOR_COLUMNS[attribute][0] not in table.names
         }
         vectors = {attribute: names for attribute, names in _VECTOR_COLUMNS.items() if attribute not in optional}
+        sign = [name for name in (_SIGN,) if name in table.names]
         watched = [name for name in table.names if name.startswith(_HEALTH)]
-        wanted = ["t_s", "angle_rad", *(name for names in vectors.values() for name in names), *watched]
+        wanted = ["t_s", "angle_rad", *(name for names in vectors.values() for name in names), *sign, *watched]
         missing = [name for name in wanted if name not in table.names]
         if missing:
             raise InputError(f"{table.file}: column {missing[0]} is missing; give a file that gfimu estimate wrote")
@@ -148,12 +162,14 @@ class Estimate(Tabular):
             t_s=values["t_s"],
             angle=values["angle_rad"],
             health={name.removeprefix(_HEALTH): values[name].astype(np.int8) for name in watched} or None,
+            sign_probability=values[_SIGN] if sign else None,
             metadata=table.metadata,
             **{attribute: np.column_stack([values[name] for name in names]) for attribute, names in vectors.items()},
         )
 
 
 _HEALTH = "health_"
+_SIGN = "omega_sign_probability"
 
 _VECTOR_COLUMNS: dict[str, tuple[str, ...]] = {
     "p": tuple(f"p_{axis}_m_s2" for axis in _AXES),
@@ -277,6 +293,7 @@ def estimate(
             raise
         names = ", ".join(dead)
         raise InputError(f"without the dead {names}: {error}; --method filter may do without it") from None
+    scale = np.ones(len(readings)) if rate.noise_scale is None else rate.noise_scale
     motion = linear.with_omega(rate.omega)
     alpha, p = motion[:, :3], motion[:, 3:]
     start = _initial_attitude(recording, motion, rate.omega, quaternion0)
@@ -303,16 +320,19 @@ def estimate(
         quaternion=quaternion,
         angle=table_angle(recording.t_s, turning, axis=axis),
         omega_products=linear.omega_products,
-        omega_products_std=linear.omega_products_std,
+        omega_products_std=linear.omega_products_std * scale[:, None],
         velocity=None if travelled is None else travelled.velocity,
         position=None if travelled is None else travelled.position,
         health=None if health is None else dict(zip(health.channels, health.codes().T, strict=True)),
+        sign_probability=rate.sign_probability,
         metadata={
             "array": array.name,
             "method": method,
             "form": linear.form,
             **rate.remarks,
-            "warnings": [finding.text for finding in found] + ([] if health is None else health.sentences()),
+            "warnings": [finding.text for finding in found]
+            + ([] if health is None else health.sentences())
+            + rate.sentences(),
             "health": None if health is None else health.to_dict(),
             "channels_left_out": dead,
             **({} if earth is None else earth.to_dict()),
@@ -366,8 +386,11 @@ def _with_sensor_errors(method: RateMethod, problem: RateProblem) -> RateSolutio
         problem.array, problem.t_s, problem.readings, errors, method=method.name, settings=settings,
         gyro=problem.gyro, progress=problem.progress,
     )  # fmt: skip
+    disagreement = None if found.scale is None else sum_up_disagreement(found.scale, found.omega)
     remarks = {
         "sign": found.sign.state,
+        "sign_undecided_samples": int(found.sign_undecided.sum()),
+        "disagreement": None if disagreement is None else disagreement.to_dict(),
         "sign_decided_at_s": found.sign.decided_at_s if np.isfinite(found.sign.decided_at_s) else None,
         "mean_normalised_innovation_squared": found.mean_nis if np.isfinite(found.mean_nis) else None,
         "share_at_rest": float(found.rest.mean()),
@@ -381,7 +404,11 @@ def _with_sensor_errors(method: RateMethod, problem: RateProblem) -> RateSolutio
         if consistency is not None and consistency.worst_channel is not None:
             consistency = replace(consistency, worst_channel=names[consistency.worst_channel])
         remarks["consistency"] = None if consistency is None else consistency.to_dict()
-    return RateSolution(found.omega, np.where(np.isfinite(found.std), found.std, np.nan), found.rest, remarks)
+    std = np.where(np.isfinite(found.std), found.std, np.nan)
+    probability = found.sign_probability
+    if probability is None:
+        probability = np.full(len(found), 0.5 if found.sign.state == "undecided" else 1.0)
+    return RateSolution(found.omega, std, found.rest, found.scale, probability, remarks)
 
 
 def _step_of(readings: NDArray[np.float64]) -> float:
@@ -428,13 +455,14 @@ def _filter_again(
     problem: RateProblem, errors: SensorErrors, found: RateEstimate
 ) -> Callable[[slice, NDArray[np.float64]], RateEstimate]:
     """Return a filter of some rows with other readings that starts as the one before did, or from what it found."""
+    stated = MeasuredNoise.as_stated(problem.t_s)
 
     def run(rows: slice, readings: NDArray[np.float64]) -> RateEstimate:
         if rows.start == 0 and problem.omega0 is not None:
-            settings = FilterSettings(start_omega=problem.omega0)
+            settings = FilterSettings(start_omega=problem.omega0, noise=stated)
         else:
             std = float(np.nan_to_num(found.std[rows.start]).max())
-            settings = FilterSettings(start_omega=found.omega[rows.start], start_std=max(std, 1e-3))
+            settings = FilterSettings(found.omega[rows.start], max(std, 1e-3), noise=stated)
         gyro = None if problem.gyro is None else problem.gyro[rows]
         return estimate_rate(
             problem.array, problem.t_s[rows], readings, errors, method="filter", settings=settings, gyro=gyro

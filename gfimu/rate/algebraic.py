@@ -12,11 +12,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gfimu.geometry.array import AccelerometerArray
-from gfimu.rate.null_readings import align_signs, null_readings
-from gfimu.rate.result import RateEstimate, SignDecision
+from gfimu.rate.null_readings import null_readings
+from gfimu.rate.per_sample import KnownStart, per_sample_estimate
+from gfimu.rate.result import RateEstimate
 from gfimu.rate.sensing import SensorErrors
 
 __all__ = ["algebraic_rate", "rate_from_products"]
+
+_SLOW_FIT = 4.0  # at rest the closed form leaves 7 % more residual than the best fit: 4.66 squares in simulation
 
 
 def rate_from_products(products: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -56,7 +59,13 @@ def rate_from_products(products: ArrayLike) -> tuple[NDArray[np.float64], NDArra
 
 
 def algebraic_rate(
-    array: AccelerometerArray, t: ArrayLike, readings: ArrayLike, errors: SensorErrors, *, start_at_rest: bool = True
+    array: AccelerometerArray,
+    t: ArrayLike,
+    readings: ArrayLike,
+    errors: SensorErrors,
+    *,
+    start_at_rest: bool = True,
+    start: KnownStart | None = None,
 ) -> RateEstimate:
     """Estimate the rate of each sample by the tensor method.
 
@@ -72,11 +81,13 @@ def algebraic_rate(
         Noise of the channels, and their range.
     start_at_rest : bool
         Whether constant readings at the start are rest, whose mean is removed as bias.
+    start : KnownStart, optional
+        Rate at the first sample, where the run starts turning at a known rate.
 
     Returns
     -------
     RateEstimate
-        The sign is carried from sample to sample and never certain.
+        Sign, ``nis`` and covariance as those of `gfimu.rate.maximum_likelihood`.
 
     Raises
     ------
@@ -87,12 +98,7 @@ def algebraic_rate(
     inverse = np.linalg.pinv(null.sensitivity)  # (6, d): z has unit noise
     products = null.z @ inverse.T
     omega, slope = rate_from_products(products)
-    align_signs(null.t, null.alpha, omega)
     with np.errstate(invalid="ignore"):
         covariance = slope @ (inverse @ inverse.T) @ np.swapaxes(slope, 1, 2)
     covariance[~np.isfinite(covariance).all(axis=(1, 2))] = np.diag([np.inf] * 3)
-    n = len(null.t)
-    return RateEstimate(
-        "algebraic", null.t, omega, covariance, np.full(n, np.nan), np.zeros(n, dtype=np.int64), null.rest,
-        SignDecision("undecided", 0.0),
-    )  # fmt: skip
+    return per_sample_estimate("algebraic", null, omega, covariance, array, errors, start, slow_fit=_SLOW_FIT)

@@ -12,6 +12,7 @@ from gfimu.errors import GeometryError, InputError
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.rate.kalman import FilterSettings, join, spread_rest
 from gfimu.rate.live import LiveRateFilter
+from gfimu.rate.refinement import refined
 from gfimu.rate.result import RateEstimate
 from gfimu.rate.sensing import SensorErrors
 
@@ -60,7 +61,13 @@ def filter_rate(
     GeometryError
         If the array can't see all six motions, or can't find an unknown start.
     """
-    return run_filter(array, t, readings, errors, settings, gyro=gyro, progress=progress)[0]
+    chosen = settings or FilterSettings()
+    times, rows = np.asarray(t, dtype=float), np.asarray(readings, dtype=float)
+
+    def run(with_settings: FilterSettings) -> RateEstimate:
+        return run_filter(array, times, rows, errors, with_settings, gyro=gyro, progress=progress)[0]
+
+    return refined(array, times, rows, errors, chosen, run, causal=True)
 
 
 def require_finite(array: AccelerometerArray, result: RateEstimate) -> None:

@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from gfimu.errors import InputError, unknown_name
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.rate.backward import backward
+from gfimu.rate.disagreement import MeasuredNoise
 from gfimu.rate.preparation import prepare
 from gfimu.rate.quadrature import STENCILS, even_weights
 from gfimu.rate.recursion import forward
@@ -73,12 +74,15 @@ class FilterSettings:
         Integration of α: two samples late and of sixth order, one late, not late, of second order.
     rest : RestTest or None
         Recognition of rest; None to never use it.
+    noise : MeasuredNoise or None
+        How much larger than stated the noise was found to be, sample by sample.
     """
 
     start_omega: NDArray[np.float64] | None = field(default_factory=lambda: np.zeros(3))
     start_std: float = 1e-3
     quadrature: str = "centred6"
     rest: RestTest | None = field(default_factory=RestTest)
+    noise: MeasuredNoise | None = None
 
     def __post_init__(self) -> None:
         if self.quadrature not in QUADRATURES:
@@ -357,6 +361,7 @@ class KalmanRateFilter:
         data.t[first:last] = t
         data.y[first:last] = readings
         data.gyro[first:last] = np.nan if gyro is None else gyro
+        data.excess[first:last] = 0.0 if self.settings.noise is None else self.settings.noise.excess(t)
         self._received = last
         self._prepare(first, last)
 
@@ -477,6 +482,7 @@ def _buffer(rows: int, n_channels: int, n_null: int) -> RecursionInput:
         np.zeros(rows), np.zeros((rows, n_channels)), np.zeros((rows, 3)), np.zeros((rows, n_null)),
         np.zeros(rows, dtype=np.int64), np.full((rows, 3), np.nan), np.zeros(rows, dtype=np.int64),
         np.zeros(rows, dtype=np.int64), np.zeros((rows, 3)), np.zeros(rows, dtype=np.bool_),
+        np.zeros(rows),
     )  # fmt: skip
 
 

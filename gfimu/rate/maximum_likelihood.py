@@ -11,8 +11,9 @@ from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from gfimu.geometry.array import AccelerometerArray
-from gfimu.rate.null_readings import align_signs, null_readings
-from gfimu.rate.result import RateEstimate, SignDecision
+from gfimu.rate.null_readings import null_readings
+from gfimu.rate.per_sample import KnownStart, per_sample_estimate
+from gfimu.rate.result import RateEstimate
 from gfimu.rate.sensing import SensorErrors
 
 __all__ = ["maximum_likelihood_rate", "rate_of_null_space"]
@@ -26,7 +27,13 @@ _STARTS = np.array(
 
 
 def maximum_likelihood_rate(
-    array: AccelerometerArray, t: ArrayLike, readings: ArrayLike, errors: SensorErrors, *, start_at_rest: bool = True
+    array: AccelerometerArray,
+    t: ArrayLike,
+    readings: ArrayLike,
+    errors: SensorErrors,
+    *,
+    start_at_rest: bool = True,
+    start: KnownStart | None = None,
 ) -> RateEstimate:
     """Estimate the rate of each sample by maximum likelihood.
 
@@ -42,11 +49,14 @@ def maximum_likelihood_rate(
         Noise of the channels, and their range.
     start_at_rest : bool
         Whether constant readings at the start are rest, whose mean is removed as bias.
+    start : KnownStart, optional
+        Rate at the first sample, where the run starts turning at a known rate.
 
     Returns
     -------
     RateEstimate
-        The sign is carried from sample to sample and never certain; ``nis`` is the remaining sum of squares.
+        With the probability of each sample's sign; ``nis`` is the remaining sum of squares in units of the stated
+        noise, and the covariance is enlarged where that is significantly too large (`gfimu.rate.disagreement`).
 
     Raises
     ------
@@ -58,12 +68,8 @@ def maximum_likelihood_rate(
     # Rows beyond the rank see no product: only the first ones carry information.
     left, strengths, right = np.linalg.svd(null.sensitivity)
     compact = strengths[:rank, None] * right[:rank]  # (rank, 6)
-    omega, covariance, squares = _solve(null.z @ left[:, :rank], compact, _STARTS)
-    align_signs(null.t, null.alpha, omega)
-    freedom = np.where(np.isfinite(squares), max(rank - 3, 0), 0)
-    return RateEstimate(
-        "ml", null.t, omega, covariance, squares, freedom, null.rest, SignDecision("undecided", 0.0)
-    )  # fmt: skip
+    omega, covariance, _ = _solve(null.z @ left[:, :rank], compact, _STARTS)
+    return per_sample_estimate("ml", null, omega, covariance, array, errors, start)
 
 
 def rate_of_null_space(z: NDArray[np.float64], sensitivity: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -5,8 +5,8 @@ method         uses                                        sign of ω           
 =============  ==========================================  =======================  ==========================
 ``integrate``  α                                           from the start           grows with √t, and with
                                                                                     b t of what bias is left
-``algebraic``  null space, sample by sample                by continuity            σ_α/|ω| × 1.0 … 1.22
-``ml``         null space, sample by sample                by continuity            σ_α/|ω|
+``algebraic``  null space, sample by sample                by α, with probability   σ_α/|ω| × 1.0 … 1.22
+``ml``         null space, sample by sample                by α, with probability   σ_α/|ω|
 ``filter``     α, null space, rest, gyro; samples so far   start, or manoeuvre      σ_α √(Δt/|ω|)
 ``smoother``   the same, all samples                       start, or manoeuvre      σ_α √(Δt/2|ω|)
 =============  ==========================================  =======================  ==========================
@@ -15,7 +15,6 @@ method         uses                                        sign of ω           
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -27,6 +26,7 @@ from gfimu.rate.integration import integrate_rate
 from gfimu.rate.kalman import FilterSettings
 from gfimu.rate.maximum_likelihood import maximum_likelihood_rate
 from gfimu.rate.null_readings import null_readings
+from gfimu.rate.per_sample import KnownStart
 from gfimu.rate.registry import RATE_METHODS, rate_method
 from gfimu.rate.result import RateEstimate
 from gfimu.rate.sensing import ChannelTables, SensorErrors
@@ -142,9 +142,5 @@ def _per_sample(
 ) -> RateEstimate:
     start: NDArray[np.float64] | None = settings.start_omega
     at_rest = start is not None and not np.any(start)
-    found = solve(array, t, readings, errors, start_at_rest=at_rest)
-    if start is not None and np.any(start):  # a known rate at the start settles the sign there
-        known = np.flatnonzero(np.isfinite(found.omega).all(axis=1))
-        if known.size and found.omega[known[0]] @ start < 0:
-            found = replace(found, omega=-found.omega)
-    return found
+    known = None if start is None or at_rest else KnownStart(start, settings.start_std)
+    return solve(array, t, readings, errors, start_at_rest=at_rest, start=known)

@@ -12,7 +12,7 @@ from gfimu.geometry.array import AccelerometerArray
 from gfimu.rate.rest_test import RestTest, constant_readings
 from gfimu.rate.sensing import ChannelTables, SensorErrors
 
-__all__ = ["NullReadings", "align_signs", "null_readings"]
+__all__ = ["NullReadings", "null_readings"]
 
 
 @dataclass(frozen=True)
@@ -103,21 +103,3 @@ def null_readings(
             alpha = alpha - alpha[rest].mean(axis=0)
             z = z - z[rest].mean(axis=0)
     return NullReadings(times, alpha, z, tables.null_sensitivity[0], rest)
-
-
-def align_signs(t: NDArray[np.float64], alpha: NDArray[np.float64], omega: NDArray[np.float64]) -> None:
-    """Give each ω (n, 3) the sign that is nearer to the integral of α; in place.
-
-    The integral is drawn to the ω so signed within its time constant 1/|ω|, so that it does not drift away. A single
-    sample can't tell ω from −ω: after a slow passage through zero the sign may be wrong for good.
-    """
-    carried, time = np.zeros(3), t[0]
-    for k in range(len(t)):
-        step, time = t[k] - time, t[k]
-        if np.isfinite(alpha[k]).all():
-            carried = carried + step * alpha[k]
-        if not np.isfinite(omega[k]).all():
-            continue
-        if omega[k] @ carried < 0:
-            omega[k] = -omega[k]
-        carried = carried + min(1.0, step * float(np.linalg.norm(omega[k]))) * (omega[k] - carried)

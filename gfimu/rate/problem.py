@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.geometry.linear_solution import LinearSolution
+from gfimu.rate.disagreement import Disagreement
 from gfimu.short_repr import short_repr
 
 __all__ = ["RateProblem", "RateSolution"]
@@ -59,13 +60,31 @@ class RateProblem:
 class RateSolution:
     """Angular rate in body axes and its standard deviation, rad/s, each of shape (n, 3); NaN where not found.
 
-    ``rest`` marks the samples recognised as rest, where the method does that. ``remarks`` are figures and sentences
-    about how it was found, by name, for the estimate's metadata.
+    ``rest`` marks the samples recognised as rest, where the method does that. ``noise_scale`` (n,) is how much larger
+    than stated the noise was found, and ``sign_probability`` (n,) how sure the sign of each rate is, where that was
+    judged. ``remarks`` are figures and sentences about how it was found, by name, for the estimate's metadata.
     """
 
     omega: NDArray[np.float64]
     omega_std: NDArray[np.float64]
     rest: NDArray[np.bool_] | None = None
+    noise_scale: NDArray[np.float64] | None = None
+    sign_probability: NDArray[np.float64] | None = None
     remarks: Mapping[str, Any] = field(default_factory=dict)
 
     __repr__ = short_repr
+
+    def sentences(self) -> list[str]:
+        """Return what is to be said of the rate in words: disagreeing channels, samples of undecided sign."""
+        found, judged = self.remarks.get("disagreement"), self.remarks.get("consistency")
+        if judged is not None and judged["worst_channel"] is not None:  # one channel is the cause of both, and named
+            return []
+        said = [] if found is None else Disagreement.from_dict(found).sentences()
+        count = self.remarks.get("sign_undecided_samples", 0)
+        if count and self.sign_probability is not None:
+            said.append(
+                f"the sign of the rate is undecided in {count} of {len(self.omega)} samples (probability 0.99 or less, "
+                "column omega_sign_probability): there the more probable one is given; a start at rest, faster changes "
+                "of the rate or a higher sample rate decide it"
+            )
+        return said

@@ -39,6 +39,7 @@ from gfimu.rate.second_order import second_order
 __all__ = ["forward"]
 
 _WALK_MEMORY = 1.0  # s, over which the wandering of α is averaged
+_HIDDEN = 0.1  # (⅓)²: share of the change of α by which its integral may be off, squared
 _SLOW = 1e-3  # tr P above this share of |ω|² switches the second-order terms on
 
 
@@ -94,6 +95,7 @@ def forward(  # type: ignore[no-untyped-def]
         noise_set = place if sensed else 0
         if inflated and sensed:
             inflation = inflation_of(data, k, state, tuning, x[0] * x[0] + x[1] * x[1] + x[2] * x[2])
+        inflation += (1.0 + inflation) * data.excess[k]
         if state.counts[STARTED] > 0:
             # Prediction, (1).
             step = data.t[k] - state.scalars[TIME]
@@ -107,6 +109,11 @@ def forward(  # type: ignore[no-untyped-def]
                     follow_differences(alpha, start, forget, state.scalars)
                 rough = undersampled(noise_power, state.scalars) * step * step
                 if rough > 0.0:
+                    if sensed and data.excess[k] > 0.0:  # and no less than this change of α alone may hide
+                        c0 = alpha[k, 0] - alpha[k - 1, 0]
+                        c1 = alpha[k, 1] - alpha[k - 1, 1]
+                        c2 = alpha[k, 2] - alpha[k - 1, 2]
+                        rough = max(rough, _HIDDEN * step * step * (c0 * c0 + c1 * c1 + c2 * c2))
                     for a in range(3):
                         covariance[a, a] += rough
             clean = True

@@ -92,6 +92,7 @@ class RecursionInput(NamedTuple):
     whole_run: NDArray[np.int64]  # (N,) steps without a gap up to here
     corrected: NDArray[np.float64]  # (N, 3) α of the past without what the products of ω left in it
     vetoed: NDArray[np.bool_]  # (N,) a block that ends here is known not to be rest
+    excess: NDArray[np.float64]  # (N,) measured variance of the noise over the stated one, less 1
 
 
 class RecursionOutput(NamedTuple):

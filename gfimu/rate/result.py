@@ -12,7 +12,12 @@ from numpy.typing import NDArray
 from gfimu.files.table import Tabular
 from gfimu.short_repr import joined, timing
 
-__all__ = ["ChannelReport", "RateEstimate", "SignDecision", "full_covariance"]
+__all__ = ["DECIDED", "ChannelReport", "RateEstimate", "SignDecision", "clear_of_zero", "full_covariance", "undecided"]
+
+DECIDED = 0.99
+"""Probability from which the sign of a rate counts as decided."""
+
+_CLEAR = 4.0 * 13.82  # of ωᵀC⁻¹ω: four times the 99.9 % quantile of χ²(2), as a fit takes two of z's freedoms at rest
 
 
 @dataclass(frozen=True)
@@ -21,13 +26,14 @@ class SignDecision:
 
     Parameters
     ----------
-    state : {"known", "decided", "undecided"}
+    state : {"known", "decided", "partly", "undecided"}
         ``known``: the start was known, so the sign was never in doubt. ``undecided`` after a start at rest: the
-        readings at the start were not those of rest, so what followed may have either sign.
+        readings at the start were not those of rest, so what followed may have either sign. ``partly``: decided in
+        some samples only, as ``RateEstimate.sign_probability`` shows.
     log_likelihood_ratio : float
         Of the estimate against its mirror image where the decision fell (or at the end, undecided).
     decided_at_s : float
-        Time from which on the sign is certain, s; NaN if undecided.
+        Time from which on the sign is certain, s; NaN if undecided. With ``partly``, of the first decided sample.
     """
 
     state: str = "known"
@@ -108,6 +114,12 @@ class RateEstimate(Tabular):
         Final [b_α (rad/s²); b_z (noise units); b_gyro (rad/s)] of the filter and its covariance.
     channels : ChannelReport
         Channels left out, gaps bridged.
+    scale : ndarray, shape (n,), or None
+        s̃, by which standard deviations were multiplied because the channels disagree more than their stated noise
+        (`gfimu.rate.disagreement`); ``covariance`` has it already, ``nis`` has not. None where it was not measured.
+    sign_probability : ndarray, shape (n,), or None
+        Probability that ``omega`` and not ``−omega`` is the rate; one half at rest, where the sign means nothing. None
+        where the sign was never in doubt.
     """
 
     method: str
@@ -122,6 +134,8 @@ class RateEstimate(Tabular):
     bias: NDArray[np.float64] | None = None
     bias_covariance: NDArray[np.float64] | None = None
     channels: ChannelReport = field(default_factory=ChannelReport)
+    scale: NDArray[np.float64] | None = None
+    sign_probability: NDArray[np.float64] | None = None
     unit: str = "rad/s"
     format_version: int = 1
 
@@ -141,7 +155,9 @@ class RateEstimate(Tabular):
         columns: dict[str, NDArray[Any]] = {"t_s": self.t_s}
         columns |= {f"omega_{axis}_rad_s": self.omega[:, place] for place, axis in enumerate("xyz")}
         columns |= {f"omega_{axis}_std_rad_s": self.std[:, place] for place, axis in enumerate("xyz")}
-        return columns | {"nis": self.nis, "nis_dof": self.nis_dof, "rest": self.rest}
+        columns |= {"nis": self.nis, "nis_dof": self.nis_dof, "rest": self.rest}
+        further = {"noise_scale": self.scale, "omega_sign_probability": self.sign_probability}
+        return columns | {name: values for name, values in further.items() if values is not None}
 
     def _table_metadata(self) -> dict[str, Any]:
         return {
@@ -152,11 +168,38 @@ class RateEstimate(Tabular):
         }
 
     @property
+    def sign_undecided(self) -> NDArray[np.bool_]:
+        """Samples whose rate has a sign that is not decided (probability of 0.99 or less), shape (n,)."""
+        if self.sign_probability is None:
+            return np.full(len(self), self.sign.state == "undecided")
+        return undecided(self.sign_probability, self.omega, self.std)
+
+    @property
     def mean_nis(self) -> float:
         """Sum of ``nis`` over the sum of its degrees of freedom: 1 for a filter whose model is right."""
         used = (self.nis_dof > 0) & np.isfinite(self.nis)
         freedom = int(self.nis_dof[used].sum())
         return float(self.nis[used].sum() / freedom) if freedom else float("nan")
+
+
+def clear_of_zero(omega: NDArray[np.float64], std: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Whether each rate (n, 3) stands clear of zero, so that it has a sign at all; from ``std`` (n, 3), both rad/s.
+
+    The products of ω have twice the relative error of ω: ω has a sign where it is as many standard deviations from zero
+    as makes the products significant at 99.9 %.
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(np.sum(np.square(omega / std), axis=1) > _CLEAR)
+
+
+def undecided(
+    probability: NDArray[np.float64], omega: NDArray[np.float64], std: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """Whether the sign of each rate (n, 3) is undecided, by its probability (n,) and its ``std`` (n, 3), rad/s.
+
+    A rate that does not stand clear of zero has no sign to decide.
+    """
+    return clear_of_zero(omega, std) & ~(probability > DECIDED)
 
 
 def full_covariance(packed: NDArray[np.float64]) -> NDArray[np.float64]:

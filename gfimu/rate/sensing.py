@@ -132,6 +132,11 @@ class SensorErrors:
         return cls(np.concatenate(noise), np.concatenate(bias), **fields)
 
     @property
+    def white_only(self) -> bool:
+        """Whether no errors of gain, position or time are stated beside white noise and bias."""
+        return self.scale_std == self.placement_std == self.timing_std == 0.0
+
+    @property
     def limits(self) -> NDArray[np.float64]:
         """Saturation limit of each channel, shape (c,), m/s²; infinite where none is known."""
         return np.full(len(self.noise_std), np.inf) if self.full_range is None else np.asarray(self.full_range)

@@ -19,6 +19,7 @@ from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.rate.filter import require_finite, run_filter
 from gfimu.rate.kalman import FilterSettings, KalmanRateFilter, spread_rest
+from gfimu.rate.refinement import refined
 from gfimu.rate.result import RateEstimate, SignDecision
 from gfimu.rate.sensing import SensorErrors
 
@@ -72,7 +73,24 @@ def smooth_rate(
     period = float(np.median(np.diff(times)))
     rows = np.asarray(readings, dtype=float)
     turning = None if gyro is None else np.asarray(gyro, dtype=float)
-    chosen = settings or FilterSettings()
+
+    def run(with_settings: FilterSettings) -> RateEstimate:
+        return _smoothed(array, times, rows, errors, with_settings, turning, period, progress)
+
+    return refined(array, times, rows, errors, settings or FilterSettings(), run, causal=False)
+
+
+def _smoothed(
+    array: AccelerometerArray,
+    times: NDArray[np.float64],
+    rows: NDArray[np.float64],
+    errors: SensorErrors,
+    chosen: FilterSettings,
+    turning: NDArray[np.float64] | None,
+    period: float,
+    progress: Callable[[float], object] | None,
+) -> RateEstimate:
+    """Smooth with a known or an unknown start."""
     if chosen.start_omega is not None:
         smoothed_run = _smooth(array, times, rows, errors, chosen, turning, period, progress)
         window = chosen.rest.window(period) if chosen.rest else 0

@@ -40,6 +40,7 @@ __all__ = [
     "TACHO",
     "TONES",
     "TRUTH",
+    "UNDECIDED",
     "Colour",
     "chip_colour",
     "css",
@@ -52,6 +53,8 @@ AXES: tuple[Colour, Colour, Colour] = ((213, 60, 60), (150, 225, 120), (70, 130,
 TRUTH: Colour = (165, 168, 174)
 ESTIMATE: Colour = (240, 140, 20)
 ESTIMATE_BAND: Colour = (196, 146, 88)
+UNDECIDED: Colour = (235, 90, 165)
+"""The rate where its sign is not decided."""
 TACHO: Colour = (86, 190, 240)
 COMMAND: Colour = (140, 95, 215)
 MEASURED: Colour = (138, 142, 150)

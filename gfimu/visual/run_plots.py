@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.motion.attitude import table_angle, to_rotation
 from gfimu.recording import Recording
-from gfimu.visual.colours import AXES, COMMAND, ESTIMATE, ESTIMATE_BAND, TACHO, TRUTH, chip_colour
+from gfimu.visual.colours import AXES, COMMAND, ESTIMATE, ESTIMATE_BAND, TACHO, TRUTH, UNDECIDED, chip_colour
 from gfimu.visual.motion import ExpectedDrift, KnownMotion, MotionEstimate, reference_rate
 from gfimu.visual.plots import LONGEST_LEGEND, Line, Plot
 
@@ -83,6 +83,7 @@ def spin_rate_plots(
         spread = np.sqrt(estimate.omega_std**2 @ axis**2)[:, None] * _BOTH_SIDES
         lines.insert(0, Line("±2σ", estimate.t_s, rate[:, None] + spread, ESTIMATE_BAND, 1.0))
         lines.append(Line("estimate", estimate.t_s, rate, ESTIMATE))
+        lines += _undecided(estimate, rate)
     span = None if estimate is None else _span(rate, 1.0, margin=1.2)
     plots = [Plot("angular rate about the axis of rotation, rad/s", lines, span=span)] if lines else []
     if estimate is not None and compared is not None:
@@ -111,6 +112,7 @@ def free_rate_plots(recording: Recording, estimate: MotionEstimate | None, known
         if estimate is None:
             continue
         lines.append(Line(f"estimate {name}", estimate.t_s, estimate.omega[:, axis], colour))
+        lines += _undecided(estimate, estimate.omega[:, axis])
         if reference is not None:
             error = estimate.omega[:, axis] - np.interp(estimate.t_s, reference[1], reference[2])
             errors.append(Line(f"{name}, estimate − {reference[0]}", estimate.t_s, error, colour, 1.2))
@@ -122,6 +124,14 @@ def free_rate_plots(recording: Recording, estimate: MotionEstimate | None, known
         span = _span(sizes, _SHOWN, margin=2.0, even=True)
         plots.append(Plot("error of the rate, rad/s", [band, *errors], span=span))
     return plots
+
+
+def _undecided(estimate: MotionEstimate, rate: NDArray[np.float64]) -> list[Line]:
+    """Return the stretches of a component (n,) of the rate in which its sign is not decided, as a line; or none."""
+    marked = getattr(estimate, "sign_undecided", None)
+    if marked is None or not marked.any():
+        return []
+    return [Line("sign undecided", estimate.t_s, np.where(marked, rate, np.nan), UNDECIDED, 3.0)]
 
 
 def motion_plots(estimate: MotionEstimate, known: KnownMotion | None) -> Iterator[Plot]:

@@ -12,6 +12,7 @@ from reference_filter import reference_filter, reference_smoother
 from gfimu.errors import GeometryError, InputError
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.rate.backward import backward
+from gfimu.rate.disagreement import MeasuredNoise
 from gfimu.rate.filter import filter_rate
 from gfimu.rate.kalman import FilterSettings
 from gfimu.rate.live import LiveRateFilter
@@ -36,7 +37,8 @@ def run():
 def test_filter_agrees_with_the_numpy_loop(run):
     motion, values, errors = run
     omega, covariance, nis = reference_filter(CUBE, motion.t, values, errors)
-    found = filter_rate(CUBE, motion.t, values, errors, PLAIN)
+    stated = replace(PLAIN, noise=MeasuredNoise.as_stated(motion.t))
+    found = filter_rate(CUBE, motion.t, values, errors, stated)
     np.testing.assert_allclose(found.omega, omega, rtol=0, atol=1e-9)
     np.testing.assert_allclose(found.covariance, covariance, rtol=1e-7, atol=1e-12)
     np.testing.assert_allclose(found.nis, nis, rtol=1e-6)
@@ -47,7 +49,8 @@ def test_smoother_agrees_with_rauch_tung_striebel_by_the_book(run):
     *_, predicted, filtered, transitions = reference_filter(CUBE, motion.t, values, errors, keep=True)
     # The book inverts predicted covariances, so it is good to their condition (1e10) only.
     omega, covariance = reference_smoother(predicted, filtered, transitions)
-    found = smooth_rate(CUBE, motion.t, values, errors, PLAIN)
+    stated = replace(PLAIN, noise=MeasuredNoise.as_stated(motion.t))
+    found = smooth_rate(CUBE, motion.t, values, errors, stated)
     np.testing.assert_allclose(found.omega, omega, rtol=0, atol=1e-6)
     np.testing.assert_allclose(found.covariance, covariance, rtol=1e-4, atol=1e-9)
 

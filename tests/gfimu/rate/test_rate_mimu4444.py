@@ -14,6 +14,7 @@ from gfimu.calibration.array_calibration import calibrate_array
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.rate.filter import filter_rate
 from gfimu.rate.kalman import FilterSettings
+from gfimu.rate.methods import estimate_rate
 from gfimu.rate.sensing import SensorErrors
 from gfimu.rate.smoother import smooth_rate
 from gfimu.recording.mimu4444 import read_mimu4444
@@ -64,6 +65,25 @@ def test_rate_against_the_gyros_from_a_cold_start(motion, solve):
     assert found.mean_nis == pytest.approx(1, abs=0.15)
     # The error is what undersampling and the chips' clocks explain: median of χ²(3) is 2.4.
     assert 0.8 < square < 5
+
+
+@pytest.mark.parametrize("method", ["ml", "smoother"])
+def test_stated_noise_of_rest_is_enlarged_to_what_the_channels_show(motion, method):
+    """Normalised errors and signs with nothing stated but the noise of rest; the gyros are 1.5 ms ahead."""
+    array, t, readings, gyro = motion
+    found = estimate_rate(array, t, readings, sensors(array), method=method, settings=DARK)
+    known = np.isfinite(gyro).all(axis=1)
+    reference = np.column_stack([np.interp(t - 1.5e-3, t[known], axis[known]) for axis in gyro.T])
+    rows = known & (np.linalg.norm(reference, axis=1) > np.radians(100)) & np.isfinite(found.omega).all(axis=1)
+    each = np.abs((found.omega - reference) / found.std)[rows]
+    typical = np.median(each, axis=0) / 0.6745
+    assert np.all((typical > 0.5) & (typical < 1.3))
+    assert np.mean(each < 3) > 0.96
+    decided = found.sign_probability[rows] > 0.99
+    wrong = np.sum(found.omega * reference, axis=1)[rows] < 0
+    assert decided.mean() > 0.75
+    assert wrong[decided].mean() < 0.005
+    assert np.median(found.scale[rows]) > 8
 
 
 def test_noise_alone_explains_next_to_nothing(motion):

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from rate_worlds import cube, measure, readings, rms, sensor_errors, tumble, turntable
 
+from gfimu.rate.disagreement import MeasuredNoise
 from gfimu.rate.filter import filter_rate
+from gfimu.rate.kalman import FilterSettings
 from gfimu.rate.smoother import smooth_rate
 
 RATE = 100.0
@@ -31,7 +33,8 @@ def test_truth_stays_within_three_sigma_and_beats_the_naive_filter(kind, size, w
         world_array = displaced(array, rng, size * array.length_unit) if kind == "placement" else array
         values = measure(world_array, motion, rng, scale=size if kind == "scale" else 0.0)
         found = filter_rate(array, motion.t, values, sensor_errors(array, RATE, **told))
-        plain = filter_rate(array, motion.t, values, sensor_errors(array, RATE))
+        stated = FilterSettings(noise=MeasuredNoise.as_stated(motion.t))
+        plain = filter_rate(array, motion.t, values, sensor_errors(array, RATE), stated)
         aware.append((found.omega - motion.omega)[rows])
         naive.append((plain.omega - motion.omega)[rows])
         inside.append(np.abs(aware[-1]) < 3 * found.std[rows])

@@ -1,0 +1,316 @@
+"""The sign of the rate as a probability per sample: a chain of two states with α as the only witness.
+
+One sample gives ω up to its sign. The integral of α from sample to sample says which signs go together: with s = ±1 the
+sign of each sample's estimate w, the rate predicted from the sample before is m, and
+
+    r = s w − m,    V = C + P + Q
+
+is its misfit, with C the covariance of w and P that of the rate before. Q is what the integral of α over the interval
+may be off: noise, the bias of α, and what α does between two samples, of which half of its change from one to the next
+is taken, (½ Δt |Δα|)². Misfits of a hand-held or undersampled motion have heavy tails, so the likelihood of a step is
+Student's t with four degrees of freedom.
+
+At constant ω both signs explain the readings equally well, but the noise of α would make a random walk of their
+likelihoods, which ends as far from zero as one likes. So α is first shrunk to what of it is real: by the share of its
+power, over half a second, that noise and bias don't explain with near certainty (a Wiener filter). Without a manoeuvre
+nothing remains, and no sign is decided.
+
+Each of the two signs of a sample carries a rate and its covariance, a mixture of the two histories that lead to it,
+collapsed to one (after the second-order generalised pseudo-Bayesian filter, Y. Bar-Shalom, X. R. Li & T. Kirubarajan,
+Estimation with Applications to Tracking and Navigation, 2001, ch. 11.6). The chain runs forward; for a recording it
+runs backward over the later samples as well and the two probabilities are multiplied (two-filter smoother). A passage
+through zero so slow that neither sign stands out leaves both probable, until a later manoeuvre shows the sign again.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from gfimu.rate.recursion_data import COMPILE
+
+__all__ = ["SignPolicy", "SignSteps", "sign_probabilities"]
+
+
+@dataclass(frozen=True)
+class SignPolicy:
+    """Numbers of the chain.
+
+    Parameters
+    ----------
+    tail : float
+        Degrees of freedom of Student's t of a step.
+    change : float
+        Share of the change of α from one sample to the next by which its integral may be off, a ratio.
+    window_s : float
+        Length over which the power of α is averaged, s.
+    noise_deviate : float
+        Standard deviations by which that power must exceed the noise's.
+    bias_square : float
+        The same of the bias, in its variance per axis: χ² of three axes.
+    floor : float
+        Probability that a step is explained by nothing of this (a shock, a lost sample): a sign is never surer.
+    """
+
+    tail: float = 4.0
+    change: float = 0.5
+    window_s: float = 0.5
+    noise_deviate: float = 5.0
+    bias_square: float = 11.3
+    floor: float = 1e-6
+
+
+_POLICY = SignPolicy()
+
+
+@dataclass(frozen=True)
+class SignSteps:
+    """What the chain is given.
+
+    Parameters
+    ----------
+    t : ndarray, shape (n,)
+        Sample times, s.
+    alpha : ndarray, shape (n, 3)
+        Angular acceleration, rad/s²; NaN where there is none.
+    omega : ndarray, shape (n, 3)
+        Rate of each sample but for its sign, rad/s; NaN where there is none.
+    covariance : ndarray, shape (n, 3, 3)
+        Its covariance, finite where ``omega`` is, (rad/s)².
+    alpha_covariance : ndarray, shape (3, 3)
+        Covariance of one sample of α by the stated noise, (rad/s²)².
+    scale : ndarray, shape (n,)
+        Factor of its standard deviation (`gfimu.rate.disagreement.measured_scale`).
+    alpha_bias_std : float
+        Standard deviation of the constant bias of α, rad/s².
+    rest : ndarray of bool, shape (n,)
+        Samples at which the body is at rest.
+    rest_std : float
+        Standard deviation of the rate there, rad/s: a slow departure can go unseen for a while.
+    start : ndarray, shape (3,), or None
+        Known rate at the first sample, rad/s.
+    start_std : float
+        Its standard deviation, rad/s.
+    """
+
+    t: NDArray[np.float64]
+    alpha: NDArray[np.float64]
+    omega: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+    alpha_covariance: NDArray[np.float64]
+    scale: NDArray[np.float64]
+    alpha_bias_std: float
+    rest: NDArray[np.bool_]
+    rest_std: float
+    start: NDArray[np.float64] | None
+    start_std: float
+
+
+def sign_probabilities(steps: SignSteps, *, causal: bool = False, policy: SignPolicy = _POLICY) -> NDArray[np.float64]:
+    """Return the probability, shape (n,), that each sample's rate is ``omega`` and not ``−omega``; NaN without one.
+
+    Parameters
+    ----------
+    steps : SignSteps
+        Rates but for their sign, and α.
+    causal : bool
+        Whether each probability is from the samples up to its own alone.
+    policy : SignPolicy, optional
+        Numbers of the chain.
+    """
+    start = np.full(3, np.nan) if steps.start is None else np.asarray(steps.start, dtype=float)
+    bias = steps.alpha_bias_std
+    fixed = steps.alpha_covariance, bias, policy.change, policy.tail, steps.rest_std, policy.floor
+    alpha = _real_part(steps, policy)
+    columns = (steps.t, alpha, steps.omega, steps.covariance, steps.scale, steps.rest)
+    ahead = _chain(*columns, start, steps.start_std, *fixed)
+    if causal:
+        return ahead
+    # Backward in time, α changes its sign: ω(t − Δt) = ω(t) − Δt α.
+    nothing = np.full(3, np.nan)
+    turned = (-steps.t, -alpha, steps.omega, steps.covariance, steps.scale, steps.rest)
+    back = _chain(*(np.ascontiguousarray(column[::-1]) for column in turned), nothing, 1.0, *fixed)[::-1]
+    both = ahead * back
+    return both / (both + (1.0 - ahead) * (1.0 - back))
+
+
+def _real_part(steps: SignSteps, policy: SignPolicy) -> NDArray[np.float64]:
+    """Shrink α (n, 3) by the share of its power that noise and bias don't explain."""
+    present = np.isfinite(steps.alpha).all(axis=1) & ~steps.rest
+    n = len(present)
+    period = (steps.t[-1] - steps.t[0]) / max(n - 1, 1)
+    half = max(1, round(0.5 * policy.window_s / period))
+    white = np.trace(steps.alpha_covariance) * steps.scale**2
+    sums = np.zeros((n + 1, 3))
+    sums[1:, 0] = np.cumsum(np.where(present, np.sum(np.square(np.nan_to_num(steps.alpha)), axis=1), 0.0))
+    sums[1:, 1] = np.cumsum(np.where(present, white, 0.0))
+    sums[1:, 2] = np.cumsum(present)
+    place = np.arange(n)
+    seen = sums[np.minimum(place + half + 1, n)] - sums[np.maximum(place - half, 0)]
+    count = np.maximum(seen[:, 2], 1.0)
+    noise = seen[:, 1] / count
+    allowed = noise * (1.0 + policy.noise_deviate * np.sqrt(2.0 / (3.0 * count)))
+    allowed += policy.bias_square * steps.alpha_bias_std**2
+    excess = np.maximum(seen[:, 0] / count - allowed, 0.0)
+    return steps.alpha * (excess / np.maximum(excess + allowed, 1e-300))[:, None]
+
+
+@njit(**COMPILE)
+def _chain(  # type: ignore[no-untyped-def]
+    t, alpha, omega, covariance, scale, rest, start, start_std, noise, bias, change, tail, rest_std, floor
+):
+    """Run the chain forward; returns the probability of the sign that ``omega`` has, (n,)."""
+    n = len(t)
+    plus = np.full(n, np.nan)
+    mean = np.zeros((2, 3))  # of the rate with either sign of the last estimate
+    spread = np.zeros((2, 3, 3))
+    share = np.array([0.5, 0.5])
+    moved = np.zeros((2, 3))  # the same, carried to the present sample
+    inverse = np.zeros((3, 3))  # of V
+    gain = np.zeros((2, 3, 3))
+    kept = np.zeros((2, 3, 3))  # covariance behind the update
+    misfit = np.zeros((2, 2, 3))  # sign now, sign before
+    square = np.zeros((2, 2))
+    logs = np.zeros((2, 2))
+    weight = np.zeros(2)
+    part = np.zeros((2, 3))
+    extra = np.zeros((3, 3))
+    total = np.zeros((3, 3))
+    last = -1
+    known = np.isfinite(start[0])
+    if known:
+        for s in range(2):
+            for a in range(3):
+                mean[s, a] = start[a]
+                spread[s, a, a] = start_std * start_std
+    period = (t[n - 1] - t[0]) / max(n - 1, 1)
+    for k in range(n):
+        if rest[k]:
+            mean[:] = 0.0
+            spread[:] = 0.0
+            for a in range(3):
+                spread[0, a, a] = rest_std * rest_std
+                spread[1, a, a] = rest_std * rest_std
+            share[0] = 0.5
+            share[1] = 0.5
+            known = True
+            last = k if np.isfinite(alpha[k, 0]) else last
+            if np.isfinite(omega[k, 0]):
+                plus[k] = 0.5
+            continue
+        if not (np.isfinite(omega[k, 0]) and np.isfinite(alpha[k, 0])):
+            continue
+        if not known:
+            for a in range(3):
+                mean[0, a] = omega[k, a]
+                mean[1, a] = -omega[k, a]
+            spread[0] = covariance[k]
+            spread[1] = covariance[k]
+            plus[k] = 0.5
+            known = True
+            last = k
+            continue
+        step = t[k] - t[last] if last >= 0 else 0.0
+        size = 0.0
+        for a in range(3):
+            size += omega[k, a] * omega[k, a]
+        jump = 0.0
+        for a in range(3):
+            for b in range(3):
+                extra[a, b] = covariance[k, a, b]
+        if last >= 0:
+            gap = step > 1.5 * period
+            for a in range(3):
+                if gap:
+                    jump += (abs(alpha[k, a]) + abs(alpha[last, a])) ** 2
+                else:
+                    jump += (alpha[k, a] - alpha[last, a]) ** 2
+            both = 0.25 * step * step * (scale[k] * scale[k] + scale[last] * scale[last])
+            rough = (change * step) ** 2 * jump + bias * step * np.sqrt(size)
+            for a in range(3):
+                for b in range(3):
+                    extra[a, b] += both * noise[a, b]
+                extra[a, a] += rough
+        largest = -np.inf
+        for before in range(2):
+            for a in range(3):
+                integral = 0.5 * step * (alpha[k, a] + alpha[last, a]) if last >= 0 else 0.0
+                moved[before, a] = mean[before, a] + integral
+            for a in range(3):
+                for b in range(3):
+                    total[a, b] = extra[a, b] + spread[before, a, b]
+            determinant = _invert(total, inverse)
+            for a in range(3):
+                for b in range(3):
+                    value = 0.0
+                    for c in range(3):
+                        value += (total[a, c] - covariance[k, a, c]) * inverse[c, b]
+                    gain[before, a, b] = value
+            for a in range(3):
+                for b in range(3):
+                    value = 0.0
+                    for c in range(3):
+                        value += gain[before, a, c] * covariance[k, c, b]
+                    kept[before, a, b] = value
+            for now in range(2):
+                side = 1.0 if now == 0 else -1.0
+                value = 0.0
+                for a in range(3):
+                    misfit[now, before, a] = side * omega[k, a] - moved[before, a]
+                for a in range(3):
+                    for b in range(3):
+                        value += misfit[now, before, a] * inverse[a, b] * misfit[now, before, b]
+                square[now, before] = value
+                logs[now, before] = -0.5 * np.log(determinant) - 0.5 * (tail + 3.0) * np.log1p(value / tail)
+                largest = max(largest, logs[now, before])
+        before_plus = share[0]
+        for now in range(2):
+            weight[0] = np.exp(logs[now, 0] - largest)
+            weight[1] = np.exp(logs[now, 1] - largest)
+            share[now] = before_plus * weight[0] + (1.0 - before_plus) * weight[1]
+            # Rates are collapsed as if both signs had been alike before: else the sharper of them would gain by that.
+            first = weight[0] / max(weight[0] + weight[1], 1e-300)
+            for before in range(2):
+                for a in range(3):
+                    value = moved[before, a]
+                    for b in range(3):
+                        value += gain[before, a, b] * misfit[now, before, b]
+                    part[before, a] = value
+            # A t distribution widens with its misfit.
+            wide0 = first * max(1.0, (tail + square[now, 0]) / (tail + 3.0))
+            wide1 = (1.0 - first) * max(1.0, (tail + square[now, 1]) / (tail + 3.0))
+            for a in range(3):
+                mean[now, a] = first * part[0, a] + (1.0 - first) * part[1, a]
+                for b in range(a + 1):
+                    apart = (part[0, a] - part[1, a]) * (part[0, b] - part[1, b])
+                    value = wide0 * kept[0, a, b] + wide1 * kept[1, a, b] + first * (1.0 - first) * apart
+                    spread[now, a, b] = value
+                    spread[now, b, a] = value
+        mass = share[0] + share[1]
+        share[0] = (1.0 - floor) * share[0] / mass + 0.5 * floor
+        share[1] = 1.0 - share[0]
+        plus[k] = share[0]
+        last = k
+    return plus
+
+
+@njit(**COMPILE)
+def _invert(m, out):  # type: ignore[no-untyped-def]
+    """Invert a symmetric matrix (3, 3) into ``out``; returns the determinant."""
+    c00 = m[1, 1] * m[2, 2] - m[1, 2] * m[1, 2]
+    c01 = m[0, 2] * m[1, 2] - m[0, 1] * m[2, 2]
+    c02 = m[0, 1] * m[1, 2] - m[0, 2] * m[1, 1]
+    determinant = m[0, 0] * c00 + m[0, 1] * c01 + m[0, 2] * c02
+    out[0, 0] = c00 / determinant
+    out[0, 1] = c01 / determinant
+    out[0, 2] = c02 / determinant
+    out[1, 1] = (m[0, 0] * m[2, 2] - m[0, 2] * m[0, 2]) / determinant
+    out[1, 2] = (m[0, 1] * m[0, 2] - m[0, 0] * m[1, 2]) / determinant
+    out[2, 2] = (m[0, 0] * m[1, 1] - m[0, 1] * m[0, 1]) / determinant
+    out[1, 0] = out[0, 1]
+    out[2, 0] = out[0, 2]
+    out[2, 1] = out[1, 2]
+    return determinant
