@@ -19,17 +19,13 @@ from numpy.typing import NDArray
 
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.integrity.fault import ChannelFault
-from gfimu.integrity.prediction import omega_products, prediction_row
+from gfimu.integrity.policy import MonitorPolicy
+from gfimu.integrity.recursion.prediction import omega_products, prediction_row
 from gfimu.rate.sensing import SensorErrors
 
 __all__ = ["kind_of_fault", "name_kinds"]
 
-_DECIDED = 6.0  # by which the best kind must exceed the next in 2 log likelihood, else the simpler: odds of 20 to 1
-_SPIKES = 0.1  # of the samples that hold most of the squares, for spikes
-_NOISY = 1.5  # of the stated variance, from which noise is part of a fault
-_FEWEST = 8  # samples
-_BEFORE_S = 2.0  # from which the bias before the onset is taken
-_AFTER_S = 2.0  # behind the time at which a fault was found, that are fitted
+_FEWEST = 8  # numerical: samples
 
 
 def kind_of_fault(
@@ -37,6 +33,7 @@ def kind_of_fault(
     readings: NDArray[np.float64],
     difference: NDArray[np.float64],
     noise_std: float,
+    policy: MonitorPolicy | None = None,
 ) -> str:
     """Name what a channel does.
 
@@ -51,11 +48,15 @@ def kind_of_fault(
     noise_std : float
         Standard deviation of one sample of ``difference`` from a sound channel, m/s².
 
+    policy : MonitorPolicy, optional
+        What counts as noise and as spikes.
+
     Returns
     -------
     str
         "step", "drift", "gain", "noise", "freeze", "spikes" or "unknown".
     """
+    policy = policy or MonitorPolicy()
     valid = np.isfinite(readings) & np.isfinite(difference)
     t, readings, difference = t[valid], readings[valid], difference[valid]
     if len(t) < _FEWEST:
@@ -73,15 +74,15 @@ def kind_of_fault(
         length = float(column @ column)
         removed[name] = float(column @ difference) ** 2 / length / noise_std**2 if length > 0.0 else 0.0
     best = max(removed, key=lambda name: removed[name])
-    if removed["step"] >= removed[best] - _DECIDED:  # a gain at rest looks like a step, and is called one
+    if removed["step"] >= removed[best] - policy.kind_decided:  # a gain at rest looks like a step, and is called one
         best = "step"
     column = columns[best]
     rest = difference - column * float(column @ difference) / float(column @ column)
     variance = float(rest @ rest) / (len(t) - 1) / noise_std**2
-    energy = len(t) * (variance - 1.0 - np.log(max(variance, 1e-12))) if variance > _NOISY else 0.0
+    energy = len(t) * (variance - 1.0 - np.log(max(variance, 1e-12))) if variance > policy.noisy_kind else 0.0
     if energy > removed[best]:
         share = np.sort(rest**2)[::-1].cumsum()
-        few = max(1, int(_SPIKES * len(t)))
+        few = max(1, int(policy.spike_share * len(t)))
         return "spikes" if share[few - 1] > 0.9 * share[-1] else "noise"
     if removed[best] < 0.5 * float(difference @ difference) / noise_std**2 - len(t):
         return "unknown"
@@ -95,6 +96,8 @@ def name_kinds(
     readings: NDArray[np.float64],
     omega: NDArray[np.float64],
     faults: Sequence[ChannelFault],
+    *,
+    policy: MonitorPolicy,
 ) -> tuple[ChannelFault, ...]:
     """Name the kind of each isolated fault of a recording; several channels of one fault share it or are "unknown".
 
@@ -107,10 +110,11 @@ def name_kinds(
             continue
         used = np.ones(array.n_channels, dtype=np.bool_)
         for other in faults:
-            if other.onset_s < fault.found_s + _AFTER_S and other.end_s > fault.onset_s - _BEFORE_S:
+            if other.onset_s < fault.found_s + policy.kind_span_s and other.end_s > fault.onset_s - policy.kind_span_s:
                 used[[array.channels.index(name) for name in other.channels]] = False
         kinds = {
-            _kind(array, errors, t, readings, omega, fault, array.channels.index(name), used) for name in fault.channels
+            _kind(array, errors, t, readings, omega, fault, array.channels.index(name), used, policy)
+            for name in fault.channels
         }
         named.append(replace(fault, kind=kinds.pop() if len(kinds) == 1 else "unknown"))
     return tuple(named)
@@ -125,6 +129,7 @@ def _kind(
     fault: ChannelFault,
     channel: int,
     used: NDArray[np.bool_],
+    policy: MonitorPolicy,
 ) -> str:
     """Name the kind of a fault on one of its channels."""
     if (
@@ -133,7 +138,7 @@ def _kind(
     ):
         return "unknown"
     row = prediction_row(array, channel, used)
-    near = (t >= fault.onset_s - _BEFORE_S) & (t <= min(fault.found_s + _AFTER_S, fault.end_s))
+    near = (t >= fault.onset_s - policy.kind_span_s) & (t <= min(fault.found_s + policy.kind_span_s, fault.end_s))
     part = np.where(np.isfinite(readings[near]) | (row != 0.0), readings[near], 0.0)
     difference = part @ row - omega_products(omega[near]) @ (row @ array.centripetal_matrix)
     times = t[near]
@@ -142,4 +147,4 @@ def _kind(
         difference = difference - float(np.mean(difference[before]))
     after = times >= fault.onset_s
     noise = float(np.sqrt(np.sum((row * errors.noise_std) ** 2)))
-    return kind_of_fault(times[after], readings[near][after, channel], difference[after], noise)
+    return kind_of_fault(times[after], readings[near][after, channel], difference[after], noise, policy)

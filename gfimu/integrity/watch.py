@@ -6,27 +6,22 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
-from gfimu.integrity.blocks import Blocks, block_means
 from gfimu.integrity.fault import ChannelHealth
 from gfimu.integrity.kinds import name_kinds
-from gfimu.integrity.monitor import MARGIN, ChannelMonitor
+from gfimu.integrity.monitor import ChannelMonitor
 from gfimu.integrity.policy import MonitorPolicy
+from gfimu.integrity.recursion.blocks import Blocks, block_means
 from gfimu.rate.rest_test import RestTest, constant_readings
 from gfimu.rate.sensing import SensorErrors
 
 __all__ = ["leading_rest_bias", "watch_channels", "watch_from_rest"]
 
-_QUARTER = 0.25  # of the seconds of a recording must be free of faults for the errors of the model to be measured
-_MOVING = 15.0  # range of a channel's block means within a second, in their noise, from which the array moves
-_FEWEST_SECONDS = 8  # of motion, or of rest, that are judged by themselves
-_LEAST_SCALE = 1e-4  # a ratio, where gains and axes are stated as exact
-_LEAST_PLACE = 2e-5  # m, the same of positions
-_LARGEST_FACTOR = 64.0
-_LEAST_REST_S = 1.0  # shortest rest that shows the biases well enough
+_LEAST_SCALE = 1e-4  # numerical: a ratio, where gains and axes are stated as exact
+_LEAST_PLACE = 2e-5  # numerical: m, the same of positions
 
 
 def watch_channels(
@@ -77,23 +72,25 @@ def watch_channels(
     if not np.isfinite(times).all() or np.any(np.diff(times) <= 0):
         raise InputError("sample times must be finite and increase; drop repeated or reordered samples")
     period = float(np.median(np.diff(times)))
-    samples = (policy or MonitorPolicy()).samples(period)
+    settings = policy or MonitorPolicy()
+    samples = settings.samples(period)
     blocks = block_means(times, rows, errors.limits, samples)
     factor, monitor = 0.5, None
     while monitor is None:
         factor *= 2.0
         trial = ChannelMonitor(
-            array, _larger(errors, factor), period, omega0=omega0, omega0_std=omega0_std, policy=policy
+            array, _larger(errors, factor), period, omega0=omega0, omega0_std=omega0_std, policy=settings
         )
-        if factor >= _LARGEST_FACTOR or _agrees(trial, blocks):
+        if factor >= settings.largest_factor or _agrees(trial, blocks):
             monitor = trial
-    omega, _, odd = monitor.run(blocks)
+    monitor.extend(blocks)
+    odd = monitor.unexplained
     rate = np.zeros((len(times), 3))
     if len(blocks):
-        rate = np.column_stack([np.interp(times, blocks.t, column) for column in omega.T])
-    faults = name_kinds(array, errors, times, rows, rate, monitor.faults)
+        rate = np.column_stack([np.interp(times, blocks.t, column) for column in monitor.omega.T])
+    faults = name_kinds(array, errors, times, rows, rate, monitor.faults, policy=settings)
     excluded = np.zeros(rows.shape, dtype=np.bool_)
-    before = (MARGIN + 0.5) * monitor.block_s
+    before = (settings.margin + 0.5) * monitor.block_s
     for fault in faults:
         inside = (times >= fault.onset_s - before) & (times < fault.end_s)
         for name in fault.channels:
@@ -129,7 +126,7 @@ def watch_from_rest(
         return None
     times = np.asarray(t, dtype=float)
     rows = np.asarray(readings, dtype=float)
-    bias = leading_rest_bias(array, float(np.median(np.diff(times))), rows, errors)
+    bias = leading_rest_bias(array, float(np.median(np.diff(times))), rows, errors, settings)
     if bias is None:
         return None
     left = replace(
@@ -162,14 +159,15 @@ def _agrees(monitor: ChannelMonitor, blocks: Blocks) -> bool:
     whole = slice(0, count * per_second)
     nis = monitor.innovations(blocks)[whole].reshape(count, per_second).mean(axis=1)
     spread = np.ptp(blocks.means[whole].reshape(count, per_second, -1), axis=1) / monitor.noise_of_means
-    moving = spread.max(axis=1) > _MOVING
-    limit = chi2.ppf(1.0 - _QUARTER, freedom) / freedom
-    parts = [nis[part] for part in (moving, ~moving) if part.sum() >= min(count, _FEWEST_SECONDS)]
-    return all(bool(np.quantile(part, _QUARTER) <= limit) for part in parts)
+    policy = monitor.policy
+    moving = spread.max(axis=1) > policy.moving
+    limit = chdtri(freedom, policy.agreeing_share) / freedom
+    parts = [nis[part] for part in (moving, ~moving) if part.sum() >= min(count, policy.fewest_seconds)]
+    return all(bool(np.quantile(part, policy.agreeing_share) <= limit) for part in parts)
 
 
 def leading_rest_bias(
-    array: AccelerometerArray, period: float, readings: NDArray[np.float64], errors: SensorErrors
+    array: AccelerometerArray, period: float, readings: NDArray[np.float64], errors: SensorErrors, policy: MonitorPolicy
 ) -> NDArray[np.float64] | None:
     """Return what the mean readings at the start say of the biases, shape (c,), m/s²; None without a rest there.
 
@@ -192,7 +190,7 @@ def leading_rest_bias(
     window = RestTest().window(period)
     if length < len(constant):
         length -= window  # the last block may be the start of a slow motion
-    if length * period < _LEAST_REST_S:
+    if length * period < policy.least_rest_s:
         return None
     mean = np.mean(readings[:length], axis=0)
     gravity = array.regression_matrix[:, 3:]

@@ -107,19 +107,20 @@ def test_a_channel_that_lacks_readings_is_no_fault():
 
 
 def test_after_an_exclusion_the_rate_stays_within_its_deviation():
-    from gfimu.integrity.blocks import block_means
     from gfimu.integrity.monitor import ChannelMonitor
+    from gfimu.integrity.recursion.blocks import block_means
 
     t, y, omega = readings("tumble", 9)
     y[t >= 8.0, 0] += 50 * MG
     monitor = ChannelMonitor(CUBE, CALIBRATED, 0.01)
     blocks = block_means(t, y, CALIBRATED.limits, monitor.samples)
-    found, std, _ = monitor.run(blocks)
+    monitor.extend(blocks)
+    found, std = monitor.omega, monitor.omega_std
     true = omega.reshape(len(blocks), monitor.samples, 3).mean(axis=1)
     late = blocks.t > 8.5
     assert np.mean(np.abs(found - true)[late] < 3 * std[late]) > 0.97
     monitor = ChannelMonitor(CUBE, CALIBRATED, 0.01, policy=MonitorPolicy(false_alarms_per_hour=1e-300))
-    monitor.run(blocks)  # a threshold that nothing reaches
+    monitor.extend(blocks)  # a threshold that nothing reaches
 
 
 def test_a_rest_at_the_start_shows_the_biases():

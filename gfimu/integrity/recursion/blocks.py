@@ -41,6 +41,26 @@ class Blocks:
     def __len__(self) -> int:
         return len(self.t)
 
+    def rows(self, part: slice) -> Blocks:
+        """Return some of the blocks, as views."""
+        return Blocks(self.samples, self.t[part], self.means[part], self.missing[part], self.readings[part])
+
+    def joined(self, later: Blocks) -> Blocks:
+        """Return these blocks and those behind them."""
+        return Blocks(
+            self.samples,
+            np.concatenate([self.t, later.t]),
+            np.concatenate([self.means, later.means]),
+            np.concatenate([self.missing, later.missing]),
+            np.concatenate([self.readings, later.readings]),
+        )
+
+    def samples_of(self, period: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return times (m B,), a sample period apart within a block, and readings (m B, c), NaN in missing blocks."""
+        place = (np.arange(self.samples) - (self.samples - 1) / 2.0) * period
+        rows = np.where(self.missing[:, None, :], np.nan, self.readings)
+        return (self.t[:, None] + place).ravel(), rows.reshape(-1, rows.shape[2])
+
 
 def block_means(
     t: NDArray[np.float64], readings: NDArray[np.float64], limits: NDArray[np.float64], samples: int
