@@ -18,6 +18,9 @@ from firmware_bridge.recorder import Batch
 from gfimu.errors import GfimuError
 from gfimu.files.rerun_stream import rrd_stream, viewer_stream
 from gfimu.geometry.array import AccelerometerArray
+from gfimu.integrity.fault import ChannelFault
+from gfimu.integrity.live.channel_watch import HealthEvent, LiveWatch
+from gfimu.integrity.live.watched_filter import WatchedRateFilter
 from gfimu.rate.live import LiveRateFilter
 from gfimu.rate.sensing import SensorErrors
 
@@ -44,7 +47,8 @@ class StreamPicture(Protocol):
 class LiveView:
     """Is given each batch of a recording; estimates the rate at up to 100 Hz, in a thread of its own.
 
-    The recording never waits for the view: the filter is compiled on first use, which takes a while.
+    The recording never waits for the view: the filter is compiled on first use, which takes a while. If the recording
+    begins with a rest, channels that contradict the others are reported and left out of the rate, not of the recording.
 
     Parameters
     ----------
@@ -54,6 +58,8 @@ class LiveView:
         Size of a count, m/s².
     on_text : callable, optional
         Is given a line of text a few times a second.
+    on_fault : callable, optional
+        Is given a sentence when a channel is found faulty, or used again.
     rrd : Path, optional
         Write a rerun recording when the view is closed.
     viewer : bool
@@ -68,12 +74,13 @@ class LiveView:
         lsb: float,
         *,
         on_text: Callable[[str], None] | None = None,
+        on_fault: Callable[[str], None] | None = None,
         rrd: Path | None = None,
         viewer: bool = False,
         picture: StreamPicture | None = None,
     ) -> None:
-        self._array, self._lsb, self._on_text = array, lsb, on_text
-        self._filter: LiveRateFilter | None = None
+        self._array, self._lsb, self._on_text, self._on_fault = array, lsb, on_text, on_fault
+        self._filter: WatchedRateFilter | None = None
         self._picture, self._without_rate = picture, ""
         self._sum = np.zeros(array.n_channels)
         self._times: list[float] = []
@@ -115,15 +122,20 @@ class LiveView:
             shown = rate / self._group
             try:
                 errors = SensorErrors.from_parts(self._array, float(shown))
-                self._filter = LiveRateFilter(self._array, errors, float(1.0 / shown))
+                period = float(1.0 / shown)
+                watch = LiveWatch(self._array, errors, period)
+                self._filter = WatchedRateFilter(LiveRateFilter(self._array, errors, period), watch)
             except GfimuError as error:  # an array that can't see all six motions still has readings
                 self._without_rate = f"no rate: {error}"
         times, readings = self._averaged(batch)
         if not len(times):
             return
         omega = self._estimate(times, readings)
+        self._report_faults()
         for stream in self._streams:
             _log(stream, self._array, times, readings, omega)
+            if self._filter is not None and (health := self._filter.health) is not None:
+                _log_health(stream, self._array, times, health)
             if self._picture is not None:
                 import rerun as rr
 
@@ -158,6 +170,21 @@ class LiveView:
             self.omega = result.omega[-1]
         return result.omega
 
+    def _report_faults(self) -> None:
+        """Pass on what changed in the health of the channels."""
+        for event in [] if self._filter is None else self._filter.take_events():
+            if self._on_fault is not None:
+                self._on_fault(self._sentence(event))
+
+    def _sentence(self, event: HealthEvent) -> str:
+        """Return an event in words, with the time since the first sample."""
+        return f"{event.t_s - (self._first_s or 0.0):.2f} s: {event.text}"
+
+    @property
+    def faults(self) -> tuple[ChannelFault, ...]:
+        """Faults of channels that were found so far; times on the board's clock."""
+        return () if self._filter is None else self._filter.watch.faults
+
     def _line(self, batch: Batch, counts: StreamCounts) -> str:
         elapsed = float(batch.t_s[-1]) - (self._first_s or 0.0)
         rate = self._seen / elapsed if elapsed > 0 else 0.0
@@ -185,6 +212,15 @@ def _flush(stream: Any) -> None:
     """Send what still waits; a viewer that was closed meanwhile is no fault of the recording."""
     with suppress(RuntimeError):
         stream.flush(timeout_sec=_FLUSH_S)
+
+
+def _log_health(stream: Any, array: AccelerometerArray, times: NDArray[np.float64], health: list[int]) -> None:
+    """Send the health of each channel, at the newest time: 0 used, 1 in doubt, 2 not used."""
+    import rerun as rr
+
+    index = [rr.TimeColumn("t", duration=times[-1:])]
+    for channel, code in zip(array.channels, health, strict=True):
+        rr.send_columns(f"health/{channel}", index, rr.Scalars.columns(scalars=[float(code)]), recording=stream)
 
 
 def _log(

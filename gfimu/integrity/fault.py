@@ -62,6 +62,24 @@ class ChannelFault:
             "statistic": self.statistic,
         }
 
+    def entries(self) -> list[dict[str, Any]]:
+        """Return an entry for each channel, as JSON can hold it: kind, onset, size and its standard deviation."""
+        return [
+            {
+                "channel": name,
+                "kind": self.kind,
+                "isolated": self.isolated,
+                "onset_s": self.onset_s,
+                "detected_s": self.found_s,
+                "end_s": self.end_s if np.isfinite(self.end_s) else None,
+                "size": size if np.isfinite(size) else None,
+                "std": std if np.isfinite(std) else None,
+                "unit": "m/s2",
+                "excluded": not np.isfinite(self.end_s),
+            }
+            for name, size, std in zip(self.channels, self.sizes, self.sizes_std, strict=True)
+        ]
+
     def sentence(self) -> str:
         """Return the fault in words."""
         names = ", ".join(self.channels)

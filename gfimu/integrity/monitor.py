@@ -152,6 +152,21 @@ class ChannelMonitor:
             noise.drop(count)
         self._base += count
 
+    @property
+    def total_blocks(self) -> int:
+        """Blocks so far, those that were forgotten included."""
+        return self._base + len(self.blocks)
+
+    def recent_innovations(self, errors: SensorErrors) -> tuple[Blocks, NDArray[np.float64]]:
+        """Return the last blocks, and their normalised innovation squared per degree of freedom.
+
+        The channels are those in use now; gains, axes and positions have the errors given.
+        """
+        count = min(len(self.blocks), self.follower.history - 1)
+        first = self.total_blocks - count
+        recent = self.blocks.rows(slice(first - self._base, None))
+        return recent, self.follower.innovations(recent, self.watched, errors, base=first)
+
     def innovations(self, blocks: Blocks) -> NDArray[np.float64]:
         """Return the normalised innovation squared per degree of freedom of each block, without looking for faults."""
         return self.follower.innovations(blocks)

@@ -94,6 +94,8 @@ class MonitorPolicy:
         Seconds of motion, or of rest, from which they are judged by themselves.
     largest_factor : int
         Factor on the errors of gains, axes and positions that is not exceeded, a power of two.
+    unproven_factor : int
+        That factor in a stream until `fewest_seconds` of motion were seen, a power of two.
     least_rest_s : float
         Shortest rest that shows the biases well enough, s.
     live_rest_s : float
@@ -135,6 +137,7 @@ class MonitorPolicy:
     moving: float = 15.0
     fewest_seconds: int = 8
     largest_factor: int = 64
+    unproven_factor: int = 8
     least_rest_s: float = 1.0
     live_rest_s: float = 3.0
 

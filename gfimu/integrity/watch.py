@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-from scipy.special import chdtri
+from numpy.typing import ArrayLike
 
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
@@ -14,14 +11,12 @@ from gfimu.integrity.fault import ChannelHealth
 from gfimu.integrity.kinds import name_kinds
 from gfimu.integrity.monitor import ChannelMonitor
 from gfimu.integrity.policy import MonitorPolicy
-from gfimu.integrity.recursion.blocks import Blocks, block_means
-from gfimu.rate.rest_test import RestTest, constant_readings
+from gfimu.integrity.recursion.blocks import block_means
+from gfimu.integrity.residue import agree, larger_errors, with_residue
+from gfimu.integrity.rest import leading_rest_bias
 from gfimu.rate.sensing import SensorErrors
 
-__all__ = ["leading_rest_bias", "watch_channels", "watch_from_rest"]
-
-_LEAST_SCALE = 1e-4  # numerical: a ratio, where gains and axes are stated as exact
-_LEAST_PLACE = 2e-5  # numerical: m, the same of positions
+__all__ = ["watch_channels", "watch_from_rest"]
 
 
 def watch_channels(
@@ -79,9 +74,9 @@ def watch_channels(
     while monitor is None:
         factor *= 2.0
         trial = ChannelMonitor(
-            array, _larger(errors, factor), period, omega0=omega0, omega0_std=omega0_std, policy=settings
+            array, larger_errors(errors, factor), period, omega0=omega0, omega0_std=omega0_std, policy=settings
         )
-        if factor >= settings.largest_factor or _agrees(trial, blocks):
+        if factor >= settings.largest_factor or agree(trial.follower, blocks, trial.innovations(blocks), settings):
             monitor = trial
     monitor.extend(blocks)
     odd = monitor.unexplained
@@ -129,69 +124,5 @@ def watch_from_rest(
     bias = leading_rest_bias(array, float(np.median(np.diff(times))), rows, errors, settings)
     if bias is None:
         return None
-    left = replace(
-        errors,
-        bias_std=np.full(array.n_channels, settings.bias_std),
-        scale_std=max(errors.scale_std, settings.gain_std),
-        placement_std=max(errors.placement_std, settings.place_std),
-    )
+    left = with_residue(array, errors, settings)
     return watch_channels(array, times, rows - bias, left, policy=settings)
-
-
-def _larger(errors: SensorErrors, factor: float) -> SensorErrors:
-    """Return the errors with those of gains, axes and positions larger by a factor."""
-    if factor == 1.0:
-        return errors
-    return replace(
-        errors,
-        scale_std=factor * max(errors.scale_std, _LEAST_SCALE),
-        placement_std=factor * max(errors.placement_std, _LEAST_PLACE),
-    )
-
-
-def _agrees(monitor: ChannelMonitor, blocks: Blocks) -> bool:
-    """Whether a quarter of all seconds of motion, and of rest, have innovations that the stated errors explain."""
-    per_second = max(1, round(1.0 / monitor.block_s))
-    count = len(blocks) // per_second
-    freedom = monitor.null_count * per_second
-    if count == 0 or freedom == 0:
-        return True
-    whole = slice(0, count * per_second)
-    nis = monitor.innovations(blocks)[whole].reshape(count, per_second).mean(axis=1)
-    spread = np.ptp(blocks.means[whole].reshape(count, per_second, -1), axis=1) / monitor.noise_of_means
-    policy = monitor.policy
-    moving = spread.max(axis=1) > policy.moving
-    limit = chdtri(freedom, policy.agreeing_share) / freedom
-    parts = [nis[part] for part in (moving, ~moving) if part.sum() >= min(count, policy.fewest_seconds)]
-    return all(bool(np.quantile(part, policy.agreeing_share) <= limit) for part in parts)
-
-
-def leading_rest_bias(
-    array: AccelerometerArray, period: float, readings: NDArray[np.float64], errors: SensorErrors, policy: MonitorPolicy
-) -> NDArray[np.float64] | None:
-    """Return what the mean readings at the start say of the biases, shape (c,), m/s²; None without a rest there.
-
-    Of the mean reading, the specific force p that fits it best is taken off: that is gravity. What of a bias looks like
-    a specific force stays unknown, and changes neither α nor the null space.
-
-    Parameters
-    ----------
-    array : AccelerometerArray
-        An array that sees all six motions, with c channels.
-    period : float
-        Sample period, s.
-    readings : ndarray, shape (n, c)
-        Specific force, m/s²; NaN where missing.
-    errors : SensorErrors
-        Noise of the channels.
-    """
-    constant = constant_readings(array, readings, errors.noise_std, period)
-    length = len(constant) if constant.all() else int(np.argmin(constant))
-    window = RestTest().window(period)
-    if length < len(constant):
-        length -= window  # the last block may be the start of a slow motion
-    if length * period < policy.least_rest_s:
-        return None
-    mean = np.mean(readings[:length], axis=0)
-    gravity = array.regression_matrix[:, 3:]
-    return np.asarray(mean - gravity @ np.linalg.lstsq(gravity, mean, rcond=None)[0])

@@ -147,17 +147,50 @@ class MonitorFilter:
         )  # fmt: skip
         return rows.start + place, slot
 
-    def innovations(self, blocks: Blocks) -> NDArray[np.float64]:
-        """Return the normalised innovation squared per degree of freedom of each block, without looking for faults."""
+    def innovations(
+        self,
+        blocks: Blocks,
+        watched: NDArray[np.bool_] | None = None,
+        errors: SensorErrors | None = None,
+        *,
+        base: int | None = None,
+    ) -> NDArray[np.float64]:
+        """Return the normalised innovation squared per degree of freedom of each block, without looking for faults.
+
+        Parameters
+        ----------
+        blocks : Blocks
+            The blocks, m of them.
+        watched : ndarray of bool, shape (c,), optional
+            Channels in use; all by default.
+        errors : SensorErrors, optional
+            Errors of gains, axes and positions; by default those that are reckoned with.
+        base : int, optional
+            Number of the first block since the start of the run, among the last `history`; by default the blocks are
+            what comes next.
+        """
         count = len(blocks)
-        everything, watched = slice(0, count), np.ones(self.array.n_channels, dtype=np.bool_)
+        everything = slice(0, count)
+        if watched is None:
+            watched = np.ones(self.array.n_channels, dtype=np.bool_)
+        state, tuning = self.state.copy(), self._blind()
+        if base is not None:
+            state.go_back(base)
+        if errors is not None:
+            tuning = tuning._replace(scale_std=errors.scale_std, placement_std=errors.placement_std)
         nis = np.zeros(count)
         self._run(
-            self.state.copy(), blocks, everything, watched, self._blind(), base=0,
+            state, blocks, everything, watched, tuning, base=base or 0,
             levels=np.ones(count), omega=np.empty((count, 3)), std=np.empty((count, 3)), nis=nis,
         )  # fmt: skip
         counts = self.tables.null_count[self._sets(blocks, watched, everything)]
         return np.asarray(nis / np.maximum(counts, 1))
+
+    def reckon_with(self, errors: SensorErrors) -> None:
+        """Reckon with other errors of gains, axes and positions from now on; onsets begin anew."""
+        self.errors = errors
+        self._tuning = self._tuning._replace(scale_std=errors.scale_std, placement_std=errors.placement_std)
+        self.state.ages[:] = 0.0
 
     def evidence(
         self, state: MonitorState | None = None
