@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,11 +18,10 @@ from firmware_bridge.recorder import Batch
 from gfimu.errors import GfimuError
 from gfimu.files.rerun_stream import rrd_stream, viewer_stream
 from gfimu.geometry.array import AccelerometerArray
-from gfimu.integrity.fault import ChannelFault
-from gfimu.integrity.live.channel_watch import HealthEvent, LiveWatch
-from gfimu.integrity.live.watched_filter import WatchedRateFilter
-from gfimu.rate.live import LiveRateFilter
-from gfimu.rate.sensing import SensorErrors
+
+if TYPE_CHECKING:  # imported by the view's own thread: that takes longer than a recording should wait
+    from gfimu.integrity.fault import ChannelFault
+    from gfimu.integrity.live.watched_filter import WatchedRateFilter
 
 __all__ = ["LiveView", "StreamPicture"]
 
@@ -30,6 +29,7 @@ _VIEW_HZ = 100.0
 _TEXT_EVERY_S = 0.25
 _APPLICATION = "gfimu_record"
 _FLUSH_S = 5.0
+_LANE = 0.7  # numerical: height of a lane
 
 
 class StreamPicture(Protocol):
@@ -121,10 +121,7 @@ class LiveView:
             self._group = max(1, round(rate / _VIEW_HZ))
             shown = rate / self._group
             try:
-                errors = SensorErrors.from_parts(self._array, float(shown))
-                period = float(1.0 / shown)
-                watch = LiveWatch(self._array, errors, period)
-                self._filter = WatchedRateFilter(LiveRateFilter(self._array, errors, period), watch)
+                self._filter = _watched_filter(self._array, float(shown))
             except GfimuError as error:  # an array that can't see all six motions still has readings
                 self._without_rate = f"no rate: {error}"
         times, readings = self._averaged(batch)
@@ -174,11 +171,7 @@ class LiveView:
         """Pass on what changed in the health of the channels."""
         for event in [] if self._filter is None else self._filter.take_events():
             if self._on_fault is not None:
-                self._on_fault(self._sentence(event))
-
-    def _sentence(self, event: HealthEvent) -> str:
-        """Return an event in words, with the time since the first sample."""
-        return f"{event.t_s - (self._first_s or 0.0):.2f} s: {event.text}"
+                self._on_fault(f"{event.text} (at {event.t_s:.1f} s on the board's clock)")
 
     @property
     def faults(self) -> tuple[ChannelFault, ...]:
@@ -208,6 +201,17 @@ class LiveView:
             self._open.pop_all()
 
 
+def _watched_filter(array: AccelerometerArray, rate: float) -> WatchedRateFilter:
+    """Return a filter for a sample rate, Hz, that watches its channels."""
+    from gfimu.integrity.live.channel_watch import LiveWatch
+    from gfimu.integrity.live.watched_filter import WatchedRateFilter
+    from gfimu.rate.live import LiveRateFilter
+    from gfimu.rate.sensing import SensorErrors
+
+    errors, period = SensorErrors.from_parts(array, rate), 1.0 / rate
+    return WatchedRateFilter(LiveRateFilter(array, errors, period), LiveWatch(array, errors, period))
+
+
 def _flush(stream: Any) -> None:
     """Send what still waits; a viewer that was closed meanwhile is no fault of the recording."""
     with suppress(RuntimeError):
@@ -215,12 +219,16 @@ def _flush(stream: Any) -> None:
 
 
 def _log_health(stream: Any, array: AccelerometerArray, times: NDArray[np.float64], health: list[int]) -> None:
-    """Send the health of each channel, at the newest time: 0 used, 1 in doubt, 2 not used."""
+    """Send the health of each channel at the newest time, in a lane for each, the first at the top.
+
+    A line stands at the bottom of its lane while the channel is used, in the middle in doubt, at the top when not used.
+    """
     import rerun as rr
 
     index = [rr.TimeColumn("t", duration=times[-1:])]
-    for channel, code in zip(array.channels, health, strict=True):
-        rr.send_columns(f"health/{channel}", index, rr.Scalars.columns(scalars=[float(code)]), recording=stream)
+    for lane, (channel, code) in enumerate(zip(array.channels, health, strict=True)):
+        place = _LANE * code / 2.0 - lane
+        rr.send_columns(f"health/{channel}", index, rr.Scalars.columns(scalars=[place]), recording=stream)
 
 
 def _log(

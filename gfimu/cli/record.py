@@ -45,8 +45,8 @@ def _record(
 ) -> None:
     """Record from a board (real or virtual), with the angular rate shown as it comes.
 
-    If the recording begins with a rest, channels that contradict the others are named while it is made. The file can be read
-    while it grows; if the program is killed, at most the last half second is missing.
+    If the recording begins with a rest, channels that contradict the others are named while it is made. The file can
+    be read while it grows; if the program is killed, at most the last half second is missing.
 
     Example: gfimu record --port /dev/ttyUSB0 --out run.parquet --rate 800 --duration 60
     """

@@ -30,8 +30,8 @@ class ChannelFault:
     end_s : float
         Time from which on the channels are used again, s; infinite if they are not.
     sizes, sizes_std : tuple of float
-        Size of the fault of each channel as a constant from the onset to ``found_s``, and its standard deviation,
-        m/s²; NaN for noise.
+        Size of the fault of each channel as a constant from the onset on, and its standard deviation, m/s²; NaN for
+        noise.
     statistic : float
         Twice the log likelihood ratio of the fault against none.
     """

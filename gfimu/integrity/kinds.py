@@ -12,7 +12,7 @@ which a few samples hold most is spikes.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,7 +47,6 @@ def kind_of_fault(
         Readings less the prediction by the other channels, with the bias from before the onset taken off, m/s².
     noise_std : float
         Standard deviation of one sample of ``difference`` from a sound channel, m/s².
-
     policy : MonitorPolicy, optional
         What counts as noise and as spikes.
 
@@ -112,15 +111,44 @@ def name_kinds(
         for other in faults:
             if other.onset_s < fault.found_s + policy.kind_span_s and other.end_s > fault.onset_s - policy.kind_span_s:
                 used[[array.channels.index(name) for name in other.channels]] = False
-        kinds = {
-            _kind(array, errors, t, readings, omega, fault, array.channels.index(name), used, policy)
+        found = [
+            _seen(array, errors, t, readings, omega, fault, array.channels.index(name), used, policy)
             for name in fault.channels
-        }
-        named.append(replace(fault, kind=kinds.pop() if len(kinds) == 1 else "unknown"))
+        ]
+        named.append(_described(fault, [one for one in found if one is not None], policy))
     return tuple(named)
 
 
-def _kind(
+@dataclass(frozen=True)
+class _Seen:
+    """What a channel did around a fault."""
+
+    t: NDArray[np.float64]  # (n,) from the onset on, s
+    readings: NDArray[np.float64]  # (n,) m/s²
+    difference: NDArray[np.float64]  # (n,) from the prediction, less its mean before the onset, m/s²
+    noise_std: float  # of one sample of it
+    constant_std: float  # of its mean: bias and errors of the calibration
+
+
+def _described(fault: ChannelFault, seen: list[_Seen], policy: MonitorPolicy) -> ChannelFault:
+    """Return the fault with its kind, and the sizes of a step as the differences have them."""
+    kinds = {kind_of_fault(one.t, one.readings, one.difference, one.noise_std, policy) for one in seen}
+    if len(seen) < len(fault.channels) or len(kinds) != 1:
+        return replace(fault, kind="unknown")
+    kind = kinds.pop()
+    if kind != "step":
+        return replace(fault, kind=kind)
+    sizes, spreads = [], []
+    for one in seen:  # the onset is known to a block
+        settled = one.difference[(one.t > fault.onset_s + policy.block_s) & np.isfinite(one.difference)]
+        if not len(settled):
+            return replace(fault, kind=kind)
+        sizes.append(float(settled.mean()))
+        spreads.append(float(np.hypot(one.noise_std / np.sqrt(len(settled)), one.constant_std)))
+    return replace(fault, kind=kind, sizes=tuple(sizes), sizes_std=tuple(spreads))
+
+
+def _seen(
     array: AccelerometerArray,
     errors: SensorErrors,
     t: NDArray[np.float64],
@@ -130,21 +158,23 @@ def _kind(
     channel: int,
     used: NDArray[np.bool_],
     policy: MonitorPolicy,
-) -> str:
-    """Name the kind of a fault on one of its channels."""
-    if (
-        np.linalg.matrix_rank(array.regression_matrix[used] / np.array([array.length_unit] * 3 + [1.0] * 3), tol=1e-6)
-        < 6
-    ):
-        return "unknown"
+) -> _Seen | None:
+    """Return what one channel of a fault did; None where the others don't predict it."""
+    lengths = np.array([array.length_unit] * 3 + [1.0] * 3)
+    if np.linalg.matrix_rank(array.regression_matrix[used] / lengths, tol=1e-6) < 6:
+        return None
     row = prediction_row(array, channel, used)
     near = (t >= fault.onset_s - policy.kind_span_s) & (t <= min(fault.found_s + policy.kind_span_s, fault.end_s))
     part = np.where(np.isfinite(readings[near]) | (row != 0.0), readings[near], 0.0)
     difference = part @ row - omega_products(omega[near]) @ (row @ array.centripetal_matrix)
     times = t[near]
-    before = (times < fault.onset_s - 0.1) & np.isfinite(difference)
+    noise = float(np.sqrt(np.sum((row * errors.noise_std) ** 2)))
+    before = (times < fault.onset_s - policy.block_s) & np.isfinite(difference)
+    variance = float(row @ row) * policy.bias_std**2
     if before.any():
         difference = difference - float(np.mean(difference[before]))
+        variance = float(row @ row) * policy.bias_walk * policy.kind_span_s + noise**2 / before.sum()
+    ranges = np.nan_to_num(np.nanmax(part, axis=0) - np.nanmin(part, axis=0)) if len(part) else np.zeros(len(row))
+    variance += float(np.sum((0.5 * errors.scale_std * ranges * row) ** 2))
     after = times >= fault.onset_s
-    noise = float(np.sqrt(np.sum((row * errors.noise_std) ** 2)))
-    return kind_of_fault(times[after], readings[near][after, channel], difference[after], noise, policy)
+    return _Seen(times[after], part[after, channel], difference[after], noise, float(np.sqrt(variance)))

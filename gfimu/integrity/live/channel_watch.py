@@ -22,6 +22,8 @@ from gfimu.short_repr import short_repr
 
 __all__ = ["HealthEvent", "LiveWatch"]
 
+_SLOW = ("drift", "gain")  # can't be separated from a step at once
+
 
 @dataclass(frozen=True)
 class HealthEvent:
@@ -31,8 +33,9 @@ class HealthEvent:
     ----------
     t_s : float
         Time of the newest sample when it was found, s.
-    event : {"excluded", "readmitted", "named", "unwatched"}
-        What happened; "named": the kind of a fault became clear. "unwatched": nothing is watched (from now on).
+    event : {"excluded", "measured", "readmitted", "unwatched"}
+        What happened; "measured": kind and size of a fault from the seconds since it was found. "unwatched": nothing is
+        watched (from now on).
     fault : ChannelFault, optional
         The fault.
     text : str
@@ -93,6 +96,7 @@ class LiveWatch:
         self._waiting = 0
         self._looked = 0
         self._reported: list[ChannelFault] = []
+        self._unnamed: set[int] = set()  # faults whose kind is not final
         self._over = ""
         if array.n_channels - 7 < self.policy.fewest_null:
             self._over = f"array {array.name!r} has too few channels for a fault to be isolated"
@@ -191,7 +195,10 @@ class LiveWatch:
         for number, fault in enumerate(monitor.faults):
             if number == len(self._reported):
                 named = self._named(monitor, fault)
+                if named.kind in _SLOW:
+                    named = replace(named, kind="step")
                 self._reported.append(named)
+                self._unnamed.add(number)
                 events.append(HealthEvent(now, "excluded", named, named.sentence()))
                 continue
             before = self._reported[number]
@@ -204,18 +211,12 @@ class LiveWatch:
                         f"{names}: used again from {fault.end_s:.4g} s on",
                     )
                 )  # fmt: skip
-            elif self._open_kind(before, now):
+            elif number in self._unnamed and now >= before.found_s + self.policy.kind_span_s:
+                self._unnamed.discard(number)
                 named = self._named(monitor, replace(fault, end_s=before.end_s))
                 self._reported[number] = named
-                if named.kind != before.kind:
-                    events.append(HealthEvent(now, "named", named, named.sentence()))
+                events.append(HealthEvent(now, "measured", named, named.sentence()))
         return events
-
-    def _open_kind(self, fault: ChannelFault, now: float) -> bool:
-        """Whether just so much has passed since a fault was found that its kind can be judged for good."""
-        monitor = self._monitor
-        later = now - fault.found_s - self.policy.kind_span_s
-        return monitor is not None and fault.kind != "noise" and 0.0 <= later < 1.5 * monitor.block_s
 
     def _named(self, monitor: ChannelMonitor, fault: ChannelFault) -> ChannelFault:
         """Name the kind of a fault from the blocks that are kept."""

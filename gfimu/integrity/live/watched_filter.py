@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections import deque
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,7 +24,16 @@ class _Samples(NamedTuple):
 
     t: NDArray[np.float64]  # (n,)
     readings: NDArray[np.float64]  # (n, c), NaN where not used
+    masked: NDArray[np.bool_]  # (n, c) left out although there is a reading
     gyro: NDArray[np.float64] | None  # (n, 3)
+
+
+class _Kept(NamedTuple):
+    """The filter before a sample."""
+
+    t_s: float
+    live: LiveRateFilter
+    left_out: NDArray[np.int64]  # (c,) readings left out so far
 
 
 class WatchedRateFilter:
@@ -43,7 +53,8 @@ class WatchedRateFilter:
 
     def __init__(self, live: LiveRateFilter, watch: LiveWatch) -> None:
         self._live, self.watch = live, watch
-        self._states: deque[tuple[float, LiveRateFilter]] = deque()  # with the time before which they were kept
+        self._left_out = np.zeros(live.array.n_channels, dtype=np.int64)
+        self._states: deque[_Kept] = deque()
         self._samples: deque[_Samples] = deque()
         self._events: list[HealthEvent] = []
 
@@ -54,8 +65,13 @@ class WatchedRateFilter:
 
     @property
     def report(self) -> ChannelReport:
-        """What was wrong with the channels so far."""
-        return self._live.report
+        """What was wrong with the channels so far; readings that the watch left out are not missing."""
+        report = self._live.report
+        if not self._left_out.any():
+            return report
+        counts = dict(zip(self._live.array.channels, self._left_out.tolist(), strict=True))
+        missing = {name: count - counts[name] for name, count in report.missing.items() if count > counts[name]}
+        return replace(report, missing=missing)
 
     @property
     def health(self) -> list[int] | None:
@@ -77,8 +93,10 @@ class WatchedRateFilter:
         times = np.atleast_1d(np.asarray(t, dtype=float))
         rows = np.atleast_2d(np.asarray(readings, dtype=float))
         turning = None if gyro is None else np.atleast_2d(np.asarray(gyro, dtype=float))
-        used = np.where(self.watch.watched, rows, np.nan)
-        self._keep(_Samples(times, used, turning))
+        masked = ~self.watch.watched & np.isfinite(rows)
+        used = np.where(masked, np.nan, rows)
+        self._keep(_Samples(times, used, masked, turning))
+        self._left_out += masked.sum(axis=0)
         found = self._live.push(times, used, turning)
         events = self.watch.push(times, rows)
         self._events += events
@@ -99,26 +117,28 @@ class WatchedRateFilter:
         if not self.watch.possible or not len(samples.t):
             return
         now = float(samples.t[0])
-        if not self._states or now - self._states[-1][0] >= _KEEP_EVERY_S:
-            self._states.append((now, copy.deepcopy(self._live)))
+        if not self._states or now - self._states[-1].t_s >= _KEEP_EVERY_S:
+            self._states.append(_Kept(now, copy.deepcopy(self._live), self._left_out.copy()))
         self._samples.append(samples)
         oldest = now - self.watch.policy.oldest_s - 2.0 * _KEEP_EVERY_S
-        while len(self._states) > 2 and self._states[1][0] < oldest:
+        while len(self._states) > 2 and self._states[1].t_s < oldest:
             self._states.popleft()
-        while len(self._samples) > 1 and self._states and self._samples[1].t[0] <= self._states[0][0]:
+        while len(self._samples) > 1 and self._states and self._samples[1].t[0] <= self._states[0].t_s:
             self._samples.popleft()
 
     def _again(self, since: float) -> None:
         """Filter the samples since a time again, without the channels that are excluded now."""
-        kept = [number for number, (time, _) in enumerate(self._states) if time <= since] or [0]
-        while len(self._states) > kept[-1] + 1:
+        while len(self._states) > 1 and self._states[-1].t_s > since:
             self._states.pop()
-        start, state = self._states[-1]
-        parts = list(self._samples)
-        times, rows = np.concatenate([part.t for part in parts]), np.concatenate([part.readings for part in parts])
+        kept, parts = self._states[-1], list(self._samples)
+        times = np.concatenate([part.t for part in parts])
+        rows, masked = (np.concatenate([part[place] for part in parts]) for place in (1, 2))
         gyro = None if parts[0].gyro is None else np.concatenate([part.gyro for part in parts if part.gyro is not None])
-        rows[(times >= since)[:, None] & ~self.watch.watched] = np.nan
-        self._samples = deque([_Samples(times, rows, gyro)])
-        again = times >= start
-        self._live = copy.deepcopy(state)
+        new = (times >= since)[:, None] & ~self.watch.watched & np.isfinite(rows)
+        rows[new] = np.nan
+        masked = masked | new
+        self._samples = deque([_Samples(times, rows, masked, gyro)])
+        again = times >= kept.t_s
+        self._live = copy.deepcopy(kept.live)
+        self._left_out = kept.left_out + masked[again].sum(axis=0)
         self._live.push(times[again], rows[again], None if gyro is None else gyro[again])
