@@ -29,6 +29,7 @@ class _Suspicion:
     since: int  # block
     next_trial: int  # block
     unexplained: bool = False
+    doubtful: ChannelFault | None = None  # seen in channels that can't be separated, and not excluded
 
 
 class ChannelMonitor:
@@ -60,7 +61,9 @@ class ChannelMonitor:
     watched : ndarray of bool, shape (c,)
         Channels in use.
     faults : list of ChannelFault
-        What was found.
+        What was excluded.
+    doubtful : list of ChannelFault
+        What was seen in channels that can't be separated, and stayed in use.
 
     Raises
     ------
@@ -93,6 +96,7 @@ class ChannelMonitor:
         self.unexplained = np.zeros(0, dtype=np.bool_)
         self.watched = np.ones(c, dtype=np.bool_)
         self.faults: list[ChannelFault] = []
+        self._past_doubts: list[ChannelFault] = []
         self._base = 0  # number of the oldest block that is kept; all numbers of blocks below are of the whole run
         self._place = 0  # next block
         self._noise: dict[bytes, BlockNoise] = {}
@@ -120,6 +124,12 @@ class ChannelMonitor:
     def lost(self) -> bool:
         """Whether the filter ran away; nothing is watched from then on."""
         return self._lost
+
+    @property
+    def doubtful(self) -> list[ChannelFault]:
+        """Faults in channels that can't be separated and are used."""
+        now = [] if self._suspicion is None or self._suspicion.doubtful is None else [self._suspicion.doubtful]
+        return self._past_doubts + now
 
     @property
     def kept_blocks(self) -> int:
@@ -197,7 +207,7 @@ class ChannelMonitor:
             elif reached == noisy + 1:
                 back = self._exclude_noisy(place, channel)
             else:
-                self._suspicion = None
+                self._end_suspicion(place)
             if back < place:  # again from before the onset, without the channels
                 self._place = back
                 follower.state.go_back(back)
@@ -239,12 +249,28 @@ class ChannelMonitor:
             if len(rivals) > 1 and not late:
                 return place, False
             blamed = np.unique(np.concatenate([entry.channels for entry in rivals]))
-            if not self._may_exclude(blamed, fewest=None if len(rivals) == 1 else 0):
-                break
+            alone = len(rivals) == 1
             chosen = Explanation(blamed, best.statistic, best.slot)
-            return self._exclude(place, used, chosen, len(rivals) == 1, information, score), False
-        suspicion.unexplained = True
-        return place, True
+            fault = self._fault(place, used, chosen, information, score)
+            if not alone:
+                sets = tuple(tuple(self.array.channels[i] for i in entry.channels) for entry in rivals)
+                fault = replace(fault, isolated=False, alternatives=sets)
+            if self._may_exclude(blamed, fewest=None if alone else 0):
+                self._add(place, blamed, fault)
+                return self._before(place - self._span(used, chosen)), False
+            if alone:
+                break
+            suspicion.doubtful, suspicion.unexplained = replace(fault, excluded=False), False
+            return place, False
+        suspicion.unexplained = suspicion.doubtful is None
+        return place, suspicion.unexplained
+
+    def _end_suspicion(self, place: int) -> None:
+        """Keep a fault that was not isolated and is not seen any longer."""
+        if self._suspicion is not None and self._suspicion.doubtful is not None:
+            end = float(self.blocks.t[place - 1 - self._base])
+            self._past_doubts.append(replace(self._suspicion.doubtful, end_s=end))
+        self._suspicion = None
 
     def _explains(self, place: int, used: NDArray[np.int64], entry: Explanation) -> bool:
         """Whether nothing is left to explain if these channels had not been used since before their onset."""
@@ -253,9 +279,14 @@ class ChannelMonitor:
             return False
         watched = self.watched.copy()
         watched[entry.channels] = False
-        rows = slice(self._before(place - age) - self._base, place - self._base)
+        rows = slice(self._before(place - self._span(used, entry)) - self._base, place - self._base)
         rest = self.follower.unexplained_without(self.blocks, rows, watched, base=self._base)
         return rest < self.policy.unexplained
+
+    def _span(self, used: NDArray[np.int64], entry: Explanation) -> int:
+        """Return how many blocks ago a fault may have begun at most: the onset lies near one of those followed."""
+        ages = self.follower.state.ages[used]
+        return int(ages[max(0, entry.slot - 1)]) - 1 if entry.slot else int(ages[0])
 
     def _before(self, block: int) -> int:
         """Return the block from which to go on if a fault began at this one."""
@@ -268,31 +299,26 @@ class ChannelMonitor:
         rank = np.linalg.matrix_rank(self.array.regression_matrix[kept] / self._length_scale, tol=1e-6)
         return bool(rank == 6 and kept.sum() - 6 >= (self.policy.fewest_null if fewest is None else fewest))
 
-    def _exclude(
+    def _fault(
         self,
         place: int,
         used: NDArray[np.int64],
         chosen: Explanation,
-        isolated: bool,
         information: NDArray[np.float64],
         score: NDArray[np.float64],
-    ) -> int:
-        """Take channels out; returns the block before their fault began, from which to go on."""
+    ) -> ChannelFault:
+        """Return the fault of these channels, with the sizes that explain most."""
         channels = chosen.channels
         age = float(self.follower.state.ages[used[chosen.slot]])
         block = information[chosen.slot][np.ix_(channels, channels)]
         spread = np.linalg.inv(block + np.eye(len(channels)) / _LARGEST_FAULT**2)
         sizes = spread @ score[chosen.slot][channels]
         now = float(self.blocks.t[place - 1 - self._base])
-        self._add(
-            place, channels,
-            ChannelFault(
-                tuple(self.array.channels[i] for i in channels), "unknown", isolated,
-                now - (age - 0.5) * self.block_s, now + 0.5 * self.block_s, np.inf,
-                tuple(sizes.tolist()), tuple(np.sqrt(np.diag(spread)).tolist()), chosen.statistic,
-            ),
+        return ChannelFault(
+            tuple(self.array.channels[i] for i in channels), "unknown", True,
+            now - (age - 0.5) * self.block_s, now + 0.5 * self.block_s, np.inf,
+            tuple(sizes.tolist()), tuple(np.sqrt(np.diag(spread)).tolist()), chosen.statistic,
         )  # fmt: skip
-        return self._before(place - int(age))
 
     def _exclude_noisy(self, place: int, channel: int) -> int:
         """Take a noisy channel out; returns the block from which to go on."""

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
-from gfimu.integrity.fault import ChannelHealth
+from gfimu.integrity.fault import ChannelFault, ChannelHealth
 from gfimu.integrity.kinds import name_kinds
 from gfimu.integrity.monitor import ChannelMonitor
 from gfimu.integrity.policy import MonitorPolicy
@@ -84,17 +86,27 @@ def watch_channels(
     if len(blocks):
         rate = np.column_stack([np.interp(times, blocks.t, column) for column in monitor.omega.T])
     faults = name_kinds(array, errors, times, rows, rate, monitor.faults, policy=settings)
-    excluded = np.zeros(rows.shape, dtype=np.bool_)
+    doubts = tuple(monitor.doubtful)
     before = (settings.margin + 0.5) * monitor.block_s
-    for fault in faults:
-        inside = (times >= fault.onset_s - before) & (times < fault.end_s)
-        for name in fault.channels:
-            excluded[inside, array.channels.index(name)] = True
+    excluded = _concerned(array, times, faults, before)
     unexplained = np.zeros(len(times), dtype=np.bool_)
     unexplained[: len(odd) * samples] = np.repeat(odd, samples)
     return ChannelHealth(
-        tuple(array.channels), faults, excluded, unexplained, monitor.largest_statistic, monitor.threshold, factor
-    )
+        tuple(array.channels), (*faults, *doubts), excluded, _concerned(array, times, doubts, 0.0), unexplained,
+        monitor.largest_statistic, monitor.threshold, factor,
+    )  # fmt: skip
+
+
+def _concerned(
+    array: AccelerometerArray, times: NDArray[np.float64], faults: Sequence[ChannelFault], before: float
+) -> NDArray[np.bool_]:
+    """Return which readings the faults concern, shape (n, c), from some seconds before their onsets on."""
+    concerned = np.zeros((len(times), array.n_channels), dtype=np.bool_)
+    for fault in faults:
+        inside = (times >= fault.onset_s - before) & (times < fault.end_s)
+        for name in fault.channels:
+            concerned[inside, array.channels.index(name)] = True
+    return concerned
 
 
 def watch_from_rest(

@@ -21,7 +21,7 @@ _ARRAY = "scene/array"
 
 
 class LivePicture:
-    """What a stream of readings and rates is drawn as; the stream holds ``readings/a11`` …, ``omega/x`` … and ``health/a11`` ….
+    """What a stream is drawn as; it holds ``readings/a11`` …, ``omega/x`` … and ``health/a11`` ….
 
     Parameters
     ----------
@@ -104,8 +104,8 @@ than they are; each has one hue in all pictures. At rest the arrows together poi
 **Plots.** One line per chip; time on the board's clock, in seconds. The rate is there once the filter has started, and
 only where the array sees all six motions.
 
-**Health.** A line stands at the bottom of its lane while its channel is used, in the middle while it is in doubt, at the
-top when it contradicts the others and is not used for the rate. Needs a rest of some seconds at the start.
+**Health.** A line stands at the bottom of its lane while its channel is used, in the middle while it is in doubt, at
+the top when it contradicts the others and is not used for the rate. Needs a rest of some seconds at the start.
 
 {array_words(self._array)}
 """

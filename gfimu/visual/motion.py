@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,6 +59,11 @@ class MotionEstimate(Protocol):
     @property
     def quaternion(self) -> NDArray[np.float64]:
         """Attitude (w, x, y, z), body to world, shape (n, 4)."""
+        ...
+
+    @property
+    def health(self) -> Mapping[str, NDArray[Any]] | None:
+        """Health of each channel by name, shape (n,): 0 used, 1 in doubt, 2 not used; None where not watched."""
         ...
 
 

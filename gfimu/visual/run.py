@@ -46,6 +46,7 @@ from gfimu.visual.run_plots import (
     angle_plot,
     drift_plot,
     free_rate_plots,
+    health_plot,
     motion_plots,
     raw_plots,
     spin_rate_plots,
@@ -112,6 +113,8 @@ def write_run(
     if estimate is not None:
         alpha, *force = motion_plots(estimate, known)
         cells += [[alpha], force] if force else [[alpha]]
+        if estimate.health:
+            cells.insert(len(rates), [health_plot(estimate.t_s, estimate.health, array)])
     angle = angle_plot(estimate, known, about) if spins or known is not None else None
     cells += [[plot] for plot in (angle, drift_plot(drift) if drift is not None else None) if plot is not None]
     write_rrd(

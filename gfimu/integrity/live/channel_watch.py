@@ -33,9 +33,9 @@ class HealthEvent:
     ----------
     t_s : float
         Time of the newest sample when it was found, s.
-    event : {"excluded", "measured", "readmitted", "unwatched"}
-        What happened; "measured": kind and size of a fault from the seconds since it was found. "unwatched": nothing is
-        watched (from now on).
+    event : {"excluded", "measured", "readmitted", "undecided", "unwatched"}
+        What happened. "measured": kind and size of a fault from the seconds since it was found; "undecided": a fault is
+        seen and lies in channels that can't be separated; "unwatched": nothing is watched (from now on).
     fault : ChannelFault, optional
         The fault.
     text : str
@@ -97,6 +97,7 @@ class LiveWatch:
         self._looked = 0
         self._reported: list[ChannelFault] = []
         self._unnamed: set[int] = set()  # faults whose kind is not final
+        self._doubts = 0
         self._over = ""
         if array.n_channels - 7 < self.policy.fewest_null:
             self._over = f"array {array.name!r} has too few channels for a fault to be isolated"
@@ -129,8 +130,12 @@ class LiveWatch:
         """Health of each channel now, shape (c,): 0 used, 1 in doubt, 2 not used; None while nothing is watched."""
         if self._monitor is None or self._over:
             return None
-        doubt = len(self._monitor.unexplained) > 0 and bool(self._monitor.unexplained[-1])
-        return np.where(self._monitor.watched, np.int8(doubt), np.int8(2))
+        monitor = self._monitor
+        doubt = np.full(self.array.n_channels, len(monitor.unexplained) > 0 and bool(monitor.unexplained[-1]))
+        for fault in monitor.doubtful:
+            if not np.isfinite(fault.end_s):
+                doubt[[self.array.channels.index(name) for name in fault.channels]] = True
+        return np.where(monitor.watched, doubt.astype(np.int8), np.int8(2))
 
     @property
     def faults(self) -> tuple[ChannelFault, ...]:
@@ -216,6 +221,10 @@ class LiveWatch:
                 named = self._named(monitor, replace(fault, end_s=before.end_s))
                 self._reported[number] = named
                 events.append(HealthEvent(now, "measured", named, named.sentence()))
+        doubts = monitor.doubtful
+        if len(doubts) > self._doubts:
+            events.append(HealthEvent(now, "undecided", doubts[-1], doubts[-1].sentence()))
+        self._doubts = len(doubts)
         return events
 
     def _named(self, monitor: ChannelMonitor, fault: ChannelFault) -> ChannelFault:
