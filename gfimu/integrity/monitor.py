@@ -238,14 +238,18 @@ class ChannelMonitor:
         used, information, score = self.follower.evidence()
         late = waited * self.block_s >= policy.wait_s
         for kind in explanations(information, score, self.watched, self.array.chip_of_channel, policy.tried):
-            passing = [entry for entry in kind if self._explains(place, used, entry)]
-            if not passing:
+            explains = [self._explains(place, used, entry) for entry in kind]
+            if not any(explains):
                 continue
-            best = passing[0]
+            best = kind[explains.index(True)]
             age = float(self.follower.state.ages[used[best.slot]])
             needed = max(policy.isolation, (policy.relative + policy.first_block / age) * best.statistic)
             several = len(best.channels) > 1  # two equal faults may look exactly like two others at first
-            rivals = [entry for entry in passing if several or entry.statistic > best.statistic - needed]
+            rivals = [
+                entry
+                for entry, fits in zip(kind, explains, strict=True)
+                if (fits and several) or (entry.statistic > best.statistic - needed and (fits or several))
+            ]
             if len(rivals) > 1 and not late:
                 return place, False
             blamed = np.unique(np.concatenate([entry.channels for entry in rivals]))
