@@ -64,7 +64,7 @@ def live(
         Angle between that axis and the vertical, rad; by default from the first second.
     keep_faulty : bool
         Use every channel, without looking for faulty ones. By default a channel that contradicts the others is left out
-        while it does so (`gfimu.integrity.live`); that needs a rest at the start.
+        while it does so (`gfimu.integrity.live`): from a rest at the start on, else from when the rate has settled.
 
     Returns
     -------
@@ -108,13 +108,13 @@ def live(
     errors = SensorErrors.from_parts(geometry, rate, scale_std=scale_std, **biases)
     settings = FilterSettings(start_omega=None) if unknown_start else FilterSettings(start_omega=np.zeros(3))
     watched = None
-    if not keep_faulty and not unknown_start:
+    if not keep_faulty:
         from gfimu.integrity.live.channel_watch import LiveWatch
         from gfimu.integrity.live.watched_filter import WatchedRateFilter
         from gfimu.rate.live import LiveRateFilter
 
         live = LiveRateFilter(geometry, errors, 1.0 / rate, settings, gyro=gyro)
-        watched = WatchedRateFilter(live, LiveWatch(geometry, errors, 1.0 / rate))
+        watched = WatchedRateFilter(live, LiveWatch(geometry, errors, 1.0 / rate, at_rest=not unknown_start))
     return filter_stream(lines, geometry, errors, 1.0 / rate, settings, fuse_gyro=gyro, watched=watched)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -144,6 +144,19 @@ class ChannelHealth:
     model_factor: float = 1.0
 
     __repr__ = short_repr
+
+    def behind(self, count: int) -> ChannelHealth:
+        """Return the same with ``count`` samples before it in which nothing was watched."""
+
+        def longer(marks: NDArray[np.bool_]) -> NDArray[np.bool_]:
+            return np.concatenate([np.zeros((count, *marks.shape[1:]), dtype=np.bool_), marks])
+
+        return replace(
+            self,
+            excluded=longer(self.excluded),
+            doubted=longer(self.doubted),
+            unexplained=longer(self.unexplained),
+        )
 
     @property
     def sound(self) -> bool:

@@ -98,6 +98,10 @@ class MonitorPolicy:
         That factor in a stream until `fewest_seconds` of motion were seen, a power of two.
     least_rest_s : float
         Shortest rest that shows the biases well enough, s.
+    settled_std : float
+        In a run that begins in motion: standard deviation of the biases from which on the channels are watched, m/s².
+    settled_ratio : float
+        In such a run: innovations squared of a second over those of the second before, from which they no longer fall.
     live_rest_s : float
         Rest from which a stream's biases are taken, if it lasts so long, s.
     """
@@ -139,6 +143,8 @@ class MonitorPolicy:
     largest_factor: int = 64
     unproven_factor: int = 8
     least_rest_s: float = 1.0
+    settled_std: float = 1.5e-3
+    settled_ratio: float = 0.8
     live_rest_s: float = 3.0
 
     def __post_init__(self) -> None:

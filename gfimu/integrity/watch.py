@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,9 +17,12 @@ from gfimu.integrity.policy import MonitorPolicy
 from gfimu.integrity.recursion.blocks import block_means
 from gfimu.integrity.residue import agree, larger_errors, with_residue
 from gfimu.integrity.rest import leading_rest_bias
+from gfimu.integrity.start import Settling
+from gfimu.rate.kalman import FilterSettings
+from gfimu.rate.live import LiveRateFilter
 from gfimu.rate.sensing import SensorErrors
 
-__all__ = ["watch_channels", "watch_from_rest"]
+__all__ = ["watch_channels", "watch_from_rest", "watch_in_motion"]
 
 
 def watch_channels(
@@ -95,6 +99,54 @@ def watch_channels(
         tuple(array.channels), (*faults, *doubts), excluded, _concerned(array, times, doubts, 0.0), unexplained,
         monitor.largest_statistic, monitor.threshold, factor,
     )  # fmt: skip
+
+
+def watch_in_motion(
+    array: AccelerometerArray,
+    t: ArrayLike,
+    readings: ArrayLike,
+    errors: SensorErrors,
+    *,
+    omega0: ArrayLike | None,
+    policy: MonitorPolicy | None = None,
+) -> ChannelHealth | None:
+    """Find the faulty channels of a recording that begins in motion, from when the rate filter has settled on.
+
+    Parameters are those of `watch_channels`; ``omega0`` is the rate at the first sample, or None where it is not known.
+    None where the filter never settles: the sign of the rate stays undecided, or the motion does not show the biases;
+    or where the array has too few channels for a fault to be isolated.
+
+    Raises
+    ------
+    InputError
+        As `watch_channels`.
+    """
+    settings = policy or MonitorPolicy()
+    if array.n_channels - 7 < settings.fewest_null:
+        return None
+    times, rows = np.asarray(t, dtype=float), np.asarray(readings, dtype=float)
+    period = float(np.median(np.diff(times)))
+    start_omega = None if omega0 is None else np.asarray(omega0, dtype=float)
+    live = LiveRateFilter(array, errors, period, FilterSettings(start_omega=start_omega))
+    second = max(1, round(1.0 / period))
+    settling, done, start = Settling(period, settings), 0, None
+    for first in range(0, len(times), second):
+        part = slice(first, first + second)
+        estimates = live.push(times[part], rows[part])
+        settling.add(estimates)
+        done += len(estimates)
+        start = settling.start(live)
+        if start is not None:
+            break
+    if start is None or len(times) - done < 2:
+        return None
+    left = with_residue(array, errors, settings)
+    left = replace(left, bias_std=np.maximum(left.bias_std, start.bias_std))
+    found = watch_channels(
+        array, times[done:], rows[done:] - start.bias, left,
+        omega0=start.omega, omega0_std=max(start.omega_std, 1e-3), policy=settings,
+    )  # fmt: skip
+    return found.behind(done)
 
 
 def _concerned(

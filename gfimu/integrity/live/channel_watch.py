@@ -17,11 +17,13 @@ from gfimu.integrity.policy import MonitorPolicy
 from gfimu.integrity.recursion.blocks import block_means
 from gfimu.integrity.residue import with_residue
 from gfimu.integrity.rest import leading_rest, rest_bias
+from gfimu.integrity.start import MotionStart
 from gfimu.rate.sensing import SensorErrors
 from gfimu.short_repr import short_repr
 
 __all__ = ["HealthEvent", "LiveWatch"]
 
+_LEAST_RATE_STD = 1e-3  # numerical: rad/s
 _SLOW = ("drift", "gain")  # can't be separated from a step at once
 
 
@@ -33,9 +35,9 @@ class HealthEvent:
     ----------
     t_s : float
         Time of the newest sample when it was found, s.
-    event : {"excluded", "measured", "readmitted", "undecided", "unwatched"}
+    event : {"excluded", "measured", "readmitted", "undecided", "watched", "unwatched"}
         What happened. "measured": kind and size of a fault from the seconds since it was found; "undecided": a fault is
-        seen and lies in channels that can't be separated; "unwatched": nothing is watched (from now on).
+        seen and lies in channels that can't be separated; "watched", "unwatched": they are, or are not, from now on.
     fault : ChannelFault, optional
         The fault.
     text : str
@@ -58,7 +60,8 @@ class HealthEvent:
 class LiveWatch:
     """Watches the channels of a stream of samples.
 
-    The stream has to begin with a rest, which shows the biases. Until the channels were seen to agree in motion, larger
+    If the stream begins with a rest, that shows the biases; else the watch begins where it is given rate and biases
+    (`begin_in_motion`). Until the channels were seen to agree in motion, larger
     errors of gains, axes and positions are reckoned with, and only faults beyond those are excluded in motion.
 
     Parameters
@@ -69,13 +72,15 @@ class LiveWatch:
         Errors of its channels.
     period : float
         Sample period, s.
+    at_rest : bool
+        Whether the stream may begin with a rest.
     policy : MonitorPolicy, optional
         Thresholds.
 
     Attributes
     ----------
-    watched : ndarray of bool, shape (c,)
-        Channels to be used.
+    in_motion : bool
+        Whether the stream does not begin with a rest.
 
     Raises
     ------
@@ -84,7 +89,13 @@ class LiveWatch:
     """
 
     def __init__(
-        self, array: AccelerometerArray, errors: SensorErrors, period: float, *, policy: MonitorPolicy | None = None
+        self,
+        array: AccelerometerArray,
+        errors: SensorErrors,
+        period: float,
+        *,
+        at_rest: bool = True,
+        policy: MonitorPolicy | None = None,
     ) -> None:
         self.array, self.policy, self._period = array, policy or MonitorPolicy(), period
         self._errors = errors
@@ -98,6 +109,7 @@ class LiveWatch:
         self._reported: list[ChannelFault] = []
         self._unnamed: set[int] = set()  # faults whose kind is not final
         self._doubts = 0
+        self.in_motion = not at_rest
         self._over = ""
         if array.n_channels - 7 < self.policy.fewest_null:
             self._over = f"array {array.name!r} has too few channels for a fault to be isolated"
@@ -144,7 +156,7 @@ class LiveWatch:
 
     def push(self, t: ArrayLike, readings: ArrayLike) -> list[HealthEvent]:
         """Take samples t (n,), s, and readings (n, c), m/s², NaN where missing; returns what changed."""
-        if self._over:
+        if self._over or (self.in_motion and self._monitor is None):
             return []
         times, rows = np.atleast_1d(np.asarray(t, dtype=float)), np.atleast_2d(np.asarray(readings, dtype=float))
         self._times.append(times)
@@ -156,7 +168,7 @@ class LiveWatch:
                 return []
             self._looked = self._waiting
             if not self._begin():
-                return [self._give_up()] if self._over else []
+                return [self._give_up()] if self.in_motion else []
         monitor = self._monitor
         if monitor is None or self._waiting < monitor.samples:
             return []
@@ -168,7 +180,7 @@ class LiveWatch:
         count, over = leading_rest(self.array, self._period, rows, self._errors)
         seconds = count * self._period
         if over and seconds < self.policy.least_rest_s:
-            self._over = "the stream does not begin with a rest, which would show the biases"
+            self.in_motion = True
             return False
         if not over and seconds < self.policy.live_rest_s:
             return False
@@ -176,6 +188,18 @@ class LiveWatch:
         self._agreement = Agreement(with_residue(self.array, self._errors, self.policy), self.policy)
         self._monitor = ChannelMonitor(self.array, self._agreement.errors, self._period, policy=self.policy)
         return True
+
+    def begin_in_motion(self, start: MotionStart, t_s: float) -> HealthEvent:
+        """Begin with the next sample, behind one at ``t_s`` with this rate and these biases."""
+        left = with_residue(self.array, self._errors, self.policy)
+        left = replace(left, bias_std=np.maximum(left.bias_std, start.bias_std))
+        self._bias = start.bias
+        self._agreement = Agreement(left, self.policy)
+        self._monitor = ChannelMonitor(
+            self.array, self._agreement.errors, self._period, omega0=start.omega,
+            omega0_std=max(start.omega_std, _LEAST_RATE_STD), policy=self.policy,
+        )  # fmt: skip
+        return HealthEvent(t_s, "watched", None, f"channels are watched from {t_s:.4g} s on")
 
     def _watch(self, monitor: ChannelMonitor) -> list[HealthEvent]:
         """Give the monitor all whole blocks that wait."""
@@ -243,4 +267,5 @@ class LiveWatch:
     def _give_up(self, now: float | None = None) -> HealthEvent:
         time = float(self._times[-1][-1]) if now is None else now
         self._times, self._rows, self._waiting = [], [], 0
-        return HealthEvent(time, "unwatched", None, f"channels are not watched: {self._over}")
+        why = self._over or "the run does not begin with a rest; they will be once the rate has settled"
+        return HealthEvent(time, "unwatched", None, f"channels are not watched: {why}")

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gfimu.integrity.live.channel_watch import HealthEvent, LiveWatch
+from gfimu.integrity.start import Settling
 from gfimu.rate.live import LiveRateFilter
 from gfimu.rate.result import ChannelReport, RateEstimate
 
@@ -57,6 +58,8 @@ class WatchedRateFilter:
         self._states: deque[_Kept] = deque()
         self._samples: deque[_Samples] = deque()
         self._events: list[HealthEvent] = []
+        self._settling = Settling(live.period, watch.policy)
+        self._ask_at = -np.inf
 
     @property
     def live(self) -> LiveRateFilter:
@@ -95,11 +98,18 @@ class WatchedRateFilter:
         turning = None if gyro is None else np.atleast_2d(np.asarray(gyro, dtype=float))
         masked = ~self.watch.watched & np.isfinite(rows)
         used = np.where(masked, np.nan, rows)
-        self._keep(_Samples(times, used, masked, turning))
-        self._left_out += masked.sum(axis=0)
+        if len(times):
+            self._keep_state(float(times[0]))
         found = self._live.push(times, used, turning)
+        self._left_out += masked.sum(axis=0)
+        if len(times):
+            self._keep_samples(_Samples(times, used, masked, turning))
         events = self.watch.push(times, rows)
         self._events += events
+        if len(found) and self.watch.possible and not self.watch.active:
+            self._settling.add(found)
+        if self.watch.in_motion and len(found) and self.watch.possible and not self.watch.active:
+            self._begin_in_motion(float(found.t_s[-1]))
         onsets = [event.fault.onset_s for event in events if event.event == "excluded" and event.fault is not None]
         if onsets:
             self._again(min(onsets) - self.watch.margin_s)
@@ -109,21 +119,37 @@ class WatchedRateFilter:
         """Return the estimates of the last samples."""
         return self._live.finish()
 
-    def _keep(self, samples: _Samples) -> None:
-        """Keep samples, and now and then the filter's state, as long as a fault may be found in them."""
+    def _begin_in_motion(self, now: float) -> None:
+        """Begin to watch behind the newest estimate, if the filter has settled; asked every second."""
+        if now < self._ask_at:
+            return
+        self._ask_at = now + _KEEP_EVERY_S
+        start = self._settling.start(self._live)
+        if start is None:
+            return
+        self._events.append(self.watch.begin_in_motion(start, now))
+        for samples in self._samples:
+            later = samples.t > now
+            if later.any():
+                self._events += self.watch.push(samples.t[later], samples.readings[later])
+
+    def _keep_state(self, now: float) -> None:
+        """Keep the filter's state now and then, before a sample at a time, as long as a fault may have begun there."""
         if not self.watch.possible:
             self._states.clear()
-            self._samples.clear()
-        if not self.watch.possible or not len(samples.t):
-            return
-        now = float(samples.t[0])
-        if not self._states or now - self._states[-1].t_s >= _KEEP_EVERY_S:
+        elif not self._states or now - self._states[-1].t_s >= _KEEP_EVERY_S:
             self._states.append(_Kept(now, copy.deepcopy(self._live), self._left_out.copy()))
+            oldest = now - self.watch.policy.oldest_s - 2.0 * _KEEP_EVERY_S
+            while len(self._states) > 2 and self._states[1].t_s < oldest:
+                self._states.popleft()
+
+    def _keep_samples(self, samples: _Samples) -> None:
+        """Keep samples that were filtered, from the oldest state on."""
+        if not self.watch.possible:
+            self._samples.clear()
+            return
         self._samples.append(samples)
-        oldest = now - self.watch.policy.oldest_s - 2.0 * _KEEP_EVERY_S
-        while len(self._states) > 2 and self._states[1].t_s < oldest:
-            self._states.popleft()
-        while len(self._samples) > 1 and self._states and self._samples[1].t[0] <= self._states[0].t_s:
+        while len(self._samples) > 1 and self._samples[1].t[0] <= self._states[0].t_s:
             self._samples.popleft()
 
     def _again(self, since: float) -> None:

@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
-from watched_world import CALIBRATED, CUBE, GRAVITY, readings
+from watched_world import CALIBRATED, CUBE, GRAVITY, RATE_HZ, readings
 
 from gfimu.errors import InputError
 from gfimu.integrity import MonitorPolicy, watch_channels
-from gfimu.integrity.watch import watch_from_rest
+from gfimu.integrity.watch import watch_from_rest, watch_in_motion
+from gfimu.rate.sensing import SensorErrors
 
 MG = 1e-3 * GRAVITY
 NAMES = list(CUBE.channels)
@@ -130,6 +131,48 @@ def test_a_rest_at_the_start_shows_the_biases():
     y[times >= 12.0, 8] += 15 * MG
     assert named(watch_from_rest(CUBE, times, y, CALIBRATED)) == {NAMES[8]}
     assert watch_from_rest(CUBE, times, y[::-1] + np.sin(9 * times)[:, None], CALIBRATED) is None
+
+
+@pytest.mark.parametrize("kind", ["tumble", "turn"])
+def test_a_run_that_begins_in_motion_is_watched_once_the_rate_has_settled(kind):
+    t, y, omega = readings(kind, 11, duration=67.0)
+    errors = SensorErrors.from_parts(CUBE, RATE_HZ)
+    y = y + np.random.default_rng(3).normal(0.0, errors.bias_std)
+    t, y, omega = t[700:] - t[700], y[700:], omega[700:]
+    assert watch_in_motion(CUBE, t, y, errors, omega0=omega[0]).sound
+    y[t >= 40.0, 10] += 15 * MG
+    health = watch_in_motion(CUBE, t, y, errors, omega0=omega[0])
+    (fault,) = health.faults
+    assert fault.channels == (NAMES[10],)
+    assert fault.onset_s == pytest.approx(40.0, abs=0.35)
+    assert health.excluded[t > 41.0, 10].all()
+    assert health.excluded.shape == y.shape
+
+
+def test_a_run_whose_start_is_not_known_is_not_watched_while_its_sign_is_undecided():
+    t, y, _ = readings("turn", 11, duration=20.0)
+    assert watch_in_motion(CUBE, t[700:], y[700:], SensorErrors.from_parts(CUBE, RATE_HZ), omega0=None) is None
+
+
+@pytest.mark.parametrize("kind", ["rest", "tumble"])
+def test_two_equal_faults_that_look_like_two_others_are_both_named(kind):
+    """For some pairs of cube12 two equal faults at once are exactly two others: both are named, none is guessed."""
+    pair = {"rest": (2, 5), "tumble": (5, 11)}[kind]
+    seed, onset = {"rest": (1013, 7.01), "tumble": (1000, 8.17)}[kind]
+    t, y, _ = readings(kind, seed)
+    y[np.ix_(t >= onset, pair)] += 20 * MG
+    health = watch_channels(CUBE, t, y, CALIBRATED)
+    (fault,) = health.faults
+    assert not fault.isolated
+    assert not fault.excluded
+    assert {NAMES[i] for i in pair} in [set(names) for names in fault.alternatives]
+    assert len(fault.alternatives) == 2
+    assert ", or in" in fault.sentence()
+    codes = health.codes()
+    inside = (t > fault.onset_s) & (t < fault.end_s)
+    concerned = [NAMES.index(name) for name in fault.channels]
+    assert (codes[np.ix_(inside, concerned)] == 1).all()
+    assert not health.excluded.any()
 
 
 def test_bad_input_is_refused():

@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 from watched_world import CALIBRATED, CUBE, GRAVITY, RATE_HZ, readings
 
+from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.integrity.live.channel_watch import LiveWatch
 from gfimu.integrity.live.watched_filter import WatchedRateFilter
 from gfimu.integrity.watch import watch_from_rest
 from gfimu.rate.filter import filter_rate
+from gfimu.rate.kalman import FilterSettings
 from gfimu.rate.live import LiveRateFilter
 from gfimu.rate.sensing import SensorErrors
 from gfimu.rate.stream import filter_stream
@@ -95,13 +97,42 @@ def test_an_uncalibrated_array_that_tumbles_excludes_nothing(seed):
     assert live.watch._agreement.factor > 2.0
 
 
-def test_a_stream_that_begins_in_motion_is_not_watched_and_says_so():
+def test_a_stream_that_begins_in_motion_is_watched_once_the_rate_has_settled():
+    t, y, omega = readings("tumble", 1, duration=40.0)
+    t, y, omega = t[700:] - t[700], y[700:] + np.random.default_rng(0).normal(0.0, 0.3, 12), omega[700:]
+    y[t >= 22.0, 4] += 30 * MG
+    live = WatchedRateFilter(
+        LiveRateFilter(CUBE, ERRORS, 0.01, FilterSettings(start_omega=omega[0])), LiveWatch(CUBE, ERRORS, 0.01)
+    )
+    events = []
+    for first in range(0, len(t), 50):
+        live.push(t[first : first + 50], y[first : first + 50])
+        events += live.take_events()
+    assert [event.event for event in events] == ["unwatched", "watched", "excluded", "measured"]
+    assert events[1].t_s < 12.0
+    assert events[2].fault.channels == (CUBE.channels[4],)
+    assert live.health[4] == 2
+
+
+def test_a_start_whose_sign_is_undecided_is_not_watched():
     t, y, _ = readings("tumble", 1, duration=10.0)
     live, events, times, _ = streamed(t, y)
     assert [event.event for event in events] == ["unwatched"]
     assert "rest" in events[0].text
     assert live.health is None
     assert len(times) == len(t) - 2
+
+
+def test_a_line_that_is_refused_is_not_filtered_again():
+    t, y, _ = readings("rest", 4, duration=12.0, rest=4.0)
+    y[t >= 8.0, 6] += 50 * MG
+    live = watched_filter()
+    for k in range(len(t)):
+        if k in (300, 830):
+            with pytest.raises(InputError, match="increase"):
+                live.push(t[k - 1], y[k])
+        live.push(t[k], y[k])
+    assert live.health == [0, 0, 0, 0, 0, 0, 2, 0, 0, 0, 0, 0]
 
 
 def test_an_array_with_few_channels_is_not_watched():
