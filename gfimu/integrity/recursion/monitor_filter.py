@@ -59,6 +59,7 @@ class MonitorFilter:
         c, slots = array.n_channels, policy.slots
         self.threshold = policy.threshold(c, self.block_s)
         self._tuning = MonitorTuning(
+            follow=True,
             samples=self.samples,
             period=self.block_s,
             threshold=self.threshold,
@@ -173,9 +174,10 @@ class MonitorFilter:
         everything = slice(0, count)
         if watched is None:
             watched = np.ones(self.array.n_channels, dtype=np.bool_)
-        state, tuning = self.state.copy(), self._blind()
+        state, tuning = self.state.copy(), self._blind()._replace(follow=False)
         if base is not None:
             state.go_back(base)
+        state.ages[:] = 0.0
         if errors is not None:
             tuning = tuning._replace(scale_std=errors.scale_std, placement_std=errors.placement_std)
         nis = np.zeros(count)

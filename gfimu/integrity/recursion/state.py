@@ -24,6 +24,7 @@ class MonitorTables(NamedTuple):
 class MonitorTuning(NamedTuple):
     """Numbers that stay the same over a run."""
 
+    follow: bool  # whether onsets of faults are followed
     samples: int  # per block
     period: float  # of the blocks, s
     threshold: float  # of a fault

@@ -72,8 +72,9 @@ def advance(tables, tuning, state, means, steps, sets, levels, watched, omega, s
         _predict(tables, tuning, state, means[k], step, place, level, transition)
         if step > 1.5 * tuning.period:
             state.ages[:] = 0.0
-        new_slot(state, tuning.oldest)
-        carry_signatures(tables, state, transition, step, place)
+        if tuning.follow:
+            new_slot(state, tuning.oldest)
+            carry_signatures(tables, state, transition, step, place)
         nis[k] = _update(tables, tuning, state, means[k], place, level)
         omega[k] = state.omega
         for a in range(3):
