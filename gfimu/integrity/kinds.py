@@ -26,6 +26,7 @@ from gfimu.rate.sensing import SensorErrors
 __all__ = ["kind_of_fault", "name_kinds"]
 
 _FEWEST = 8  # numerical: samples
+_PARTS = 5  # numerical: of a time, whose means show errors that last
 
 
 def kind_of_fault(
@@ -144,8 +145,17 @@ def _described(fault: ChannelFault, seen: list[_Seen], policy: MonitorPolicy) ->
         if not len(settled):
             return replace(fault, kind=kind)
         sizes.append(float(settled.mean()))
-        spreads.append(float(np.hypot(one.noise_std / np.sqrt(len(settled)), one.constant_std)))
+        spreads.append(float(np.hypot(_std_of_mean(settled, one.noise_std), one.constant_std)))
     return replace(fault, kind=kind, sizes=tuple(sizes), sizes_std=tuple(spreads))
+
+
+def _std_of_mean(values: NDArray[np.float64], noise_std: float) -> float:
+    """Return the standard deviation of a mean, of values (n,) whose errors may last for a part of their time."""
+    white = noise_std / np.sqrt(len(values))
+    if len(values) < _PARTS * _FEWEST:
+        return float(white)
+    means = [part.mean() for part in np.array_split(values, _PARTS)]
+    return float(max(white, np.std(means, ddof=1) / np.sqrt(_PARTS)))
 
 
 def _seen(
@@ -172,8 +182,9 @@ def _seen(
     before = (times < fault.onset_s - policy.block_s) & np.isfinite(difference)
     variance = float(row @ row) * policy.bias_std**2
     if before.any():
+        variance = float(row @ row) * policy.bias_walk * policy.kind_span_s
+        variance += _std_of_mean(difference[before], noise) ** 2
         difference = difference - float(np.mean(difference[before]))
-        variance = float(row @ row) * policy.bias_walk * policy.kind_span_s + noise**2 / before.sum()
     ranges = np.nan_to_num(np.nanmax(part, axis=0) - np.nanmin(part, axis=0)) if len(part) else np.zeros(len(row))
     variance += float(np.sum((0.5 * errors.scale_std * ranges * row) ** 2))
     after = times >= fault.onset_s

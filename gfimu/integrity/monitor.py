@@ -150,9 +150,9 @@ class ChannelMonitor:
         self._run()
 
     def forget(self) -> None:
-        """Drop blocks of the distant past, once they are as many as must be kept."""
+        """Drop blocks of the distant past, some at once."""
         count = len(self.blocks) - self.kept_blocks
-        if count < self.kept_blocks:
+        if count < self.kept_blocks // 8:
             return
         self.blocks = self.blocks.rows(slice(count, None))
         self.omega, self.omega_std = self.omega[count:].copy(), self.omega_std[count:].copy()

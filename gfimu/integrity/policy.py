@@ -49,6 +49,9 @@ class MonitorPolicy:
         Least uncertainty of the positions, m.
     bias_walk : float
         Growth of the variance of a bias, (m/s²)²/s: covers an instability of 0.15 mg.
+    range_share : float
+        Share of the range of a channel's readings by which they deviate from their mean: times the error of its gain, a
+        constant fault that this error resembles.
     range_memory_s : float
         Time constant with which the range of a channel's readings is forgotten, s.
     noise_memory_s : float
@@ -119,10 +122,11 @@ class MonitorPolicy:
     gain_std: float = 9e-4
     place_std: float = 1e-4
     bias_walk: float = 1.5e-6
+    range_share: float = 0.5
     range_memory_s: float = 2.0
     noise_memory_s: float = 0.5
     readmission_s: float = 5.0
-    longest_readmission_s: float = 80.0
+    longest_readmission_s: float = 40.0
     sound_scatter: float = 2.0
     fewest_null: int = 3
     screen: float = 0.6

@@ -67,6 +67,7 @@ class MonitorFilter:
             oldest=policy.oldest_s / self.block_s,
             walk=policy.bias_walk,
             forget=min(1.0, self.block_s / policy.range_memory_s),
+            range_share=policy.range_share,
             scale_std=errors.scale_std,
             placement_std=errors.placement_std,
             floor=policy.bias_std,

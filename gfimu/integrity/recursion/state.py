@@ -32,6 +32,7 @@ class MonitorTuning(NamedTuple):
     oldest: float  # blocks
     walk: float  # (m/s²)²/s
     forget: float  # of the range of readings, per block
+    range_share: float  # of the range of a channel's readings, its deviation from their mean
     scale_std: float  # of gains and axes, a ratio
     placement_std: float  # m
     floor: float  # m/s²

@@ -96,7 +96,7 @@ def model_errors(state, tuning, std):  # type: ignore[no-untyped-def]
     for a in range(3):
         square += state.omega[a] * state.omega[a]
     for i in range(len(std)):
-        gain = 0.5 * tuning.scale_std * (state.high[i] - state.low[i])
+        gain = tuning.range_share * tuning.scale_std * (state.high[i] - state.low[i])
         place = tuning.placement_std * square
         std[i] = np.sqrt(gain * gain + place * place + tuning.floor * tuning.floor)
 

@@ -45,6 +45,18 @@ def test_a_small_step_is_found_within_a_second(kind, channel):
     assert health.excluded[t < onset - 0.5].sum() == 0
 
 
+@pytest.mark.parametrize("kind", ["rest", "tumble", "turn"])
+def test_the_size_of_a_step_is_as_sure_as_it_says(kind):
+    scores = []
+    for seed in range(12):
+        t, y, _ = readings(kind, 700 + seed, duration=13.0)
+        y[t >= 8.0, seed] += 25 * MG
+        (fault,) = watch_channels(CUBE, t, y, CALIBRATED).faults
+        scores.append((fault.sizes[0] - 25 * MG) / fault.sizes_std[0])
+    assert 0.5 < np.sqrt(np.mean(np.square(scores))) < 1.55  # χ²(12) within 0.2 % on either side
+    assert np.abs(scores).max() < 4.0
+
+
 def test_a_gain_is_found_while_the_reading_changes():
     t, y, _ = readings("tumble", 3)
     y[t >= 8.0, 4] *= 1.2

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pyarrow as pa
@@ -31,6 +31,7 @@ class Motion:
     omega: np.ndarray
     omega_std: np.ndarray
     quaternion: np.ndarray
+    health: dict[str, np.ndarray] | None = None
 
 
 @dataclass(frozen=True)
@@ -104,6 +105,27 @@ def test_a_run_holds_what_went_in(tmp_path, run):
     for channel in run.array.channels:
         entity = next(name for name in found if name.startswith("/plots/raw") and name.endswith(f"_{channel}"))
         assert_allclose(numbers(found[entity]["scalars"]), run.recording.readings[:, run.array.index(channel)])
+
+
+def test_each_channel_has_a_lane_of_its_health(tmp_path, run):
+    count = len(run.estimate.t_s)
+    health = {name: np.zeros(count, dtype=np.int8) for name in run.array.channels}
+    health["a21"][10:] = 2
+    health["a43"][:5] = 1
+    path = tmp_path / "run.rrd"
+    write_run(path, run.recording, run.array, estimate=replace(run.estimate, health=health), known=run.known)
+    lanes = {name: numbers(columns["scalars"]) for name, columns in contents(path).items()
+             if "health" in name and "scalars" in columns}  # fmt: skip
+    used, doubt, left_out = (
+        next(lanes[name] for name in lanes if name.endswith(end)) for end in ("used", "in_doubt", "a21_not_used")
+    )
+    expected = np.tile(-np.arange(12.0), (count, 1))
+    expected[10:, 3] = np.nan
+    expected[:5, 11] = np.nan
+    assert_allclose(used, expected)
+    assert_allclose(left_out, np.where(np.arange(count) >= 10, -3.0, np.nan))
+    assert_allclose(doubt[:5, 11], -11.0)
+    assert np.isnan(doubt[5:]).all()
 
 
 def test_truth_turns_the_rig_and_the_estimate_its_ghost(tmp_path, run):
