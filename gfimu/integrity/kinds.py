@@ -25,6 +25,7 @@ from gfimu.rate.sensing import SensorErrors
 
 __all__ = ["kind_of_fault", "name_kinds"]
 
+_SLOW = ("drift", "gain")
 _FEWEST = 8  # numerical: samples
 _PARTS = 5  # numerical: of a time, whose means show errors that last
 
@@ -98,10 +99,12 @@ def name_kinds(
     faults: Sequence[ChannelFault],
     *,
     policy: MonitorPolicy,
+    early: bool = False,
 ) -> tuple[ChannelFault, ...]:
     """Name the kind of each isolated fault of a recording; several channels of one fault share it or are "unknown".
 
-    ``t`` (n,), ``readings`` (n, c) and ``omega`` (n, 3) are the recording and the rate found in it, rad/s.
+    ``t`` (n,), ``readings`` (n, c) and ``omega`` (n, 3) are the recording and the rate found in it, rad/s. ``early``: a
+    drift or a gain can't be separated from a step yet, and is called one.
     """
     named = []
     for fault in faults:
@@ -116,7 +119,7 @@ def name_kinds(
             _seen(array, errors, t, readings, omega, fault, array.channels.index(name), used, policy)
             for name in fault.channels
         ]
-        named.append(_described(fault, [one for one in found if one is not None], policy))
+        named.append(_described(fault, [one for one in found if one is not None], policy, early=early))
     return tuple(named)
 
 
@@ -131,12 +134,14 @@ class _Seen:
     constant_std: float  # of its mean: bias and errors of the calibration
 
 
-def _described(fault: ChannelFault, seen: list[_Seen], policy: MonitorPolicy) -> ChannelFault:
+def _described(fault: ChannelFault, seen: list[_Seen], policy: MonitorPolicy, *, early: bool) -> ChannelFault:
     """Return the fault with its kind, and the sizes of a step as the differences have them."""
     kinds = {kind_of_fault(one.t, one.readings, one.difference, one.noise_std, policy) for one in seen}
     if len(seen) < len(fault.channels) or len(kinds) != 1:
         return replace(fault, kind="unknown")
     kind = kinds.pop()
+    if early and kind in _SLOW:
+        kind = "step"
     if kind != "step":
         return replace(fault, kind=kind)
     sizes, spreads = [], []

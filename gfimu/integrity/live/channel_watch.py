@@ -24,7 +24,6 @@ from gfimu.short_repr import short_repr
 __all__ = ["HealthEvent", "LiveWatch"]
 
 _LEAST_RATE_STD = 1e-3  # numerical: rad/s
-_SLOW = ("drift", "gain")  # can't be separated from a step at once
 
 
 @dataclass(frozen=True)
@@ -223,9 +222,7 @@ class LiveWatch:
         events = []
         for number, fault in enumerate(monitor.faults):
             if number == len(self._reported):
-                named = self._named(monitor, fault)
-                if named.kind in _SLOW:
-                    named = replace(named, kind="step")
+                named = self._named(monitor, fault, early=True)
                 self._reported.append(named)
                 self._unnamed.add(number)
                 events.append(HealthEvent(now, "excluded", named, named.sentence()))
@@ -251,7 +248,7 @@ class LiveWatch:
         self._doubts = len(doubts)
         return events
 
-    def _named(self, monitor: ChannelMonitor, fault: ChannelFault) -> ChannelFault:
+    def _named(self, monitor: ChannelMonitor, fault: ChannelFault, *, early: bool = False) -> ChannelFault:
         """Name the kind of a fault from the blocks that are kept."""
         if fault.kind == "noise":
             return fault
@@ -261,8 +258,8 @@ class LiveWatch:
         times, rows = part.samples_of(self._period)
         rate = np.repeat(monitor.omega[first:], monitor.samples, axis=0)
         others = [other for other in monitor.faults if other.onset_s != fault.onset_s]
-        named = name_kinds(self.array, self._errors, times, rows, rate, [fault, *others], policy=self.policy)
-        return named[0]
+        faults = [fault, *others]
+        return name_kinds(self.array, self._errors, times, rows, rate, faults, policy=self.policy, early=early)[0]
 
     def _give_up(self, now: float | None = None) -> HealthEvent:
         time = float(self._times[-1][-1]) if now is None else now
