@@ -104,6 +104,7 @@ class ChannelMonitor:
         self._patience = np.full(c, self.policy.readmission_s)
         self._suspicion: _Suspicion | None = None
         self._lost = False
+        self._refuses = False
 
     @property
     def noise_of_means(self) -> NDArray[np.float64]:
@@ -130,6 +131,17 @@ class ChannelMonitor:
         """Faults in channels that can't be separated and are used."""
         now = [] if self._suspicion is None or self._suspicion.doubtful is None else [self._suspicion.doubtful]
         return self._past_doubts + now
+
+    def refuse(self, refuses: bool) -> None:
+        """Exclude nothing from now on, or do so again: for channels whose contradictions no errors explain."""
+        if refuses and not self._refuses and len(self.blocks):
+            end = float(self.blocks.t[-1] + 0.5 * self.block_s)
+            for number in {number for number, _ in self._open.values()}:
+                self.faults[number] = replace(self.faults[number], end_s=end)
+            self._open.clear()
+            self.watched[:] = True
+            self.follower.state.ages[:] = 0.0
+        self._refuses = refuses
 
     @property
     def kept_blocks(self) -> int:
@@ -228,6 +240,8 @@ class ChannelMonitor:
     def _judge(self, place: int) -> tuple[int, bool]:
         """Isolate the fault that is seen, or wait; returns the block to go on with, and whether nothing explains it."""
         policy = self.policy
+        if self._refuses:
+            return place, True
         if self._suspicion is None:
             self._suspicion = _Suspicion(place, place + policy.least_age - 1)
         suspicion = self._suspicion
@@ -327,7 +341,7 @@ class ChannelMonitor:
     def _exclude_noisy(self, place: int, channel: int) -> int:
         """Take a noisy channel out; returns the block from which to go on."""
         channels = np.array([channel])
-        if not self._may_exclude(channels):
+        if self._refuses or not self._may_exclude(channels):
             return place
         found = float(self.blocks.t[place - 1 - self._base] + 0.5 * self.block_s)
         oldest = max(0, place - self.follower.history + self.policy.margin - self._base)

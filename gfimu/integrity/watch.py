@@ -82,7 +82,9 @@ def watch_channels(
         trial = ChannelMonitor(
             array, larger_errors(errors, factor), period, omega0=omega0, omega0_std=omega0_std, policy=settings
         )
-        if factor >= settings.largest_factor or agree(trial.follower, blocks, trial.innovations(blocks), settings):
+        agrees = agree(trial.follower, blocks, trial.innovations(blocks), settings)
+        if agrees or factor >= settings.largest_factor:
+            trial.refuse(not agrees)
             monitor = trial
     monitor.extend(blocks)
     odd = monitor.unexplained

@@ -53,12 +53,12 @@ class Agreement:
         if self._moving < self._next:
             return
         self._next = self._moving + policy.fewest_seconds
-        factor = 0.5
-        while factor < policy.largest_factor:
+        factor, agrees = 0.5, False
+        while factor < policy.largest_factor and not agrees:
             factor *= 2.0
             blocks, innovations = monitor.recent_innovations(larger_errors(self._stated, factor))
-            if agree(follower, blocks, innovations, policy):
-                break
+            agrees = agree(follower, blocks, innovations, policy)
+        monitor.refuse(not agrees)
         if factor != self.factor:
             self.factor = factor
             follower.reckon_with(self.errors)

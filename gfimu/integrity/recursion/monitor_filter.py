@@ -246,10 +246,15 @@ class MonitorFilter:
         times = blocks.t[rows]
         before = blocks.t[rows.start - 1] if rows.start else blocks.t[0] - self.block_s
         sets = self._sets(blocks, watched, rows)
-        place, slot = advance(
-            self._compiled_tables(), tuning, state, blocks.means[rows], np.diff(times, prepend=before), sets,
-            arrays["levels"], watched, arrays["omega"], arrays["std"], arrays["nis"], 0, len(times), base + rows.start,
-        )  # fmt: skip
+        try:
+            place, slot = advance(
+                self._compiled_tables(), tuning, state, blocks.means[rows], np.diff(times, prepend=before), sets,
+                arrays["levels"], watched, arrays["omega"], arrays["std"], arrays["nis"], 0, len(times),
+                base + rows.start,
+            )  # fmt: skip
+        except np.linalg.LinAlgError:  # the filter ran away
+            state.omega[:] = np.nan
+            return len(times), -1
         return int(place), int(slot)
 
     def _sets(self, blocks: Blocks, watched: NDArray[np.bool_], rows: slice) -> NDArray[np.int64]:

@@ -18,6 +18,8 @@ class BlockNoise:
 
     A channel is noisy where 2 log LR = ν (q − 1 − ln q) exceeds the threshold, and that of the next channel by the
     margin of isolation; q is its variance over the level, averaged with a memory, and ν the degrees of freedom in it.
+    Where the level exceeds the stated noise by model errors (a share u of it), those may differ between channels by
+    factors of e^±u, and the spread of ln q is √(2/ν + u²) in place of √(2/ν).
 
     Parameters
     ----------
@@ -67,6 +69,8 @@ class BlockNoise:
             memory = np.minimum(number + 1, 2.0 / forget - 1.0) * freedom
             excess = np.maximum(smooth / levels[:, None], 1.0)
             statistic = memory[:, None] * (excess - 1.0 - np.log(excess))
+            foreign = 1.0 - 1.0 / levels  # share that the stated noise does not explain, and no channel is known to own
+            statistic /= (1.0 + 0.5 * memory * foreign**2)[:, None]
             top = np.partition(statistic, -2, axis=1)
             found = (number * self._block_s > self._policy.noise_settled_s) & (top[:, -1] > self._threshold)
             found &= top[:, -1] - top[:, -2] > self._policy.isolation
