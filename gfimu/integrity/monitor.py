@@ -15,6 +15,7 @@ from gfimu.integrity.recursion.blocks import Blocks
 from gfimu.integrity.recursion.isolation import Explanation, explanations
 from gfimu.integrity.recursion.monitor_filter import MonitorFilter
 from gfimu.integrity.recursion.noise import BlockNoise
+from gfimu.integrity.residue import moving_seconds
 from gfimu.rate.sensing import SensorErrors
 
 __all__ = ["ChannelMonitor"]
@@ -62,6 +63,8 @@ class ChannelMonitor:
         Channels in use.
     faults : list of ChannelFault
         What was excluded.
+    noise_in_motion : bool
+        Whether a channel may be excluded for noise while the array moves.
     doubtful : list of ChannelFault
         What was seen in channels that can't be separated, and stayed in use.
 
@@ -105,6 +108,7 @@ class ChannelMonitor:
         self._suspicion: _Suspicion | None = None
         self._lost = False
         self._refuses = False
+        self.noise_in_motion = True
 
     @property
     def noise_of_means(self) -> NDArray[np.float64]:
@@ -341,7 +345,11 @@ class ChannelMonitor:
     def _exclude_noisy(self, place: int, channel: int) -> int:
         """Take a noisy channel out; returns the block from which to go on."""
         channels = np.array([channel])
-        if self._refuses or not self._may_exclude(channels):
+        last = self.blocks.rows(
+            slice(max(0, place - self._base - max(1, round(1.0 / self.block_s))), place - self._base)
+        )
+        calm = self.noise_in_motion or not moving_seconds(self.follower, last, self.policy).any()
+        if self._refuses or not calm or not self._may_exclude(channels):
             return place
         found = float(self.blocks.t[place - 1 - self._base] + 0.5 * self.block_s)
         oldest = max(0, place - self.follower.history + self.policy.margin - self._base)

@@ -52,7 +52,11 @@ class Agreement:
             self._moving += int(moving_seconds(follower, second, policy).any())
         if self._moving < self._next:
             return
+        recent = monitor.blocks.rows(slice(max(0, len(monitor.blocks) - follower.history + 1), None))
+        if moving_seconds(follower, recent, policy).sum() < policy.fewest_seconds:
+            return
         self._next = self._moving + policy.fewest_seconds
+        monitor.noise_in_motion = True
         factor, agrees = 0.5, False
         while factor < policy.largest_factor and not agrees:
             factor *= 2.0

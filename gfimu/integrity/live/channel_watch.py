@@ -186,6 +186,7 @@ class LiveWatch:
         self._bias = rest_bias(self.array, rows[:count])
         self._agreement = Agreement(with_residue(self.array, self._errors, self.policy), self.policy)
         self._monitor = ChannelMonitor(self.array, self._agreement.errors, self._period, policy=self.policy)
+        self._monitor.noise_in_motion = False  # until the channels were seen to agree
         return True
 
     def begin_in_motion(self, start: MotionStart, t_s: float) -> HealthEvent:
@@ -198,6 +199,7 @@ class LiveWatch:
             self.array, self._agreement.errors, self._period, omega0=start.omega,
             omega0_std=max(start.omega_std, _LEAST_RATE_STD), policy=self.policy,
         )  # fmt: skip
+        self._monitor.noise_in_motion = False
         return HealthEvent(t_s, "watched", None, f"channels are watched from {t_s:.4g} s on")
 
     def _watch(self, monitor: ChannelMonitor) -> list[HealthEvent]:
