@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,8 +18,10 @@ from firmware_bridge.recorder import Batch
 from gfimu.errors import GfimuError
 from gfimu.files.rerun_stream import rrd_stream, viewer_stream
 from gfimu.geometry.array import AccelerometerArray
-from gfimu.rate.live import LiveRateFilter
-from gfimu.rate.sensing import SensorErrors
+
+if TYPE_CHECKING:  # imported by the view's own thread: that takes longer than a recording should wait
+    from gfimu.integrity.fault import ChannelFault
+    from gfimu.integrity.live.watched_filter import WatchedRateFilter
 
 __all__ = ["LiveView", "StreamPicture"]
 
@@ -27,6 +29,7 @@ _VIEW_HZ = 100.0
 _TEXT_EVERY_S = 0.25
 _APPLICATION = "gfimu_record"
 _FLUSH_S = 5.0
+_LANE = 0.7  # numerical: height of a lane
 
 
 class StreamPicture(Protocol):
@@ -44,7 +47,8 @@ class StreamPicture(Protocol):
 class LiveView:
     """Is given each batch of a recording; estimates the rate at up to 100 Hz, in a thread of its own.
 
-    The recording never waits for the view: the filter is compiled on first use, which takes a while.
+    The recording never waits for the view: the filter is compiled on first use, which takes a while. If the recording
+    begins with a rest, channels that contradict the others are reported and left out of the rate, not of the recording.
 
     Parameters
     ----------
@@ -54,6 +58,8 @@ class LiveView:
         Size of a count, m/s².
     on_text : callable, optional
         Is given a line of text a few times a second.
+    on_fault : callable, optional
+        Is given a sentence when a channel is found faulty, or used again.
     rrd : Path, optional
         Write a rerun recording when the view is closed.
     viewer : bool
@@ -68,12 +74,13 @@ class LiveView:
         lsb: float,
         *,
         on_text: Callable[[str], None] | None = None,
+        on_fault: Callable[[str], None] | None = None,
         rrd: Path | None = None,
         viewer: bool = False,
         picture: StreamPicture | None = None,
     ) -> None:
-        self._array, self._lsb, self._on_text = array, lsb, on_text
-        self._filter: LiveRateFilter | None = None
+        self._array, self._lsb, self._on_text, self._on_fault = array, lsb, on_text, on_fault
+        self._filter: WatchedRateFilter | None = None
         self._picture, self._without_rate = picture, ""
         self._sum = np.zeros(array.n_channels)
         self._times: list[float] = []
@@ -114,16 +121,18 @@ class LiveView:
             self._group = max(1, round(rate / _VIEW_HZ))
             shown = rate / self._group
             try:
-                errors = SensorErrors.from_parts(self._array, float(shown))
-                self._filter = LiveRateFilter(self._array, errors, float(1.0 / shown))
+                self._filter = _watched_filter(self._array, float(shown))
             except GfimuError as error:  # an array that can't see all six motions still has readings
                 self._without_rate = f"no rate: {error}"
         times, readings = self._averaged(batch)
         if not len(times):
             return
         omega = self._estimate(times, readings)
+        self._report_faults()
         for stream in self._streams:
             _log(stream, self._array, times, readings, omega)
+            if self._filter is not None and (health := self._filter.health) is not None:
+                _log_health(stream, self._array, times, health)
             if self._picture is not None:
                 import rerun as rr
 
@@ -158,6 +167,17 @@ class LiveView:
             self.omega = result.omega[-1]
         return result.omega
 
+    def _report_faults(self) -> None:
+        """Pass on what changed in the health of the channels."""
+        for event in [] if self._filter is None else self._filter.take_events():
+            if self._on_fault is not None:
+                self._on_fault(f"{event.text} (at {event.t_s:.1f} s on the board's clock)")
+
+    @property
+    def faults(self) -> tuple[ChannelFault, ...]:
+        """Faults of channels that were found so far; times on the board's clock."""
+        return () if self._filter is None else self._filter.watch.faults
+
     def _line(self, batch: Batch, counts: StreamCounts) -> str:
         elapsed = float(batch.t_s[-1]) - (self._first_s or 0.0)
         rate = self._seen / elapsed if elapsed > 0 else 0.0
@@ -181,10 +201,34 @@ class LiveView:
             self._open.pop_all()
 
 
+def _watched_filter(array: AccelerometerArray, rate: float) -> WatchedRateFilter:
+    """Return a filter for a sample rate, Hz, that watches its channels."""
+    from gfimu.integrity.live.channel_watch import LiveWatch
+    from gfimu.integrity.live.watched_filter import WatchedRateFilter
+    from gfimu.rate.live import LiveRateFilter
+    from gfimu.rate.sensing import SensorErrors
+
+    errors, period = SensorErrors.from_parts(array, rate), 1.0 / rate
+    return WatchedRateFilter(LiveRateFilter(array, errors, period), LiveWatch(array, errors, period))
+
+
 def _flush(stream: Any) -> None:
     """Send what still waits; a viewer that was closed meanwhile is no fault of the recording."""
     with suppress(RuntimeError):
         stream.flush(timeout_sec=_FLUSH_S)
+
+
+def _log_health(stream: Any, array: AccelerometerArray, times: NDArray[np.float64], health: list[int]) -> None:
+    """Send the health of each channel at the newest time, in a lane for each, the first at the top.
+
+    A line stands at the bottom of its lane while the channel is used, in the middle in doubt, at the top when not used.
+    """
+    import rerun as rr
+
+    index = [rr.TimeColumn("t", duration=times[-1:])]
+    for lane, (channel, code) in enumerate(zip(array.channels, health, strict=True)):
+        place = _LANE * code / 2.0 - lane
+        rr.send_columns(f"health/{channel}", index, rr.Scalars.columns(scalars=[place]), recording=stream)
 
 
 def _log(

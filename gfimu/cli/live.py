@@ -46,12 +46,15 @@ def _live(
     axis_point: AxisPointOption = (0.0, 0.0, 0.0),
     hub: HubOption = "fixed",
     inclination_rad: InclinationOption = None,
+    keep_faulty: Annotated[
+        bool, typer.Option("--keep-faulty", help="Use every channel, without looking for faulty ones.")
+    ] = False,
 ) -> None:
     """Estimate the angular rate while samples arrive: CSV lines in, one JSON line per sample out.
 
     The first line that is no comment names the columns as in a recording (t_s, a11_m_s2, … or raw counts, a11_lsb, …).
     Array and rate may stand in comment lines before it, as gfimu record writes them. An estimate comes two samples
-    after its own.
+    after its own. Where a channel contradicts the others, a line says which, how and since when; it is left out.
 
     Example: gfimu live --from run.parquet --follow
 
@@ -74,6 +77,7 @@ def _live(
         axis_point=axis_point,
         hub=hub,
         inclination_rad=inclination_rad,
+        keep_faulty=keep_faulty,
     ):
         sys.stdout.write(line + "\n")
         sys.stdout.flush()

@@ -45,7 +45,8 @@ def _record(
 ) -> None:
     """Record from a board (real or virtual), with the angular rate shown as it comes.
 
-    The file can be read while it grows; if the program is killed, at most the last half second is missing.
+    If the recording begins with a rest, channels that contradict the others are named while it is made. The file can
+    be read while it grows; if the program is killed, at most the last half second is missing.
 
     Example: gfimu record --port /dev/ttyUSB0 --out run.parquet --rate 800 --duration 60
     """
@@ -55,6 +56,13 @@ def _record(
     interactive = screen.is_terminal and not json
     if interactive and reconnect and "://" not in port and not Path(port).exists():
         screen.print(f"waiting for {port}, up to {reconnect:g} s")
+    messages = console(stderr=True)
+    contradictions: list[str] = []
+
+    def name_fault(text: str) -> None:
+        contradictions.append(text)
+        messages.print(f"{' ' * 100}\r{text}" if interactive else f"gfimu: {text}", soft_wrap=True)
+
     report = record(
         port,
         out,
@@ -68,12 +76,13 @@ def _record(
         rrd=rrd,
         view=view,
         on_text=(lambda text: screen.print(text, end="\r")) if interactive else None,
+        on_fault=name_fault,
     )
     if interactive:
         screen.print()
     written = {"recording": out} | ({"rrd": rrd} if rrd is not None else {})
     if json:
-        print_json(asdict(report) | {"files": written})
+        print_json(asdict(report) | {"channel_faults": contradictions, "files": written})
         return
     stream, clock, identity = report.stream, report.clock, report.identity
     rows = [

@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 
 __all__ = ["register"]
 
+_MG = 9.80665e-3  # numerical: m/s²
+
 
 def register(app: typer.Typer) -> None:
     """Add the commands."""
@@ -51,7 +53,9 @@ def _score(
     axis: AxisOption = None,
     axis_point: AxisPointOption = (0.0, 0.0, 0.0),
     hub: HubOption = "fixed",
-    sample_rate_hz: Annotated[float, typer.Option("--sample-rate-hz", help="With --axis: sample rate, Hz.")] = 100.0,
+    sample_rate_hz: Annotated[
+        float, typer.Option("--sample-rate-hz", help="Of least faults, and with --axis: sample rate, Hz.")
+    ] = 100.0,
     inclination_rad: InclinationOption = None,
     point_std: PointStdOption = 0.0,
     direction_std: DirectionStdOption = 0.0,
@@ -68,9 +72,13 @@ def _score(
     jerk: Annotated[
         float, typer.Option("--jerk-rad2-s5", help="With --axis: spectral density of the change of α, rad²/s⁵.")
     ] = 1.0,
+    fault_time: Annotated[
+        float, typer.Option("--fault-time-s", help="Time within which a fault of a channel is to be found, s.")
+    ] = 1.0,
+    per_channel: Annotated[bool, typer.Option("--per-channel", help="Least fault of every channel.")] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Score array geometries: condition number, GDOP, errors per axis, what ω² leaves, what ω can be seen.
+    """Score array geometries: condition number, GDOP, errors, what ω² leaves, what ω and which faults are seen.
 
     Example: gfimu score cube12 p3_three_plus_one --speed-rad-s 10
 
@@ -100,6 +108,8 @@ def _score(
         duration_s=duration,
         hub_std_m_s2=hub_std,
         jerk_rad2_s5=jerk,
+        fault_time_s=fault_time,
+        per_channel=per_channel,
     )
     bounds = [entry for entry in scores if not isinstance(entry, Score)]
     figures = [entry for entry in scores if isinstance(entry, Score)]
@@ -109,6 +119,7 @@ def _score(
         return
     if figures:
         _print_scores(figures, f"{speed:.4g} rad/s about {spin_axis} and channel noise {noise:.4g} m/s²")
+        _print_protection(figures)
     if bounds:
         _print_bounds(bounds, noise, sample_rate_hz)
 
@@ -226,6 +237,59 @@ def _print_scores(scores: list[Score], condition: str) -> None:
                 for first, (component, terms) in _with_first(entry.omega_squared_terms)
             ],
         )
+
+
+def _print_protection(scores: list[Score]) -> None:
+    """Print the least fault of a channel that each array finds."""
+    from gfimu.integrity.protection import FaultProtection, protection_remark
+
+    found = {entry.name: entry.protection for entry in scores if isinstance(entry.protection, FaultProtection)}
+    if not found:
+        return
+    one = next(iter(found.values()))
+    print_table(
+        f"Least fault of a channel that is found within {one.duration_s:g} s, worst channel, mg",
+        ["array", "seen", "assigned", "seen, ω unknown", "assigned, ω unknown", "unseen error of α, rad/s²"],
+        [
+            [
+                name,
+                *(
+                    _number(faults.max() / _MG, ".2f")
+                    for faults in (
+                        entry.followed.detected, entry.followed.isolated, entry.single.detected, entry.single.isolated
+                    )
+                ),
+                _number(entry.unseen_alpha.max(), ".3g"),
+            ]
+            for name, entry in found.items()
+        ],
+        note=f"A constant fault, found with 95 % probability at {one.sample_rate_hz:g} Hz and channel noise "
+        f"{one.noise_m_s2:.4g} m/s². Assigned: to its channel. ω unknown: by the parity space of single samples; else "
+        "as a filter follows ω. Unseen error of α: by a fault that is just not seen. —: never.",
+    )  # fmt: skip
+    if one.per_channel:
+        for name, entry in found.items():
+            print_table(
+                f"{name}: least fault of each channel, mg",
+                ["channel", "seen", "assigned", "seen, ω unknown", "assigned, ω unknown", "nearest channel"],
+                [
+                    [
+                        channel,
+                        *(
+                            _number(faults[i] / _MG, ".2f")
+                            for faults in (
+                                entry.followed.detected, entry.followed.isolated, entry.single.detected,
+                                entry.single.isolated,
+                            )
+                        ),
+                        entry.followed.rivals[i] or "—",
+                    ]
+                    for i, channel in enumerate(entry.followed.channels)
+                ],
+            )  # fmt: skip
+    remark = protection_remark(found)
+    if remark:
+        print_text(remark)
 
 
 def _print_bounds(bounds: list[AxisBounds], noise: float, sample_rate_hz: float) -> None:

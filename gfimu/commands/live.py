@@ -30,6 +30,7 @@ def live(
     axis_point: Sequence[float] = (0.0, 0.0, 0.0),
     hub: str = "fixed",
     inclination_rad: float | None = None,
+    keep_faulty: bool = False,
 ) -> Iterator[str]:
     """Estimate the angular rate while samples arrive: CSV lines in, one JSON line per sample out.
 
@@ -61,6 +62,9 @@ def live(
         Whether that axis stands still (a table) or moves with a body (a wheel).
     inclination_rad : float, optional
         Angle between that axis and the vertical, rad; by default from the first second.
+    keep_faulty : bool
+        Use every channel, without looking for faulty ones. By default a channel that contradicts the others is left out
+        while it does so (`gfimu.integrity.live`): from a rest at the start on, else from when the rate has settled.
 
     Returns
     -------
@@ -103,7 +107,15 @@ def live(
     biases = {} if bias_std is None else {"bias_std": bias_std}
     errors = SensorErrors.from_parts(geometry, rate, scale_std=scale_std, **biases)
     settings = FilterSettings(start_omega=None) if unknown_start else FilterSettings(start_omega=np.zeros(3))
-    return filter_stream(lines, geometry, errors, 1.0 / rate, settings, fuse_gyro=gyro)
+    watched = None
+    if not keep_faulty:
+        from gfimu.integrity.live.channel_watch import LiveWatch
+        from gfimu.integrity.live.watched_filter import WatchedRateFilter
+        from gfimu.rate.live import LiveRateFilter
+
+        live = LiveRateFilter(geometry, errors, 1.0 / rate, settings, gyro=gyro)
+        watched = WatchedRateFilter(live, LiveWatch(geometry, errors, 1.0 / rate, at_rest=not unknown_start))
+    return filter_stream(lines, geometry, errors, 1.0 / rate, settings, fuse_gyro=gyro, watched=watched)
 
 
 def _lines(source: str | Path, *, follow: bool) -> Iterator[str]:

@@ -30,6 +30,7 @@ def record(
     rrd: str | Path | None = None,
     view: bool = False,
     on_text: Callable[[str], None] | None = None,
+    on_fault: Callable[[str], None] | None = None,
     stop: Callable[[], bool] | None = None,
 ) -> RecordReport:
     """Record from a board, real or virtual, until the time is up, ``stop`` says so, or Ctrl-C.
@@ -61,6 +62,9 @@ def record(
         Open the rerun viewer and show what comes in.
     on_text : callable, optional
         Is given a line of text with the angular rate a few times a second.
+    on_fault : callable, optional
+        Is given a sentence when a channel contradicts the others, and when it does so no longer
+        (`gfimu.integrity.live`). The recording has every channel all the same.
     stop : callable, optional
         Asked often; True ends the recording.
 
@@ -75,8 +79,8 @@ def record(
     setup = [set_range(range_g)] if range_g is not None else []
     setup += [set_rate(rate)] if rate is not None else []
     live = None
-    if on_text is not None or rrd is not None or view:
-        live = _live_view(form, array, on_text, rrd, view=view)
+    if on_text is not None or on_fault is not None or rrd is not None or view:
+        live = _live_view(form, array, on_text, on_fault, rrd, view=view)
     try:
         report = record_port(
             port, out, duration_s=duration, form=form, array=array, baud=baud, setup=tuple(setup),
@@ -92,7 +96,13 @@ def record(
 
 
 def _live_view(
-    form: str, array: str, on_text: Callable[[str], None] | None, rrd: str | Path | None, *, view: bool
+    form: str,
+    array: str,
+    on_text: Callable[[str], None] | None,
+    on_fault: Callable[[str], None] | None,
+    rrd: str | Path | None,
+    *,
+    view: bool,
 ) -> LiveView:
     from firmware_bridge.frames import frame_format
     from firmware_bridge.live import LiveView
@@ -106,4 +116,7 @@ def _live_view(
         from gfimu.visual.live import LivePicture
 
         picture = LivePicture(carried)
-    return LiveView(carried, lsb, on_text=on_text, rrd=None if rrd is None else Path(rrd), viewer=view, picture=picture)
+    return LiveView(
+        carried, lsb, on_text=on_text, on_fault=on_fault, rrd=None if rrd is None else Path(rrd), viewer=view,
+        picture=picture,
+    )  # fmt: skip

@@ -43,6 +43,8 @@ def score(
     duration_s: float = 60.0,
     hub_std_m_s2: float = 0.7,
     jerk_rad2_s5: float = 1.0,
+    fault_time_s: float = 1.0,
+    per_channel: bool = False,
 ) -> list[Score | AxisBounds]:
     """Score the geometry of one or several arrays.
 
@@ -71,7 +73,7 @@ def score(
     hub : {"fixed", "free"}
         Whether that axis stands still (a table) or moves with a body (a wheel).
     sample_rate_hz : float
-        Sample rate at which the bound of a filter about that axis holds.
+        Sample rate at which the least faults, and the bound of a filter about that axis, hold.
     inclination_rad : float, optional
         Angle between that axis and the vertical, rad; by default a fixed one is upright, a free one level.
     point_std_m, direction_std_rad, lever_std_m, rotation_std_rad, bias_std_m_s2 : float
@@ -80,6 +82,11 @@ def score(
     duration_s, hub_std_m_s2, jerk_rad2_s5 : float
         The run for which the estimate's standard deviation is predicted
         (`gfimu.known_axis.accuracy.predicted.PredictedRun`).
+    fault_time_s : float
+        Time within which a constant fault of a channel is to be found, s: the least that is, is in ``protection`` of
+        each `Score` (`gfimu.integrity.protection.FaultProtection`).
+    per_channel : bool
+        Whether its JSON form lists every channel.
 
     Raises
     ------
@@ -95,6 +102,7 @@ def score(
     from gfimu.geometry.observability import seeing_arrays
     from gfimu.geometry.scoring import score as score_arrays
     from gfimu.geometry.turning_axis import AxisUncertainty
+    from gfimu.integrity.protection import fault_protection
 
     if spin_axis not in _AXES:
         raise unknown_name("axis", spin_axis, _AXES)
@@ -117,7 +125,11 @@ def score(
         run = PredictedRun(duration_s, sample_rate_hz, hub_std_m_s2, jerk_rad2_s5)
     for array, about in given_axes:
         if about is None:
-            found.append(next(scores))
+            faults = fault_protection(
+                array, noise_m_s2=noise_m_s2, sample_rate_hz=sample_rate_hz, duration_s=fault_time_s,
+                per_channel=per_channel,
+            )  # fmt: skip
+            found.append(replace(next(scores), protection=faults))
             continue
         doubt = about.uncertainty if uncertainty.exact else uncertainty
         tilt = about.inclination if inclination_rad is None else inclination_rad

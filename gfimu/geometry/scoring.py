@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,12 +22,20 @@ from gfimu.geometry.dilution import gdop, gdop_lower_bound
 from gfimu.geometry.kinematics import MOTION_NAMES, joint_covariance, null_space, omega_leakage, require_all_motions
 from gfimu.short_repr import short_repr
 
-__all__ = ["DEFAULT_NOISE_STD", "Score", "gdop", "gdop_lower_bound", "ranking_remark", "score"]
+__all__ = ["DEFAULT_NOISE_STD", "Protection", "Score", "gdop", "gdop_lower_bound", "ranking_remark", "score"]
 
 DEFAULT_NOISE_STD = 0.0287
 """Channel noise at which rate bounds are quoted, m/s²: ADXL345, x and y axes at 100 Hz (0.75 LSB of 3.9 mg)."""
 
 _NEGLIGIBLE = 1e-6  # coefficient of a product of ω not worth a word
+
+
+class Protection(Protocol):
+    """What faults of single channels an array shows (`gfimu.integrity.protection.FaultProtection`)."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the figures, with units in the names."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -64,6 +72,8 @@ class Score:
         Channel standard deviation at which it holds.
     rate_bound_rad_s : ndarray, shape (3,)
         Cramér–Rao bound of one sample on the components of ω; infinite where one sample can't tell.
+    protection : Protection, optional
+        Least faults of its channels that are found.
     """
 
     name: str
@@ -81,6 +91,7 @@ class Score:
     omega_rad_s: NDArray[np.float64]
     noise_m_s2: float
     rate_bound_rad_s: NDArray[np.float64]
+    protection: Protection | None = None
 
     __repr__ = short_repr
 
@@ -99,6 +110,7 @@ class Score:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the entry of ``gfimu score --json``."""
+        faults = {} if self.protection is None else {"least_fault": self.protection.to_dict()}
         return {
             "name": self.name,
             "description": self.description,
@@ -115,6 +127,7 @@ class Score:
             "omega_rad_s": self.omega_rad_s,
             "noise_m_s2": self.noise_m_s2,
             "rate_bound_rad_s": self.rate_bound_rad_s,
+            **faults,
         }
 
 

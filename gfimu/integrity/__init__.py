@@ -1,18 +1,19 @@
 """Which channels of an array are faulty: detection, isolation and exclusion from the other channels alone."""
 
-from gfimu.integrity.detectable import DetectableFaults, detectable_faults
-from gfimu.integrity.fault import ChannelFault, ChannelHealth
-from gfimu.integrity.monitor import ChannelMonitor
-from gfimu.integrity.policy import MonitorPolicy
-from gfimu.integrity.watch import watch_channels, watch_from_rest
+from gfimu.lazy_names import names_on_first_use
 
-__all__ = [
-    "ChannelFault",
-    "ChannelHealth",
-    "ChannelMonitor",
-    "DetectableFaults",
-    "MonitorPolicy",
-    "detectable_faults",
-    "watch_channels",
-    "watch_from_rest",
-]
+__getattr__ = names_on_first_use(
+    "gfimu.integrity",
+    {
+        "ChannelFault": "fault",
+        "ChannelHealth": "fault",
+        "ChannelMonitor": "monitor",
+        "DetectableFaults": "detectable",
+        "FaultProtection": "protection",
+        "MonitorPolicy": "policy",
+        "detectable_faults": "detectable",
+        "fault_protection": "protection",
+        "watch_channels": "watch",
+        "watch_from_rest": "watch",
+    },
+)

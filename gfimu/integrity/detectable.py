@@ -1,18 +1,22 @@
 """The least fault that the monitor of channels detects and isolates, per channel, in closed form.
 
-A constant fault f on channel i puts f Z_i into each of N samples of the whitened null space, so after N samples its
-statistic is the square of a normal variable with the mean f √(N C_ii), C = ZᵀZ. A bias that is known to m only, and
-walks, counts as noise that no time reduces. The statistic exceeds the threshold h with a probability of 95 % from
+A constant fault f on channel i puts f z_i, column i of the whitened null space Z (d, c), into the mean of N samples, on
+top of white noise of covariance 1/N and of the biases of all channels. A bias is known to m before the onset and walks
+by q per second; over T seconds that counts as a constant of variance m² + q T/2 on every channel. So
 
-    f_i = (√h + 1.65) √(1/(N C_ii) + m² + q T/2)                                                         (1)
+    C = Zᵀ (1/N + (m² + q T/2) Z Zᵀ)⁻¹ Z                                                                 (1)
+
+is the information on constant faults, and the statistic of channel i is the square of a normal variable with the mean
+f √C_ii. It exceeds the threshold h with a probability of 95 % from
+
+    f_i = (√h + 1.65) / √C_ii                                                                            (2)
 
 on. Channel j explains the share cos²_ij = C_ij²/(C_ii C_jj) of it; the fault is isolated where what the others leave,
-N C_ii (1 − max cos²) f², exceeds the margin m by its own spread,
+C_ii (1 − max cos²) f², exceeds the margin m by its own spread,
 
-    N C_ii (1 − max cos²) f² ≥ m + 2 · 1.65 √m + 1.65².                                                   (2)
+    C_ii (1 − max cos²) f² ≥ m + 2 · 1.65 √m + 1.65².                                                    (3)
 
-This is the limit of a test that knows the onset and the bias before it. The monitor, which knows neither, found 1.3
-times f_i within 1 s in 16 of 24 runs of the cube at rest and within 3 s in 23; 1.5 times f_i in 20 and 24.
+This is the limit of a test that knows the onset.
 
 ω is taken as known: at rest, or carried by the filter. With ``unknown_rate`` the products of ω are unknown in every
 sample, and only what of Z lies across M (z = M s(ω)) remains: that is all that a test of single samples (the parity
@@ -50,7 +54,7 @@ class DetectableFaults:
     detected, isolated : ndarray, shape (c,)
         Least fault that is seen, and that is also assigned to its channel, m/s²; infinite where there is none.
     rivals : tuple of str
-        For each channel the one that is hardest to separate from it.
+        For each channel the one that is hardest to separate from it; empty where its faults are not seen.
     alpha_error : ndarray, shape (c,)
         Error of the angular acceleration that a fault of 1 m/s² on the channel makes, rad/s² per m/s².
     """
@@ -106,17 +110,16 @@ def detectable_faults(
         left, strengths, _ = np.linalg.svd(tables.null_sensitivity[0] / array.length_unit)
         rank = int(np.sum(strengths > _RANK * max(1e-300, strengths.max(initial=0.0))))
         null = left[:, rank:].T @ null
-    information = null.T @ null  # C, (c, c)
-    own = np.diag(information)
-    visible = own > _EQUAL / np.max(errors.noise_std) ** 2
     samples = max(1.0, duration * sample_rate)
+    bias = policy.bias_std**2 + 0.5 * policy.bias_walk * duration
+    noise = np.eye(len(null)) / samples + bias * null @ null.T
+    information = null.T @ np.linalg.solve(noise, null)  # C of (1), (c, c)
+    own = np.diag(information)
+    visible = np.sum(null**2, axis=0) > _EQUAL / np.max(errors.noise_std) ** 2
     block_s = policy.samples(1.0 / sample_rate) / sample_rate
     threshold = policy.threshold(array.n_channels, block_s)
-    bias = policy.bias_std**2 + 0.5 * policy.bias_walk * duration
     with np.errstate(divide="ignore", invalid="ignore"):
-        detected = np.where(
-            visible, (np.sqrt(threshold) + _QUANTILE) * np.sqrt(1.0 / (samples * own) + bias), np.inf
-        )  # (1)
+        detected = np.where(visible, (np.sqrt(threshold) + _QUANTILE) / np.sqrt(own), np.inf)  # (2)
         square = information**2 / np.outer(own, own)
     square[~np.outer(visible, visible)] = 0.0
     np.fill_diagonal(square, 0.0)
@@ -124,9 +127,10 @@ def detectable_faults(
     needed = policy.isolation + 2.0 * _QUANTILE * np.sqrt(policy.isolation) + _QUANTILE**2
     separate = visible & (closest < 1.0 - _EQUAL)
     with np.errstate(divide="ignore", invalid="ignore"):
-        apart = np.sqrt(needed / (samples * own * (1.0 - closest)))  # (2)
+        apart = np.sqrt(needed / (own * (1.0 - closest)))  # (3)
     isolated = np.where(separate, np.maximum(detected, apart), np.inf)
+    rivals = tuple(array.channels[int(np.argmax(row))] if row.any() else "" for row in square)
     return DetectableFaults(
-        tuple(array.channels), detected, isolated, tuple(array.channels[int(np.argmax(row))] for row in square),
+        tuple(array.channels), detected, isolated, rivals,
         np.linalg.norm(tables.alpha_rows[0], axis=0),
     )  # fmt: skip

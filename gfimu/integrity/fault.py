@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,7 @@ class ChannelFault:
     Parameters
     ----------
     channels : tuple of str
-        Channels that were left out. Where ``isolated`` is false the fault lies in one or two of them.
+        Channels that are at fault; where ``isolated`` is false, all that may be.
     kind : {"step", "drift", "gain", "noise", "freeze", "spikes", "unknown"}
         What the channel does, judged by its difference from what the others predict.
     isolated : bool
@@ -30,10 +30,15 @@ class ChannelFault:
     end_s : float
         Time from which on the channels are used again, s; infinite if they are not.
     sizes, sizes_std : tuple of float
-        Size of the fault of each channel as a constant from the onset to ``found_s``, and its standard deviation,
-        m/s²; NaN for noise.
+        Size of the fault of each channel as a constant from the onset on, and its standard deviation, m/s²; NaN for
+        noise.
     statistic : float
         Twice the log likelihood ratio of the fault against none.
+    alternatives : tuple of tuple of str
+        Where it is not isolated: the sets of channels each of which explains it.
+    excluded : bool
+        Whether the channels were left out. Of a fault that is not isolated all alternatives are left out if the others
+        still see all six motions, else none.
     """
 
     channels: tuple[str, ...]
@@ -45,6 +50,8 @@ class ChannelFault:
     sizes: tuple[float, ...]
     sizes_std: tuple[float, ...]
     statistic: float
+    alternatives: tuple[tuple[str, ...], ...] = ()
+    excluded: bool = True
 
     __repr__ = short_repr
 
@@ -60,17 +67,38 @@ class ChannelFault:
             "sizes_m_s2": [value if np.isfinite(value) else None for value in self.sizes],
             "sizes_std_m_s2": [value if np.isfinite(value) else None for value in self.sizes_std],
             "statistic": self.statistic,
+            "alternatives": [list(names) for names in self.alternatives],
+            "excluded": self.excluded,
         }
+
+    def entries(self) -> list[dict[str, Any]]:
+        """Return an entry for each channel, as JSON can hold it: kind, onset, size and its standard deviation."""
+        return [
+            {
+                "channel": name,
+                "kind": self.kind,
+                "isolated": self.isolated,
+                "onset_s": self.onset_s,
+                "detected_s": self.found_s,
+                "end_s": self.end_s if np.isfinite(self.end_s) else None,
+                "size": size if np.isfinite(size) else None,
+                "std": std if np.isfinite(std) else None,
+                "unit": "m/s2",
+                "excluded": self.excluded and not np.isfinite(self.end_s),
+                "alternatives": [list(names) for names in self.alternatives],
+            }
+            for name, size, std in zip(self.channels, self.sizes, self.sizes_std, strict=True)
+        ]
 
     def sentence(self) -> str:
         """Return the fault in words."""
         names = ", ".join(self.channels)
         until = f" to {self.end_s:.4g} s" if np.isfinite(self.end_s) else ""
         if not self.isolated:
-            return (
-                f"a fault from {self.onset_s:.4g} s{until} lies in {names}, and these can't be separated: "
-                "none of them is used"
-            )
+            sets = self.alternatives or (self.channels,)
+            lies = ", or ".join(f"in {' and '.join(one)}" for one in sets)
+            use = "none of them is used" if self.excluded else "all of them are used"
+            return f"a fault from {self.onset_s:.4g} s{until} lies {lies}, and these can't be separated: {use}"
         size = ""
         if self.kind in {"step", "unknown"} and np.isfinite(self.sizes).all():
             values = ", ".join(
@@ -93,6 +121,8 @@ class ChannelHealth:
         What was found, in the order in which it was found.
     excluded : ndarray of bool, shape (n, c)
         Readings not to be used.
+    doubted : ndarray of bool, shape (n, c)
+        Readings of channels of which some are at fault and it can't be said which; they are used.
     unexplained : ndarray of bool, shape (n,)
         Samples at which a fault was seen that no channel, pair or chip explains: nothing is excluded for it.
     largest_statistic : float
@@ -107,12 +137,26 @@ class ChannelHealth:
     channels: tuple[str, ...]
     faults: tuple[ChannelFault, ...]
     excluded: NDArray[np.bool_]
+    doubted: NDArray[np.bool_]
     unexplained: NDArray[np.bool_]
     largest_statistic: float
     threshold: float
     model_factor: float = 1.0
 
     __repr__ = short_repr
+
+    def behind(self, count: int) -> ChannelHealth:
+        """Return the same with ``count`` samples before it in which nothing was watched."""
+
+        def longer(marks: NDArray[np.bool_]) -> NDArray[np.bool_]:
+            return np.concatenate([np.zeros((count, *marks.shape[1:]), dtype=np.bool_), marks])
+
+        return replace(
+            self,
+            excluded=longer(self.excluded),
+            doubted=longer(self.doubted),
+            unexplained=longer(self.unexplained),
+        )
 
     @property
     def sound(self) -> bool:
@@ -122,9 +166,10 @@ class ChannelHealth:
     def codes(self) -> NDArray[np.int8]:
         """Return the health of each channel at each sample, shape (n, c): 0 used, 1 in doubt, 2 not used.
 
-        In doubt are all channels while they contradict each other and no channel, pair or chip explains it.
+        In doubt are the channels in which a fault may lie, and all of them while they contradict each other and no
+        channel, pair or chip explains it.
         """
-        codes = np.where(self.unexplained[:, None], np.int8(1), np.int8(0)) * np.ones(len(self.channels), dtype=np.int8)
+        codes = np.where(self.unexplained[:, None] | self.doubted, np.int8(1), np.int8(0))
         codes[self.excluded] = 2
         return codes
 

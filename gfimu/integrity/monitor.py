@@ -8,27 +8,19 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gfimu.geometry.array import AccelerometerArray
-from gfimu.integrity.block_noise import BlockNoise, block_noise
-from gfimu.integrity.blocks import Blocks, scatter
 from gfimu.integrity.fault import ChannelFault
-from gfimu.integrity.isolation import Explanation, deflate, explanations, strongest
 from gfimu.integrity.policy import MonitorPolicy
-from gfimu.integrity.prediction import omega_products, prediction_row
-from gfimu.integrity.recursion import MonitorState, MonitorTables, MonitorTuning, advance, model_errors
-from gfimu.rate.sensing import ChannelTables, SensorErrors
+from gfimu.integrity.readmission import behaves
+from gfimu.integrity.recursion.blocks import Blocks
+from gfimu.integrity.recursion.isolation import Explanation, explanations
+from gfimu.integrity.recursion.monitor_filter import MonitorFilter
+from gfimu.integrity.recursion.noise import BlockNoise
+from gfimu.integrity.residue import moving_seconds
+from gfimu.rate.sensing import SensorErrors
 
-__all__ = ["MARGIN", "ChannelMonitor"]
+__all__ = ["ChannelMonitor"]
 
-_RAN_AWAY = 1e9  # numerical: rate, score and information of a filter that follows stay far below
-_LARGEST_FAULT = 100.0  # m/s², prior standard deviation of a fault's size: a limit that no fault reaches
-_LEAST_AGE = 3  # blocks, of an onset from which a fault is isolated: it may be later still
-_TRIED = 4  # sets of each kind of which it is tried whether they explain a fault
-_FIRST_BLOCK = 0.25  # of one block's evidence, which an onset in the middle of the block spoils at most
-MARGIN = 2
-"""Blocks before the onset of a fault, from which on its channels are not used."""
-
-
-_SOUND_SCATTER = 2.0  # of the stated variance, up to which a channel counts as quiet again
+_LARGEST_FAULT = 100.0  # numerical: m/s², prior standard deviation of a fault's size, which no fault reaches
 
 
 @dataclass
@@ -38,6 +30,7 @@ class _Suspicion:
     since: int  # block
     next_trial: int  # block
     unexplained: bool = False
+    doubtful: ChannelFault | None = None  # seen in channels that can't be separated, and not excluded
 
 
 class ChannelMonitor:
@@ -58,6 +51,23 @@ class ChannelMonitor:
     policy : MonitorPolicy, optional
         Thresholds.
 
+    Attributes
+    ----------
+    blocks : Blocks
+        The blocks that are kept, m of them; `forget` drops the oldest.
+    omega, omega_std : ndarray, shape (m, 3)
+        Angular rate in them and its standard deviation, rad/s.
+    unexplained : ndarray of bool, shape (m,)
+        Where a fault was seen that nothing explains.
+    watched : ndarray of bool, shape (c,)
+        Channels in use.
+    faults : list of ChannelFault
+        What was excluded.
+    noise_in_motion : bool
+        Whether a channel may be excluded for noise while the array moves.
+    doubtful : list of ChannelFault
+        What was seen in channels that can't be separated, and stayed in use.
+
     Raises
     ------
     GeometryError
@@ -76,213 +86,233 @@ class ChannelMonitor:
     ) -> None:
         self.array = array
         self.policy = policy or MonitorPolicy()
-        self.samples = self.policy.samples(period)
-        self._period = self.samples * period
-        self._errors = errors
-        self._tables = ChannelTables(array, errors)
+        self.follower = MonitorFilter(array, errors, period, omega0=omega0, omega0_std=omega0_std, policy=self.policy)
+        self.samples, self.block_s = self.follower.samples, self.follower.block_s
+        self.threshold = self.follower.threshold
         c = array.n_channels
-        policy = self.policy
-        self.threshold = policy.threshold(c, self._period)
-        self._tuning = MonitorTuning(
-            samples=self.samples,
-            period=self._period,
-            threshold=self.threshold,
-            oldest=policy.oldest_s / self._period,
-            walk=policy.bias_walk,
-            forget=min(1.0, self._period / policy.range_memory_s),
-            scale_std=errors.scale_std,
-            placement_std=errors.placement_std,
-            floor=policy.bias_std,
-        )
-        covariance = np.zeros((3 + c, 3 + c))
-        covariance[range(3), range(3)] = omega0_std**2
-        covariance[range(3, 3 + c), range(3, 3 + c)] = np.maximum(errors.bias_std, policy.bias_std) ** 2
-        slots = policy.slots
-        history = int(2.0 * self._tuning.oldest) + MARGIN + 1
-        self._state = MonitorState(
-            omega=np.array(omega0, dtype=float),
-            bias=np.zeros(c),
-            covariance=covariance,
-            last=np.zeros(c),
-            low=np.zeros(c),
-            high=np.zeros(c),
-            ages=np.zeros(slots),
-            signature=np.zeros((slots, 3 + c, c)),
-            information=np.zeros((slots, c, c)),
-            score=np.zeros((slots, c)),
-            started=np.zeros(1, dtype=np.bool_),
-            largest=np.zeros(1),
-            past_rate=np.zeros((history, 3)),
-            past_bias=np.zeros((history, c)),
-            past_covariance=np.zeros((history, 3 + c, 3 + c)),
-            past_means=np.zeros((history, 3, c)),
-        )
         self._length_scale = np.array([array.length_unit] * 3 + [1.0] * 3)
+        self.blocks = Blocks(
+            self.samples, np.zeros(0), np.zeros((0, c)), np.zeros((0, c), dtype=np.bool_),
+            np.zeros((0, self.samples, c)),
+        )  # fmt: skip
+        self.omega, self.omega_std = np.zeros((0, 3)), np.zeros((0, 3))
+        self.unexplained = np.zeros(0, dtype=np.bool_)
         self.watched = np.ones(c, dtype=np.bool_)
         self.faults: list[ChannelFault] = []
-        self._noise: dict[int, BlockNoise] = {}
+        self._past_doubts: list[ChannelFault] = []
+        self._base = 0  # number of the oldest block that is kept; all numbers of blocks below are of the whole run
+        self._place = 0  # next block
+        self._noise: dict[bytes, BlockNoise] = {}
         self._open: dict[int, tuple[int, int]] = {}  # channel: its fault's number, block from which it is judged
-        self._patience = np.full(c, policy.readmission_s)
+        self._patience = np.full(c, self.policy.readmission_s)
         self._suspicion: _Suspicion | None = None
-
-    @property
-    def block_s(self) -> float:
-        """Length of a block, s."""
-        return self._period
+        self._lost = False
+        self._refuses = False
+        self.noise_in_motion = True
 
     @property
     def noise_of_means(self) -> NDArray[np.float64]:
         """Standard deviation that white noise gives the mean of a block, shape (c,), m/s²."""
-        return np.asarray(self._errors.noise_std / np.sqrt(self.samples))
+        return self.follower.noise_of_means
 
     @property
     def null_count(self) -> int:
         """Directions of the null space with all channels."""
-        return self._tables.n_null
+        return self.follower.tables.n_null
 
     @property
     def largest_statistic(self) -> float:
         """Largest statistic of a channel so far; those far below the threshold are not followed."""
-        return float(self._state.largest[0])
+        return float(self.follower.state.largest[0])
 
-    def run(self, blocks: Blocks) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
-        """Take all blocks; returns ω (m, 3), its std (m, 3) and where a fault was seen that nothing explains (m,)."""
+    @property
+    def lost(self) -> bool:
+        """Whether the filter ran away; nothing is watched from then on."""
+        return self._lost
+
+    @property
+    def doubtful(self) -> list[ChannelFault]:
+        """Faults in channels that can't be separated and are used."""
+        now = [] if self._suspicion is None or self._suspicion.doubtful is None else [self._suspicion.doubtful]
+        return self._past_doubts + now
+
+    def refuse(self, refuses: bool) -> None:
+        """Exclude nothing from now on, or do so again: for channels whose contradictions no errors explain."""
+        if refuses and not self._refuses and len(self.blocks):
+            end = float(self.blocks.t[-1] + 0.5 * self.block_s)
+            for number in {number for number, _ in self._open.values()}:
+                self.faults[number] = replace(self.faults[number], end_s=end)
+            self._open.clear()
+            self.watched[:] = True
+            self.follower.state.ages[:] = 0.0
+        self._refuses = refuses
+
+    @property
+    def kept_blocks(self) -> int:
+        """Blocks that must be kept for what may still come."""
+        return self.follower.history + round(self.policy.longest_readmission_s / self.block_s)
+
+    def extend(self, blocks: Blocks) -> None:
+        """Take further blocks."""
         count = len(blocks)
-        omega = np.full((count, 3), np.nan)
-        std = np.full((count, 3), np.nan)
-        nis = np.zeros(count)
-        unexplained = np.zeros(count, dtype=np.bool_)
-        steps = np.diff(blocks.t, prepend=blocks.t[0] - self._period) if count else np.zeros(0)
-        place = 0
-        while place < count:
-            sets = self._sets(blocks, self.watched, slice(None))
-            tables = self._compiled_tables()
-            noise = self._noise_of(blocks)
-            noisy, channel = noise.first_from(place)
-            end = min(count, noisy + 1)
-            if self._open:
-                end = min(end, place + max(1, round(1.0 / self._period)))
-            place, slot = advance(
-                tables, self._tuning, self._state, blocks.means, steps, sets, noise.levels, self.watched,
-                omega, std, nis, place, end,
-            )  # fmt: skip
-            if _lost(self._state):
-                unexplained[place - 1 :] = True
-                break
-            back = place
-            if slot >= 0:
-                back, unexplained[place - 1] = self._judge(blocks, place)
-            elif place == noisy + 1:
-                back = self._exclude_noisy(blocks, place, channel)
-            else:
-                self._suspicion = None
-            if back < place:  # again from before the onset, without the channels
-                place = back
-                self._state.go_back(place)
-            else:
-                self._readmit(blocks, place, omega)
-        return omega, std, unexplained
+        self.blocks = self.blocks.joined(blocks) if len(self.blocks) else blocks
+        self.omega, self.omega_std = (
+            np.concatenate([rates, np.full((count, 3), np.nan)]) for rates in (self.omega, self.omega_std)
+        )
+        self.unexplained = np.concatenate([self.unexplained, np.zeros(count, dtype=np.bool_)])
+        if self._lost:
+            self.unexplained[-count:] = True
+            return
+        self._run()
+
+    def forget(self) -> None:
+        """Drop blocks of the distant past, some at once."""
+        count = len(self.blocks) - self.kept_blocks
+        if count < self.kept_blocks // 8:
+            return
+        self.blocks = self.blocks.rows(slice(count, None))
+        self.omega, self.omega_std = self.omega[count:].copy(), self.omega_std[count:].copy()
+        self.unexplained = self.unexplained[count:].copy()
+        self._noise = {key: noise for key, noise in self._noise.items() if len(noise) >= count}
+        for noise in self._noise.values():
+            noise.drop(count)
+        self._base += count
+
+    @property
+    def total_blocks(self) -> int:
+        """Blocks so far, those that were forgotten included."""
+        return self._base + len(self.blocks)
+
+    def recent_innovations(self, errors: SensorErrors) -> tuple[Blocks, NDArray[np.float64]]:
+        """Return the last blocks, and their normalised innovation squared per degree of freedom.
+
+        The channels are those in use now; gains, axes and positions have the errors given.
+        """
+        count = min(len(self.blocks), self.follower.history - 1)
+        first = self.total_blocks - count
+        recent = self.blocks.rows(slice(first - self._base, None))
+        return recent, self.follower.innovations(recent, self.watched, errors, base=first)
 
     def innovations(self, blocks: Blocks) -> NDArray[np.float64]:
         """Return the normalised innovation squared per degree of freedom of each block, without looking for faults."""
-        count = len(blocks)
-        state = self._state.copy()
-        nis = np.zeros(count)
-        sets = self._sets(blocks, self.watched, slice(None))
-        steps = np.diff(blocks.t, prepend=blocks.t[0] - self._period) if count else np.zeros(0)
-        tables = self._compiled_tables()
-        advance(
-            tables, self._tuning._replace(threshold=np.inf), state, blocks.means, steps, sets, np.ones(count),
-            self.watched, np.empty((count, 3)), np.empty((count, 3)), nis, 0, count,
-        )  # fmt: skip
-        return np.asarray(nis / np.maximum(tables.null_count[sets], 1))
+        return self.follower.innovations(blocks)
 
-    def _sets(self, blocks: Blocks, watched: NDArray[np.bool_], rows: slice) -> NDArray[np.int64]:
-        """Return the set of channels of each block in ``rows``, in the tables."""
-        bits = np.int64(1) << np.arange(self.array.n_channels, dtype=np.int64)
-        masks = ((blocks.missing[rows] | ~watched) * bits).sum(axis=1)
-        unique, inverse = np.unique(masks, return_inverse=True)
-        return np.array([self._tables.index(int(mask)) for mask in unique], dtype=np.int64)[inverse]
+    def _run(self) -> None:
+        """Go on to the last block."""
+        follower, base = self.follower, self._base
+        last = base + len(self.blocks)
+        while self._place < last:
+            noise = self._noise_of()
+            noisy, channel = noise.first_from(self._place - base)
+            end = min(last, base + noisy + 1)
+            if self._open:
+                end = min(end, self._place + max(1, round(1.0 / self.block_s)))
+            reached, slot = follower.advance(
+                self.blocks, slice(self._place - base, end - base), self.watched, noise.levels,
+                (self.omega, self.omega_std), base=base,
+            )  # fmt: skip
+            place = base + reached
+            self._place = place
+            if follower.lost:
+                self.unexplained[reached - 1 :] = True
+                self._lost = True
+                return
+            back = place
+            if slot >= 0:
+                back, self.unexplained[reached - 1] = self._judge(place)
+            elif reached == noisy + 1:
+                back = self._exclude_noisy(place, channel)
+            else:
+                self._end_suspicion(place)
+            if back < place:  # again from before the onset, without the channels
+                self._place = back
+                follower.state.go_back(back)
+            else:
+                self._readmit(place)
 
-    def _compiled_tables(self) -> MonitorTables:
-        tables = self._tables
-        return MonitorTables(
-            tables.alpha_rows, tables.alpha_leak, tables.null_rows, tables.null_sensitivity,
-            tables.null_count, tables.alpha_noise,
-        )  # fmt: skip
-
-    def _excluded_bits(self) -> int:
-        return sum(1 << int(channel) for channel in np.flatnonzero(~self.watched))
-
-    def _noise_of(self, blocks: Blocks) -> BlockNoise:
+    def _noise_of(self) -> BlockNoise:
         """Return the noise of all blocks with the channels that are watched now; kept per set of channels."""
-        missing = self._excluded_bits()
-        if missing not in self._noise:
-            null_rows = self._tables.null_rows[self._tables.index(missing)]
-            self._noise[missing] = block_noise(blocks, null_rows, self.block_s, self.threshold, self.policy)
-        return self._noise[missing]
+        key = self.watched.tobytes()
+        if key not in self._noise:
+            rows = self.follower.null_rows(self.watched)
+            self._noise[key] = BlockNoise(rows, self.block_s, self.threshold, self.policy)
+        noise = self._noise[key]
+        if len(noise) < len(self.blocks):
+            noise.extend(self.blocks, slice(len(noise), len(self.blocks)))
+        return noise
 
-    def _judge(self, blocks: Blocks, place: int) -> tuple[int, bool]:
+    def _judge(self, place: int) -> tuple[int, bool]:
         """Isolate the fault that is seen, or wait; returns the block to go on with, and whether nothing explains it."""
+        policy = self.policy
+        if self._refuses:
+            return place, True
         if self._suspicion is None:
-            self._suspicion = _Suspicion(place, place + _LEAST_AGE - 1)
+            self._suspicion = _Suspicion(place, place + policy.least_age - 1)
         suspicion = self._suspicion
         if place < suspicion.next_trial:
             return place, suspicion.unexplained
         waited = place - suspicion.since
         suspicion.next_trial = place + max(1, waited // 4)
-        used, information, score = self._evidence(self._state)
-        late = waited * self._period >= self.policy.wait_s
-        for kind in explanations(information, score, self.watched, self.array.chip_of_channel, _TRIED):
-            passing = [entry for entry in kind if self._explains(blocks, place, used, entry)]
-            if not passing:
+        used, information, score = self.follower.evidence()
+        late = waited * self.block_s >= policy.wait_s
+        for kind in explanations(information, score, self.watched, self.array.chip_of_channel, policy.tried):
+            explains = [self._explains(place, used, entry) for entry in kind]
+            if not any(explains):
                 continue
-            best = passing[0]
-            age = float(self._state.ages[used[best.slot]])
-            needed = max(self.policy.isolation, (self.policy.relative + _FIRST_BLOCK / age) * best.statistic)
+            best = kind[explains.index(True)]
+            age = float(self.follower.state.ages[used[best.slot]])
+            needed = max(policy.isolation, (policy.relative + policy.first_block / age) * best.statistic)
             several = len(best.channels) > 1  # two equal faults may look exactly like two others at first
-            rivals = [entry for entry in passing if several or entry.statistic > best.statistic - needed]
+            rivals = [
+                entry
+                for entry, fits in zip(kind, explains, strict=True)
+                if (fits and several) or (entry.statistic > best.statistic - needed and (fits or several))
+            ]
             if len(rivals) > 1 and not late:
                 return place, False
             blamed = np.unique(np.concatenate([entry.channels for entry in rivals]))
-            if not self._may_exclude(blamed, fewest=None if len(rivals) == 1 else 0):
-                break
+            alone = len(rivals) == 1
             chosen = Explanation(blamed, best.statistic, best.slot)
-            return self._exclude(blocks, place, used, chosen, len(rivals) == 1, information, score), False
-        suspicion.unexplained = True
-        return place, True
+            fault = self._fault(place, used, chosen, information, score)
+            if not alone:
+                sets = tuple(tuple(self.array.channels[i] for i in entry.channels) for entry in rivals)
+                fault = replace(fault, isolated=False, alternatives=sets)
+            if self._may_exclude(blamed, fewest=None if alone else 0):
+                self._add(place, blamed, fault)
+                return self._before(place - self._span(used, chosen)), False
+            if alone:
+                break
+            suspicion.doubtful, suspicion.unexplained = replace(fault, excluded=False), False
+            return place, False
+        suspicion.unexplained = suspicion.doubtful is None
+        return place, suspicion.unexplained
 
-    def _evidence(self, state: MonitorState) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
-        """Return the slots in use, and C (s, c, c) and d (s, c) of each with the errors of the model taken out."""
-        std = np.empty(self.array.n_channels)
-        model_errors(state, self._tuning, std)
-        used = np.flatnonzero(state.ages >= 1.0)
-        cleaned = [deflate(state.information[s], state.score[s], std) for s in used]
-        return used, np.stack([pair[0] for pair in cleaned]), np.stack([pair[1] for pair in cleaned])
+    def _end_suspicion(self, place: int) -> None:
+        """Keep a fault that was not isolated and is not seen any longer."""
+        if self._suspicion is not None and self._suspicion.doubtful is not None:
+            end = float(self.blocks.t[place - 1 - self._base])
+            self._past_doubts.append(replace(self._suspicion.doubtful, end_s=end))
+        self._suspicion = None
 
-    def _explains(self, blocks: Blocks, place: int, used: NDArray[np.int64], entry: Explanation) -> bool:
+    def _explains(self, place: int, used: NDArray[np.int64], entry: Explanation) -> bool:
         """Whether nothing is left to explain if these channels had not been used since before their onset."""
-        age = int(self._state.ages[used[entry.slot]])
-        if age < _LEAST_AGE or not self._may_exclude(entry.channels, fewest=1):
+        age = int(self.follower.state.ages[used[entry.slot]])
+        if age < self.policy.least_age or not self._may_exclude(entry.channels, fewest=1):
             return False
-        first = max(0, place - age - MARGIN)
         watched = self.watched.copy()
         watched[entry.channels] = False
-        state = self._state.copy()
-        state.go_back(first)
-        rows = slice(first, place)
-        sets = self._sets(blocks, watched, rows)
-        count = place - first
-        steps = np.diff(blocks.t[rows], prepend=blocks.t[first] - self._period)
-        advance(
-            self._compiled_tables(), self._tuning._replace(threshold=np.inf), state, blocks.means[rows], steps, sets,
-            np.ones(count), watched, np.empty((count, 3)), np.empty((count, 3)), np.empty(count), 0, count,
-        )  # fmt: skip
-        if _lost(state):
-            return False
-        _, information, score = self._evidence(state)
-        rest = max(strongest(*pair, watched)[1] for pair in zip(information, score, strict=True))
-        return bool(rest < self.policy.unexplained)
+        rows = slice(self._before(place - self._span(used, entry)) - self._base, place - self._base)
+        rest = self.follower.unexplained_without(self.blocks, rows, watched, base=self._base)
+        return rest < self.policy.unexplained
+
+    def _span(self, used: NDArray[np.int64], entry: Explanation) -> int:
+        """Return how many blocks ago a fault may have begun at most: the onset lies near one of those followed."""
+        ages = self.follower.state.ages[used]
+        return int(ages[max(0, entry.slot - 1)]) - 1 if entry.slot else int(ages[0])
+
+    def _before(self, block: int) -> int:
+        """Return the block from which to go on if a fault began at this one."""
+        return max(self._base, block - self.policy.margin)
 
     def _may_exclude(self, channels: NDArray[np.int64], fewest: int | None = None) -> bool:
         """Whether the rest sees all six motions and can still check itself."""
@@ -291,92 +321,69 @@ class ChannelMonitor:
         rank = np.linalg.matrix_rank(self.array.regression_matrix[kept] / self._length_scale, tol=1e-6)
         return bool(rank == 6 and kept.sum() - 6 >= (self.policy.fewest_null if fewest is None else fewest))
 
-    def _exclude(
+    def _fault(
         self,
-        blocks: Blocks,
         place: int,
         used: NDArray[np.int64],
         chosen: Explanation,
-        isolated: bool,
         information: NDArray[np.float64],
         score: NDArray[np.float64],
-    ) -> int:
-        """Take channels out; returns the block before their fault began, from which to go on."""
-        state, channels = self._state, chosen.channels
-        slot = used[chosen.slot]
+    ) -> ChannelFault:
+        """Return the fault of these channels, with the sizes that explain most."""
+        channels = chosen.channels
+        age = float(self.follower.state.ages[used[chosen.slot]])
         block = information[chosen.slot][np.ix_(channels, channels)]
         spread = np.linalg.inv(block + np.eye(len(channels)) / _LARGEST_FAULT**2)
         sizes = spread @ score[chosen.slot][channels]
-        onset = float(blocks.t[place - 1] - (state.ages[slot] - 0.5) * self._period)
-        self._add(
-            blocks, place, channels,
-            ChannelFault(
-                tuple(self.array.channels[i] for i in channels), "unknown", isolated, onset,
-                float(blocks.t[place - 1] + 0.5 * self._period), np.inf,
-                tuple(sizes.tolist()), tuple(np.sqrt(np.diag(spread)).tolist()), chosen.statistic,
-            ),
+        now = float(self.blocks.t[place - 1 - self._base])
+        return ChannelFault(
+            tuple(self.array.channels[i] for i in channels), "unknown", True,
+            now - (age - 0.5) * self.block_s, now + 0.5 * self.block_s, np.inf,
+            tuple(sizes.tolist()), tuple(np.sqrt(np.diag(spread)).tolist()), chosen.statistic,
         )  # fmt: skip
-        return max(0, place - int(state.ages[slot]) - MARGIN)
 
-    def _exclude_noisy(self, blocks: Blocks, place: int, channel: int) -> int:
+    def _exclude_noisy(self, place: int, channel: int) -> int:
         """Take a noisy channel out; returns the block from which to go on."""
         channels = np.array([channel])
-        if not self._may_exclude(channels):
+        last = self.blocks.rows(
+            slice(max(0, place - self._base - max(1, round(1.0 / self.block_s))), place - self._base)
+        )
+        calm = self.noise_in_motion or not moving_seconds(self.follower, last, self.policy).any()
+        if self._refuses or not calm or not self._may_exclude(channels):
             return place
-        found = float(blocks.t[place - 1] + 0.5 * self._period)
-        first = self._noise_of(blocks).onset(channel, place - 1)
-        onset = float(blocks.t[first] - 0.5 * self._period)
+        found = float(self.blocks.t[place - 1 - self._base] + 0.5 * self.block_s)
+        oldest = max(0, place - self.follower.history + self.policy.margin - self._base)
+        first = max(oldest, self._noise_of().onset(channel, place - 1 - self._base))
+        onset = float(self.blocks.t[first] - 0.5 * self.block_s)
         self._add(
-            blocks, place, channels,
+            place, channels,
             ChannelFault(
                 (self.array.channels[channel],), "noise", True, onset, found, np.inf, (np.nan,), (np.nan,), np.nan
             ),
         )  # fmt: skip
-        return max(0, first - MARGIN)
+        return self._before(self._base + first)
 
-    def _add(self, blocks: Blocks, place: int, channels: NDArray[np.int64], fault: ChannelFault) -> None:
+    def _add(self, place: int, channels: NDArray[np.int64], fault: ChannelFault) -> None:
         self.watched[channels] = False
         self._suspicion = None
         for channel in channels:
             self._open[int(channel)] = (len(self.faults), place)
         self.faults.append(fault)
 
-    def _readmit(self, blocks: Blocks, place: int, omega: NDArray[np.float64]) -> None:
+    def _readmit(self, place: int) -> None:
         """Take channels in again that have agreed with the others for long enough."""
         for channel, (number, since) in list(self._open.items()):
-            length = round(self._patience[channel] / self._period)
-            if place - since < length or not self._behaves(blocks, slice(place - length, place), omega, channel):
+            length = round(self._patience[channel] / self.block_s)
+            if place - since < length:
                 continue
-            self._patience[channel] *= 2.0
+            rows = slice(place - length - self._base, place - self._base)
+            part = self.blocks.rows(rows)
+            if not behaves(self.follower, part, self.omega[rows], channel, self.watched, self.policy):
+                continue
+            self._patience[channel] = min(2.0 * self._patience[channel], self.policy.longest_readmission_s)
             del self._open[channel]
             self.watched[channel] = True
-            self._state.ages[:] = 0.0
+            self.follower.state.ages[:] = 0.0
             if not any(other == number for other, _ in self._open.values()):
-                end = float(blocks.t[place - 1] + 0.5 * self._period)
+                end = float(self.blocks.t[place - 1 - self._base] + 0.5 * self.block_s)
                 self.faults[number] = replace(self.faults[number], end_s=end)
-
-    def _behaves(self, blocks: Blocks, rows: slice, omega: NDArray[np.float64], channel: int) -> bool:
-        """Whether an excluded channel has the readings that the others predict."""
-        if blocks.missing[rows].any():
-            return False
-        row = prediction_row(self.array, channel, self.watched)
-        state = self._state
-        centred = blocks.means[rows] - state.bias
-        residual = centred @ row - omega_products(omega[rows]) @ (row @ self.array.centripetal_matrix)
-        samples = blocks.samples
-        noise = float(np.sum(row**2 * self._errors.noise_std**2))
-        std = np.empty(self.array.n_channels)
-        model_errors(state, self._tuning, std)
-        bias = float(row @ state.covariance[3:, 3:] @ row) + std[channel] ** 2
-        second = max(1, round(1.0 / self._period))
-        means = residual[: len(residual) // second * second].reshape(-1, second).mean(axis=1)
-        near = np.abs(means) < 3.0 * np.sqrt(noise / (samples * second) + bias)
-        ratios, _ = scatter(blocks, rows, row[None] / np.sqrt(noise))
-        return bool(near.all() and ratios[:, channel].mean() < _SOUND_SCATTER)
-
-
-def _lost(state: MonitorState) -> bool:
-    """Whether the filter ran away: too few channels, or none of them as stated."""
-    used = state.ages >= 1.0
-    parts = (state.omega, state.score[used], state.information[used])
-    return not all(np.all(np.abs(part) < _RAN_AWAY) for part in parts)  # NaN is not smaller either

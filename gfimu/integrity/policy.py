@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from statistics import NormalDist
 
 import numpy as np
-from scipy.stats import chi2
 
 from gfimu.errors import InputError
 
@@ -49,14 +49,64 @@ class MonitorPolicy:
         Least uncertainty of the positions, m.
     bias_walk : float
         Growth of the variance of a bias, (m/s²)²/s: covers an instability of 0.15 mg.
+    range_share : float
+        Share of the range of a channel's readings by which they deviate from their mean: times the error of its gain, a
+        constant fault that this error resembles.
     range_memory_s : float
         Time constant with which the range of a channel's readings is forgotten, s.
     noise_memory_s : float
         Time constant of a channel's noise, s.
     readmission_s : float
         So long an excluded channel must agree with the others before it is used again, s.
+    longest_readmission_s : float
+        That time doubles with each time that the channel is used again, up to this, s.
+    sound_scatter : float
+        Variance within blocks over the stated one, up to which an excluded channel counts as quiet again.
     fewest_null : int
         Directions of the null space that must remain after an exclusion: with fewer, no next fault can be isolated.
+    screen : float
+        Share of the threshold below which errors of gains and positions are not taken out of a statistic, as they only
+        lower it; saves time.
+    tried : int
+        Sets of each kind (channels, pairs, chips) of which it is tried whether they explain a fault.
+    least_age : int
+        Age in blocks from which an onset is used for isolation: a younger one may really be later.
+    first_block : float
+        Share of one block's evidence that an onset in the middle of the block spoils at most.
+    margin : int
+        Blocks before the onset of a fault from which on its channels are not used.
+    largest_scatter : float
+        Ratio to the stated variance up to which one block's scatter counts: a step within a block is no noise.
+    noise_settled_s : float
+        Time from the first block on before a channel is called noisy, s.
+    quiet : float
+        Quantile of a sound channel's scatter in one block, above which the block is loud.
+    kind_decided : float
+        By how much the best kind of fault must exceed a step in 2 log likelihood: 6 is odds of 20 to 1.
+    spike_share : float
+        Share of the samples that hold most of the squares, for spikes.
+    noisy_kind : float
+        Ratio to the stated variance from which noise is part of a fault.
+    kind_span_s : float
+        Time before the onset that shows a channel's bias, and after the finding that shows what the fault does, s.
+    agreeing_share : float
+        Share of the seconds of a recording that must be free of faults for the errors of the model to be measured.
+    moving : float
+        Range of a channel's block means within a second, in their noise, from which the array moves.
+    fewest_seconds : int
+        Seconds of motion, or of rest, from which they are judged by themselves.
+    largest_factor : int
+        Factor on the errors of gains, axes and positions that is not exceeded, a power of two.
+    unproven_factor : int
+        That factor in a stream until `fewest_seconds` of motion were seen, a power of two.
+    least_rest_s : float
+        Shortest rest that shows the biases well enough, s.
+    settled_std : float
+        In a run that begins in motion: standard deviation of the biases from which on the channels are watched, m/s².
+    settled_ratio : float
+        In such a run: innovations squared of a second over those of the second before, from which they no longer fall.
+    live_rest_s : float
+        Rest from which a stream's biases are taken, if it lasts so long, s.
     """
 
     block_s: float = 0.1
@@ -72,10 +122,34 @@ class MonitorPolicy:
     gain_std: float = 9e-4
     place_std: float = 1e-4
     bias_walk: float = 1.5e-6
+    range_share: float = 0.5
     range_memory_s: float = 2.0
     noise_memory_s: float = 0.5
     readmission_s: float = 5.0
+    longest_readmission_s: float = 40.0
+    sound_scatter: float = 2.0
     fewest_null: int = 3
+    screen: float = 0.6
+    tried: int = 4
+    least_age: int = 3
+    first_block: float = 0.25
+    margin: int = 2
+    largest_scatter: float = 6.0
+    noise_settled_s: float = 0.3
+    quiet: float = 0.99
+    kind_decided: float = 6.0
+    spike_share: float = 0.1
+    noisy_kind: float = 1.5
+    kind_span_s: float = 2.0
+    agreeing_share: float = 0.25
+    moving: float = 15.0
+    fewest_seconds: int = 8
+    largest_factor: int = 64
+    unproven_factor: int = 8
+    least_rest_s: float = 1.0
+    settled_std: float = 1.5e-3
+    settled_ratio: float = 0.8
+    live_rest_s: float = 3.0
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
@@ -89,4 +163,5 @@ class MonitorPolicy:
     def threshold(self, n_channels: int, block_s: float) -> float:
         """Return the statistic from which a fault is believed: χ²(1) at the stated rate of false alarms."""
         tests = self.tests_per_channel * n_channels * 3600.0 / block_s
-        return float(chi2.isf(min(0.5, self.false_alarms_per_hour / tests), 1))
+        share = min(0.5, self.false_alarms_per_hour / tests)
+        return NormalDist().inv_cdf(0.5 * share) ** 2  # quantile of χ²(1)

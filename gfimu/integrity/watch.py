@@ -2,31 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import chi2
 
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
-from gfimu.integrity.blocks import Blocks, block_means
-from gfimu.integrity.fault import ChannelHealth
+from gfimu.integrity.fault import ChannelFault, ChannelHealth
 from gfimu.integrity.kinds import name_kinds
-from gfimu.integrity.monitor import MARGIN, ChannelMonitor
+from gfimu.integrity.monitor import ChannelMonitor
 from gfimu.integrity.policy import MonitorPolicy
-from gfimu.rate.rest_test import RestTest, constant_readings
+from gfimu.integrity.recursion.blocks import block_means
+from gfimu.integrity.residue import agree, larger_errors, with_residue
+from gfimu.integrity.rest import leading_rest_bias
+from gfimu.integrity.start import Settling
+from gfimu.rate.kalman import FilterSettings
+from gfimu.rate.live import LiveRateFilter
 from gfimu.rate.sensing import SensorErrors
 
-__all__ = ["leading_rest_bias", "watch_channels", "watch_from_rest"]
-
-_QUARTER = 0.25  # of the seconds of a recording must be free of faults for the errors of the model to be measured
-_MOVING = 15.0  # range of a channel's block means within a second, in their noise, from which the array moves
-_FEWEST_SECONDS = 8  # of motion, or of rest, that are judged by themselves
-_LEAST_SCALE = 1e-4  # a ratio, where gains and axes are stated as exact
-_LEAST_PLACE = 2e-5  # m, the same of positions
-_LARGEST_FACTOR = 64.0
-_LEAST_REST_S = 1.0  # shortest rest that shows the biases well enough
+__all__ = ["watch_channels", "watch_from_rest", "watch_in_motion"]
 
 
 def watch_channels(
@@ -77,32 +73,94 @@ def watch_channels(
     if not np.isfinite(times).all() or np.any(np.diff(times) <= 0):
         raise InputError("sample times must be finite and increase; drop repeated or reordered samples")
     period = float(np.median(np.diff(times)))
-    samples = (policy or MonitorPolicy()).samples(period)
+    settings = policy or MonitorPolicy()
+    samples = settings.samples(period)
     blocks = block_means(times, rows, errors.limits, samples)
     factor, monitor = 0.5, None
     while monitor is None:
         factor *= 2.0
         trial = ChannelMonitor(
-            array, _larger(errors, factor), period, omega0=omega0, omega0_std=omega0_std, policy=policy
+            array, larger_errors(errors, factor), period, omega0=omega0, omega0_std=omega0_std, policy=settings
         )
-        if factor >= _LARGEST_FACTOR or _agrees(trial, blocks):
+        agrees = agree(trial.follower, blocks, trial.innovations(blocks), settings)
+        if agrees or factor >= settings.largest_factor:
+            trial.refuse(not agrees)
             monitor = trial
-    omega, _, odd = monitor.run(blocks)
+    monitor.extend(blocks)
+    odd = monitor.unexplained
     rate = np.zeros((len(times), 3))
     if len(blocks):
-        rate = np.column_stack([np.interp(times, blocks.t, column) for column in omega.T])
-    faults = name_kinds(array, errors, times, rows, rate, monitor.faults)
-    excluded = np.zeros(rows.shape, dtype=np.bool_)
-    before = (MARGIN + 0.5) * monitor.block_s
-    for fault in faults:
-        inside = (times >= fault.onset_s - before) & (times < fault.end_s)
-        for name in fault.channels:
-            excluded[inside, array.channels.index(name)] = True
+        rate = np.column_stack([np.interp(times, blocks.t, column) for column in monitor.omega.T])
+    faults = name_kinds(array, errors, times, rows, rate, monitor.faults, policy=settings)
+    doubts = tuple(monitor.doubtful)
+    before = (settings.margin + 0.5) * monitor.block_s
+    excluded = _concerned(array, times, faults, before)
     unexplained = np.zeros(len(times), dtype=np.bool_)
     unexplained[: len(odd) * samples] = np.repeat(odd, samples)
     return ChannelHealth(
-        tuple(array.channels), faults, excluded, unexplained, monitor.largest_statistic, monitor.threshold, factor
-    )
+        tuple(array.channels), (*faults, *doubts), excluded, _concerned(array, times, doubts, 0.0), unexplained,
+        monitor.largest_statistic, monitor.threshold, factor,
+    )  # fmt: skip
+
+
+def watch_in_motion(
+    array: AccelerometerArray,
+    t: ArrayLike,
+    readings: ArrayLike,
+    errors: SensorErrors,
+    *,
+    omega0: ArrayLike | None,
+    policy: MonitorPolicy | None = None,
+) -> ChannelHealth | None:
+    """Find the faulty channels of a recording that begins in motion, from when the rate filter has settled on.
+
+    Parameters are those of `watch_channels`; ``omega0`` is the rate at the first sample, or None where it is not known.
+    None where the filter never settles: the sign of the rate stays undecided, or the motion does not show the biases;
+    or where the array has too few channels for a fault to be isolated.
+
+    Raises
+    ------
+    InputError
+        As `watch_channels`.
+    """
+    settings = policy or MonitorPolicy()
+    if array.n_channels - 7 < settings.fewest_null:
+        return None
+    times, rows = np.asarray(t, dtype=float), np.asarray(readings, dtype=float)
+    period = float(np.median(np.diff(times)))
+    start_omega = None if omega0 is None else np.asarray(omega0, dtype=float)
+    live = LiveRateFilter(array, errors, period, FilterSettings(start_omega=start_omega))
+    second = max(1, round(1.0 / period))
+    settling, done, start = Settling(period, settings), 0, None
+    for first in range(0, len(times), second):
+        part = slice(first, first + second)
+        estimates = live.push(times[part], rows[part])
+        settling.add(estimates)
+        done += len(estimates)
+        start = settling.start(live)
+        if start is not None:
+            break
+    if start is None or len(times) - done < 2:
+        return None
+    left = with_residue(array, errors, settings)
+    left = replace(left, bias_std=np.maximum(left.bias_std, start.bias_std))
+    found = watch_channels(
+        array, times[done:], rows[done:] - start.bias, left,
+        omega0=start.omega, omega0_std=max(start.omega_std, 1e-3), policy=settings,
+    )  # fmt: skip
+    return found.behind(done)
+
+
+def _concerned(
+    array: AccelerometerArray, times: NDArray[np.float64], faults: Sequence[ChannelFault], before: float
+) -> NDArray[np.bool_]:
+    """Return which readings the faults concern, shape (n, c), from some seconds before their onsets on."""
+    concerned = np.zeros((len(times), array.n_channels), dtype=np.bool_)
+    for fault in faults:
+        inside = (times >= fault.onset_s - before) & (times < fault.end_s)
+        for name in fault.channels:
+            concerned[inside, array.channels.index(name)] = True
+    return concerned
 
 
 def watch_from_rest(
@@ -129,71 +187,8 @@ def watch_from_rest(
         return None
     times = np.asarray(t, dtype=float)
     rows = np.asarray(readings, dtype=float)
-    bias = leading_rest_bias(array, float(np.median(np.diff(times))), rows, errors)
+    bias = leading_rest_bias(array, float(np.median(np.diff(times))), rows, errors, settings)
     if bias is None:
         return None
-    left = replace(
-        errors,
-        bias_std=np.full(array.n_channels, settings.bias_std),
-        scale_std=max(errors.scale_std, settings.gain_std),
-        placement_std=max(errors.placement_std, settings.place_std),
-    )
+    left = with_residue(array, errors, settings)
     return watch_channels(array, times, rows - bias, left, policy=settings)
-
-
-def _larger(errors: SensorErrors, factor: float) -> SensorErrors:
-    """Return the errors with those of gains, axes and positions larger by a factor."""
-    if factor == 1.0:
-        return errors
-    return replace(
-        errors,
-        scale_std=factor * max(errors.scale_std, _LEAST_SCALE),
-        placement_std=factor * max(errors.placement_std, _LEAST_PLACE),
-    )
-
-
-def _agrees(monitor: ChannelMonitor, blocks: Blocks) -> bool:
-    """Whether a quarter of all seconds of motion, and of rest, have innovations that the stated errors explain."""
-    per_second = max(1, round(1.0 / monitor.block_s))
-    count = len(blocks) // per_second
-    freedom = monitor.null_count * per_second
-    if count == 0 or freedom == 0:
-        return True
-    whole = slice(0, count * per_second)
-    nis = monitor.innovations(blocks)[whole].reshape(count, per_second).mean(axis=1)
-    spread = np.ptp(blocks.means[whole].reshape(count, per_second, -1), axis=1) / monitor.noise_of_means
-    moving = spread.max(axis=1) > _MOVING
-    limit = chi2.ppf(1.0 - _QUARTER, freedom) / freedom
-    parts = [nis[part] for part in (moving, ~moving) if part.sum() >= min(count, _FEWEST_SECONDS)]
-    return all(bool(np.quantile(part, _QUARTER) <= limit) for part in parts)
-
-
-def leading_rest_bias(
-    array: AccelerometerArray, period: float, readings: NDArray[np.float64], errors: SensorErrors
-) -> NDArray[np.float64] | None:
-    """Return what the mean readings at the start say of the biases, shape (c,), m/s²; None without a rest there.
-
-    Of the mean reading, the specific force p that fits it best is taken off: that is gravity. What of a bias looks like
-    a specific force stays unknown, and changes neither α nor the null space.
-
-    Parameters
-    ----------
-    array : AccelerometerArray
-        An array that sees all six motions, with c channels.
-    period : float
-        Sample period, s.
-    readings : ndarray, shape (n, c)
-        Specific force, m/s²; NaN where missing.
-    errors : SensorErrors
-        Noise of the channels.
-    """
-    constant = constant_readings(array, readings, errors.noise_std, period)
-    length = len(constant) if constant.all() else int(np.argmin(constant))
-    window = RestTest().window(period)
-    if length < len(constant):
-        length -= window  # the last block may be the start of a slow motion
-    if length * period < _LEAST_REST_S:
-        return None
-    mean = np.mean(readings[:length], axis=0)
-    gravity = array.regression_matrix[:, 3:]
-    return np.asarray(mean - gravity @ np.linalg.lstsq(gravity, mean, rcond=None)[0])

@@ -234,7 +234,8 @@ def estimate(
         Whether to go on with a recording that its checks refuse; what they found is kept as a warning.
     keep_faulty : bool
         Use every channel, without looking for faulty ones. By default ``filter`` and ``smoother`` leave out channels
-        that contradict the others, while they do so (`gfimu.integrity`); that needs a rest at the start.
+        that contradict the others, while they do so (`gfimu.integrity`): from the first sample after a rest, else
+        from when the rate has settled.
     findings : sequence of Finding, optional
         What `gfimu.recording.checks.check_recording` found, if it was run already.
     progress : callable, optional
@@ -270,8 +271,8 @@ def estimate(
     noise = white_noise_std(array, recording.sample_rate) if noise_std is None else np.asarray(noise_std, dtype=float)
     noise = np.broadcast_to(noise, array.n_channels)
     health = None
-    if chosen.recursive and not keep_faulty and rate0 is not None and not rate0.any():
-        health = _watch(recording, array, readings, noise)
+    if chosen.recursive and not keep_faulty:
+        health = _watch(recording, array, readings, noise, rate0)
     if health is not None:
         readings = np.where(health.excluded, np.nan, readings)
     linear = linear_solution(array, readings, noise, form=form)
@@ -344,15 +345,22 @@ def estimate(
 
 
 def _watch(
-    recording: Recording, array: AccelerometerArray, readings: NDArray[np.float64], noise: NDArray[np.float64]
+    recording: Recording,
+    array: AccelerometerArray,
+    readings: NDArray[np.float64],
+    noise: NDArray[np.float64],
+    omega0: NDArray[np.float64] | None,
 ) -> ChannelHealth | None:
     """Look for faulty channels; None where that can't be done."""
-    from gfimu.integrity.watch import watch_from_rest
+    from gfimu.integrity.watch import watch_from_rest, watch_in_motion
 
     errors = SensorErrors.from_parts(array, recording.sample_rate, step=_step_of(readings), noise_std=noise)
     if errors.stuck_after == 0:  # steps coarser than the noise: rounding errors last, and look like faults
         return None
-    return watch_from_rest(array, recording.t_s, readings, errors)
+    health = None
+    if omega0 is not None and not omega0.any():
+        health = watch_from_rest(array, recording.t_s, readings, errors)
+    return health or watch_in_motion(array, recording.t_s, readings, errors, omega0=omega0)
 
 
 def _integrate(problem: RateProblem) -> RateSolution:

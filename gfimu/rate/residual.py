@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from gfimu.bounds import omega_products_jacobian
+from gfimu.bounds.sample import omega_products_jacobian
 from gfimu.rate.recursion_data import COMPILE
 
 __all__ = ["Residual", "bounded_covariance", "least_curvature", "residual_of"]

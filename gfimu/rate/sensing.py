@@ -17,12 +17,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import scipy.linalg
 from numpy.typing import ArrayLike, NDArray
 
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.geometry.kinematics import require_all_motions
+from gfimu.geometry.observability import null_rows
 from gfimu.parts.part import white_noise_std
 from gfimu.parts.part_file import PartFile
 from gfimu.short_repr import short_repr
@@ -210,17 +210,15 @@ class ChannelTables:
         present = np.array([not (missing >> channel) & 1 for channel in range(c)])
         rows = np.zeros((3, c))
         bias, leak, noise = np.zeros((3, d)), np.zeros((3, 6)), np.zeros((3, 3))
-        null_rows, sensitivity, combination = np.zeros((d, c)), np.zeros((d, 6)), np.zeros((d, d))
+        rows_of_null, sensitivity, combination = np.zeros((d, c)), np.zeros((d, 6)), np.zeros((d, d))
         count = -1
         if np.linalg.matrix_rank(self.array.regression_matrix[present] / self._length_scale, tol=1e-6) == 6:
-            if missing == 0:
-                kept = np.eye(d)
-            else:  # combinations of the null space that don't touch the missing channels
-                kept = scipy.linalg.null_space(self._basis[:, ~present].T, rcond=_RANK_TOLERANCE).T
+            # Combinations of the null space that don't touch the missing channels.
+            kept = np.eye(d) if missing == 0 else null_rows(self._basis[:, ~present].T)
             count = len(kept)
             smaller = kept @ self._basis  # (count, c)
             smaller[:, ~present] = 0.0
-            null_rows[:count], combination[:count] = smaller, kept
+            rows_of_null[:count], combination[:count] = smaller, kept
             sensitivity[:count] = _clean(smaller @ self.array.centripetal_matrix)
             rows = self._base_alpha if missing == 0 else self._alpha_rows(present, smaller)
             bias = (rows - self._base_alpha) * self._variance @ self._basis.T  # (3, d), Z R Zᵀ = I
@@ -231,7 +229,7 @@ class ChannelTables:
         self.alpha_bias = np.concatenate([self.alpha_bias, bias[None]])
         self.alpha_leak = np.concatenate([self.alpha_leak, leak[None]])
         self.alpha_noise = np.concatenate([self.alpha_noise, noise[None]])
-        self.null_rows = np.concatenate([self.null_rows, null_rows[None]])
+        self.null_rows = np.concatenate([self.null_rows, rows_of_null[None]])
         self.null_sensitivity = np.concatenate([self.null_sensitivity, sensitivity[None]])
         self.null_bias = np.concatenate([self.null_bias, combination[None]])
         self.null_count = np.append(self.null_count, np.int64(count))
@@ -245,13 +243,11 @@ class ChannelTables:
 
     def _whitened_null_space(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Rows Z with Z J = 0 and unit noise, those that see ω best first, and their strengths."""
-        basis = scipy.linalg.null_space(
-            (self.array.regression_matrix / self._length_scale).T, rcond=_RANK_TOLERANCE
-        ).T  # (c - 6, c)
+        basis = null_rows((self.array.regression_matrix / self._length_scale).T)  # (c - 6, c)
         if len(basis) == 0:
             return basis, np.zeros(0)
         cholesky = np.linalg.cholesky(basis * self._variance @ basis.T)
-        white = scipy.linalg.solve_triangular(cholesky, basis, lower=True)
+        white = np.linalg.solve(cholesky, basis)
         rotation, strengths, _ = np.linalg.svd(white @ self.array.centripetal_matrix)
         return rotation.T @ white, strengths
 

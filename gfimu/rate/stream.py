@@ -7,10 +7,10 @@ import itertools
 import json
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from gfimu.errors import InputError
 from gfimu.files.column_file import head_line
@@ -19,11 +19,37 @@ from gfimu.parts.part import Part
 from gfimu.parts.plausible import largest_of_array
 from gfimu.rate.kalman import FilterSettings
 from gfimu.rate.live import LiveRateFilter
-from gfimu.rate.result import RateEstimate
+from gfimu.rate.result import ChannelReport, RateEstimate
 from gfimu.rate.sensing import SensorErrors
 from gfimu.units import GYRO_COLUMNS, READING_UNITS
 
-__all__ = ["StreamLayout", "StreamSample", "filter_stream", "read_head", "stream_samples"]
+__all__ = ["StreamFilter", "StreamLayout", "StreamSample", "filter_stream", "read_head", "stream_samples"]
+
+
+class StreamFilter(Protocol):
+    """A rate filter on a stream that watches its channels (`gfimu.integrity.live.watched_filter`)."""
+
+    @property
+    def report(self) -> ChannelReport:
+        """What was wrong with the channels so far."""
+        ...
+
+    @property
+    def health(self) -> list[int] | None:
+        """Health of each channel now: 0 used, 1 in doubt, 2 not used; None while nothing is watched."""
+        ...
+
+    def push(self, t: ArrayLike, readings: ArrayLike, gyro: ArrayLike | None = None) -> RateEstimate:
+        """Take one sample; return the estimates that are ready."""
+        ...
+
+    def finish(self) -> RateEstimate:
+        """Return the estimates of the last samples."""
+        ...
+
+    def take_news(self) -> list[dict[str, Any]]:
+        """Return what changed since this was asked last: one line each, as JSON can hold it."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -151,6 +177,7 @@ def filter_stream(
     settings: FilterSettings | None = None,
     *,
     fuse_gyro: bool = False,
+    watched: StreamFilter | None = None,
 ) -> Iterator[str]:
     """Filter a stream of CSV lines, sample by sample.
 
@@ -158,7 +185,8 @@ def filter_stream(
     size a line ``# lsb_m_s2: …`` before it or the array's part gives). Each estimate is one JSON line:
     ``t_s``, ``omega_rad_s``, ``omega_std_rad_s``, ``nis`` and its degrees of freedom, ``rest`` where a block of rest
     ended, ``sign``, and ``fault`` where something was wrong with the line or its channels. A line that can't be read
-    is reported and skipped.
+    is reported and skipped. With a filter that watches its channels each line has ``health``, one number per channel of
+    the array, and a line with ``event``, ``faults`` and ``text`` comes when a channel is excluded, or used again.
 
     Parameters
     ----------
@@ -174,6 +202,8 @@ def filter_stream(
         Start, quadrature, rest.
     fuse_gyro : bool
         Whether to use the stream's gyro columns.
+    watched : StreamFilter, optional
+        A filter that watches its channels, in place of one by ``settings``.
 
     Yields
     ------
@@ -185,7 +215,7 @@ def filter_stream(
     InputError
         If the first line doesn't name the columns.
     """
-    live = LiveRateFilter(array, errors, period, settings, gyro=fuse_gyro)
+    live = watched or LiveRateFilter(array, errors, period, settings, gyro=fuse_gyro)
     reported: dict[str, Any] = live.report.to_dict()
     for sample in stream_samples(lines, array, gyro=fuse_gyro):
         if isinstance(sample, str):
@@ -199,8 +229,10 @@ def filter_stream(
         faults = live.report.to_dict()
         news = {key: value for key, value in faults.items() if value != reported[key]}
         reported = faults
-        yield from _lines(found, news)
-    yield from _lines(live.finish(), {})
+        yield from _lines(found, news, None if watched is None else watched.health)
+        if watched is not None:
+            yield from (json.dumps(event) for event in watched.take_news())
+    yield from _lines(live.finish(), {}, None if watched is None else watched.health)
 
 
 def stream_samples(
@@ -254,7 +286,7 @@ def _numbers(cells: list[str], layout: StreamLayout) -> np.ndarray:
         raise InputError(f"{error}; line skipped") from None
 
 
-def _lines(found: RateEstimate, faults: dict[str, Any]) -> Iterator[str]:
+def _lines(found: RateEstimate, faults: dict[str, Any], health: list[int] | None) -> Iterator[str]:
     std = found.std
     for k in range(len(found)):
         record: dict[str, Any] = {
@@ -267,6 +299,8 @@ def _lines(found: RateEstimate, faults: dict[str, Any]) -> Iterator[str]:
         }
         if found.rest[k]:
             record["rest"] = True
+        if health is not None:
+            record["health"] = health
         if faults and k == len(found) - 1:
             record["fault"] = faults
         yield json.dumps(record)

@@ -21,7 +21,7 @@ _ARRAY = "scene/array"
 
 
 class LivePicture:
-    """What a stream of readings and rates is drawn as; the stream holds ``readings/a11`` … and ``omega/x`` ….
+    """What a stream is drawn as; it holds ``readings/a11`` …, ``omega/x`` … and ``health/a11`` ….
 
     Parameters
     ----------
@@ -53,6 +53,7 @@ class LivePicture:
             stream.log(
                 f"readings/{channel}", rr.SeriesLines(names=[channel], colors=[colour], widths=[1.2]), static=True
             )
+            stream.log(f"health/{channel}", rr.SeriesLines(names=[channel], colors=[colour], widths=[2.0]), static=True)
         for axis, colour in zip("xyz", AXES, strict=True):
             stream.log(f"omega/{axis}", rr.SeriesLines(names=[f"ω {axis}"], colors=[colour], widths=[1.5]), static=True)
         stream.log(_NOTES, rr.TextDocument(self._notes(), media_type=rr.MediaType.MARKDOWN), static=True)
@@ -77,13 +78,18 @@ class LivePicture:
             for axis in range(most)
         ]
         rate = rrb.TimeSeriesView(origin="/omega", name="angular rate ω, rad/s")
+        health = rrb.TimeSeriesView(
+            origin="/health",
+            name=f"health, a lane per channel, {array.channels[0]} at the top; raised: not used",
+            plot_legend=rrb.PlotLegend(visible=False),
+        )
         left = rrb.Vertical(
             scene.view(scene_title(array)),
             rrb.TextDocumentView(origin=f"/{_NOTES}", name="what you see"),
             row_shares=[3, 2],
         )
         return rrb.Blueprint(
-            rrb.Horizontal(left, rrb.Vertical(*lines, rate), column_shares=[2, 3]),
+            rrb.Horizontal(left, rrb.Vertical(*lines, rate, health), column_shares=[2, 3]),
             rrb.BlueprintPanel(state="collapsed"),
             rrb.SelectionPanel(state="collapsed"),
             auto_views=False,
@@ -97,6 +103,9 @@ than they are; each has one hue in all pictures. At rest the arrows together poi
 
 **Plots.** One line per chip; time on the board's clock, in seconds. The rate is there once the filter has started, and
 only where the array sees all six motions.
+
+**Health.** A line stands at the bottom of its lane while its channel is used, in the middle while it is in doubt, at
+the top when it contradicts the others and is not used for the rate. Needs a rest of some seconds at the start.
 
 {array_words(self._array)}
 """

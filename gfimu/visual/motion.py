@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,6 +64,11 @@ class MotionEstimate(Protocol):
     @property
     def position(self) -> NDArray[np.float64] | None:
         """Position of the body origin in the world, m, shape (n, 3), where it was asked for."""
+        ...
+
+    @property
+    def health(self) -> Mapping[str, NDArray[Any]] | None:
+        """Health of each channel by name, shape (n,): 0 used, 1 in doubt, 2 not used; None where not watched."""
         ...
 
 

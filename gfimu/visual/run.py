@@ -46,6 +46,7 @@ from gfimu.visual.run_plots import (
     angle_plot,
     drift_plot,
     free_rate_plots,
+    health_plot,
     motion_plots,
     position_plot,
     raw_plots,
@@ -118,6 +119,8 @@ def write_run(
         place = position_plot(estimate, known)
         if place is not None and estimate.position is not None:
             cells.append([place, PositionTrace(estimate.t_s, estimate.position, true_displacement(known))])
+        if estimate.health:
+            cells.insert(len(rates), [health_plot(estimate.t_s, estimate.health, array)])
     angle = angle_plot(estimate, known, about) if spins or known is not None else None
     cells += [[plot] for plot in (angle, drift_plot(drift) if drift is not None else None) if plot is not None]
     write_rrd(

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,7 @@ __all__ = [
     "angle_plot",
     "drift_plot",
     "free_rate_plots",
+    "health_plot",
     "motion_plots",
     "position_plot",
     "raw_plots",
@@ -28,6 +30,7 @@ __all__ = [
 _NAMES = ("x", "y", "z")
 _BOTH_SIDES = 2 * np.array([-1.0, 1.0])  # ±2σ
 _CHIPS_PER_GROUP = 8
+_NOT_USED = 2  # of the codes of health
 _SHOWN = 0.9  # of the errors and their band
 
 
@@ -196,6 +199,22 @@ def drift_plot(drift: ExpectedDrift) -> Plot:
         "position drift, m",
         [band, *[Line(f"error {name}", drift.t, drift.error[:, axis], AXES[axis]) for axis, name in enumerate(_NAMES)]],
     )
+
+
+def health_plot(t: NDArray[np.float64], health: Mapping[str, NDArray[Any]], array: AccelerometerArray) -> Plot:
+    """Lane of each channel, the first at the top: thin while it is used, thick in doubt and where it is not used."""
+    names = [name for name in array.channels if name in health]
+    codes = np.column_stack([health[name] for name in names])  # (n, c)
+    lanes = np.broadcast_to(-np.arange(len(names), dtype=float), codes.shape)
+    lines = [Line("used", t, np.where(codes == 0, lanes, np.nan), TRUTH, 1.0)]
+    if (codes == 1).any():
+        lines.append(Line("in doubt", t, np.where(codes == 1, lanes, np.nan), ESTIMATE, 4.0))
+    for column in np.flatnonzero((codes == _NOT_USED).any(axis=0)):
+        colour = chip_colour(int(array.chip_of_channel[array.channels.index(names[column])]))
+        left_out = np.where(codes[:, column] == _NOT_USED, lanes[:, column], np.nan)
+        lines.append(Line(f"{names[column]} not used", t, left_out, colour, 8.0))
+    title = f"health, a lane per channel from {names[0]} (top) to {names[-1]}"
+    return Plot(title, lines, span=(-len(names) + 0.5, 0.5))
 
 
 def _span(

@@ -75,6 +75,21 @@ def test_optimize_writes_an_array_that_score_reads(gfimu_command, tmp_path):
     assert content["arrays"][0]["gdop"] == pytest.approx(1.0607, abs=5e-5)
 
 
+def test_the_least_fault_of_each_channel_is_listed_on_demand(gfimu_command):
+    short = json.loads(gfimu_command("score", "cube12", "corners8", "--json").stdout)["arrays"]
+    cube, corners = (entry["least_fault"] for entry in short)
+    assert cube["detected_m_s2"] > corners["detected_m_s2"] > 0.0
+    assert cube["detected_without_rate_m_s2"] is None
+    assert "channels" not in cube
+    long = json.loads(gfimu_command("score", "cube12", "--per-channel", "--fault-time-s", 10, "--json").stdout)
+    slow = long["arrays"][0]["least_fault"]
+    assert [row["channel"] for row in slow["channels"]] == list(AccelerometerArray.load("cube12").channels)
+    assert slow["detected_m_s2"] == max(row["detected_m_s2"] for row in slow["channels"]) < cube["detected_m_s2"]
+    table = gfimu_command("score", "cube12", "corners8", "--per-channel").stdout
+    assert "corners8 protects best" in table
+    assert "a43" in table
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -83,6 +98,7 @@ def test_optimize_writes_an_array_that_score_reads(gfimu_command, tmp_path):
         (("score", "missing.xml"), "missing.xml: no such file"),
         (("score", "cube12", "--spin-axis", "w"), "unknown axis 'w'; valid: x, y, z"),
         (("score", "cube12", "--noise-m-s2", "0"), "noise_std"),
+        (("score", "cube12", "--fault-time-s", "0"), "fault time 0.0 s: must be positive"),
         (("optimize", "--chips", "2", "--restarts", "2"), "can't see angular acceleration"),
         (("optimize", "--chips", "4", "--out", "best.json"), "ends in .toml"),
     ],

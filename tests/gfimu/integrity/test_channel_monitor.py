@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
-from watched_world import CALIBRATED, CUBE, GRAVITY, readings
+from watched_world import CALIBRATED, CUBE, GRAVITY, RATE_HZ, readings
 
 from gfimu.errors import InputError
 from gfimu.integrity import MonitorPolicy, watch_channels
-from gfimu.integrity.watch import watch_from_rest
+from gfimu.integrity.watch import watch_from_rest, watch_in_motion
+from gfimu.rate.sensing import SensorErrors
 
 MG = 1e-3 * GRAVITY
 NAMES = list(CUBE.channels)
@@ -42,6 +43,18 @@ def test_a_small_step_is_found_within_a_second(kind, channel):
     assert abs(fault.sizes[0] - size) < 4 * fault.sizes_std[0]
     assert health.excluded[t > onset, channel].all()
     assert health.excluded[t < onset - 0.5].sum() == 0
+
+
+@pytest.mark.parametrize("kind", ["rest", "tumble", "turn"])
+def test_the_size_of_a_step_is_as_sure_as_it_says(kind):
+    scores = []
+    for seed in range(12):
+        t, y, _ = readings(kind, 700 + seed, duration=13.0)
+        y[t >= 8.0, seed] += 25 * MG
+        (fault,) = watch_channels(CUBE, t, y, CALIBRATED).faults
+        scores.append((fault.sizes[0] - 25 * MG) / fault.sizes_std[0])
+    assert 0.5 < np.sqrt(np.mean(np.square(scores))) < 1.55  # χ²(12) within 0.2 % on either side
+    assert np.abs(scores).max() < 4.0
 
 
 def test_a_gain_is_found_while_the_reading_changes():
@@ -107,19 +120,20 @@ def test_a_channel_that_lacks_readings_is_no_fault():
 
 
 def test_after_an_exclusion_the_rate_stays_within_its_deviation():
-    from gfimu.integrity.blocks import block_means
     from gfimu.integrity.monitor import ChannelMonitor
+    from gfimu.integrity.recursion.blocks import block_means
 
     t, y, omega = readings("tumble", 9)
     y[t >= 8.0, 0] += 50 * MG
     monitor = ChannelMonitor(CUBE, CALIBRATED, 0.01)
     blocks = block_means(t, y, CALIBRATED.limits, monitor.samples)
-    found, std, _ = monitor.run(blocks)
+    monitor.extend(blocks)
+    found, std = monitor.omega, monitor.omega_std
     true = omega.reshape(len(blocks), monitor.samples, 3).mean(axis=1)
     late = blocks.t > 8.5
     assert np.mean(np.abs(found - true)[late] < 3 * std[late]) > 0.97
     monitor = ChannelMonitor(CUBE, CALIBRATED, 0.01, policy=MonitorPolicy(false_alarms_per_hour=1e-300))
-    monitor.run(blocks)  # a threshold that nothing reaches
+    monitor.extend(blocks)  # a threshold that nothing reaches
 
 
 def test_a_rest_at_the_start_shows_the_biases():
@@ -129,6 +143,48 @@ def test_a_rest_at_the_start_shows_the_biases():
     y[times >= 12.0, 8] += 15 * MG
     assert named(watch_from_rest(CUBE, times, y, CALIBRATED)) == {NAMES[8]}
     assert watch_from_rest(CUBE, times, y[::-1] + np.sin(9 * times)[:, None], CALIBRATED) is None
+
+
+@pytest.mark.parametrize("kind", ["tumble", "turn"])
+def test_a_run_that_begins_in_motion_is_watched_once_the_rate_has_settled(kind):
+    t, y, omega = readings(kind, 11, duration=67.0)
+    errors = SensorErrors.from_parts(CUBE, RATE_HZ)
+    y = y + np.random.default_rng(3).normal(0.0, errors.bias_std)
+    t, y, omega = t[700:] - t[700], y[700:], omega[700:]
+    assert watch_in_motion(CUBE, t, y, errors, omega0=omega[0]).sound
+    y[t >= 40.0, 10] += 15 * MG
+    health = watch_in_motion(CUBE, t, y, errors, omega0=omega[0])
+    (fault,) = health.faults
+    assert fault.channels == (NAMES[10],)
+    assert fault.onset_s == pytest.approx(40.0, abs=0.35)
+    assert health.excluded[t > 41.0, 10].all()
+    assert health.excluded.shape == y.shape
+
+
+def test_a_run_whose_start_is_not_known_is_not_watched_while_its_sign_is_undecided():
+    t, y, _ = readings("turn", 11, duration=20.0)
+    assert watch_in_motion(CUBE, t[700:], y[700:], SensorErrors.from_parts(CUBE, RATE_HZ), omega0=None) is None
+
+
+@pytest.mark.parametrize("kind", ["rest", "tumble"])
+def test_two_equal_faults_that_look_like_two_others_are_both_named(kind):
+    """For some pairs of cube12 two equal faults at once are exactly two others: both are named, none is guessed."""
+    pair = {"rest": (2, 5), "tumble": (5, 11)}[kind]
+    seed, onset = {"rest": (1013, 7.01), "tumble": (1000, 8.17)}[kind]
+    t, y, _ = readings(kind, seed)
+    y[np.ix_(t >= onset, pair)] += 20 * MG
+    health = watch_channels(CUBE, t, y, CALIBRATED)
+    (fault,) = health.faults
+    assert not fault.isolated
+    assert not fault.excluded
+    assert {NAMES[i] for i in pair} in [set(names) for names in fault.alternatives]
+    assert len(fault.alternatives) == 2
+    assert ", or in" in fault.sentence()
+    codes = health.codes()
+    inside = (t > fault.onset_s) & (t < fault.end_s)
+    concerned = [NAMES.index(name) for name in fault.channels]
+    assert (codes[np.ix_(inside, concerned)] == 1).all()
+    assert not health.excluded.any()
 
 
 def test_bad_input_is_refused():

@@ -32,6 +32,7 @@ class Motion:
     omega_std: np.ndarray
     quaternion: np.ndarray
     position: np.ndarray | None = None
+    health: dict[str, np.ndarray] | None = None
 
 
 @dataclass(frozen=True)
@@ -118,6 +119,27 @@ def test_the_way_of_the_body_is_a_line_and_a_point_that_runs_along_it(tmp_path, 
     assert_allclose(numbers(found["/trace/estimate"]["strips"]), way, rtol=1e-6, atol=1e-6)
     plotted = next(name for name in found if "position_in_the_world" in name and name.endswith("y"))
     assert_allclose(numbers(found[plotted]["scalars"]), way[:, 1])
+
+
+def test_each_channel_has_a_lane_of_its_health(tmp_path, run):
+    count = len(run.estimate.t_s)
+    health = {name: np.zeros(count, dtype=np.int8) for name in run.array.channels}
+    health["a21"][10:] = 2
+    health["a43"][:5] = 1
+    path = tmp_path / "run.rrd"
+    write_run(path, run.recording, run.array, estimate=replace(run.estimate, health=health), known=run.known)
+    lanes = {name: numbers(columns["scalars"]) for name, columns in contents(path).items()
+             if "health" in name and "scalars" in columns}  # fmt: skip
+    used, doubt, left_out = (
+        next(lanes[name] for name in lanes if name.endswith(end)) for end in ("used", "in_doubt", "a21_not_used")
+    )
+    expected = np.tile(-np.arange(12.0), (count, 1))
+    expected[10:, 3] = np.nan
+    expected[:5, 11] = np.nan
+    assert_allclose(used, expected)
+    assert_allclose(left_out, np.where(np.arange(count) >= 10, -3.0, np.nan))
+    assert_allclose(doubt[:5, 11], -11.0)
+    assert np.isnan(doubt[5:]).all()
 
 
 def test_truth_turns_the_rig_and_the_estimate_its_ghost(tmp_path, run):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +41,26 @@ class Blocks:
 
     def __len__(self) -> int:
         return len(self.t)
+
+    def rows(self, part: slice) -> Blocks:
+        """Return some of the blocks, as views."""
+        return Blocks(self.samples, self.t[part], self.means[part], self.missing[part], self.readings[part])
+
+    def joined(self, later: Blocks) -> Blocks:
+        """Return these blocks and those behind them."""
+        return Blocks(
+            self.samples,
+            np.concatenate([self.t, later.t]),
+            np.concatenate([self.means, later.means]),
+            np.concatenate([self.missing, later.missing]),
+            np.concatenate([self.readings, later.readings]),
+        )
+
+    def samples_of(self, period: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return times (m B,), a sample period apart within a block, and readings (m B, c), NaN in missing blocks."""
+        place = (np.arange(self.samples) - (self.samples - 1) / 2.0) * period
+        rows = np.where(self.missing[:, None, :], np.nan, self.readings)
+        return (self.t[:, None] + place).ravel(), rows.reshape(-1, rows.shape[2])
 
 
 def block_means(
@@ -81,11 +102,16 @@ def scatter(blocks: Blocks, rows: slice, null_rows: NDArray[np.float64]) -> tupl
         Ratios, shape (m, c), zero for channels that are not used, and their degrees of freedom.
     """
     samples = blocks.samples
-    place = np.arange(samples) - (samples - 1) / 2.0
-    motion, _ = np.linalg.qr(np.column_stack([np.ones(samples), place, place**2]))
-    keep = np.eye(samples) - motion @ motion.T
-    white = keep @ (blocks.readings[rows] @ null_rows.T)  # (m, B, d)
+    white = _without_motion(samples) @ (blocks.readings[rows] @ null_rows.T)  # (m, B, d)
     length = np.sum(null_rows**2, axis=0)  # (c,)
     along = white @ null_rows  # (m, B, c)
     energy = np.sum(along**2, axis=1) / (samples - 3)
     return np.where(length > 0.0, energy / np.maximum(length, 1e-30), 0.0), samples - 3
+
+
+@lru_cache(maxsize=16)
+def _without_motion(samples: int) -> NDArray[np.float64]:
+    """Return the projection, shape (B, B), that takes mean, slope and curvature out of B samples."""
+    place = np.arange(samples) - (samples - 1) / 2.0
+    motion, _ = np.linalg.qr(np.column_stack([np.ones(samples), place, place**2]))
+    return np.asarray(np.eye(samples) - motion @ motion.T)

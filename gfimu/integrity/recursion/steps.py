@@ -23,88 +23,24 @@ onset has the most likely sizes f = C_SS⁻¹ d_S and explains T_S = d_Sᵀ f of
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-from gfimu.integrity.isolation import deflate, strongest
+from gfimu.integrity.recursion.signatures import carry_signatures, new_slot, strongest_slot
 from gfimu.rate.recursion_data import COMPILE
 
-__all__ = ["MonitorState", "MonitorTables", "MonitorTuning", "advance"]
+__all__ = ["advance", "model_errors"]
 
 _TINY = 1e-14  # numerical: least variance kept on the diagonal of the covariance
-_LARGEST = 1e12  # numerical: statistics of a filter that has run away
-_SCREEN = 0.6  # of the threshold: below it the statistic is not corrected for model errors, which only lower it
-
-
-class MonitorTables(NamedTuple):
-    """Matrices per set of channels (`gfimu.rate.sensing.ChannelTables`), stacked."""
-
-    alpha: NDArray[np.float64]  # (sets, 3, c)
-    leak: NDArray[np.float64]  # (sets, 3, 6)
-    null: NDArray[np.float64]  # (sets, d, c)
-    sensitivity: NDArray[np.float64]  # (sets, d, 6)
-    null_count: NDArray[np.int64]  # (sets,) directions of the null space; −1 where α can't be seen
-    noise: NDArray[np.float64]  # (sets, 3, 3) of α, per sample
-
-
-class MonitorTuning(NamedTuple):
-    """Numbers that stay the same over a run."""
-
-    samples: int  # per block
-    period: float  # of the blocks, s
-    threshold: float  # of a fault
-    oldest: float  # blocks
-    walk: float  # (m/s²)²/s
-    forget: float  # of the range of readings, per block
-    scale_std: float  # of gains and axes, a ratio
-    placement_std: float  # m
-    floor: float  # m/s²
-
-
-class MonitorState(NamedTuple):
-    """What is carried from one block to the next."""
-
-    omega: NDArray[np.float64]  # (3,)
-    bias: NDArray[np.float64]  # (c,)
-    covariance: NDArray[np.float64]  # (3 + c, 3 + c)
-    last: NDArray[np.float64]  # (c,) mean readings of the block before
-    low: NDArray[np.float64]  # (c,) range of the readings
-    high: NDArray[np.float64]  # (c,)
-    ages: NDArray[np.float64]  # (slots,) blocks since the onset, oldest first; 0: unused
-    signature: NDArray[np.float64]  # (slots, 3 + c, c) G
-    information: NDArray[np.float64]  # (slots, c, c) C
-    score: NDArray[np.float64]  # (slots, c) d
-    started: NDArray[np.bool_]  # (1,)
-    largest: NDArray[np.float64]  # (1,) statistic of a channel so far, beyond what model errors explain
-    past_rate: NDArray[np.float64]  # (h, 3) before each of the last blocks, rings; block k at k mod h
-    past_bias: NDArray[np.float64]  # (h, c)
-    past_covariance: NDArray[np.float64]  # (h, 3 + c, 3 + c)
-    past_means: NDArray[np.float64]  # (h, 3, c) last mean readings, low, high
-
-    def copy(self) -> MonitorState:
-        """Return a state that shares nothing with this one."""
-        return MonitorState._make(field.copy() for field in self)
-
-    def go_back(self, block: int) -> None:
-        """Return to the state before a block; it must be one of the last h."""
-        place = block % len(self.past_rate)
-        self.omega[:] = self.past_rate[place]
-        self.bias[:] = self.past_bias[place]
-        self.covariance[:] = self.past_covariance[place]
-        self.last[:], self.low[:], self.high[:] = self.past_means[place]
-        self.ages[:] = 0.0
-        self.started[0] = block > 0
 
 
 @njit(**COMPILE)
-def advance(tables, tuning, state, means, steps, sets, levels, watched, omega, std, nis, first, last):  # type: ignore[no-untyped-def]
+def advance(tables, tuning, state, means, steps, sets, levels, watched, omega, std, nis, first, last, base):  # type: ignore[no-untyped-def]
     """Take the blocks ``first`` to ``last − 1``; stop behind one in which a fault is seen.
 
     ``means`` (n, c), ``steps`` (n,) s since the block before, ``sets`` (n,) of channels, ``levels`` (n,) measured
-    variance of the null space over the stated one. ``omega``, ``std`` (n, 3) and ``nis`` (n,) are filled.
+    variance of the null space over the stated one. ``omega``, ``std`` (n, 3) and ``nis`` (n,) are filled. ``base`` is
+    the number of the first of the n blocks since the start of the run.
 
     Returns
     -------
@@ -116,7 +52,7 @@ def advance(tables, tuning, state, means, steps, sets, levels, watched, omega, s
     pending = 0.0
     k = first
     while k < last:
-        _keep(state, k)
+        _keep(state, base + k)
         place = sets[k]
         level = levels[k]
         transition = np.zeros((3, 3))
@@ -136,8 +72,9 @@ def advance(tables, tuning, state, means, steps, sets, levels, watched, omega, s
         _predict(tables, tuning, state, means[k], step, place, level, transition)
         if step > 1.5 * tuning.period:
             state.ages[:] = 0.0
-        _new_slot(state, tuning.oldest)
-        _carry_signatures(tables, state, transition, step, place)
+        if tuning.follow:
+            new_slot(state, tuning.oldest)
+            carry_signatures(tables, state, transition, step, place)
         nis[k] = _update(tables, tuning, state, means[k], place, level)
         omega[k] = state.omega
         for a in range(3):
@@ -146,7 +83,7 @@ def advance(tables, tuning, state, means, steps, sets, levels, watched, omega, s
         state.started[0] = True
         k += 1
         model_errors(state, tuning, model_std)
-        slot = _strongest_slot(state, tuning, model_std, watched)
+        slot = strongest_slot(state, tuning, model_std, watched)
         if slot >= 0:
             return k, slot
     return k, -1
@@ -159,7 +96,7 @@ def model_errors(state, tuning, std):  # type: ignore[no-untyped-def]
     for a in range(3):
         square += state.omega[a] * state.omega[a]
     for i in range(len(std)):
-        gain = 0.5 * tuning.scale_std * (state.high[i] - state.low[i])
+        gain = tuning.range_share * tuning.scale_std * (state.high[i] - state.low[i])
         place = tuning.placement_std * square
         std[i] = np.sqrt(gain * gain + place * place + tuning.floor * tuning.floor)
 
@@ -266,72 +203,6 @@ def _predict(tables, tuning, state, mean, step, place, level, transition):  # ty
 
 
 @njit(**COMPILE)
-def _new_slot(state, oldest):  # type: ignore[no-untyped-def]
-    """Begin an onset with this block; of too many the one goes whose neighbours are nearest, on a scale of log age."""
-    ages = state.ages
-    used = 0
-    for s in range(len(ages)):
-        if ages[s] > 0.0:
-            used += 1
-    if used == len(ages):
-        drop = 0
-        least = np.inf
-        for s in range(used):
-            if s == 0:
-                gap = 1e8 if ages[0] < oldest else -1.0
-            else:
-                younger = ages[s + 1] if s < used - 1 else 0.0
-                gap = (ages[s - 1] - younger) / (ages[s] + 1.0)
-            if gap < least:
-                least = gap
-                drop = s
-        for s in range(drop, used - 1):
-            state.signature[s] = state.signature[s + 1]
-            state.information[s] = state.information[s + 1]
-            state.score[s] = state.score[s + 1]
-            ages[s] = ages[s + 1]
-        used -= 1
-    state.signature[used] = 0.0
-    state.information[used] = 0.0
-    state.score[used] = 0.0
-    ages[used] = 0.5  # half of the step before lies behind the onset; set to 1 after this block
-
-
-@njit(**COMPILE)
-def _carry_signatures(tables, state, transition, step, place):  # type: ignore[no-untyped-def]
-    """Carry the effect of every fault on the state over to this block, (3)."""
-    alpha_rows = tables.alpha[place]
-    c = alpha_rows.shape[1]
-    moved = np.zeros((3, c))
-    for s in range(len(state.ages)):
-        age = state.ages[s]
-        if age == 0.0:
-            continue
-        g = state.signature[s]
-        if age == 0.5:
-            for a in range(3):
-                for i in range(c):
-                    g[a, i] = 0.5 * step * alpha_rows[a, i]
-            state.ages[s] = 1.0
-            continue
-        for a in range(3):
-            for i in range(c):
-                moved[a, i] = g[a, i] + step * alpha_rows[a, i]
-            for j in range(c):
-                weight = step * alpha_rows[a, j]
-                if weight != 0.0:
-                    for i in range(c):
-                        moved[a, i] -= weight * g[3 + j, i]
-            for b in range(3):
-                weight = transition[a, b]
-                if weight != 0.0:
-                    for i in range(c):
-                        moved[a, i] += weight * g[b, i]
-        g[:3] = moved
-        state.ages[s] = age + 1.0
-
-
-@njit(**COMPILE)
 def _update(tables, tuning, state, mean, place, level):  # type: ignore[no-untyped-def]
     """Measure the null space row by row, (2), with all signatures, (3); returns the normalised innovation squared."""
     c = len(mean)
@@ -411,23 +282,3 @@ def _update(tables, tuning, state, mean, place, level):  # type: ignore[no-untyp
                 for i in range(c):
                     information[m, i] += weight * hg[i]
     return total
-
-
-@njit(**COMPILE)
-def _strongest_slot(state, tuning, model_std, watched):  # type: ignore[no-untyped-def]
-    """Return the slot in which a channel exceeds the threshold most, beyond what model errors explain; −1 if none."""
-    found = -1
-    best = tuning.threshold
-    for s in range(len(state.ages)):
-        if state.ages[s] < 2.0:
-            continue
-        raw = strongest(state.information[s], state.score[s], watched)[1]
-        if not _SCREEN * tuning.threshold < raw < _LARGEST:
-            continue
-        information, score = deflate(state.information[s], state.score[s], model_std)
-        value = strongest(information, score, watched)[1]
-        state.largest[0] = max(state.largest[0], value)
-        if value > best:
-            best = value
-            found = s
-    return found
