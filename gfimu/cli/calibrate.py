@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from gfimu.calibration.registry import METHODS
-from gfimu.cli.mapped import MapOption, MapSetOption
+from gfimu.cli.mapped import ForceOption, MapOption, MapSetOption
 from gfimu.cli.output import JsonOption, print_json, print_paths, print_table
 
 if TYPE_CHECKING:
@@ -68,6 +68,7 @@ def _calibrate(
         float, typer.Option("--bias-walk", help="With --update: random walk of a bias between poses, m/s²/√s.")
     ] = 0.0,
     picture: Annotated[Path | None, typer.Option("--picture", help="Picture to write (.png, .svg, .pdf).")] = None,
+    force: ForceOption = False,
     column_map: MapOption = None,
     map_set: MapSetOption = None,
     json: JsonOption = False,
@@ -98,6 +99,7 @@ def _calibrate(
         turn_on_std=turn_on_std,
         bias_walk=bias_walk,
         picture=picture,
+        force=force,
     )
     written = {"calibration": out} | ({} if picture is None else {"picture": picture})
     if json:

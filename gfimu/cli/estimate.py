@@ -19,7 +19,7 @@ from gfimu.cli.axis_options import (
     PointStdOption,
     RotationStdOption,
 )
-from gfimu.cli.mapped import MapOption, MapSetOption
+from gfimu.cli.mapped import ForceOption, MapOption, MapSetOption
 from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, print_text, progress
 from gfimu.rate.registry import RATE_METHODS, rate_method, recursive_methods
 
@@ -60,9 +60,7 @@ def _estimate(
     ] = False,
     gyro: Annotated[bool, typer.Option("--gyro", help=f"Fuse the recording's gyro ({_RECURSIVE}).")] = False,
     position: Annotated[bool, typer.Option("--position", help="Integrate to velocity and position too.")] = False,
-    force: Annotated[
-        bool, typer.Option("--force", help="Go on where the checks of units, time, array and channels refuse the file.")
-    ] = False,
+    force: ForceOption = False,
     keep_faulty: Annotated[
         bool, typer.Option("--keep-faulty", help=f"Use channels that contradict the others, too ({_RECURSIVE}).")
     ] = False,

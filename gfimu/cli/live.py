@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from gfimu.cli.axis_options import AxisOption, AxisPointOption, HubOption, InclinationOption
+from gfimu.cli.mapped import ForceOption
 
 __all__ = ["register"]
 
@@ -46,6 +47,7 @@ def _live(
     axis_point: AxisPointOption = (0.0, 0.0, 0.0),
     hub: HubOption = "fixed",
     inclination_rad: InclinationOption = None,
+    force: ForceOption = False,
 ) -> None:
     """Estimate the angular rate while samples arrive: CSV lines in, one JSON line per sample out.
 
@@ -74,6 +76,7 @@ def _live(
         axis_point=axis_point,
         hub=hub,
         inclination_rad=inclination_rad,
+        force=force,
     ):
         sys.stdout.write(line + "\n")
         sys.stdout.flush()

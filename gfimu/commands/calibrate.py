@@ -52,6 +52,7 @@ def calibrate(
     turn_on_std: float = 0.03,
     bias_walk: float = 0.0,
     picture: str | Path | None = None,
+    force: bool = False,
     n_parameters: int | None = None,
     min_rest_s: float | None = None,
     levelling_std_rad: float | None = None,
@@ -94,16 +95,19 @@ def calibrate(
         With ``update``: change of a bias between power-ons, m/s², and random walk between poses, m/s²/√s.
     picture : str or Path, optional
         Picture to write, ``.png``, ``.svg`` or ``.pdf``.
+    force : bool
+        Go on, with a warning, where the checks of a recording would refuse it.
 
     Raises
     ------
     InputError
-        If the method is unknown, the data are faulty, the poses don't suffice, or an output can't be written where it
-        is asked for.
+        If the method is unknown, an option has no use with it, a recording is refused by its checks, the data are
+        faulty, the poses don't suffice, or an output can't be written where it is asked for.
     """
     from gfimu.calibration.methods import CalibrationTask, run_calibration
     from gfimu.calibration.registry import calibration_method
-    from gfimu.commands.opened import as_array, as_calibration, by_map
+    from gfimu.commands.opened import as_array, as_calibration, by_map, name_of
+    from gfimu.recording.checks import examine
 
     chosen = calibration_method(method)
     levelling = levelling_std_rad if levelling_std is None else levelling_std
@@ -120,6 +124,10 @@ def calibrate(
     local_gravity = _gravity(gravity, latitude, height)
     source = by_map(recording, column_map, map_set)
     run = _uncalibrated(source, drawing)
+    examine(run, drawing, source=name_of(recording), force=force)
+    turned = None if motion is None else _uncalibrated(by_map(motion, column_map, map_set), drawing)
+    if turned is not None:
+        examine(turned, drawing, source=name_of(motion), force=force)
     task = CalibrationTask(
         run,
         gravity=local_gravity,
@@ -129,7 +137,7 @@ def calibrate(
         min_rest_s=min_rest_s if min_rest is None else min_rest,
         levelling_std_rad=levelling,
         array=_own_array(source) if drawing is None and "array" in chosen.options else drawing,
-        motion=None if motion is None else _uncalibrated(by_map(motion, column_map, map_set), drawing),
+        motion=turned,
         update=None if update is None else as_calibration(update),
         turn_on_std_m_s2=turn_on_std,
         bias_walk_m_s2_rt_s=bias_walk,

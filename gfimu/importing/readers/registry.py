@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from gfimu.errors import InputError, unknown_name
+from gfimu.files.input_file import check_input
 from gfimu.importing.column_map import TextSpec
 from gfimu.importing.raw_table import RawFile
 from gfimu.importing.readers.logs import read_bag, read_mcap, read_ulog
@@ -71,11 +72,10 @@ def format_of(path: Path) -> str:
         if (path / "metadata.yaml").is_file():
             return "rosbag"
         raise InputError(f"{path}: a folder that is no ROS 2 bag; give a file")
+    check_input(path)
     try:
         with path.open("rb") as stream:
             head = stream.read(4096)
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file; check the path") from None
     except OSError as error:
         raise InputError(f"{path}: {error.strerror or error}; check the path") from None
     if not head:

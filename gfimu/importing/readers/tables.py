@@ -14,22 +14,22 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from gfimu.errors import GfimuError, InputError
+from gfimu.files.input_file import parsing
 from gfimu.importing.column_map import TextSpec
 from gfimu.importing.raw_table import RawFile, RawTable
 from gfimu.importing.readers.text import table_of_text
 
 __all__ = ["arrow_table", "read_archive", "read_hdf5", "read_matlab", "read_parquet"]
 
+_MOST_UNPACKED = 64 << 20  # bytes that any archive may unpack to
+_MOST_PACKED = 25  # bytes from one packed byte
 _MOST_COLUMNS = 64  # of one matrix: what has more is no table of samples
 
 
 def read_parquet(path: Path, text: TextSpec = TextSpec()) -> RawFile:
     """Read a Parquet file."""
-    try:
-        table = pq.read_table(path)
-    except (pa.ArrowException, OSError) as error:
-        raise InputError(f"{path}: damaged Parquet file ({str(error).splitlines()[0][:120]}); write it again") from None
-    return RawFile(str(path), "parquet", {"": arrow_table(table)})
+    with parsing(path, "Parquet file", "write it again"):
+        return RawFile(str(path), "parquet", {"": arrow_table(pq.read_table(path))})
 
 
 def arrow_table(table: pa.Table) -> RawTable:
@@ -50,12 +50,12 @@ def arrow_table(table: pa.Table) -> RawTable:
 
 def read_archive(path: Path, text: TextSpec = TextSpec()) -> RawFile:
     """Read the text files of a zip archive, each as a table."""
-    try:
-        with zipfile.ZipFile(path) as archive:
-            members = [one for one in archive.namelist() if Path(one).suffix.lower() in {".csv", ".txt", ".tsv"}]
-            tables = {one: _member(archive.read(one), path, one, text) for one in members}
-    except (zipfile.BadZipFile, OSError, RuntimeError) as error:
-        raise InputError(f"{path}: damaged archive ({error}); copy it again") from None
+    with parsing(path, "archive", "copy it again"), zipfile.ZipFile(path) as archive:
+        members = [one for one in archive.namelist() if Path(one).suffix.lower() in {".csv", ".txt", ".tsv"}]
+        most = max(_MOST_UNPACKED, _MOST_PACKED * path.stat().st_size)
+        if sum(archive.getinfo(one).file_size for one in members) > most:
+            raise InputError(f"{path}: unpacks to more than {most >> 20} MB, as no recording does; unpack it and look")
+        tables = {one: _member(archive.read(one), path, one, text) for one in members}
     found = {name: table for name, table in tables.items() if table is not None}
     if not found:
         raise InputError(f"{path}: no text file with numbers in the archive; unpack it and give the recording")
@@ -72,18 +72,16 @@ def _member(data: bytes, path: Path, name: str, text: TextSpec) -> RawTable | No
 def read_matlab(path: Path, text: TextSpec = TextSpec()) -> RawFile:
     """Read the variables of a MATLAB file; those of equal length are one table."""
     from scipy.io import loadmat
-    from scipy.io.matlab import MatReadError
 
-    try:
-        content = loadmat(path, simplify_cells=True)
-    except NotImplementedError:  # version 7.3 is HDF5
-        return read_hdf5(path, text)
-    except (ValueError, TypeError, OSError, IndexError, KeyError, MatReadError) as error:
-        raise InputError(f"{path}: damaged MATLAB file ({str(error)[:120]}); save it again") from None
     found: dict[str, NDArray[Any]] = {}
-    for name, value in content.items():
-        if not name.startswith("__"):
-            _gather(name, value, found)
+    with parsing(path, "MATLAB file", "save it again"):
+        try:
+            content = loadmat(path, simplify_cells=True)
+        except NotImplementedError:  # version 7.3 is HDF5
+            return read_hdf5(path, text)
+        for name, value in content.items():
+            if not name.startswith("__"):
+                _gather(name, value, found)
     return _by_length(path, "matlab", found)
 
 
@@ -99,11 +97,8 @@ def read_hdf5(path: Path, text: TextSpec = TextSpec()) -> RawFile:
         if isinstance(item, h5py.Dataset) and item.shape:
             _gather(name.replace("/", "."), item[()], found)
 
-    try:
-        with h5py.File(path, "r") as file:
-            file.visititems(take)
-    except OSError as error:
-        raise InputError(f"{path}: damaged HDF5 file ({str(error)[:120]}); write it again") from None
+    with parsing(path, "HDF5 file", "write it again"), h5py.File(path, "r") as file:
+        file.visititems(take)
     return _by_length(path, "hdf5", found)
 
 

@@ -45,6 +45,7 @@ _ITERATIONS = 15
 _NO_LEAK = 1e-6  # rad/s² per rad²/s²
 _WEAK = 0.1  # products seen more weakly than this share of the best are not used to clean α
 _FEWEST = 30  # samples
+_TABLE = {"tacho_rad_s", "command_rad_s", "angle_rad"}  # references of a body that turns about one axis only
 
 
 @dataclass(frozen=True)
@@ -167,7 +168,7 @@ class Evidence:
     windows : tuple of Window
         Stretches of motion.
     up : ndarray, shape (3,), or None
-        Upward direction at rest in body axes, if the recording says how the body was mounted.
+        Upward direction at rest in body axes, if the recording is of a table and says how the body was mounted on it.
     quiet : ndarray, shape (c,)
         Noise seen between neighbouring samples where they are quietest, m/s².
     sample_rate : float
@@ -412,7 +413,7 @@ def gather(recording: Recording, array: AccelerometerArray, limits: PartLimits, 
     step = max(1, int(np.count_nonzero(whole)) // 20_000)
     covariance = np.cov(readings[whole][::step].T) if np.count_nonzero(whole) > 2 else np.zeros((0, 0))
     up = None
-    if "mounting_rotvec_rad" in recording.metadata:
+    if "mounting_rotvec_rad" in recording.metadata and _TABLE & set(recording.reference):
         up = Rotation.from_rotvec(recording.mounting_rotvec).inv().apply([0.0, 0.0, 1.0])
     means = np.array([readings[rest][whole[rest]].mean(axis=0) for rest in rests]).reshape(-1, array.n_channels)
     windows = _windows(recording, readings[:, alive], whole, rests)
