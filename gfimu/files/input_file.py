@@ -91,10 +91,10 @@ def unpacked(data: bytes, source: str) -> bytes:
                     f"{source}: unpacks to more than {most >> 20} MB, as no recording does; unpack it and look"
                 )
             if not packed.eof:
-                raise EOFError("cut off")
+                raise _damaged(source, "cut off")
             rest = packed.unused_data.lstrip(b"\x00")
-    except (zlib.error, EOFError) as error:
-        raise InputError(f"{source}: damaged gzip file ({error}); copy it again") from None
+    except zlib.error as error:
+        raise _damaged(source, str(error)) from None
     return bytes(found)
 
 
@@ -122,6 +122,10 @@ def parsing(source: str | Path, what: str, remedy: str) -> Iterator[None]:
     except Exception as error:  # noqa: BLE001  parsers raise whatever a damaged file leads to
         reason = " ".join(str(error).split())[:_LONGEST_REASON] or type(error).__name__
         raise InputError(f"{source}: damaged {what} ({reason}); {remedy}") from None
+
+
+def _damaged(source: str, reason: str) -> InputError:
+    return InputError(f"{source}: damaged gzip file ({reason}); copy it again")
 
 
 def _short(file: Path) -> str:

@@ -13,6 +13,7 @@ import numpy as np
 
 __all__ = ["Target", "targets"]
 
+_LONGEST = 20_000  # bytes of a text, so that most inputs take milliseconds
 _IMPORTING = Path(__file__).parents[1] / "gfimu" / "importing"
 
 
@@ -44,6 +45,7 @@ def targets(folder: Path) -> dict[str, Target]:
 
     from gfimu.calibration.imu_tk import read_text_triad
     from gfimu.calibration.result import load_calibration
+    from gfimu.files.model_files import list_models
     from gfimu.geometry.array import AccelerometerArray
     from gfimu.importing import inspect_file, load_map
     from gfimu.joining import open_reference
@@ -78,9 +80,7 @@ def targets(folder: Path) -> dict[str, Target]:
         "array": Target(AccelerometerArray.load, toml("arrays", "cube12", "wheel_pair", "mimu4444"), 2.0),
         "part": Target(_part(Part), toml("parts", "adxl345", "mpu9250"), 2.0),
         "scenario": Target(Scenario.load, toml("scenarios", "paper_run", "hand", "wheel", "linear_axis"), 2.0),
-        "twin": Target(
-            Twin.load, toml("twins", *sorted(one.stem for one in (models / "twins").glob("*.toml"))[:4]), 2.0
-        ),
+        "twin": Target(Twin.load, toml("twins", *list_models("twins")[:4]), 2.0),
         "mjcf": Target(array_from_mjcf, _mjcf(), 1.0),
         "calibration": Target(load_calibration, _calibration(folder), 2.0),
         "reference": Target(open_reference, own["reference"], 2.0),
@@ -105,11 +105,11 @@ def _own_recordings(folder: Path) -> dict[str, tuple[tuple[bytes, str], ...]]:
     run = gfimu.simulate("rest", seed=1, changes=["duration_s=0.4"])
     raw = gfimu.simulate("rest", seed=1, changes=["duration_s=0.4"], raw=True)
     found: dict[str, list[tuple[bytes, str]]] = {"csv": [], "parquet": []}
-    for suffix in found:
+    for suffix, files in found.items():
         for number, one in enumerate((run, raw)):
             file = folder / f"own{number}.{suffix}"
             one.write(file)
-            found[suffix].append((file.read_bytes(), f".{suffix}"))
+            files.append((file.read_bytes(), f".{suffix}"))
     rng = np.random.default_rng(0)
     packets = bytearray(b"\xa0\x28\x00\xc8")
     for number in range(60):
@@ -138,8 +138,8 @@ def _foreign(folder: Path, foreign: Any, field: Any) -> tuple[tuple[tuple[bytes,
     found: dict[str, list[tuple[bytes, str]]] = {
         key: [] for key in ("text", "json", "zip", "excel", "matlab", "hdf5", "ulog", "mcap", "rosbag")
     }
-    writers = [getattr(foreign, name) for name in ("klipper", "euroc", "xsens_dot", "gcdc", "phyphox", "sisfall", "ulog",
-                                                   "mcap", "bag_of_ros1")]  # fmt: skip
+    names = ("klipper", "euroc", "xsens_dot", "gcdc", "phyphox", "sisfall", "ulog", "mcap", "bag_of_ros1")
+    writers = [getattr(foreign, name) for name in names]
     for number, write in enumerate(writers):
         one = folder / f"foreign{number}"
         try:
@@ -158,9 +158,9 @@ def _foreign(folder: Path, foreign: Any, field: Any) -> tuple[tuple[tuple[bytes,
             continue
         for file in place.rglob("*"):
             if file.is_file():
-                found[format_of(file)].append(
-                    (file.read_bytes()[:60_000] if file.suffix in {".csv", ".txt"} else file.read_bytes(), file.suffix)
-                )
+                data = file.read_bytes()
+                kind = format_of(file)
+                found[kind].append((data[:_LONGEST] if kind in {"text", "json"} else data, file.suffix))
     _more(folder, found)
     return tuple(found["text"]), {key: tuple(value) for key, value in found.items()}
 
@@ -175,11 +175,8 @@ def _more(folder: Path, found: dict[str, list[tuple[bytes, str]]]) -> None:
 
     t = np.arange(80) / 100.0
     axes = {"ax": np.sin(t), "ay": np.cos(t), "az": 9.8 + 0 * t}
-    file = folder / "more"
-    scipy.io.savemat(file, {"t": t, **axes})
-    found["matlab"].append(
-        (file.with_suffix(".mat").read_bytes() if file.with_suffix(".mat").exists() else file.read_bytes(), ".mat")
-    )
+    scipy.io.savemat(folder / "more.mat", {"t": t, **axes})
+    found["matlab"].append(((folder / "more.mat").read_bytes(), ".mat"))
     with h5py.File(folder / "more.h5", "w") as made:
         for name, values in {"t": t, **axes}.items():
             made[name] = values

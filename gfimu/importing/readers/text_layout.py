@@ -100,7 +100,10 @@ def cells_of(line: str, separator: str) -> list[str]:
     if separator != ";":
         closed = closed.rstrip(";")
     if '"' in closed:  # a cell in quotes may hold the separator
-        return [cell.strip() for cell in next(csv.reader([closed], delimiter=separator, skipinitialspace=True), [])]
+        try:
+            return [cell.strip() for cell in next(csv.reader([closed], delimiter=separator, skipinitialspace=True), [])]
+        except csv.Error:  # a cell longer than any, or a return in it
+            pass
     return [cell.strip() for cell in closed.split(separator)]
 
 

@@ -37,7 +37,7 @@ def plain_lines(lines: Sequence[str]) -> list[str]:
 def _most(lines: Sequence[str], mark: re.Pattern[str]) -> bool:
     """Tell whether most of the first filled lines match."""
     looked = [line for line in lines[:_LOOKED_AT] if line.strip()]
-    return sum(mark.search(line) is not None for line in looked) > _LEAST * len(looked)
+    return sum(len(line) <= _LONGEST and mark.search(line) is not None for line in looked) > _LEAST * len(looked)
 
 
 def _without_frames(lines: list[str]) -> list[str]:
