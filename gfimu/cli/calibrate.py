@@ -62,11 +62,13 @@ def _calibrate(
         typer.Option("--update", help="array: calibration of an earlier run to carry over; the biases may have moved."),
     ] = None,
     turn_on_std: Annotated[
-        float, typer.Option("--turn-on-std", help="With --update: change of a bias between power-ons, m/s².")
-    ] = 0.03,
+        float | None,
+        typer.Option("--turn-on-std", help="With --update: change of a bias between power-ons, m/s²; 0.03 by default."),
+    ] = None,
     bias_walk: Annotated[
-        float, typer.Option("--bias-walk", help="With --update: random walk of a bias between poses, m/s²/√s.")
-    ] = 0.0,
+        float | None,
+        typer.Option("--bias-walk", help="With --update: random walk of a bias between poses, m/s²/√s; 0 by default."),
+    ] = None,
     picture: Annotated[Path | None, typer.Option("--picture", help="Picture to write (.png, .svg, .pdf).")] = None,
     force: ForceOption = False,
     column_map: MapOption = None,

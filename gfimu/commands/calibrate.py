@@ -49,8 +49,8 @@ def calibrate(
     levelling_std: float | None = None,
     motion: Recording | str | Path | MappedFile | None = None,
     update: Calibration | str | Path | None = None,
-    turn_on_std: float = 0.03,
-    bias_walk: float = 0.0,
+    turn_on_std: float | None = None,
+    bias_walk: float | None = None,
     picture: str | Path | None = None,
     force: bool = False,
     n_parameters: int | None = None,
@@ -91,8 +91,9 @@ def calibrate(
         For ``array``: recording with the motion, if it is another one.
     update : Calibration, str or Path, optional
         For ``array``: calibration of an earlier run to carry over.
-    turn_on_std, bias_walk : float
-        With ``update``: change of a bias between power-ons, m/s², and random walk between poses, m/s²/√s.
+    turn_on_std, bias_walk : float, optional
+        With ``update``: change of a bias between power-ons, m/s², 0.03 by default; random walk between poses, m/s²/√s,
+        0 by default.
     picture : str or Path, optional
         Picture to write, ``.png``, ``.svg`` or ``.pdf``.
     force : bool
@@ -120,6 +121,8 @@ def calibrate(
         n_parameters=count,
         input_kind=None if input_kind == "averaged" else input_kind,
     )
+    if update is None and (turn_on_std is not None or bias_walk is not None):
+        raise InputError("--turn-on-std and --bias-walk are of --update; give the calibration to carry over")
     drawing = None if array is None else as_array(array)
     local_gravity = _gravity(gravity, latitude, height)
     source = by_map(recording, column_map, map_set)
@@ -139,8 +142,8 @@ def calibrate(
         array=_own_array(source) if drawing is None and "array" in chosen.options else drawing,
         motion=turned,
         update=None if update is None else as_calibration(update),
-        turn_on_std_m_s2=turn_on_std,
-        bias_walk_m_s2_rt_s=bias_walk,
+        turn_on_std_m_s2=0.03 if turn_on_std is None else turn_on_std,
+        bias_walk_m_s2_rt_s=bias_walk or 0.0,
     )
     result = run_calibration(chosen, task)
     if out is not None:

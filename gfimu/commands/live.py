@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 __all__ = ["live"]
 
+_RATES = 1e-3, 1e6  # Hz
 _START_S = 3.0  # of a stream, which are examined
 _FEWEST, _MOST = 50, 5000  # samples of that start
 
@@ -98,8 +99,8 @@ def live(
         rate = metadata.get("sample_rate_hz", metadata.get("time_stamp_rate_hz"))
     if rate is None:
         raise InputError("--rate is missing, and the stream does not state its sample rate; give it")
-    if not isinstance(rate, int | float) or not rate > 0:
-        raise InputError(f"--rate {rate}: must be positive, Hz")
+    if not isinstance(rate, int | float) or not _RATES[0] <= rate <= _RATES[1]:
+        raise InputError(f"--rate {rate}: must be positive, {_RATES[0]:g} to {_RATES[1]:g} Hz")
     lines = _examined(lines, geometry, rate, force=force)
     about = known_axis(turning_axis(axis, axis_point, hub, inclination_rad), geometry)
     if about is not None:
