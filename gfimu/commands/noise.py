@@ -83,12 +83,14 @@ def noise(
         or an output can't be written where it is asked for.
     """
     from gfimu.calibration.run_file import open_calibrated, open_uncalibrated
+    from gfimu.commands.known_axis import known_axis, turning_axis
     from gfimu.commands.opened import as_array, as_calibration, by_map, name_of
     from gfimu.files.atomic_file import write_text
     from gfimu.recording import Recording
     from gfimu.recording.checks import examine
     from gfimu.sensor_noise import kalibr_yaml, recording_noise
 
+    chosen = turning_axis(axis, axis_point, hub, None)
     unit = None if calibration is None else as_calibration(calibration)
     source = by_map(recording, column_map, map_set)
     if isinstance(source, Recording):
@@ -99,12 +101,11 @@ def noise(
     examine(run, given, source=name_of(recording), force=force)
     result = recording_noise(run, stretch=stretch, rest_threshold=rest_threshold)
     if axis is not None or array is not None or "[turning_axis]" in str(run.metadata.get("array_toml", "")):
-        from gfimu.commands.known_axis import known_axis, turning_axis
         from gfimu.commands.opened import as_run
         from gfimu.known_axis.accuracy.noise import axis_noise
 
         geometry = given or as_run(source, None)[1]
-        turning = known_axis(turning_axis(axis, axis_point, hub, None), geometry)
+        turning = known_axis(chosen, geometry)
         if turning is not None:
             result = replace(result, about_axis=axis_noise(result, geometry, turning, rate_rad_s=speed_rad_s))
     if kalibr is not None:

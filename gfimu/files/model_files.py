@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import re
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from gfimu.files.input_file import check_input, is_ordinary
 __all__ = ["find_model", "list_models", "models_directory", "parse_toml", "read_toml"]
 
 _LONGEST_REASON = 160
+_MOST_PARTS = 100  # numerical: of a dotted key
 
 
 def models_directory() -> Path:
@@ -84,6 +86,9 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 def parse_toml(text: str, source: str | Path) -> dict[str, Any]:
     """Return the content of TOML text; a syntax error, nesting too deep or a number too long is an `InputError`."""
+    for line in text.splitlines() if text.count(".") > _MOST_PARTS else ():
+        if line.count(".") > _MOST_PARTS and any(_is_long_key(piece) for piece in re.split(r"[=,{}\[\]]", line)):
+            raise InputError(f"{source}: not valid TOML (a key of more than {_MOST_PARTS} parts); correct the file")
     try:
         return tomllib.loads(text)
     except RecursionError:
@@ -91,6 +96,11 @@ def parse_toml(text: str, source: str | Path) -> dict[str, Any]:
     except ValueError as error:  # also of a whole number with thousands of digits
         reason = " ".join(str(error).split())[:_LONGEST_REASON]
         raise InputError(f"{source}: not valid TOML ({reason}); correct the file") from None
+
+
+def _is_long_key(piece: str) -> bool:
+    """Tell whether a piece of a line may be a dotted key of so many parts that its parser takes hours and gigabytes."""
+    return piece.count(".") > _MOST_PARTS and all(part.strip() for part in piece.split("."))
 
 
 def _short(text: str) -> str:

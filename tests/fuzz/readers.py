@@ -71,7 +71,7 @@ def targets(folder: Path) -> dict[str, Target]:
         "json": Target(inspect_file, binary["json"], 1.0),
         "zip": Target(inspect_file, binary["zip"], 0.5),
         "excel": Target(inspect_file, binary["excel"], 0.15),
-        "matlab": Target(inspect_file, binary["matlab"], 0.7),
+        "matlab": Target(inspect_file, binary["matlab"], 0.05),
         "hdf5": Target(inspect_file, binary["hdf5"], 0.7),
         "ulog": Target(inspect_file, binary["ulog"], 0.7),
         "mcap": Target(inspect_file, binary["mcap"], 0.15),

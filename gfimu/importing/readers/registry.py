@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,8 +12,9 @@ from gfimu.files.input_file import check_input
 from gfimu.importing.column_map import TextSpec
 from gfimu.importing.raw_table import RawFile
 from gfimu.importing.readers.logs import read_bag, read_mcap, read_ulog
+from gfimu.importing.readers.matlab import read_matlab
 from gfimu.importing.readers.records import is_workbook, read_excel, read_json
-from gfimu.importing.readers.tables import read_archive, read_hdf5, read_matlab, read_parquet
+from gfimu.importing.readers.tables import read_archive, read_hdf5, read_parquet
 from gfimu.importing.readers.text import is_text, read_text
 from gfimu.plugins import plugins
 
@@ -68,7 +70,7 @@ def format_of(path: Path) -> str:
     InputError
         If it is missing, empty, or of no format that is known.
     """
-    if path.is_dir():
+    if os.path.isdir(path):  # noqa: PTH112  false for a name that is too long
         if (path / "metadata.yaml").is_file():
             return "rosbag"
         raise InputError(f"{path}: a folder that is no ROS 2 bag; give a file")

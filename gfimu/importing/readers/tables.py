@@ -19,7 +19,7 @@ from gfimu.importing.column_map import TextSpec
 from gfimu.importing.raw_table import RawFile, RawTable
 from gfimu.importing.readers.text import table_of_text
 
-__all__ = ["arrow_table", "read_archive", "read_hdf5", "read_matlab", "read_parquet"]
+__all__ = ["arrow_table", "gather", "read_archive", "read_hdf5", "read_parquet", "tables_by_length"]
 
 _MOST_UNPACKED = 64 << 20  # bytes that any archive may unpack to
 _MOST_PACKED = 25  # bytes from one packed byte
@@ -69,22 +69,6 @@ def _member(data: bytes, path: Path, name: str, text: TextSpec) -> RawTable | No
         return None  # a description, not a table
 
 
-def read_matlab(path: Path, text: TextSpec = TextSpec()) -> RawFile:
-    """Read the variables of a MATLAB file; those of equal length are one table."""
-    from scipy.io import loadmat
-
-    found: dict[str, NDArray[Any]] = {}
-    with parsing(path, "MATLAB file", "save it again"):
-        try:
-            content = loadmat(path, simplify_cells=True)
-        except NotImplementedError:  # version 7.3 is HDF5
-            return read_hdf5(path, text)
-        for name, value in content.items():
-            if not name.startswith("__"):
-                _gather(name, value, found)
-    return _by_length(path, "matlab", found)
-
-
 def read_hdf5(path: Path, text: TextSpec = TextSpec()) -> RawFile:
     """Read the data sets of an HDF5 file; those of equal length are one table."""
     try:
@@ -95,23 +79,23 @@ def read_hdf5(path: Path, text: TextSpec = TextSpec()) -> RawFile:
 
     def take(name: str, item: Any) -> None:
         if isinstance(item, h5py.Dataset) and item.shape:
-            _gather(name.replace("/", "."), item[()], found)
+            gather(name.replace("/", "."), item[()], found)
 
     with parsing(path, "HDF5 file", "write it again"), h5py.File(path, "r") as file:
         file.visititems(take)
-    return _by_length(path, "hdf5", found)
+    return tables_by_length(path, "hdf5", found)
 
 
-def _gather(name: str, value: Any, found: dict[str, NDArray[Any]]) -> None:
+def gather(name: str, value: Any, found: dict[str, NDArray[Any]]) -> None:
     """Collect the columns of a value: a vector, a matrix, a structure of them."""
     if isinstance(value, Mapping):
         for key, item in value.items():
-            _gather(f"{name}.{key}", item, found)
+            gather(f"{name}.{key}", item, found)
         return
     values = np.asarray(value)
     if values.dtype.names:
         for key in values.dtype.names:
-            _gather(f"{name}.{key}", values[key], found)
+            gather(f"{name}.{key}", values[key], found)
         return
     if values.dtype.kind not in "iuf" or values.size < 2:
         return
@@ -124,7 +108,7 @@ def _gather(name: str, value: Any, found: dict[str, NDArray[Any]]) -> None:
             found |= {f"{name}_{place}": column for place, column in enumerate(upright.T, start=1)}
 
 
-def _by_length(path: Path, kind: str, found: Mapping[str, NDArray[Any]]) -> RawFile:
+def tables_by_length(path: Path, kind: str, found: Mapping[str, NDArray[Any]]) -> RawFile:
     """Group columns by their length: the samples of one clock belong together."""
     if not found:
         raise InputError(f"{path}: no vector or matrix of numbers; save the readings as one")
