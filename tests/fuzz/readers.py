@@ -231,9 +231,10 @@ def _sent() -> tuple[tuple[bytes, str], ...]:
 
 def _frames(path: Path) -> None:
     from firmware_bridge.frames import SampleDecoder
+    from gfimu.files.input_file import read_bytes
 
     decoder = SampleDecoder()
-    data = path.read_bytes()
+    data = read_bytes(path)
     middle = len(data) // 2
     decoder.feed(data[:middle])
     decoder.feed(data[middle:])

@@ -72,7 +72,8 @@ def _main(file: str, out: str) -> int:
     except InputError as error:
         sys.stderr.write(f"{str(error).removeprefix(': ')}\n")
         return _REFUSED
-    np.savez(out, names=np.array(list(found), dtype=str), **{f"c{k}": one for k, one in enumerate(found.values())})
+    columns: dict[str, Any] = {f"c{k}": one for k, one in enumerate(found.values())}
+    np.savez(out, names=np.array(list(found), dtype=str), **columns)
     return 0
 
 
