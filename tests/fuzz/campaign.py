@@ -171,7 +171,7 @@ def work(first: int, count: int, seed: int, only: str | None, keep: Path) -> Non
             out.write(json.dumps({"number": number, "reader": reader}) + "\n")
             end, seconds, trace = _ended(target.call, file, base + MEMORY + 2 * size)
             out.write(json.dumps({"number": number, "reader": reader, "end": end, "seconds": seconds}) + "\n")
-            if trace and file.is_file():
+            if trace and what != "odd file":
                 keep.mkdir(parents=True, exist_ok=True)
                 (keep / f"{number}-{reader}{suffix}").write_bytes(content)
                 (keep / f"{number}-{reader}.trace").write_text(f"{what}\n{trace}", errors="backslashreplace")
