@@ -1,4 +1,4 @@
-"""Files that are read: ordinary ones only, unpacked to a bounded size, and damage told in one line."""
+"""Files that are read: ordinary ones only, unpacked to a bounded size, and damage said in one line."""
 
 from __future__ import annotations
 
