@@ -173,7 +173,7 @@ def test_diagnose_takes_paths_and_objects(made, monkeypatch):
     recording, file = made
     calls = []
 
-    def explain(recordings, model, *, held_out, names, report):
+    def explain(recordings, model, *, held_out, names, report, force):
         calls.append((len(recordings), model.array.name, len(held_out), names))
 
     monkeypatch.setattr(importlib.import_module("gfimu.diagnosis.diagnose"), "diagnose", explain)
