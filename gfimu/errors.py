@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import os
+import re
 from collections.abc import Iterable
 
 __all__ = [
@@ -17,11 +18,20 @@ __all__ = [
     "unknown_name",
 ]
 
+_LONGEST = 2000  # numerical: characters of a message
+_CONTROL = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029]")
 _ALIKE = 0.75  # numerical: of difflib; by choice, so that cube13 is near cube12 and nonsense near nothing
 
 
 class GfimuError(Exception):
     """Base of every error that a user's input or environment can cause; commands print it as one line."""
+
+    def __str__(self) -> str:
+        """Return the message as one line, the middle left out where what it quotes is very long."""
+        text = super().__str__()
+        if _CONTROL.search(text):
+            text = " ".join(_CONTROL.sub(" ", text).split())
+        return text if len(text) <= _LONGEST else f"{text[: _LONGEST // 2]} … {text[-_LONGEST // 2 :]}"
 
 
 class InputError(GfimuError, ValueError):

@@ -10,7 +10,9 @@ import mujoco
 import numpy as np
 
 from gfimu.errors import InputError, unknown_name
+from gfimu.files.input_file import check_input
 from gfimu.geometry.array import AccelerometerArray, Chip
+from sim.mjcf_size import check_mjcf_size
 
 __all__ = ["array_from_mjcf"]
 
@@ -41,9 +43,8 @@ def array_from_mjcf(
     InputError
         If the file can't be read, holds no such body or no such site, or more than three sites share a point.
     """
-    file = Path(path)
-    if not file.is_file():
-        raise InputError(f"{file}: no such file; check the path")
+    file = check_input(path)
+    check_mjcf_size(file)
     try:
         model = mujoco.MjModel.from_xml_path(str(file))
     except ValueError as error:

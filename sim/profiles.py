@@ -23,6 +23,9 @@ from sim.motion import BodyState, SplineSpin
 
 __all__ = ["Chirp", "Hold", "Ramp", "Segment", "Sine", "Tumble", "paper_run", "speed_sweep", "spin_profile"]
 
+_MOST_NODES = 10_000_000  # numerical: of a sweep
+_LONGEST = 1e9  # numerical: s, of a piece of a profile
+
 _WINDOW_SHARE = 0.1  # share of an oscillation's duration in which its window opens, and again closes
 _POINTS_PER_PERIOD = 40  # nodes of the quintic spline of an oscillation, per shortest period
 _PRECESSION_HARMONICS = 512
@@ -124,6 +127,10 @@ class Chirp:
         """Rate as a piecewise quintic of the time since the piece began, rad/s."""
         fastest = max(self.start_frequency, self.stop_frequency)
         nodes = max(int(np.ceil(_POINTS_PER_PERIOD * fastest * self.duration)), 80)
+        if nodes > _MOST_NODES:
+            raise InputError(
+                f"a sweep of {self.duration:g} s up to {fastest:g} Hz is too long; make one of them smaller"
+            )
         t = np.linspace(0.0, self.duration, nodes + 1)
         growth = np.log(self.stop_frequency / self.start_frequency) / self.duration
         cycles = self.start_frequency * (np.expm1(growth * t) / growth if growth else t)
@@ -343,6 +350,8 @@ def _smooth_step(share: NDArray[np.float64]) -> NDArray[np.float64]:
 def _quintic(start: float, stop: float, duration: float) -> NDArray[np.float64]:
     """Coefficients of one quintic piece from ``start`` to ``stop``, highest power first, shape (6, 1)."""
     step = stop - start
+    if not duration < _LONGEST:
+        raise InputError(f"a piece of {duration:g} s; give less than {_LONGEST:g} s")
     return np.array(
         [[6 * step / duration**5], [-15 * step / duration**4], [10 * step / duration**3], [0], [0], [start]]
     )

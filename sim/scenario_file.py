@@ -28,6 +28,7 @@ __all__ = ["ReferenceSettings", "ScenarioFile", "scenario_fields"]
 Latitude = Annotated[float, msgspec.Meta(ge=-90.0, le=90.0)]
 """Geodetic latitude, degrees."""
 
+_MOST_SAMPLES = 20_000_000  # of a run: 55 hours at 100 Hz
 _TWIN_MOTION = "paper_run"  # the motion of a twin file, which has none of its own
 _CARRIAGE_MOTION = "linear_axis"  # that of a twin file of a linear axis
 
@@ -235,6 +236,10 @@ def scenario_fields(data: Mapping[str, Any], source: str, beside: Path | None) -
         raise InputError(f"{source}: key 'duration_s' is missing; add it: the motion has no length of its own")
     if duration * file.sample_rate_hz < 2:
         raise InputError(f"{source}: duration_s and sample_rate_hz give fewer than two samples; simulate longer")
+    if duration * file.sample_rate_hz > _MOST_SAMPLES:
+        raise InputError(
+            f"{source}: duration_s and sample_rate_hz give more than {_MOST_SAMPLES:g} samples; simulate less"
+        )
     sheet = DataSheet.load(part or array.chips[0].part, array.part_files)
     return {
         "name": file.name if "name" in data else Path(source).stem,

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-import gzip
+import io
+import warnings
 from pathlib import Path
 
 import numpy as np
 
 from gfimu.errors import InputError
+from gfimu.files.input_file import read_bytes
 from gfimu.recording import Recording
 
 __all__ = ["read_text_triad"]
+
+_LONGEST_REASON = 160
 
 
 def read_text_triad(path: str | Path, *, channels: tuple[str, str, str] = ("a11", "a12", "a13")) -> Recording:
@@ -34,13 +38,14 @@ def read_text_triad(path: str | Path, *, channels: tuple[str, str, str] = ("a11"
         If the file is missing or not four columns of numbers, or its time does not increase.
     """
     file = Path(path)
+    content = read_bytes(file)
     try:
-        with gzip.open(file, "rt") if file.suffix == ".gz" else file.open() as stream:
-            table = np.loadtxt(stream, ndmin=2)
-    except (OSError, EOFError) as error:
-        raise InputError(f"{file}: {getattr(error, 'strerror', None) or error}; check the path") from None
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # of a file without a row: refused below
+            table = np.loadtxt(io.StringIO(content.decode()), ndmin=2)
     except (ValueError, UnicodeDecodeError) as error:
-        raise InputError(f"{file}: not rows of four numbers ({error}); columns are time, x, y, z") from None
+        reason = " ".join(str(error).split())[:_LONGEST_REASON]
+        raise InputError(f"{file}: not rows of four numbers ({reason}); columns are time, x, y, z") from None
     if table.shape[1] != 4 or len(table) < 2:
         raise InputError(f"{file}: {table.shape[0]} rows of {table.shape[1]} columns; needed: time, x, y, z")
     backwards = np.diff(table[:, 0]) <= 0

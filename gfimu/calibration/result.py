@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from gfimu.calibration.error_model import GAUGES, ErrorModel, free_elements
 from gfimu.errors import InputError, UnitError
 from gfimu.files.atomic_file import write_text
+from gfimu.files.input_file import check_input
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
 from gfimu.short_repr import joined
@@ -382,12 +383,12 @@ def load_calibration(path: str | Path) -> Calibration:
     InputError
         If the file is missing, not JSON, not a calibration, or of another format version.
     """
-    file = Path(path)
+    file = check_input(path)
     try:
         data = json.loads(file.read_text(encoding="utf-8"))
     except OSError as error:
         raise InputError(f"{file}: {error.strerror or error}; check the path") from None
-    except (json.JSONDecodeError, UnicodeDecodeError):
+    except (ValueError, RecursionError):  # also of whole numbers with thousands of digits
         raise InputError(f"{file}: not a calibration file; make one with `gfimu calibrate`") from None
     return Calibration.from_dict(data, source=str(file))
 

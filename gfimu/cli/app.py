@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import os
 import sys
+import tempfile
 import traceback
 
 import typer
@@ -102,7 +103,21 @@ def _report(error: BaseException, *, debug: bool) -> int:
     if isinstance(error, MemoryError):
         return _say("not enough memory; use a shorter recording or a machine with more", 1)
     text = f"{type(error).__name__}: {error}"[:_LONGEST]
-    return _say(f"unexpected {text}; please report it with what the same command prints with {_DEBUG}", 1)
+    file = _written(error)
+    attached = f"the file {file}" if file else f"what the same command prints with {_DEBUG}"
+    return _say(f"unexpected {text}; please report it with {attached} ({_DEBUG} shows where it came from)", 1)
+
+
+def _written(error: BaseException) -> str:
+    """Write where an error came from to a file to attach to a report; return its name, empty where that fails."""
+    lines = [f"gfimu {gfimu.__version__}, Python {sys.version}, {sys.platform}\n", f"arguments: {sys.argv[1:]!r}\n\n"]
+    try:
+        handle, name = tempfile.mkstemp(prefix="gfimu-error-", suffix=".txt")
+        with os.fdopen(handle, "w", encoding="utf-8", errors="backslashreplace") as file:
+            file.writelines([*lines, *traceback.format_exception(error)])
+    except Exception:  # noqa: BLE001  the report of an error must not become another one
+        return ""
+    return name
 
 
 def _say(text: str, code: int) -> int:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from gfimu.calibration.registry import METHODS
-from gfimu.cli.mapped import MapOption, MapSetOption
+from gfimu.cli.mapped import ForceOption, MapOption, MapSetOption
 from gfimu.cli.output import JsonOption, print_json, print_paths, print_table
 
 if TYPE_CHECKING:
@@ -63,12 +63,15 @@ def _calibrate(
         typer.Option("--update", help="array: calibration of an earlier run to carry over; the biases may have moved."),
     ] = None,
     turn_on_std: Annotated[
-        float, typer.Option("--turn-on-std", help="With --update: change of a bias between power-ons, m/s².")
-    ] = 0.03,
+        float | None,
+        typer.Option("--turn-on-std", help="With --update: change of a bias between power-ons, m/s²; 0.03 by default."),
+    ] = None,
     bias_walk: Annotated[
-        float, typer.Option("--bias-walk", help="With --update: random walk of a bias between poses, m/s²/√s.")
-    ] = 0.0,
+        float | None,
+        typer.Option("--bias-walk", help="With --update: random walk of a bias between poses, m/s²/√s; 0 by default."),
+    ] = None,
     picture: Annotated[Path | None, typer.Option("--picture", help="Picture to write (.png, .svg, .pdf).")] = None,
+    force: ForceOption = False,
     column_map: MapOption = None,
     map_set: MapSetOption = None,
     json: JsonOption = False,
@@ -99,6 +102,7 @@ def _calibrate(
         turn_on_std=turn_on_std,
         bias_walk=bias_walk,
         picture=picture,
+        force=force,
     )
     written = {"calibration": out} | ({} if picture is None else {"picture": picture})
     if json:

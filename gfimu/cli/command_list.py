@@ -94,7 +94,7 @@ JOBS: dict[str, tuple[Entry, ...]] = {
     "Design and simulate": (
         Entry(
             "score",
-            "Score array geometries: condition number, GDOP, errors per axis, what ω² leaves, what ω can be seen.",
+            "Score array geometries: condition number, GDOP, errors, what ω² leaves, what ω and which faults are seen.",
             "score",
         ),
         Entry("optimize", "Search the geometry of least GDOP for a number of chips in a box.", "score"),

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gfimu.cli.mapped import MapOption, MapSetOption, ReferenceMapSetOption
+from gfimu.cli.mapped import ForceOption, MapOption, MapSetOption, ReferenceMapSetOption
 from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, print_text, progress
 from gfimu.errors import InputError
 
@@ -50,6 +50,7 @@ def _diagnose(
             "--grammar", help="Search the wider library of effects at once, not only where the usual one fails."
         ),
     ] = False,
+    force: ForceOption = False,
     column_map: MapOption = None,
     map_set: MapSetOption = None,
     reference: Annotated[
@@ -104,6 +105,7 @@ def _diagnose(
             calibration=calibration,
             report=done,
             grammar=grammar,
+            force=force,
         )
     written = {meaning: out / name for name, meaning in FILES.items()}
     if json:

@@ -19,7 +19,7 @@ from gfimu.cli.axis_options import (
     PointStdOption,
     RotationStdOption,
 )
-from gfimu.cli.mapped import MapOption, MapSetOption
+from gfimu.cli.mapped import ForceOption, MapOption, MapSetOption
 from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, print_text, progress
 from gfimu.rate.registry import RATE_METHODS, rate_method, recursive_methods
 from gfimu.units import STANDARD_GRAVITY
@@ -69,9 +69,7 @@ def _estimate(
         float | None,
         typer.Option("--north-rad", help="With --latitude: north from the x-axis at the start, about up, rad; else 0."),
     ] = None,
-    force: Annotated[
-        bool, typer.Option("--force", help="Go on where the checks of units, time, array and channels refuse the file.")
-    ] = False,
+    force: ForceOption = False,
     keep_faulty: Annotated[
         bool, typer.Option("--keep-faulty", help=f"Use channels that contradict the others, too ({_RECURSIVE}).")
     ] = False,

@@ -39,7 +39,12 @@ def _join(
         typer.Option("--most-rate-error", help="Largest rate error between the clocks that is searched, a ratio."),
     ] = 0.02,
     force: Annotated[
-        bool, typer.Option("--force", help="Join nevertheless where the two don't seem to belong together.")
+        bool,
+        typer.Option(
+            "--force",
+            help="Go on where the checks of units, time, array and channels refuse the file, or the two don't seem to "
+            "belong together.",
+        ),
     ] = False,
     json: JsonOption = False,
 ) -> None:

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from gfimu.cli.axis_options import AxisOption, AxisPointOption, HubOption, InclinationOption
+from gfimu.cli.mapped import ForceOption
 
 __all__ = ["register"]
 
@@ -49,6 +50,7 @@ def _live(
     keep_faulty: Annotated[
         bool, typer.Option("--keep-faulty", help="Use every channel, without looking for faulty ones.")
     ] = False,
+    force: ForceOption = False,
 ) -> None:
     """Estimate the angular rate while samples arrive: CSV lines in, one JSON line per sample out.
 
@@ -78,6 +80,7 @@ def _live(
         hub=hub,
         inclination_rad=inclination_rad,
         keep_faulty=keep_faulty,
+        force=force,
     ):
         sys.stdout.write(line + "\n")
         sys.stdout.flush()

@@ -1,4 +1,4 @@
-"""The options --map and --map-set: a foreign file read by a map of its columns."""
+"""Options of a recording that is read: --map and --map-set for a foreign file, --force for one that is refused."""
 
 from __future__ import annotations
 
@@ -6,13 +6,16 @@ from typing import Annotated
 
 import typer
 
-__all__ = ["MapOption", "MapSetOption", "ReferenceMapSetOption", "TableOption"]
+__all__ = ["ForceOption", "MapOption", "MapSetOption", "ReferenceMapSetOption", "TableOption"]
 
 MapOption = Annotated[
     str | None,
     typer.Option(
         "--map", metavar="MAP", help="Column map of a foreign file: a name, or a TOML file (`gfimu inspect`)."
     ),
+]
+ForceOption = Annotated[
+    bool, typer.Option("--force", help="Go on where the checks of units, time, array and channels refuse the file.")
 ]
 MapSetOption = Annotated[
     list[str] | None,

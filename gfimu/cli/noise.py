@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from gfimu.cli.axis_options import AxisOption, AxisPointOption, HubOption
-from gfimu.cli.mapped import MapOption, MapSetOption
+from gfimu.cli.mapped import ForceOption, MapOption, MapSetOption
 from gfimu.cli.output import JsonOption, print_json, print_paths, print_table
 
 __all__ = ["register"]
@@ -32,6 +32,7 @@ def _noise(
     calibration: Annotated[Path | None, typer.Option("--calibration", help="Calibration to apply first.")] = None,
     kalibr: Annotated[Path | None, typer.Option("--kalibr", help="Kalibr imu.yaml to write.")] = None,
     picture: Annotated[Path | None, typer.Option("--picture", help="Picture to write (.png, .svg, .pdf).")] = None,
+    force: ForceOption = False,
     column_map: MapOption = None,
     map_set: MapSetOption = None,
     axis: AxisOption = None,
@@ -66,6 +67,7 @@ def _noise(
         axis_point=axis_point,
         hub=hub,
         speed_rad_s=speed,
+        force=force,
     )
     written = {} if kalibr is None else {"Kalibr": kalibr}
     written |= {} if picture is None else {"picture": picture}

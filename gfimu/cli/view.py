@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from gfimu.cli.axis_options import AxisOption, AxisPointOption, HubOption, InclinationOption
-from gfimu.cli.mapped import MapOption, MapSetOption
+from gfimu.cli.mapped import ForceOption, MapOption, MapSetOption
 from gfimu.cli.output import print_paths
 
 __all__ = ["register"]
@@ -32,6 +32,7 @@ def _view(
     hub: HubOption = "fixed",
     inclination_rad: InclinationOption = None,
     out: Annotated[Path | None, typer.Option("--out", help="Write the .rrd here and don't open it.")] = None,
+    force: ForceOption = False,
 ) -> None:
     """Open a run in the rerun viewer: the rig in 3-D, raw channels, and the estimate over time.
 
@@ -53,5 +54,6 @@ def _view(
         hub=hub,
         inclination_rad=inclination_rad,
         out=out,
+        force=force,
         on_picture=lambda picture: print_paths([("rerun recording", picture)]),
     )

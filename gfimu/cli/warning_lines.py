@@ -23,5 +23,6 @@ def install() -> None:
             printed.add(str(message))
             sys.stderr.write(f"gfimu: warning: {' '.join(str(message).split())}\n")
 
+    warnings.simplefilter("ignore", RuntimeWarning)  # of numbers without end: what follows from them is refused
     warnings.simplefilter("always", RecordingWarning)
     warnings.showwarning = show

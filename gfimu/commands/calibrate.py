@@ -49,9 +49,10 @@ def calibrate(
     levelling_std: float | None = None,
     motion: Recording | str | Path | MappedFile | None = None,
     update: Calibration | str | Path | None = None,
-    turn_on_std: float = 0.03,
-    bias_walk: float = 0.0,
+    turn_on_std: float | None = None,
+    bias_walk: float | None = None,
     picture: str | Path | None = None,
+    force: bool = False,
     n_parameters: int | None = None,
     min_rest_s: float | None = None,
     levelling_std_rad: float | None = None,
@@ -91,20 +92,24 @@ def calibrate(
         is taken for shakes by hand from rest to rest, which may be in ``recording`` itself.
     update : Calibration, str or Path, optional
         For ``array``: calibration of an earlier run to carry over.
-    turn_on_std, bias_walk : float
-        With ``update``: change of a bias between power-ons, m/s², and random walk between poses, m/s²/√s.
+    turn_on_std, bias_walk : float, optional
+        With ``update``: change of a bias between power-ons, m/s², 0.03 by default; random walk between poses, m/s²/√s,
+        0 by default.
     picture : str or Path, optional
         Picture to write, ``.png``, ``.svg`` or ``.pdf``.
+    force : bool
+        Go on, with a warning, where the checks of a recording would refuse it.
 
     Raises
     ------
     InputError
-        If the method is unknown, the data are faulty, the poses don't suffice, or an output can't be written where it
-        is asked for.
+        If the method is unknown, an option has no use with it, a recording is refused by its checks, the data are
+        faulty, the poses don't suffice, or an output can't be written where it is asked for.
     """
     from gfimu.calibration.methods import CalibrationTask, run_calibration
     from gfimu.calibration.registry import calibration_method
-    from gfimu.commands.opened import as_array, as_calibration, by_map
+    from gfimu.commands.opened import as_array, as_calibration, by_map, name_of
+    from gfimu.recording.checks import examine
 
     chosen = calibration_method(method)
     levelling = levelling_std_rad if levelling_std is None else levelling_std
@@ -117,10 +122,16 @@ def calibrate(
         n_parameters=count,
         input_kind=None if input_kind == "averaged" else input_kind,
     )
+    if update is None and (turn_on_std is not None or bias_walk is not None):
+        raise InputError("--turn-on-std and --bias-walk are of --update; give the calibration to carry over")
     drawing = None if array is None else as_array(array)
     local_gravity = _gravity(gravity, latitude, height)
     source = by_map(recording, column_map, map_set)
     run = _uncalibrated(source, drawing)
+    examine(run, drawing, source=name_of(recording), force=force)
+    turned = None if motion is None else _uncalibrated(by_map(motion, column_map, map_set), drawing)
+    if turned is not None:
+        examine(turned, drawing, source=name_of(motion), force=force)
     task = CalibrationTask(
         run,
         gravity=local_gravity,
@@ -130,10 +141,10 @@ def calibrate(
         min_rest_s=min_rest_s if min_rest is None else min_rest,
         levelling_std_rad=levelling,
         array=_own_array(source) if drawing is None and "array" in chosen.options else drawing,
-        motion=None if motion is None else _uncalibrated(by_map(motion, column_map, map_set), drawing),
+        motion=turned,
         update=None if update is None else as_calibration(update),
-        turn_on_std_m_s2=turn_on_std,
-        bias_walk_m_s2_rt_s=bias_walk,
+        turn_on_std_m_s2=0.03 if turn_on_std is None else turn_on_std,
+        bias_walk_m_s2_rt_s=bias_walk or 0.0,
     )
     result = run_calibration(chosen, task)
     if out is not None:

@@ -80,9 +80,10 @@ def convert(
         If the source can't be read, or the target can't be written where it is asked for.
     """
     from gfimu.commands.export_calibration import export_calibration
-    from gfimu.commands.opened import as_array, by_map, files_by_map
+    from gfimu.commands.opened import as_array, by_map, files_by_map, name_of
     from gfimu.recording import Recording
     from gfimu.recording.carried_array import carried_array
+    from gfimu.recording.checks import examine
     from gfimu.recording.formats import open_recording
     from gfimu.recording.mapped import MappedFile
 
@@ -105,6 +106,8 @@ def convert(
     if len(given) > 1:
         raise InputError(f"{given[1]}: several files need --map, which says what the columns of each chip's file are")
     recording = given[0] if isinstance(given[0], Recording) else open_recording(given[0], array=drawing)
+    if recording.unit == "m_s2":
+        examine(recording, drawing, source=name_of(given[0]), force=True)  # a conversion is how a file is mended
     if drawing is not None:
         recording = recording.carrying(drawing)
     elif "array_toml" in recording.metadata:

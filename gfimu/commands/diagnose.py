@@ -7,7 +7,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gfimu.files.outputs import OutputFolder, writes
+from gfimu.errors import InputError
+from gfimu.files.outputs import OutputFolder, same_file, writes
 
 if TYPE_CHECKING:
     from gfimu.calibration.result import Calibration
@@ -19,6 +20,9 @@ if TYPE_CHECKING:
     from gfimu.world_model import WorldModel
 
 __all__ = ["FOLDER", "diagnose", "write_result"]
+
+EXPLAINED = frozenset({"sign", "exchange", "dead", "rest_bias"})
+"""Findings of a recording's checks that are effects of the library: the diagnosis explains them."""
 
 FOLDER = OutputFolder(("verdict.json", "twin.toml", "report.html", "diagnosis.rrd", "array.toml"))
 """What the folder of a diagnosis holds."""
@@ -40,6 +44,7 @@ def diagnose(
     names: Sequence[str] | None = None,
     report: Callable[[float, str], None] | None = None,
     grammar: bool = False,
+    force: bool = False,
 ) -> Diagnosis:
     """Show what a simulation gets wrong against recordings, name the cause, extend the simulation, measure the gain.
 
@@ -73,6 +78,8 @@ def diagnose(
     grammar : bool
         Whether further effects of a rig, and places times dependences without a name of their own, are searched at
         once, as a twin file with ``grammar = true`` asks for, and not only where the usual effects give no good answer.
+    force : bool
+        Go on, with a warning, where the checks of a recording would refuse it.
 
     Returns
     -------
@@ -82,12 +89,15 @@ def diagnose(
     Raises
     ------
     InputError
-        If a recording is too short or lacks the reference that drives the twin, or the folder can't be written.
+        If a recording is too short, lacks the reference that drives the twin, is refused by its checks, or is held
+        out and fitted both; or the folder can't be written.
     """
     from gfimu.commands.opened import as_calibration, as_runs, as_twin, by_map
     from gfimu.joining import displaced_reference
+    from gfimu.recording.checks import examine
 
     runs, unseen = ([by_map(run, column_map, map_set) for run in as_runs(group)] for group in (recordings, held_out))
+    _refuse_fitted(runs, unseen)
     model = as_twin(twin)
     model = model.searching(wide=True) if grammar else model
     unit = None if calibration is None else as_calibration(calibration)
@@ -95,13 +105,15 @@ def diagnose(
     if unit is not None and unit.positions:
         model = model.with_array(unit.calibrated_array(model.array))
     labels = _names(runs) if names is None else names
+    for one, name in zip((*read, *kept), (*labels, *_names(unseen)), strict=True):
+        examine(one, model.array, source=name, force=force, apart_from=EXPLAINED, whose="")
     free = model.drive_source == "gyro"
     clocks = [displaced_reference(one, rates=free) if not free or _by_tacho(one) else None for one in read]
     if reference is not None:
         from gfimu.commands.join import join
 
         clocks[0] = join(read[0], reference, reference_map=reference_map, reference_map_set=reference_map_set)
-    found, used = _explained(read, clocks, model, reference is not None, kept, labels, report)
+    found, used = _explained(read, clocks, model, reference is not None, kept, labels, report, force)
     if out is not None:
         if report is not None:
             report(0.99, "write the report")
@@ -117,6 +129,7 @@ def _explained(
     kept: Sequence[Recording],
     labels: Sequence[str],
     report: Callable[[float, str], None] | None,
+    force: bool,
 ) -> tuple[Diagnosis, Recording]:
     """Return the diagnosis of recordings whose references are aligned where they had another clock, and the first run.
 
@@ -134,7 +147,7 @@ def _explained(
 
     first = next((one for one in clocks if one is not None), None)
     used = runs(model.drive_source != "gyro")
-    found = explain(used, model, held_out=kept, names=labels, report=report)
+    found = explain(used, model, held_out=kept, names=labels, report=report, force=force)
     if first is None:
         return found, used[0]
     corrected = ["tacho_latency"] if first.is_far and not two_files else []
@@ -142,7 +155,7 @@ def _explained(
         corrected.append("clock_error")
         if model.drive_source != "gyro":
             used = runs(False)
-            found = explain(used, model, held_out=kept, names=labels, report=report)
+            found = explain(used, model, held_out=kept, names=labels, report=report, force=force)
     return with_reference_clock(found, first.clock, corrected, model), used[0]
 
 
@@ -178,6 +191,18 @@ def write_result(out: str | Path, found: Diagnosis, recording: Recording) -> dic
             world.slide,
         ),
     )
+
+
+def _refuse_fitted(fitted: Sequence[object], held_out: Sequence[object]) -> None:
+    """Refuse a run that is fitted and held out both: the gain would be measured on what was fitted."""
+    for one in held_out:
+        for other in fitted:
+            same = one is other
+            if not same and isinstance(one, str | os.PathLike) and isinstance(other, str | os.PathLike):
+                same = same_file(Path(one), Path(other))
+            if same:
+                name = one if isinstance(one, str | os.PathLike) else "a recording"
+                raise InputError(f"{name}: is fitted and held out; hold out a recording that is not fitted")
 
 
 def _by_tacho(recording: Recording) -> bool:

@@ -203,9 +203,12 @@ def estimate_run(
     from gfimu.errors import InputError
     from gfimu.motion.estimation import estimate as solve
     from gfimu.motion.rest_bias import estimate_from_rest
+    from gfimu.recording.carried_array import warn_of_other_array
     from gfimu.recording.reference_times import reference_on_rows
 
     run, geometry = _opened(by_map(recording, column_map, map_set), array, calibration)
+    if array is not None and calibration is None:
+        warn_of_other_array(run.metadata, geometry, "the recording", whose="the given")
     run = reference_on_rows(run)
     turning = _turning(axis, geometry, uncertainty)
     if turning is not None:
@@ -303,13 +306,12 @@ def _about_axis(
     from gfimu.errors import InputError
     from gfimu.known_axis.estimation import estimate_about_axis
     from gfimu.rate.registry import rate_method
-    from gfimu.recording.checks import check_recording, refuse_or_warn, without_dead_channels
+    from gfimu.recording.checks import examine, without_dead_channels
 
     for name, word in (("fuse_gyro", "--gyro"), ("with_position", "--position")):
         if options.get(name):
             raise InputError(f"{word} has no use with --axis: the rate about one axis is all that is estimated")
-    findings = check_recording(recording, array)
-    refuse_or_warn(findings, force=bool(options.get("force")))
+    findings = examine(recording, array, force=bool(options.get("force")), whose="")
     recording = without_dead_channels(recording, array, findings)
     if rest_bias:
         from gfimu.motion.rest_bias import rest_bias as read_off

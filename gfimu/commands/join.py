@@ -51,22 +51,26 @@ def join(
     most_rate_error : float
         Largest rate error between the clocks that is searched, a ratio.
     force : bool
-        Join nevertheless where the two don't seem to belong together.
+        Go on, with a warning, where the checks of the channels would refuse them; join nevertheless where the two don't
+        seem to belong together.
 
     Raises
     ------
     InputError
-        If a file can't be read, the reference does not change, or the two don't seem to belong together.
+        If a file can't be read, the channels' checks refuse them, the reference does not change, or the two don't seem
+        to belong together.
     """
-    from gfimu.commands.opened import as_array, by_map
+    from gfimu.commands.opened import as_array, by_map, name_of
     from gfimu.importing import load_map
     from gfimu.joining import ReferenceSeries, join_reference, open_reference
     from gfimu.recording import Recording
+    from gfimu.recording.checks import examine
     from gfimu.recording.formats import open_recording
 
     drawing = None if array is None else as_array(array)
     source = by_map(channels, column_map, map_set)
     recording = source if isinstance(source, Recording) else open_recording(source, array=drawing)
+    examine(recording, drawing, source=name_of(channels), force=force)
     if drawing is not None:
         recording = recording.carrying(drawing)
     if isinstance(reference, ReferenceSeries):

@@ -18,9 +18,18 @@ def turning_axis(
     hub: str,
     inclination_rad: float | None,
 ) -> TurningAxis | None:
-    """Return an axis given as such or by its numbers; None without one."""
+    """Return an axis given as such or by its numbers; None without one.
+
+    Raises
+    ------
+    InputError
+        If the numbers are no axis, or point and hub are given without one.
+    """
+    from gfimu.errors import InputError
     from gfimu.geometry.turning_axis import TurningAxis
 
+    if axis is None and (any(point) or hub != "fixed"):
+        raise InputError("--axis-point and --hub are of a known axis; give the axis too (--axis)")
     if axis is None or isinstance(axis, TurningAxis):
         return axis
     return TurningAxis.of(axis, point=point, hub=hub, inclination=inclination_rad)

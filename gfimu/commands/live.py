@@ -15,6 +15,10 @@ if TYPE_CHECKING:
 
 __all__ = ["live"]
 
+_RATES = 1e-3, 1e6  # Hz
+_START_S = 3.0  # of a stream, which are examined
+_FEWEST, _MOST = 50, 5000  # samples of that start
+
 
 def live(
     array: AccelerometerArray | str | Path | None = None,
@@ -31,6 +35,7 @@ def live(
     hub: str = "fixed",
     inclination_rad: float | None = None,
     keep_faulty: bool = False,
+    force: bool = False,
 ) -> Iterator[str]:
     """Estimate the angular rate while samples arrive: CSV lines in, one JSON line per sample out.
 
@@ -65,6 +70,8 @@ def live(
     keep_faulty : bool
         Use every channel, without looking for faulty ones. By default a channel that contradicts the others is left out
         while it does so (`gfimu.integrity.live`): from a rest at the start on, else from when the rate has settled.
+    force : bool
+        Go on, with a warning, where the checks of the first seconds would refuse the stream.
 
     Returns
     -------
@@ -76,7 +83,8 @@ def live(
     ------
     InputError
         If array or rate are stated nowhere, the rate is not positive, the source can't be opened or its first line that
-        is no comment doesn't name the columns.
+        is no comment doesn't name the columns. While lines come: if the first seconds show that units, times, array or
+        order of the channels are wrong.
     """
     import numpy as np
 
@@ -95,8 +103,9 @@ def live(
         rate = metadata.get("sample_rate_hz", metadata.get("time_stamp_rate_hz"))
     if rate is None:
         raise InputError("--rate is missing, and the stream does not state its sample rate; give it")
-    if not isinstance(rate, int | float) or not rate > 0:
-        raise InputError(f"--rate {rate}: must be positive, Hz")
+    if not isinstance(rate, int | float) or not _RATES[0] <= rate <= _RATES[1]:
+        raise InputError(f"--rate {rate}: must be positive, {_RATES[0]:g} to {_RATES[1]:g} Hz")
+    lines = _examined(lines, geometry, rate, force=force)
     about = known_axis(turning_axis(axis, axis_point, hub, inclination_rad), geometry)
     if about is not None:
         from gfimu.known_axis.live import axis_stream
@@ -118,13 +127,53 @@ def live(
     return filter_stream(lines, geometry, errors, 1.0 / rate, settings, fuse_gyro=gyro, watched=watched)
 
 
+def _examined(lines: Iterator[str], array: AccelerometerArray, rate: float, *, force: bool) -> Iterator[str]:
+    """Pass lines on, and examine the samples of the first seconds once they are there."""
+    wanted = min(max(_FEWEST, round(_START_S * rate)), _MOST)
+    head: list[str] | None = []
+    samples = 0
+    for line in lines:
+        if head is not None:
+            head.append(line)
+            samples += bool(line.strip()) and not line.startswith("#")
+            if samples > wanted:  # the line that names the columns is none
+                _examine(head, array, rate, force=force)
+                head = None
+        yield line
+    if head is not None:
+        _examine(head, array, rate, force=force)
+
+
+def _examine(lines: list[str], array: AccelerometerArray, rate: float, *, force: bool) -> None:
+    """Check the first samples of a stream as a recording; what can't be read is left to the filter."""
+    import numpy as np
+
+    from gfimu.rate.stream import StreamSample, stream_samples
+    from gfimu.recording import Recording
+    from gfimu.recording.checks import examine
+
+    found = [one for one in stream_samples(lines, array) if isinstance(one, StreamSample) and np.isfinite(one.t_s)]
+    later = np.diff([one.t_s for one in found], prepend=-np.inf) > 0.0
+    kept = [one for one, is_later in zip(found, later, strict=True) if is_later]
+    if len(kept) < _FEWEST or np.any(np.diff([one.t_s for one in kept]) <= 0.0):
+        return
+    run = Recording.from_arrays(
+        [one.t_s for one in kept],
+        np.array([one.readings for one in kept]),
+        array,
+        metadata={"sample_rate_hz": float(rate)},
+    )
+    examine(run, array, source="the stream's start", force=force)
+
+
 def _lines(source: str | Path, *, follow: bool) -> Iterator[str]:
     """Lines of the source as they arrive."""
+    from gfimu.files.input_file import is_ordinary
     from gfimu.rate.stream_source import recording_lines
 
     if source == "-":
         return iter(sys.stdin.readline, "")
-    if Path(source).is_file():
+    if is_ordinary(source):
         return recording_lines(source, follow=follow)
     host, colon, port = str(source).removeprefix("socket://").rpartition(":")
     if not colon or not port.isdigit():

@@ -40,6 +40,7 @@ def noise(
     axis_point: Sequence[float] = (0.0, 0.0, 0.0),
     hub: str = "fixed",
     speed_rad_s: float = math.tau,
+    force: bool = False,
 ) -> RecordingNoise:
     """Identify velocity random walk N, bias instability B, acceleration random walk K, quantisation Q and ramp R.
 
@@ -72,33 +73,39 @@ def noise(
         Whether that axis stands still (a table) or moves with a body (a wheel).
     speed_rad_s : float
         Rate at which that holds, rad/s.
+    force : bool
+        Go on, with a warning, where the checks of the recording would refuse it.
 
     Raises
     ------
     InputError
-        If the recording can't be read or never rests, or holds counts where an axis is given, or an output can't
-        be written where it is asked for.
+        If the recording can't be read, is refused by its checks or never rests, or holds counts where an axis is given,
+        or an output can't be written where it is asked for.
     """
     from gfimu.calibration.run_file import open_calibrated, open_uncalibrated
-    from gfimu.commands.opened import as_calibration, by_map
+    from gfimu.commands.known_axis import known_axis, turning_axis
+    from gfimu.commands.opened import as_array, as_calibration, by_map, name_of
     from gfimu.files.atomic_file import write_text
     from gfimu.recording import Recording
+    from gfimu.recording.checks import examine
     from gfimu.sensor_noise import kalibr_yaml, recording_noise
 
+    chosen = turning_axis(axis, axis_point, hub, None)
     unit = None if calibration is None else as_calibration(calibration)
     source = by_map(recording, column_map, map_set)
     if isinstance(source, Recording):
         run = source if unit is None else unit.apply(source)
     else:
         run = open_uncalibrated(source) if unit is None else open_calibrated(source, unit)
+    given = None if array is None else as_array(array)
+    examine(run, given, source=name_of(recording), force=force)
     result = recording_noise(run, stretch=stretch, rest_threshold=rest_threshold)
     if axis is not None or array is not None or "[turning_axis]" in str(run.metadata.get("array_toml", "")):
-        from gfimu.commands.known_axis import known_axis, turning_axis
-        from gfimu.commands.opened import as_array, as_run
+        from gfimu.commands.opened import as_run
         from gfimu.known_axis.accuracy.noise import axis_noise
 
-        geometry = as_run(source, None)[1] if array is None else as_array(array)
-        turning = known_axis(turning_axis(axis, axis_point, hub, None), geometry)
+        geometry = given or as_run(source, None)[1]
+        turning = known_axis(chosen, geometry)
         if turning is not None:
             result = replace(result, about_axis=axis_noise(result, geometry, turning, rate_rad_s=speed_rad_s))
     if kalibr is not None:

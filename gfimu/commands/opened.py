@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -26,6 +27,7 @@ __all__ = [
     "as_twin",
     "by_map",
     "files_by_map",
+    "name_of",
 ]
 
 _Source = TypeVar("_Source")
@@ -160,3 +162,8 @@ def as_runs(
 ) -> list[Recording | str | Path | MappedFile]:
     """Return recordings given as one of them, or as a list or tuple of several."""
     return list(recordings) if isinstance(recordings, list | tuple) else [recordings]  # type: ignore[list-item]
+
+
+def name_of(recording: object) -> str:
+    """Return the name of a recording's file, for messages; empty for an object."""
+    return os.path.basename(os.fspath(recording)) if isinstance(recording, str | os.PathLike) else ""  # noqa: PTH119

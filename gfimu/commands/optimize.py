@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 __all__ = ["optimize"]
 
+_MOST_CHIPS, _MOST_RESTARTS = 200, 100_000  # more take days
+
 
 @writes(out=ARRAY_FILE)
 def optimize(
@@ -79,6 +81,8 @@ def optimize(
     number = n_chips if chips is None else chips
     if number is None:
         raise InputError("no number of chips: give chips")
+    if number > _MOST_CHIPS or restarts > _MOST_RESTARTS:
+        raise InputError(f"at most {_MOST_CHIPS} chips and {_MOST_RESTARTS} restarts are searched; give fewer")
     if seed < 0:
         raise InputError(f"seed {seed}: must be zero or positive")
     result = search(

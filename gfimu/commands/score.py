@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = ["score"]
 
+_FASTEST = 1e6  # rad/s
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
@@ -104,6 +105,8 @@ def score(
     from gfimu.geometry.turning_axis import AxisUncertainty
     from gfimu.integrity.protection import fault_protection
 
+    if not abs(speed_rad_s) <= _FASTEST:
+        raise InputError(f"--speed-rad-s {speed_rad_s}: must be a number of at most {_FASTEST:g}")
     if spin_axis not in _AXES:
         raise unknown_name("axis", spin_axis, _AXES)
     if arrays:

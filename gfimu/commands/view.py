@@ -28,6 +28,7 @@ def view(
     hub: str = "fixed",
     inclination_rad: float | None = None,
     out: str | Path | None = None,
+    force: bool = False,
     on_picture: Callable[[Path], None] | None = None,
 ) -> Path:
     """Open a run in the rerun viewer, or write its picture.
@@ -53,6 +54,8 @@ def view(
         Angle between that axis and the vertical, rad; estimated by default.
     out : str or Path, optional
         Write the ``.rrd`` here and don't open it.
+    force : bool
+        Go on, with a warning, where the checks of the recording would refuse it.
     on_picture : callable, optional
         Called with the rerun recording once it is written, before the viewer opens.
 
@@ -64,7 +67,7 @@ def view(
     Raises
     ------
     InputError
-        If the file can't be read, or the output can't be written where it is asked for.
+        If the file can't be read, its checks refuse it, or the output can't be written where it is asked for.
     GfimuError
         If this machine has no display, or the viewer fails; the message says what to do instead.
     """
@@ -84,6 +87,7 @@ def view(
         picture,
         array=None if array is None else as_array(array),
         axis=turning_axis(axis, axis_point, hub, inclination_rad),
+        force=force,
     )
     if on_picture is not None:
         on_picture(picture)

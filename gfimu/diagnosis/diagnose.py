@@ -34,6 +34,7 @@ def diagnose(
     names: Sequence[str] | None = None,
     report: Report | None = None,
     policy: Policy | None = None,
+    force: bool = False,
 ) -> Diagnosis:
     """Show what a simulation gets wrong, name the cause, extend the model, measure the gain.
 
@@ -51,6 +52,8 @@ def diagnose(
         Called with the share done (0 to 1) and a line of text.
     policy : Policy, optional
         Other thresholds than the usual ones.
+    force : bool
+        Go on, with a warning, with a run that fits the simulation in another unit or the like only.
 
     Returns
     -------
@@ -74,8 +77,8 @@ def diagnose(
         if model.drive_source == "gyro":
             settings = settings.of_body()
         tell(0.02, "read")
-        prepared = prepare(recordings, model, labels, settings)
-        kept = prepare(held_out, model, held_labels, settings) if held_out else None
+        prepared = prepare(recordings, model, labels, settings, force=force)
+        kept = prepare(held_out, model, held_labels, settings, force=force) if held_out else None
         try:
             found = _by_stages(prepared, kept, model, settings, tell)
         except np.linalg.LinAlgError as error:
@@ -89,13 +92,18 @@ def diagnose(
 
 
 def prepare(
-    recordings: Sequence[Recording], model: WorldModel, names: Sequence[str], policy: Policy = Policy()
+    recordings: Sequence[Recording],
+    model: WorldModel,
+    names: Sequence[str],
+    policy: Policy = Policy(),
+    *,
+    force: bool = False,
 ) -> PreparedRuns:
     """Read recordings of a table or of a free body and find the faults of their samples."""
     if model.drive_source == "gyro":
         recordings = [with_axis_gyro(reference_on_rows(one), model.array) for one in recordings]
         return prepare_bodies(recordings, model, names, spike_share=policy.body_spike_share)
-    return PreparedRuns.build(recordings, model, names, predicted_by_reference)
+    return PreparedRuns.build(recordings, model, names, predicted_by_reference, force=force)
 
 
 def _by_stages(

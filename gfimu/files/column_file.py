@@ -7,6 +7,7 @@ values are JSON. A block is small against the table, so reading needs no second 
 from __future__ import annotations
 
 import csv
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol
@@ -19,6 +20,7 @@ from numpy.typing import NDArray
 
 from gfimu.errors import InputError
 from gfimu.files.atomic_file import atomic_path
+from gfimu.files.input_file import LONGEST_LINE, MOST_COLUMNS, check_input
 from gfimu.files.table import ArrowStream, column_type, from_json, metadata_of_schema, numbers, schema_metadata, to_json
 from gfimu.files.table_columns import TableColumns
 
@@ -66,20 +68,22 @@ def open_columns(source: str | Path | ArrowStream | ColumnFile) -> ColumnFile:
     """
     if not isinstance(source, str | Path):
         return source if isinstance(source, TableColumns) else TableColumns(source)
-    file = Path(source)
+    file = check_input(source)
     try:
         with file.open("rb") as stream:
             magic = stream.read(4)
-    except FileNotFoundError:
-        raise InputError(f"{file}: no such file; check the path") from None
     except OSError as error:
         raise InputError(f"{file}: {error.strerror or error}; check the path") from None
     if not magic:
         raise InputError(f"{file}: empty file; record again or give another file")
     table: ColumnFile = _ParquetColumns(file) if magic == b"PAR1" else _CsvColumns(file)
-    repeated = sorted({name for name in table.names if table.names.count(name) > 1})
+    if len(table.names) > MOST_COLUMNS:
+        raise InputError(
+            f"{file}: has {len(table.names)} columns, more than {MOST_COLUMNS}; write those of the recording"
+        )
+    repeated = sorted(name for name, times in Counter(table.names).items() if times > 1)
     if repeated:
-        raise InputError(f"{file}: column {repeated[0]!r} appears twice; keep one")
+        raise InputError(f"{file}: column {_cell(repeated[0])} appears twice; keep one")
     return table
 
 
@@ -193,8 +197,10 @@ class _CsvColumns:
         header = ""
         try:
             with file.open(encoding="utf-8-sig") as stream:
-                for line in stream:
+                while line := stream.readline(LONGEST_LINE):
                     self._header_lines += 1
+                    if len(line) >= LONGEST_LINE:
+                        raise InputError(f"{file}: a line is longer than {LONGEST_LINE} characters; write it again")
                     if "\x00" in line:
                         raise self._binary()
                     if line.strip() and not line.startswith("#"):
@@ -205,7 +211,7 @@ class _CsvColumns:
             raise self._binary() from None
         if not header:
             raise InputError(f"{file}: no header line; the first line must name the columns, such as t_s,a11_m_s2")
-        self.names = [name.strip() for name in next(csv.reader([header.strip()], skipinitialspace=True))]
+        self.names = [name.strip() for name in _cells_of(header.strip(), str(file), skipinitialspace=True)]
         if len(self.names) == 1 and any(mark in header for mark in ";\t"):
             raise InputError(f"{file}: columns are not separated by commas; write it with commas")
         self.max_rows = _count_lines(file) - self._header_lines
@@ -266,7 +272,7 @@ class _CsvColumns:
             for number, line in enumerate(stream, start=1):
                 if number <= self._header_lines or not line.strip():
                     continue
-                cells = next(csv.reader([line.rstrip("\r\n").replace("\x00", "�")]))
+                cells = _cells_of(line.rstrip("\r\n").replace("\x00", "�"), f"{self.file}: line {number}")
                 if len(cells) != len(self.names):
                     return InputError(
                         f"{self.file}: line {number} has {len(cells)} columns, the header {len(self.names)}; "
@@ -275,10 +281,23 @@ class _CsvColumns:
                 for place, name in wanted.items():
                     if cells[place] not in _MISSING and not _is_number(cells[place]):
                         return InputError(
-                            f"{self.file}: line {number}, column {name}: {cells[place].strip()[:40]!r} is not a "
+                            f"{self.file}: line {number}, column {name}: {_cell(cells[place])} is not a "
                             "number; leave the cell empty where a value is missing"
                         )
         return InputError(f"{self.file}: not a readable CSV file ({_first_line(error)}); write it again")
+
+
+def _cells_of(line: str, source: str, *, skipinitialspace: bool = False) -> list[str]:
+    """Return the cells of a line of a CSV file."""
+    try:
+        return next(csv.reader([line], skipinitialspace=skipinitialspace), [])
+    except csv.Error as error:
+        raise InputError(f"{source}: can't be read as cells ({error}); write it again") from None
+
+
+def _cell(text: str) -> str:
+    """Return the begin of a cell, for messages."""
+    return repr(text.strip()[:40])
 
 
 def _is_number(cell: str) -> bool:

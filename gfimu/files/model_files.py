@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import importlib.util
+import re
 import tomllib
 from pathlib import Path
 from typing import Any
 
 from gfimu.errors import InputError, unknown_name
+from gfimu.files.input_file import check_input, is_ordinary
 
-__all__ = ["find_model", "list_models", "models_directory", "read_toml"]
+__all__ = ["find_model", "list_models", "models_directory", "parse_toml", "read_toml"]
+
+_LONGEST_REASON = 160
+_MOST_PARTS = 100  # numerical: of a dotted key
 
 
 def models_directory() -> Path:
@@ -58,20 +63,45 @@ def find_model(kind: str, name: str | Path, *, beside: Path | None = None, suffi
     if text.endswith(suffix) or "/" in text or "\\" in text:
         candidates = ([beside / text] if beside is not None else []) + [Path(text)]
         for path in candidates:
-            if path.is_file():
+            if is_ordinary(path):
                 return path
-        raise InputError(f"{text}: no such file; give a path or one of {', '.join(list_models(kind, suffix))}")
+        raise InputError(f"{_short(text)}: no such file; give a path or one of {', '.join(list_models(kind, suffix))}")
     path = models_directory() / kind / f"{text}{suffix}"
-    if path.is_file():
+    if is_ordinary(path):
         return path
-    raise unknown_name(kind.rstrip("s"), text, list_models(kind, suffix))
+    raise unknown_name(kind.rstrip("s"), _short(text), list_models(kind, suffix))
 
 
 def read_toml(path: Path) -> dict[str, Any]:
     """Read a TOML file; a syntax error or unreadable file becomes an `InputError` that names it."""
+    check_input(path)
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        text = path.read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
         raise InputError(f"{path}: not valid TOML ({error}); correct the file") from None
     except OSError as error:
         raise InputError(f"{path}: {error.strerror or error}; check the path") from None
+    return parse_toml(text, path)
+
+
+def parse_toml(text: str, source: str | Path) -> dict[str, Any]:
+    """Return the content of TOML text; a syntax error, nesting too deep or a number too long is an `InputError`."""
+    for line in text.splitlines() if text.count(".") > _MOST_PARTS else ():
+        if line.count(".") > _MOST_PARTS and any(_is_long_key(piece) for piece in re.split(r"[=,{}\[\]]", line)):
+            raise InputError(f"{source}: not valid TOML (a key of more than {_MOST_PARTS} parts); correct the file")
+    try:
+        return tomllib.loads(text)
+    except RecursionError:
+        raise InputError(f"{source}: not valid TOML (nested too deeply); correct the file") from None
+    except ValueError as error:  # also of a whole number with thousands of digits
+        reason = " ".join(str(error).split())[:_LONGEST_REASON]
+        raise InputError(f"{source}: not valid TOML ({reason}); correct the file") from None
+
+
+def _is_long_key(piece: str) -> bool:
+    """Tell whether a piece of a line may be a dotted key of so many parts that its parser takes hours and gigabytes."""
+    return piece.count(".") > _MOST_PARTS and all(part.strip() for part in piece.split("."))
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= _LONGEST_REASON else f"{text[:_LONGEST_REASON]}…"

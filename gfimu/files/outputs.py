@@ -35,6 +35,7 @@ __all__ = [
     "OutputFolder",
     "check_outputs",
     "check_parent",
+    "same_file",
     "writes",
 ]
 
@@ -159,11 +160,11 @@ def _check(outputs: Iterable[tuple[str, str | Path, Output]], read: list[Path]) 
         _check_kind(path, output)
         for file in output.files(path):
             for source in read:
-                if _same(file, source):
+                if same_file(file, source):
                     through = "" if file == source else f" is the same file as {source} and"
                     raise InputError(f"{file}:{through} is read by this command; choose another {_option(name)}")
             for other, earlier in written:
-                if _same(file, earlier):
+                if same_file(file, earlier):
                     raise InputError(
                         f"{file}: {_option(other)} and {_option(name)} name the same file; choose two different ones"
                     )
@@ -268,7 +269,7 @@ def _check_kind(path: Path, output: Output) -> None:
         raise InputError(f"{path}: is not an ordinary file; choose another name")
 
 
-def _same(first: Path, second: Path) -> bool:
+def same_file(first: Path, second: Path) -> bool:
     """Whether two paths are one file, whether or not it exists yet."""
     try:
         return first.samefile(second)

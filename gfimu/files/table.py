@@ -97,7 +97,7 @@ def from_json(text: str) -> Any:
     """Return the value that a metadata text holds; the text itself where it is no JSON."""
     try:
         return json.loads(text)
-    except json.JSONDecodeError:
+    except (ValueError, RecursionError):  # also of whole numbers with thousands of digits
         return text
 
 

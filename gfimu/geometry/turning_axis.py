@@ -17,6 +17,8 @@ from gfimu.short_repr import short_repr
 
 __all__ = ["HUBS", "AxisUncertainty", "TurningAxis"]
 
+_LARGEST_STD = 1e3  # numerical: m, rad or m/s², far beyond any mounting
+
 HUBS = ("fixed", "free")
 
 
@@ -53,8 +55,10 @@ class AxisUncertainty:
 
     def __post_init__(self) -> None:
         for name, value in asdict(self).items():
-            if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value < math.inf:
-                raise InputError(f"[turning_axis]: {name} is {value!r}; give a standard deviation of at least 0")
+            if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value < _LARGEST_STD:
+                raise InputError(
+                    f"[turning_axis]: {name} is {value!r}; give a standard deviation of 0 to {_LARGEST_STD:g}"
+                )
 
     @classmethod
     def names(cls) -> tuple[str, ...]:

@@ -22,6 +22,9 @@ from gfimu.units import REFERENCE_UNITS, TIME_COLUMNS
 __all__ = ["ColumnView", "Inspection", "inspect_file"]
 
 
+_MOST_COLUMNS, _MOST_TABLES = 600, 200  # of a file whose layout is guessed
+
+
 @dataclass(frozen=True)
 class ColumnView:
     """A column as it looks.
@@ -133,6 +136,10 @@ def inspect_file(path: str | Path, *, table: str = "", text: TextSpec = TextSpec
         If the file can't be read at all.
     """
     raw = read_foreign(path, text=text)
+    widest = max(raw.tables.values(), key=lambda one: len(one.columns))
+    if len(widest.columns) > _MOST_COLUMNS or len(raw.tables) > _MOST_TABLES:
+        what = f"{len(widest.columns)} columns" if len(widest.columns) > _MOST_COLUMNS else f"{len(raw.tables)} tables"
+        raise InputError(f"{path}: has {what}, too many to guess what they are; name those of the recording in a map")
     plain = raw.table(table) if table else next(iter(raw.tables.values()))
     own = own_chips(list(plain.columns))
     if own:

@@ -78,7 +78,7 @@ def find_split(table: RawTable, times: str | None) -> str | None:
 
 def _values(table: RawTable, name: str) -> tuple[list[str], NDArray[np.int64]]:
     """Return the values of a column in their order, and which one each row has; -1 for rare and empty ones."""
-    texts = np.array(["" if value is None else str(value).strip() for value in table.columns[name].tolist()])
+    texts = np.array(["" if value is None else str(value).strip()[:80] for value in table.columns[name].tolist()])
     values, places, counts = np.unique(texts, return_inverse=True, return_counts=True)
     usual = (counts >= _LEAST_SHARE * counts.max()) & (values != "")
     order = [place for place in range(len(values)) if usual[place]]

@@ -25,6 +25,7 @@ _LEVERS = 5.0  # standard deviations between the levers by ω² and by α
 _LEVER_SHARE = 0.15  # of a lever: gains, axes and a tilt of the table make it differ by so much
 _LOST = 0.2  # of the variance, on a quarter that the fit did not see
 _FOREIGN = 6  # references of shuffled pieces
+_MOST_RATE_ERROR = 0.5  # ratio that can be searched at most
 _RATE_STDS = 5.0  # standard deviations from which a rate error is no chance: the stated ones may be low by a factor
 
 
@@ -143,6 +144,8 @@ def join_reference(
     InputError
         If the reference does not change, the files are too short, or they don't belong together.
     """
+    if not 0.0 <= most_rate_error <= _MOST_RATE_ERROR:
+        raise InputError(f"largest rate error {most_rate_error}: give a ratio of 0 to {_MOST_RATE_ERROR:g}")
     signals, rate, width = grids(recording if seen is None else seen, reference)
     found = align(signals, most_rate_error=most_rate_error)
     if found is None:

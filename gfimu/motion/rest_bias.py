@@ -86,7 +86,8 @@ class RestBias:
         beyond = int(np.count_nonzero(ratio > 1.0))
         others = f" (and {beyond - 1} more channels exceed theirs)" if beyond > 1 else ""
         text = (
-            f"channel {self.array.channels[worst]} reads {self.bias[worst] / _MILLI_G:+.0f} mg beyond gravity at rest; "
+            f"channel {self.array.channels[worst]} of array {self.array.name!r} reads "
+            f"{self.bias[worst] / _MILLI_G:+.0f} mg beyond gravity at rest; "
             f"its data sheet allows {limit[worst] / _MILLI_G:.0f} mg{others}: the table is not level or the mounting "
             "another, the unit, order, sign or array is wrong, the body turned, or the chip is damaged"
         )

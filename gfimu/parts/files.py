@@ -7,13 +7,11 @@ carries its array can be read where the file isn't.
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from gfimu.errors import InputError
-from gfimu.files.model_files import find_model, read_toml
+from gfimu.files.model_files import find_model, parse_toml, read_toml
 
 __all__ = ["add_part_file", "is_part_file", "part_table"]
 
@@ -75,9 +73,6 @@ def part_table(name: str, files: Mapping[str, str]) -> tuple[dict[str, Any], str
         If the part is unknown or its text is not valid TOML.
     """
     if name in files:
-        try:
-            return tomllib.loads(files[name]), f"part {name!r}"
-        except tomllib.TOMLDecodeError as error:
-            raise InputError(f"part {name!r}: not valid TOML ({error}); correct the file") from None
+        return parse_toml(files[name], f"part {name!r}"), f"part {name!r}"
     path = find_model("parts", name)
     return read_toml(path), str(path)

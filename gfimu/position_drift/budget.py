@@ -44,6 +44,8 @@ TILT_LIMIT = 0.25
 _FORMAT_VERSION = 1
 _LONGEST_SEARCH = 1000.0  # times the time asked for
 _MOST_RADIANS = 1e4
+_LONGEST = 1e8  # numerical: s, three years
+_LARGEST = 1e6  # numerical: of a rate, an offset and gravity, SI
 
 
 @dataclass(frozen=True)
@@ -215,10 +217,10 @@ def drift_budget(
     GeometryError
         If the array can't see all six motions.
     """
-    if not (math.isfinite(time) and time > 0):
-        raise InputError(f"time is {time} s; it must be above zero")
-    if not np.isfinite([rate, *offset, gravity]).all():
-        raise InputError("rate, offset and gravity must be finite numbers")
+    if not 0.0 < time <= _LONGEST:
+        raise InputError(f"time is {time} s; it must be above zero, and {_LONGEST:g} s at most")
+    if not np.all(np.abs([rate, *offset, gravity]) <= _LARGEST):
+        raise InputError(f"rate, offset and gravity must be numbers of at most {_LARGEST:g}")
     unit = motion_covariance(array)  # (6, 6) of [alpha; p] for channels of unit variance
     alpha_only, p_only = unit.copy(), unit.copy()
     alpha_only[3:], alpha_only[:, 3:], p_only[:3], p_only[:, :3] = 0.0, 0.0, 0.0, 0.0

@@ -45,6 +45,7 @@ __all__ = [
 
 _SERIES_RADIUS = 4.0
 _SERIES_TERMS = 40
+_LARGEST = 1e6  # numerical: of a source of error, SI
 
 
 @dataclass(frozen=True)
@@ -70,8 +71,8 @@ class ErrorSources:
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
-            if not (math.isfinite(value) and value >= 0):
-                raise InputError(f"{name} is {value}; it must be a finite number, zero or above")
+            if not 0.0 <= value <= _LARGEST:
+                raise InputError(f"{name} is {value}; it must be a number from zero to {_LARGEST:g}")
 
 
 @dataclass(frozen=True)

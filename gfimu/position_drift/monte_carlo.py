@@ -27,6 +27,7 @@ from gfimu.units import STANDARD_GRAVITY
 __all__ = ["DriftSample", "monte_carlo_drift"]
 
 _SAMPLES_PER_RADIAN = 10.0
+_MOST_STEPS, _MOST_RUNS = 10**9, 10**6  # numerical: samples of all runs, hours of work; runs
 _LEAST_STEPS = 60
 # Even weights: Simpson's alternating ones would raise the variance of integrated white noise by a ninth.
 _METHOD = "centred4"
@@ -108,6 +109,8 @@ def monte_carlo_drift(
     if not (math.isfinite(time) and time > 0 and math.isfinite(sample_rate) and sample_rate > 0):
         raise InputError("time and sample rate must be above zero")
     steps = max(_LEAST_STEPS, math.ceil(time * max(sample_rate, _SAMPLES_PER_RADIAN * abs(rate))))
+    if steps * runs > _MOST_STEPS or runs > _MOST_RUNS:
+        raise InputError(f"{runs} runs of {steps} samples take too long; ask for fewer, or for a shorter time")
     t = np.linspace(0.0, time, steps + 1)
     inverse = pseudo_inverse(array)  # (6, c)
     true_omega = np.array([0.0, 0.0, rate])

@@ -30,6 +30,7 @@ from gfimu.short_repr import short_repr
 __all__ = ["ChannelTables", "SensorErrors"]
 
 _RANK_TOLERANCE = 1e-9
+_LARGEST = 1e6  # numerical: m/s², far beyond any part
 _WEAK = 0.1  # products seen more weakly than this share of the best are not used to clean α
 _LEAST_NOISE_LSB = 0.3  # LSB: below that equal readings prove nothing
 _EQUAL_READINGS = 1e-7  # probability per sample at which equal readings count as a stuck channel
@@ -76,8 +77,8 @@ class SensorErrors:
     def __post_init__(self) -> None:
         for name in ("noise_std", "bias_std"):
             value = getattr(self, name)
-            if value.ndim != 1 or not np.isfinite(value).all() or np.any(value < 0):
-                raise InputError(f"{name} must hold one number per channel, none negative, m/s²")
+            if value.ndim != 1 or not np.all(value <= _LARGEST) or np.any(value < 0):
+                raise InputError(f"{name} must hold one number per channel, none negative or above {_LARGEST:g} m/s²")
         if np.any(self.noise_std <= 0):
             raise InputError("noise_std must be positive for every channel; a real sensor has noise, m/s²")
         for name in ("scale_std", "placement_std", "timing_std", "gyro_noise_std", "gyro_bias_std"):

@@ -260,7 +260,11 @@ def stream_samples(
     for line in stream:
         if not line.strip() or line.startswith("#"):
             continue
-        cells = next(csv.reader([line]))
+        try:
+            cells = next(csv.reader([line]), [])
+        except csv.Error as error:
+            yield f"{error}; line skipped"
+            continue
         if layout is None:
             layout = StreamLayout.from_header(cells, array, metadata)
             if gyro and not layout.gyro:

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from gfimu.errors import InputError
+from gfimu.files.input_file import check_input
 from gfimu.recording import Recording
 
 __all__ = ["recording_lines"]
@@ -37,7 +38,7 @@ def recording_lines(path: str | Path, *, follow: bool = False) -> Iterator[str]:
     InputError
         If the file can't be read.
     """
-    file = Path(path)
+    file = check_input(path)
     try:
         with file.open("rb") as stream:
             magic = stream.read(len(_PARQUET))

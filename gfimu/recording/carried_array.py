@@ -7,7 +7,6 @@
 from __future__ import annotations
 
 import re
-import tomllib
 import warnings
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
@@ -17,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from gfimu.errors import InputError, RecordingWarning
-from gfimu.files.model_files import list_models
+from gfimu.files.model_files import list_models, parse_toml
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.units import READING_UNITS
 
@@ -65,7 +64,7 @@ def carried_array(
     text = metadata.get("array_toml")
     if text is not None:
         try:
-            array = AccelerometerArray.from_dict(tomllib.loads(text), source="array")
+            array = AccelerometerArray.from_dict(parse_toml(text, "array"), source="array")
         except (TypeError, ValueError, AttributeError) as error:
             raise _damaged(source, "array_toml", str(error)) from None
         parts = metadata.get("parts_toml") or {}
@@ -122,20 +121,21 @@ def array_difference(one: AccelerometerArray, other: AccelerometerArray) -> str:
     return ", ".join(found)
 
 
-def warn_of_other_array(metadata: Mapping[str, Any], used: AccelerometerArray, name: str) -> None:
+def warn_of_other_array(
+    metadata: Mapping[str, Any], used: AccelerometerArray, name: str, *, whose: str = "the twin's"
+) -> None:
     """Warn in one line where a recording carries another geometry than the one it is compared with."""
     try:
         own = carried_array(metadata, source=name)
     except InputError as error:
         if "array_toml" in metadata:
             text = str(error).partition(";")[0]
-            warnings.warn(f"{text}; the twin's array {used.name!r} is used", RecordingWarning, stacklevel=3)
+            warnings.warn(f"{text}; {whose} array {used.name!r} is used", RecordingWarning, stacklevel=3)
         return
     difference = "" if own is None else array_difference(own, used)
     if own is not None and difference:
         warnings.warn(
-            f"{name}: recorded with array {own.name!r}, but the twin's {used.name!r} is used; "
-            f"they differ: {difference}",
+            f"{name}: recorded with array {own.name!r}, but {whose} {used.name!r} is used; they differ: {difference}",
             RecordingWarning,
             stacklevel=3,
         )

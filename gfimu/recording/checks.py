@@ -8,24 +8,34 @@ smaller contradiction, there is a warning; otherwise nothing is said.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import warnings
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.errors import InputError
-from gfimu.files.model_files import list_models
+from gfimu.errors import InputError, RecordingWarning
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.geometry.observability import unseen_motions
 from gfimu.parts.limits import PartLimits
+from gfimu.recording.carried_array import warn_of_other_array
 from gfimu.recording.evidence.gravity import gravity_text
 from gfimu.recording.evidence.rigid import Costs, Evidence, Otherwise, gather
+from gfimu.recording.evidence.ways import TIME_UNITS, time_text, ways_to_read
 from gfimu.recording.recording import Recording
-from gfimu.units import STANDARD_GRAVITY
 
-__all__ = ["Finding", "check_recording", "dead_channels", "noisy_channels", "refuse_or_warn", "without_dead_channels"]
+__all__ = [
+    "Finding",
+    "check_recording",
+    "dead_channels",
+    "examine",
+    "noisy_channels",
+    "refuse_or_warn",
+    "without_dead_channels",
+]
 
 _FEWEST = 50  # samples
 _LEAST_NOISE = 0.3  # of the data sheet's: from that on a channel surely has noise of its own
@@ -42,8 +52,6 @@ _SLOWEST = 2.0  # Hz, a rate that is plausible for a moving body
 
 _CLEAR = 0.02  # of the contradiction is left: no need to look further
 _OF_ALL = frozenset({"time", "unit", "array"})
-
-_TIME_UNITS = {1e-3: "milliseconds", 1e-6: "microseconds"}
 
 
 @dataclass(frozen=True)
@@ -80,8 +88,77 @@ def refuse_or_warn(findings: Iterable[Finding], *, force: bool = False) -> tuple
     found = tuple(findings)
     for finding in found:
         if finding.refused and not force:
-            raise InputError(f"{finding.text}; --force (force=True) estimates nevertheless")
+            raise InputError(f"{finding.text}; --force (force=True) goes on nevertheless")
     return found
+
+
+def examine(
+    recording: Recording,
+    array: AccelerometerArray | None = None,
+    *,
+    source: str | Path = "",
+    force: bool = False,
+    apart_from: Collection[str] = (),
+    whose: str = "the given",
+) -> tuple[Finding, ...]:
+    """Refuse or warn of a recording that its array contradicts: the gate of every command that reads one.
+
+    Parameters
+    ----------
+    recording : Recording
+        Readings in m/s² or raw counts.
+    array : AccelerometerArray, optional
+        The array that it is taken to be of; its own by default. Nothing is looked for where it has none.
+    source : str or Path
+        Its name, for messages.
+    force : bool
+        Warn where the recording would be refused.
+    apart_from : collection of str
+        Kinds of findings (`Finding.kind`) that are left out: those that the caller explains itself.
+    whose : str
+        Whose array ``array`` is, for the warning that the recording carries another one; empty for no such warning.
+
+    Returns
+    -------
+    tuple of Finding
+        What was found, as `check_recording`; each is a `gfimu.errors.RecordingWarning` too.
+
+    Raises
+    ------
+    InputError
+        With cause and remedy, if the recording should not be used as it is; or if it lacks channels of ``array``.
+    """
+    if array is None:
+        try:
+            array = recording.array
+        except InputError:
+            return ()
+        if array is None or not set(array.channels) <= set(recording.channels):
+            return ()
+    elif whose:
+        warn_of_other_array(recording.metadata, array, str(source) or "the recording", whose=whose)
+    name = f"{source}: " if str(source) else ""
+    found = [
+        replace(one, text=f"{name}{one.text}")
+        for one in check_recording(_in_si(recording, array), array)
+        if one.kind not in apart_from
+    ]
+    refuse_or_warn(found, force=force)
+    for one in found:
+        warnings.warn(one.text, RecordingWarning, stacklevel=2)
+    return tuple(found)
+
+
+def _in_si(recording: Recording, array: AccelerometerArray) -> Recording:
+    """Return readings in m/s², by the size of a count that the recording states or the parts have."""
+    if recording.unit == "m_s2":
+        return recording
+    size = recording.metadata.get("lsb_m_s2")
+    readings = recording.readings[:, [recording.channels.index(name) for name in array.channels]]
+    if not isinstance(size, int | float):
+        limits = _limits(recording, array)
+        size = np.ones(array.n_channels) if limits is None else limits.lsb
+    return replace(recording, readings=readings * size, channels=array.channels, unit="m_s2")
 
 
 def dead_channels(recording: Recording, array: AccelerometerArray) -> tuple[Finding, ...]:
@@ -94,11 +171,11 @@ def dead_channels(recording: Recording, array: AccelerometerArray) -> tuple[Find
     others = int(np.count_nonzero(noisy)) >= max(1, int(np.count_nonzero(~constant & present.any(axis=0))) // 2)
     for name, seen, held, column in zip(array.channels, present.T, constant, readings.T, strict=True):
         if not seen.any():
-            text = f"channel {name} has no readings; the estimate goes on without it: check its wiring"
+            text = f"channel {name} has no readings: check its wiring"
             found.append(Finding("dead", text, False, (name,)))
         elif held and others and len(column) >= _FEWEST:
             value = column[seen][0]
-            text = f"channel {name} reads {value:.4g} m/s² throughout; the estimate goes on without it: check its chip"
+            text = f"channel {name} reads {value:.4g} m/s² throughout: check its chip"
             found.append(Finding("dead", text, False, (name,)))
     return tuple(found)
 
@@ -150,9 +227,14 @@ def check_recording(recording: Recording, array: AccelerometerArray) -> tuple[Fi
     found = [*_time_against_metadata(recording), *_duplicates(readings, limits, array)]
     if not found and np.count_nonzero(alive) > 3:
         evidence = gather(recording, array, limits, alive)
-        found += _decide(evidence, recording)
+        found += _decide(evidence)
+        if not found and evidence.up is not None:  # the table may be inclined: its axis is no vertical then
+            found += _decide(replace(evidence, up=None))
         if not found:
             found += _slow(recording, readings, limits)
+        if not found and not len(evidence.rests):  # gravity can't be read off a rest; the quietest seconds hold it too
+            text, _ = gravity_text(recording, array, limits)
+            found += [Finding("unit", f"{text} (likely, not certain)", False)] if text else []
     if not found and unseen_motions(array):  # too few channels to contradict one another
         text, refused = gravity_text(recording, array, limits)
         found += [Finding("unit", text, refused)] if text else []
@@ -194,9 +276,9 @@ def _time_against_metadata(recording: Recording) -> list[Finding]:
     ratio = float(stated) / recording.sample_rate
     if 1.0 / _RATE_RATIO < ratio < _RATE_RATIO:
         return []
-    for factor, name in _TIME_UNITS.items():
+    for factor, name in TIME_UNITS.items():
         if abs(ratio * factor - 1.0) < _RATE_RATIO - 1.0:
-            text = _time_text(
+            text = time_text(
                 name, factor, f"the metadata state {stated:g} Hz, the column gives {recording.sample_rate:.4g} Hz"
             )
             return [Finding("time", text, True)]
@@ -205,10 +287,6 @@ def _time_against_metadata(recording: Recording) -> list[Finding]:
         "correct t_s, or sample_rate_hz in the metadata"
     )
     return [Finding("time", text, False)]
-
-
-def _time_text(unit: str, factor: float, reason: str) -> str:
-    return f"column t_s is in {unit}: {reason}; multiply it by {factor:g}"
 
 
 def _slow(recording: Recording, readings: NDArray[np.float64], limits: PartLimits) -> list[Finding]:
@@ -248,14 +326,14 @@ def _duplicates(readings: NDArray[np.float64], limits: PartLimits, array: Accele
     return found
 
 
-def _decide(evidence: Evidence, recording: Recording) -> list[Finding]:
+def _decide(evidence: Evidence) -> list[Finding]:
     """Compare the file as given with the other ways to read it."""
     given = evidence.as_given()
     before = evidence.costs(given)
     if not _contradicts(before, evidence):
         return []
     found: list[tuple[float, Otherwise, bool]] = []
-    ways = _ways(evidence, recording)
+    ways = ways_to_read(evidence)
     few = [way for way in ways if way.kind in _OF_ALL]
     for group in (few, [way for way in ways if way.kind not in _OF_ALL]):
         found += _explaining(group, before, evidence)
@@ -367,84 +445,3 @@ def _finding(way: Otherwise, alike: Sequence[Otherwise], *, refused: bool) -> Fi
     if others and way.channels:
         text += "; as likely: " + ", or ".join(" and ".join(one.channels) for one in others)
     return Finding(way.kind, text, refused, way.channels)
-
-
-def _ways(evidence: Evidence, recording: Recording) -> list[Otherwise]:
-    """List the other ways to read the file."""
-    array = evidence.array
-    names, chip_of = array.channels, array.chip_of_channel
-    count = len(names)
-    identity = np.eye(count)
-    ways = [
-        Otherwise(
-            "time",
-            _time_text(name, factor, "the turning that the channels show takes that much less time"),
-            identity,
-            time=factor,
-        )
-        for factor, name in _TIME_UNITS.items()
-    ]
-    lsb = evidence.limits.lsb
-    units = {
-        "g": ("_g", np.full(count, STANDARD_GRAVITY)),
-        "mg": ("_mg", np.full(count, STANDARD_GRAVITY / 1000.0)),
-        "counts of the converter": ("_lsb", lsb),
-        "cm/s²": ("", np.full(count, 0.01)),
-        "mm/s²": ("", np.full(count, 0.001)),
-    }
-    for unit, (suffix, scale) in units.items():
-        remedy = f"name the columns {names[0]}{suffix} …" if suffix else f"multiply them by {scale[0]:g}"
-        rest = evidence.gravity_at_rest(evidence.as_given())
-        seen = f"gravity reads {np.median(rest):.4g} at rest" if len(rest) else "the motion fits no other unit"
-        ways.append(Otherwise("unit", f"all readings are in {unit}, not in m/s²: {seen}; {remedy}", np.diag(scale)))
-        for number, chip in enumerate(array.chips):
-            mine = chip_of == number
-            columns = ", ".join(f"{name}{suffix}" for name in chip.channels)
-            cure = f"name its columns {columns}" if suffix else f"multiply its columns by {scale[0]:g}"
-            text = f"chip {chip.name} reads in {unit}, the others in m/s²; {cure}"
-            ways.append(Otherwise("chip_unit", text, np.diag(np.where(mine, scale, 1.0)), channels=chip.channels))
-    for channel, name in enumerate(names):
-        sign = np.ones(count)
-        sign[channel] = -1.0
-        text = f"channel {name} is inverted; change the sign of its column, or of its axis in the array file"
-        ways.append(Otherwise("sign", text, np.diag(sign), channels=(name,)))
-    for number, chip in enumerate(array.chips):
-        if len(chip.axes) > 1:
-            text = (
-                f"all channels of chip {chip.name} are inverted; "
-                "change the sign of its columns, or of its axes in the array file"
-            )
-            ways.append(
-                Otherwise("sign", text, np.diag(np.where(chip_of == number, -1.0, 1.0)), channels=chip.channels)
-            )
-    ways.append(Otherwise("sign", "all channels are inverted; change the sign of all columns", -identity, channels=()))
-    for one, two in combinations(range(count), 2):
-        order = np.arange(count)
-        order[[one, two]] = order[[two, one]]
-        text = f"channels {names[one]} and {names[two]} are exchanged; exchange the names of their columns"
-        ways.append(Otherwise("exchange", text, identity[order], channels=(names[one], names[two])))
-    for one, two in combinations(range(len(array.chips)), 2):
-        first, second = np.flatnonzero(chip_of == one), np.flatnonzero(chip_of == two)
-        if len(first) == len(second) > 1:
-            order = np.arange(count)
-            order[np.concatenate([first, second])] = np.concatenate([second, first])
-            chips = array.chips[one].name, array.chips[two].name
-            text = f"chips {chips[0]} and {chips[1]} are exchanged; exchange the names of their columns"
-            ways.append(Otherwise("exchange", text, identity[order], channels=chips))
-    return ways + _other_arrays(array)
-
-
-def _other_arrays(array: AccelerometerArray) -> list[Otherwise]:
-    """List the shipped arrays that have the same channels."""
-    ways = []
-    for name in list_models("arrays"):
-        other = AccelerometerArray.load(name)
-        if set(other.channels) != set(array.channels) or other.name == array.name:
-            continue
-        same = other.channels == array.channels
-        if same and np.allclose(other.positions, array.positions, atol=1e-9) and np.allclose(other.axes, array.axes):
-            continue
-        order = [array.index(channel) for channel in other.channels]
-        text = f"the readings are not those of array {array.name!r} but fit {name!r}; give it with --array {name}"
-        ways.append(Otherwise("array", text, np.eye(array.n_channels)[order], array=other))
-    return ways

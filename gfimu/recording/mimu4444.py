@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.errors import InputError
+from gfimu.files.input_file import is_ordinary, read_bytes
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.parts.part import Part
 from gfimu.recording.carried_array import array_metadata
@@ -49,6 +50,8 @@ class _Packets:
 
 def is_mimu4444(path: str | Path) -> bool:
     """Tell whether a file starts as a MIMU4444 stream does, gzipped or plain."""
+    if not is_ordinary(path):
+        return False
     try:
         with Path(path).open("rb") as stream:
             head = stream.read(4)
@@ -121,17 +124,7 @@ def read_mimu4444(path: str | Path) -> Recording:
 
 
 def _read_bytes(file: Path) -> NDArray[np.uint8]:
-    try:
-        content = file.read_bytes()
-        if content.startswith(_GZIP_MAGIC):
-            content = gzip.decompress(content)
-    except FileNotFoundError:
-        raise InputError(f"{file}: no such file; check the path") from None
-    except (EOFError, zlib.error, gzip.BadGzipFile):
-        raise InputError(f"{file}: damaged gzip file; copy it again") from None
-    except OSError as error:
-        raise InputError(f"{file}: {error.strerror or error}; check the path") from None
-    return np.frombuffer(content, dtype=np.uint8)
+    return np.frombuffer(read_bytes(file), dtype=np.uint8)
 
 
 def _decode(stream: NDArray[np.uint8]) -> _Packets | None:

@@ -24,6 +24,7 @@ _CLUSTER_SHARE = 0.05
 _VALLEY_SHARE = 0.01
 _STANDING_RATE = 0.05
 _ROUNDING = 1e-13
+_LONGEST = 1e9  # numerical: s
 
 
 @dataclass(frozen=True)
@@ -171,7 +172,7 @@ def detect_rest(
     InputError
         If the recording is shorter than the window or a value is not positive.
     """
-    if not (window_s > 0.0 and min_duration_s > 0.0 and (threshold is None or threshold > 0.0)):
+    if not (0.0 < window_s < _LONGEST and 0.0 < min_duration_s < _LONGEST and (threshold is None or threshold > 0.0)):
         raise InputError("window, shortest rest and threshold must be positive")
     window = max(round(window_s * recording.sample_rate) | 1, 11)
     if len(recording) <= window:

@@ -14,6 +14,7 @@ from gfimu.known_axis.estimation import estimate_about_axis
 from gfimu.motion.estimation import Estimate, estimate
 from gfimu.motion.rest_bias import estimate_from_rest, rest_bias
 from gfimu.recording import Recording
+from gfimu.recording.checks import examine
 from gfimu.recording.formats import open_run
 from gfimu.recording.mapped import MappedFile
 from gfimu.visual.run import write_run
@@ -30,7 +31,12 @@ def picture_path(recording: Path) -> Path:
 
 
 def picture_of(
-    recording: Path | MappedFile, out: Path, *, array: AccelerometerArray | None = None, axis: TurningAxis | None = None
+    recording: Path | MappedFile,
+    out: Path,
+    *,
+    array: AccelerometerArray | None = None,
+    axis: TurningAxis | None = None,
+    force: bool = False,
 ) -> None:
     """Write the rerun recording of a recording file, with its estimate where the array sees all six motions.
 
@@ -44,31 +50,36 @@ def picture_of(
         The array; the recording's own otherwise.
     axis : TurningAxis, optional
         The axis about which alone it turns; the array's own otherwise, where it can't see all six motions.
+    force : bool
+        Go on, with a warning, where the checks of the recording would refuse it.
 
     Raises
     ------
     InputError
-        If the recording can't be read, names no array, or the picture can't be written.
+        If the recording can't be read, names no array, is refused by its checks, or the picture can't be written.
     """
     name = Path(recording)
     if name.suffix == ".rrd":
         raise InputError(f"{recording}: already a rerun recording; open it without --out")
     run, geometry = open_run(recording, array)
+    examine(run, geometry, source=name.name, force=force)
     if axis is not None:
         geometry = replace(geometry, turning_axis=axis)
         found, note = _about_axis(run, geometry, axis)
     else:
-        found, note = _estimate(run, geometry)
+        found, note = _estimate(run, geometry, force=force)
     write_run(out, run, geometry, estimate=found, notes=note, title=name.stem)
 
 
-def _estimate(run: Recording, array: AccelerometerArray) -> tuple[Estimate | None, str]:
+def _estimate(run: Recording, array: AccelerometerArray, *, force: bool) -> tuple[Estimate | None, str]:
     """Estimate as far as possible; a note says how, for the picture."""
     on_table = any(name in run.reference for name in ("tacho_rad_s", "command_rad_s", "angle_rad"))
     try:
         if on_table:
-            return estimate_from_rest(run, array), "Biases were read off the first rest, with the table taken as level."
-        return estimate(run, array), ""
+            return estimate_from_rest(
+                run, array, force=force
+            ), "Biases were read off the first rest, with the table taken as level."
+        return estimate(run, array, force=force), ""
     except GeometryError as error:
         return (
             _about_axis(run, array, array.turning_axis) if array.turning_axis is not None else (None, _missing(error))
@@ -76,7 +87,7 @@ def _estimate(run: Recording, array: AccelerometerArray) -> tuple[Estimate | Non
     except InputError as error:  # nothing to read biases off: their effect stays in the picture
         if not on_table:
             raise
-        return estimate(run, array), f"Biases are left in: {error}."
+        return estimate(run, array, force=force), f"Biases are left in: {error}."
 
 
 def _about_axis(run: Recording, array: AccelerometerArray, axis: TurningAxis) -> tuple[Estimate | None, str]:

@@ -6,6 +6,7 @@ import errno
 import os
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -28,8 +29,9 @@ def one_line(result, *words):
 
 
 @pytest.fixture
-def broken(monkeypatch):
+def broken(monkeypatch, tmp_path):
     """`gfimu score` with a bug in it."""
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
 
     def fail(*_, **__):
         raise ZeroDivisionError("first line\nsecond [line]")
@@ -38,10 +40,15 @@ def broken(monkeypatch):
     monkeypatch.delenv("GFIMU_DEBUG", raising=False)
 
 
-def test_an_unforeseen_error_is_one_line(gfimu_command, broken):
+def test_an_unforeseen_error_is_one_line_and_a_file_to_attach(gfimu_command, broken):
     result = gfimu_command("score", "cube12")
     assert result.code == 1
     one_line(result, "unexpected ZeroDivisionError", "first line second [line]", "--debug")
+    (file,) = Path(tempfile.gettempdir()).glob("gfimu-error-*.txt")
+    assert str(file) in result.stderr
+    attached = file.read_text()
+    assert "arguments: ['score', 'cube12']" in attached
+    assert 'raise ZeroDivisionError("first line' in attached
 
 
 @pytest.mark.parametrize("arguments", [("--debug", "score", "cube12"), ("score", "cube12", "--debug")])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -12,6 +13,7 @@ from gfimu.diagnosis.data.integrity import IntegrityReport, check_integrity
 from gfimu.diagnosis.data.plausibility import refuse_implausible
 from gfimu.diagnosis.data.run import Run, prepare_run
 from gfimu.diagnosis.data.samples import reference_spikes
+from gfimu.errors import InputError, RecordingWarning
 from gfimu.recording import Recording
 from gfimu.world_model import Effect, WorldModel
 
@@ -47,7 +49,13 @@ class PreparedRuns:
 
     @classmethod
     def build(
-        cls, recordings: Sequence[Recording], model: WorldModel, names: Sequence[str], predict: Predict
+        cls,
+        recordings: Sequence[Recording],
+        model: WorldModel,
+        names: Sequence[str],
+        predict: Predict,
+        *,
+        force: bool = False,
     ) -> PreparedRuns:
         """Read, check and label recordings (`prepare_run`, `check_integrity`).
 
@@ -61,6 +69,8 @@ class PreparedRuns:
             Names of the runs, for people.
         predict : callable
             From a model and a run to the channels (n, c) that its reference alone predicts, m/s².
+        force : bool
+            Warn where a run would be refused as implausible.
         """
         runs, effects, spikes = [], [], 0
         why: dict[str, str] = {}
@@ -70,7 +80,7 @@ class PreparedRuns:
             run = replace(
                 run, reference=np.where(wrong, 0.0, run.reference), reference_valid=run.reference_valid & ~wrong
             )
-            checked = _check(model, run, predict)
+            checked = _check(model, run, predict, force=force)
             runs.append(checked.run)
             effects.append(list(checked.effects))
             why = {**checked.why, **why}  # of the run whose numbers are told, the first
@@ -79,7 +89,12 @@ class PreparedRuns:
         return cls(runs, effects, why, spikes, rounded)
 
 
-def _check(model: WorldModel, run: Run, predict: Predict) -> IntegrityReport:
+def _check(model: WorldModel, run: Run, predict: Predict, *, force: bool) -> IntegrityReport:
     prediction = predict(model, run)
-    refuse_implausible(model, run, prediction, lambda other: predict(model, other))
+    try:
+        refuse_implausible(model, run, prediction, lambda other: predict(model, other))
+    except InputError as error:
+        if not force:
+            raise InputError(f"{error}; --force (force=True) goes on nevertheless") from None
+        warnings.warn(str(error), RecordingWarning, stacklevel=2)
     return check_integrity(model, run, prediction)

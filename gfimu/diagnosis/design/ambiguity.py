@@ -40,7 +40,7 @@ def open_effects(path: str | Path, model: WorldModel) -> list[str | Effect]:
         rivals = [str(rival) for cause in causes.values() for rival in cause.get("not_distinguishable_from", [])]
     except OSError as error:
         raise InputError(f"{file}: {error.strerror}; name a verdict.json or the folder that diagnose wrote") from None
-    except (ValueError, KeyError, TypeError, AttributeError):
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         raise InputError(f"{file}: not a verdict; name the verdict.json that diagnose wrote") from None
     named = [name for name, cause in causes.items() if cause.get("not_distinguishable_from")]
     names = list(dict.fromkeys([*named, *rivals]))

@@ -14,6 +14,7 @@ from gfimu.errors import InputError
 
 __all__ = ["Limits", "improve", "plain_profile", "profile_of", "starting_points"]
 
+_LONGEST = 1e4  # numerical: s, of a planned run
 _LEGS = 8
 _PARAMETERS = 3 * _LEGS + 5
 _SHORTEST_RAMP = 0.25
@@ -47,6 +48,8 @@ class Limits:
         for name, value in (("rate", self.rate), ("acceleration", self.acceleration), ("duration", self.duration)):
             if not (math.isfinite(value) and value > 0):
                 raise InputError(f"limit of {name} {value}: give a positive number")
+        if self.duration > _LONGEST:
+            raise InputError(f"limit of duration {self.duration:g}: give {_LONGEST:g} s at most")
 
 
 def plain_profile(limits: Limits) -> TableProfile:

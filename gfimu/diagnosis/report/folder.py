@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -11,7 +9,7 @@ from gfimu.diagnosis.report.page import write_report
 from gfimu.diagnosis.report.picture import write_picture
 from gfimu.diagnosis.report.rig import DrawnRig
 from gfimu.diagnosis.verdict.verdict import Diagnosis
-from gfimu.errors import InputError, WriteError
+from gfimu.files.atomic_file import atomic_folder
 from gfimu.files.outputs import OutputFolder, check_outputs
 
 __all__ = ["FILES", "check_folder", "write_diagnosis"]
@@ -67,12 +65,7 @@ def write_diagnosis(
         What was written, by its meaning.
     """
     folder = check_folder(directory)
-    try:
-        folder.mkdir(exist_ok=True)
-        made = Path(tempfile.mkdtemp(prefix=".making-", dir=folder))
-    except OSError as error:
-        raise InputError(f"{folder}: {error.strerror or error}; choose a folder that can be written") from None
-    try:
+    with atomic_folder(folder) as made:
         diagnosis.write(made)
         if twin_toml is not None:
             (made / "twin.toml").write_text(twin_toml, encoding="utf-8")
@@ -81,12 +74,4 @@ def write_diagnosis(
             (made / name).write_text(text, encoding="utf-8")
         write_report(made / "report.html", diagnosis, rig)
         write_picture(made / "diagnosis.rrd", diagnosis, rig=rig)
-        for file in made.iterdir():
-            file.replace(folder / file.name)
-    except WriteError:
-        raise
-    except OSError as error:
-        raise WriteError(folder, error) from error
-    finally:
-        shutil.rmtree(made, ignore_errors=True)
     return {meaning: folder / name for name, meaning in FILES.items()}

@@ -26,6 +26,7 @@ _HINTS = {"ns": ("ns", "nano", "nanos"), "us": ("us", "micro", "micros", "fine")
 _DAYS = (2e4, 1e6)  # of dates as numbers in spreadsheets and MATLAB, from 1954 in the one to far on in the other
 _UNKNOWN_RATE_HZ = 100.0  # stands in a suggested map until the user gives the rate
 _LEAST_WRAP = 256.0  # a counter of one byte
+_LARGEST_COUNTER = 2.0**64
 _NEAR_WRAP = 0.02  # of the wrap, by which a step back may miss it: samples lost there
 _LOOKED_AT = 50  # texts
 _MOST_PARTS = 8  # restarts of a logger: what goes back more often is no time
@@ -254,7 +255,7 @@ def _part(seconds: NDArray[np.float64]) -> int | None:
 def _wrap(steps: NDArray[np.float64], usual: float) -> float | None:
     """Return the number at which a counter starts anew, a power of two; None where times merely go back."""
     back = steps[steps < 0]
-    if not 0 < len(back) <= 0.01 * len(steps) or np.any(steps != np.round(steps)):
+    if not 0 < len(back) <= 0.01 * len(steps) or np.any(steps != np.round(steps)) or -back.min() > _LARGEST_COUNTER:
         return None
     wrap = float(2.0 ** math.ceil(math.log2(-back.min())))
     near = wrap + back <= max(3.0 * usual, _NEAR_WRAP * wrap)

@@ -113,7 +113,7 @@ def unit_of_acceleration(table: RawTable, columns: Sequence[str]) -> TriadUnit:
             where = ", ".join(f"{one:.6g}" for one in centre)
             why = f"rest poses lie on a sphere about {where} of radius {radius:.6g} counts"
             return TriadUnit("g", 1.0 / radius, offset, why, True)
-    if length > _LOW_COUNTS:
+    if _LOW_COUNTS < length < math.inf:
         power = 2.0 ** round(math.log2(length))
         if abs(length / power - 1.0) < NEAR:
             why = f"at rest its length is {length:.5g}: {power:g} counts per g"

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.errors import GfimuError, InputError
+from gfimu.files.input_file import parsing
 from gfimu.importing.column_map import TextSpec
 from gfimu.importing.raw_table import RawFile, RawTable
 
@@ -34,11 +35,8 @@ def read_ulog(path: Path, text: TextSpec = TextSpec()) -> RawFile:
         from pyulog import ULog
     except ImportError:
         raise GfimuError(f"{path}: ULog needs pyulog, {_NEEDS}") from None
-    try:
-        with contextlib.redirect_stdout(io.StringIO()):
-            log = ULog(str(path))
-    except Exception as error:  # noqa: BLE001 - its parser raises whatever a damaged file leads to
-        raise InputError(f"{path}: damaged ULog file ({str(error)[:120]}); download it again") from None
+    with parsing(path, "ULog file", "download it again"), contextlib.redirect_stdout(io.StringIO()):
+        log = ULog(str(path))
     tables = {}
     for topic in log.data_list:
         name = f"{topic.name}/{topic.multi_id}"
@@ -52,7 +50,6 @@ def read_ulog(path: Path, text: TextSpec = TextSpec()) -> RawFile:
 def read_mcap(path: Path, text: TextSpec = TextSpec()) -> RawFile:
     """Read the topics with ``sensor_msgs/Imu`` of an MCAP file that ROS 2 wrote."""
     try:
-        from mcap.exceptions import McapError
         from mcap.reader import make_reader
         from rosbags.typesys import Stores, get_typestore
     except ImportError:
@@ -60,36 +57,30 @@ def read_mcap(path: Path, text: TextSpec = TextSpec()) -> RawFile:
     store = get_typestore(Stores.ROS2_HUMBLE)
     rows: dict[str, list[tuple[float, ...]]] = {}
     others: set[str] = set()
-    try:
-        with path.open("rb") as stream:
-            for schema, channel, message in make_reader(stream).iter_messages():
-                if schema is None or schema.name not in {_IMU, "sensor_msgs/Imu"} or channel.message_encoding != "cdr":
-                    others.add(channel.topic)
-                    continue
-                rows.setdefault(channel.topic, []).append(_row(store.deserialize_cdr(message.data, _IMU)))
-    except (McapError, OSError, ValueError, KeyError) as error:
-        raise InputError(f"{path}: damaged MCAP file ({str(error)[:120]}); mcap recover may repair it") from None
+    with parsing(path, "MCAP file", "mcap recover may repair it"), path.open("rb") as stream:
+        for schema, channel, message in make_reader(stream).iter_messages():
+            if schema is None or schema.name not in {_IMU, "sensor_msgs/Imu"} or channel.message_encoding != "cdr":
+                others.add(channel.topic)
+                continue
+            rows.setdefault(channel.topic, []).append(_row(store.deserialize_cdr(message.data, _IMU)))
     return _topics(path, "mcap", rows, others)
 
 
 def read_bag(path: Path, text: TextSpec = TextSpec()) -> RawFile:
     """Read the topics with ``sensor_msgs/Imu`` of a ROS bag: a ROS 1 file, or a folder of ROS 2."""
     try:
-        from rosbags.highlevel import AnyReader, AnyReaderError
+        from rosbags.highlevel import AnyReader
         from rosbags.typesys import Stores, get_typestore
     except ImportError:
         raise GfimuError(f"{path}: a ROS bag needs rosbags, {_NEEDS}") from None
     rows: dict[str, list[tuple[float, ...]]] = {}
     folder = path.parent if path.suffix == ".db3" else path
     store = get_typestore(Stores.ROS1_NOETIC if path.suffix == ".bag" else Stores.ROS2_HUMBLE)
-    try:
-        with AnyReader([folder], default_typestore=store) as reader:
-            imu = [one for one in reader.connections if one.msgtype == _IMU]
-            others = {one.topic for one in reader.connections} - {one.topic for one in imu}
-            for connection, _, data in reader.messages(connections=imu) if imu else ():
-                rows.setdefault(connection.topic, []).append(_row(reader.deserialize(data, connection.msgtype)))
-    except (AnyReaderError, OSError, ValueError, KeyError) as error:
-        raise InputError(f"{path}: not a ROS bag that can be read ({str(error)[:120]})") from None
+    with parsing(path, "ROS bag", "record it again"), AnyReader([folder], default_typestore=store) as reader:
+        imu = [one for one in reader.connections if one.msgtype == _IMU]
+        others = {one.topic for one in reader.connections} - {one.topic for one in imu}
+        for connection, _, data in reader.messages(connections=imu) if imu else ():
+            rows.setdefault(connection.topic, []).append(_row(reader.deserialize(data, connection.msgtype)))
     return _topics(path, "rosbag", rows, others)
 
 

@@ -14,6 +14,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from gfimu.errors import GfimuError, InputError
+from gfimu.files.input_file import parsing, read_bytes
 from gfimu.importing.column_map import TextSpec
 from gfimu.importing.raw_table import RawFile, RawTable
 from gfimu.importing.readers.text import cell_values, table_of_text
@@ -26,11 +27,13 @@ _MOST_CELLS = 64  # of a list in a record: what has more is no sample
 
 def read_json(path: Path, text: TextSpec = TextSpec()) -> RawFile:
     """Read JSON: records one per line, a list of records, or lists of numbers by name."""
-    data = path.read_bytes().removeprefix(b"\xef\xbb\xbf").strip()
+    data = read_bytes(path).removeprefix(b"\xef\xbb\xbf").strip()
     lost = 0
     try:
         content = msgspec.json.decode(data)
-    except msgspec.DecodeError as error:
+    except RecursionError:
+        raise InputError(f"{path}: JSON nested too deeply; write a record per sample") from None
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
         content, lost = _lines(data)
         if len(content) < _LEAST_ROWS:
             raise InputError(f"{path}: damaged JSON file ({str(error)[:120]}); write it again") from None
@@ -50,7 +53,7 @@ def _lines(data: bytes) -> tuple[list[Any], int]:
         if line.strip():
             try:
                 found.append(msgspec.json.decode(line.strip().rstrip(b",")))
-            except msgspec.DecodeError:
+            except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
                 lost += 1
     return found, lost
 
@@ -153,7 +156,7 @@ def is_workbook(path: Path) -> bool:
     try:
         with zipfile.ZipFile(path) as archive:
             return any(name.startswith("xl/") for name in archive.namelist())
-    except (zipfile.BadZipFile, OSError):
+    except (zipfile.BadZipFile, OSError, ValueError, RuntimeError):  # also of a version that is not implemented
         return False
 
 
@@ -167,7 +170,7 @@ def read_excel(path: Path, text: TextSpec = TextSpec()) -> RawFile:
             "the sheet as CSV"
         ) from None
     tables: dict[str, RawTable] = {}
-    try:
+    with parsing(path, "workbook", "save the sheet as CSV"):
         book = openpyxl.load_workbook(path, read_only=True, data_only=True)
         for sheet in book.worksheets:
             lines = ["\t".join(_cell(one) for one in row) for row in sheet.iter_rows(values_only=True)]
@@ -176,8 +179,6 @@ def read_excel(path: Path, text: TextSpec = TextSpec()) -> RawFile:
             except InputError:
                 continue  # a sheet of remarks or a chart
             tables[sheet.title] = RawTable(sheet.title, table.columns, table.notes, table.named, table.preamble)
-    except Exception as error:  # noqa: BLE001 - its parser raises whatever a damaged file leads to
-        raise InputError(f"{path}: damaged workbook ({str(error)[:120]}); save the sheet as CSV") from None
     if not tables:
         raise InputError(f"{path}: no sheet with numbers in columns; save the recording as CSV")
     return RawFile(str(path), "excel", tables)

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from gfimu.errors import InputError, unknown_name
+from gfimu.files.input_file import check_input
 from gfimu.importing.column_map import TextSpec
 from gfimu.importing.raw_table import RawFile
 from gfimu.importing.readers.logs import read_bag, read_mcap, read_ulog
+from gfimu.importing.readers.matlab import read_matlab
 from gfimu.importing.readers.records import is_workbook, read_excel, read_json
-from gfimu.importing.readers.tables import read_archive, read_hdf5, read_matlab, read_parquet
+from gfimu.importing.readers.tables import read_archive, read_hdf5, read_parquet
 from gfimu.importing.readers.text import is_text, read_text
 from gfimu.plugins import plugins
 
@@ -67,15 +70,14 @@ def format_of(path: Path) -> str:
     InputError
         If it is missing, empty, or of no format that is known.
     """
-    if path.is_dir():
+    if os.path.isdir(path):  # noqa: PTH112  false for a name that is too long
         if (path / "metadata.yaml").is_file():
             return "rosbag"
         raise InputError(f"{path}: a folder that is no ROS 2 bag; give a file")
+    check_input(path)
     try:
         with path.open("rb") as stream:
             head = stream.read(4096)
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file; check the path") from None
     except OSError as error:
         raise InputError(f"{path}: {error.strerror or error}; check the path") from None
     if not head:

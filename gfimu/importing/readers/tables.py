@@ -14,22 +14,22 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from gfimu.errors import GfimuError, InputError
+from gfimu.files.input_file import parsing
 from gfimu.importing.column_map import TextSpec
 from gfimu.importing.raw_table import RawFile, RawTable
 from gfimu.importing.readers.text import table_of_text
 
-__all__ = ["arrow_table", "read_archive", "read_hdf5", "read_matlab", "read_parquet"]
+__all__ = ["arrow_table", "gather", "read_archive", "read_hdf5", "read_parquet", "tables_by_length"]
 
+_MOST_UNPACKED = 64 << 20  # bytes that any archive may unpack to
+_MOST_PACKED = 25  # bytes from one packed byte
 _MOST_COLUMNS = 64  # of one matrix: what has more is no table of samples
 
 
 def read_parquet(path: Path, text: TextSpec = TextSpec()) -> RawFile:
     """Read a Parquet file."""
-    try:
-        table = pq.read_table(path)
-    except (pa.ArrowException, OSError) as error:
-        raise InputError(f"{path}: damaged Parquet file ({str(error).splitlines()[0][:120]}); write it again") from None
-    return RawFile(str(path), "parquet", {"": arrow_table(table)})
+    with parsing(path, "Parquet file", "write it again"):
+        return RawFile(str(path), "parquet", {"": arrow_table(pq.read_table(path))})
 
 
 def arrow_table(table: pa.Table) -> RawTable:
@@ -50,12 +50,12 @@ def arrow_table(table: pa.Table) -> RawTable:
 
 def read_archive(path: Path, text: TextSpec = TextSpec()) -> RawFile:
     """Read the text files of a zip archive, each as a table."""
-    try:
-        with zipfile.ZipFile(path) as archive:
-            members = [one for one in archive.namelist() if Path(one).suffix.lower() in {".csv", ".txt", ".tsv"}]
-            tables = {one: _member(archive.read(one), path, one, text) for one in members}
-    except (zipfile.BadZipFile, OSError, RuntimeError) as error:
-        raise InputError(f"{path}: damaged archive ({error}); copy it again") from None
+    with parsing(path, "archive", "copy it again"), zipfile.ZipFile(path) as archive:
+        members = [one for one in archive.namelist() if Path(one).suffix.lower() in {".csv", ".txt", ".tsv"}]
+        most = max(_MOST_UNPACKED, _MOST_PACKED * path.stat().st_size)
+        if sum(archive.getinfo(one).file_size for one in members) > most:
+            raise InputError(f"{path}: unpacks to more than {most >> 20} MB, as no recording does; unpack it and look")
+        tables = {one: _member(archive.read(one), path, one, text) for one in members}
     found = {name: table for name, table in tables.items() if table is not None}
     if not found:
         raise InputError(f"{path}: no text file with numbers in the archive; unpack it and give the recording")
@@ -69,24 +69,6 @@ def _member(data: bytes, path: Path, name: str, text: TextSpec) -> RawTable | No
         return None  # a description, not a table
 
 
-def read_matlab(path: Path, text: TextSpec = TextSpec()) -> RawFile:
-    """Read the variables of a MATLAB file; those of equal length are one table."""
-    from scipy.io import loadmat
-    from scipy.io.matlab import MatReadError
-
-    try:
-        content = loadmat(path, simplify_cells=True)
-    except NotImplementedError:  # version 7.3 is HDF5
-        return read_hdf5(path, text)
-    except (ValueError, TypeError, OSError, IndexError, KeyError, MatReadError) as error:
-        raise InputError(f"{path}: damaged MATLAB file ({str(error)[:120]}); save it again") from None
-    found: dict[str, NDArray[Any]] = {}
-    for name, value in content.items():
-        if not name.startswith("__"):
-            _gather(name, value, found)
-    return _by_length(path, "matlab", found)
-
-
 def read_hdf5(path: Path, text: TextSpec = TextSpec()) -> RawFile:
     """Read the data sets of an HDF5 file; those of equal length are one table."""
     try:
@@ -97,26 +79,23 @@ def read_hdf5(path: Path, text: TextSpec = TextSpec()) -> RawFile:
 
     def take(name: str, item: Any) -> None:
         if isinstance(item, h5py.Dataset) and item.shape:
-            _gather(name.replace("/", "."), item[()], found)
+            gather(name.replace("/", "."), item[()], found)
 
-    try:
-        with h5py.File(path, "r") as file:
-            file.visititems(take)
-    except OSError as error:
-        raise InputError(f"{path}: damaged HDF5 file ({str(error)[:120]}); write it again") from None
-    return _by_length(path, "hdf5", found)
+    with parsing(path, "HDF5 file", "write it again"), h5py.File(path, "r") as file:
+        file.visititems(take)
+    return tables_by_length(path, "hdf5", found)
 
 
-def _gather(name: str, value: Any, found: dict[str, NDArray[Any]]) -> None:
+def gather(name: str, value: Any, found: dict[str, NDArray[Any]]) -> None:
     """Collect the columns of a value: a vector, a matrix, a structure of them."""
     if isinstance(value, Mapping):
         for key, item in value.items():
-            _gather(f"{name}.{key}", item, found)
+            gather(f"{name}.{key}", item, found)
         return
     values = np.asarray(value)
     if values.dtype.names:
         for key in values.dtype.names:
-            _gather(f"{name}.{key}", values[key], found)
+            gather(f"{name}.{key}", values[key], found)
         return
     if values.dtype.kind not in "iuf" or values.size < 2:
         return
@@ -129,7 +108,7 @@ def _gather(name: str, value: Any, found: dict[str, NDArray[Any]]) -> None:
             found |= {f"{name}_{place}": column for place, column in enumerate(upright.T, start=1)}
 
 
-def _by_length(path: Path, kind: str, found: Mapping[str, NDArray[Any]]) -> RawFile:
+def tables_by_length(path: Path, kind: str, found: Mapping[str, NDArray[Any]]) -> RawFile:
     """Group columns by their length: the samples of one clock belong together."""
     if not found:
         raise InputError(f"{path}: no vector or matrix of numbers; save the readings as one")

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import gzip
 import io
 import re
-import zlib
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +14,7 @@ import pyarrow.csv as pa_csv
 from numpy.typing import NDArray
 
 from gfimu.errors import InputError
+from gfimu.files.input_file import MOST_COLUMNS, read_bytes
 from gfimu.importing.column_map import TextSpec
 from gfimu.importing.raw_table import RawFile, RawTable
 from gfimu.importing.readers.text_layout import COMMENT_MARKS, Layout, layout_of
@@ -40,13 +39,7 @@ def read_text(path: Path, text: TextSpec = TextSpec()) -> RawFile:
     InputError
         If it is empty, not text, or no line holds numbers.
     """
-    data = path.read_bytes()
-    if data[:2] == b"\x1f\x8b":
-        try:
-            data = gzip.decompress(data)
-        except (OSError, EOFError, zlib.error) as error:
-            raise InputError(f"{path}: damaged gzip file ({error}); copy it again") from None
-    return RawFile(str(path), "text", {"": table_of_text(data, str(path), text)})
+    return RawFile(str(path), "text", {"": table_of_text(read_bytes(path), str(path), text)})
 
 
 def table_of_text(data: bytes, source: str, text: TextSpec = TextSpec()) -> RawTable:
@@ -59,6 +52,10 @@ def table_of_text(data: bytes, source: str, text: TextSpec = TextSpec()) -> RawT
     if layout is None:
         raise InputError(
             f"{source}: no line holds numbers; give a recording, or the separator in a map (text.separator)"
+        )
+    if len(layout.names) > MOST_COLUMNS:
+        raise InputError(
+            f"{source}: has {len(layout.names)} columns, more than {MOST_COLUMNS}; write those of the recording"
         )
     body, repeated = _body(lines[layout.first :], layout, lines[: layout.first])
     skipped = []

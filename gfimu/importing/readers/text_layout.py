@@ -13,6 +13,7 @@ from gfimu.importing.notation import kind_of, unit_of_name
 __all__ = ["COMMENT_MARKS", "Layout", "cells_of", "layout_of"]
 
 COMMENT_MARKS = "#;%/*"
+_LONGEST_CELL = 100  # characters of a number or time
 _LOOKED_AT = 400  # lines
 _QUOTED_AT = 20  # of these, at the end, that show whether numbers stand in quotes
 _SEPARATORS = {"comma": ",", "semicolon": ";", "tab": "\t", "space": " "}
@@ -100,7 +101,10 @@ def cells_of(line: str, separator: str) -> list[str]:
     if separator != ";":
         closed = closed.rstrip(";")
     if '"' in closed:  # a cell in quotes may hold the separator
-        return [cell.strip() for cell in next(csv.reader([closed], delimiter=separator, skipinitialspace=True), [])]
+        try:
+            return [cell.strip() for cell in next(csv.reader([closed], delimiter=separator, skipinitialspace=True), [])]
+        except csv.Error:  # a cell longer than any, or a return in it
+            pass
     return [cell.strip() for cell in closed.split(separator)]
 
 
@@ -113,7 +117,7 @@ def _data_lines(lines: Sequence[str], separator: str, decimal: str, skip: int) -
             continue
         cells = cells_of(line, separator)
         filled = [cell for cell in cells if cell]
-        numeric = sum(number.fullmatch(cell) is not None for cell in filled)
+        numeric = sum(len(cell) <= _LONGEST_CELL and number.fullmatch(cell) is not None for cell in filled)
         if numeric and numeric >= _LEAST_NUMBERS * len(filled):
             found.append((place, cells))
     return found
@@ -122,7 +126,8 @@ def _data_lines(lines: Sequence[str], separator: str, decimal: str, skip: int) -
 def _share_read(lines: Sequence[Sequence[str]], decimal: str) -> float:
     """Return which share of the filled cells are numbers, dates or times of day, to a hundredth."""
     filled = [cell for cells in lines for cell in cells if cell]
-    read = sum(_NUMBER[decimal].fullmatch(cell) is not None or _STAMP.fullmatch(cell) is not None for cell in filled)
+    short = [cell for cell in filled if len(cell) <= _LONGEST_CELL]
+    read = sum(_NUMBER[decimal].fullmatch(cell) is not None or _STAMP.fullmatch(cell) is not None for cell in short)
     return round(read / max(len(filled), 1), 2)
 
 

@@ -10,7 +10,9 @@ __all__ = ["plain_lines"]
 
 _LOOKED_AT = 400  # lines
 _HOST_TIME = re.compile(r"\s*\[?(\d{1,2}:\d\d:\d\d[.,:]\d+)\]?\s*(?:->|>|\]|\|)\s*")
-_LABELLED = re.compile(r"([A-Za-z_][\w .\[\]()/°²^-]*?)\s*[:=]\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?![\d:])")
+_LABELLED = re.compile(
+    r"([A-Za-z_][\w .\[\]()/°²^-]{0,60}?)\s*[:=]\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?![\d:])"
+)
 _BRACKETED = re.compile(r"^\s*[\[({][^A-Za-z\"]*[\])}]\s*,?\s*$")
 _CHECKED = re.compile(r"\*[0-9A-Fa-f]{2}\s*$")
 _STAMP = re.compile(r"(?:\d{4}-\d\d-\d\d[T _])?\d{1,2}:\d\d:\d\d(?:[.,:]\d+)?")
@@ -19,6 +21,7 @@ _COLOURS = re.compile(r"\x1b\[[\d;]*m")
 _TICK = re.compile(r"^\s*[IWEDV] \((\d+)\)")
 _UNIT = re.compile(r"\s*([A-Za-zµ°²%/^\d]{0,8})\s*$")
 _HOST = "host_time"
+_LONGEST = 10_000  # characters of a line of a serial monitor
 _LEAST = 0.5  # of the filled lines
 _LEAST_OFTEN = 0.5  # of the lines of the most frequent kind
 
@@ -34,7 +37,7 @@ def plain_lines(lines: Sequence[str]) -> list[str]:
 def _most(lines: Sequence[str], mark: re.Pattern[str]) -> bool:
     """Tell whether most of the first filled lines match."""
     looked = [line for line in lines[:_LOOKED_AT] if line.strip()]
-    return sum(mark.search(line) is not None for line in looked) > _LEAST * len(looked)
+    return sum(len(line) <= _LONGEST and mark.search(line) is not None for line in looked) > _LEAST * len(looked)
 
 
 def _without_frames(lines: list[str]) -> list[str]:
@@ -102,7 +105,7 @@ def _stamp(text: str) -> str:
 
 def _labels(line: str) -> tuple[str, ...]:
     """Return the names of the numbers of a line, with the unit at its end; empty where not all of it is so."""
-    found = list(_LABELLED.finditer(line))
+    found = list(_LABELLED.finditer(line)) if len(line) <= _LONGEST else []
     if not found:
         return ()
     before = line[: found[0].start()]

@@ -35,6 +35,8 @@ __all__ = ["Costs", "Evidence", "Otherwise", "Window", "gather"]
 
 ALIGNMENT = 0.05  # rad, by which a sensing axis may be off on a real board: "turned by degrees"
 _RESTS = 8  # stretches of rest that are used, the longest
+_MOST_RESTS = 200  # stretches of rest that are looked at, the longest
+_FEWEST_STILL = 10  # samples of a rest in a window of motion, after decimation
 _STILL = 0.02  # of the size of the mean readings, by which readings at rest may scatter, in whatever unit they are
 _WINDOW = 2000  # samples of a window of motion, after decimation
 _ROWS = 200  # of them that are compared
@@ -45,6 +47,7 @@ _ITERATIONS = 15
 _NO_LEAK = 1e-6  # rad/s² per rad²/s²
 _WEAK = 0.1  # products seen more weakly than this share of the best are not used to clean α
 _FEWEST = 30  # samples
+_TABLE = {"tacho_rad_s", "command_rad_s", "angle_rad"}  # references of a body that turns about one axis only
 
 
 @dataclass(frozen=True)
@@ -167,7 +170,7 @@ class Evidence:
     windows : tuple of Window
         Stretches of motion.
     up : ndarray, shape (3,), or None
-        Upward direction at rest in body axes, if the recording says how the body was mounted.
+        Upward direction at rest in body axes, if the recording is of a table and says how the body was mounted on it.
     quiet : ndarray, shape (c,)
         Noise seen between neighbouring samples where they are quietest, m/s².
     sample_rate : float
@@ -412,9 +415,10 @@ def gather(recording: Recording, array: AccelerometerArray, limits: PartLimits, 
     step = max(1, int(np.count_nonzero(whole)) // 20_000)
     covariance = np.cov(readings[whole][::step].T) if np.count_nonzero(whole) > 2 else np.zeros((0, 0))
     up = None
-    if "mounting_rotvec_rad" in recording.metadata:
+    if "mounting_rotvec_rad" in recording.metadata and _TABLE & set(recording.reference):
         up = Rotation.from_rotvec(recording.mounting_rotvec).inv().apply([0.0, 0.0, 1.0])
-    means = np.array([readings[rest][whole[rest]].mean(axis=0) for rest in rests]).reshape(-1, array.n_channels)
+    longest = sorted(sorted(rests, key=lambda rest: rest.start - rest.stop)[:_RESTS], key=lambda rest: rest.start)
+    means = np.array([readings[rest][whole[rest]].mean(axis=0) for rest in longest]).reshape(-1, array.n_channels)
     windows = _windows(recording, readings[:, alive], whole, rests)
     return Evidence(array, alive, limits, means, covariance, windows, up, _quiet(readings), recording.sample_rate)
 
@@ -427,7 +431,7 @@ def _rests(
     alive: NDArray[np.bool_],
     noise: NDArray[np.float64],
 ) -> list[slice]:
-    """Return the longest stretches of rest."""
+    """Return the stretches of rest, the longest ones of many."""
     t = recording.t_s
     rate = recording.sample_rate
     if not _NOMINAL_RATES[0] < rate < _NOMINAL_RATES[1]:
@@ -438,7 +442,7 @@ def _rests(
         rest = detect_rest(Recording(t, readings[:, alive], names, tacho))
     except InputError:
         return []
-    longest = np.sort(np.argsort(-rest.lengths, kind="stable")[:_RESTS])
+    longest = np.sort(np.argsort(-rest.lengths, kind="stable")[:_MOST_RESTS])
     found = [slice(int(rest.start[place]), int(rest.stop[place])) for place in longest]
     kept = []
     for rows in found:
@@ -468,14 +472,33 @@ def _windows(
     if rests:
         last = int(np.count_nonzero(whole[: rests[0].stop])) // group
         after_rest = max(0, min(last - _FEWEST, count - length))
+    passed = np.concatenate([[0], np.cumsum(whole)])
+    edges = np.array([[passed[rest.start], passed[rest.stop]] for rest in rests]).reshape(-1, 2) // group
     chosen = dict.fromkeys([after_rest, int(starts[int(np.argmax(spread))])])
     windows = []
     for start in chosen:
         part = slice(start, start + length)
-        integrals = integrate_samples(t[part], values[part], method="trapezoid")
+        still = _still(t[part], values[part], edges - start)
+        integrals = integrate_samples(t[part], values[part] - still, method="trapezoid")
         rows = np.unique(np.linspace(0, length - 1, min(_ROWS, length)).astype(int))
         windows.append(Window(values[part][rows], integrals[rows], t[part][rows] - t[start], 1.0 / group))
     return tuple(windows)
+
+
+def _still(t: NDArray[np.float64], values: NDArray[np.float64], rests: NDArray[np.intp]) -> NDArray[np.float64]:
+    """Return what channels (m, c) read while α is zero, interpolated between the rests (k, 2) of a window.
+
+    A gain that is off by a tenth makes an α of gravity, another one in each pose, that would integrate to a rate. At
+    rest, and in a steady spin, α is zero; so what is read there is taken off. Zero where a window has one rest only: an
+    error of α that stays is fitted.
+    """
+    inside = np.clip(rests, 0, len(t))
+    inside = inside[inside[:, 1] - inside[:, 0] >= _FEWEST_STILL]
+    if len(inside) < 2:
+        return np.zeros_like(values)
+    middles = [float(t[start:stop].mean()) for start, stop in inside]
+    means = np.array([values[start:stop].mean(axis=0) for start, stop in inside])
+    return np.column_stack([np.interp(t, middles, column) for column in means.T])
 
 
 def _quiet(readings: NDArray[np.float64]) -> NDArray[np.float64]:

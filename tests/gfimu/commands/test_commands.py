@@ -6,6 +6,7 @@ import importlib
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -173,12 +174,12 @@ def test_diagnose_takes_paths_and_objects(made, monkeypatch):
     recording, file = made
     calls = []
 
-    def explain(recordings, model, *, held_out, names, report):
+    def explain(recordings, model, *, held_out, names, report, force):
         calls.append((len(recordings), model.array.name, len(held_out), names))
 
     monkeypatch.setattr(importlib.import_module("gfimu.diagnosis.diagnose"), "diagnose", explain)
     gfimu.diagnose(file, "cube12_turntable")
-    gfimu.diagnose([recording, str(file)], Twin.load("cube12_turntable"), held_out=recording)
+    gfimu.diagnose([recording, str(file)], Twin.load("cube12_turntable"), held_out=replace(recording))
     gfimu.diagnose((file, file), "cube12_turntable", names=["one", "other"])
     assert calls == [
         (1, "cube12", 0, ["run.parquet"]),

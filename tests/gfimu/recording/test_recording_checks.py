@@ -242,6 +242,8 @@ def test_real_hand_motion_is_not_refused(shared_data, name):
 def test_a_rest_bias_beyond_the_data_sheet_is_refused(table_run):
     assert "rest_bias_m_s2" in estimate_from_rest(table_run, CUBE).metadata
     wrong = with_columns(table_run, lambda readings: readings.__setitem__((slice(None), 4), readings[:, 4] + 0.3 * G))
-    with pytest.raises(InputError, match=r"channel a22 reads \+[23]\d\d mg beyond gravity .* allows 175 mg"):
+    with pytest.raises(
+        InputError, match=r"channel a22 of array 'cube12' reads \+[23]\d\d mg beyond gravity .* allows 175 mg"
+    ):
         estimate_from_rest(wrong, CUBE)
     assert "a22" in estimate_from_rest(wrong, CUBE, force=True).metadata["warnings"][0]

@@ -1,0 +1,103 @@
+"""The other ways to read a file: another unit of time or readings, order or sign of its columns, another array."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+
+from gfimu.files.model_files import list_models
+from gfimu.geometry.array import AccelerometerArray
+from gfimu.recording.evidence.rigid import Evidence, Otherwise
+from gfimu.units import STANDARD_GRAVITY
+
+__all__ = ["TIME_UNITS", "time_text", "ways_to_read"]
+
+TIME_UNITS = {1e-3: "milliseconds", 1e-6: "microseconds"}
+"""Units that a column of seconds may be in by mistake, by their size in s."""
+
+
+def time_text(unit: str, factor: float, reason: str) -> str:
+    """Say in which unit of time a column is, why, and what to do."""
+    return f"column t_s is in {unit}: {reason}; multiply it by {factor:g}"
+
+
+def ways_to_read(evidence: Evidence) -> list[Otherwise]:
+    """List the other ways to read the file."""
+    array = evidence.array
+    names, chip_of = array.channels, array.chip_of_channel
+    count = len(names)
+    identity = np.eye(count)
+    ways = [
+        Otherwise(
+            "time",
+            time_text(name, factor, "the turning that the channels show takes that much less time"),
+            identity,
+            time=factor,
+        )
+        for factor, name in TIME_UNITS.items()
+    ]
+    lsb = evidence.limits.lsb
+    units = {
+        "g": ("_g", np.full(count, STANDARD_GRAVITY)),
+        "mg": ("_mg", np.full(count, STANDARD_GRAVITY / 1000.0)),
+        "counts of the converter": ("_lsb", lsb),
+        "cm/s²": ("", np.full(count, 0.01)),
+        "mm/s²": ("", np.full(count, 0.001)),
+    }
+    for unit, (suffix, scale) in units.items():
+        remedy = f"name the columns {names[0]}{suffix} …" if suffix else f"multiply them by {scale[0]:g}"
+        rest = evidence.gravity_at_rest(evidence.as_given())
+        seen = f"gravity reads {np.median(rest):.4g} at rest" if len(rest) else "the motion fits no other unit"
+        ways.append(Otherwise("unit", f"all readings are in {unit}, not in m/s²: {seen}; {remedy}", np.diag(scale)))
+        for number, chip in enumerate(array.chips):
+            mine = chip_of == number
+            columns = ", ".join(f"{name}{suffix}" for name in chip.channels)
+            cure = f"name its columns {columns}" if suffix else f"multiply its columns by {scale[0]:g}"
+            text = f"chip {chip.name} reads in {unit}, the others in m/s²; {cure}"
+            ways.append(Otherwise("chip_unit", text, np.diag(np.where(mine, scale, 1.0)), channels=chip.channels))
+    for channel, name in enumerate(names):
+        sign = np.ones(count)
+        sign[channel] = -1.0
+        text = f"channel {name} is inverted; change the sign of its column, or of its axis in the array file"
+        ways.append(Otherwise("sign", text, np.diag(sign), channels=(name,)))
+    for number, chip in enumerate(array.chips):
+        if len(chip.axes) > 1:
+            text = (
+                f"all channels of chip {chip.name} are inverted; "
+                "change the sign of its columns, or of its axes in the array file"
+            )
+            ways.append(
+                Otherwise("sign", text, np.diag(np.where(chip_of == number, -1.0, 1.0)), channels=chip.channels)
+            )
+    ways.append(Otherwise("sign", "all channels are inverted; change the sign of all columns", -identity, channels=()))
+    for one, two in combinations(range(count), 2):
+        order = np.arange(count)
+        order[[one, two]] = order[[two, one]]
+        text = f"channels {names[one]} and {names[two]} are exchanged; exchange the names of their columns"
+        ways.append(Otherwise("exchange", text, identity[order], channels=(names[one], names[two])))
+    for one, two in combinations(range(len(array.chips)), 2):
+        first, second = np.flatnonzero(chip_of == one), np.flatnonzero(chip_of == two)
+        if len(first) == len(second) > 1:
+            order = np.arange(count)
+            order[np.concatenate([first, second])] = np.concatenate([second, first])
+            chips = array.chips[one].name, array.chips[two].name
+            text = f"chips {chips[0]} and {chips[1]} are exchanged; exchange the names of their columns"
+            ways.append(Otherwise("exchange", text, identity[order], channels=chips))
+    return ways + _other_arrays(array)
+
+
+def _other_arrays(array: AccelerometerArray) -> list[Otherwise]:
+    """List the shipped arrays that have the same channels."""
+    ways = []
+    for name in list_models("arrays"):
+        other = AccelerometerArray.load(name)
+        if set(other.channels) != set(array.channels) or other.name == array.name:
+            continue
+        same = other.channels == array.channels
+        if same and np.allclose(other.positions, array.positions, atol=1e-9) and np.allclose(other.axes, array.axes):
+            continue
+        order = [array.index(channel) for channel in other.channels]
+        text = f"the readings are not those of array {array.name!r} but fit {name!r}; give it with --array {name}"
+        ways.append(Otherwise("array", text, np.eye(array.n_channels)[order], array=other))
+    return ways
