@@ -225,9 +225,12 @@ def _log_health(stream: Any, array: AccelerometerArray, times: NDArray[np.float6
     """
     import rerun as rr
 
+    from gfimu.integrity.fault import HealthCode
+
     index = [rr.TimeColumn("t", duration=times[-1:])]
     for lane, (channel, code) in enumerate(zip(array.channels, health, strict=True)):
-        place = _LANE * code / 2.0 - lane
+        height = {HealthCode.USED: 0.0, HealthCode.DOUBTED: 0.5}.get(HealthCode(code), 1.0)
+        place = _LANE * height - lane
         rr.send_columns(f"health/{channel}", index, rr.Scalars.columns(scalars=[place]), recording=stream)
 
 

@@ -75,6 +75,8 @@ class RecordReport:
         What the board said about itself.
     status_counts : dict of str to int
         Samples per status bit.
+    faults : tuple of dict
+        Faults of channels that a live view saw (`gfimu.integrity.fault.ChannelFault.entries`).
     """
 
     path: Path
@@ -84,6 +86,7 @@ class RecordReport:
     clock: ClockFit | None
     identity: Identity | None
     status_counts: dict[str, int] = field(default_factory=dict)
+    faults: tuple[dict[str, Any], ...] = ()
 
 
 class SampleClock:

@@ -57,10 +57,8 @@ def _record(
     if interactive and reconnect and "://" not in port and not Path(port).exists():
         screen.print(f"waiting for {port}, up to {reconnect:g} s")
     messages = console(stderr=True)
-    contradictions: list[str] = []
 
     def name_fault(text: str) -> None:
-        contradictions.append(text)
         messages.print(f"{' ' * 100}\r{text}" if interactive else f"gfimu: {text}", soft_wrap=True)
 
     report = record(
@@ -82,7 +80,7 @@ def _record(
         screen.print()
     written = {"recording": out} | ({"rrd": rrd} if rrd is not None else {})
     if json:
-        print_json(asdict(report) | {"channel_faults": contradictions, "files": written})
+        print_json(asdict(report) | {"files": written})
         return
     stream, clock, identity = report.stream, report.clock, report.identity
     rows = [

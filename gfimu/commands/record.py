@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -90,9 +91,10 @@ def record(
         if live is not None:
             live.close(keep=False)
         raise
-    if live is not None:
-        live.close()
-    return report
+    if live is None:
+        return report
+    live.close()
+    return replace(report, faults=tuple(entry for fault in live.faults for entry in fault.entries()))
 
 
 def _live_view(

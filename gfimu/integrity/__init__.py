@@ -10,6 +10,7 @@ __getattr__ = names_on_first_use(
         "ChannelMonitor": "monitor",
         "DetectableFaults": "detectable",
         "FaultProtection": "protection",
+        "HealthCode": "fault",
         "MonitorPolicy": "policy",
         "detectable_faults": "detectable",
         "fault_protection": "protection",

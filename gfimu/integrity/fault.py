@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from enum import IntEnum
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,19 @@ from numpy.typing import NDArray
 
 from gfimu.short_repr import short_repr
 
-__all__ = ["ChannelFault", "ChannelHealth"]
+__all__ = ["ChannelFault", "ChannelHealth", "HealthCode"]
+
+
+class HealthCode(IntEnum):
+    """Health of a channel at a sample, as the columns ``health_a11`` … hold it."""
+
+    USED = 0
+    EXCLUDED = 1
+    MISSING = 2
+    SATURATED = 3
+    STUCK = 4
+    DOUBTED = 5
+    """Used, though a fault lies in it or in others and it can't be said in which."""
 
 
 @dataclass(frozen=True)
@@ -21,7 +34,7 @@ class ChannelFault:
     ----------
     channels : tuple of str
         Channels that are at fault; where ``isolated`` is false, all that may be.
-    kind : {"step", "drift", "gain", "noise", "freeze", "spikes", "unknown"}
+    kind : {"step", "drift", "gain", "noise", "stuck", "spikes", "unknown"}
         What the channel does, judged by its difference from what the others predict.
     isolated : bool
         Whether these channels and no others are at fault.
@@ -72,7 +85,10 @@ class ChannelFault:
         }
 
     def entries(self) -> list[dict[str, Any]]:
-        """Return an entry for each channel, as JSON can hold it: kind, onset, size and its standard deviation."""
+        """Return an entry for each channel, as JSON can hold it: kind, onset, size and its standard deviation.
+
+        ``excluded`` is whether the channel was left out from the onset to ``end_s`` (None: to the end).
+        """
         return [
             {
                 "channel": name,
@@ -84,7 +100,7 @@ class ChannelFault:
                 "size": size if np.isfinite(size) else None,
                 "std": std if np.isfinite(std) else None,
                 "unit": "m/s2",
-                "excluded": self.excluded and not np.isfinite(self.end_s),
+                "excluded": self.excluded,
                 "alternatives": [list(names) for names in self.alternatives],
             }
             for name, size, std in zip(self.channels, self.sizes, self.sizes_std, strict=True)
@@ -163,14 +179,20 @@ class ChannelHealth:
         """Whether no fault was seen."""
         return not (self.faults or self.unexplained.any())
 
-    def codes(self) -> NDArray[np.int8]:
-        """Return the health of each channel at each sample, shape (n, c): 0 used, 1 in doubt, 2 not used.
+    def codes(self, t: NDArray[np.float64]) -> NDArray[np.int8]:
+        """Return the health of each channel at each sample (`HealthCode`), shape (n, c), at the times (n,), s.
 
         In doubt are the channels in which a fault may lie, and all of them while they contradict each other and no
         channel, pair or chip explains it.
         """
-        codes = np.where(self.unexplained[:, None] | self.doubted, np.int8(1), np.int8(0))
-        codes[self.excluded] = 2
+        doubted = self.unexplained[:, None] | self.doubted
+        codes = np.where(doubted, np.int8(HealthCode.DOUBTED), np.int8(HealthCode.USED))
+        codes[self.excluded] = HealthCode.EXCLUDED
+        for fault in self.faults:
+            if fault.kind == "stuck":
+                columns = [self.channels.index(name) for name in fault.channels]
+                during = self.excluded[:, columns] & ((t <= fault.end_s) & (t >= fault.onset_s))[:, None]
+                codes[:, columns] = np.where(during, np.int8(HealthCode.STUCK), codes[:, columns])
         return codes
 
     def sentences(self) -> list[str]:

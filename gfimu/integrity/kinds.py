@@ -1,4 +1,4 @@
-"""What a faulty channel does: step, drift, gain, noise, freeze or spikes.
+"""What a faulty channel does: step, drift, gain, noise, stuck or spikes.
 
 The difference r of a channel from what the other channels predict is fitted from the onset of the fault to shortly
 after it was found. Each kind is a model of r with at most one size,
@@ -55,7 +55,7 @@ def kind_of_fault(
     Returns
     -------
     str
-        "step", "drift", "gain", "noise", "freeze", "spikes" or "unknown".
+        "step", "drift", "gain", "noise", "stuck", "spikes" or "unknown".
     """
     policy = policy or MonitorPolicy()
     valid = np.isfinite(readings) & np.isfinite(difference)
@@ -63,7 +63,7 @@ def kind_of_fault(
     if len(t) < _FEWEST:
         return "unknown"
     if np.ptp(readings[len(readings) // 4 :]) == 0.0:
-        return "freeze"
+        return "stuck"
     predicted = readings - difference
     columns = {
         "step": np.ones(len(t)),

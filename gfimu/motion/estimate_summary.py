@@ -105,6 +105,8 @@ class EstimateSummary:
         Where navigation ends, where the position was asked for.
     health : mapping or None
         Faults of channels that were found and left out (`gfimu.integrity.fault.ChannelHealth`), where it was looked.
+    faults : tuple of mapping
+        The same faults, an entry for each channel (`gfimu.integrity.fault.ChannelFault.entries`).
     channels_left_out : tuple of str
         Dead channels that the estimate goes without.
     warnings : tuple of str
@@ -133,6 +135,7 @@ class EstimateSummary:
     mounting: Mapping[str, Any] | None = None
     position: PositionSummary | None = None
     health: Mapping[str, Any] | None = None
+    faults: tuple[Mapping[str, Any], ...] = ()
     channels_left_out: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
 
@@ -186,6 +189,7 @@ def summarise(estimate: Estimate, recording: Recording, array: AccelerometerArra
         mounting=estimate.metadata.get("mounting"),
         position=_position(estimate),
         health=estimate.metadata.get("health"),
+        faults=tuple(estimate.metadata.get("faults", ())),
         channels_left_out=tuple(estimate.metadata.get("channels_left_out", ())),
         warnings=(*estimate.metadata.get("warnings", ()), *_inconsistency(estimate, consistency)),
     )

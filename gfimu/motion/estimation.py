@@ -22,8 +22,8 @@ from gfimu.files.column_file import open_columns, write_columns
 from gfimu.files.table import ArrowStream, Tabular
 from gfimu.geometry.array import OMEGA_PRODUCTS, AccelerometerArray
 from gfimu.geometry.linear_solution import linear_solution
-from gfimu.integrity.fault import ChannelHealth
 from gfimu.motion.attitude import from_rotation, integrate_attitude, table_angle, to_rotation
+from gfimu.motion.channel_health import UsedReadings, step_of_readings, watched_readings
 from gfimu.motion.earth import EarthRotation
 from gfimu.motion.navigation import level, navigate
 from gfimu.motion.rest_navigation import navigate_with_rest
@@ -49,7 +49,6 @@ __all__ = ["Estimate", "estimate"]
 FORMAT_VERSION = 1
 _AXES = ("x", "y", "z")
 _LEVEL_SECONDS = 1.0
-_FOR_STEP = 20_000  # numerical: samples in which the step of the readings is looked for
 
 
 @dataclass(frozen=True)
@@ -77,8 +76,9 @@ class Estimate(Tabular):
     velocity, position : ndarray, shape (n, 3), optional
         Velocity, m/s, and position, m, of the body origin in the world, where asked for.
     health : mapping of str to ndarray, optional
-        For each channel by name its health at each sample, shape (n,): 0 used, 1 in doubt, 2 not used
-        (`gfimu.integrity.fault.ChannelHealth`); where the channels were watched.
+        For each channel by name its health at each sample, shape (n,): 0 used, 1 excluded, 2 missing, 3 saturated,
+        4 stuck, 5 in doubt (`gfimu.integrity.fault.HealthCode`). None where the channels were not watched and all are
+        used.
     sign_probability : ndarray, shape (n,), optional
         Probability that ``omega`` and not ``−omega`` is the rate; one half at rest. Where the method judges it.
     metadata : mapping
@@ -258,9 +258,11 @@ def estimate(
     chosen = rate_method(method)
     found = refuse_or_warn(check_recording(recording, array) if findings is None else findings, force=force)
     recording = without_dead_channels(recording, array, found)
+    missing = np.isnan(recording.for_array(array))  # (n, c)
     recording, clipped = without_clipped(recording, array)
     found = (*found, *clipped)
     readings = recording.for_array(array)
+    saturated = np.isnan(readings) & ~missing
     rate0 = None if omega0 is None else np.asarray(omega0, dtype=float)
     if rate0 is None:
         chosen.refuse_unknown_start()
@@ -270,11 +272,10 @@ def estimate(
         raise InputError(f"omega0 is {omega0!r}; it must hold three finite numbers, in rad/s")
     noise = white_noise_std(array, recording.sample_rate) if noise_std is None else np.asarray(noise_std, dtype=float)
     noise = np.broadcast_to(noise, array.n_channels)
-    health = None
-    if chosen.recursive and not keep_faulty:
-        health = _watch(recording, array, readings, noise, rate0)
-    if health is not None:
-        readings = np.where(health.excluded, np.nan, readings)
+    used = UsedReadings(recording.t_s, missing, saturated)
+    if chosen.recursive:
+        used = watched_readings(used, array, readings, noise, omega0=rate0, watch=not keep_faulty)
+        readings = np.where(used.excluded, np.nan, readings)
     linear = linear_solution(array, readings, noise, form=form)
     usable = np.isfinite(linear.motion).all(axis=1)
     if not usable.any():
@@ -324,17 +325,16 @@ def estimate(
         omega_products_std=linear.omega_products_std * scale[:, None],
         velocity=None if travelled is None else travelled.velocity,
         position=None if travelled is None else travelled.position,
-        health=None if health is None else dict(zip(health.channels, health.codes().T, strict=True)),
+        health=used.codes(array),
         sign_probability=rate.sign_probability,
         metadata={
             "array": array.name,
             "method": method,
             "form": linear.form,
             **rate.remarks,
-            "warnings": [finding.text for finding in found]
-            + ([] if health is None else health.sentences())
-            + rate.sentences(),
-            "health": None if health is None else health.to_dict(),
+            "warnings": [finding.text for finding in found] + used.sentences(array) + rate.sentences(),
+            "health": None if used.watch is None else used.watch.to_dict(),
+            "faults": [entry for fault in used.faults(array) for entry in fault.entries()],
             "channels_left_out": dead,
             **({} if earth is None else earth.to_dict()),
             "mounting_rotvec_rad": recording.mounting_rotvec.tolist(),
@@ -342,25 +342,6 @@ def estimate(
             "software_version": __version__,
         },
     )
-
-
-def _watch(
-    recording: Recording,
-    array: AccelerometerArray,
-    readings: NDArray[np.float64],
-    noise: NDArray[np.float64],
-    omega0: NDArray[np.float64] | None,
-) -> ChannelHealth | None:
-    """Look for faulty channels; None where that can't be done."""
-    from gfimu.integrity.watch import watch_from_rest, watch_in_motion
-
-    errors = SensorErrors.from_parts(array, recording.sample_rate, step=_step_of(readings), noise_std=noise)
-    if errors.stuck_after == 0:  # steps coarser than the noise: rounding errors last, and look like faults
-        return None
-    health = None
-    if omega0 is not None and not omega0.any():
-        health = watch_from_rest(array, recording.t_s, readings, errors)
-    return health or watch_in_motion(array, recording.t_s, readings, errors, omega0=omega0)
 
 
 def _integrate(problem: RateProblem) -> RateSolution:
@@ -387,7 +368,7 @@ def _with_sensor_errors(method: RateMethod, problem: RateProblem) -> RateSolutio
     """Run a method of `gfimu.rate.methods` with the sensors' errors from their data sheets."""
     problem, names = _of_living_channels(problem)
     rate = 1.0 / float(np.median(np.diff(problem.t_s)))
-    step = _step_of(problem.readings)
+    step = step_of_readings(problem.readings)
     errors = SensorErrors.from_parts(problem.array, rate, step=step, noise_std=problem.noise_std)
     settings = FilterSettings(start_omega=problem.omega0)
     found = estimate_rate(
@@ -417,16 +398,6 @@ def _with_sensor_errors(method: RateMethod, problem: RateProblem) -> RateSolutio
     if probability is None:
         probability = np.full(len(found), 0.5 if found.sign.state == "undecided" else 1.0)
     return RateSolution(found.omega, std, found.rest, found.scale, probability, remarks)
-
-
-def _step_of(readings: NDArray[np.float64]) -> float:
-    """Return the step of the readings (n, c), m/s²: the least difference of two values, the median of the channels."""
-    steps = []
-    for column in readings[:_FOR_STEP].T:
-        values = np.unique(column[np.isfinite(column)])
-        if len(values) > 1:
-            steps.append(float(np.diff(values).min()))
-    return float(np.median(steps)) if steps else 0.0
 
 
 def _of_living_channels(problem: RateProblem) -> tuple[RateProblem, dict[str, str]]:

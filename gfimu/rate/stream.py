@@ -36,7 +36,7 @@ class StreamFilter(Protocol):
 
     @property
     def health(self) -> list[int] | None:
-        """Health of each channel now: 0 used, 1 in doubt, 2 not used; None while nothing is watched."""
+        """Health of each channel now (`gfimu.integrity.fault.HealthCode`); None while nothing is watched."""
         ...
 
     def push(self, t: ArrayLike, readings: ArrayLike, gyro: ArrayLike | None = None) -> RateEstimate:

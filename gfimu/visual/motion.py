@@ -68,7 +68,7 @@ class MotionEstimate(Protocol):
 
     @property
     def health(self) -> Mapping[str, NDArray[Any]] | None:
-        """Health of each channel by name, shape (n,): 0 used, 1 in doubt, 2 not used; None where not watched."""
+        """Health of each channel by name, shape (n,): `gfimu.integrity.fault.HealthCode`; None where not watched."""
         ...
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.geometry.array import AccelerometerArray
+from gfimu.integrity.fault import HealthCode
 from gfimu.motion.attitude import table_angle, to_rotation
 from gfimu.recording import Recording
 from gfimu.visual.colours import AXES, COMMAND, ESTIMATE, ESTIMATE_BAND, TACHO, TRUTH, UNDECIDED, chip_colour
@@ -30,7 +31,6 @@ __all__ = [
 _NAMES = ("x", "y", "z")
 _BOTH_SIDES = 2 * np.array([-1.0, 1.0])  # ±2σ
 _CHIPS_PER_GROUP = 8
-_NOT_USED = 2  # of the codes of health
 _SHOWN = 0.9  # of the errors and their band
 
 
@@ -206,12 +206,13 @@ def health_plot(t: NDArray[np.float64], health: Mapping[str, NDArray[Any]], arra
     names = [name for name in array.channels if name in health]
     codes = np.column_stack([health[name] for name in names])  # (n, c)
     lanes = np.broadcast_to(-np.arange(len(names), dtype=float), codes.shape)
-    lines = [Line("used", t, np.where(codes == 0, lanes, np.nan), TRUTH, 1.0)]
-    if (codes == 1).any():
-        lines.append(Line("in doubt", t, np.where(codes == 1, lanes, np.nan), ESTIMATE, 4.0))
-    for column in np.flatnonzero((codes == _NOT_USED).any(axis=0)):
+    lines = [Line("used", t, np.where(codes == HealthCode.USED, lanes, np.nan), TRUTH, 1.0)]
+    if (codes == HealthCode.DOUBTED).any():
+        lines.append(Line("in doubt", t, np.where(codes == HealthCode.DOUBTED, lanes, np.nan), ESTIMATE, 4.0))
+    unused = ~np.isin(codes, (HealthCode.USED, HealthCode.DOUBTED))
+    for column in np.flatnonzero(unused.any(axis=0)):
         colour = chip_colour(int(array.chip_of_channel[array.channels.index(names[column])]))
-        left_out = np.where(codes[:, column] == _NOT_USED, lanes[:, column], np.nan)
+        left_out = np.where(unused[:, column], lanes[:, column], np.nan)
         lines.append(Line(f"{names[column]} not used", t, left_out, colour, 8.0))
     title = f"health, a lane per channel from {names[0]} (top) to {names[-1]}"
     return Plot(title, lines, span=(-len(names) + 0.5, 0.5))

@@ -236,4 +236,9 @@ def test_a_faulty_channel_is_named_in_table_and_json(gfimu_command, tmp_path):
     assert "a22: step" in result.stdout + result.stderr
     figures = json.loads(gfimu_command(*how, "--json").stdout)
     assert [fault["channels"] for fault in figures["health"]["faults"]] == [["a22"]]
+    (fault,) = figures["faults"]
+    assert (fault["channel"], fault["kind"], fault["unit"], fault["excluded"]) == ("a22", "step", "m/s2", True)
+    assert fault["onset_s"] == pytest.approx(15.0, abs=0.1)
+    assert 15.0 < fault["detected_s"] < 16.0
+    assert abs(fault["size"] - 0.3) < 3 * fault["std"] < 0.1
     assert gfimu_command(*how, "--keep-faulty", "--json").code == 0

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gfimu.geometry.array import AccelerometerArray
-from gfimu.integrity.fault import ChannelFault
+from gfimu.integrity.fault import ChannelFault, HealthCode
 from gfimu.integrity.kinds import name_kinds
 from gfimu.integrity.live.agreement import Agreement
 from gfimu.integrity.monitor import ChannelMonitor
@@ -138,7 +138,7 @@ class LiveWatch:
 
     @property
     def codes(self) -> NDArray[np.int8] | None:
-        """Health of each channel now, shape (c,): 0 used, 1 in doubt, 2 not used; None while nothing is watched."""
+        """Health of each channel now (`HealthCode`), shape (c,); None while nothing is watched."""
         if self._monitor is None or self._over:
             return None
         monitor = self._monitor
@@ -146,7 +146,12 @@ class LiveWatch:
         for fault in monitor.doubtful:
             if not np.isfinite(fault.end_s):
                 doubt[[self.array.channels.index(name) for name in fault.channels]] = True
-        return np.where(monitor.watched, doubt.astype(np.int8), np.int8(2))
+        used = np.where(doubt, np.int8(HealthCode.DOUBTED), np.int8(HealthCode.USED))
+        codes = np.where(monitor.watched, used, np.int8(HealthCode.EXCLUDED))
+        for fault in self._reported:
+            if fault.kind == "stuck" and not np.isfinite(fault.end_s):
+                codes[[self.array.channels.index(name) for name in fault.channels]] = HealthCode.STUCK
+        return codes
 
     @property
     def faults(self) -> tuple[ChannelFault, ...]:

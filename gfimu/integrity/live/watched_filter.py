@@ -78,7 +78,7 @@ class WatchedRateFilter:
 
     @property
     def health(self) -> list[int] | None:
-        """Health of each channel now: 0 used, 1 in doubt, 2 not used; None while nothing is watched."""
+        """Health of each channel now (`gfimu.integrity.fault.HealthCode`); None while nothing is watched."""
         codes = self.watch.codes
         return None if codes is None else [int(code) for code in codes]
 

@@ -5,7 +5,7 @@ import pytest
 from watched_world import CALIBRATED, CUBE, GRAVITY, RATE_HZ, readings
 
 from gfimu.errors import InputError
-from gfimu.integrity import MonitorPolicy, watch_channels
+from gfimu.integrity import HealthCode, MonitorPolicy, watch_channels
 from gfimu.integrity.watch import watch_from_rest, watch_in_motion
 from gfimu.rate.sensing import SensorErrors
 
@@ -64,13 +64,13 @@ def test_a_gain_is_found_while_the_reading_changes():
     assert (fault.channels, fault.kind) == ((NAMES[4],), "gain")
 
 
-@pytest.mark.parametrize(("kind", "motion"), [("drift", "rest"), ("freeze", "tumble"), ("noise", "turn")])
+@pytest.mark.parametrize(("kind", "motion"), [("drift", "rest"), ("stuck", "tumble"), ("noise", "turn")])
 def test_the_kind_of_a_fault_is_named(kind, motion):
     t, y, _ = readings(motion, 4)
     bad = t >= 8.0
     if kind == "drift":
         y[bad, 2] += 5 * MG * (t[bad] - 8.0)
-    elif kind == "freeze":
+    elif kind == "stuck":
         y[bad, 2] = y[bad, 2][0]
     else:
         y[bad, 2] += np.random.default_rng(0).normal(0.0, 8**0.5 * CALIBRATED.noise_std[2], bad.sum())
@@ -180,10 +180,10 @@ def test_two_equal_faults_that_look_like_two_others_are_both_named(kind):
     assert {NAMES[i] for i in pair} in [set(names) for names in fault.alternatives]
     assert len(fault.alternatives) == 2
     assert ", or in" in fault.sentence()
-    codes = health.codes()
+    codes = health.codes(t)
     inside = (t > fault.onset_s) & (t < fault.end_s)
     concerned = [NAMES.index(name) for name in fault.channels]
-    assert (codes[np.ix_(inside, concerned)] == 1).all()
+    assert (codes[np.ix_(inside, concerned)] == HealthCode.DOUBTED).all()
     assert not health.excluded.any()
 
 

@@ -8,6 +8,7 @@ from watched_world import CALIBRATED, CUBE, GRAVITY, RATE_HZ, readings
 
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
+from gfimu.integrity.fault import HealthCode
 from gfimu.integrity.live.channel_watch import LiveWatch
 from gfimu.integrity.live.watched_filter import WatchedRateFilter
 from gfimu.integrity.watch import watch_from_rest
@@ -112,7 +113,7 @@ def test_a_stream_that_begins_in_motion_is_watched_once_the_rate_has_settled():
     assert [event.event for event in events] == ["unwatched", "watched", "excluded", "measured"]
     assert events[1].t_s < 12.0
     assert events[2].fault.channels == (CUBE.channels[4],)
-    assert live.health[4] == 2
+    assert live.health[4] == HealthCode.EXCLUDED
 
 
 def test_a_start_whose_sign_is_undecided_is_not_watched():
@@ -133,7 +134,7 @@ def test_a_line_that_is_refused_is_not_filtered_again():
             with pytest.raises(InputError, match="increase"):
                 live.push(t[k - 1], y[k])
         live.push(t[k], y[k])
-    assert live.health == [0, 0, 0, 0, 0, 0, 2, 0, 0, 0, 0, 0]
+    assert live.health == [0, 0, 0, 0, 0, 0, HealthCode.EXCLUDED, 0, 0, 0, 0, 0]
 
 
 def test_an_array_with_few_channels_is_not_watched():
@@ -160,5 +161,5 @@ def test_lines_of_a_stream_carry_health_and_events():
     assert len(estimates) == len(t)
     assert "health" not in estimates[100]
     assert estimates[800]["health"] == [0] * 12
-    assert estimates[-1]["health"] == [0, 0, 2, *[0] * 9]
+    assert estimates[-1]["health"] == [0, 0, HealthCode.EXCLUDED, *[0] * 9]
     assert [line["fault"] for line in estimates if "fault" in line] == [{"missing": {"a22": 1}}]

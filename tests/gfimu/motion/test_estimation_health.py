@@ -7,6 +7,7 @@ import pytest
 
 import gfimu
 from gfimu.geometry.array import AccelerometerArray
+from gfimu.integrity.fault import HealthCode
 from gfimu.motion.estimation import Estimate
 
 
@@ -41,12 +42,36 @@ def test_a_step_on_one_channel_hardly_harms(run, method):
 
 def test_health_is_in_the_file(run, tmp_path):
     found = gfimu.estimate(faulty(run, 0.2), method="filter", rest_bias=True)
-    assert set(np.unique(found.health["a11"])) == {0, 2}
+    assert set(np.unique(found.health["a11"])) == {HealthCode.USED, HealthCode.EXCLUDED}
     assert not any(codes.any() for name, codes in found.health.items() if name != "a11")
     for name in ("e.csv", "e.parquet"):
         found.write(tmp_path / name)
         again = Estimate.read(tmp_path / name)
         np.testing.assert_array_equal(again.health["a11"], found.health["a11"])
+
+
+def test_readings_that_are_missing_clipped_or_stuck_have_codes_of_their_own(run):
+    readings = run.for_array(AccelerometerArray.load("cube12")).copy()
+    limit = 0.6 * np.nanmax(readings[:, 0])  # far below the part's range
+    readings[:, 0] = np.minimum(readings[:, 0], limit)
+    readings[1000:1005, 1] = np.nan
+    readings[1500:, 8] = readings[1500, 8]
+    found = gfimu.estimate(replace(run, readings=readings), method="filter", rest_bias=True, force=True)
+    health = found.health
+    assert (health["a12"][1000:1005] == HealthCode.MISSING).all()
+    assert np.sum(health["a12"] != HealthCode.USED) == 5
+    clipped = readings[:, 0] == limit
+    assert (health["a11"][clipped] == HealthCode.SATURATED).all()
+    assert np.mean(health["a33"][1600:] == HealthCode.STUCK) > 0.9
+    assert not np.isin(health["a33"][:1400], (HealthCode.STUCK, HealthCode.EXCLUDED)).any()
+
+
+def test_methods_that_watch_no_channel_have_codes_where_a_reading_is_missing(run):
+    assert gfimu.estimate(run, rest_bias=True).health is None
+    readings = run.for_array(AccelerometerArray.load("cube12")).copy()
+    readings[100, 3] = np.nan
+    health = gfimu.estimate(replace(run, readings=readings), method="ml").health
+    assert health["a21"][100] == HealthCode.MISSING
 
 
 def test_a_sound_run_is_estimated_as_before(run):

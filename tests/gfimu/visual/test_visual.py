@@ -16,6 +16,7 @@ from scipy.spatial.transform import Rotation
 from gfimu import AccelerometerArray, InputError, Recording, specific_force
 from gfimu.geometry.array import Chip
 from gfimu.geometry.turning_axis import TurningAxis
+from gfimu.integrity.fault import HealthCode
 from gfimu.visual import Box, Cylinder, ExpectedDrift, KnownMotion, Line, Mesh, Plot, write_comparison, write_run
 from gfimu.visual.picture import picture_of, picture_path
 from gfimu.visual.plots import _broken_at_gaps, _emptiest_corner
@@ -124,8 +125,8 @@ def test_the_way_of_the_body_is_a_line_and_a_point_that_runs_along_it(tmp_path, 
 def test_each_channel_has_a_lane_of_its_health(tmp_path, run):
     count = len(run.estimate.t_s)
     health = {name: np.zeros(count, dtype=np.int8) for name in run.array.channels}
-    health["a21"][10:] = 2
-    health["a43"][:5] = 1
+    health["a21"][10:] = HealthCode.EXCLUDED
+    health["a43"][:5] = HealthCode.DOUBTED
     path = tmp_path / "run.rrd"
     write_run(path, run.recording, run.array, estimate=replace(run.estimate, health=health), known=run.known)
     lanes = {name: numbers(columns["scalars"]) for name, columns in contents(path).items()

@@ -1,0 +1,159 @@
+"""Health of the channels that an estimate is made from: watched, missing, saturated or stuck."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gfimu.geometry.array import AccelerometerArray
+from gfimu.integrity.fault import ChannelFault, ChannelHealth, HealthCode
+from gfimu.rate.sensing import SensorErrors
+from gfimu.short_repr import short_repr
+
+__all__ = ["UsedReadings", "step_of_readings", "stuck_readings", "watched_readings"]
+
+_FOR_STEP = 20_000  # numerical: samples in which the step of the readings is looked for
+
+
+@dataclass(frozen=True)
+class UsedReadings:
+    """Which readings of a recording an estimate can use.
+
+    Parameters
+    ----------
+    t_s : ndarray, shape (n,)
+        Times, s.
+    missing, saturated : ndarray of bool, shape (n, c)
+        Readings that are not there, and readings at the end of the range.
+    stuck : ndarray of bool, shape (n, c), optional
+        Readings that repeat the one before too often for the noise, where that was looked for.
+    stuck_after : int
+        So many equal readings in a row are too many.
+    watch : ChannelHealth, optional
+        Which channels contradict the others, where they were watched.
+    """
+
+    t_s: NDArray[np.float64]
+    missing: NDArray[np.bool_]
+    saturated: NDArray[np.bool_]
+    stuck: NDArray[np.bool_] | None = None
+    stuck_after: int = 0
+    watch: ChannelHealth | None = None
+
+    __repr__ = short_repr
+
+    @property
+    def excluded(self) -> NDArray[np.bool_]:
+        """Readings that contradict the others, shape (n, c)."""
+        return np.zeros_like(self.missing) if self.watch is None else self.watch.excluded
+
+    def codes(self, array: AccelerometerArray) -> dict[str, NDArray[np.int8]] | None:
+        """Return the health (`HealthCode`) of each channel by name; None where none was watched and all are used."""
+        stuck = np.zeros_like(self.missing) if self.stuck is None else self.stuck
+        if self.watch is None and not (self.missing | self.saturated | stuck).any():
+            return None
+        used = np.full(self.missing.shape, np.int8(HealthCode.USED))
+        codes = used if self.watch is None else self.watch.codes(self.t_s)
+        codes[stuck] = HealthCode.STUCK
+        codes[self.saturated] = HealthCode.SATURATED
+        codes[self.missing] = HealthCode.MISSING
+        return dict(zip(array.channels, codes.T, strict=True))
+
+    def faults(self, array: AccelerometerArray) -> list[ChannelFault]:
+        """Return the faults that were watched, then the stuck channels that are not among them."""
+        found = [] if self.watch is None else list(self.watch.faults)
+        return found + self._stuck_faults(array, found)
+
+    def sentences(self, array: AccelerometerArray) -> list[str]:
+        """Return what was found in words; empty if nothing was."""
+        watched = [] if self.watch is None else self.watch.sentences()
+        known = [] if self.watch is None else self.watch.faults
+        return watched + [fault.sentence() for fault in self._stuck_faults(array, known)]
+
+    def _stuck_faults(self, array: AccelerometerArray, known: Sequence[ChannelFault]) -> list[ChannelFault]:
+        """Return one fault for each run of equal readings that no known fault of the channel covers."""
+        if self.stuck is None:
+            return []
+        found = []
+        for column, name in enumerate(array.channels):
+            for start, stop in _runs(self.stuck[:, column]):
+                onset = float(self.t_s[max(start - self.stuck_after + 1, 0)])
+                end = float(self.t_s[stop]) if stop < len(self.t_s) else float("inf")
+                if not any(name in one.channels and one.onset_s < end and one.end_s > onset for one in known):
+                    found.append(_stuck_fault(name, onset, float(self.t_s[start]), end))
+        return found
+
+
+def watched_readings(
+    used: UsedReadings,
+    array: AccelerometerArray,
+    readings: NDArray[np.float64],
+    noise: NDArray[np.float64],
+    *,
+    omega0: NDArray[np.float64] | None,
+    watch: bool,
+) -> UsedReadings:
+    """Look for stuck channels, and for channels that contradict the others.
+
+    Parameters
+    ----------
+    used : UsedReadings
+        What is missing or saturated.
+    array : AccelerometerArray
+        The array, with c channels.
+    readings : ndarray, shape (n, c)
+        Readings, m/s²; NaN where missing or saturated.
+    noise : ndarray, shape (c,)
+        White noise of the channels, m/s².
+    omega0 : ndarray, shape (3,), or None
+        Angular rate at the first sample, rad/s, where it is known.
+    watch : bool
+        Whether to look for channels that contradict the others.
+    """
+    rate = 1.0 / float(np.median(np.diff(used.t_s)))
+    errors = SensorErrors.from_parts(array, rate, step=step_of_readings(readings), noise_std=noise)
+    if errors.stuck_after == 0:  # steps coarser than the noise: rounding errors last, and look like faults
+        return used
+    health = None
+    if watch:
+        from gfimu.integrity.watch import watch_from_rest, watch_in_motion
+
+        if omega0 is not None and not omega0.any():
+            health = watch_from_rest(array, used.t_s, readings, errors)
+        health = health or watch_in_motion(array, used.t_s, readings, errors, omega0=omega0)
+    stuck = stuck_readings(readings, errors.stuck_after)
+    return replace(used, stuck=stuck, stuck_after=errors.stuck_after, watch=health)
+
+
+def stuck_readings(readings: NDArray[np.float64], after: int) -> NDArray[np.bool_]:
+    """Mark readings (n, c) from the ``after``-th equal one in a row on; none where ``after`` is 0."""
+    if after < 2:
+        return np.zeros(readings.shape, dtype=np.bool_)
+    rows = np.arange(len(readings))[:, None]
+    new = np.ones(readings.shape, dtype=np.bool_)
+    new[1:] = readings[1:] != readings[:-1]  # NaN differs from all
+    first = np.maximum.accumulate(np.where(new, rows, 0), axis=0)  # (n, c), row of the first equal reading
+    return np.asarray(rows - first + 1 >= after)
+
+
+def step_of_readings(readings: NDArray[np.float64]) -> float:
+    """Return the step of the readings (n, c), m/s²: the least difference of two values, the median of the channels."""
+    steps = []
+    for column in readings[:_FOR_STEP].T:
+        values = np.unique(column[np.isfinite(column)])
+        if len(values) > 1:
+            steps.append(float(np.diff(values).min()))
+    return float(np.median(steps)) if steps else 0.0
+
+
+def _stuck_fault(name: str, onset: float, found: float, end: float) -> ChannelFault:
+    unknown = (float("nan"),)
+    return ChannelFault((name,), "stuck", True, onset, found, end, unknown, unknown, float("inf"))
+
+
+def _runs(marks: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], marks, [False]]).astype(np.int8)))
+    return [(int(start), int(stop)) for start, stop in zip(edges[::2], edges[1::2], strict=True)]
