@@ -148,7 +148,7 @@ def step_at(time: float) -> str:
 
 
 def is_of_time(name: str) -> bool:
-    """Tell whether a function looks at the clock: what belongs to one recording and to no other."""
+    """Whether a function looks at the clock: what belongs to one recording and to no other."""
     return "time" in name or name.startswith(("step", "tone"))
 
 

@@ -135,12 +135,12 @@ def dependence_of(family: EffectFamily) -> Dependence | None:
 
 
 def is_of_one_recording(family: EffectFamily) -> bool:
-    """Tell whether a kind of effect has the phase of a clock that no other recording shares; others need not say so."""
+    """Whether a kind of effect has the phase of a clock that no other recording shares; others need not say so."""
     return bool(getattr(family, "of_one_recording", False))
 
 
 def is_of_wiring(effect: Effect) -> bool:
-    """Tell whether a fault of the samples changes a prediction without noise; others need not say so."""
+    """Whether a fault of the samples changes a prediction without noise; others need not say so."""
     return bool(getattr(effect, "of_wiring", False))
 
 
@@ -161,17 +161,17 @@ def axis_inclination(model: WorldModel) -> float:
 
 
 def reads_place(model: WorldModel) -> bool:
-    """Tell whether the reference of a simulation is an angle, or the place of a carriage, and no rate."""
+    """Whether the reference of a simulation is an angle, or the place of a carriage, and no rate."""
     return model.drive_source in ("angle", "carriage")
 
 
 def is_linear(model: WorldModel) -> bool:
-    """Tell whether a simulation is of a linear axis, whose spin has place (m), speed (m/s) and acceleration (m/s²)."""
+    """Whether a simulation is of a linear axis, whose spin has place (m), speed (m/s) and acceleration (m/s²)."""
     return model.drive_source in ("carriage", "carriage_speed", "carriage_acceleration")
 
 
 def acts_back(effect: Effect) -> bool:
-    """Tell whether what an effect remembers acts back on the motion, as a mode between table and array does.
+    """Whether what an effect remembers acts back on the motion, as a mode between table and array does.
 
     What only adds to the readings has little to do with how they depend on the drive.
     """

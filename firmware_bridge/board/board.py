@@ -225,7 +225,7 @@ class Board:
         self.alarm = -1
 
     def spinning(self, slot: int) -> bool:
-        """Tell whether the last register access was the same: the program waits in a loop."""
+        """Whether the last register access was the same: the program waits in a loop."""
         last_slot, last_access = self._polled
         self._polled = (slot, self.accesses)
         return slot == last_slot and self.accesses == last_access + 1

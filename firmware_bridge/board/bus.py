@@ -108,7 +108,7 @@ class Bus(Protocol):
         """Wake a peripheral at ``when`` (instead of the time it asked for before)."""
 
     def spinning(self, slot: int) -> bool:
-        """Tell whether the last register access was the same: the program waits in a loop."""
+        """Whether the last register access was the same: the program waits in a loop."""
 
     def wait_until(self, when: int) -> None:
         """Let a polling program skip to ``when``, or to the next event if that is earlier."""

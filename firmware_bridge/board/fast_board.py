@@ -361,7 +361,7 @@ class FastBoard(Board):
             self.native.board_schedule(self.handle, slot, when)
 
     def spinning(self, slot: int) -> bool:
-        """Tell whether the last register access was the same."""
+        """Whether the last register access was the same."""
         return bool(self.native.board_spinning(self.handle, slot))
 
     def wait_until(self, when: int) -> None:

@@ -82,7 +82,7 @@ class Nvic(Peripheral):
         return best if (priority & self.group_mask if priority > 0 else priority) < self.running else 0
 
     def masked(self, exception: int, primask: int, basepri: int, faultmask: int) -> bool:
-        """Tell whether the mask registers hold an exception back."""
+        """Whether the mask registers hold an exception back."""
         priority = self._group(exception)
         if priority < 0:
             return False
@@ -106,7 +106,7 @@ class Nvic(Peripheral):
 
     @property
     def wakes(self) -> bool:
-        """Tell whether something pending wakes the processor from WFI (masks do not matter)."""
+        """Whether something pending wakes the processor from WFI (masks do not matter)."""
         return bool(self.pending & self.enabled)
 
     # Registers

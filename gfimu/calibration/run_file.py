@@ -69,7 +69,7 @@ def open_calibrated_run(
 
 
 def _carries(recording: Recording, array: AccelerometerArray) -> bool:
-    """Tell whether a recording carries the geometry of ``array``."""
+    """Whether a recording carries the geometry of ``array``."""
     try:
         own = recording.array
     except InputError:

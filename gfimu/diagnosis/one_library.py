@@ -225,7 +225,7 @@ class LibraryDiagnosis:
         return Described(whole, carried), gain
 
     def _carries_over(self, explanation: Explanation, described: Fit) -> bool:
-        """Tell whether one half of a run predicts the other: blocks in between follow what changes with time."""
+        """Whether one half of a run predicts the other: blocks in between follow what changes with time."""
         if self._kept is not None:
             return True
         halves = held_out_gain(described.causes, self._pairs(explanation, described, np.inf), self._policy, label="")

@@ -128,7 +128,7 @@ def _remove_abandoned(folder: Path) -> None:
 
 
 def _runs(process: int) -> bool:
-    """Tell whether a process of this machine runs; true where that can't be known."""
+    """Whether a process of this machine runs; true where that can't be known."""
     if os.name != "posix":  # a signal would end it
         return True
     try:

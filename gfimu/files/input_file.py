@@ -48,7 +48,7 @@ def check_input(path: str | Path) -> Path:
 
 
 def is_ordinary(path: str | Path) -> bool:
-    """Tell whether there is an ordinary file; false too for a name that can't be one."""
+    """Whether there is an ordinary file; false too for a name that can't be one."""
     try:
         return stat.S_ISREG(Path(path).stat().st_mode)
     except (OSError, ValueError):

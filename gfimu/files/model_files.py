@@ -99,7 +99,7 @@ def parse_toml(text: str, source: str | Path) -> dict[str, Any]:
 
 
 def _is_long_key(piece: str) -> bool:
-    """Tell whether a piece of a line may be a dotted key of so many parts that its parser takes hours and gigabytes."""
+    """Whether a piece of a line may be a dotted key of so many parts that its parser takes hours and gigabytes."""
     return piece.count(".") > _MOST_PARTS and all(part.strip() for part in piece.split("."))
 
 

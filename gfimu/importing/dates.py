@@ -90,7 +90,7 @@ def nanoseconds_of(values: NDArray[Any] | Sequence[Any]) -> tuple[NDArray[np.int
 
 
 def _months_first(texts: pa.Array, first: NDArray[np.int64], second: NDArray[np.int64]) -> bool:
-    """Tell whether the first number of a date is the month."""
+    """Whether the first number of a date is the month."""
     if (first > 12).any():
         return False
     return bool((second > 12).any()) or "/" in str(texts[0])

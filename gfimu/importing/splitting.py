@@ -90,7 +90,7 @@ def _values(table: RawTable, name: str) -> tuple[list[str], NDArray[np.int64]]:
 
 
 def _sorts(table: RawTable, times: str, places: NDArray[np.int64]) -> bool:
-    """Tell whether the times increase within each chip, but not over all rows."""
+    """Whether the times increase within each chip, but not over all rows."""
     t = table.columns[times]
     if t.dtype == object or t.dtype.kind == "M":
         from gfimu.importing.dates import nanoseconds_of

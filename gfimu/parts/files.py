@@ -17,7 +17,7 @@ __all__ = ["add_part_file", "is_part_file", "part_table"]
 
 
 def is_part_file(name: str) -> bool:
-    """Tell whether a part is named by the path of a file and not like one in ``models/parts``."""
+    """Whether a part is named by the path of a file and not like one in ``models/parts``."""
     return name.endswith(".toml") or "/" in name or "\\" in name
 
 

@@ -10,7 +10,7 @@ __all__ = ["must_compile"]
 
 
 def must_compile(kernel: Any = forward) -> bool:
-    """Tell whether the first call of a filter will compile it: nothing is compiled here or kept from an earlier run.
+    """Whether the first call of a filter will compile it: nothing is compiled here or kept from an earlier run.
 
     numba keeps compiled code beside the source, or in ``NUMBA_CACHE_DIR``, once per installation and kind of processor.
     """

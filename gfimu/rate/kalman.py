@@ -1,7 +1,7 @@
 """Kalman filter for the rate: angular acceleration integrated, the null space of J as measurement.
 
 The filter knows its biases' uncertainty, recognises rest (`gfimu.rate.rest_test`), widens its uncertainty with the
-scale-factor and placement errors it was told of, leaves out channels that are missing, saturated or stuck, and bridges
+scale-factor and placement errors that are stated, leaves out channels that are missing, saturated or stuck, and bridges
 gaps. It takes samples one at a time or in blocks, with the same answer.
 
 Over an interval the angular acceleration is integrated as the polynomial through the neighbouring samples. The default

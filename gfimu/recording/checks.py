@@ -45,7 +45,7 @@ _FITS = 1.0  # of what the limits allow
 _SIGNIFICANT = 3.0  # times what white noise gives, for a warning
 _REMOVED_FOR_WARNING = 0.9
 _WORSE = 0.1  # by which a cost may grow that was possible before
-_ALIKE = 1.5  # ratio of the costs of two ways that can't be told apart
+_ALIKE = 1.5  # ratio of the costs of two ways that can't be separated
 _RATE_RATIO = 1.5  # between the rate by the times and the metadata's, for a refusal
 _FASTEST = 2.0  # times the part's fastest output data rate
 _SLOWEST = 2.0  # Hz, a rate that is plausible for a moving body
@@ -399,7 +399,7 @@ def _left(before: Costs, after: Costs, impossible: Sequence[str], *, scaled: boo
 
 
 def _contradicts(costs: Costs, evidence: Evidence) -> bool:
-    """Tell whether there is a contradiction at all."""
+    """Whether there is a contradiction at all."""
     moving = costs.motion > _SIGNIFICANT * costs.motion_noise  # false for NaN
     if evidence.has_parity:
         moving = moving and costs.motion > _FITS
@@ -407,7 +407,7 @@ def _contradicts(costs: Costs, evidence: Evidence) -> bool:
 
 
 def _explains_noise(before: Costs, after: Costs, *, motion: bool) -> bool:
-    """Tell whether a contradiction is significant and gone, at rest as in motion."""
+    """Whether a contradiction is significant and gone, at rest as in motion."""
     pairs = [(before.parity - before.parity_noise, after.parity - before.parity_noise, before.parity_noise)]
     if motion:
         pairs.append((before.motion - before.motion_noise, after.motion - before.motion_noise, before.motion_noise))
@@ -423,7 +423,7 @@ def _explains_noise(before: Costs, after: Costs, *, motion: bool) -> bool:
 
 
 def _possible(way: Otherwise, before: Costs, evidence: Evidence) -> bool:
-    """Tell whether a way is possible at all.
+    """Whether a way is possible at all.
 
     Another unit of time has to give a rate that the part has; another unit of all readings has to be asked for by
     gravity at rest; and the noise has to fit another unit, as it shrinks and grows with the readings.

@@ -49,7 +49,7 @@ class _Packets:
 
 
 def is_mimu4444(path: str | Path) -> bool:
-    """Tell whether a file starts as a MIMU4444 stream does, gzipped or plain."""
+    """Whether a file starts as a MIMU4444 stream does, gzipped or plain."""
     if not is_ordinary(path):
         return False
     try:

@@ -32,7 +32,7 @@ _SPANNED = 1e-6  # share of the sizes that a place may leave
 
 
 def is_miss(outcome: Outcome) -> bool:
-    """Tell whether an outcome is a miss that a fit of the truth can explain: on a table, inside the library."""
+    """Whether an outcome is a miss that a fit of the truth can explain: on a table, inside the library."""
     outside = outcome["without"] or outcome["study"] == "exotics" or outcome.get("body")
     return visible(outcome) and not outside and not score(outcome)["fair"]
 

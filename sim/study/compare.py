@@ -66,7 +66,7 @@ class Promise:
         return int(binom.ppf(level if self.measure.wanted else 1.0 - level, cases, self.rate))
 
     def kept(self, hits: int, cases: int, level: float) -> bool:
-        """Tell whether a count is within its bound."""
+        """Whether a count is within its bound."""
         bound = self.bound(cases, level)
         return hits >= bound if self.measure.wanted else hits <= bound
 

@@ -176,7 +176,7 @@ def _with_limits(
 
 
 def _reaches(twin: Twin, motion: SpinMotion, setting: Measurement, level: float) -> bool:
-    """Tell whether readings go beyond a level, m/s², often enough for clipping there to be seen."""
+    """Whether readings go beyond a level, m/s², often enough for clipping there to be seen."""
     t = np.arange(round(setting.duration * setting.sample_rate)) / setting.sample_rate
     return bool(np.quantile(np.abs(twin.predict(motion, t)[0]), 1.0 - _FASTEST_SHARE) > level)
 

@@ -83,7 +83,7 @@ def score(outcome: Outcome) -> dict[str, bool]:
 
 
 def _inseparable(outcome: Outcome, rivals: set[str]) -> bool:
-    """Tell whether the data can't tell any of these rivals from what is hidden."""
+    """Whether the data can't tell any of these rivals from what is hidden."""
     left_by = outcome.get("left_by")
     if not left_by:
         return any(rivals | set(outcome["effects"]) <= group for group in INSEPARABLE)

@@ -48,7 +48,7 @@ ValuesOf = Callable[[Stretch, Posterior], NDArray[np.float64]]
 
 
 def judges_reference(stretches: Sequence[Stretch]) -> bool:
-    """Tell whether the residual of the reference is noise where nothing is wrong: fine steps of a measurement.
+    """Whether the residual of the reference is noise where nothing is wrong: fine steps of a measurement.
 
     A command is followed as well as the motor can, and errors of coarse steps do not average out.
     """

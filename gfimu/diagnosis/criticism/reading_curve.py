@@ -53,7 +53,7 @@ def reading_curve(stretches: Sequence[Stretch], found: Fit, policy: Policy = Pol
 
 
 def _distorts(cause: Cause, channels: int, number: int) -> bool:
-    """Tell whether a cause changes a channel by a law of its sensing: one size per channel and no shape."""
+    """Whether a cause changes a channel by a law of its sensing: one size per channel and no shape."""
     per_channel = cause.family.place == "sensing" and len(cause.mixing) == channels and not cause.shape
     of_temperature = getattr(cause.family, "needs_temperature", False)
     return per_channel and not of_temperature and bool(np.abs(cause.mixing[number]).any())

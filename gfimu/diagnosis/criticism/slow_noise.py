@@ -41,7 +41,7 @@ class LoudestChannel:
     log_odds: float
 
     def stands_out(self, policy: Policy) -> bool:
-        """Tell whether it surely has more slow noise than the other channels."""
+        """Whether it surely has more slow noise than the other channels."""
         return self.ratio > policy.loud_ratio and self.log_odds > policy.ambiguous
 
 

@@ -68,7 +68,7 @@ class _Term:
     series: tuple[int, ...]
 
     def is_in(self, others: Sequence[_Term]) -> bool:
-        """Tell whether others hold it already."""
+        """Whether others hold it already."""
         return any(one.function == self.function and set(self.series) <= set(one.series) for one in others)
 
     def cause(self, stretch: Stretch, units: BasisUnits) -> Cause:

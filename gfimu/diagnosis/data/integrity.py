@@ -432,12 +432,12 @@ def _signed(misfit: NDArray[np.float64], inverted: NDArray[np.float64], *places:
 
 
 def _clears(after: float, before: float) -> bool:
-    """Tell whether a mean squared misfit is significant, and gone after."""
+    """Whether a mean squared misfit is significant, and gone after."""
     return before > SIGNIFICANT_RMS**2 and after < (1 - _REMOVED) * before
 
 
 def _reads_negative(run: Run, prediction: NDArray[np.float64], white: float, channel: int) -> bool:
-    """Tell whether what varies of a channel is the negative of its prediction (n,), down to the noise.
+    """Whether what varies of a channel is the negative of its prediction (n,), down to the noise.
 
     Of little, as on a slow table: an offset may look like an inverted constant, but nothing else inverts a variation.
     """

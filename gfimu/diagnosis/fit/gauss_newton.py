@@ -142,12 +142,12 @@ def linearly_without(found: Fit, cause: Cause, policy: Policy) -> Fit:
 
 
 def is_rough(stretches: Sequence[Stretch], found: Fit) -> bool:
-    """Tell whether a fit was made by a derivative that leaves out what a cause of it remembers."""
+    """Whether a fit was made by a derivative that leaves out what a cause of it remembers."""
     return not found.point.exact and _is_long(stretches, found.point)
 
 
 def _is_long(stretches: Sequence[Stretch], point: Point) -> bool:
-    """Tell whether a cause remembers the drive for so long that the cheap derivative leaves it out."""
+    """Whether a cause remembers the drive for so long that the cheap derivative leaves it out."""
     return any(remembers_long(effects_of(point.causes, one.model.array, one.index)) for one in stretches[:1])
 
 

@@ -188,7 +188,7 @@ def _cholesky(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def remembers_long(effects: Sequence[Effect]) -> bool:
-    """Tell whether an effect remembers the drive for so long that the derivative leaves it out unless it is exact."""
+    """Whether an effect remembers the drive for so long that the derivative leaves it out unless it is exact."""
     return any(memory_of(effect) > _LONG_MEMORY and acts_back(effect) for effect in effects)
 
 

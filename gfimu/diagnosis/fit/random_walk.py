@@ -42,7 +42,7 @@ class Walk:
     unequal: float
 
     def is_likely(self, policy: Policy) -> bool:
-        """Tell whether the residual shows it, equally in all channels."""
+        """Whether the residual shows it, equally in all channels."""
         return self.log_odds > policy.lack_odds and self.unequal < policy.unequal_walk
 
 

@@ -167,14 +167,14 @@ def grown_sets(blocks: Blocks, members: tuple[int, ...], policy: Policy) -> list
 
 
 def _nested(hypotheses: Sequence[Hypothesis], members: Sequence[int]) -> bool:
-    """Tell whether one effect of a set can do all that another does: both together mean nothing."""
+    """Whether one effect of a set can do all that another does: both together mean nothing."""
     families = [hypotheses[number].cause.family for number in members]
     names = {str(family.name) for family in families}
     return any(names & getattr(family, "contained_in", frozenset()) for family in families)
 
 
 def _is_worth(blocks: Blocks, candidate: Candidate, policy: Policy) -> bool:
-    """Tell whether every member of a set adds something to the others, as much as makes it worth a fit."""
+    """Whether every member of a set adds something to the others, as much as makes it worth a fit."""
     members = candidate.members
     rests = [tuple(other for other in members if other != member) for member in members] if len(members) > 1 else []
     return all(candidate.log_odds - blocks.log_odds(rest) >= policy.worth_a_search for rest in rests)

@@ -104,7 +104,7 @@ class Sets:
             return None
 
     def _is_worth_it(self, found: Fit) -> bool:
-        """Tell whether a fit is rough, and details of what a mode remembers can matter.
+        """Whether a fit is rough, and details of what a mode remembers can matter.
 
         They can't where the mode eases little of what is left without it, nor where far more than noise is left.
         """
@@ -166,7 +166,7 @@ def excess(stretches: Sequence[Stretch], found: Fit) -> float:
 
 
 def hardly_eases(stretches: Sequence[Stretch], before: Fit, after: Fit, policy: Policy) -> bool:
-    """Tell whether a fit leaves far more than noise, and hardly less than another: more of the same leads nowhere.
+    """Whether a fit leaves far more than noise, and hardly less than another: more of the same leads nowhere.
 
     Of a body in the hand every cause may be a small share of what real chips disagree about.
     """
@@ -179,7 +179,7 @@ def _key(causes: Sequence[Cause]) -> _Key:
 
 
 def _is_alike(one: Fit, other: Fit) -> bool:
-    """Tell whether two fits of a set ended at the same optimum over the shapes of its causes."""
+    """Whether two fits of a set ended at the same optimum over the shapes of its causes."""
     mine = {cause.key: cause for cause in other.causes}
     return all(cause.apart(mine[cause.key]) < ALIKE for cause in one.causes)
 

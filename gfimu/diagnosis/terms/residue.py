@@ -59,7 +59,7 @@ class Residue:
 
     @staticmethod
     def is_possible(stretch: Stretch) -> bool:
-        """Tell whether the library has effects that a calibration leaves a residue of."""
+        """Whether the library has effects that a calibration leaves a residue of."""
         return bool(_families(stretch))
 
     def effects(self, stretch: Stretch, sizes: np.ndarray) -> tuple[Effect, ...]:

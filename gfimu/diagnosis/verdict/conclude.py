@@ -77,7 +77,7 @@ def removed(explanation: Explanation) -> float:
 
 
 def stands_out(explanation: Explanation, left: LackOfFit, policy: Policy) -> bool:
-    """Tell whether a lack of fit is no chance, nor the inexactness that every model has."""
+    """Whether a lack of fit is no chance, nor the inexactness that every model has."""
     return left.noise_odds > policy.lack_odds or _depends(explanation, left, policy)
 
 
@@ -89,7 +89,7 @@ def _depends(explanation: Explanation, left: LackOfFit, policy: Policy) -> bool:
 
 
 def is_dominant(explanation: Explanation, left: LackOfFit, policy: Policy) -> bool:
-    """Tell whether the lack of fit weighs too much against what the causes explain for these to be believed."""
+    """Whether the lack of fit weighs too much against what the causes explain for these to be believed."""
     if not explanation.best.causes:
         return stands_out(explanation, left, policy)
     large = left.instead or 2.0 * left.log_odds > policy.dominant * removed(explanation)
@@ -97,7 +97,7 @@ def is_dominant(explanation: Explanation, left: LackOfFit, policy: Policy) -> bo
 
 
 def is_unknown(explanation: Explanation, left: LackOfFit, gain: Gain, policy: Policy) -> bool:
-    """Tell whether the causes are not to be believed, their gain on held-out data being known."""
+    """Whether the causes are not to be believed, their gain on held-out data being known."""
     # Several causes that together still miss something, and a share of held-out data, coincide by chance. Real hands
     # leave more beside what is right.
     missed = (
@@ -114,7 +114,7 @@ def is_unknown(explanation: Explanation, left: LackOfFit, gain: Gain, policy: Po
 
 
 def _is_full(explanation: Explanation, policy: Policy) -> bool:
-    """Tell whether the causes are as many as a set may have: wide causes enough describe anything."""
+    """Whether the causes are as many as a set may have: wide causes enough describe anything."""
     causes = explanation.best.causes
     return len(causes) >= policy.most_causes and all(cause.family.inexactness == 0.0 for cause in causes)
 

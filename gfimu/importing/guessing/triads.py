@@ -142,7 +142,7 @@ def _by_gravity(table: RawTable, triads: Sequence[tuple[Triad, bool]]) -> list[T
 
 
 def is_acceleration(name: str) -> bool:
-    """Tell whether a column is an acceleration by its unit or its name."""
+    """Whether a column is an acceleration by its unit or its name."""
     plain, unit = unit_of_name(name)
     if _NEITHER.search(plain) or _GYRO.search(plain):
         return False

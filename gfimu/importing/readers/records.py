@@ -152,7 +152,7 @@ def _table(name: str, columns: Mapping[str, list[Any]], notes: list[str]) -> Raw
 
 
 def is_workbook(path: Path) -> bool:
-    """Tell whether a zip archive is an Excel workbook."""
+    """Whether a zip archive is an Excel workbook."""
     try:
         with zipfile.ZipFile(path) as archive:
             return any(name.startswith("xl/") for name in archive.namelist())

@@ -151,7 +151,7 @@ def cell_values(cells: pa.Array, decimal: str) -> tuple[NDArray[Any] | None, int
 
 
 def is_text(head: bytes) -> bool:
-    """Tell whether the first bytes of a file look like text."""
+    """Whether the first bytes of a file look like text."""
     return head[:2] in (b"\xff\xfe", b"\xfe\xff") or (
         b"\x00" not in head and not re.search(rb"[\x01-\x08\x0e-\x1a]", head)
     )

@@ -158,7 +158,7 @@ def _named_cells(line: str, separator: str, width: int) -> list[str] | None:
 
 
 def _are_units(cells: Sequence[str]) -> bool:
-    """Tell whether cells hold units: ``ms``, ``[mg]``, ``deg/s``; all that are filled, and not numbers of axes."""
+    """Whether cells hold units: ``ms``, ``[mg]``, ``deg/s``; all that are filled, and not numbers of axes."""
     plain = [cell.strip(" []()*").lower() for cell in cells]
     known = [bool(kind_of(cell)) for cell in plain]
     return sum(known) >= 2 and all(one or cell in _NO_UNITS for one, cell in zip(known, plain, strict=True))

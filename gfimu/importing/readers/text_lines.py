@@ -35,7 +35,7 @@ def plain_lines(lines: Sequence[str]) -> list[str]:
 
 
 def _most(lines: Sequence[str], mark: re.Pattern[str]) -> bool:
-    """Tell whether most of the first filled lines match."""
+    """Whether most of the first filled lines match."""
     looked = [line for line in lines[:_LOOKED_AT] if line.strip()]
     return sum(len(line) <= _LONGEST and mark.search(line) is not None for line in looked) > _LEAST * len(looked)
 

@@ -49,7 +49,7 @@ class HiddenCase:
         return f"{self.group}-{hidden}{size}-{self.generator}-{self.case.seed}"
 
     def is_right(self, outcome: Mapping[str, Any]) -> bool:
-        """Tell whether an outcome is right: the hidden names, alone or in a set that the data can't tell apart.
+        """Whether an outcome is right: the hidden names, alone or in a set that the data can't tell apart.
 
         Nothing where nothing is hidden, ``unknown`` outside the library, or the point of the grammar that it is.
         """

@@ -76,9 +76,9 @@ def test_normalised_errors_of_single_samples(method, factor):
     array = cube()
     motion = tumble(RATE, 2 * np.pi, duration=30.0)
     errors = sensor_errors(array, RATE)
-    told = replace(errors, noise_std=errors.noise_std / factor, bias_std=np.full(12, 0.01))
+    smaller = replace(errors, noise_std=errors.noise_std / factor, bias_std=np.full(12, 0.01))
     values = measure(array, motion, np.random.default_rng(3), bias=0.0)
-    found = estimate_rate(array, motion.t, values, told, method=method)
+    found = estimate_rate(array, motion.t, values, smaller, method=method)
     rows = motion.t > 6
     square = np.mean(((found.omega - motion.omega) / found.std)[rows] ** 2)
     if factor == 1.0:
@@ -96,10 +96,10 @@ def test_a_filter_takes_the_noise_that_it_measures():
     motion = tumble(RATE, 2 * np.pi, duration=20.0)
     errors = sensor_errors(array, RATE)
     values = measure(array, motion, np.random.default_rng(4), bias=0.0)
-    told = replace(errors, noise_std=errors.noise_std / 3.0, bias_std=np.full(12, 0.01))
-    found = filter_rate(array, motion.t, values, told)
+    smaller = replace(errors, noise_std=errors.noise_std / 3.0, bias_std=np.full(12, 0.01))
+    found = filter_rate(array, motion.t, values, smaller)
     stated = FilterSettings(noise=MeasuredNoise.as_stated(motion.t))
-    naive = filter_rate(array, motion.t, values, told, stated)
+    naive = filter_rate(array, motion.t, values, smaller, stated)
     rows = motion.t > 6
     squares = [np.mean(((one.omega - motion.omega) / one.std)[rows] ** 2) for one in (naive, found)]
     assert squares[0] > 5.0

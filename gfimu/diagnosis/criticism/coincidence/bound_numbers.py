@@ -174,7 +174,7 @@ def _in_coordinates(cause: Cause, pattern: Pattern) -> NDArray[np.float64] | Non
 
 
 def _are_of_a_kind(one: Cause, other: Cause) -> bool:
-    """Tell whether two causes have the same numbers: one for each of the same channels or chips."""
+    """Whether two causes have the same numbers: one for each of the same channels or chips."""
     return (
         one.mixing.shape == other.mixing.shape
         and len(one.coordinates) > SPARE
