@@ -101,8 +101,8 @@ def rate_bound(array: AccelerometerArray, omega: ArrayLike, noise_std: float) ->
     Returns
     -------
     ndarray, shape (..., 3)
-        Least standard deviation of an unbiased estimate, rad/s; infinite for a component that one sample does not determine
-        (all three at ω = 0, and always for arrays with no null space). The sign of ω is taken as known.
+        Least standard deviation of an unbiased estimate, rad/s; infinite for a component that one sample does not
+        determine (all three at ω = 0, and always for arrays with no null space). The sign of ω is taken as known.
     """
     information = rate_information(array, omega, noise_std)
     values, vectors = np.linalg.eigh(information)  # (..., 3), (..., 3, 3)
