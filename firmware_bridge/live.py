@@ -168,9 +168,9 @@ class LiveView:
         return result.omega
 
     def _report_faults(self) -> None:
-        """Pass on what changed in the health of the channels."""
+        """Pass on the faults of channels that were found, measured, or are over."""
         for event in [] if self._filter is None else self._filter.take_events():
-            if self._on_fault is not None:
+            if self._on_fault is not None and event.fault is not None:
                 self._on_fault(f"{event.text} (at {event.t_s:.1f} s on the board's clock)")
 
     @property

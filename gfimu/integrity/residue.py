@@ -50,7 +50,14 @@ def moving_seconds(follower: MonitorFilter, blocks: Blocks, policy: MonitorPolic
     return np.asarray(spread.max(axis=1, initial=0.0) > policy.moving)
 
 
-def agree(follower: MonitorFilter, blocks: Blocks, innovations: NDArray[np.float64], policy: MonitorPolicy) -> bool:
+def agree(
+    follower: MonitorFilter,
+    blocks: Blocks,
+    innovations: NDArray[np.float64],
+    policy: MonitorPolicy,
+    *,
+    judged: NDArray[np.bool_] | None = None,
+) -> bool:
     """Whether a share of all seconds of motion, and of rest, have innovations that the stated errors explain.
 
     Parameters
@@ -63,6 +70,14 @@ def agree(follower: MonitorFilter, blocks: Blocks, innovations: NDArray[np.float
         Normalised innovation squared per degree of freedom.
     policy : MonitorPolicy
         That share.
+    judged : ndarray of bool, shape (m,), optional
+        Blocks to judge by, all by default: in one where a channel is noisier than all others, errors of the geometry
+        are not what the innovations show.
+
+    Returns
+    -------
+    bool
+        True also where no second is left to judge by.
     """
     per_second = max(1, round(1.0 / follower.block_s))
     count = len(blocks) // per_second
@@ -71,6 +86,9 @@ def agree(follower: MonitorFilter, blocks: Blocks, innovations: NDArray[np.float
         return True
     nis = innovations[: count * per_second].reshape(count, per_second).mean(axis=1)
     moving = moving_seconds(follower, blocks, policy)
+    if judged is not None:
+        whole = judged[: count * per_second].reshape(count, per_second).all(axis=1)
+        nis, moving, count = nis[whole], moving[whole], int(whole.sum())
     limit = chdtri(freedom, policy.agreeing_share) / freedom
     parts = [nis[part] for part in (moving, ~moving) if part.sum() >= min(count, policy.fewest_seconds)]
     return all(bool(np.quantile(part, policy.agreeing_share) <= limit) for part in parts)

@@ -14,7 +14,8 @@ from gfimu.integrity.fault import ChannelFault, ChannelHealth
 from gfimu.integrity.kinds import name_kinds
 from gfimu.integrity.monitor import ChannelMonitor
 from gfimu.integrity.policy import MonitorPolicy
-from gfimu.integrity.recursion.blocks import block_means
+from gfimu.integrity.recursion.blocks import Blocks, block_means
+from gfimu.integrity.recursion.noise import BlockNoise
 from gfimu.integrity.residue import agree, larger_errors, with_residue
 from gfimu.integrity.rest import leading_rest_bias
 from gfimu.integrity.start import Settling
@@ -76,13 +77,14 @@ def watch_channels(
     settings = policy or MonitorPolicy()
     samples = settings.samples(period)
     blocks = block_means(times, rows, errors.limits, samples)
-    factor, monitor = 0.5, None
+    factor, monitor, judged = 0.5, None, None
     while monitor is None:
         factor *= 2.0
         trial = ChannelMonitor(
             array, larger_errors(errors, factor), period, omega0=omega0, omega0_std=omega0_std, policy=settings
         )
-        agrees = agree(trial.follower, blocks, trial.innovations(blocks), settings)
+        judged = _no_noisy_channel(trial, blocks) if judged is None else judged
+        agrees = agree(trial.follower, blocks, trial.innovations(blocks), settings, judged=judged)
         if agrees or factor >= settings.largest_factor:
             trial.refuse(not agrees)
             monitor = trial
@@ -149,6 +151,14 @@ def watch_in_motion(
         omega0=start.omega, omega0_std=max(start.omega_std, 1e-3), policy=settings,
     )  # fmt: skip
     return found.behind(done)
+
+
+def _no_noisy_channel(monitor: ChannelMonitor, blocks: Blocks) -> NDArray[np.bool_]:
+    """Return in which blocks no channel is noisier than all others, shape (m,)."""
+    rows = monitor.follower.null_rows(np.ones(monitor.array.n_channels, dtype=np.bool_))
+    noise = BlockNoise(rows, monitor.block_s, monitor.threshold, monitor.policy)
+    noise.extend(blocks, slice(0, len(blocks)))
+    return np.asarray(noise.noisy < 0)
 
 
 def _concerned(

@@ -220,7 +220,7 @@ def drift_budget(
     if not 0.0 < time <= _LONGEST:
         raise InputError(f"time is {time} s; it must be above zero, and {_LONGEST:g} s at most")
     if not np.all(np.abs([rate, *offset, gravity]) <= _LARGEST):
-        raise InputError(f"rate, offset and gravity must be numbers of at most {_LARGEST:g}")
+        raise InputError(f"rate, offset and gravity must be finite numbers of at most {_LARGEST:g}")
     unit = motion_covariance(array)  # (6, 6) of [alpha; p] for channels of unit variance
     alpha_only, p_only = unit.copy(), unit.copy()
     alpha_only[3:], alpha_only[:, 3:], p_only[:3], p_only[:, :3] = 0.0, 0.0, 0.0, 0.0

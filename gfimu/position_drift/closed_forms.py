@@ -72,7 +72,9 @@ class ErrorSources:
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
             if not 0.0 <= value <= _LARGEST:
-                raise InputError(f"{name} is {value}; it must be a number from zero to {_LARGEST:g}")
+                raise InputError(
+                    f"{name} is {value}; it must be a finite number, zero or above, of at most {_LARGEST:g}"
+                )
 
 
 @dataclass(frozen=True)

@@ -188,7 +188,7 @@ def test_a_large_rest_bias_is_refused_unless_forced(gfimu_command, noisy):
     out = file.with_name("estimate.parquet")
     refused = gfimu_command("estimate", file, "--out", out, "--rest-bias")
     assert refused.code == 2
-    assert "channel a22 reads +300 mg beyond gravity" in refused.stderr
+    assert "channel a22 of array 'cube12' reads +300 mg beyond gravity" in refused.stderr
     assert gfimu_command("estimate", file, "--out", out, "--rest-bias", "--force").code == 0
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,6 @@ from gfimu.errors import InputError
 
 __all__ = ["Limits", "improve", "plain_profile", "profile_of", "starting_points"]
 
-_LONGEST = 1e4  # numerical: s, of a planned run
 _LEGS = 8
 _PARAMETERS = 3 * _LEGS + 5
 _SHORTEST_RAMP = 0.25
@@ -43,13 +43,14 @@ class Limits:
     rate: float
     acceleration: float
     duration: float
+    longest: ClassVar[float] = 1e4  # numerical: s, of a planned run
 
     def __post_init__(self) -> None:
         for name, value in (("rate", self.rate), ("acceleration", self.acceleration), ("duration", self.duration)):
             if not (math.isfinite(value) and value > 0):
                 raise InputError(f"limit of {name} {value}: give a positive number")
-        if self.duration > _LONGEST:
-            raise InputError(f"limit of duration {self.duration:g}: give {_LONGEST:g} s at most")
+        if self.duration > self.longest:
+            raise InputError(f"limit of duration {self.duration:g}: give {self.longest:g} s at most")
 
 
 def plain_profile(limits: Limits) -> TableProfile:

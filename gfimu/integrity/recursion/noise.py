@@ -84,6 +84,11 @@ class BlockNoise:
         """Forget the first blocks."""
         self.levels, self._noisy, self._loud = self.levels[count:], self._noisy[count:], self._loud[count:]
 
+    @property
+    def noisy(self) -> NDArray[np.int64]:
+        """Channel that is noisier than all others in each block, −1 where none is, shape (m,)."""
+        return self._noisy
+
     def first_from(self, block: int) -> tuple[int, int]:
         """Return the first block from ``block`` on at which a channel is noisy, and that channel; m and −1 if none."""
         found = np.flatnonzero(self._noisy[block:] >= 0)
