@@ -18,6 +18,8 @@ __all__ = ["Carriage", "Hand", "Wheel"]
 
 _AXLE = np.array([0.0, 1.0, 0.0])  # of a wheel, in the world: it rolls along x
 
+_MOST_KNOTS = 1e6  # numerical: of the movement of a hand
+
 
 @dataclass(frozen=True)
 class Carriage:
@@ -141,6 +143,8 @@ class Hand:
                 f"hand: {self.duration:g} s are too short for rest_s = {self.rest:g} at both ends and a few movements "
                 f"of pace_s = {self.pace:g}; give a longer duration_s"
             )
+        if not self.duration / self.pace <= _MOST_KNOTS:
+            raise InputError(f"hand: pace_s = {self.pace:g} gives more than {_MOST_KNOTS:g} movements; move slower")
 
     @cached_property
     def _spline(self):  # type: ignore[no-untyped-def]

@@ -25,6 +25,7 @@ __all__ = ["Chirp", "Hold", "Ramp", "Segment", "Sine", "Tumble", "paper_run", "s
 
 _MOST_NODES = 10_000_000  # numerical: of a sweep
 _LONGEST = 1e9  # numerical: s, of a piece of a profile
+_SHORTEST = 1e-9  # numerical: s, of a piece: its fifth power is no zero
 
 _WINDOW_SHARE = 0.1  # share of an oscillation's duration in which its window opens, and again closes
 _POINTS_PER_PERIOD = 40  # nodes of the quintic spline of an oscillation, per shortest period
@@ -350,8 +351,8 @@ def _smooth_step(share: NDArray[np.float64]) -> NDArray[np.float64]:
 def _quintic(start: float, stop: float, duration: float) -> NDArray[np.float64]:
     """Coefficients of one quintic piece from ``start`` to ``stop``, highest power first, shape (6, 1)."""
     step = stop - start
-    if not duration < _LONGEST:
-        raise InputError(f"a piece of {duration:g} s; give less than {_LONGEST:g} s")
+    if not _SHORTEST < duration < _LONGEST:
+        raise InputError(f"a piece of {duration:g} s; give more than {_SHORTEST:g} s and less than {_LONGEST:g} s")
     return np.array(
         [[6 * step / duration**5], [-15 * step / duration**4], [10 * step / duration**3], [0], [0], [start]]
     )

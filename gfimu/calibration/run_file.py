@@ -8,6 +8,7 @@ from gfimu.calibration.imu_tk import read_text_triad
 from gfimu.calibration.result import Calibration
 from gfimu.errors import InputError
 from gfimu.files.column_file import open_columns
+from gfimu.files.input_file import is_ordinary
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
 from gfimu.recording.carried_array import array_difference
@@ -80,7 +81,7 @@ def _carries(recording: Recording, array: AccelerometerArray) -> bool:
 def _open(path: str | Path | MappedFile, array: AccelerometerArray | None, unit: str | None) -> Recording:
     if isinstance(path, MappedFile):
         return path.read(array, unit=unit)
-    if str(path).endswith(_TEXT) and Path(path).is_file():
+    if str(path).endswith(_TEXT) and is_ordinary(path):
         return read_text_triad(path)
     whole = format_of_recording(path)
     if whole is not None:

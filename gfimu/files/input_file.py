@@ -10,7 +10,16 @@ from pathlib import Path
 
 from gfimu.errors import GfimuError, InputError
 
-__all__ = ["LONGEST_LINE", "MOST_COLUMNS", "check_input", "is_ordinary", "parsing", "read_bytes", "unpacked"]
+__all__ = [
+    "LONGEST_LINE",
+    "MOST_COLUMNS",
+    "check_input",
+    "is_ordinary",
+    "is_there",
+    "parsing",
+    "read_bytes",
+    "unpacked",
+]
 
 LONGEST_LINE = 2_000_000
 """Numerical: characters of a line, far more than a recording's metadata or samples need."""
@@ -53,6 +62,15 @@ def is_ordinary(path: str | Path) -> bool:
         return stat.S_ISREG(Path(path).stat().st_mode)
     except (OSError, ValueError):
         return False
+
+
+def is_there(path: str | Path) -> bool:
+    """Whether there is a file or a folder; false too for a name that can't be one."""
+    try:
+        Path(path).stat()
+    except (OSError, ValueError):
+        return False
+    return True
 
 
 def read_bytes(path: str | Path) -> bytes:

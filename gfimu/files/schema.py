@@ -284,7 +284,7 @@ def _kind(info: types.Type, value: Any = None, *, many: bool = False) -> str:
     if isinstance(info, types.IntType):
         return f"{a}whole number{s}" + _bound(info, " ")
     if isinstance(info, types.FloatType):
-        good = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+        good = isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < math.inf
         return _bound(info) or f"{a}finite number{s}" if good else f"{a}finite number{s}"
     if isinstance(info, types.TupleType):
         return f"a list of {len(info.item_types)} {_kind(info.item_types[0], many=True)}"

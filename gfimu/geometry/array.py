@@ -17,6 +17,7 @@ import tomli_w
 from numpy.typing import ArrayLike, NDArray
 
 from gfimu.errors import InputError
+from gfimu.files.input_file import is_ordinary
 from gfimu.files.model_files import find_model, read_toml
 from gfimu.files.schema import read
 from gfimu.geometry.array_file import ArrayFile, ChipTable
@@ -227,7 +228,7 @@ class AccelerometerArray:
         path = find_model("arrays", name, beside=beside)
         array = cls.from_dict(read_toml(path), source=str(path))
         for part in dict.fromkeys(chip.part for chip in array.chips if is_part_file(chip.part)):
-            if any((folder / part).is_file() for folder in (path.parent, Path())):  # others fail where they are needed
+            if any(is_ordinary(folder / part) for folder in (path.parent, Path())):  # others fail where they are needed
                 array, kept = array.with_part_file(part, beside=path.parent)
                 chips = tuple(replace(chip, part=kept) if chip.part == part else chip for chip in array.chips)
                 array = replace(array, chips=chips)

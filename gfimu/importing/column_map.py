@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal, get_args
 import msgspec
 
 from gfimu.errors import InputError
+from gfimu.files.input_file import is_ordinary
 from gfimu.files.model_files import find_model, list_models, read_toml
 from gfimu.importing.map_keys import FOR_ALL, complete, set_map_key
 from gfimu.importing.notation import factor_of
@@ -241,7 +242,7 @@ def load_map(name: str | Path | ColumnMap | None, changes: Sequence[str] = ()) -
         found = msgspec.convert(complete(data), ColumnMap)
     except msgspec.ValidationError as error:
         raise InputError(f"{source}: {_plain_words(str(error))}; correct the map") from None
-    if beside is not None and found.array.endswith(".toml") and (beside / found.array).is_file():
+    if beside is not None and found.array.endswith(".toml") and is_ordinary(beside / found.array):
         found = msgspec.structs.replace(found, array=str(beside / found.array))
     found.check(source)
     return found

@@ -12,6 +12,7 @@ from scipy.interpolate import CubicSpline
 
 from gfimu.errors import InputError
 from gfimu.files.column_file import open_columns
+from gfimu.files.input_file import is_there
 from gfimu.importing import ColumnMap, load_map
 from gfimu.importing.recognise import map_hint
 from gfimu.recording.mapped import mapped_reference
@@ -89,7 +90,7 @@ def open_reference(path: str | Path, column_map: ColumnMap | str | Path | None =
     try:
         table = open_columns(path)
     except InputError as error:
-        hint = map_hint(path) if Path(path).exists() else ""
+        hint = map_hint(path) if is_there(path) else ""
         raise InputError(f"{error}" + (f"; {hint} (here --reference-map)" if hint else "")) from None
     factors = {
         f"{name}_{unit}": (f"{name}_{next(iter(units))}", factor)

@@ -10,6 +10,7 @@ from pathlib import Path
 from types import FunctionType, ModuleType
 
 from gfimu.errors import InputError, unknown_name
+from gfimu.files.input_file import is_ordinary
 from gfimu.files.model_files import read_toml
 from gfimu.own_rig.cause import UnnamedCause
 from gfimu.own_rig.simulator import SimulatorModel
@@ -43,7 +44,7 @@ def load_model(name: str | Path) -> WorldModel | None:
     installed = plugins(GROUP, FunctionType)
     if text in installed:
         return _with_source(_made(installed[text], text), text)
-    if text.endswith(".toml") and Path(text).is_file():
+    if text.endswith(".toml") and is_ordinary(text):
         return _of_file(Path(text))
     return None
 
@@ -72,7 +73,7 @@ def _of_file(path: Path) -> WorldModel | None:
 
 
 def _module(file: Path) -> ModuleType:
-    if not file.is_file():
+    if not is_ordinary(file):
         raise InputError(f"{file}: no such file; give a Python file and a function in it: rig.py:twin")
     name = f"gfimu_own_rig_{file.stem}"
     spec = importlib.util.spec_from_file_location(name, file)

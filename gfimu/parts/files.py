@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from gfimu.files.input_file import is_ordinary
 from gfimu.files.model_files import find_model, parse_toml, read_toml
 
 __all__ = ["add_part_file", "is_part_file", "part_table"]
@@ -45,7 +46,7 @@ def add_part_file(files: Mapping[str, str], name: str, beside: Path | None) -> t
     InputError
         If there is no such file and none of that name is kept yet, or it is not valid TOML.
     """
-    if name in files and not any((folder / name).is_file() for folder in (beside or Path(), Path())):
+    if name in files and not any(is_ordinary(folder / name) for folder in (beside or Path(), Path())):
         return dict(files), name
     path = find_model("parts", name, beside=beside)
     read_toml(path)  # a syntax error is reported with the path of the file

@@ -10,6 +10,7 @@ from typing import cast
 
 from gfimu.errors import InputError
 from gfimu.files.column_file import ColumnFile, open_columns
+from gfimu.files.input_file import is_there
 from gfimu.files.table import ArrowStream
 from gfimu.files.table_columns import TableColumns
 from gfimu.geometry.array import AccelerometerArray
@@ -85,7 +86,7 @@ def _hinting_at_maps(path: str | Path | ArrowStream) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        hint = map_hint(path) if isinstance(path, str | Path) and Path(path).exists() else ""
+        hint = map_hint(path) if isinstance(path, str | Path) and is_there(path) else ""
         if not hint:
             raise
         raise type(error)(f"{error}; {hint}") from None
