@@ -37,15 +37,25 @@ def new_slot(state, oldest):  # type: ignore[no-untyped-def]
                 least = gap
                 drop = s
         for s in range(drop, used - 1):
-            state.signature[s] = state.signature[s + 1]
-            state.information[s] = state.information[s + 1]
-            state.score[s] = state.score[s + 1]
+            _move_slot(state, s + 1, s)
             ages[s] = ages[s + 1]
         used -= 1
     state.signature[used] = 0.0
     state.information[used] = 0.0
     state.score[used] = 0.0
     ages[used] = 0.5  # half of the step before lies behind the onset; set to 1 after this block
+
+
+@njit(**COMPILE)
+def _move_slot(state, source, target):  # type: ignore[no-untyped-def]
+    """Copy a slot, number by number: slices take longer to compile than all of this module."""
+    rows, c = state.signature.shape[1], state.signature.shape[2]
+    for i in range(c):
+        for r in range(rows):
+            state.signature[target, r, i] = state.signature[source, r, i]
+        for j in range(c):
+            state.information[target, i, j] = state.information[source, i, j]
+        state.score[target, i] = state.score[source, i]
 
 
 @njit(**COMPILE)
@@ -78,7 +88,9 @@ def carry_signatures(tables, state, transition, step, place):  # type: ignore[no
                 if weight != 0.0:
                     for i in range(c):
                         moved[a, i] += weight * g[b, i]
-        g[:3] = moved
+        for a in range(3):
+            for i in range(c):
+                g[a, i] = moved[a, i]
         state.ages[s] = age + 1.0
 
 

@@ -67,7 +67,8 @@ def advance(tables, tuning, state, means, steps, sets, levels, watched, omega, s
             continue
         pending = 0.0
         if not state.started[0]:  # from the first sample to the middle of the first block
-            state.last[:] = means[k]
+            for i in range(len(state.last)):
+                state.last[i] = means[k, i]
             step = 0.5 * tuning.period * (1.0 - 1.0 / tuning.samples)
         _predict(tables, tuning, state, means[k], step, place, level, transition)
         if step > 1.5 * tuning.period:
@@ -79,7 +80,8 @@ def advance(tables, tuning, state, means, steps, sets, levels, watched, omega, s
         omega[k] = state.omega
         for a in range(3):
             std[k, a] = np.sqrt(max(state.covariance[a, a], 0.0))
-        state.last[:] = means[k]
+        for i in range(len(state.last)):
+            state.last[i] = means[k, i]
         state.started[0] = True
         k += 1
         model_errors(state, tuning, model_std)
@@ -103,14 +105,18 @@ def model_errors(state, tuning, std):  # type: ignore[no-untyped-def]
 
 @njit(**COMPILE)
 def _keep(state, block):  # type: ignore[no-untyped-def]
-    """Keep the state before a block."""
+    """Keep the state before a block: number by number, as slices take ten times as long to compile."""
     place = block % len(state.past_rate)
-    state.past_rate[place] = state.omega
-    state.past_bias[place] = state.bias
-    state.past_covariance[place] = state.covariance
-    state.past_means[place, 0] = state.last
-    state.past_means[place, 1] = state.low
-    state.past_means[place, 2] = state.high
+    for a in range(3):
+        state.past_rate[place, a] = state.omega[a]
+    for i in range(len(state.bias)):
+        state.past_bias[place, i] = state.bias[i]
+        state.past_means[place, 0, i] = state.last[i]
+        state.past_means[place, 1, i] = state.low[i]
+        state.past_means[place, 2, i] = state.high[i]
+    for r in range(len(state.covariance)):
+        for q in range(len(state.covariance)):
+            state.past_covariance[place, r, q] = state.covariance[r, q]
 
 
 @njit(**COMPILE)
