@@ -191,6 +191,9 @@ def _print_summary(summary: EstimateSummary) -> None:
     if summary.health is not None:
         faulty = dict.fromkeys(name for fault in summary.health["faults"] for name in fault["channels"])
         rows.append(("channels that contradict the others", ", ".join(faulty) or "none", ""))
+    stuck = dict.fromkeys(fault["channel"] for fault in summary.faults if fault["kind"] == "stuck")
+    if stuck:
+        rows.append(("channels stuck for a while", ", ".join(stuck), ""))
     if summary.channels_left_out:
         rows.append(("channels left out", ", ".join(summary.channels_left_out), ""))
     print_table(f"{summary.array}, method {summary.method}, {summary.form} form", ("quantity", "value", "unit"), rows)
