@@ -155,11 +155,11 @@ class _ParquetColumns:
         try:
             # Buffered reading streams pages; without it a whole column chunk would be held beside the data.
             self._parquet = pq.ParquetFile(file, pre_buffer=False, buffer_size=1 << 20, page_checksum_verification=True)
-        except (pa.ArrowException, OSError) as error:
+            schema = self._parquet.schema_arrow
+            self.names: list[str] = list(schema.names)
+        except (pa.ArrowException, OSError, UnicodeDecodeError) as error:  # names of columns are UTF-8
             raise InputError(f"{file}: damaged Parquet file ({_first_line(error)}); write it again") from None
-        schema = self._parquet.schema_arrow
-        self._types = dict(zip(schema.names, schema.types, strict=True))
-        self.names: list[str] = list(schema.names)
+        self._types = dict(zip(self.names, schema.types, strict=True))
         self.max_rows: int = self._parquet.metadata.num_rows
         self.metadata = metadata_of_schema(self._parquet.metadata.metadata)
 
