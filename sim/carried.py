@@ -19,6 +19,7 @@ __all__ = ["Carriage", "Hand", "Wheel"]
 _AXLE = np.array([0.0, 1.0, 0.0])  # of a wheel, in the world: it rolls along x
 
 _MOST_KNOTS = 1e6  # numerical: of the movement of a hand
+_WIDEST = 1e3  # numerical: rad and m, of the same
 
 
 @dataclass(frozen=True)
@@ -37,7 +38,7 @@ class Carriage:
     axis: tuple[float, float, float] = (1.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        if not np.linalg.norm(self.axis) > 0:
+        if not 0.0 < np.linalg.norm(self.axis) < np.inf:
             raise InputError(f"carriage axis {self.axis}: give a direction, such as [1, 0, 0]")
 
     def at(self, t: ArrayLike) -> world_model.SpinState:
@@ -75,7 +76,7 @@ class Wheel:
     def __post_init__(self) -> None:
         if self.radius < 0 or self.shake < 0 or self.shake_frequency <= 0:
             raise InputError("wheel: radius_m and shake_m_s2 must not be negative, shake_hz must be positive")
-        if not np.linalg.norm(self.axis) > 0:
+        if not 0.0 < np.linalg.norm(self.axis) < np.inf:
             raise InputError(f"wheel axis {self.axis}: give a direction, such as [0, 0, 1]")
 
     def at(self, t: ArrayLike) -> BodyState:
@@ -143,6 +144,8 @@ class Hand:
                 f"hand: {self.duration:g} s are too short for rest_s = {self.rest:g} at both ends and a few movements "
                 f"of pace_s = {self.pace:g}; give a longer duration_s"
             )
+        if not (abs(self.turn) <= _WIDEST and abs(self.sway) <= _WIDEST):
+            raise InputError(f"hand: turn {self.turn:g} rad, sway {self.sway:g} m: give numbers of at most {_WIDEST:g}")
         if not self.duration / self.pace <= _MOST_KNOTS:
             raise InputError(f"hand: pace_s = {self.pace:g} gives more than {_MOST_KNOTS:g} movements; move slower")
 

@@ -148,7 +148,7 @@ def _describe(method: str, axis: str | None = None) -> str:
         from gfimu.rate.first_call import must_compile
 
         if must_compile():
-            return "compiling the filter, the first time only: half a minute or so"
+            return "compiling the filter, the first time only: a minute or so"
     return f"estimating by {method}"
 
 

@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
@@ -144,7 +144,7 @@ def judge_consistency(
     freedom = np.array([dof[part].sum() for part in parts])
     # One test for the run and one for the worst of its seconds, so those share the probability.
     probability = np.array([FALSE_ALARM] + [FALSE_ALARM / max(count, 1)] * count)
-    noise = np.where(freedom > 0, chi2.isf(probability, np.maximum(freedom, 1)), np.inf)
+    noise = np.where(freedom > 0, chdtri(np.maximum(freedom, 1), probability), np.inf)
     slow = np.zeros(len(parts))
     for number in np.flatnonzero((sums > noise) | (np.arange(len(parts)) == 0)):  # the others need no allowance
         slow[number] = _slow_quantile(signatures[parts[number]], seen, float(probability[number]))
@@ -260,7 +260,7 @@ def _slow_quantile(signatures: NDArray[np.float64], seen: NDArray[np.float64], p
     if not (mean > 0.0 and square > 0.0 and cube > 0.0):
         return 0.0
     freedom = square**3 / cube**2
-    return mean + float(np.sqrt(square / freedom) * (chi2.isf(probability, freedom) - freedom))
+    return mean + float(np.sqrt(square / freedom) * (chdtri(freedom, probability) - freedom))
 
 
 def _worst_channel(

@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from gfimu.rate.recursion_data import COMPILE
 from gfimu.short_repr import short_repr
@@ -116,7 +116,7 @@ def measured_scale(
     sums = np.where(used, squares, 0.0)
     counts = np.where(used, freedom, 0.0).astype(float)
     kept = np.exp(-1.0 / policy.memory), np.exp(-period / policy.long_memory_s)
-    deviates = float(norm.isf(policy.false_alarm)), float(norm.isf(policy.long_false_alarm))
+    deviates = -float(ndtri(policy.false_alarm)), -float(ndtri(policy.long_false_alarm))
     return _scale(sums, counts, *kept, policy.prior, *deviates, causal)
 
 

@@ -40,7 +40,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
@@ -109,9 +109,9 @@ class RestTest:
         """Return the limits of the five statistics, the largest variance of ω, and of α and ω at entry, shape (8,)."""
         false_alarm = self.false_alarm if false_alarm is None else false_alarm
         freedom = np.array([n_channels * (self.window(period) - 1), n_channels, 3, max(n_null, 1), 3])
-        largest = chi2.ppf(1.0 - false_alarm / len(freedom), freedom)
+        largest = chdtri(freedom, false_alarm / len(freedom))
         largest[:2] *= (1.0 + self.noise_margin) ** 2
-        return np.array([*largest, self.largest_rate_std**2, *chi2.ppf([0.8, 0.95], 3)])
+        return np.array([*largest, self.largest_rate_std**2, *chdtri(3, [0.2, 0.05])])
 
     def all_limits(self, n_channels: int, n_null: int, period: float) -> NDArray[np.float64]:
         """Return the limits for a block, for the first one, and those that end a rest at once, shape (3, 8)."""

@@ -57,6 +57,8 @@ def test_a_hand_begins_and_ends_at_rest():
     [
         (lambda: Hand(duration=4.0), "too short"),
         (lambda: Hand(duration=100.0, pace=1e-6), "movements"),
+        (lambda: Hand(duration=100.0, turn=1e308), "at most"),
+        (lambda: Wheel(SPIN, axis=(1e308, 1e308, 0.0)), "give a direction"),
         (lambda: Wheel(SPIN, radius=-1.0), "must not be negative"),
         (lambda: Wheel(SPIN, axis=(0.0, 0.0, 0.0)), "give a direction"),
     ],
