@@ -88,7 +88,7 @@ def _explaining_together(
         return []
     possible = [(way, costs) for way, costs in tried if _possible(way, before, evidence)]
     possible.sort(key=lambda one: np.nan_to_num(_sum(one[1], impossible), nan=np.inf))
-    pairs = {}
+    pairs: dict[str, Otherwise] = {}
     for one, _ in possible[:_FIRST]:
         for two, _ in possible:
             if one is two or (one.kind == two.kind and set(one.channels) & set(two.channels)):
