@@ -5,7 +5,8 @@ from __future__ import annotations
 import difflib
 import os
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 
 __all__ = [
     "CorruptValueWarning",
@@ -15,6 +16,7 @@ __all__ = [
     "RecordingWarning",
     "UnitError",
     "WriteError",
+    "naming",
     "unknown_name",
 ]
 
@@ -61,6 +63,17 @@ class RecordingWarning(UserWarning):
 
 class CorruptValueWarning(RecordingWarning):
     """Values of a recording that can be no measurement were left out."""
+
+
+@contextmanager
+def naming(source: str) -> Iterator[None]:
+    """Put the name of a file in front of the message of an `InputError` that does not have it; nothing if empty."""
+    try:
+        yield
+    except InputError as error:
+        if not source or source in str(error):
+            raise
+        raise type(error)(f"{source}: {error}") from None
 
 
 def unknown_name(kind: str, name: str, valid: Iterable[str]) -> InputError:

@@ -13,6 +13,7 @@ from gfimu.errors import InputError, unknown_name
 from gfimu.files.input_file import check_input
 from gfimu.geometry.array import AccelerometerArray, Chip
 from sim.mjcf_size import check_mjcf_size
+from sim.mujoco_warnings import mujoco_warnings
 
 __all__ = ["array_from_mjcf"]
 
@@ -41,12 +42,14 @@ def array_from_mjcf(
     Raises
     ------
     InputError
-        If the file can't be read, holds no such body or no such site, or more than three sites share a point.
+        If the file can't be read, holds no such body or no such site, sites without a finite place, or more than three
+        that share a point.
     """
     file = check_input(path)
     check_mjcf_size(file)
     try:
-        model = mujoco.MjModel.from_xml_path(str(file))
+        with mujoco_warnings(str(file)):
+            model = mujoco.MjModel.from_xml_path(str(file))
     except ValueError as error:
         raise InputError(f"{file}: not a valid MJCF model ({' '.join(str(error).split())})") from None
     names = [model.site(i).name for i in range(model.nsite)]
@@ -60,6 +63,9 @@ def array_from_mjcf(
     to_body = data.xmat[frame].reshape(3, 3).T
     positions = (data.site_xpos[wanted] - data.xpos[frame]) @ to_body.T
     axes = data.site_xmat[wanted].reshape(-1, 3, 3)[:, :, 0] @ to_body.T
+    bad = [names[wanted[row]] for row in np.flatnonzero(~np.isfinite(np.hstack([positions, axes])).all(axis=1))]
+    if bad:
+        raise InputError(f"{file}: site {bad[0]} has no finite place or axis; correct the numbers of it and its bodies")
     # Compiled rotations carry rounding errors of 1e-17; on axes along the body's they would only disturb readers.
     positions, axes = np.round(positions, 12) + 0.0, np.round(axes, 12) + 0.0
     axes /= np.linalg.norm(axes, axis=1, keepdims=True)

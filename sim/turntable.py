@@ -27,6 +27,7 @@ from gfimu.short_repr import short_repr
 from sim.earth import earth_readings
 from sim.forward import arm_growth, lean_states
 from sim.motion import BodyMotion, BodyState, SpinMotion, SpinState, SplineSpin
+from sim.mujoco_warnings import mujoco_warnings
 from sim.truth import cube_state
 from sim.world import Nod, World
 
@@ -85,6 +86,7 @@ class DrivenRun:
         )
 
 
+@mujoco_warnings()
 def turntable_model(world: World) -> mujoco.MjModel:
     """Compile the turntable of ``models/mjcf/turntable.xml`` for a world.
 
@@ -95,11 +97,13 @@ def turntable_model(world: World) -> mujoco.MjModel:
     return _turntable(world).compile()
 
 
+@mujoco_warnings()
 def free_model(world: World) -> mujoco.MjModel:
     """Compile the free cube of ``models/mjcf/free_cube.xml`` with the chips and the gravity of a world."""
     return _free_cube(world).compile()
 
 
+@mujoco_warnings()
 def prescribed_readings(world: World, motion: SpinMotion | BodyMotion, t: NDArray[np.float64]) -> NDArray[np.float64]:
     """Specific force along each sensing axis under prescribed motion, by MuJoCo's inverse dynamics.
 
@@ -139,6 +143,7 @@ def prescribed_readings(world: World, motion: SpinMotion | BodyMotion, t: NDArra
     return readings
 
 
+@mujoco_warnings()
 def drive(world: World, command: SpinMotion, duration: float, *, step: float = _LONGEST_STEP) -> DrivenRun:
     """Drive the table with its motor after a commanded rate, against inertia and friction.
 

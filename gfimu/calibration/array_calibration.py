@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -38,6 +39,7 @@ def calibrate_array(
     fit_positions: bool | None = None,
     rest_threshold: float | None = None,
     min_rest_s: float = 2.0,
+    progress: Callable[[float], object] | None = None,
 ) -> Calibration:
     """Calibrate all chips of an array in one body frame, and their positions where there is motion.
 
@@ -58,6 +60,8 @@ def calibrate_array(
         Threshold of rest, reading unit squared; chosen by the data if not given.
     min_rest_s : float
         Shortest pose, s.
+    progress : callable, optional
+        Called with the share done of a fit to shakes, 0 to 1.
 
     Returns
     -------
@@ -86,7 +90,7 @@ def calibrate_array(
         if motion is None and not fit_positions:
             return replace(result, statements=(*result.statements, _AS_DRAWN))
         still = detect_rest(moving)
-        return _with_positions(result, array, array_shake(moving, array, result, still))
+        return _with_positions(result, array, array_shake(moving, array, result, still, progress=progress))
     try:
         reference = motion_reference(moving)
     except InputError as error:

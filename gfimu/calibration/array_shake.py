@@ -10,7 +10,7 @@ slower rates give the same centripetal field. The signs are settled by it as wel
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -41,6 +41,7 @@ _ITERATIONS = 8
 _BLOCK = 500
 _CLUSTER_S = 0.5
 _LEAST_SCALE = 0.2  # standard deviation of the scale beyond which the drawing says more, a ratio
+_NOT_AT_ALL = 1.0  # standard deviation of the scale as large as the scale
 _RESOLVED = 0.5  # with more vibration than that against the noise, α = dω/dt does not hold sample by sample
 _SCALE_BY_ALL = "from α = dω/dt"
 _SCALE_BY_BAND = (
@@ -90,7 +91,14 @@ class _Step:
     minus_log_likelihood: float
 
 
-def array_shake(recording: Recording, array: AccelerometerArray, static: Calibration, rest: Rest) -> ArrayMotion:
+def array_shake(
+    recording: Recording,
+    array: AccelerometerArray,
+    static: Calibration,
+    rest: Rest,
+    *,
+    progress: Callable[[float], object] | None = None,
+) -> ArrayMotion:
     """Fit positions, residual biases and delays of the chips to shakes of the array between rests.
 
     Parameters
@@ -103,6 +111,8 @@ def array_shake(recording: Recording, array: AccelerometerArray, static: Calibra
         The static calibration, whose uncertainty is taken along.
     rest : Rest
         Rests of the recording; two samples or more of them bound each shake.
+    progress : callable, optional
+        Called with the share done, 0 to 1.
 
     Returns
     -------
@@ -129,7 +139,8 @@ def array_shake(recording: Recording, array: AccelerometerArray, static: Calibra
         np.zeros(setup.doubt.shape[2]),
         setup.start_noise,
     )
-    ratio, others = _learned_ratio(setup, state)
+    done = progress or (lambda _: None)
+    ratio, others = _learned_ratio(setup, state, done)
     resolved = ratio <= _RESOLVED
     step = _settled(setup, others[-2], ratio)
     state = step.state
@@ -142,8 +153,9 @@ def array_shake(recording: Recording, array: AccelerometerArray, static: Calibra
         state, covariance = _scaled(setup, state, covariance, found, [other.positions for other in others[-3:]])
     scale_std = _scale_std(state, covariance)
     if not scale_std < _LEAST_SCALE:
+        how = f"to {100.0 * scale_std:.2g} % only" if scale_std < _NOT_AT_ALL else "not at all"
         raise InputError(
-            f"this motion shows the scale of the positions to {100.0 * scale_std:.2g} % only; shake the array faster "
+            f"this motion shows the scale of the positions {how}; shake the array faster "
             "(5 rad/s and more, about all axes, from rest to rest)"
         )
     null = step.null[: 3 * k + c]
@@ -220,7 +232,7 @@ def _lever(array: AccelerometerArray) -> float:
     return float(np.sqrt(np.mean(np.sum(arms**2, axis=1)) / 3.0))
 
 
-def _learned_ratio(data: _Data, state: _State) -> tuple[float, list[_State]]:
+def _learned_ratio(data: _Data, state: _State, done: Callable[[float], object]) -> tuple[float, list[_State]]:
     """Find the size of unresolved vibration by restricted maximum likelihood, as a ratio to the noise.
 
     From large to small: with much of it α does not bind the rate, and any start settles. Returned are the best ratio
@@ -228,7 +240,8 @@ def _learned_ratio(data: _Data, state: _State) -> tuple[float, list[_State]]:
     """
     states: list[_State] = []
     best, least = _RATIOS[0], np.inf
-    for ratio in _RATIOS:
+    for number, ratio in enumerate(_RATIOS):
+        done(number / (len(_RATIOS) + 1))  # settling counts as one more
         step = _settled(data, state, ratio, enough=0.3, iterations=4)
         state = step.state
         states.append(state)

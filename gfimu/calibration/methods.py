@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -66,6 +67,8 @@ class CalibrationTask:
         Calibration of an earlier run to carry over.
     turn_on_std_m_s2, bias_walk_m_s2_rt_s : float
         With ``update``: change of a bias between power-ons, m/s², and random walk between poses, m/s²/√s.
+    progress : callable, optional
+        Called with the share done of a fit that takes long, 0 to 1.
     """
 
     recording: Recording
@@ -80,6 +83,7 @@ class CalibrationTask:
     update: Calibration | None = None
     turn_on_std_m_s2: float = 0.03
     bias_walk_m_s2_rt_s: float = 0.0
+    progress: Callable[[float], object] | None = None
 
 
 def calibrate(
@@ -210,6 +214,7 @@ def calibrate_whole_array(method: CalibrationMethod, task: CalibrationTask) -> C
         motion=task.motion,
         rest_threshold=task.rest_threshold,
         min_rest_s=_min_rest(method, task),
+        progress=task.progress,
     )
     return result
 

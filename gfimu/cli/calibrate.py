@@ -9,7 +9,7 @@ import typer
 
 from gfimu.calibration.registry import METHODS
 from gfimu.cli.mapped import ForceOption, MapOption, MapSetOption
-from gfimu.cli.output import JsonOption, print_json, print_paths, print_table
+from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, progress
 
 if TYPE_CHECKING:
     from gfimu.calibration.result import Calibration
@@ -82,28 +82,30 @@ def _calibrate(
     """
     from gfimu.commands.calibrate import calibrate
 
-    result = calibrate(
-        method,
-        run,
-        out=out,
-        array=array,
-        gravity=gravity,
-        latitude=latitude,
-        height=height,
-        parameters=parameters,
-        input_kind=input_kind,
-        rest_threshold=rest_threshold,
-        min_rest=min_rest,
-        levelling_std=levelling_std,
-        motion=motion,
-        column_map=column_map,
-        map_set=map_set or [],
-        update=update,
-        turn_on_std=turn_on_std,
-        bias_walk=bias_walk,
-        picture=picture,
-        force=force,
-    )
+    with progress("calibrating", total=1.0) as done:
+        result = calibrate(
+            method,
+            run,
+            progress=lambda share: done(share, "fitting positions to the shakes"),
+            out=out,
+            array=array,
+            gravity=gravity,
+            latitude=latitude,
+            height=height,
+            parameters=parameters,
+            input_kind=input_kind,
+            rest_threshold=rest_threshold,
+            min_rest=min_rest,
+            levelling_std=levelling_std,
+            motion=motion,
+            column_map=column_map,
+            map_set=map_set or [],
+            update=update,
+            turn_on_std=turn_on_std,
+            bias_walk=bias_walk,
+            picture=picture,
+            force=force,
+        )
     written = {"calibration": out} | ({} if picture is None else {"picture": picture})
     if json:
         print_json(result.to_dict() | {"files": written})

@@ -20,7 +20,9 @@ def register(app: typer.Typer) -> None:
 
 
 def _view(
-    file: Annotated[Path, typer.Argument(help="A .rrd file, or a recording (.csv, .parquet, .bin) to make one from.")],
+    file: Annotated[
+        Path, typer.Argument(help="A .rrd file, or a recording or estimate (.csv, .parquet, .bin) to make one from.")
+    ],
     array: Annotated[
         str | None,
         typer.Option("--array", help="Array: a name, a .toml file or MJCF sites (.xml); else the recording's own."),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -53,6 +53,7 @@ def calibrate(
     bias_walk: float | None = None,
     picture: str | Path | None = None,
     force: bool = False,
+    progress: Callable[[float], object] | None = None,
     n_parameters: int | None = None,
     min_rest_s: float | None = None,
     levelling_std_rad: float | None = None,
@@ -99,6 +100,8 @@ def calibrate(
         Picture to write, ``.png``, ``.svg`` or ``.pdf``.
     force : bool
         Go on, with a warning, where the checks of a recording would refuse it.
+    progress : callable, optional
+        Called with the share done of a fit to shakes, 0 to 1.
 
     Raises
     ------
@@ -145,6 +148,7 @@ def calibrate(
         update=None if update is None else as_calibration(update),
         turn_on_std_m_s2=0.03 if turn_on_std is None else turn_on_std,
         bias_walk_m_s2_rt_s=bias_walk or 0.0,
+        progress=progress,
     )
     result = run_calibration(chosen, task)
     if out is not None:

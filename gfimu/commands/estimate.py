@@ -199,8 +199,8 @@ def estimate_run(
     InputError
         As `estimate`.
     """
-    from gfimu.commands.opened import by_map
-    from gfimu.errors import InputError
+    from gfimu.commands.opened import by_map, name_of
+    from gfimu.errors import InputError, naming
     from gfimu.motion.estimation import estimate as solve
     from gfimu.motion.rest_bias import estimate_from_rest
     from gfimu.recording.carried_array import warn_of_other_array
@@ -214,11 +214,13 @@ def estimate_run(
     if turning is not None:
         if latitude is not None:
             raise InputError("--latitude has no use with --axis: the rate about one axis is all that is estimated")
-        found = _about_axis(run, geometry, turning, rest_bias=rest_bias, **options)
+        with naming(name_of(recording)):
+            found = _about_axis(run, geometry, turning, rest_bias=rest_bias, **options)
     else:
         _require_all_motions(run, geometry)
         options |= _place(run, latitude, north_rad)
-        found = (estimate_from_rest if rest_bias else solve)(run, geometry, **options)
+        with naming(name_of(recording)):
+            found = (estimate_from_rest if rest_bias else solve)(run, geometry, **options)
     if out is not None:
         found.write(out)
     if rrd is not None:
@@ -308,7 +310,7 @@ def _about_axis(
     from gfimu.rate.registry import rate_method
     from gfimu.recording.checks import examine, without_dead_channels
 
-    for name, word in (("fuse_gyro", "--gyro"), ("with_position", "--position")):
+    for name, word in (("fuse_gyro", "--gyro"), ("with_position", "--position"), ("keep_faulty", "--keep-faulty")):
         if options.get(name):
             raise InputError(f"{word} has no use with --axis: the rate about one axis is all that is estimated")
     findings = examine(recording, array, force=bool(options.get("force")), whose="")

@@ -36,7 +36,7 @@ def view(
     Parameters
     ----------
     file : str or Path
-        A ``.rrd`` file, or a recording to make one from; its picture goes beside it as ``FILE.view.rrd``.
+        A ``.rrd`` file, or a recording or an estimate to make one from; that goes beside it as ``FILE.view.rrd``.
     array : AccelerometerArray, str or Path, optional
         The array, its name or file; the recording's own by default.
     column_map : ColumnMap, str or Path, optional

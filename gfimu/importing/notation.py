@@ -100,7 +100,7 @@ _SAME = {
 }
 _ENDS = re.compile(r"^(.*?[A-Za-z0-9\]])[_ ,.]+(m_s2|mm_s2|cm_s2|rad_s|deg_s|[A-Za-zµ°/²^]+[0-9]?)$")
 _WORDS = {"g", "s", "h", "d", "c", "min", "gs", "day", "hz", "rev", "turn", "turns", "second", "gal"}
-_BRACKETS = re.compile(r"\s*[\[({]\s*((?:[^\[\](){}]|\([^\[\](){}]*\))+?)\s*[\])}]\s*$")
+_BRACKETS = re.compile(r"[\[({]((?:[^\[\](){}]|\([^\[\](){}]*\))+)[\])}]$")
 
 
 def _plain(text: str) -> str:
@@ -146,10 +146,11 @@ def kind_of(unit: str) -> str:
 
 def bracketed_unit(name: str) -> tuple[str, str]:
     """Split the name of a column into the name and a unit in brackets at its end; empty without one."""
-    found = _BRACKETS.search(name)
+    plain = name.strip()
+    found = _BRACKETS.search(plain)
     if found is None or not kind_of(found[1]):
-        return name.strip(), ""
-    return name[: found.start()].strip(), found[1]
+        return plain, ""
+    return plain[: found.start()].strip(), found[1].strip()
 
 
 def unit_of_name(name: str) -> tuple[str, str]:

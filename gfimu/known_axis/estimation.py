@@ -20,6 +20,7 @@ from gfimu.motion.attitude import from_rotation
 from gfimu.motion.estimation import FORMAT_VERSION, Estimate
 from gfimu.parts.part import white_noise_std
 from gfimu.recording import Recording
+from gfimu.recording.carried_array import array_metadata
 from gfimu.recording.clipping import without_clipped
 
 __all__ = ["estimate_about_axis"]
@@ -106,7 +107,7 @@ def estimate_about_axis(
         omega_products=products,
         omega_products_std=np.abs(2.0 * products) * (std / np.maximum(np.abs(states[:, 1]), 1e-9))[:, None],
         metadata={
-            "array": array.name,
+            **array_metadata(array),
             "method": "smoother about a known axis" if smooth else "filter about a known axis",
             "form": "one axis",
             "gives": _GIVES,

@@ -39,6 +39,7 @@ from gfimu.rate.registry import RateMethod, rate_method
 from gfimu.rate.result import RateEstimate, undecided
 from gfimu.rate.sensing import SensorErrors
 from gfimu.recording import Recording
+from gfimu.recording.carried_array import array_metadata
 from gfimu.recording.checks import Finding, check_recording, refuse_or_warn, without_dead_channels
 from gfimu.recording.clipping import without_clipped
 from gfimu.short_repr import joined, timing
@@ -268,6 +269,8 @@ def estimate(
         chosen.refuse_unknown_start()
     if fuse_gyro:
         chosen.refuse_gyro()
+    if keep_faulty:
+        chosen.refuse_keep_faulty()
     if rate0 is not None and (rate0.shape != (3,) or not np.isfinite(rate0).all()):
         raise InputError(f"omega0 is {omega0!r}; it must hold three finite numbers, in rad/s")
     noise = white_noise_std(array, recording.sample_rate) if noise_std is None else np.asarray(noise_std, dtype=float)
@@ -328,7 +331,7 @@ def estimate(
         health=used.codes(array),
         sign_probability=rate.sign_probability,
         metadata={
-            "array": array.name,
+            **array_metadata(array),
             "method": method,
             "form": linear.form,
             **rate.remarks,

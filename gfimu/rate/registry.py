@@ -84,6 +84,14 @@ class RateMethod:
         if not self.recursive:
             raise InputError(f"method {self.name!r} can't use a gyro; use {recursive_methods()}")
 
+    def refuse_keep_faulty(self) -> None:
+        """Raise `InputError` unless the method looks for faulty channels, which it may then be asked to keep."""
+        if not self.recursive:
+            raise InputError(
+                f"--keep-faulty has no use with method {self.name!r}, which leaves no faulty channel out; "
+                f"use {recursive_methods()}"
+            )
+
     def refuse_unknown_start(self) -> None:
         """Raise `InputError` unless the method can start from an unknown rate."""
         if not self.recursive:

@@ -22,9 +22,10 @@ from gfimu.geometry.array import AccelerometerArray
 from gfimu.geometry.observability import unseen_motions
 from gfimu.parts.limits import PartLimits
 from gfimu.recording.carried_array import warn_of_other_array
+from gfimu.recording.evidence.explanation import explanations
 from gfimu.recording.evidence.gravity import gravity_text
-from gfimu.recording.evidence.rigid import Costs, Evidence, Otherwise, gather
-from gfimu.recording.evidence.ways import TIME_UNITS, time_text, ways_to_read
+from gfimu.recording.evidence.rigid import Evidence, Otherwise, gather
+from gfimu.recording.evidence.ways import TIME_UNITS, time_text
 from gfimu.recording.recording import Recording
 
 __all__ = [
@@ -39,19 +40,9 @@ __all__ = [
 
 _FEWEST = 50  # samples
 _LEAST_NOISE = 0.3  # of the data sheet's: from that on a channel surely has noise of its own
-_MOST_NOISE = 4.0  # of the data sheet's, in another unit
-_REMOVED = 0.8  # of the contradiction, by the other way to read the file
-_FITS = 1.0  # of what the limits allow
-_SIGNIFICANT = 3.0  # times what white noise gives, for a warning
-_REMOVED_FOR_WARNING = 0.9
-_WORSE = 0.1  # by which a cost may grow that was possible before
 _ALIKE = 1.5  # ratio of the costs of two ways that can't be separated
 _RATE_RATIO = 1.5  # between the rate by the times and the metadata's, for a refusal
-_FASTEST = 2.0  # times the part's fastest output data rate
 _SLOWEST = 2.0  # Hz, a rate that is plausible for a moving body
-
-_CLEAR = 0.02  # of the contradiction is left: no need to look further
-_OF_ALL = frozenset({"time", "unit", "array"})
 
 
 @dataclass(frozen=True)
@@ -328,115 +319,12 @@ def _duplicates(readings: NDArray[np.float64], limits: PartLimits, array: Accele
 
 def _decide(evidence: Evidence) -> list[Finding]:
     """Compare the file as given with the other ways to read it."""
-    given = evidence.as_given()
-    before = evidence.costs(given)
-    if not _contradicts(before, evidence):
-        return []
-    found: list[tuple[float, Otherwise, bool]] = []
-    ways = ways_to_read(evidence)
-    few = [way for way in ways if way.kind in _OF_ALL]
-    for group in (few, [way for way in ways if way.kind not in _OF_ALL]):
-        found += _explaining(group, before, evidence)
-        if min((ratio for ratio, *_ in found), default=1.0) < _CLEAR:
-            break
+    found = explanations(evidence)
     if not found:
         return []
-    found.sort(key=lambda one: one[0])
     best = found[0]
-    alike = [way for ratio, way, _ in found[1:] if ratio < _ALIKE * best[0]]
-    return [_finding(best[1], alike, refused=best[2])]
-
-
-def _explaining(ways: Sequence[Otherwise], before: Costs, evidence: Evidence) -> list[tuple[float, Otherwise, bool]]:
-    """Return the ways that explain a contradiction: what is left of its cost, the way, and whether to refuse."""
-    # Wiring shows in the combinations that no motion changes, where there are any; else in the whole motion.
-    hopeless = before.total(motion=True)
-    costs = [
-        evidence.costs(way, with_motion=not evidence.has_parity or way.kind in _OF_ALL, hopeless=hopeless)
-        for way in ways
-    ]
-    usable = any(one.motion < _FITS for one in [before, *costs])
-    found = []
-    for way, after in zip(ways, costs, strict=True):
-        compared = usable and bool(np.isfinite(after.motion))
-        if not _possible(way, before, evidence) or after.worst_rest > _FITS:
-            continue
-        fits = max(after.parity, after.motion if compared else 0.0, after.level) < _FITS
-        if not fits:
-            continue
-        if compared and after.points and after.motion < before.motion:  # the fit of the file as given may have failed
-            again = evidence.costs(evidence.as_given(), points=after.points)
-            before = again if again.motion < before.motion else before
-        impossible = _impossible(before, motion=compared)
-        ratio = _left(before, after, impossible, scaled=way.kind in {"unit", "chip_unit"})
-        if impossible and ratio < 1.0 - _REMOVED:
-            found.append((ratio, way, True))
-        elif not impossible and _explains_noise(before, after, motion=compared):
-            found.append((after.total(motion=compared) / before.total(motion=compared), way, False))
-    return found
-
-
-def _impossible(costs: Costs, *, motion: bool) -> tuple[str, ...]:
-    """Return the costs that errors within the limits can't be the reason for."""
-    beyond = {
-        "rest": costs.worst_rest > _FITS,
-        "level": costs.level > _FITS,
-        "parity": costs.parity > _FITS,
-        "motion": motion and costs.motion > _FITS,
-    }
-    return tuple(name for name, is_beyond in beyond.items() if is_beyond)
-
-
-def _left(before: Costs, after: Costs, impossible: Sequence[str], *, scaled: bool) -> float:
-    """Return what is left of the impossible costs, or 1 if another one grows (larger readings have larger errors)."""
-    others = {"rest", "level", "parity", "motion"} - set(impossible)
-    grown = [name for name in others if getattr(after, name) > getattr(before, name) + _WORSE]  # false for NaN
-    if any(not scaled or getattr(after, name) > _FITS for name in grown):
-        return 1.0
-    return float(
-        sum(getattr(after, name) for name in impossible) / max(sum(getattr(before, name) for name in impossible), 1e-12)
-    )
-
-
-def _contradicts(costs: Costs, evidence: Evidence) -> bool:
-    """Whether there is a contradiction at all."""
-    moving = costs.motion > _SIGNIFICANT * costs.motion_noise  # false for NaN
-    if evidence.has_parity:
-        moving = moving and costs.motion > _FITS
-    return max(costs.worst_rest, costs.level) > 0.5 or costs.parity > _SIGNIFICANT * costs.parity_noise or bool(moving)
-
-
-def _explains_noise(before: Costs, after: Costs, *, motion: bool) -> bool:
-    """Whether a contradiction is significant and gone, at rest as in motion."""
-    pairs = [(before.parity - before.parity_noise, after.parity - before.parity_noise, before.parity_noise)]
-    if motion:
-        pairs.append((before.motion - before.motion_noise, after.motion - before.motion_noise, before.motion_noise))
-    if before.worst_rest > 0.5:
-        pairs.append((before.rest, after.rest, 0.1))
-    left = [
-        rest_after - (1.0 - _REMOVED_FOR_WARNING) * excess
-        for excess, rest_after, noise in pairs
-        if excess > _SIGNIFICANT * noise
-    ]
-    worse = after.rest > before.rest + _WORSE or after.level > before.level + _WORSE
-    return bool(left) and max(left) < 0.0 and not worse
-
-
-def _possible(way: Otherwise, before: Costs, evidence: Evidence) -> bool:
-    """Whether a way is possible at all.
-
-    Another unit of time has to give a rate that the part has; another unit of all readings has to be asked for by
-    gravity at rest; and the noise has to fit another unit, as it shrinks and grows with the readings.
-    """
-    if way.kind == "time":
-        return evidence.sample_rate / way.time < _FASTEST * evidence.limits.output_rate[1]
-    if way.kind == "unit" and not (len(evidence.rests) and before.level > _FITS):
-        return False
-    if way.kind not in {"unit", "chip_unit"}:
-        return True
-    scale = np.abs(np.diag(way.columns))
-    changed = evidence.alive & (scale != 1.0)
-    return bool(np.median(scale[changed] * evidence.quiet[changed] / evidence.limits.noise[changed]) < _MOST_NOISE)
+    alike = [one.way for one in found[1:] if one.left < _ALIKE * best.left]
+    return [_finding(best.way, alike, refused=best.refused)]
 
 
 def _finding(way: Otherwise, alike: Sequence[Otherwise], *, refused: bool) -> Finding:

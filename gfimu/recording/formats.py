@@ -21,7 +21,9 @@ from gfimu.recording.mapped import MappedFile
 from gfimu.recording.mimu4444 import is_mimu4444, read_mimu4444
 from gfimu.recording.recording import Recording
 
-__all__ = ["FORMATS", "RecordingFormat", "format_of_recording", "formats", "open_recording", "open_run"]
+__all__ = ["FORMATS", "RecordingFormat", "format_of_recording", "formats", "is_estimate", "open_recording", "open_run"]
+
+_OF_ESTIMATE = {"omega_x_rad_s", "omega_x_std_rad_s", "q_w", "p_x_m_s2"}
 
 
 @dataclass(frozen=True)
@@ -121,6 +123,8 @@ def open_run(
     if isinstance(path, str | Path):
         with _hinting_at_maps(path):
             table_of_file = open_columns(path)
+            if _holds_estimate(table_of_file):
+                raise InputError(f"{path}: an estimate, no recording; gfimu view shows it; give its recording here")
             if "t_s" not in table_of_file.names:
                 Recording.read(path)  # raises what is missing first of all
             own = _own_array(table_of_file, Path(path).parent)
@@ -133,6 +137,20 @@ def open_run(
     table = TableColumns(path)  # an Arrow stream can be read only once
     own = _own_array(table, None)
     return Recording.read(cast("ArrowStream", table), array=own), own
+
+
+def is_estimate(path: str | Path) -> bool:
+    """Whether a file holds an estimate of the motion, as `gfimu estimate` writes them, and no readings."""
+    if Path(path).suffix not in {".csv", ".parquet"}:
+        return False
+    try:
+        return _holds_estimate(open_columns(path))
+    except InputError:
+        return False
+
+
+def _holds_estimate(table: ColumnFile) -> bool:
+    return set(table.names) >= _OF_ESTIMATE
 
 
 def _own_array(table: ColumnFile, beside: Path | None) -> AccelerometerArray:

@@ -14,10 +14,11 @@ from gfimu.known_axis.estimation import estimate_about_axis
 from gfimu.motion.estimation import Estimate, estimate
 from gfimu.motion.rest_bias import estimate_from_rest, rest_bias
 from gfimu.recording import Recording
+from gfimu.recording.carried_array import carried_array, warn_of_other_array
 from gfimu.recording.checks import examine
-from gfimu.recording.formats import open_run
+from gfimu.recording.formats import is_estimate, open_run
 from gfimu.recording.mapped import MappedFile
-from gfimu.visual.run import write_run
+from gfimu.visual.run import write_estimate, write_run
 
 __all__ = ["picture_of", "picture_path"]
 
@@ -40,6 +41,8 @@ def picture_of(
 ) -> None:
     """Write the rerun recording of a recording file, with its estimate where the array sees all six motions.
 
+    A file that `gfimu estimate` wrote is drawn as it is.
+
     Parameters
     ----------
     recording : Path or MappedFile
@@ -61,6 +64,11 @@ def picture_of(
     name = Path(recording)
     if name.suffix == ".rrd":
         raise InputError(f"{recording}: already a rerun recording; open it without --out")
+    if not isinstance(recording, MappedFile) and is_estimate(recording):
+        if axis is not None:
+            raise InputError(f"{recording}: an estimate, which an axis can't change; give its recording with --axis")
+        _picture_of_estimate(name, out, array)
+        return
     run, geometry = open_run(recording, array)
     examine(run, geometry, source=name.name, force=force)
     if axis is not None:
@@ -69,6 +77,23 @@ def picture_of(
     else:
         found, note = _estimate(run, geometry, force=force)
     write_run(out, run, geometry, estimate=found, notes=note, title=name.stem)
+
+
+def _picture_of_estimate(file: Path, out: Path, array: AccelerometerArray | None) -> None:
+    """Write the rerun recording of a file that `gfimu estimate` wrote."""
+    found = Estimate.read(file)
+    geometry = carried_array(found.metadata, source=file, beside=file.parent) if array is None else array
+    if geometry is None:
+        raise InputError(f"{file}: the estimate does not name its array; give it with --array")
+    if array is not None:
+        warn_of_other_array(found.metadata, array, str(file), whose="the given")
+    strangers = sorted(set(found.health or {}) - set(geometry.channels))
+    if strangers:
+        raise InputError(
+            f"{file}: an estimate with channel {strangers[0]}, which array {geometry.name!r} does not have"
+        )
+    method = found.metadata.get("method", "unknown")
+    write_estimate(out, found, geometry, notes=f"An estimate by method {method}.", title=file.stem)
 
 
 def _estimate(run: Recording, array: AccelerometerArray, *, force: bool) -> tuple[Estimate | None, str]:

@@ -44,6 +44,7 @@ from gfimu.visual.rig.words import run_legend, scene_title
 from gfimu.visual.rrd_file import notes_view, write_rrd
 from gfimu.visual.run_plots import (
     angle_plot,
+    banded_rate_plots,
     drift_plot,
     free_rate_plots,
     health_plot,
@@ -56,7 +57,7 @@ from gfimu.visual.run_plots import (
 from gfimu.visual.scene import Body, Path, Scene, SensingArrows, Shape
 from gfimu.visual.trace import PositionTrace
 
-__all__ = ["reading_arrows", "run_scene", "write_run"]
+__all__ = ["reading_arrows", "run_scene", "write_estimate", "write_run"]
 
 _ARROW_PER_G = 1.2  # length of an arrow at 1 g, in sizes of the drawing
 _UNCROWDED = 6  # chips that can have arrows of that length
@@ -114,13 +115,7 @@ def write_run(
     rates = spin_rate_plots(recording, estimate, known, about) if spins else free_rate_plots(recording, estimate, known)
     cells: list[Sequence[Plot | PositionTrace]] = [[plot] for plot in rates]
     if estimate is not None:
-        alpha, *force = motion_plots(estimate, known)
-        cells += [[alpha], force] if force else [[alpha]]
-        place = position_plot(estimate, known)
-        if place is not None and estimate.position is not None:
-            cells.append([place, PositionTrace(estimate.t_s, estimate.position, true_displacement(known))])
-        if estimate.health:
-            cells.insert(len(rates), [health_plot(estimate.t_s, estimate.health, array)])
+        cells += _motion_cells(estimate, known, array)
     angle = angle_plot(estimate, known, about) if spins or known is not None else None
     cells += [[plot] for plot in (angle, drift_plot(drift) if drift is not None else None) if plot is not None]
     write_rrd(
@@ -131,6 +126,57 @@ def write_run(
         plots=[plot for group in (*raw, *cells) for plot in group],
         notes=f"{notes}\n\n{run_legend(array, estimate=estimate is not None, known=known)}".strip(),
     )
+
+
+def write_estimate(
+    path: str | FilePath, estimate: MotionEstimate, array: AccelerometerArray, *, notes: str = "", title: str = ""
+) -> None:
+    """Write the rerun recording of an estimate alone: the body as it turns, and all that was estimated over time.
+
+    Parameters
+    ----------
+    path : str or Path
+        File to write, ``.rrd``.
+    estimate : MotionEstimate
+        The estimate.
+    array : AccelerometerArray
+        The array that it is of.
+    notes : str
+        Markdown put above the explanation of the colours.
+    title : str
+        Name that the viewer shows; the array's name otherwise.
+
+    Raises
+    ------
+    InputError
+        If the file can't be written.
+    """
+    scene = run_scene([], array, estimate=estimate, on_table=False)
+    cells: list[Sequence[Plot | PositionTrace]] = [[plot] for plot in banded_rate_plots(estimate)]
+    cells += _motion_cells(estimate, None, array)
+    write_rrd(
+        path,
+        title=title or array.name,
+        layout=_layout(scene.view(scene_title(array)), [], cells),
+        scene=scene,
+        plots=[plot for group in cells for plot in group],
+        notes=f"{notes}\n\n{run_legend(array, estimate=True, known=None)}".strip(),
+    )
+
+
+def _motion_cells(
+    estimate: MotionEstimate, known: KnownMotion | None, array: AccelerometerArray
+) -> list[Sequence[Plot | PositionTrace]]:
+    """Return what is drawn of an estimate beside its rate: health of the channels, α, p and the position."""
+    cells: list[Sequence[Plot | PositionTrace]] = []
+    if estimate.health:
+        cells.append([health_plot(estimate.t_s, estimate.health, array)])
+    alpha, *force = motion_plots(estimate, known)
+    cells += [[alpha], force] if force else [[alpha]]
+    place = position_plot(estimate, known)
+    if place is not None and estimate.position is not None:
+        cells.append([place, PositionTrace(estimate.t_s, estimate.position, true_displacement(known))])
+    return cells
 
 
 def run_scene(

@@ -18,6 +18,7 @@ from gfimu.visual.plots import LONGEST_LEGEND, Line, Plot
 
 __all__ = [
     "angle_plot",
+    "banded_rate_plots",
     "drift_plot",
     "free_rate_plots",
     "health_plot",
@@ -126,6 +127,19 @@ def free_rate_plots(recording: Recording, estimate: MotionEstimate | None, known
         sizes = np.abs(np.concatenate([edges[:, 1], *(line.values for line in errors)]))
         span = _span(sizes, _SHOWN, margin=2.0, even=True)
         plots.append(Plot("error of the rate, rad/s", [band, *errors], span=span))
+    return plots
+
+
+def banded_rate_plots(estimate: MotionEstimate) -> list[Plot]:
+    """Each component of the rate in its ±2σ band."""
+    plots = []
+    for axis, name in enumerate(_NAMES):
+        rate = estimate.omega[:, axis]
+        if not np.isfinite(rate).any():
+            continue
+        band = Line("±2σ", estimate.t_s, rate[:, None] + estimate.omega_std[:, axis, None] * _BOTH_SIDES, ESTIMATE_BAND)
+        lines = [band, Line("estimate", estimate.t_s, rate, ESTIMATE), *_undecided(estimate, rate)]
+        plots.append(Plot(f"angular rate ω, {name}, rad/s", lines, span=_span(rate, 1.0, margin=1.2)))
     return plots
 
 

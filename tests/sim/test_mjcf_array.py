@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gfimu.errors import InputError
+from gfimu.errors import InputError, RecordingWarning
 from gfimu.files.model_files import find_model
 from gfimu.geometry.array import AccelerometerArray
 from sim.mjcf_array import array_from_mjcf
@@ -75,3 +75,21 @@ def test_files_that_hold_no_array(tmp_path, text, options, message):
 def test_a_missing_file_is_named(tmp_path):
     with pytest.raises(InputError, match=r"none\.xml: no such file"):
         array_from_mjcf(tmp_path / "none.xml")
+
+
+NAN_ELSEWHERE = TURNED.replace("<worldbody>", '<option timestep="nan"/><worldbody>')
+
+
+def test_what_mujoco_warns_of_is_a_warning_and_no_file(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "model.xml").write_text(NAN_ELSEWHERE)
+    with pytest.warns(RecordingWarning, match=r"model\.xml: XML contains a 'NaN'"):
+        array_from_mjcf(tmp_path / "model.xml")
+    assert [file.name for file in tmp_path.iterdir()] == ["model.xml"]
+
+
+def test_a_place_that_is_no_number_is_refused(tmp_path):
+    path = tmp_path / "model.xml"
+    path.write_text(TURNED.replace('name="s1" pos="0 0.1 0"', 'name="s1" pos="nan 0 0"'))
+    with pytest.warns(RecordingWarning, match="NaN"), pytest.raises(InputError, match=r"model\.xml: .*finite"):
+        array_from_mjcf(path)

@@ -120,6 +120,8 @@ def _of_texts(name: str, values: NDArray[Any]) -> tuple[float, TimeGuess] | None
     if known.mean() < 0.5:
         return None
     stamps, known = nanoseconds_of(values)
+    if not known.any():
+        return None
     seconds: NDArray[np.float64] = np.full(len(stamps), np.nan)
     seconds[known] = (stamps[known] - stamps[known][0]) * 1e-9
     return _of_seconds(name, seconds)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.errors import GfimuError, InputError
-from gfimu.files.input_file import parsing
+from gfimu.files.input_file import MOST_COLUMNS, parsing
 from gfimu.importing.column_map import TextSpec
 from gfimu.importing.raw_table import RawFile, RawTable
 
@@ -28,6 +28,10 @@ IMU_COLUMNS = (
 )
 """Columns of a topic with `sensor_msgs/Imu`."""
 
+_MOST_READ = 64 << 20  # numerical: bytes that a parser may read of any file, and times the size besides
+_MOST_TIMES_READ = 8
+_LEAST_READ = 512  # numerical: bytes that a call costs as much as
+
 
 def read_ulog(path: Path, text: TextSpec = TextSpec()) -> RawFile:
     """Read a ULog file: each topic and instance is a table, ``sensor_accel/0`` say."""
@@ -36,7 +40,9 @@ def read_ulog(path: Path, text: TextSpec = TextSpec()) -> RawFile:
     except ImportError:
         raise GfimuError(f"{path}: ULog needs pyulog, {_NEEDS}") from None
     with parsing(path, "ULog file", "download it again"), contextlib.redirect_stdout(io.StringIO()):
-        log = ULog(str(path))
+        formats = ULog(_BoundedFile(path), parse_header_only=True).message_formats
+        _check_fields(path, {name: one.fields for name, one in formats.items()})
+        log = ULog(_BoundedFile(path))
     tables = {}
     for topic in log.data_list:
         name = f"{topic.name}/{topic.multi_id}"
@@ -45,6 +51,39 @@ def read_ulog(path: Path, text: TextSpec = TextSpec()) -> RawFile:
     if not tables:
         raise InputError(f"{path}: a ULog file without a topic; log sensor_accel or sensor_combined")
     return RawFile(str(path), "ulog", tables)
+
+
+class _BoundedFile(io.FileIO):
+    """A file whose parser may read some times its size: pyulog goes back in damaged files, in some without end."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path)
+        self._left = _MOST_READ + _MOST_TIMES_READ * path.stat().st_size
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        """Read as many bytes, while the parser may read more at all."""
+        data = super().read(-1 if size is None else size) or b""
+        self._left -= _LEAST_READ + len(data)
+        if self._left < 0:
+            raise OSError("its messages can't be followed to the end")
+        return data
+
+
+def _check_fields(path: Path, formats: Mapping[str, Sequence[tuple[str, int, str]]]) -> None:
+    """Refuse formats within formats that are more fields than any message has: they are laid out one by one."""
+    counts: dict[str, int] = {}
+
+    def fields(name: str) -> int:
+        if name not in formats:
+            return 1
+        if name not in counts:
+            counts[name] = MOST_COLUMNS  # of one within itself
+            counts[name] = sum(max(size, 1) * fields(kind) for kind, size, _ in formats[name])
+        return counts[name]
+
+    for name in formats:
+        if fields(name) > MOST_COLUMNS:
+            raise InputError(f"{path}: topic {name[:40]} has more than {MOST_COLUMNS} fields; download it again")
 
 
 def read_mcap(path: Path, text: TextSpec = TextSpec()) -> RawFile:

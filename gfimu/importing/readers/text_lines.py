@@ -9,7 +9,7 @@ from collections.abc import Sequence
 __all__ = ["plain_lines"]
 
 _LOOKED_AT = 400  # lines
-_HOST_TIME = re.compile(r"\s*\[?(\d{1,2}:\d\d:\d\d[.,:]\d+)\]?\s*(?:->|>|\]|\|)\s*")
+_HOST_TIME = re.compile(r"^\s*\[?(\d{1,2}:\d\d:\d\d[.,:]\d+)\]?\s*(?:->|>|\]|\|)\s*")
 _LABELLED = re.compile(
     r"([A-Za-z_][\w .\[\]()/°²^-]{0,60}?)\s*[:=]\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?![\d:])"
 )

@@ -11,7 +11,7 @@ integrals, and each other reading costs little.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -68,6 +68,8 @@ class Otherwise:
         Another array.
     channels : tuple of str
         Channels that it is about.
+    parts : tuple of Otherwise
+        The two ways that it is made of, if it is.
     """
 
     kind: str
@@ -76,6 +78,11 @@ class Otherwise:
     time: float = 1.0
     array: AccelerometerArray | None = None
     channels: tuple[str, ...] = ()
+    parts: tuple[Otherwise, ...] = ()
+
+    def is_one_of(self, kinds: Collection[str]) -> bool:
+        """Whether the way, or one of its parts, is of one of these kinds."""
+        return any(one.kind in kinds for one in self.parts or (self,))
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from itertools import combinations
 
 import numpy as np
@@ -11,7 +12,9 @@ from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording.evidence.rigid import Evidence, Otherwise
 from gfimu.units import STANDARD_GRAVITY
 
-__all__ = ["TIME_UNITS", "time_text", "ways_to_read"]
+__all__ = ["TIME_UNITS", "both_ways", "time_text", "ways_to_read"]
+
+_ORDER = ("time", "unit", "chip_unit", "sign", "exchange", "array")
 
 TIME_UNITS = {1e-3: "milliseconds", 1e-6: "microseconds"}
 """Units that a column of seconds may be in by mistake, by their size in s."""
@@ -50,12 +53,14 @@ def ways_to_read(evidence: Evidence) -> list[Otherwise]:
         rest = evidence.gravity_at_rest(evidence.as_given())
         seen = f"gravity reads {np.median(rest):.4g} at rest" if len(rest) else "the motion fits no other unit"
         ways.append(Otherwise("unit", f"all readings are in {unit}, not in m/s²: {seen}; {remedy}", np.diag(scale)))
-        for number, chip in enumerate(array.chips):
-            mine = chip_of == number
-            columns = ", ".join(f"{name}{suffix}" for name in chip.channels)
-            cure = f"name its columns {columns}" if suffix else f"multiply its columns by {scale[0]:g}"
-            text = f"chip {chip.name} reads in {unit}, the others in m/s²; {cure}"
-            ways.append(Otherwise("chip_unit", text, np.diag(np.where(mine, scale, 1.0)), channels=chip.channels))
+        for who, channels in _some_channels(array):
+            columns = ", ".join(f"{name}{suffix}" for name in channels)
+            cure = f"name it {columns}" if suffix else f"multiply it by {scale[0]:g}"
+            if len(channels) > 1:
+                cure = f"name its columns {columns}" if suffix else f"multiply its columns by {scale[0]:g}"
+            text = f"{who} reads in {unit}, the others in m/s²; {cure}"
+            mine = np.isin(names, channels)
+            ways.append(Otherwise("chip_unit", text, np.diag(np.where(mine, scale, 1.0)), channels=channels))
     for channel, name in enumerate(names):
         sign = np.ones(count)
         sign[channel] = -1.0
@@ -85,6 +90,29 @@ def ways_to_read(evidence: Evidence) -> list[Otherwise]:
             text = f"chips {chips[0]} and {chips[1]} are exchanged; exchange the names of their columns"
             ways.append(Otherwise("exchange", text, identity[order], channels=chips))
     return ways + _other_arrays(array)
+
+
+def _some_channels(array: AccelerometerArray) -> Iterator[tuple[str, tuple[str, ...]]]:
+    """Yield each chip with several channels and each channel: in words, and the names of its channels."""
+    for chip in array.chips:
+        if len(chip.channels) > 1:
+            yield f"chip {chip.name}", tuple(chip.channels)
+    for name in array.channels:
+        yield f"channel {name}", (name,)
+
+
+def both_ways(one: Otherwise, two: Otherwise) -> Otherwise:
+    """Return two ways at once: units and signs are those of the columns as they are named, before an exchange."""
+    first, second = sorted((one, two), key=lambda way: _ORDER.index(way.kind))
+    return Otherwise(
+        first.kind,
+        f"{first.text}; besides, {second.text}",
+        second.columns @ first.columns,
+        time=first.time * second.time,
+        array=second.array or first.array,
+        channels=(*first.channels, *second.channels),
+        parts=(first, second),
+    )
 
 
 def _other_arrays(array: AccelerometerArray) -> list[Otherwise]:

@@ -1,5 +1,9 @@
 """Damaged, foreign or wrongly mapped files end in one line that names file and remedy, and what is odd is reported."""
 
+import contextlib
+import struct
+import time
+
 import foreign_files as files
 import numpy as np
 import pytest
@@ -60,6 +64,37 @@ def test_a_bad_file_is_one_line(tmp_path, content, words):
     assert message.startswith(str(file))
     assert "\n" not in message
     assert all(word in message for word in words), message
+
+
+def ulog_message(kind, body):
+    return struct.pack("<HB", len(body), ord(kind)) + body
+
+
+ULOG_HEAD = b"ULog\x01\x12\x35\x01" + bytes(8)
+ENDLESS = {
+    "a ULog that its parser goes back in": ULOG_HEAD + b"[" * 20_000,
+    "ULog formats within formats": ULOG_HEAD
+    + b"".join(
+        ulog_message("F", b"f%d:f%d[60000] x;" % (number, number + 1) if number < 5 else b"f5:float x;")
+        for number in range(6)
+    )
+    + ulog_message("A", struct.pack("<BH", 0, 7) + b"f0"),
+    "a ULog format within itself": ULOG_HEAD + ulog_message("F", b"f:f[9] x;") + ulog_message("A", bytes(3) + b"f"),
+    "a name of spaces": b"t,x" + b" " * 60_000 + b"x,y\n" + b"0.1,1,2\n" * 9,
+    "an open bracket": b"t,x [" + b" " * 60_000 + b"x,y\n" + b"0.1,1,2\n" * 9,
+    "lines that begin with spaces": (b" " * 9_000 + b"1 2 3\n") * 400,
+    "dates above words": b"t,ax\n" + b"2024-05-17T23:59:50.000Z,1\n" * 60 + b"x,2\n" * 100,
+}
+
+
+@pytest.mark.parametrize("content", ENDLESS.values(), ids=ENDLESS)
+def test_a_file_that_leads_a_parser_astray_ends_soon(tmp_path, content):
+    file = tmp_path / "run"
+    file.write_bytes(content)
+    start = time.process_time()
+    with contextlib.suppress(InputError):
+        inspect_file(file)
+    assert time.process_time() - start < 5.0
 
 
 def test_another_map_than_the_file_needs_is_named(tmp_path):

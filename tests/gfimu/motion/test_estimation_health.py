@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import gfimu
+from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.integrity.fault import HealthCode
 from gfimu.motion.estimation import Estimate
@@ -38,6 +39,13 @@ def test_a_step_on_one_channel_hardly_harms(run, method):
     assert fault["channels"] == ["a11"]
     assert any("a11: step" in warning for warning in left_out.metadata["warnings"])
     assert kept.health is None
+
+
+def test_a_method_that_leaves_no_channel_out_refuses_to_keep_them(run):
+    with pytest.raises(InputError, match=r"--keep-faulty has no use with method 'integrate'.*filter"):
+        gfimu.estimate(run, keep_faulty=True)
+    with pytest.raises(InputError, match="--keep-faulty has no use with --axis"):
+        gfimu.estimate(run, axis="z", keep_faulty=True)
 
 
 def test_health_is_in_the_file(run, tmp_path):

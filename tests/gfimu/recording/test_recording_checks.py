@@ -120,6 +120,7 @@ WRONG = {
     "all in mg": (lambda run: replace(run, readings=1e3 * run.readings / G), "unit", "all readings are in mg"),
     "counts": (lambda run: replace(run, readings=run.readings / 0.038245935), "unit", "all readings are in counts"),
     "one chip in g": (lambda run: with_columns(run, scaled([3, 4, 5], 1 / G)), "chip_unit", "chip a2 reads in g"),
+    "a22 alone in g": (lambda run: with_columns(run, scaled([4], 1 / G)), "chip_unit", "channel a22 reads in g"),
     "a11 and a12": (lambda run: with_columns(run, exchanged(0, 1)), "exchange", "a11 and a12 are exchanged"),
     "a11 and a13": (lambda run: with_columns(run, exchanged(0, 2)), "exchange", "a11 and a13 are exchanged"),
     "a12 and a32": (lambda run: with_columns(run, exchanged(1, 7)), "exchange", "a12 and a32 are exchanged"),
@@ -155,6 +156,32 @@ def test_a_wrong_file_is_refused_with_its_cause(table_run, name):
     with pytest.raises(InputError, match=r"--force"):
         refuse_or_warn(found)
     assert refuse_or_warn(found, force=True) == found
+
+
+TWICE = {
+    "one chip in g, two channels exchanged": (
+        [scaled([3, 4, 5], 1 / G), exchanged(0, 1)],
+        "chip_unit",
+        ["chip a2 reads in g", "a11 and a12 are exchanged"],
+    ),
+    "all in g, one inverted": (
+        [scaled(list(range(12)), 1 / G), scaled([0], -1)],
+        "unit",
+        ["all readings are in g", "a11 is inverted"],
+    ),
+    "two inverted": ([scaled([0], -1), scaled([8], -1)], "sign", ["a11 is inverted", "a33 is inverted"]),
+}
+
+
+@pytest.mark.parametrize("name", TWICE)
+def test_two_things_wrong_at_once_are_both_named(table_run, name):
+    changes, kind, words = TWICE[name]
+    wrong = table_run
+    for change in changes:
+        wrong = with_columns(wrong, change)
+    found = check_recording(wrong, CUBE)
+    assert [(one.kind, one.refused) for one in found] == [(kind, True)]
+    assert all(word in found[0].text for word in words), found[0].text
 
 
 def test_another_array_is_named(table_run):

@@ -13,10 +13,12 @@ from numpy.testing import assert_allclose
 from rerun.chunk import RrdReader
 from scipy.spatial.transform import Rotation
 
+import gfimu
 from gfimu import AccelerometerArray, InputError, Recording, specific_force
 from gfimu.geometry.array import Chip
 from gfimu.geometry.turning_axis import TurningAxis
 from gfimu.integrity.fault import HealthCode
+from gfimu.recording.formats import open_run
 from gfimu.visual import Box, Cylinder, ExpectedDrift, KnownMotion, Line, Mesh, Plot, write_comparison, write_run
 from gfimu.visual.picture import picture_of, picture_path
 from gfimu.visual.plots import _broken_at_gaps, _emptiest_corner
@@ -301,6 +303,28 @@ def test_a_picture_takes_the_rest_biases_off_on_a_table_and_says_so(tmp_path, ru
     assert "Biases were read off the first rest" in str(found["/notes"])
     error = next(name for name in found if name.endswith("estimate_tacho"))
     assert np.abs(numbers(found[error]["scalars"])).max() < 0.05
+
+
+def test_a_file_of_an_estimate_is_shown_with_band_health_and_position(tmp_path, run):
+    recording = replace(run.recording, readings=run.recording.readings.copy())
+    recording.readings[recording.t_s > 1.0, 0] += 3.0
+    estimated = gfimu.estimate(recording, run.array, method="filter", position=True)
+    file, out = tmp_path / "estimate.parquet", tmp_path / "estimate.rrd"
+    estimated.write(file)
+    picture_of(file, out)
+    found = contents(out)
+    assert not any(name.startswith("/plots/raw") for name in found)
+    for axis, letter in enumerate("xyz"):
+        rate = next(name for name in found if name.endswith(f"{letter}_rad_s/01_estimate"))
+        assert_allclose(numbers(found[rate]["scalars"]), estimated.omega[:, axis])
+        edges = numbers(found[rate.replace("01_estimate", "00_2σ")]["scalars"])
+        assert_allclose(np.diff(edges, axis=1)[:, 0], 4.0 * estimated.omega_std[:, axis])
+    assert any("health" in name for name in found)
+    assert "/trace/estimate" in found
+    with pytest.raises(InputError, match="give its recording with --axis"):
+        picture_of(file, out, axis=TurningAxis(np.array([0.0, 0.0, 1.0]), np.zeros(3)))
+    with pytest.raises(InputError, match="an estimate, no recording; gfimu view shows it"):
+        open_run(file)
 
 
 def test_a_picture_without_rest_leaves_the_biases_in_and_says_so(tmp_path, run):
