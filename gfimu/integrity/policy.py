@@ -56,6 +56,13 @@ class MonitorPolicy:
         Time constant with which the range of a channel's readings is forgotten, s.
     noise_memory_s : float
         Time constant of a channel's noise, s.
+    noise_spread : float
+        Standard deviation of the logarithm of a channel's noise variance from part to part. Measured on a board of
+        eight chips (MIMU4444), at rest, against the data sheet: 0.4.
+    largest_noise : float
+        Ratio of a sound channel's noise to the data sheet's that is not exceeded.
+    noise_span_s : float
+        Readings from which that noise is measured before the watch begins, s.
     readmission_s : float
         So long an excluded channel must agree with the others before it is used again, s.
     longest_readmission_s : float
@@ -125,6 +132,9 @@ class MonitorPolicy:
     range_share: float = 0.5
     range_memory_s: float = 2.0
     noise_memory_s: float = 0.5
+    noise_spread: float = 0.4
+    largest_noise: float = 2.0
+    noise_span_s: float = 10.0
     readmission_s: float = 5.0
     longest_readmission_s: float = 40.0
     sound_scatter: float = 2.0

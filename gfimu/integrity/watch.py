@@ -17,7 +17,7 @@ from gfimu.integrity.policy import MonitorPolicy
 from gfimu.integrity.recursion.blocks import Blocks, block_means
 from gfimu.integrity.recursion.noise import BlockNoise
 from gfimu.integrity.residue import agree, larger_errors, with_residue
-from gfimu.integrity.rest import leading_rest_bias
+from gfimu.integrity.rest import leading_rest_bias, with_measured_noise
 from gfimu.integrity.start import Settling
 from gfimu.rate.kalman import FilterSettings
 from gfimu.rate.live import LiveRateFilter
@@ -144,7 +144,7 @@ def watch_in_motion(
             break
     if start is None or len(times) - done < 2:
         return None
-    left = with_residue(array, errors, settings)
+    left = with_residue(array, with_measured_noise(period, rows[:done], errors, settings), settings)
     left = replace(left, bias_std=np.maximum(left.bias_std, start.bias_std))
     found = watch_channels(
         array, times[done:], rows[done:] - start.bias, left,
@@ -197,7 +197,9 @@ def watch_from_rest(
         return None
     times = np.asarray(t, dtype=float)
     rows = np.asarray(readings, dtype=float)
-    bias = leading_rest_bias(array, float(np.median(np.diff(times))), rows, errors, settings)
+    period = float(np.median(np.diff(times)))
+    errors = with_measured_noise(period, rows[: round(settings.live_rest_s / period)], errors, settings)
+    bias = leading_rest_bias(array, period, rows, errors, settings)
     if bias is None:
         return None
     left = with_residue(array, errors, settings)

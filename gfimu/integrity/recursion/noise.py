@@ -70,7 +70,7 @@ class BlockNoise:
             excess = np.maximum(smooth / levels[:, None], 1.0)
             statistic = memory[:, None] * (excess - 1.0 - np.log(excess))
             foreign = 1.0 - 1.0 / levels  # share that the stated noise does not explain, and no channel is known to own
-            statistic /= (1.0 + 0.5 * memory * foreign**2)[:, None]
+            statistic /= (1.0 + 0.5 * memory * (foreign**2 + self._policy.noise_spread**2))[:, None]
             top = np.partition(statistic, -2, axis=1)
             found = (number * self._block_s > self._policy.noise_settled_s) & (top[:, -1] > self._threshold)
             found &= top[:, -1] - top[:, -2] > self._policy.isolation
