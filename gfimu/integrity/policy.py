@@ -86,6 +86,8 @@ class MonitorPolicy:
         Ratio to the stated variance up to which one block's scatter counts: a step within a block is no noise.
     noise_settled_s : float
         Time from the first block on before a channel is called noisy, s.
+    calm : float
+        Quantile of the scatter that all channels share in one block, above which it counts for that block at once.
     quiet : float
         Quantile of a sound channel's scatter in one block, above which the block is loud.
     kind_decided : float
@@ -144,8 +146,9 @@ class MonitorPolicy:
     least_age: int = 3
     first_block: float = 0.25
     margin: int = 2
-    largest_scatter: float = 6.0
+    largest_scatter: float = 9.0
     noise_settled_s: float = 0.3
+    calm: float = 0.999
     quiet: float = 0.99
     kind_decided: float = 6.0
     spike_share: float = 0.1

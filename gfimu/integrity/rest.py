@@ -48,7 +48,7 @@ def with_measured_noise(
     count = np.maximum((~blocks.missing).sum(axis=0), 1)
     shown = np.nanmedian(np.where(absent, np.nan, variance), axis=0)
     ratio = shown / (chdtri(freedom, 0.5) / freedom) / errors.noise_std**2
-    doubt = 0.5 * np.pi * 2.0 / (freedom * count)  # variance of ln ratio: a median is π/2 times that of a mean
+    doubt = np.pi / (freedom * count)  # variance of ln ratio: that of a median is π/2 times a mean's, 2/(ν m)
     drawn = policy.noise_spread**2 / (policy.noise_spread**2 + doubt)
     factor = np.clip(ratio, 1.0, policy.largest_noise**2) ** (0.5 * drawn)
     return replace(errors, noise_std=errors.noise_std * factor)

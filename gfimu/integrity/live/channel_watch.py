@@ -221,13 +221,13 @@ class LiveWatch:
         blocks = block_means(times[:whole], rows[:whole] - self._bias, self._errors.limits, monitor.samples)
         monitor.extend(blocks)
         now = float(times[whole - 1])
+        if monitor.lost:
+            self._over = "too few channels agree for the rate to be followed"
+            return [self._give_up(now)]
         if self._agreement is not None:
             self._agreement.judge(monitor)
         events = self._changes(monitor, now)
         monitor.forget()
-        if monitor.lost:
-            self._over = "too few channels agree for the rate to be followed"
-            events.append(self._give_up(now))
         return events
 
     def _changes(self, monitor: ChannelMonitor, now: float) -> list[HealthEvent]:
