@@ -40,7 +40,7 @@ def with_measured_noise(
     """
     samples = policy.samples(period)
     part = readings[-max(samples, round(policy.noise_span_s / period)) :]
-    blocks = block_means(np.arange(len(part)) * period, part, errors.limits, samples)
+    blocks = block_means(np.arange(float(len(part))), part, errors.limits, samples)
     variance, freedom = detrended_variance(blocks)  # (m, c)
     if not len(blocks):
         return errors
