@@ -1,8 +1,8 @@
 """How many faulty channels are found, and how many sound ones are excluded: the table of docs/integrity.md.
 
 Run ``PYTHONPATH=tests/gfimu/integrity python benchmarks/channel_faults.py`` (10 min of processor time). The readings
-are those of the tests (`watched_world`): ``cube12``, noise of the data sheet, gains 0.05 %, axes 0.5 mrad, places 0.1 mm,
-onset at random within 2 s. Options: runs per cell, hours of each motion without a fault, and the first seed.
+are those of the tests (`watched_world`): ``cube12``, noise of the data sheet, gains 0.05 %, axes 0.5 mrad, places
+0.1 mm, onset at random within 2 s. Options: runs per cell, hours of each motion without a fault, and the first seed.
 """
 
 from __future__ import annotations

@@ -40,8 +40,8 @@ def advance(tables, tuning, state, means, turning, steps, sets, levels, watched,
     """Take n blocks; stop behind one in which a fault is seen.
 
     ``means`` (n, c), ``turning`` (n, 12) (`turning.turning_of`), ``steps`` (n,) s since the block before, ``sets`` (n,)
-    of channels, ``levels`` (n,) measured variance of the null space over the stated one. ``omega``, ``std`` (n, 3) and ``nis`` (n,) are filled. ``base`` is
-    the number of the first of the n blocks since the start of the run.
+    of channels, ``levels`` (n,) measured variance of the null space over the stated one. ``omega``, ``std`` (n, 3) and
+    ``nis`` (n,) are filled. ``base`` is the number of the first of the n blocks since the start of the run.
 
     Returns
     -------
