@@ -41,6 +41,10 @@ class BlockNoise:
     def __init__(self, null_rows: NDArray[np.float64], block_s: float, threshold: float, policy: MonitorPolicy) -> None:
         self._null_rows, self._block_s, self._threshold, self._policy = null_rows, block_s, threshold, policy
         self._seen = np.flatnonzero(np.sum(null_rows**2, axis=0) > 0.0)
+        directions = null_rows[:, self._seen] / np.linalg.norm(null_rows[:, self._seen], axis=0)
+        self._overlap = (
+            directions.T @ directions
+        ) ** 2  # (s, s) share of a channel's variance along another's direction
         self._forget = min(1.0, block_s / policy.noise_memory_s)
         self._smooth = np.full((1, len(self._seen) + 1), 1.0 - self._forget)  # state of the filter
         self._smooth[0, -1] = 0.0
@@ -61,7 +65,11 @@ class BlockNoise:
         levels, noisy = np.ones(count), np.full(count, -1, dtype=np.int64)
         if count and len(self._seen) > 1:
             counted = np.where(whole, ratios, 1.0)[:, self._seen]
-            shared = np.median(counted, axis=1)
+            loudest = np.argmax(counted, axis=1)
+            beside = self._overlap[loudest] * np.maximum(np.max(counted, axis=1) - 1.0, 0.0)[:, None]
+            shared = np.median(
+                counted - beside, axis=1
+            )  # without what the loudest channel does to the directions of others
             shared = np.where(shared > self._sudden(freedom), shared, 1.0)  # level of this block alone
             foreign = 1.0 - 1.0 / shared  # share that the stated noise does not explain, and no channel is known to own
             largest = np.maximum(counted.max(axis=1), 1.0)
