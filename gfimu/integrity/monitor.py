@@ -302,7 +302,8 @@ class ChannelMonitor:
         watched = self.watched.copy()
         watched[entry.channels] = False
         rows = slice(self._before(place - self._span(used, entry)) - self._base, place - self._base)
-        rest = self.follower.unexplained_without(self.blocks, rows, watched, base=self._base)
+        levels = self._noise_of().levels
+        rest = self.follower.unexplained_without(self.blocks, rows, watched, levels, base=self._base)
         return rest < self.policy.unexplained
 
     def _span(self, used: NDArray[np.int64], entry: Explanation) -> int:

@@ -56,6 +56,13 @@ class MonitorPolicy:
         Time constant with which the range of a channel's readings is forgotten, s.
     noise_memory_s : float
         Time constant of a channel's noise, s.
+    noise_spread : float
+        Standard deviation of the logarithm of a channel's noise variance from part to part. Measured on a board of
+        eight chips (MIMU4444), at rest, against the data sheet: 0.4.
+    largest_noise : float
+        Ratio of a sound channel's noise to the data sheet's that is not exceeded.
+    noise_span_s : float
+        Readings from which that noise is measured before the watch begins, s.
     readmission_s : float
         So long an excluded channel must agree with the others before it is used again, s.
     longest_readmission_s : float
@@ -79,6 +86,8 @@ class MonitorPolicy:
         Ratio to the stated variance up to which one block's scatter counts: a step within a block is no noise.
     noise_settled_s : float
         Time from the first block on before a channel is called noisy, s.
+    calm : float
+        Quantile of the scatter that all channels share in one block, above which it counts for that block at once.
     quiet : float
         Quantile of a sound channel's scatter in one block, above which the block is loud.
     kind_decided : float
@@ -125,6 +134,9 @@ class MonitorPolicy:
     range_share: float = 0.5
     range_memory_s: float = 2.0
     noise_memory_s: float = 0.5
+    noise_spread: float = 0.4
+    largest_noise: float = 2.0
+    noise_span_s: float = 10.0
     readmission_s: float = 5.0
     longest_readmission_s: float = 40.0
     sound_scatter: float = 2.0
@@ -134,8 +146,9 @@ class MonitorPolicy:
     least_age: int = 3
     first_block: float = 0.25
     margin: int = 2
-    largest_scatter: float = 6.0
+    largest_scatter: float = 9.0
     noise_settled_s: float = 0.3
+    calm: float = 0.999
     quiet: float = 0.99
     kind_decided: float = 6.0
     spike_share: float = 0.1

@@ -12,9 +12,10 @@ from gfimu.geometry.array import AccelerometerArray
 from gfimu.integrity.policy import MonitorPolicy
 from gfimu.integrity.recursion.blocks import Blocks
 from gfimu.integrity.recursion.monitor_filter import MonitorFilter
+from gfimu.integrity.recursion.noise import BlockNoise
 from gfimu.rate.sensing import SensorErrors
 
-__all__ = ["agree", "larger_errors", "moving_seconds", "with_residue"]
+__all__ = ["agree", "larger_errors", "moving_seconds", "with_residue", "without_noisy_channel"]
 
 _LEAST_SCALE = 1e-4  # numerical: a ratio, where gains and axes are stated as exact
 _LEAST_PLACE = 2e-5  # numerical: m, the same of positions
@@ -50,13 +51,26 @@ def moving_seconds(follower: MonitorFilter, blocks: Blocks, policy: MonitorPolic
     return np.asarray(spread.max(axis=1, initial=0.0) > policy.moving)
 
 
+def without_noisy_channel(
+    follower: MonitorFilter, blocks: Blocks, watched: NDArray[np.bool_], policy: MonitorPolicy
+) -> NDArray[np.bool_]:
+    """Return in which blocks no channel is noisier than all others, shape (m,).
+
+    Where one is, errors of the geometry are not what the innovations show.
+    """
+    noise = BlockNoise(follower.null_rows(watched), follower.block_s, follower.threshold, policy)
+    noise.extend(blocks, slice(0, len(blocks)))
+    return np.asarray(noise.noisy < 0)
+
+
 def agree(
     follower: MonitorFilter,
     blocks: Blocks,
     innovations: NDArray[np.float64],
     policy: MonitorPolicy,
     *,
-    judged: NDArray[np.bool_] | None = None,
+    judged: NDArray[np.bool_],
+    fewest: int | None = None,
 ) -> bool:
     """Whether a share of all seconds of motion, and of rest, have innovations that the stated errors explain.
 
@@ -70,9 +84,10 @@ def agree(
         Normalised innovation squared per degree of freedom.
     policy : MonitorPolicy
         That share.
-    judged : ndarray of bool, shape (m,), optional
-        Blocks to judge by, all by default: in one where a channel is noisier than all others, errors of the geometry
-        are not what the innovations show.
+    judged : ndarray of bool, shape (m,)
+        Blocks to judge by (`without_noisy_channel`).
+    fewest : int, optional
+        Seconds of motion, or of rest, from which they are judged by themselves; by default those of the policy.
 
     Returns
     -------
@@ -86,9 +101,8 @@ def agree(
         return True
     nis = innovations[: count * per_second].reshape(count, per_second).mean(axis=1)
     moving = moving_seconds(follower, blocks, policy)
-    if judged is not None:
-        whole = judged[: count * per_second].reshape(count, per_second).all(axis=1)
-        nis, moving, count = nis[whole], moving[whole], int(whole.sum())
+    whole = judged[: count * per_second].reshape(count, per_second).all(axis=1)
+    nis, moving, count = nis[whole], moving[whole], int(whole.sum())
     limit = chdtri(freedom, policy.agreeing_share) / freedom
-    parts = [nis[part] for part in (moving, ~moving) if part.sum() >= min(count, policy.fewest_seconds)]
+    parts = [nis[part] for part in (moving, ~moving) if part.sum() >= min(count, fewest or policy.fewest_seconds)]
     return all(bool(np.quantile(part, policy.agreeing_share) <= limit) for part in parts)

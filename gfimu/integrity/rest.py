@@ -1,16 +1,59 @@
-"""What a rest at the start shows of the biases."""
+"""What the start of a run shows of the channels: their noise, and in a rest their biases."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import chdtri
 
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.integrity.policy import MonitorPolicy
+from gfimu.integrity.recursion.blocks import block_means, detrended_variance
 from gfimu.rate.rest_test import RestTest, constant_readings
 from gfimu.rate.sensing import SensorErrors
 
-__all__ = ["leading_rest", "leading_rest_bias", "rest_bias"]
+__all__ = ["leading_rest", "leading_rest_bias", "rest_bias", "with_measured_noise"]
+
+
+def with_measured_noise(
+    period: float, readings: NDArray[np.float64], errors: SensorErrors, policy: MonitorPolicy
+) -> SensorErrors:
+    """Return the errors with the white noise of each channel as it is, where that is more than stated.
+
+    A data sheet states typical noise. The variance of each channel is measured within blocks, without what a motion
+    adds to them, as the median over the blocks: neither an impact nor a motion in less than half of them shows. Its
+    logarithm is drawn to the stated one by the spread of it from part to part (``noise_spread``), and it is at most
+    ``largest_noise`` times the stated standard deviation.
+
+    Parameters
+    ----------
+    period : float
+        Sample period, s.
+    readings : ndarray, shape (n, c)
+        Specific force, m/s²; NaN where missing. The last ``noise_span_s`` of it are used.
+    errors : SensorErrors
+        Stated errors.
+    policy : MonitorPolicy
+        Length of the blocks, spread and limit.
+    """
+    samples = policy.samples(period)
+    part = readings[-max(samples, round(policy.noise_span_s / period)) :]
+    blocks = block_means(np.arange(float(len(part))), part, errors.limits, samples)
+    variance, freedom = detrended_variance(blocks)  # (m, c)
+    if not len(blocks):
+        return errors
+    absent = blocks.missing & ~blocks.missing.all(
+        axis=0
+    )  # a channel without any reading has zeros, and stays as stated
+    count = np.maximum((~blocks.missing).sum(axis=0), 1)
+    shown = np.nanmedian(np.where(absent, np.nan, variance), axis=0)
+    ratio = shown / (chdtri(freedom, 0.5) / freedom) / errors.noise_std**2
+    doubt = np.pi / (freedom * count)  # variance of ln ratio: that of a median is π/2 times a mean's, 2/(ν m)
+    drawn = policy.noise_spread**2 / (policy.noise_spread**2 + doubt)
+    factor = np.clip(ratio, 1.0, policy.largest_noise**2) ** (0.5 * drawn)
+    return replace(errors, noise_std=errors.noise_std * factor)
 
 
 def leading_rest(

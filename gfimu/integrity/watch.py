@@ -14,10 +14,9 @@ from gfimu.integrity.fault import ChannelFault, ChannelHealth
 from gfimu.integrity.kinds import name_kinds
 from gfimu.integrity.monitor import ChannelMonitor
 from gfimu.integrity.policy import MonitorPolicy
-from gfimu.integrity.recursion.blocks import Blocks, block_means
-from gfimu.integrity.recursion.noise import BlockNoise
-from gfimu.integrity.residue import agree, larger_errors, with_residue
-from gfimu.integrity.rest import leading_rest_bias
+from gfimu.integrity.recursion.blocks import block_means
+from gfimu.integrity.residue import agree, larger_errors, with_residue, without_noisy_channel
+from gfimu.integrity.rest import leading_rest_bias, with_measured_noise
 from gfimu.integrity.start import Settling
 from gfimu.rate.kalman import FilterSettings
 from gfimu.rate.live import LiveRateFilter
@@ -78,12 +77,14 @@ def watch_channels(
     samples = settings.samples(period)
     blocks = block_means(times, rows, errors.limits, samples)
     factor, monitor, judged = 0.5, None, None
+    everything = np.ones(array.n_channels, dtype=np.bool_)
     while monitor is None:
         factor *= 2.0
         trial = ChannelMonitor(
             array, larger_errors(errors, factor), period, omega0=omega0, omega0_std=omega0_std, policy=settings
         )
-        judged = _no_noisy_channel(trial, blocks) if judged is None else judged
+        if judged is None:
+            judged = without_noisy_channel(trial.follower, blocks, everything, settings)
         agrees = agree(trial.follower, blocks, trial.innovations(blocks), settings, judged=judged)
         if agrees or factor >= settings.largest_factor:
             trial.refuse(not agrees)
@@ -144,21 +145,13 @@ def watch_in_motion(
             break
     if start is None or len(times) - done < 2:
         return None
-    left = with_residue(array, errors, settings)
+    left = with_residue(array, with_measured_noise(period, rows[:done], errors, settings), settings)
     left = replace(left, bias_std=np.maximum(left.bias_std, start.bias_std))
     found = watch_channels(
         array, times[done:], rows[done:] - start.bias, left,
         omega0=start.omega, omega0_std=max(start.omega_std, 1e-3), policy=settings,
     )  # fmt: skip
     return found.behind(done)
-
-
-def _no_noisy_channel(monitor: ChannelMonitor, blocks: Blocks) -> NDArray[np.bool_]:
-    """Return in which blocks no channel is noisier than all others, shape (m,)."""
-    rows = monitor.follower.null_rows(np.ones(monitor.array.n_channels, dtype=np.bool_))
-    noise = BlockNoise(rows, monitor.block_s, monitor.threshold, monitor.policy)
-    noise.extend(blocks, slice(0, len(blocks)))
-    return np.asarray(noise.noisy < 0)
 
 
 def _concerned(
@@ -197,7 +190,9 @@ def watch_from_rest(
         return None
     times = np.asarray(t, dtype=float)
     rows = np.asarray(readings, dtype=float)
-    bias = leading_rest_bias(array, float(np.median(np.diff(times))), rows, errors, settings)
+    period = float(np.median(np.diff(times)))
+    errors = with_measured_noise(period, rows[: round(settings.live_rest_s / period)], errors, settings)
+    bias = leading_rest_bias(array, period, rows, errors, settings)
     if bias is None:
         return None
     left = with_residue(array, errors, settings)

@@ -35,12 +35,14 @@ __all__ = [
     "Disagreement",
     "DisagreementPolicy",
     "MeasuredNoise",
+    "ScaleSoFar",
     "lasting_scale",
     "measured_scale",
     "sum_up_disagreement",
 ]
 
 
+_MEMORIES = 8.0  # numerical: of the longer memory, beyond which samples count for nothing
 _ALONE = 1e9  # numerical: degrees of freedom beside which a single sample counts for nothing
 
 
@@ -131,6 +133,33 @@ def lasting_scale(
     """Return s̃ of each sample by the mean over about a second around it alone, shape (n,); as `measured_scale`."""
     smooth = replace(policy, prior=_ALONE, memory=policy.long_memory_s / period, false_alarm=policy.long_false_alarm)
     return measured_scale(squares, freedom, period, causal=causal, policy=smooth)
+
+
+class ScaleSoFar:
+    """s̃ of each sample while samples arrive, from those so far (`measured_scale`, `lasting_scale`).
+
+    Parameters
+    ----------
+    period : float
+        Sample period, s.
+    lasting : bool
+        Whether s̃ is the mean over about a second alone.
+    policy : DisagreementPolicy, optional
+        Memory and significance.
+    """
+
+    def __init__(self, period: float, *, lasting: bool, policy: DisagreementPolicy = POLICY) -> None:
+        self._period, self._policy = period, policy
+        self._scale = lasting_scale if lasting else measured_scale
+        self._kept = round(_MEMORIES * policy.long_memory_s / period)
+        self._squares, self._freedom = np.zeros(0), np.zeros(0)
+
+    def push(self, squares: NDArray[np.float64], freedom: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return s̃ (n,) of further samples, by sums of squares (n,) and degrees of freedom (n,)."""
+        self._squares = np.concatenate([self._squares[-self._kept :], squares])
+        self._freedom = np.concatenate([self._freedom[-self._kept :], freedom])
+        found = self._scale(self._squares, self._freedom, self._period, causal=True, policy=self._policy)
+        return found[len(found) - len(squares) :]
 
 
 @dataclass(frozen=True)

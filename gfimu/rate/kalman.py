@@ -156,6 +156,7 @@ class KalmanRateFilter:
         self.errors = errors
         self.period = period
         self.settings = settings or FilterSettings()
+        self.noise = self.settings.noise  # of the samples to come
         self.tables = ChannelTables(array, errors)
         points, position = QUADRATURES[self.settings.quadrature]
         weights = even_weights(points)
@@ -361,7 +362,7 @@ class KalmanRateFilter:
         data.t[first:last] = t
         data.y[first:last] = readings
         data.gyro[first:last] = np.nan if gyro is None else gyro
-        data.excess[first:last] = 0.0 if self.settings.noise is None else self.settings.noise.excess(t)
+        data.excess[first:last] = 0.0 if self.noise is None else self.noise.excess(t)
         self._received = last
         self._prepare(first, last)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.rate.kalman import FilterOutput, FilterSettings, KalmanRateFilter, empty_output, join
+from gfimu.rate.live_accuracy import LiveAccuracy
 from gfimu.rate.result import ChannelReport, RateEstimate, SignDecision, full_covariance
 from gfimu.rate.sensing import SensorErrors
 from gfimu.rate.sign import InitialRate, SignTest
@@ -71,6 +73,7 @@ class LiveRateFilter:
         self._test = SignTest()
         self.hypotheses: list[KalmanRateFilter] = []
         self._limit = np.inf
+        self._last_time = -np.inf
         self.started_at_s = np.nan
         # A start at rest that doesn't look like rest leaves the sign in doubt: the bias of α was not learned.
         self._unproven = 0
@@ -118,16 +121,38 @@ class LiveRateFilter:
         gyro : array_like, shape (n, 3) or (3,), optional
             Gyro readings in body axes, rad/s; NaN where saturated or missing.
 
+        Returns
+        -------
+        RateEstimate
+            With the measured noise and the probability of the sign of each sample, by the samples so far
+            (`gfimu.rate.live_accuracy`).
+
         Raises
         ------
         InputError
             If the shapes don't fit or time does not increase.
         """
-        return self._result(*self.push_raw(t, readings, gyro))
+        times, rows = np.atleast_1d(np.asarray(t, dtype=float)), np.atleast_2d(np.asarray(readings, dtype=float))
+        if rows.shape == (len(times), self.array.n_channels):
+            if not (np.isfinite(times).all() and np.all(np.diff(times, prepend=self._last_time) > 0)):
+                raise InputError("sample times must be finite and increase; drop repeated or reordered samples")
+            self._last_time = float(times[-1]) if len(times) else self._last_time
+            noise = self._accuracy.take(times, rows)
+            for hypothesis in self.hypotheses:
+                hypothesis.noise = noise
+        return self._accurate(self._result(*self.push_raw(times, rows, gyro)))
 
     def finish(self) -> RateEstimate:
         """Return the estimates of the last samples, for which no more neighbours will come."""
-        return self._result(*self.finish_raw())
+        return self._accurate(self._result(*self.finish_raw()))
+
+    @cached_property
+    def _accuracy(self) -> LiveAccuracy:
+        return LiveAccuracy(self.array, self.errors, self.period)
+
+    def _accurate(self, found: RateEstimate) -> RateEstimate:
+        """Add the measured noise and the probability of the sign."""
+        return self._accuracy.describe(found, self.current if self.hypotheses else None) if len(found) else found
 
     def push_raw(
         self, t: ArrayLike, readings: ArrayLike, gyro: ArrayLike | None = None

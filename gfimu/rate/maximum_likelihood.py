@@ -16,7 +16,7 @@ from gfimu.rate.per_sample import KnownStart, per_sample_estimate
 from gfimu.rate.result import RateEstimate
 from gfimu.rate.sensing import SensorErrors
 
-__all__ = ["maximum_likelihood_rate", "rate_of_null_space"]
+__all__ = ["maximum_likelihood_rate", "rate_of_null_space", "rates_of_null_space"]
 
 _ITERATIONS = 60
 _CONVERGED = 1e-10
@@ -64,12 +64,20 @@ def maximum_likelihood_rate(
         If the array sees fewer than three products.
     """
     null = null_readings(array, t, readings, errors, least_rank=3, start_at_rest=start_at_rest)
-    rank = int(np.linalg.matrix_rank(null.sensitivity, tol=1e-9))
-    # Rows beyond the rank see no product: only the first ones carry information.
-    left, strengths, right = np.linalg.svd(null.sensitivity)
-    compact = strengths[:rank, None] * right[:rank]  # (rank, 6)
-    omega, covariance, _ = _solve(null.z @ left[:, :rank], compact, _STARTS)
+    omega, covariance = rates_of_null_space(null.z, null.sensitivity)
     return per_sample_estimate("ml", null, omega, covariance, array, errors, start)
+
+
+def rates_of_null_space(
+    z: NDArray[np.float64], sensitivity: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Rates (n, 3) that fit samples z (n, d) = M s(ω) + white noise best, up to the sign, and covariances (n, 3, 3)."""
+    rank = int(np.linalg.matrix_rank(sensitivity, tol=1e-9))
+    # Rows beyond the rank see no product: only the first ones carry information.
+    left, strengths, right = np.linalg.svd(sensitivity)
+    compact = strengths[:rank, None] * right[:rank]  # (rank, 6)
+    omega, covariance, _ = _solve(z @ left[:, :rank], compact, _STARTS)
+    return omega, covariance
 
 
 def rate_of_null_space(z: NDArray[np.float64], sensitivity: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -24,7 +24,7 @@ from gfimu.rate.per_sample import UNDECIDABLE, KnownStart, decision
 from gfimu.rate.result import RateEstimate
 from gfimu.rate.sensing import ChannelTables, SensorErrors
 
-__all__ = ["noise_of_run", "parity_scale", "refined"]
+__all__ = ["noise_of_run", "parity_rows", "parity_scale", "refined", "same_sign"]
 
 _BLIND = 1e-9  # numerical: sensitivity of a combination that sees no product of ω, of the best
 
@@ -103,6 +103,13 @@ def noise_of_run(
     return scale
 
 
+def parity_rows(tables: ChannelTables) -> NDArray[np.float64] | None:
+    """Return the combinations of readings that no motion changes, whitened, shape (d, c); None with too few of them."""
+    strength = np.linalg.norm(tables.null_sensitivity[0], axis=1)
+    blind = strength <= _BLIND * max(1.0, float(strength.max(initial=0.0)))
+    return np.asarray(tables.null_rows[0][blind]) if int(blind.sum()) >= POLICY.least_parity else None
+
+
 def parity_scale(
     array: AccelerometerArray,
     readings: NDArray[np.float64],
@@ -115,19 +122,17 @@ def parity_scale(
 
     Their biases are taken off as the mean over the run, or with ``causal`` over the samples so far.
     """
-    tables = ChannelTables(array, errors)
-    strength = np.linalg.norm(tables.null_sensitivity[0], axis=1)
-    blind = strength <= _BLIND * max(1.0, float(strength.max(initial=0.0)))
-    if int(blind.sum()) < POLICY.least_parity:
+    rows = parity_rows(ChannelTables(array, errors))
+    if rows is None:
         return None
     usable = np.asarray((np.abs(readings) < errors.limits).all(axis=1))
-    parity = np.where(usable[:, None], readings, 0.0) @ tables.null_rows[0][blind].T  # (n, d)
+    parity = np.where(usable[:, None], readings, 0.0) @ rows.T  # (n, d)
     count = np.cumsum(usable)
     if causal:
         parity = parity - np.cumsum(parity, axis=0) / np.maximum(count, 1)[:, None]
     elif usable.any():
         parity = parity - parity.sum(axis=0) / count[-1]
-    freedom = np.where(usable, float(blind.sum()), 0.0)
+    freedom = np.where(usable, float(len(rows)), 0.0)
     squares = np.where(usable, np.sum(parity**2, axis=1), np.nan)
     return measured_scale(squares, freedom, period, causal=causal)
 
@@ -150,7 +155,7 @@ def _with_sign(
         return found
     chance = single.sign_probability
     assert chance is not None
-    alike = _same_sign(single, found)
+    alike = same_sign(single.omega, single.covariance, found)
     probability = _filled(alike * chance + (1.0 - alike) * (1.0 - chance))
     wrong = probability < 0.5 - UNDECIDABLE
     signed = replace(
@@ -161,13 +166,13 @@ def _with_sign(
     return replace(signed, sign=decision(signed, known=start is not None))
 
 
-def _same_sign(single: RateEstimate, found: RateEstimate) -> NDArray[np.float64]:
-    """Return the probability (n,) that two estimates of a rate that is known but for its sign have the same sign."""
-    spread = single.covariance + found.covariance
-    known = np.asarray(np.isfinite(spread).all(axis=(1, 2)) & np.isfinite(single.omega).all(axis=1))
-    along = np.zeros(len(single))
+def same_sign(omega: NDArray[np.float64], covariance: NDArray[np.float64], found: RateEstimate) -> NDArray[np.float64]:
+    """Return the probability (n,) that rates (n, 3) that are known but for their sign have the sign of an estimate."""
+    spread = covariance + found.covariance
+    known = np.asarray(np.isfinite(spread).all(axis=(1, 2)) & np.isfinite(omega).all(axis=1))
+    along = np.zeros(len(omega))
     solved = np.linalg.solve(spread[known], found.omega[known][..., None])[..., 0]
-    along[known] = np.sum(single.omega[known] * solved, axis=1)
+    along[known] = np.sum(omega[known] * solved, axis=1)
     return np.asarray(1.0 / (1.0 + np.exp(-np.clip(2.0 * along, -50.0, 50.0))))
 
 

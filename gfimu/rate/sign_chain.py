@@ -24,7 +24,8 @@ through zero so slow that neither sign stands out leaves both probable, until a 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -32,7 +33,7 @@ from numpy.typing import NDArray
 
 from gfimu.rate.recursion_data import COMPILE
 
-__all__ = ["SignPolicy", "SignSteps", "sign_probabilities"]
+__all__ = ["SignChain", "SignPolicy", "SignSteps", "sign_probabilities"]
 
 
 @dataclass(frozen=True)
@@ -109,47 +110,109 @@ class SignSteps:
     start_std: float
 
 
-def sign_probabilities(steps: SignSteps, *, causal: bool = False, policy: SignPolicy = _POLICY) -> NDArray[np.float64]:
+class _ChainState(NamedTuple):
+    """What the chain carries from sample to sample."""
+
+    mean: NDArray[np.float64]  # (2, 3) of the rate with either sign of the last estimate, rad/s
+    spread: NDArray[np.float64]  # (2, 3, 3) its covariance, (rad/s)²
+    share: NDArray[np.float64]  # (2,) probability of either sign
+    known: NDArray[np.bool_]  # (1,) whether there is a rate yet
+
+    @classmethod
+    def begin(cls, start: NDArray[np.float64] | None, std: float) -> _ChainState:
+        """Return the state before the first sample, whose rate (3,) may be known."""
+        mean = np.zeros(3) if start is None else np.asarray(start, dtype=float)
+        spread = np.tile(std**2 * np.eye(3), (2, 1, 1))
+        return cls(np.tile(mean, (2, 1)), spread, np.full(2, 0.5), np.array([start is not None]))
+
+
+def sign_probabilities(steps: SignSteps, *, policy: SignPolicy = _POLICY) -> NDArray[np.float64]:
     """Return the probability, shape (n,), that each sample's rate is ``omega`` and not ``−omega``; NaN without one.
 
     Parameters
     ----------
     steps : SignSteps
         Rates but for their sign, and α.
-    causal : bool
-        Whether each probability is from the samples up to its own alone.
     policy : SignPolicy, optional
         Numbers of the chain.
     """
-    start = np.full(3, np.nan) if steps.start is None else np.asarray(steps.start, dtype=float)
-    bias = steps.alpha_bias_std
-    fixed = steps.alpha_covariance, bias, policy.change, policy.tail, steps.rest_std, policy.floor
-    alpha = _real_part(steps, policy)
-    columns = (steps.t, alpha, steps.omega, steps.covariance, steps.scale, steps.rest)
-    ahead = _chain(*columns, start, steps.start_std, *fixed)
-    if causal:
-        return ahead
+    half = max(1, round(0.5 * policy.window_s / _period(steps.t)))
+    real = replace(steps, alpha=_real_part(steps, half, half, policy))
+    ahead = _run(real, _ChainState.begin(steps.start, steps.start_std), 0, -1, _period(steps.t), policy)
     # Backward in time, α changes its sign: ω(t − Δt) = ω(t) − Δt α.
-    nothing = np.full(3, np.nan)
-    turned = (-steps.t, -alpha, steps.omega, steps.covariance, steps.scale, steps.rest)
-    back = _chain(*(np.ascontiguousarray(column[::-1]) for column in turned), nothing, 1.0, *fixed)[::-1]
+    columns: dict[str, Any] = {name: np.ascontiguousarray(getattr(real, name)[::-1]) for name in _COLUMNS}
+    turned = replace(real, **columns | {"t": -columns["t"], "alpha": -columns["alpha"]})
+    back = _run(turned, _ChainState.begin(None, 1.0), 0, -1, _period(steps.t), policy)[::-1]
     both = ahead * back
     return both / (both + (1.0 - ahead) * (1.0 - back))
 
 
-def _real_part(steps: SignSteps, policy: SignPolicy) -> NDArray[np.float64]:
-    """Shrink α (n, 3) by the share of its power that noise and bias don't explain."""
+class SignChain:
+    """The chain while samples arrive: each probability is from the samples up to its own alone.
+
+    Parameters
+    ----------
+    period : float
+        Sample period, s.
+    policy : SignPolicy, optional
+        Numbers of the chain.
+    """
+
+    def __init__(self, period: float, policy: SignPolicy = _POLICY) -> None:
+        self._period, self._policy = period, policy
+        self._window = max(1, round(policy.window_s / period))
+        self._state: _ChainState | None = None
+        self._past: SignSteps | None = None  # the last samples, over which the power of α is averaged
+
+    def push(self, steps: SignSteps) -> NDArray[np.float64]:
+        """Return the probabilities (n,) of further samples; ``start`` counts for the first ones alone."""
+        if self._state is None:
+            self._state = _ChainState.begin(steps.start, steps.start_std)
+        all_steps, count = steps, len(steps.t)
+        if self._past is not None:
+            joined: dict[str, Any] = {
+                name: np.concatenate([getattr(self._past, name), getattr(steps, name)]) for name in _COLUMNS
+            }
+            all_steps = replace(steps, **joined)
+        first = len(all_steps.t) - count
+        used = np.isfinite(all_steps.alpha[:, 0]) & (np.isfinite(all_steps.omega[:, 0]) | all_steps.rest)
+        seen = np.flatnonzero(used[:first])
+        real = replace(all_steps, alpha=_real_part(all_steps, self._window, 0, self._policy))
+        last = int(seen[-1]) if seen.size else -1
+        found = _run(real, self._state, first, last, self._period, self._policy)[first:]
+        tail: dict[str, Any] = {name: getattr(all_steps, name)[-self._window :] for name in _COLUMNS}
+        self._past = replace(steps, **tail)
+        return found
+
+
+_COLUMNS = ("t", "alpha", "omega", "covariance", "scale", "rest")
+
+
+def _period(t: NDArray[np.float64]) -> float:
+    return float((t[-1] - t[0]) / max(len(t) - 1, 1))
+
+
+def _run(
+    steps: SignSteps, state: _ChainState, first: int, last: int, period: float, policy: SignPolicy
+) -> NDArray[np.float64]:
+    """Run the chain over samples from ``first`` on, behind sample ``last`` (−1: none); ``alpha`` is its real part."""
+    return np.asarray(_chain(
+        steps.t, steps.alpha, steps.omega, steps.covariance, steps.scale, steps.rest, state, first, last, period,
+        steps.alpha_covariance, steps.alpha_bias_std, policy.change, policy.tail, steps.rest_std, policy.floor,
+    ))  # fmt: skip
+
+
+def _real_part(steps: SignSteps, before: int, behind: int, policy: SignPolicy) -> NDArray[np.float64]:
+    """Shrink α (n, 3) by the share of its power, over so many samples around, that noise and bias don't explain."""
     present = np.isfinite(steps.alpha).all(axis=1) & ~steps.rest
     n = len(present)
-    period = (steps.t[-1] - steps.t[0]) / max(n - 1, 1)
-    half = max(1, round(0.5 * policy.window_s / period))
     white = np.trace(steps.alpha_covariance) * steps.scale**2
     sums = np.zeros((n + 1, 3))
     sums[1:, 0] = np.cumsum(np.where(present, np.sum(np.square(np.nan_to_num(steps.alpha)), axis=1), 0.0))
     sums[1:, 1] = np.cumsum(np.where(present, white, 0.0))
     sums[1:, 2] = np.cumsum(present)
     place = np.arange(n)
-    seen = sums[np.minimum(place + half + 1, n)] - sums[np.maximum(place - half, 0)]
+    seen = sums[np.minimum(place + behind + 1, n)] - sums[np.maximum(place - before, 0)]
     count = np.maximum(seen[:, 2], 1.0)
     noise = seen[:, 1] / count
     allowed = noise * (1.0 + policy.noise_deviate * np.sqrt(2.0 / (3.0 * count)))
@@ -160,14 +223,14 @@ def _real_part(steps: SignSteps, policy: SignPolicy) -> NDArray[np.float64]:
 
 @njit(**COMPILE)
 def _chain(  # type: ignore[no-untyped-def]
-    t, alpha, omega, covariance, scale, rest, start, start_std, noise, bias, change, tail, rest_std, floor
+    t, alpha, omega, covariance, scale, rest, state, first_new, last, period, noise, bias, change, tail, rest_std, floor
 ):
     """Run the chain forward; returns the probability of the sign that ``omega`` has, (n,)."""
     n = len(t)
     plus = np.full(n, np.nan)
-    mean = np.zeros((2, 3))  # of the rate with either sign of the last estimate
-    spread = np.zeros((2, 3, 3))
-    share = np.array([0.5, 0.5])
+    mean = state.mean
+    spread = state.spread
+    share = state.share
     moved = np.zeros((2, 3))  # the same, carried to the present sample
     inverse = np.zeros((3, 3))  # of V
     gain = np.zeros((2, 3, 3))
@@ -179,15 +242,8 @@ def _chain(  # type: ignore[no-untyped-def]
     part = np.zeros((2, 3))
     extra = np.zeros((3, 3))
     total = np.zeros((3, 3))
-    last = -1
-    known = np.isfinite(start[0])
-    if known:
-        for s in range(2):
-            for a in range(3):
-                mean[s, a] = start[a]
-                spread[s, a, a] = start_std * start_std
-    period = (t[n - 1] - t[0]) / max(n - 1, 1)
-    for k in range(n):
+    known = state.known[0]
+    for k in range(first_new, n):
         if rest[k]:
             mean[:] = 0.0
             spread[:] = 0.0
@@ -294,6 +350,7 @@ def _chain(  # type: ignore[no-untyped-def]
         share[1] = 1.0 - share[0]
         plus[k] = share[0]
         last = k
+    state.known[0] = known
     return plus
 
 

@@ -184,8 +184,9 @@ def filter_stream(
     The first line that is no comment names the columns (``t_s``, ``a11_m_s2`` … or raw counts, ``a11_lsb`` …, whose
     size a line ``# lsb_m_s2: …`` before it or the array's part gives). Each estimate is one JSON line:
     ``t_s``, ``omega_rad_s``, ``omega_std_rad_s``, ``nis`` and its degrees of freedom, ``rest`` where a block of rest
-    ended, ``sign``, and ``fault`` where something was wrong with the line or its channels. A line that can't be read
-    is reported and skipped. With a filter that watches its channels each line has ``health``, one number per channel of
+    ended, ``sign``, ``noise_scale`` and ``omega_sign_probability`` (from the samples so far; as in an estimate file),
+    and ``fault`` where something was wrong with the line or its channels. A line that can't be read is reported and
+    skipped. With a filter that watches its channels each line has ``health``, one number per channel of
     the array, and a line with ``event``, ``faults`` and ``text`` comes when a channel is excluded, or used again.
 
     Parameters
@@ -301,6 +302,8 @@ def _lines(found: RateEstimate, faults: dict[str, Any], health: list[int] | None
             "nis_dof": int(found.nis_dof[k]),
             "sign": found.sign.state,
         }
+        further = {"noise_scale": found.scale, "omega_sign_probability": found.sign_probability}
+        record |= {name: float(values[k]) for name, values in further.items() if values is not None}
         if found.rest[k]:
             record["rest"] = True
         if health is not None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from gfimu.integrity.monitor import ChannelMonitor
 from gfimu.integrity.policy import MonitorPolicy
-from gfimu.integrity.residue import agree, larger_errors, moving_seconds
+from gfimu.integrity.residue import agree, larger_errors, moving_seconds, without_noisy_channel
 from gfimu.rate.sensing import SensorErrors
 
 __all__ = ["Agreement"]
@@ -53,15 +53,17 @@ class Agreement:
         if self._moving < self._next:
             return
         recent = monitor.blocks.rows(slice(max(0, len(monitor.blocks) - follower.history + 1), None))
-        if moving_seconds(follower, recent, policy).sum() < policy.fewest_seconds:
+        fewest = policy.fewest_seconds
+        if moving_seconds(follower, recent, policy).sum() < fewest:
             return
         self._next = self._moving + policy.fewest_seconds
         monitor.noise_in_motion = True
         factor, agrees = 0.5, False
+        judged = without_noisy_channel(follower, recent, monitor.watched, policy)
         while factor < policy.largest_factor and not agrees:
             factor *= 2.0
             blocks, innovations = monitor.recent_innovations(larger_errors(self._stated, factor))
-            agrees = agree(follower, blocks, innovations, policy)
+            agrees = agree(follower, blocks, innovations, policy, judged=judged, fewest=fewest)
         monitor.refuse(not agrees)
         if factor != self.factor:
             self.factor = factor

@@ -16,7 +16,7 @@ from gfimu.integrity.monitor import ChannelMonitor
 from gfimu.integrity.policy import MonitorPolicy
 from gfimu.integrity.recursion.blocks import block_means
 from gfimu.integrity.residue import with_residue
-from gfimu.integrity.rest import leading_rest, rest_bias
+from gfimu.integrity.rest import leading_rest, rest_bias, with_measured_noise
 from gfimu.integrity.start import MotionStart
 from gfimu.rate.sensing import SensorErrors
 from gfimu.short_repr import short_repr
@@ -181,21 +181,27 @@ class LiveWatch:
     def _begin(self) -> bool:
         """Take the biases from the rest at the start, once it has lasted long enough or is over."""
         rows = np.concatenate(self._rows)
-        count, over = leading_rest(self.array, self._period, rows, self._errors)
+        errors = with_measured_noise(self._period, rows, self._errors, self.policy)
+        count, over = leading_rest(self.array, self._period, rows, errors)
         seconds = count * self._period
         if over and seconds < self.policy.least_rest_s:
             self.in_motion = True
             return False
         if not over and seconds < self.policy.live_rest_s:
             return False
+        self._errors = errors
         self._bias = rest_bias(self.array, rows[:count])
-        self._agreement = Agreement(with_residue(self.array, self._errors, self.policy), self.policy)
+        self._agreement = Agreement(with_residue(self.array, errors, self.policy), self.policy)
         self._monitor = ChannelMonitor(self.array, self._agreement.errors, self._period, policy=self.policy)
         self._monitor.noise_in_motion = False  # until the channels were seen to agree
         return True
 
-    def begin_in_motion(self, start: MotionStart, t_s: float) -> HealthEvent:
-        """Begin with the next sample, behind one at ``t_s`` with this rate and these biases."""
+    def begin_in_motion(self, start: MotionStart, t_s: float, readings: NDArray[np.float64]) -> HealthEvent:
+        """Begin with the next sample, behind one at ``t_s`` with this rate and these biases.
+
+        ``readings`` (n, c), m/s², are those before it, from which the noise of the channels is measured.
+        """
+        self._errors = with_measured_noise(self._period, readings, self._errors, self.policy)
         left = with_residue(self.array, self._errors, self.policy)
         left = replace(left, bias_std=np.maximum(left.bias_std, start.bias_std))
         self._bias = start.bias
@@ -215,13 +221,13 @@ class LiveWatch:
         blocks = block_means(times[:whole], rows[:whole] - self._bias, self._errors.limits, monitor.samples)
         monitor.extend(blocks)
         now = float(times[whole - 1])
+        if monitor.lost:
+            self._over = "too few channels agree for the rate to be followed"
+            return [self._give_up(now)]
         if self._agreement is not None:
             self._agreement.judge(monitor)
         events = self._changes(monitor, now)
         monitor.forget()
-        if monitor.lost:
-            self._over = "too few channels agree for the rate to be followed"
-            events.append(self._give_up(now))
         return events
 
     def _changes(self, monitor: ChannelMonitor, now: float) -> list[HealthEvent]:

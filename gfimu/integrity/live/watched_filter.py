@@ -127,7 +127,8 @@ class WatchedRateFilter:
         start = self._settling.start(self._live)
         if start is None:
             return
-        self._events.append(self.watch.begin_in_motion(start, now))
+        before = np.concatenate([samples.readings[samples.t <= now] for samples in self._samples])
+        self._events.append(self.watch.begin_in_motion(start, now, before))
         for samples in self._samples:
             later = samples.t > now
             if later.any():

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from gfimu.short_repr import short_repr
 
-__all__ = ["Blocks", "block_means", "scatter"]
+__all__ = ["Blocks", "block_means", "detrended_variance", "scatter"]
 
 
 @dataclass(frozen=True)
@@ -80,6 +80,16 @@ def block_means(
         missing,
         whole,
     )
+
+
+def detrended_variance(blocks: Blocks) -> tuple[NDArray[np.float64], int]:
+    """Return the variance of each channel's readings within blocks, shape (m, c), (m/s²)², and its degrees of freedom.
+
+    Mean, slope and curvature are taken out of each block, as a fast turn has them; B − 3 degrees of freedom remain.
+    """
+    freedom = blocks.samples - 3
+    left = _without_motion(blocks.samples) @ blocks.readings  # (m, B, c)
+    return np.asarray(np.sum(left**2, axis=1) / freedom), freedom
 
 
 def scatter(blocks: Blocks, rows: slice, null_rows: NDArray[np.float64]) -> tuple[NDArray[np.float64], int]:

@@ -11,6 +11,7 @@ from gfimu.integrity.recursion.blocks import Blocks
 from gfimu.integrity.recursion.isolation import deflate, strongest
 from gfimu.integrity.recursion.state import MonitorState, MonitorTables, MonitorTuning
 from gfimu.integrity.recursion.steps import advance, model_errors
+from gfimu.integrity.recursion.turning import turning_of
 from gfimu.rate.sensing import ChannelTables, SensorErrors
 
 __all__ = ["MonitorFilter"]
@@ -211,7 +212,9 @@ class MonitorFilter:
         model_errors(self.state if state is None else state, self._tuning, std)
         return std
 
-    def unexplained_without(self, blocks: Blocks, rows: slice, watched: NDArray[np.bool_], *, base: int) -> float:
+    def unexplained_without(
+        self, blocks: Blocks, rows: slice, watched: NDArray[np.bool_], levels: NDArray[np.float64], *, base: int
+    ) -> float:
         """Return the largest statistic that remains had only these channels been used in ``rows``; ∞ where it ran away.
 
         The parameters are those of `advance`.
@@ -221,7 +224,7 @@ class MonitorFilter:
         count = rows.stop - rows.start
         self._run(
             state, blocks, rows, watched, self._blind(), base=base,
-            levels=np.ones(count), omega=np.empty((count, 3)), std=np.empty((count, 3)), nis=np.empty(count),
+            levels=levels[rows], omega=np.empty((count, 3)), std=np.empty((count, 3)), nis=np.empty(count),
         )  # fmt: skip
         if _lost(state):
             return np.inf
@@ -246,11 +249,11 @@ class MonitorFilter:
         times = blocks.t[rows]
         before = blocks.t[rows.start - 1] if rows.start else blocks.t[0] - self.block_s
         sets = self._sets(blocks, watched, rows)
+        turning = turning_of(blocks, rows, self.tables.alpha_rows, sets, self.block_s / self.samples)
         try:
             place, slot = advance(
-                self._compiled_tables(), tuning, state, blocks.means[rows], np.diff(times, prepend=before), sets,
-                arrays["levels"], watched, arrays["omega"], arrays["std"], arrays["nis"], 0, len(times),
-                base + rows.start,
+                self._compiled_tables(), tuning, state, blocks.means[rows], turning, np.diff(times, prepend=before),
+                sets, arrays["levels"], watched, arrays["omega"], arrays["std"], arrays["nis"], base + rows.start,
             )  # fmt: skip
         except np.linalg.LinAlgError:  # the filter ran away
             state.omega[:] = np.nan

@@ -41,8 +41,13 @@ class BlockNoise:
     def __init__(self, null_rows: NDArray[np.float64], block_s: float, threshold: float, policy: MonitorPolicy) -> None:
         self._null_rows, self._block_s, self._threshold, self._policy = null_rows, block_s, threshold, policy
         self._seen = np.flatnonzero(np.sum(null_rows**2, axis=0) > 0.0)
+        directions = null_rows[:, self._seen] / np.linalg.norm(null_rows[:, self._seen], axis=0)
+        self._overlap = (
+            directions.T @ directions
+        ) ** 2  # (s, s) share of a channel's variance along another's direction
         self._forget = min(1.0, block_s / policy.noise_memory_s)
-        self._smooth = np.full((1, len(self._seen)), 1.0 - self._forget)  # state of the filter
+        self._smooth = np.full((1, len(self._seen) + 1), 1.0 - self._forget)  # state of the filter
+        self._smooth[0, -1] = 0.0
         self._count = 0  # blocks so far, those that were dropped included
         self.levels = np.zeros(0)
         self._noisy = np.zeros(0, dtype=np.int64)  # channel that is noisier than all others in each block, else −1
@@ -60,17 +65,26 @@ class BlockNoise:
         levels, noisy = np.ones(count), np.full(count, -1, dtype=np.int64)
         if count and len(self._seen) > 1:
             counted = np.where(whole, ratios, 1.0)[:, self._seen]
-            largest = np.maximum(counted.max(axis=1, keepdims=True), 1.0)
-            counted = counted * np.minimum(1.0, self._policy.largest_scatter / largest)
+            loudest = np.argmax(counted, axis=1)
+            beside = self._overlap[loudest] * np.maximum(np.max(counted, axis=1) - 1.0, 0.0)[:, None]
+            shared = np.median(
+                counted - beside, axis=1
+            )  # without what the loudest channel does to the directions of others
+            shared = np.where(shared > self._sudden(freedom), shared, 1.0)  # level of this block alone
+            foreign = 1.0 - 1.0 / shared  # share that the stated noise does not explain, and no channel is known to own
+            largest = np.maximum(counted.max(axis=1), 1.0)
+            counted = counted * np.minimum(1.0, self._policy.largest_scatter * shared / largest)[:, None]
             forget = self._forget
-            smooth, self._smooth = lfilter([forget], [1.0, forget - 1.0], counted, axis=0, zi=self._smooth)
-            levels = np.maximum(1.0, np.median(smooth, axis=1))
+            columns = np.column_stack([counted / shared[:, None], foreign**2])
+            smooth, self._smooth = lfilter([forget], [1.0, forget - 1.0], columns, axis=0, zi=self._smooth)
+            smooth, foreign_square = smooth[:, :-1], smooth[:, -1]
+            common = np.maximum(1.0, np.median(smooth, axis=1))
+            levels = common * shared
             number = self._count + np.arange(count)
             memory = np.minimum(number + 1, 2.0 / forget - 1.0) * freedom
-            excess = np.maximum(smooth / levels[:, None], 1.0)
+            excess = np.maximum(smooth / common[:, None], 1.0)
             statistic = memory[:, None] * (excess - 1.0 - np.log(excess))
-            foreign = 1.0 - 1.0 / levels  # share that the stated noise does not explain, and no channel is known to own
-            statistic /= (1.0 + 0.5 * memory * foreign**2)[:, None]
+            statistic /= (1.0 + 0.5 * memory * (foreign_square + self._doubt(freedom)))[:, None]
             top = np.partition(statistic, -2, axis=1)
             found = (number * self._block_s > self._policy.noise_settled_s) & (top[:, -1] > self._threshold)
             found &= top[:, -1] - top[:, -2] > self._policy.isolation
@@ -79,6 +93,17 @@ class BlockNoise:
         self.levels = np.concatenate([self.levels, levels])
         self._noisy = np.concatenate([self._noisy, noisy])
         self._loud = np.concatenate([self._loud, loud])
+
+    def _sudden(self, freedom: int) -> float:
+        """Return the level of one block that noise alone hardly ever reaches."""
+        total = freedom * int(np.linalg.matrix_rank(self._null_rows))
+        return float(chdtri(total, 1.0 - self._policy.calm) / total)
+
+    def _doubt(self, freedom: int) -> float:
+        """Return the variance of ln q that noise has which was measured in a rest at the start."""
+        policy = self._policy
+        measured = policy.live_rest_s / self._block_s * freedom / np.pi  # 1/variance of the logarithm of a median
+        return float(1.0 / (measured + policy.noise_spread**-2))
 
     def drop(self, count: int) -> None:
         """Forget the first blocks."""

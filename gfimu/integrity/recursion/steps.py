@@ -1,15 +1,16 @@
 """The recursion of the monitor of channels, compiled: an extended Kalman filter and the signatures of faults in it.
 
-State x = [ω (3); b (c)], b the biases of the channels. From the mean readings ȳ of one block to the next, T later,
+State x = [ω (3); b (c)], ω in the middle of a block and b the biases of the channels. From the middle of one block to
+that of the next, T later,
 
-    ω ← ω + T (A (ȳ_m − b) − L s(ω)),      ȳ_m the mean of both blocks                                   (1)
+    ω ← ω + T (A (ȳ_m − b) − L s(ω)),      ȳ_m the mean of the samples between                           (1)
 
-and the null space is the measurement, one whitened row after the other,
+and the null space of the block's mean readings ȳ is the measurement, one whitened row after the other,
 
-    z_j = Z_j (ȳ − b) = M_j s(ω) + noise of variance 1/B,                                                (2)
+    z_j = Z_j (ȳ − b) = M_j ⟨s(ω)⟩ + noise of variance 1/B,                                              (2)
 
-with s the products of ω and B the samples of a block. Within a block in which ω changes by α T the mean of ω_i ω_j is
-larger by α_i α_j T²/12.
+with B the samples of a block and ⟨s⟩ the mean of the products of ω over it. By what ω does within the block, δ, which
+the samples of α show (`gfimu.integrity.recursion.turning`), ⟨s(ω)⟩ = s(ω + ⟨δ⟩) + ⟨δδ⟩ − s(⟨δ⟩).
 
 A constant fault of one unit on channel i from block k₀ on makes the state wrong by column i of G and the innovations
 by h (Willsky and Jones, IEEE Trans. Automatic Control 21, 1976):
@@ -35,12 +36,12 @@ _TINY = 1e-14  # numerical: least variance kept on the diagonal of the covarianc
 
 
 @njit(**COMPILE)
-def advance(tables, tuning, state, means, steps, sets, levels, watched, omega, std, nis, first, last, base):  # type: ignore[no-untyped-def]
-    """Take the blocks ``first`` to ``last − 1``; stop behind one in which a fault is seen.
+def advance(tables, tuning, state, means, turning, steps, sets, levels, watched, omega, std, nis, base):  # type: ignore[no-untyped-def]
+    """Take n blocks; stop behind one in which a fault is seen.
 
-    ``means`` (n, c), ``steps`` (n,) s since the block before, ``sets`` (n,) of channels, ``levels`` (n,) measured
-    variance of the null space over the stated one. ``omega``, ``std`` (n, 3) and ``nis`` (n,) are filled. ``base`` is
-    the number of the first of the n blocks since the start of the run.
+    ``means`` (n, c), ``turning`` (n, 12) (`turning.turning_of`), ``steps`` (n,) s since the block before, ``sets`` (n,)
+    of channels, ``levels`` (n,) measured variance of the null space over the stated one. ``omega``, ``std`` (n, 3) and
+    ``nis`` (n,) are filled. ``base`` is the number of the first of the n blocks since the start of the run.
 
     Returns
     -------
@@ -50,8 +51,8 @@ def advance(tables, tuning, state, means, steps, sets, levels, watched, omega, s
     c = means.shape[1]
     model_std = np.empty(c)
     pending = 0.0
-    k = first
-    while k < last:
+    k = 0
+    while k < len(means):
         _keep(state, base + k)
         place = sets[k]
         level = levels[k]
@@ -70,13 +71,13 @@ def advance(tables, tuning, state, means, steps, sets, levels, watched, omega, s
             for i in range(len(state.last)):
                 state.last[i] = means[k, i]
             step = 0.5 * tuning.period * (1.0 - 1.0 / tuning.samples)
-        _predict(tables, tuning, state, means[k], step, place, level, transition)
+        _predict(tables, tuning, state, means[k], turning[k], step, place, level, transition)
         if step > 1.5 * tuning.period:
             state.ages[:] = 0.0
         if tuning.follow:
             new_slot(state, tuning.oldest)
             carry_signatures(tables, state, transition, step, place)
-        nis[k] = _update(tables, tuning, state, means[k], place, level)
+        nis[k] = _update(tables, tuning, state, means[k], turning[k], place, level)
         omega[k] = state.omega
         for a in range(3):
             std[k, a] = np.sqrt(max(state.covariance[a, a], 0.0))
@@ -144,7 +145,7 @@ def _slope(row, w, out):  # type: ignore[no-untyped-def]
 
 
 @njit(**COMPILE)
-def _predict(tables, tuning, state, mean, step, place, level, transition):  # type: ignore[no-untyped-def]
+def _predict(tables, tuning, state, mean, turning, step, place, level, transition):  # type: ignore[no-untyped-def]
     """Carry state and covariance over to the next block, (1); ``transition`` becomes Φ_ω − 1."""
     alpha_rows = tables.alpha[place]
     leak = tables.leak[place]
@@ -153,8 +154,9 @@ def _predict(tables, tuning, state, mean, step, place, level, transition):  # ty
     p = state.covariance
     alpha = np.zeros(3)
     for a in range(3):
+        alpha[a] = turning[a]
         for i in range(c):
-            alpha[a] += alpha_rows[a, i] * (0.5 * (mean[i] + state.last[i]) - state.bias[i])
+            alpha[a] -= alpha_rows[a, i] * state.bias[i]
     leaky = False
     for a in range(3):
         for j in range(6):
@@ -209,21 +211,18 @@ def _predict(tables, tuning, state, mean, step, place, level, transition):  # ty
 
 
 @njit(**COMPILE)
-def _update(tables, tuning, state, mean, place, level):  # type: ignore[no-untyped-def]
+def _update(tables, tuning, state, mean, turning, place, level):  # type: ignore[no-untyped-def]
     """Measure the null space row by row, (2), with all signatures, (3); returns the normalised innovation squared."""
     c = len(mean)
     n = 3 + c
     p = state.covariance
     before = state.omega.copy()
-    products = _products(before)
-    alpha = np.zeros(3)
-    for a in range(3):  # the change of ω within the block
-        for i in range(c):
-            alpha[a] += tables.alpha[place, a, i] * (mean[i] - state.bias[i])
-    span = tuning.period * tuning.period / 12.0
-    pairs = _products(alpha)
+    average = np.empty(3)  # ω over the block
+    for a in range(3):
+        average[a] = before[a] + turning[3 + a]
+    products = _products(average)
     for j in range(6):
-        products[j] += span * pairs[j]
+        products[j] += turning[6 + j]
     noise = level / tuning.samples
     h = np.zeros(n)
     ph = np.zeros(n)
@@ -233,7 +232,7 @@ def _update(tables, tuning, state, mean, place, level):  # type: ignore[no-untyp
     for j in range(tables.null_count[place]):
         z_row = tables.null[place, j]
         m_row = tables.sensitivity[place, j]
-        _slope(m_row, before, slope)
+        _slope(m_row, average, slope)
         innovation = 0.0
         for a in range(6):
             innovation -= m_row[a] * products[a]

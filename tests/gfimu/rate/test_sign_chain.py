@@ -10,7 +10,7 @@ from rate_worlds import GRAVITY, TURN_ON_BIAS, Motion, cube, measure, sensor_err
 
 from gfimu.rate.kalman import FilterSettings
 from gfimu.rate.methods import estimate_rate
-from gfimu.rate.sign_chain import SignSteps, sign_probabilities
+from gfimu.rate.sign_chain import SignChain, SignSteps, sign_probabilities
 
 RATE = 100.0
 DARK = FilterSettings(start_omega=None)
@@ -87,11 +87,18 @@ def test_the_signs_of_the_single_estimates_do_not_matter():
     assert np.mean(one[fast] > 0.99) > 0.95
 
 
-def test_causal_probabilities_use_the_past_alone():
+def test_a_chain_while_samples_arrive_gives_the_same_in_pieces_of_any_size():
     t, alpha, omega = swing()
-    whole = sign_probabilities(steps(t, alpha, omega, 0.2), causal=True)
-    part = sign_probabilities(steps(t[:500], alpha[:500], omega[:500], 0.2), causal=True)
-    np.testing.assert_allclose(whole[:400], part[:400], atol=1e-9)  # α is averaged over a quarter of a second ahead
+    whole = SignChain(1 / RATE).push(steps(t, alpha, omega, 0.2))
+    for size in (1, 7, 400):
+        chain = SignChain(1 / RATE)
+        parts = [
+            chain.push(steps(t[k : k + size], alpha[k : k + size], omega[k : k + size], 0.2))
+            for k in range(0, len(t), size)
+        ]
+        np.testing.assert_allclose(np.concatenate(parts), whole, atol=1e-6)
+    fast = np.abs(5 * np.sin(2 * t + 1)) > 1.5
+    assert np.mean(whole[fast] > 0.99) > 0.9
 
 
 def test_decided_signs_are_right_as_often_as_stated():
