@@ -21,7 +21,17 @@ from numpy.typing import NDArray
 from gfimu.errors import InputError
 from gfimu.files.atomic_file import atomic_path
 from gfimu.files.input_file import LONGEST_LINE, MOST_COLUMNS, check_input
-from gfimu.files.table import ArrowStream, column_type, from_json, metadata_of_schema, numbers, schema_metadata, to_json
+from gfimu.files.table import (
+    ArrowStream,
+    arrow_column,
+    as_found,
+    column_type,
+    from_json,
+    metadata_of_schema,
+    numbers,
+    schema_metadata,
+    to_json,
+)
 from gfimu.files.table_columns import TableColumns
 
 __all__ = ["ColumnFile", "head_line", "open_columns", "write_columns"]
@@ -126,7 +136,7 @@ def _write_parquet(file: Path, columns: Mapping[str, NDArray[Any]], metadata: Ma
     # Readings are nearly random in their low bits: a dictionary would only cost time and memory.
     with pq.ParquetWriter(file, schema, compression="zstd", use_dictionary=False, write_page_checksum=True) as writer:
         for rows in _row_blocks(columns, _ROW_GROUP_ROWS):
-            writer.write_table(pa.table([pa.array(values[rows]) for values in columns.values()], schema=schema))
+            writer.write_table(pa.table([arrow_column(values[rows]) for values in columns.values()], schema=schema))
 
 
 def _write_csv(file: Path, columns: Mapping[str, NDArray[Any]], metadata: Mapping[str, Any]) -> None:
@@ -176,7 +186,7 @@ class _ParquetColumns:
 
     def read_as_found(self, columns: Sequence[str]) -> dict[str, NDArray[Any]]:
         try:
-            return {name: self._parquet.read(columns=[name]).column(name).to_numpy() for name in columns}
+            return {name: as_found(self._parquet.read(columns=[name]).column(name)) for name in columns}
         except (pa.ArrowException, OSError) as error:
             raise self._damaged(error) from None
 
@@ -246,7 +256,7 @@ class _CsvColumns:
                 table = pa_csv.read_csv(self.file, read_options=read, convert_options=convert)
             except pa.ArrowException as error:
                 raise self._locate(columns, error) from None
-        return {name: table.column(name).to_numpy() for name in columns}
+        return {name: as_found(table.column(name)) for name in columns}
 
     def place(self, row: int) -> str:
         samples = -1

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 __all__ = [
     "ArrowStream",
     "Tabular",
+    "arrow_column",
+    "as_found",
     "column_type",
     "from_json",
     "metadata_of_schema",
@@ -111,5 +113,21 @@ def metadata_of_schema(pairs: Mapping[bytes, bytes] | None) -> dict[str, Any]:
 
 def numbers(column: pa.Array | pa.ChunkedArray) -> NDArray[np.float64]:
     """Numbers of an Arrow column; nulls become NaN."""
+    return np.asarray(as_found(column), dtype=np.float64)
+
+
+def arrow_column(values: NDArray[Any]) -> pa.Array:
+    """Return an array (n,) as an Arrow column; pandas, where installed, is not imported for numbers."""
+    if values.dtype.kind in "fiu" and values.dtype.isnative:
+        kind = pa.from_numpy_dtype(values.dtype)
+        return pa.Array.from_buffers(kind, len(values), [None, pa.py_buffer(np.ascontiguousarray(values))])
+    return pa.array(values)
+
+
+def as_found(column: pa.Array | pa.ChunkedArray) -> NDArray[Any]:
+    """Return an Arrow column as an array of its own kind; pandas, where installed, is not imported for numbers."""
+    if pa.types.is_float64(column.type) and not column.null_count:
+        chunks = column.chunks if isinstance(column, pa.ChunkedArray) else [column]
+        return np.concatenate([np.from_dlpack(chunk) for chunk in chunks]) if chunks else np.empty(0)
     values = column.to_numpy() if isinstance(column, pa.ChunkedArray) else column.to_numpy(zero_copy_only=False)
-    return np.asarray(values, dtype=np.float64)
+    return np.asarray(values)

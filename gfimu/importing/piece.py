@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from gfimu.errors import InputError
 from gfimu.importing.clock import Times, times_of
@@ -192,6 +191,8 @@ def _at(t: NDArray[np.float64], times: NDArray[np.float64], values: NDArray[np.f
     known = np.isfinite(values)
     if known.sum() < 4:
         return np.full(len(t), np.nan)
+    from scipy.interpolate import CubicSpline  # takes a while, and few recordings need it
+
     seen, found = times[known], CubicSpline(times[known], values[known])(t)
     after = np.clip(np.searchsorted(seen, t), 1, len(seen) - 1)
     gap = seen[after] - seen[after - 1] > _GAP * np.median(np.diff(times))

@@ -5,12 +5,12 @@ from __future__ import annotations
 from numba import njit
 
 from gfimu.rate.quadrature import polynomial_weights
-from gfimu.rate.recursion_data import COMPILE
+from gfimu.rate.recursion_data import INNER
 
 __all__ = ["interval_weights"]
 
 
-@njit(**COMPILE)
+@njit(**INNER)
 def interval_weights(data, tuning, k, closing, weights):  # type: ignore[no-untyped-def]
     """Weights of the interval from sample k − 1 to k; returns the stencil's first sample and its length."""
     points = tuning.weights.shape[1]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from numba import njit
 
-from gfimu.rate.recursion_data import COMPILE, FIFTH, FOURTH
+from gfimu.rate.recursion_data import FIFTH, FOURTH, INNER
 
 __all__ = ["follow_differences", "inflation_of", "undersampled"]
 
@@ -14,7 +14,7 @@ _FIFTH_OF_NOISE = 252.0
 _ROUGH_SHARE = 1.0 / (12.0 * 70.0)  # (Δt² × variance of the step)/12 by the fifth difference of a random walk
 
 
-@njit(**COMPILE)
+@njit(**INNER)
 def inflation_of(data, k, state, tuning, omega_squared):  # type: ignore[no-untyped-def]
     """Variance of scale, placement and timing errors against the noise; lasting ones count as white over a second."""
     c = data.y.shape[1]
@@ -35,7 +35,7 @@ def inflation_of(data, k, state, tuning, omega_squared):  # type: ignore[no-unty
     return lasting * max(_ERROR_MEMORY / tuning.period, 1.0) + moved
 
 
-@njit(**COMPILE)
+@njit(**INNER)
 def follow_differences(alpha, start, forget, scalars):  # type: ignore[no-untyped-def]
     """Average the squares of the fourth and fifth differences of α over the last second."""
     fourth = 0.0
@@ -51,7 +51,7 @@ def follow_differences(alpha, start, forget, scalars):  # type: ignore[no-untype
     scalars[FIFTH] += forget * (fifth - scalars[FIFTH])
 
 
-@njit(**COMPILE)
+@njit(**INNER)
 def undersampled(noise_power, scalars):  # type: ignore[no-untyped-def]
     """Variance of α per axis that the polynomial through its samples does not follow.
 

@@ -32,7 +32,7 @@ from numba import njit
 
 from gfimu.rate.interval import interval_weights
 from gfimu.rate.model_errors import follow_differences, inflation_of, undersampled
-from gfimu.rate.recursion_data import BLOCK, COMPILE, LAST_GOOD, RETURN, SAMPLES, STARTED, TIME, WALK
+from gfimu.rate.recursion_data import BLOCK, COMPILE, INNER, LAST_GOOD, RETURN, SAMPLES, STARTED, TIME, WALK
 from gfimu.rate.rest_recursion import keep_rest, rest_block
 from gfimu.rate.second_order import second_order
 
@@ -235,7 +235,8 @@ def forward(  # type: ignore[no-untyped-def]
                         rows[a, a] = 1.0
                         rows[a, 3 + a] = -step
                         rows[a, noise_row + a] = carried
-                record.transition[row] = rows
+                for a in range(3):
+                    _copy(rows[a], record.transition[row, a])
         else:
             settled = (1.0 + inflation) * renewed / (1.0 - ringing * ringing)
             _renew_noise(x, covariance, tables.alpha_noise[noise_set], settled, 0.0, 0.0)
@@ -299,7 +300,7 @@ def forward(  # type: ignore[no-untyped-def]
                 else:
                     for j in range(d):
                         innovations[i] -= tables.null_bias[place, i, j] * x[6 + j]
-            before[:] = x
+            _copy(x, before)
             for i in range(measured_rows):
                 h[:] = 0.0
                 for a in range(3):
@@ -379,8 +380,9 @@ def forward(  # type: ignore[no-untyped-def]
         if keep:
             record.updates[row] = used_rows
         if tuning.rest_window > 0 and state.counts[BLOCK] == 0:
-            state.block_x[:] = x
-            state.block_covariance[:] = covariance
+            _copy(x, state.block_x)
+            for r in range(n):
+                _copy(covariance[r], state.block_covariance[r])
             if rest:
                 keep_rest(state)
 
@@ -411,7 +413,14 @@ def forward(  # type: ignore[no-untyped-def]
     return last
 
 
-@njit(**COMPILE)
+@njit(**INNER)
+def _copy(source, target):  # type: ignore[no-untyped-def]
+    """Copy number by number: a slice takes ten times as long to compile."""
+    for r in range(len(source)):
+        target[r] = source[r]
+
+
+@njit(**INNER)
 def _correct(alpha, tables, place, x, omega0, omega1, omega2, out):  # type: ignore[no-untyped-def]
     """Take K b_z and L s(ω) out of one sample of α."""
     d = tables.alpha_bias.shape[2]
@@ -430,7 +439,7 @@ def _correct(alpha, tables, place, x, omega0, omega1, omega2, out):  # type: ign
         out[a] = value
 
 
-@njit(**COMPILE)
+@njit(**INNER)
 def _renew_noise(x, covariance, noise, factor, ringing, half):  # type: ignore[no-untyped-def]
     """Take the ε of a new sample into the state, (1b), and half of what is new in it into ω."""
     noise_row = len(x) - 3
@@ -449,7 +458,7 @@ def _renew_noise(x, covariance, noise, factor, ringing, half):  # type: ignore[n
             covariance[a, b] += half * half * value
 
 
-@njit(**COMPILE)
+@njit(**INNER)
 def _apply(x, covariance, ph, inverse, innovation):  # type: ignore[no-untyped-def]
     """Update by one scalar measurement: x += P h e/S, P −= P h hᵀP/S."""
     n = len(x)
@@ -464,7 +473,7 @@ def _apply(x, covariance, ph, inverse, innovation):  # type: ignore[no-untyped-d
             covariance[r, q] -= factor * ph[q]
 
 
-@njit(**COMPILE)
+@njit(**INNER)
 def _remember(record, row, place, h, ph, inverse, innovation):  # type: ignore[no-untyped-def]
     """Store one scalar update for the backward pass."""
     for r in range(len(h)):
@@ -474,7 +483,7 @@ def _remember(record, row, place, h, ph, inverse, innovation):  # type: ignore[n
     record.innovation[row, place] = innovation
 
 
-@njit(**COMPILE)
+@njit(**INNER)
 def _manoeuvre(alpha, noise, tuning, state):  # type: ignore[no-untyped-def]
     """Average α over the filter's memory 1/|ω|; returns its largest component in standard deviations, squared."""
     x = state.x

@@ -7,10 +7,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["COMPILE", "Record", "RecursionInput", "RecursionOutput", "RecursionState", "Tables", "Tuning"]
+__all__ = ["COMPILE", "INNER", "Record", "RecursionInput", "RecursionOutput", "RecursionState", "Tables", "Tuning"]
 
 COMPILE: dict[str, Any] = {"cache": True, "error_model": "numpy", "fastmath": {"contract", "reassoc", "nsz"}}
 """Options of numba for the recursions."""
+
+INNER: dict[str, Any] = {**COMPILE, "cache": False, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+"""The same for functions that only compiled ones call: no entry from Python is compiled, and none kept."""
 
 # Places in RecursionState.scalars
 TIME, WALK, LAST_GOOD, FOURTH, FIFTH = range(5)

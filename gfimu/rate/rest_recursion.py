@@ -7,8 +7,8 @@ from numba import njit
 
 from gfimu.rate.recursion_data import (
     BLOCK,
-    COMPILE,
     DOUBT,
+    INNER,
     PAIR,
     PAST,
     REST_BLOCKS,
@@ -23,7 +23,7 @@ from gfimu.rate.rest_test import HISTORY_BLOCKS
 __all__ = ["keep_rest", "rest_block"]
 
 
-@njit(**COMPILE)
+@njit(**INNER)
 def rest_block(data, k, tables, tuning, state):  # type: ignore[no-untyped-def]
     """Count sample k into the block; at the block's end test for rest (`gfimu.rate.rest_test`).
 
@@ -67,7 +67,7 @@ def rest_block(data, k, tables, tuning, state):  # type: ignore[no-untyped-def]
     return counts[RESTING] > 0 and counts[DOUBT] == 0
 
 
-@njit(**COMPILE)
+@njit(**INNER)
 def _return_before(back, window, state):  # type: ignore[no-untyped-def]
     """Mark the kept state before the last ``back`` blocks of rest, or as many of them as are at hand."""
     counts = state.counts
@@ -79,7 +79,7 @@ def _return_before(back, window, state):  # type: ignore[no-untyped-def]
         back -= 1
 
 
-@njit(**COMPILE)
+@njit(**INNER)
 def keep_rest(state):  # type: ignore[no-untyped-def]
     """Keep the state after a block of rest, so that later blocks can be taken back."""
     place = state.counts[PAST] % len(state.past_x)
@@ -93,7 +93,7 @@ def keep_rest(state):  # type: ignore[no-untyped-def]
     state.counts[PAST] += 1
 
 
-@njit(**COMPILE)
+@njit(**INNER)
 def _moving_blocks(y, tables, tuning, state):  # type: ignore[no-untyped-def]
     """Test the block of readings y (window, c) for rest: 0, or how many blocks up to this one move.
 
@@ -197,7 +197,7 @@ def _moving_blocks(y, tables, tuning, state):  # type: ignore[no-untyped-def]
     return 0
 
 
-@njit(**COMPILE)
+@njit(**INNER)
 def _moving_run(alpha, tables, tuning, state):  # type: ignore[no-untyped-def]
     """Test the blocks in a row that ended with this one, which alone moves not; rest begins when they are enough.
 
@@ -239,7 +239,7 @@ def _moving_run(alpha, tables, tuning, state):  # type: ignore[no-untyped-def]
     return 0
 
 
-@njit(**COMPILE)
+@njit(**INNER)
 def _run_statistic(span, tables, tuning, state):  # type: ignore[no-untyped-def]
     """Mean α of the last ``span`` blocks against its bias as known when they began."""
     length = len(state.run_alpha)
@@ -258,7 +258,7 @@ def _run_statistic(span, tables, tuning, state):  # type: ignore[no-untyped-def]
     return _normalised_square(spread, difference, 3)
 
 
-@njit(**COMPILE)
+@njit(**INNER)
 def _normalised_square(spread, value, size):  # type: ignore[no-untyped-def]
     """Return vᵀ S⁻¹ v of the first ``size`` components by Cholesky's factors; both arguments are overwritten.
 

@@ -11,7 +11,6 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from gfimu.recording.recording import Recording
 from gfimu.units import TIME_COLUMNS
@@ -60,6 +59,8 @@ def reference_on_rows(recording: Recording) -> Recording:
             np.abs(rows - t[after - 1]) <= recording.sample_period
         )
         near &= (rows >= t[0] - recording.sample_period) & (rows <= t[-1] + recording.sample_period)
+        from scipy.interpolate import CubicSpline  # takes a while, and few recordings need it
+
         columns[name] = np.where(near, CubicSpline(t, values)(rows), np.nan)
     kept = {name: one for name, one in columns.items() if name not in TIME_COLUMNS.values()}
     changed = len(kept) < len(columns) or any(kept[name] is not recording.reference[name] for name in kept)

@@ -3,11 +3,14 @@
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 import typer
 
 from gfimu.cli.app import program
 from gfimu.cli.command_list import COMMANDS
+from gfimu.geometry.array import AccelerometerArray
+from gfimu.recording import Recording
 
 
 def test_a_second_call_finds_the_program_as_the_first_did(gfimu_command):
@@ -52,6 +55,31 @@ print(*{name.split(".")[0] for name in sys.modules} & {"numba", "pyarrow", "mujo
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert "cube12" in done.stdout
+    assert done.stderr.strip() == ""
+
+
+def test_an_estimate_waits_for_no_library_that_it_does_not_use(tmp_path):
+    """Rest of an ideal cube; pandas where installed, and the parts of scipy that few recordings need."""
+    t = np.arange(300) / 100.0
+    cube = AccelerometerArray.load("cube12")
+    noise = 0.01 * np.random.default_rng(1).standard_normal((len(t), cube.n_channels))
+    readings = noise + cube.regression_matrix[:, 5] * 9.81
+    Recording(t, readings, cube.channels).write(tmp_path / "rest.parquet")
+    code = f"""
+import sys
+from gfimu.cli.app import main
+sys.argv = ["gfimu", "estimate", {str(tmp_path / "rest.parquet")!r}, "--array", "cube12", "--method", "ml",
+            "--out", {str(tmp_path / "out.parquet")!r}]
+try:
+    main()
+except SystemExit as stop:
+    assert not stop.code
+unused = ("pandas", "scipy.signal", "scipy.optimize", "scipy.interpolate", "matplotlib")
+print(*(name for name in unused if name in sys.modules), file=sys.stderr)
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "out.parquet").exists()
     assert done.stderr.strip() == ""
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 from scipy.special import chdtri
 
 from gfimu.integrity.policy import MonitorPolicy
@@ -42,12 +41,10 @@ class BlockNoise:
         self._null_rows, self._block_s, self._threshold, self._policy = null_rows, block_s, threshold, policy
         self._seen = np.flatnonzero(np.sum(null_rows**2, axis=0) > 0.0)
         directions = null_rows[:, self._seen] / np.linalg.norm(null_rows[:, self._seen], axis=0)
-        self._overlap = (
-            directions.T @ directions
-        ) ** 2  # (s, s) share of a channel's variance along another's direction
+        # Share of a channel's variance along another's direction, (s, s).
+        self._overlap = (directions.T @ directions) ** 2
         self._forget = min(1.0, block_s / policy.noise_memory_s)
-        self._smooth = np.full((1, len(self._seen) + 1), 1.0 - self._forget)  # state of the filter
-        self._smooth[0, -1] = 0.0
+        self._smooth = np.append(np.ones(len(self._seen)), 0.0)  # means over the memory so far
         self._count = 0  # blocks so far, those that were dropped included
         self.levels = np.zeros(0)
         self._noisy = np.zeros(0, dtype=np.int64)  # channel that is noisier than all others in each block, else −1
@@ -67,16 +64,18 @@ class BlockNoise:
             counted = np.where(whole, ratios, 1.0)[:, self._seen]
             loudest = np.argmax(counted, axis=1)
             beside = self._overlap[loudest] * np.maximum(np.max(counted, axis=1) - 1.0, 0.0)[:, None]
-            shared = np.median(
-                counted - beside, axis=1
-            )  # without what the loudest channel does to the directions of others
+            # Without what the loudest channel does to the directions of others.
+            shared = np.median(counted - beside, axis=1)
             shared = np.where(shared > self._sudden(freedom), shared, 1.0)  # level of this block alone
             foreign = 1.0 - 1.0 / shared  # share that the stated noise does not explain, and no channel is known to own
             largest = np.maximum(counted.max(axis=1), 1.0)
             counted = counted * np.minimum(1.0, self._policy.largest_scatter * shared / largest)[:, None]
             forget = self._forget
             columns = np.column_stack([counted / shared[:, None], foreign**2])
-            smooth, self._smooth = lfilter([forget], [1.0, forget - 1.0], columns, axis=0, zi=self._smooth)
+            smooth = np.empty_like(columns)
+            for row, values in enumerate(columns):
+                self._smooth = self._smooth + forget * (values - self._smooth)
+                smooth[row] = self._smooth
             smooth, foreign_square = smooth[:, :-1], smooth[:, -1]
             common = np.maximum(1.0, np.median(smooth, axis=1))
             levels = common * shared

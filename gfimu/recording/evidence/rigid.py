@@ -18,7 +18,6 @@ from typing import Any
 import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
-from scipy.optimize import linprog
 from scipy.spatial.transform import Rotation
 
 from gfimu.errors import InputError
@@ -397,6 +396,8 @@ def _rates_of(products: NDArray[np.floating[Any]]) -> list[NDArray[np.float64]]:
 
 def _least_largest(axes: NDArray[np.float64], mean: NDArray[np.float64], limit: NDArray[np.float64]) -> float:
     """Return the least possible largest residual of a specific force, over each channel's limit (Chebyshev's fit)."""
+    from scipy.optimize import linprog  # takes a while, and few recordings need it
+
     upper = np.hstack([axes, -limit[:, None]])
     lower = np.hstack([-axes, -limit[:, None]])
     found = linprog(
