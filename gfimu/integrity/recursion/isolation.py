@@ -1,7 +1,6 @@
 """Which channels may explain the innovations: one, two, or a whole chip, each at the onset that suits it best.
 
-All functions work on the information C (slots, c, c) and the score d (slots, c) of faults on every channel, slot by
-slot from one onset. A set S
+All functions work on the information C (c, c) and the score d (c,) of faults on every channel from one onset. A set S
 explains T_S = d_Sᵀ C_SS⁻¹ d_S of the sum of squared innovations.
 """
 
@@ -10,7 +9,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
+
+from gfimu.rate.recursion_data import COMPILE
 
 __all__ = ["Explanation", "deflate", "explanations", "strongest"]
 
@@ -26,69 +28,127 @@ class Explanation(NamedTuple):
     slot: int
 
 
-def deflate(
-    information: NDArray[np.float64], score: NDArray[np.float64], std: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Take out of C and d what constant errors of all channels, with these standard deviations m (c,), may explain.
+@njit(**COMPILE)
+def deflate(information, score, std):  # type: ignore[no-untyped-def]
+    """Take out of C and d what constant errors of all channels, with these standard deviations m, may explain.
 
     (1 + C M²)⁻¹ [C, d], written as M⁻¹ (1 + M C M)⁻¹ M [C, d], whose matrix is positive definite.
     """
-    c = len(std)
-    both = std[:, None] * np.concatenate([information, score[..., None]], axis=-1)  # (slots, c, c + 1)
-    solved = np.linalg.solve(np.eye(c) + both[..., :c] * std, both) / std[:, None]
-    return solved[..., :c], solved[..., c]
+    c = len(score)
+    left = np.eye(c)
+    right = np.empty((c, c + 1))
+    for i in range(c):
+        for j in range(c):
+            left[i, j] += std[i] * information[i, j] * std[j]
+            right[i, j] = std[i] * information[i, j]
+        right[i, c] = std[i] * score[i]
+    solved = np.linalg.solve(left, right)
+    for i in range(c):
+        for j in range(c + 1):
+            solved[i, j] /= std[i]
+    return solved[:, :c].copy(), solved[:, c].copy()
 
 
-def strongest(
-    information: NDArray[np.float64], score: NDArray[np.float64], watched: NDArray[np.bool_]
-) -> NDArray[np.float64]:
-    """Return how much the channel explains that explains most alone, shape (slots,)."""
-    return np.asarray(_singles(information, score, watched).max(axis=-1))
+@njit(**COMPILE)
+def strongest(information, score, watched):  # type: ignore[no-untyped-def]
+    """Return the channel that explains most alone, how much, and how much the next one does."""
+    best = -1
+    first = 0.0
+    second = 0.0
+    for i in range(len(score)):
+        if not watched[i] or information[i, i] <= _VISIBLE:
+            continue
+        value = score[i] * score[i] / information[i, i]
+        if value > first:
+            second = first
+            first = value
+            best = i
+        elif value > second:
+            second = value
+    return best, first, second
 
 
-def _singles(
-    information: NDArray[np.float64], score: NDArray[np.float64], watched: NDArray[np.bool_]
-) -> NDArray[np.float64]:
-    """Return what each channel explains alone, shape (slots, c)."""
-    own = np.diagonal(information, axis1=-2, axis2=-1)
-    return np.where(watched & (own > _VISIBLE), score**2 / np.maximum(own, _VISIBLE), 0.0)
+@njit(**COMPILE)
+def _explained(information, score, members):  # type: ignore[no-untyped-def]
+    """Return T_S of a set; 0 where its channels can't be separated."""
+    size = len(members)
+    if size == 2:
+        a = members[0]
+        b = members[1]
+        product = information[a, a] * information[b, b]
+        rest = product - information[a, b] * information[a, b]
+        if not rest > _SEPARATE * product:
+            return 0.0
+        return (
+            score[a] * score[a] * information[b, b]
+            - 2.0 * score[a] * score[b] * information[a, b]
+            + score[b] * score[b] * information[a, a]
+        ) / rest
+    block = np.empty((size, size))
+    part = np.empty(size)
+    for m in range(size):
+        part[m] = score[members[m]]
+        for q in range(size):
+            block[m, q] = information[members[m], members[q]]
+        block[m, m] += _VISIBLE
+    return float(part @ np.linalg.solve(block, part))
 
 
-def _pairs(
-    information: NDArray[np.float64], score: NDArray[np.float64], watched: NDArray[np.bool_]
-) -> NDArray[np.float64]:
-    """Return what each pair explains, shape (slots, c, c), upper triangle; 0 where two channels can't be separated."""
-    own = np.diagonal(information, axis1=-2, axis2=-1)
-    usable = watched & (own > _VISIBLE)
-    product = own[:, :, None] * own[:, None, :]
-    rest = product - information**2
-    separate = np.triu(usable[:, :, None] & usable[:, None, :] & (rest > _SEPARATE * product), 1)
-    alone = score[:, :, None] ** 2 * own[:, None, :]
-    cross = score[:, :, None] * score[:, None, :] * information
-    total = alone - 2.0 * cross + alone.transpose(0, 2, 1)
-    return np.where(separate, total / np.where(separate, rest, 1.0), 0.0)
+@njit(**COMPILE)
+def _values_of_singles(information, score, watched):  # type: ignore[no-untyped-def]
+    """Return what each channel explains alone at its best onset, shape (c,), and that slot, shape (c,)."""
+    slots, c = score.shape
+    values = np.zeros(c)
+    places = np.zeros(c, dtype=np.int64)
+    for s in range(slots):
+        for i in range(c):
+            if watched[i] and information[s, i, i] > _VISIBLE:
+                value = score[s, i] * score[s, i] / information[s, i, i]
+                if value > values[i]:
+                    values[i] = value
+                    places[i] = s
+    return values, places
 
 
-def _chips(
-    information: NDArray[np.float64], score: NDArray[np.float64], watched: NDArray[np.bool_], chips: NDArray[np.int64]
-) -> NDArray[np.float64]:
-    """Return what the watched channels of each chip explain, shape (slots, chips); 0 for fewer than two of them."""
-    values = np.zeros((len(score), chips.max() + 1))
-    for chip in range(values.shape[1]):
+@njit(**COMPILE)
+def _values_of_pairs(information, score, watched):  # type: ignore[no-untyped-def]
+    """Return what each pair explains at its best onset, shape (c, c), upper triangle, and that slot."""
+    slots, c = score.shape
+    values = np.zeros((c, c))
+    places = np.zeros((c, c), dtype=np.int64)
+    pair = np.zeros(2, dtype=np.int64)
+    for s in range(slots):
+        for a in range(c):
+            if not watched[a] or information[s, a, a] <= _VISIBLE:
+                continue
+            for b in range(a + 1, c):
+                if not watched[b] or information[s, b, b] <= _VISIBLE:
+                    continue
+                pair[0] = a
+                pair[1] = b
+                value = _explained(information[s], score[s], pair)
+                if value > values[a, b]:
+                    values[a, b] = value
+                    places[a, b] = s
+    return values, places
+
+
+@njit(**COMPILE)
+def _values_of_chips(information, score, watched, chips):  # type: ignore[no-untyped-def]
+    """Return what the watched channels of each chip explain at their best onset, and that slot."""
+    count = chips.max() + 1
+    values = np.zeros(count)
+    places = np.zeros(count, dtype=np.int64)
+    for chip in range(count):
         members = np.flatnonzero((chips == chip) & watched)
-        part = score[:, members]
-        if len(members) == 2:
-            values[:, chip] = _pairs(information, score, watched)[:, members[0], members[1]]
-        elif len(members) > 2:
-            block = information[:, members[:, None], members] + _VISIBLE * np.eye(len(members))
-            values[:, chip] = np.sum(part * np.linalg.solve(block, part[..., None])[..., 0], axis=1)
-    return values
-
-
-def _at_best(values: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Return the largest of each column of (slots, m), and its slot."""
-    places = np.argmax(values, axis=0)
-    return values[places, np.arange(values.shape[1])], places
+        if len(members) < 2:
+            continue
+        for s in range(score.shape[0]):
+            value = _explained(information[s], score[s], members)
+            if value > values[chip]:
+                values[chip] = value
+                places[chip] = s
+    return values, places
 
 
 def explanations(
@@ -113,14 +173,14 @@ def explanations(
     most : int
         Length of each list, at most.
     """
-    singles, slots = _at_best(_singles(information, score, watched))
+    singles, slots = _values_of_singles(information, score, watched)
     one = [Explanation(np.array([i]), float(singles[i]), int(slots[i])) for i in np.argsort(-singles)[:most]]
-    pairs, slots = _at_best(_pairs(information, score, watched).reshape(len(score), -1))
-    two = [
-        Explanation(np.array(divmod(int(place), len(watched))), float(pairs[place]), int(slots[place]))
-        for place in np.argsort(-pairs)[:most]
-    ]
-    values, slots = _at_best(_chips(information, score, watched, chips))
+    pairs, slots = _values_of_pairs(information, score, watched)
+    two = []
+    for place in np.argsort(-pairs, axis=None)[:most]:
+        a, b = divmod(int(place), len(watched))
+        two.append(Explanation(np.array([a, b]), float(pairs[a, b]), int(slots[a, b])))
+    values, slots = _values_of_chips(information, score, watched, chips)
     whole = [
         Explanation(np.flatnonzero((chips == chip) & watched), float(values[chip]), int(slots[chip]))
         for chip in np.argsort(-values)[:most]

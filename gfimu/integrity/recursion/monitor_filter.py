@@ -9,7 +9,7 @@ from gfimu.geometry.array import AccelerometerArray
 from gfimu.integrity.policy import MonitorPolicy
 from gfimu.integrity.recursion.blocks import Blocks
 from gfimu.integrity.recursion.isolation import deflate, strongest
-from gfimu.integrity.recursion.state import MonitorState, MonitorTables, MonitorTuning, Steps
+from gfimu.integrity.recursion.state import MonitorState, MonitorTables, MonitorTuning
 from gfimu.integrity.recursion.steps import advance, model_errors
 from gfimu.integrity.recursion.turning import turning_of
 from gfimu.rate.sensing import ChannelTables, SensorErrors
@@ -203,11 +203,14 @@ class MonitorFilter:
         state = self.state if state is None else state
         std = self.model_errors(state)
         used = np.flatnonzero(state.ages >= 1.0)
-        return used, *deflate(state.information[used], state.score[used], std)
+        cleaned = [deflate(state.information[s], state.score[s], std) for s in used]
+        return used, np.stack([pair[0] for pair in cleaned]), np.stack([pair[1] for pair in cleaned])
 
     def model_errors(self, state: MonitorState | None = None) -> NDArray[np.float64]:
         """Return the size of a fault that errors of gain, axes and position resemble on each channel, m/s²."""
-        return model_errors(self.state if state is None else state, self._tuning)
+        std = np.empty(self.array.n_channels)
+        model_errors(self.state if state is None else state, self._tuning, std)
+        return std
 
     def unexplained_without(
         self, blocks: Blocks, rows: slice, watched: NDArray[np.bool_], levels: NDArray[np.float64], *, base: int
@@ -226,7 +229,7 @@ class MonitorFilter:
         if _lost(state):
             return np.inf
         _, information, score = self.evidence(state)
-        return float(strongest(information, score, watched).max())
+        return float(max(strongest(*pair, watched)[1] for pair in zip(information, score, strict=True)))
 
     def _blind(self) -> MonitorTuning:
         return self._tuning._replace(threshold=np.inf)
@@ -247,16 +250,15 @@ class MonitorFilter:
         before = blocks.t[rows.start - 1] if rows.start else blocks.t[0] - self.block_s
         sets = self._sets(blocks, watched, rows)
         turning = turning_of(blocks, rows, self.tables.alpha_rows, sets, self.block_s / self.samples)
-        steps = Steps(blocks.means[rows], turning, np.diff(times, prepend=before), sets, arrays["levels"])
-        out = arrays["omega"], arrays["std"], arrays["nis"]
-        for part in out:
-            part[:] = np.nan
         try:
-            with np.errstate(over="ignore", invalid="ignore"):
-                return advance(self._matrices(), tuning, state, steps, watched, out, base + rows.start)
+            place, slot = advance(
+                self._compiled_tables(), tuning, state, blocks.means[rows], turning, np.diff(times, prepend=before),
+                sets, arrays["levels"], watched, arrays["omega"], arrays["std"], arrays["nis"], base + rows.start,
+            )  # fmt: skip
         except np.linalg.LinAlgError:  # the filter ran away
             state.omega[:] = np.nan
             return len(times), -1
+        return int(place), int(slot)
 
     def _sets(self, blocks: Blocks, watched: NDArray[np.bool_], rows: slice) -> NDArray[np.int64]:
         """Return the set of channels of each block in ``rows``, in the tables."""
@@ -265,7 +267,7 @@ class MonitorFilter:
         unique, inverse = np.unique(masks, return_inverse=True)
         return np.array([self.tables.index(int(mask)) for mask in unique], dtype=np.int64)[inverse]
 
-    def _matrices(self) -> MonitorTables:
+    def _compiled_tables(self) -> MonitorTables:
         tables = self.tables
         return MonitorTables(
             tables.alpha_rows, tables.alpha_leak, tables.null_rows, tables.null_sensitivity,

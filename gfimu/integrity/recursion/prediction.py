@@ -32,6 +32,6 @@ def prediction_row(array: AccelerometerArray, channel: int, used: NDArray[np.boo
 
 
 def omega_products(omega: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return s(ω), shape (n, 6), of rates (n, 3), or (6,) of one: xx, yy, zz, xy, xz, yz."""
+    """Return s(ω), shape (n, 6), of rates (n, 3): xx, yy, zz, xy, xz, yz."""
     x, y, z = omega.T
-    return np.array([x * x, y * y, z * z, x * y, x * z, y * z]).T
+    return np.column_stack([x * x, y * y, z * z, x * y, x * z, y * z])

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["MonitorState", "MonitorTables", "MonitorTuning", "Steps"]
+__all__ = ["MonitorState", "MonitorTables", "MonitorTuning"]
 
 
 class MonitorTables(NamedTuple):
@@ -38,16 +38,6 @@ class MonitorTuning(NamedTuple):
     floor: float  # m/s²
 
 
-class Steps(NamedTuple):
-    """Blocks to be taken one after the other, n of them."""
-
-    means: NDArray[np.float64]  # (n, c) mean readings, m/s²
-    turning: NDArray[np.float64]  # (n, 12) `gfimu.integrity.recursion.turning.turning_of`
-    since: NDArray[np.float64]  # (n,) from the block before, s
-    sets: NDArray[np.int64]  # (n,) set of channels
-    levels: NDArray[np.float64]  # (n,) measured variance of the null space over the stated one
-
-
 class MonitorState(NamedTuple):
     """What is carried from one block to the next."""
 
@@ -71,14 +61,6 @@ class MonitorState(NamedTuple):
     def copy(self) -> MonitorState:
         """Return a state that shares nothing with this one."""
         return MonitorState._make(field.copy() for field in self)
-
-    def keep(self, block: int) -> None:
-        """Keep the state before a block."""
-        place = block % len(self.past_rate)
-        self.past_rate[place] = self.omega
-        self.past_bias[place] = self.bias
-        self.past_covariance[place] = self.covariance
-        self.past_means[place] = self.last, self.low, self.high
 
     def go_back(self, block: int) -> None:
         """Return to the state before a block; it must be one of the last h."""

@@ -1,11 +1,11 @@
-"""The recursion of the monitor of channels: an extended Kalman filter and the signatures of faults in it.
+"""The recursion of the monitor of channels, compiled: an extended Kalman filter and the signatures of faults in it.
 
 State x = [ω (3); b (c)], ω in the middle of a block and b the biases of the channels. From the middle of one block to
 that of the next, T later,
 
     ω ← ω + T (A (ȳ_m − b) − L s(ω)),      ȳ_m the mean of the samples between                           (1)
 
-and the null space of the block's mean readings ȳ is the measurement, in whitened rows j,
+and the null space of the block's mean readings ȳ is the measurement, one whitened row after the other,
 
     z_j = Z_j (ȳ − b) = M_j ⟨s(ω)⟩ + noise of variance 1/B,                                              (2)
 
@@ -16,7 +16,7 @@ A constant fault of one unit on channel i from block k₀ on makes the state wro
 by h (Willsky and Jones, IEEE Trans. Automatic Control 21, 1976):
 
     G_ω ← Φ_ω G_ω + T A (e − G_b)      (half of the first block lies behind the onset)
-    h = Z − H G,   G ← G + K h,   C ← C + hᵀ S⁻¹ h,   d ← d + hᵀ S⁻¹ ν                                   (3)
+    h_j = Z_j − H_j G,   G ← G + K_j h_j,   C ← C + h_jᵀ h_j/S_j,   d ← d + h_jᵀ ν_j/S_j                   (3)
 
 C is the information on faults of all channels at once, shape (c, c), and d the score: a set S of channels with that
 onset has the most likely sizes f = C_SS⁻¹ d_S and explains T_S = d_Sᵀ f of the sum of squared innovations.
@@ -25,172 +25,265 @@ onset has the most likely sizes f = C_SS⁻¹ d_S and explains T_S = d_Sᵀ f of
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+from numba import njit
 
-from gfimu.integrity.recursion.prediction import omega_products
 from gfimu.integrity.recursion.signatures import carry_signatures, new_slot, strongest_slot
-from gfimu.integrity.recursion.state import MonitorState, MonitorTables, MonitorTuning, Steps
+from gfimu.rate.recursion_data import COMPILE
 
 __all__ = ["advance", "model_errors"]
 
 _TINY = 1e-14  # numerical: least variance kept on the diagonal of the covariance
 
 
-def advance(
-    tables: MonitorTables,
-    tuning: MonitorTuning,
-    state: MonitorState,
-    steps: Steps,
-    watched: NDArray[np.bool_],
-    out: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
-    base: int,
-) -> tuple[int, int]:
+@njit(**COMPILE)
+def advance(tables, tuning, state, means, turning, steps, sets, levels, watched, omega, std, nis, base):  # type: ignore[no-untyped-def]
     """Take n blocks; stop behind one in which a fault is seen.
 
-    Parameters
-    ----------
-    tables, tuning, state
-        Matrices, numbers that stay the same, and what is carried on.
-    steps : Steps
-        The n blocks.
-    watched : ndarray of bool, shape (c,)
-        Channels in use.
-    out : tuple of ndarray, shapes (n, 3), (n, 3) and (n,)
-        Filled with ω and its standard deviation, rad/s, and the normalised innovation squared.
-    base : int
-        Number of the first of the n blocks since the start of the run.
+    ``means`` (n, c), ``turning`` (n, 12) (`turning.turning_of`), ``steps`` (n,) s since the block before, ``sets`` (n,) of channels, ``levels`` (n,) measured
+    variance of the null space over the stated one. ``omega``, ``std`` (n, 3) and ``nis`` (n,) are filled. ``base`` is
+    the number of the first of the n blocks since the start of the run.
 
     Returns
     -------
     tuple of (int, int)
         The next block, and the slot of the fault; −1 if none was seen.
     """
-    omega, std, nis = out
+    c = means.shape[1]
+    model_std = np.empty(c)
     pending = 0.0
-    for k, (mean, turning, place, level) in enumerate(
-        zip(steps.means, steps.turning, steps.sets, steps.levels, strict=True)
-    ):
-        state.keep(base + k)
-        _follow_range(state, mean, tuning.forget)
-        step = float(steps.since[k]) + pending
+    k = 0
+    while k < len(means):
+        _keep(state, base + k)
+        place = sets[k]
+        level = levels[k]
+        transition = np.zeros((3, 3))
+        _follow_range(state, means[k], tuning.forget)
+        step = steps[k] + pending
         if tables.null_count[place] < 0:  # too few channels: a gap
             pending = step
-            omega[k], std[k] = state.omega, np.inf
+            omega[k] = state.omega
+            std[k] = np.inf
             state.ages[:] = 0.0
+            k += 1
             continue
         pending = 0.0
         if not state.started[0]:  # from the first sample to the middle of the first block
-            state.last[:] = mean
+            for i in range(len(state.last)):
+                state.last[i] = means[k, i]
             step = 0.5 * tuning.period * (1.0 - 1.0 / tuning.samples)
-        transition = _predict(tables, tuning, state, mean, turning, step=step, place=place, level=level)
+        _predict(tables, tuning, state, means[k], turning[k], step, place, level, transition)
         if step > 1.5 * tuning.period:
             state.ages[:] = 0.0
         if tuning.follow:
             new_slot(state, tuning.oldest)
-            carry_signatures(state, transition, step * tables.alpha[place])
-        nis[k] = _update(tables, state, mean, turning, place=place, noise=level / tuning.samples)
+            carry_signatures(tables, state, transition, step, place)
+        nis[k] = _update(tables, tuning, state, means[k], turning[k], place, level)
         omega[k] = state.omega
-        std[k] = np.sqrt(np.maximum(state.covariance.diagonal()[:3], 0.0))
-        state.last[:] = mean
+        for a in range(3):
+            std[k, a] = np.sqrt(max(state.covariance[a, a], 0.0))
+        for i in range(len(state.last)):
+            state.last[i] = means[k, i]
         state.started[0] = True
-        if tuning.follow and np.isfinite(tuning.threshold):
-            slot = strongest_slot(state, tuning, model_errors(state, tuning), watched)
-            if slot >= 0:
-                return k + 1, slot
-    return len(steps.means), -1
+        k += 1
+        model_errors(state, tuning, model_std)
+        slot = strongest_slot(state, tuning, model_std, watched)
+        if slot >= 0:
+            return k, slot
+    return k, -1
 
 
-def model_errors(state: MonitorState, tuning: MonitorTuning) -> NDArray[np.float64]:
-    """Return how large a constant fault the errors of gain, axes and position resemble on each channel, (c,), m/s²."""
-    gain = tuning.range_share * tuning.scale_std * (state.high - state.low)
-    place = tuning.placement_std * float(state.omega @ state.omega)
-    return np.asarray(np.sqrt(gain**2 + place**2 + tuning.floor**2))
+@njit(**COMPILE)
+def model_errors(state, tuning, std):  # type: ignore[no-untyped-def]
+    """Fill in how large a constant fault the errors of gain, axes and position resemble on each channel, m/s²."""
+    square = 0.0
+    for a in range(3):
+        square += state.omega[a] * state.omega[a]
+    for i in range(len(std)):
+        gain = tuning.range_share * tuning.scale_std * (state.high[i] - state.low[i])
+        place = tuning.placement_std * square
+        std[i] = np.sqrt(gain * gain + place * place + tuning.floor * tuning.floor)
 
 
-def _follow_range(state: MonitorState, mean: NDArray[np.float64], forget: float) -> None:
+@njit(**COMPILE)
+def _keep(state, block):  # type: ignore[no-untyped-def]
+    """Keep the state before a block: number by number, as slices take ten times as long to compile."""
+    place = block % len(state.past_rate)
+    for a in range(3):
+        state.past_rate[place, a] = state.omega[a]
+    for i in range(len(state.bias)):
+        state.past_bias[place, i] = state.bias[i]
+        state.past_means[place, 0, i] = state.last[i]
+        state.past_means[place, 1, i] = state.low[i]
+        state.past_means[place, 2, i] = state.high[i]
+    for r in range(len(state.covariance)):
+        for q in range(len(state.covariance)):
+            state.past_covariance[place, r, q] = state.covariance[r, q]
+
+
+@njit(**COMPILE)
+def _follow_range(state, mean, forget):  # type: ignore[no-untyped-def]
     """Follow the range of each channel's readings, with a memory."""
-    if not state.started[0]:
-        state.low[:] = state.high[:] = mean
-    state.low[:] = np.minimum(mean, state.low + forget * (mean - state.low))
-    state.high[:] = np.maximum(mean, state.high + forget * (mean - state.high))
+    for i in range(len(mean)):
+        if not state.started[0]:
+            state.low[i] = mean[i]
+            state.high[i] = mean[i]
+        state.low[i] = min(mean[i], state.low[i] + forget * (mean[i] - state.low[i]))
+        state.high[i] = max(mean[i], state.high[i] + forget * (mean[i] - state.high[i]))
 
 
-def _slopes(rows: NDArray[np.float64], omega: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the derivative, shape (d, 3), of ``rows`` (d, 6) s(ω) by ω."""
-    x, y, z = omega
-    products = np.array([[2 * x, 0, 0], [0, 2 * y, 0], [0, 0, 2 * z], [y, x, 0], [z, 0, x], [0, z, y]])
-    return np.asarray(rows @ products)
+@njit(**COMPILE)
+def _products(w):  # type: ignore[no-untyped-def]
+    return np.array([w[0] * w[0], w[1] * w[1], w[2] * w[2], w[0] * w[1], w[0] * w[2], w[1] * w[2]])
 
 
-def _predict(
-    tables: MonitorTables,
-    tuning: MonitorTuning,
-    state: MonitorState,
-    mean: NDArray[np.float64],
-    turning: NDArray[np.float64],
-    *,
-    step: float,
-    place: int,
-    level: float,
-) -> NDArray[np.float64]:
-    """Carry state and covariance over to the next block, (1); returns Φ_ω, shape (3, 3)."""
-    gain, leak = step * tables.alpha[place], tables.leak[place]
-    alpha = turning[:3] - tables.alpha[place] @ state.bias
-    transition = np.eye(3)
-    if leak.any():  # products of ω remain in α: implicit midpoint
-        middle = state.omega
+@njit(**COMPILE)
+def _slope(row, w, out):  # type: ignore[no-untyped-def]
+    """Fill in the derivative of ``row`` s(ω) by ω."""
+    out[0] = 2.0 * w[0] * row[0] + w[1] * row[3] + w[2] * row[4]
+    out[1] = 2.0 * w[1] * row[1] + w[0] * row[3] + w[2] * row[5]
+    out[2] = 2.0 * w[2] * row[2] + w[0] * row[4] + w[1] * row[5]
+
+
+@njit(**COMPILE)
+def _predict(tables, tuning, state, mean, turning, step, place, level, transition):  # type: ignore[no-untyped-def]
+    """Carry state and covariance over to the next block, (1); ``transition`` becomes Φ_ω − 1."""
+    alpha_rows = tables.alpha[place]
+    leak = tables.leak[place]
+    c = len(mean)
+    n = 3 + c
+    p = state.covariance
+    alpha = np.zeros(3)
+    for a in range(3):
+        alpha[a] = turning[a]
+        for i in range(c):
+            alpha[a] -= alpha_rows[a, i] * state.bias[i]
+    leaky = False
+    for a in range(3):
+        for j in range(6):
+            leaky = leaky or leak[a, j] != 0.0
+    if leaky:  # products of ω remain in α: implicit midpoint
+        middle = state.omega.copy()
         for _ in range(3):
-            middle = state.omega + 0.5 * step * (alpha - leak @ omega_products(middle))
-        alpha = alpha - leak @ omega_products(middle)
-        transition -= step * _slopes(leak, middle)
-    state.omega[:] += step * alpha
+            s = _products(middle)
+            for a in range(3):
+                total = alpha[a]
+                for j in range(6):
+                    total -= leak[a, j] * s[j]
+                middle[a] = state.omega[a] + 0.5 * step * total
+        s = _products(middle)
+        slope = np.zeros(3)
+        for a in range(3):
+            for j in range(6):
+                alpha[a] -= leak[a, j] * s[j]
+            _slope(leak[a], middle, slope)
+            for b in range(3):
+                transition[a, b] = -step * slope[b]
+    rows = np.zeros((3, n))  # of F P, F = [1 + transition, −T A; 0, 1]
+    for a in range(3):
+        state.omega[a] += step * alpha[a]
+        for m in range(n):
+            total = p[a, m]
+            for b in range(3):
+                total += transition[a, b] * p[b, m]
+            for i in range(c):
+                total -= step * alpha_rows[a, i] * p[3 + i, m]
+            rows[a, m] = total
+    for a in range(3):
+        for b in range(3):
+            total = rows[a, b]
+            for m in range(3):
+                total += rows[a, m] * transition[b, m]
+            for i in range(c):
+                total -= rows[a, 3 + i] * step * alpha_rows[b, i]
+            p[a, b] = total + level * step * step * tables.noise[place, a, b] / tuning.samples
+        for i in range(c):
+            p[a, 3 + i] = rows[a, 3 + i]
+            p[3 + i, a] = rows[a, 3 + i]
+    if step > 1.5 * tuning.period:  # a gap, over which α is unknown but for its size
+        size = 0.0
+        for a in range(3):
+            size += alpha[a] * alpha[a]
+        for a in range(3):
+            p[a, a] += (size + 1.0) * step * step
+    for i in range(c):
+        change = abs(mean[i] - state.last[i]) * (state.high[i] - state.low[i])
+        p[3 + i, 3 + i] += tuning.walk * step + 0.5 * tuning.scale_std * tuning.scale_std * change
+
+
+@njit(**COMPILE)
+def _update(tables, tuning, state, mean, turning, place, level):  # type: ignore[no-untyped-def]
+    """Measure the null space row by row, (2), with all signatures, (3); returns the normalised innovation squared."""
+    c = len(mean)
+    n = 3 + c
     p = state.covariance
-    rows = transition @ p[:3] - gain @ p[3:]  # of F P, F = [Φ_ω, −T A; 0, 1]; (3, 3 + c)
-    block = rows[:, :3] @ transition.T - rows[:, 3:] @ gain.T + level * step**2 / tuning.samples * tables.noise[place]
-    p[:3, :3] = 0.5 * (block + block.T)  # an asymmetry would grow
-    p[:3, 3:] = rows[:, 3:]
-    p[3:, :3] = rows[:, 3:].T
-    growth = np.empty(len(p))
-    gap = step > 1.5 * tuning.period  # over which α is unknown but for its size
-    growth[:3] = (alpha @ alpha + 1.0) * step**2 if gap else 0.0
-    growth[3:] = tuning.walk * step
-    growth[3:] += 0.5 * tuning.scale_std**2 * np.abs(mean - state.last) * (state.high - state.low)
-    p.reshape(-1)[:: len(p) + 1] += growth  # the diagonal
-    return transition
-
-
-def _update(
-    tables: MonitorTables,
-    state: MonitorState,
-    mean: NDArray[np.float64],
-    turning: NDArray[np.float64],
-    *,
-    place: int,
-    noise: float,
-) -> float:
-    """Measure the null space, (2), with all signatures, (3); returns the normalised innovation squared.
-
-    With S = L Lᵀ, H P and the innovations are whitened by L⁻¹, so that all updates are products.
-    """
-    rows = int(tables.null_count[place])
-    null, sensitivity = tables.null[place, :rows], tables.sensitivity[place, :rows]
-    p = state.covariance
-    average = state.omega + turning[3:6]  # ω over the block
-    innovation = null @ (mean - state.bias) - sensitivity @ (omega_products(average) + turning[6:])  # (d,)
-    h = np.concatenate([_slopes(sensitivity, average), null], axis=1)  # (d, 3 + c)
-    hp = h @ p
-    white = np.linalg.inv(np.linalg.cholesky(hp @ h.T + noise * np.eye(rows)))  # (d, d)
-    pull, gain = white @ innovation, white @ hp  # (d,), (d, 3 + c)
-    change = pull @ gain
-    state.omega[:] += change[:3]
-    state.bias[:] += change[3:]
-    p -= gain.T @ gain
-    diagonal = p.reshape(-1)[:: len(p) + 1]
-    np.maximum(diagonal, _TINY, out=diagonal)
-    used = np.count_nonzero(state.ages)
-    if used:
-        seen = white @ (null - h @ state.signature[:used])  # (s, d, c)
-        state.signature[:used] += gain.T @ seen
-        state.information[:used] += seen.transpose(0, 2, 1) @ seen
-        state.score[:used] += pull @ seen
-    return float(pull @ pull)
+    before = state.omega.copy()
+    average = np.empty(3)  # ω over the block
+    for a in range(3):
+        average[a] = before[a] + turning[3 + a]
+    products = _products(average)
+    for j in range(6):
+        products[j] += turning[6 + j]
+    noise = level / tuning.samples
+    h = np.zeros(n)
+    ph = np.zeros(n)
+    slope = np.zeros(3)
+    hg = np.zeros(c)
+    total = 0.0
+    for j in range(tables.null_count[place]):
+        z_row = tables.null[place, j]
+        m_row = tables.sensitivity[place, j]
+        _slope(m_row, average, slope)
+        innovation = 0.0
+        for a in range(6):
+            innovation -= m_row[a] * products[a]
+        for a in range(3):
+            h[a] = slope[a]
+            innovation -= slope[a] * (state.omega[a] - before[a])
+        for i in range(c):
+            h[3 + i] = z_row[i]
+            innovation += z_row[i] * (mean[i] - state.bias[i])
+        variance = noise
+        for m in range(n):
+            value = 0.0
+            for q in range(n):
+                value += p[m, q] * h[q]
+            ph[m] = value
+        for m in range(n):
+            variance += h[m] * ph[m]
+        inverse = 1.0 / variance
+        total += innovation * innovation * inverse
+        for m in range(n):
+            gain = ph[m] * inverse
+            if m < 3:
+                state.omega[m] += gain * innovation
+            else:
+                state.bias[m - 3] += gain * innovation
+            for q in range(m + 1):
+                value = p[m, q] - gain * ph[q]
+                p[m, q] = value
+                p[q, m] = value
+            p[m, m] = max(p[m, m], _TINY)
+        for s in range(len(state.ages)):
+            if state.ages[s] == 0.0:
+                continue
+            g = state.signature[s]
+            for i in range(c):
+                hg[i] = z_row[i]
+            for m in range(n):
+                weight = h[m]
+                if weight != 0.0:
+                    for i in range(c):
+                        hg[i] -= weight * g[m, i]
+            for m in range(n):
+                weight = ph[m] * inverse
+                if weight != 0.0:
+                    for i in range(c):
+                        g[m, i] += weight * hg[i]
+            information = state.information[s]
+            score = state.score[s]
+            for m in range(c):
+                weight = hg[m] * inverse
+                score[m] += weight * innovation
+                for i in range(c):
+                    information[m, i] += weight * hg[i]
+    return total
