@@ -39,9 +39,9 @@ _TINY = 1e-14  # numerical: least variance kept on the diagonal of the covarianc
 def advance(tables, tuning, state, means, turning, steps, sets, levels, watched, omega, std, nis, base):  # type: ignore[no-untyped-def]
     """Take n blocks; stop behind one in which a fault is seen.
 
-    ``means`` (n, c), ``turning`` (n, 12) (`turning.turning_of`), ``steps`` (n,) s since the block before, ``sets`` (n,) of channels, ``levels`` (n,) measured
-    variance of the null space over the stated one. ``omega``, ``std`` (n, 3) and ``nis`` (n,) are filled. ``base`` is
-    the number of the first of the n blocks since the start of the run.
+    ``means`` (n, c), ``turning`` (n, 12) (`turning.turning_of`), ``steps`` (n,) s since the block before, ``sets`` (n,)
+    of channels, ``levels`` (n,) measured variance of the null space over the stated one. ``omega``, ``std`` (n, 3) and
+    ``nis`` (n,) are filled. ``base`` is the number of the first of the n blocks since the start of the run.
 
     Returns
     -------
