@@ -44,9 +44,8 @@ def with_measured_noise(
     variance, freedom = detrended_variance(blocks)  # (m, c)
     if not len(blocks):
         return errors
-    absent = blocks.missing & ~blocks.missing.all(
-        axis=0
-    )  # a channel without any reading has zeros, and stays as stated
+    # A channel without any reading has zeros, and stays as stated.
+    absent = blocks.missing & ~blocks.missing.all(axis=0)
     count = np.maximum((~blocks.missing).sum(axis=0), 1)
     shown = np.nanmedian(np.where(absent, np.nan, variance), axis=0)
     ratio = shown / (chdtri(freedom, 0.5) / freedom) / errors.noise_std**2
