@@ -338,6 +338,13 @@ class SampleDecoder:
             packets = packets[is_sample]
         return self._number(packets)
 
+    def ticks_of(self, packet: NDArray[Any]) -> int:
+        """Board time of a packet that is no sample, in ticks, unwrapped as the nearest to the newest sample's."""
+        _, clock, ticks = self._last or (0, 0, 0)
+        mask = self.format.mask_of(self.format.clock_field)
+        ahead = (int(packet[self.format.clock_field]) - clock) & mask
+        return ticks + (ahead if ahead <= mask // 2 else ahead - mask - 1)
+
     def finish(self) -> None:
         """Count an unfinished frame at the end of the stream as skipped."""
         self._scanner.finish()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import signal
 import threading
 import time
@@ -34,6 +35,8 @@ _SILENCE_S = 5.0
 _ANSWER_S = 0.5  # samples wait so long for the board to tell their scale
 _SETUP_ANSWER_S = 3.0  # and so long if they will be left out because the board was not set up yet
 _IDENTIFY_EVERY_S = 1.0
+_FIRST_ANSWERS = 2  # so many are asked for at that pace
+_EXCHANGE_EVERY_S = 10.0  # then at this one
 
 
 @dataclass(frozen=True)
@@ -103,6 +106,10 @@ class SampleClock:
         self._last_s = -np.inf
         self._last_host_s = 0.0
 
+    def of(self, ticks: int) -> float:
+        """Time of a board time in the newest segment, s."""
+        return ticks / self._tick_hz + self._origin_s
+
     def place(self, samples: Samples, host_s: float) -> NDArray[np.float64]:
         """Return times (n,), s, of samples that were read at host time ``host_s``."""
         board = samples.ticks / self._tick_hz
@@ -137,7 +144,7 @@ class _Session:
         self.rate = SampleRate(form.clock_hz)
         self.identity: Identity | None = None
         self.refused: list[Reply] = []
-        self.asked = False
+        self.answers = 0  # to the question who the board is
         self.journal: Journal | None = None
         self.first_s: float | None = None
         self.last_s = 0.0
@@ -146,6 +153,8 @@ class _Session:
         self.give_up_s = time.monotonic() + (_SETUP_ANSWER_S if has_setup else _ANSWER_S)
         self._form, self._array, self._out, self._metadata = form, array, out, metadata
         self._has_setup = has_setup
+        self._asked_s = -math.inf
+        self._unanswered_s: list[float] = []
         self._held: list[tuple[Samples, float]] = []
         self._waiting: list[Batch] = []
         self._flushed_at = 0.0
@@ -163,7 +172,6 @@ class _Session:
         if int(samples.segment[-1]) != self._segment:
             self._segment = int(samples.segment[-1])
             self.clock.restart()
-        self.clock.add(float(samples.ticks[-1]) / self._form.clock_hz, host_s)
         if self.waiting_for_board:
             self._held.append((samples, host_s))
             if self.identity is None and host_s < self.give_up_s:
@@ -174,12 +182,31 @@ class _Session:
     def _hear(self, dialogue: Dialogue, packet: NDArray[Any]) -> None:
         """Take an answer of the board; identities of an earlier listener do not count."""
         message = dialogue.parse(packet)
-        if isinstance(message, Identity) and self.asked:
+        if isinstance(message, Identity) and self.answers:
             self.identity = message
         elif isinstance(message, Reply):
-            self.asked |= message.command == dialogue.identify_code
+            if message.command == dialogue.identify_code:
+                self._take_answer(packet)
             if message.result:
                 self.refused.append(message)
+
+    def ask(self, link: Link, dialogue: Dialogue, now_s: float) -> None:
+        """Ask the board who it is: now and then, as command and answer bound the latency of the line."""
+        due_s = _IDENTIFY_EVERY_S if self.identity is None or self.answers < _FIRST_ANSWERS else _EXCHANGE_EVERY_S
+        if now_s - self._asked_s >= due_s:
+            self._asked_s = now_s
+            self._unanswered_s.append(now_s)
+            link.write(dialogue.identify)
+
+    def _take_answer(self, packet: NDArray[Any]) -> None:
+        """Relate the time in an answer to when it was asked for, at the earliest.
+
+        The first answer may be to an earlier listener's question; an answer may have been lost.
+        """
+        self.answers += 1
+        if self.answers > 1 and self._unanswered_s and self.first_s is not None:
+            self.clock.exchange(self.times.of(self.decoder.ticks_of(packet)), self._unanswered_s[0])
+        self._unanswered_s.clear()
 
     def release(self) -> Batch | None:
         """Take the samples that were held back until the board's answer told their scale."""
@@ -202,6 +229,7 @@ class _Session:
         if self.identity is not None:
             counts *= self.identity.count_size
         batch = Batch(self.times.place(samples, host_s), counts, samples.status)
+        self.clock.add(float(batch.t_s[-1]), host_s)
         self.rate.add(samples)
         for flag in Status:
             number = int(np.count_nonzero(samples.status & flag))
@@ -378,16 +406,16 @@ def _run(
     stop: Callable[[], bool],
 ) -> GfimuError | None:
     """Read until the end; return what ended the recording early, if anything did."""
-    heard_at = asked_at = time.monotonic()
+    heard_at = time.monotonic()
     for command in setup:
         link.write(command)
     dialogue = session.decoder.format.dialogue
-    if dialogue is not None:
-        link.write(dialogue.identify)
     restarts = 0
     seen: Identity | None = None
     try:
         while not stop():
+            if dialogue is not None:
+                session.ask(link, dialogue, time.monotonic())
             chunk = link.read()
             now = time.monotonic()
             if chunk is not None:
@@ -416,9 +444,6 @@ def _run(
                 return None
             if session.first_s is None and now - heard_at > _SILENCE_S:
                 return None
-            if dialogue is not None and session.identity is None and now - asked_at > _IDENTIFY_EVERY_S:
-                asked_at = now
-                link.write(dialogue.identify)
     except GfimuError as error:
         return error
     return None
