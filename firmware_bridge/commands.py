@@ -36,7 +36,12 @@ RATE_CODE_AUTO = 0xFF
 RATES_HZ = (10, 3200)
 """Lowest and highest sample rate of the firmware (core.h)."""
 
+NO_TEMPERATURE = -(1 << 15)
+"""Value of the temperature field while no sensor fills it."""
+
 _LARGEST_RATE_CODE = 15
+_SENSORS = 4  # that the bits of the identity have room for
+_LONGEST_REPLY = 10  # command, result, and at most 8 bytes of the command's payload
 _PAYLOADS = {3: "<HB", 4: "<BB", 5: "<B", 7: "<I"}
 
 
@@ -192,15 +197,26 @@ def set_range(range_g: int, *, full_resolution: bool = True) -> bytes:
 
 
 def parse_message(packet: Any) -> Reply | Identity | None:
-    """Read an identity or reply frame; None for other types."""
+    """Read an identity or reply frame; None for other types, and for what the firmware does not send.
+
+    Status and temperature of both are empty, and a reply ends in zeros: junk that passes the checksum has other bytes.
+    """
     payload = np.asarray(packet["counts"], dtype="<i2").tobytes()
+    if packet["status"] != 0 or packet["temperature"] != NO_TEMPERATURE:
+        return None
     if packet["type"] == FrameType.REPLY:
+        if any(payload[_LONGEST_REPLY:]):
+            return None
         result = payload[1] if payload[1] <= max(Result) else Result.UNKNOWN_COMMAND
         return Reply(payload[0], Result(result))
     if packet["type"] != FrameType.IDENTITY:
         return None
     fields: tuple[Any, ...] = struct.unpack("<4BHBBIBBBBIHH", payload)
     _, major, minor, patch, rate, code, data_format, baud, present, cause, streaming, sensors, build, khz, drop = fields
+    if not (
+        RATES_HZ[0] <= rate <= RATES_HZ[1] and code <= _LARGEST_RATE_CODE and streaming <= 1 and sensors <= _SENSORS
+    ):
+        return None
     causes = {1: "power-on", 2: "external", 4: "watchdog", 8: "brown-out"}
     names = [name for bit, name in causes.items() if cause & bit]
     return Identity(

@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from firmware_bridge.checksum import crc16, crc16_rows, sum16_rows
-from firmware_bridge.commands import LPC1768_DIALOGUE, Dialogue, FrameType
+from firmware_bridge.commands import LPC1768_DIALOGUE, NO_TEMPERATURE, RATES_HZ, Dialogue, FrameType
+from firmware_bridge.continuity import Continuity
 from firmware_bridge.packets import PacketLayout, PacketScanner
 from gfimu.errors import unknown_name
 from gfimu.short_repr import short_repr
@@ -36,9 +37,6 @@ __all__ = [
 ]
 
 FRAME_VERSION = 1
-NO_TEMPERATURE = -(1 << 15)
-"""Value of the temperature field while no sensor fills it."""
-
 SYNC = (0xA5, 0x5A)
 _LONGEST_GAP_OVER_WRAP_S = 10.0
 
@@ -123,6 +121,8 @@ class FrameFormat:
         Field and its value that mark a packet as a sample; None if every packet is one.
     no_reading : int, optional
         Count that stands for a missing reading.
+    slowest_hz : float
+        Lowest sample rate of the board, Hz: two samples can't be farther apart.
     dialogue : Dialogue, optional
         Commands and answers of the board; None if it only sends.
     """
@@ -138,6 +138,7 @@ class FrameFormat:
     status_field: str | None = None
     sample_type: tuple[str, int] | None = None
     no_reading: int | None = None
+    slowest_hz: float = 1.0
     dialogue: Dialogue | None = None
 
     def is_sample(self, packets: NDArray[Any]) -> NDArray[np.bool_]:
@@ -176,6 +177,7 @@ FORMATS: dict[str, FrameFormat] = {
             status_field="status",
             sample_type=("type", FrameType.SAMPLE),
             no_reading=-(1 << 15),
+            slowest_hz=RATES_HZ[0],
             dialogue=LPC1768_DIALOGUE,
         ),
         FrameFormat(
@@ -286,7 +288,7 @@ class Samples:
 
 @dataclass(frozen=True)
 class StreamCounts:
-    """What a stream held so far."""
+    """What a stream held so far; ``unconfirmed`` samples had the right checksum and followed no other sample."""
 
     samples: int
     messages: int
@@ -294,6 +296,7 @@ class StreamCounts:
     corrupt: int
     skipped_bytes: int
     restarts: int
+    unconfirmed: int = 0
 
 
 class SampleDecoder:
@@ -314,6 +317,13 @@ class SampleDecoder:
         self.format = frame_format(form)
         self.messages: list[NDArray[Any]] = []
         self._scanner = PacketScanner(self.format.layout)
+        self._continuity = Continuity(
+            self.format.sequence_field,
+            self.format.clock_field,
+            self.format.mask_of(self.format.sequence_field),
+            self.format.mask_of(self.format.clock_field),
+            self.format.clock_hz / self.format.slowest_hz,
+        )
         self._last: tuple[int, int, int] | None = None  # sequence, raw clock, unwrapped ticks
         self._recent: list[int] = []
         self._segment = 0
@@ -324,7 +334,13 @@ class SampleDecoder:
         """Totals since the start."""
         scanner = self._scanner
         return StreamCounts(
-            self._samples, self._messages, self._lost, scanner.corrupt, scanner.skipped_bytes, self._segment
+            self._samples,
+            self._messages,
+            self._lost,
+            scanner.corrupt,
+            scanner.skipped_bytes,
+            self._segment,
+            self._continuity.refused,
         )
 
     def feed(self, data: bytes | bytearray | memoryview) -> Samples:
@@ -336,7 +352,7 @@ class SampleDecoder:
             self.messages.extend(others)
             self._messages += len(others)
             packets = packets[is_sample]
-        return self._number(packets)
+        return self._number(self._continuity.admit(packets, trust_first=self._scanner.first_at == 0))
 
     def ticks_of(self, packet: NDArray[Any]) -> int:
         """Board time of a packet that is no sample, in ticks, unwrapped as the nearest to the newest sample's."""
@@ -346,12 +362,13 @@ class SampleDecoder:
         return ticks + (ahead if ahead <= mask // 2 else ahead - mask - 1)
 
     def finish(self) -> None:
-        """Count an unfinished frame at the end of the stream as skipped."""
+        """Count an unfinished frame at the end of the stream as skipped, and one that waits as unconfirmed."""
         self._scanner.finish()
+        self._continuity.finish()
 
     def break_stream(self) -> None:
         """Bytes before and after this point are not one stream: the connection was lost in between."""
-        self._scanner.finish()
+        self.finish()
 
     def _number(self, packets: NDArray[Any]) -> Samples:
         """Unwrap time and sequence, count what is missing, find the places where the board started anew."""

@@ -59,6 +59,8 @@ class PacketScanner:
         Places where the signature stood but the checksum was wrong: damaged packets.
     skipped_bytes : int
         Bytes that belong to no packet.
+    first_at : int or None
+        Bytes before the first packet; None before it has come.
     """
 
     def __init__(self, layout: PacketLayout) -> None:
@@ -66,6 +68,7 @@ class PacketScanner:
         self.accepted = 0
         self.corrupt = 0
         self.skipped_bytes = 0
+        self.first_at: int | None = None
         self._tail = b""
 
     def feed(self, data: bytes | bytearray | memoryview) -> NDArray[Any]:
@@ -98,6 +101,8 @@ class PacketScanner:
             valid &= np.isin(candidates, chosen)
         self.corrupt += int(np.count_nonzero(~_covered(candidates, chosen, size)))
         self.accepted += len(chosen)
+        if self.first_at is None and len(chosen):
+            self.first_at = self.skipped_bytes + int(chosen[0])
         used = max(starts, int(chosen[-1]) + size if len(chosen) else 0)
         self.skipped_bytes += used - size * len(chosen)
         return packets[valid], used

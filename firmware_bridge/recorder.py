@@ -364,6 +364,7 @@ def record(
         "frames_lost": counts.lost,
         "frames_corrupt": counts.corrupt,
         "bytes_skipped": counts.skipped_bytes,
+        "samples_unconfirmed": counts.unconfirmed,
         "board_restarts": counts.restarts,
         "connection_breaks": breaks,
         "status_counts": session.status_counts,

@@ -89,6 +89,7 @@ def _record(
         ("lost", stream.lost),
         ("corrupt", stream.corrupt),
         ("bytes skipped", stream.skipped_bytes),
+        ("samples that follow no other, refused", stream.unconfirmed),
         ("board restarts", stream.restarts),
         ("connection breaks", report.breaks),
     ]
