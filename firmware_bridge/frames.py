@@ -366,6 +366,16 @@ class SampleDecoder:
         self._scanner.finish()
         self._continuity.finish()
 
+    def start_anew(self) -> None:
+        """Begin a new segment with the next sample: the board's clock was set anew while nothing could be read."""
+        self._last = None
+        self._segment += 1
+
+    def gap_s(self, packet_ticks: int) -> float:
+        """Board time from the newest sample to a raw time stamp, taken modulo its width, s."""
+        _, clock, _ = self._last or (0, 0, 0)
+        return ((packet_ticks - clock) & self.format.mask_of(self.format.clock_field)) / self.format.clock_hz
+
     def break_stream(self) -> None:
         """Bytes before and after this point are not one stream: the connection was lost in between."""
         self.finish()

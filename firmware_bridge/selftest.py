@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from firmware_bridge.board_process import BoardProcess, require_emulator
-from firmware_bridge.commands import Command, encode_command, set_rate
+from firmware_bridge.commands import Command, encode_command, sample_at, set_rate
 from firmware_bridge.frames import SampleDecoder, Status
 from firmware_bridge.lpc1768.build import check_image
 
@@ -91,7 +91,7 @@ def _fast_path() -> SelfTestRow:
     for fast in (False, True):
         with BoardProcess(fast=fast) as board:
             board.run_for(_BOOT_S)
-            board.receive(set_rate(800))
+            board.receive(sample_at(800))
             board.run_for(0.3)
             streams.append(board.take_sent()[0])
     return SelfTestRow(

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from gfimu.cli.output import JsonOption, console, print_json, print_paths, print_table
+
+if TYPE_CHECKING:
+    from firmware_bridge.finder import Found
 
 __all__ = ["register"]
 
@@ -19,8 +22,11 @@ def register(app: typer.Typer) -> None:
 
 
 def _record(
-    port: Annotated[str, typer.Option("--port", help="Device, pseudo-terminal, or socket://host:port.")],
-    out: Annotated[Path, typer.Option("--out", help="Recording to write, .csv or .parquet.")],
+    port: Annotated[str, typer.Option("--port", help="Device, pseudo-terminal, or socket://host:port.")] = "",
+    out: Annotated[Path | None, typer.Option("--out", help="Recording to write, .csv or .parquet.")] = None,
+    find: Annotated[
+        bool, typer.Option("--find", help="Look for the board: every port or --port, every speed and format.")
+    ] = False,
     duration: Annotated[
         float | None, typer.Option("--duration", min=0.0, help="Length in s; else until Ctrl-C.")
     ] = None,
@@ -28,9 +34,13 @@ def _record(
         int | None, typer.Option("--rate", help="Ask the board for this sample rate, 10 to 3200 Hz.")
     ] = None,
     range_g: Annotated[int | None, typer.Option("--range", help="Ask the board for ±2, 4, 8 or 16 g.")] = None,
-    form: Annotated[str, typer.Option("--format", help="Frame format: lpc1768 or mimu4444.")] = "lpc1768",
+    form: Annotated[
+        str, typer.Option("--format", help="Frame format, lpc1768 or mimu4444; else lpc1768, or what is found.")
+    ] = "",
     array: Annotated[str, typer.Option("--array", help="Array on the board; else the format's.")] = "",
-    baud: Annotated[int, typer.Option("--baud", help="Bits per second; without meaning on a socket.")] = 1_562_500,
+    baud: Annotated[
+        int | None, typer.Option("--baud", help="Bits per second; else as the board is, raised if the rate needs it.")
+    ] = None,
     reconnect: Annotated[
         float | None,
         typer.Option(
@@ -49,21 +59,31 @@ def _record(
     be read while it grows; if the program is killed, at most the last half second is missing.
 
     Example: gfimu record --port /dev/ttyUSB0 --out run.parquet --rate 800 --duration 60
+
+    Example: gfimu record --find --out run.parquet
     """
     from gfimu.commands.record import record
 
     screen = console()
     interactive = screen.is_terminal and not json
-    if interactive and reconnect and "://" not in port and not Path(port).exists():
+    if interactive and reconnect and port and "://" not in port and not Path(port).exists():
         screen.print(f"waiting for {port}, up to {reconnect:g} s")
     messages = console(stderr=True)
 
     def name_fault(text: str) -> None:
         messages.print(f"{' ' * 100}\r{text}" if interactive else f"gfimu: {text}", soft_wrap=True)
 
+    boards: list[Found] = []
+
+    def name_board(board: Found) -> None:
+        boards.append(board)
+        if not json:
+            screen.print(f"{board.port}: {_description(board)}", soft_wrap=True)
+
     report = record(
         port,
         out,
+        find=find,
         duration=duration,
         rate=rate,
         range_g=range_g,
@@ -75,12 +95,19 @@ def _record(
         view=view,
         on_text=(lambda text: screen.print(text, end="\r")) if interactive else None,
         on_fault=name_fault,
+        on_find=name_board,
+        on_try=(lambda name: screen.print(f"looking at {name} …", end="\r")) if interactive else None,
     )
+    if report is None or out is None:
+        if json:
+            print_json({"boards": [asdict(board) for board in boards]})
+        return
+    port = boards[0].port if boards else port
     if interactive:
         screen.print()
     written = {"recording": out} | ({"rrd": rrd} if rrd is not None else {})
     if json:
-        print_json(asdict(report) | {"files": written})
+        print_json(asdict(report) | {"boards": [asdict(board) for board in boards], "files": written})
         return
     stream, clock, identity = report.stream, report.clock, report.identity
     rows = [
@@ -102,6 +129,24 @@ def _record(
         if faulty:
             rows.append(("chips that do not hold their settings", faulty))
         rows.append(("firmware", f"{identity.firmware}, {identity.rate_hz} Hz, ±{identity.range_g} g"))
+    if report.baud is not None:
+        rows.append(("speed of the line", f"{report.baud} baud"))
     rows += [(f"status {name}", number) for name, number in report.status_counts.items()]
     print_table(f"recorded from {port}", ("quantity", "value"), rows)
     print_paths(written.items())
+
+
+def _description(board: Found) -> str:
+    """Return a line on a board: speed, format, and what it says about itself."""
+    line = f"{board.form} at {board.baud} baud"
+    if (identity := board.identity) is None:
+        return f"{line}, sends without answering"
+    chips = [
+        "answers" if ok else "faulty" if bad else "missing"
+        for ok, bad in zip(identity.present, identity.faulty, strict=True)
+    ]
+    return (
+        f"{line}, firmware {identity.firmware}, {identity.rate_hz} Hz, ±{identity.range_g} g, "
+        f"{'sends' if identity.streaming else 'stopped'}; chips 1 to {len(chips)}: {', '.join(chips)}; "
+        f"last reset: {identity.reset_cause}"
+    )
