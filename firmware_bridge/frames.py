@@ -278,6 +278,10 @@ class Samples:
     def __len__(self) -> int:
         return len(self.ticks)
 
+    def of(self, rows: NDArray[np.bool_] | slice) -> Samples:
+        """Return some of the samples."""
+        return Samples(*(getattr(self, field.name)[rows] for field in fields(self)))
+
     @classmethod
     def join(cls, parts: Sequence[Samples]) -> Samples:
         """Put batches of one stream together."""

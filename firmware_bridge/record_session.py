@@ -192,7 +192,7 @@ class RecordSession:
         if self.identity is not None and self._has_setup:
             began = np.flatnonzero(samples.status & Status.FIRST)
             start = int(began[-1]) if len(began) else 0  # what came before was not as asked for
-            samples = Samples(*(getattr(samples, name)[start:] for name in Samples.__dataclass_fields__))
+            samples = samples.of(slice(start, None))
         return self._accept(samples, [(len(part), host_s) for part, host_s in held])
 
     def _accept(self, samples: Samples, arrivals: list[tuple[int, float]]) -> Batch:

@@ -11,6 +11,7 @@ import typer
 from gfimu.cli.output import JsonOption, console, print_json, print_paths, print_table
 
 if TYPE_CHECKING:
+    from firmware_bridge.chip_selftest import AxisSelfTest
     from firmware_bridge.finder import Found
 
 __all__ = ["register"]
@@ -27,6 +28,9 @@ def _record(
     find: Annotated[
         bool, typer.Option("--find", help="Look for the board: every port or --port, every speed and format.")
     ] = False,
+    self_test: Annotated[
+        bool, typer.Option("--self-test", help="Test the chips first, at rest, against the data sheet's limits.")
+    ] = False,
     duration: Annotated[
         float | None, typer.Option("--duration", min=0.0, help="Length in s; else until Ctrl-C.")
     ] = None,
@@ -35,7 +39,7 @@ def _record(
     ] = None,
     range_g: Annotated[int | None, typer.Option("--range", help="Ask the board for ±2, 4, 8 or 16 g.")] = None,
     form: Annotated[
-        str, typer.Option("--format", help="Frame format, lpc1768 or mimu4444; else lpc1768, or what is found.")
+        str, typer.Option("--format", help="Frame format: lpc1768 or mimu4444. Else lpc1768, or what is found.")
     ] = "",
     array: Annotated[str, typer.Option("--array", help="Array on the board; else the format's.")] = "",
     baud: Annotated[
@@ -60,7 +64,7 @@ def _record(
 
     Example: gfimu record --port /dev/ttyUSB0 --out run.parquet --rate 800 --duration 60
 
-    Example: gfimu record --find --out run.parquet
+    Example: gfimu record --find --self-test --out run.parquet
     """
     from gfimu.commands.record import record
 
@@ -80,10 +84,18 @@ def _record(
         if not json:
             screen.print(f"{board.port}: {_description(board)}", soft_wrap=True)
 
+    axes: list[AxisSelfTest] = []
+
+    def show_axes(tested: list[AxisSelfTest]) -> None:
+        axes.extend(tested)
+        if not json:
+            _print_self_test(tested)
+
     report = record(
         port,
         out,
         find=find,
+        self_test=self_test,
         duration=duration,
         rate=rate,
         range_g=range_g,
@@ -96,18 +108,22 @@ def _record(
         on_text=(lambda text: screen.print(text, end="\r")) if interactive else None,
         on_fault=name_fault,
         on_find=name_board,
+        on_self_test=show_axes,
         on_try=(lambda name: screen.print(f"looking at {name} …", end="\r")) if interactive else None,
     )
+    outcome = {"boards": [asdict(board) for board in boards], "self_test": [asdict(axis) for axis in axes]}
     if report is None or out is None:
         if json:
-            print_json({"boards": [asdict(board) for board in boards]})
+            print_json(outcome)
+        if any(axis.verdict != "passed" for axis in axes):
+            raise typer.Exit(1)
         return
     port = boards[0].port if boards else port
     if interactive:
         screen.print()
     written = {"recording": out} | ({"rrd": rrd} if rrd is not None else {})
     if json:
-        print_json(asdict(report) | {"boards": [asdict(board) for board in boards], "files": written})
+        print_json(asdict(report) | outcome | {"files": written})
         return
     stream, clock, identity = report.stream, report.clock, report.identity
     rows = [
@@ -150,3 +166,17 @@ def _description(board: Found) -> str:
         f"{'sends' if identity.streaming else 'stopped'}; chips 1 to {len(chips)}: {', '.join(chips)}; "
         f"last reset: {identity.reset_cause}"
     )
+
+
+def _print_self_test(tested: list[AxisSelfTest]) -> None:
+    rows = [
+        (
+            one.channel,
+            f"{one.shift_g:+.3f}",
+            f"{one.least_g:+.2f} … {one.greatest_g:+.2f}",
+            f"{1e3 * one.noise_g:.1f}",
+            one.verdict,
+        )
+        for one in tested
+    ]
+    print_table("self-test of the chips", ("channel", "shift, g", "limits, g", "noise, mg", "result"), rows)

@@ -11,6 +11,7 @@ from gfimu.errors import InputError
 from gfimu.files.outputs import RECORDING, RERUN, writes
 
 if TYPE_CHECKING:
+    from firmware_bridge.chip_selftest import AxisSelfTest
     from firmware_bridge.finder import Found
     from firmware_bridge.live import LiveView
     from firmware_bridge.recorder import RecordReport
@@ -24,6 +25,7 @@ def record(
     out: str | Path | None = None,
     *,
     find: bool = False,
+    self_test: bool = False,
     duration: float | None = None,
     rate: int | None = None,
     range_g: int | None = None,
@@ -37,6 +39,7 @@ def record(
     on_fault: Callable[[str], None] | None = None,
     on_find: Callable[[Found], None] | None = None,
     on_try: Callable[[str], None] | None = None,
+    on_self_test: Callable[[list[AxisSelfTest]], None] | None = None,
     stop: Callable[[], bool] | None = None,
 ) -> RecordReport | None:
     """Record from a board, real or virtual, until the time is up, ``stop`` says so, or Ctrl-C.
@@ -50,6 +53,8 @@ def record(
     find : bool
         Look for boards first: on ``port`` or every serial port, at the usual speeds, in ``form`` or every format. With
         ``out``, the first that is found is recorded.
+    self_test : bool
+        Test the chips first, while the unit rests: the shift under self-test against the data sheet's limits at 3.3 V.
     duration : float, optional
         Length, s of board time; by default until stopped.
     rate : int, optional
@@ -76,6 +81,8 @@ def record(
         (`gfimu.integrity.live`). The recording has every channel all the same.
     on_find, on_try : callable, optional
         Are given each board that is found, and each port before it is tried.
+    on_self_test : callable, optional
+        Is given the results of the self-test, channel by channel.
     stop : callable, optional
         Asked often; True ends the recording.
 
@@ -96,14 +103,19 @@ def record(
     if find:
         found = _found(port, form, on_find, on_try)
         port, form = found.port, found.form
+    if self_test:
+        from firmware_bridge.chip_selftest import check_chips
+
+        tested = check_chips(_needed(port), baud=baud, form=form or "lpc1768")
+        if on_self_test is not None:
+            on_self_test(tested)
     if out is None:
         given = {"duration": duration, "rate": rate, "range": range_g, "rrd": rrd, "view": view or None, "baud": baud}
         without = [f"--{name}" for name, value in given.items() if value is not None]
-        if without or not find:
+        if without or not (find or self_test):
             raise InputError(f"{', '.join(without) or 'record'}: give the recording to write with --out")
         return None
-    if not port:
-        raise InputError("give the board's port with --port, or look for the board with --find")
+    port = _needed(port)
     form = form or "lpc1768"
     setup = [set_range(range_g)] if range_g is not None else []
     setup += [set_rate(rate)] if rate is not None else []
@@ -123,6 +135,12 @@ def record(
         return report
     live.close()
     return replace(report, faults=tuple(entry for fault in live.faults for entry in fault.entries()))
+
+
+def _needed(port: str) -> str:
+    if not port:
+        raise InputError("give the board's port with --port, or look for the board with --find")
+    return port
 
 
 def _found(
