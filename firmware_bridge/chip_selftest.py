@@ -87,13 +87,13 @@ def check_chips(
         link.write(layout.dialogue.start)
         runs = []
         try:
-            for on in (False, True):
-                link.write(encode_command(Command.SELF_TEST, int(on)))
-                runs.append(_collect(link, decoder, on=on))
+            for state in (False, True):
+                link.write(encode_command(Command.SELF_TEST, int(state)))
+                runs.append(_collect(link, decoder, on=state))
         finally:
             link.write(encode_command(Command.SELF_TEST, 0))
-    readings = [np.where(run.counts == layout.no_reading, np.nan, run.counts * (scale / _COUNTS_PER_G)) for run in runs]
-    return judge(*readings, AccelerometerArray.load(layout.array).channels, at_3v3=at_3v3)
+    off, on = (np.where(run.counts == layout.no_reading, np.nan, run.counts * (scale / _COUNTS_PER_G)) for run in runs)
+    return judge(off, on, AccelerometerArray.load(layout.array).channels, at_3v3=at_3v3)
 
 
 def judge(
