@@ -24,10 +24,9 @@ class Continuity:
 
     Parameters
     ----------
-    sequence_field, clock_field : str
-        Fields of the packets, unsigned integers that wrap.
-    sequence_mask, clock_mask : int
-        Their largest values.
+    sequence, clock : tuple of (str, int)
+        Fields of the packets, unsigned integers that wrap, and their largest values; no sequence number where its field
+        is empty: then the time stamp alone decides.
     longest_period_ticks : float
         Longest sample period, in ticks of the clock.
 
@@ -37,11 +36,8 @@ class Continuity:
         Samples that passed the checksum and followed nothing.
     """
 
-    def __init__(
-        self, sequence_field: str, clock_field: str, sequence_mask: int, clock_mask: int, longest_period_ticks: float
-    ) -> None:
-        self._fields = sequence_field, clock_field
-        self._masks = sequence_mask, clock_mask
+    def __init__(self, sequence: tuple[str, int], clock: tuple[str, int], longest_period_ticks: float) -> None:
+        self._sequence, self._clock = sequence, clock
         self._longest = 1.1 * longest_period_ticks  # the board's clock against its nominal rate, and jitter
         self._last: NDArray[Any] | None = None
         self._waiting: NDArray[Any] | None = None
@@ -92,8 +88,13 @@ class Continuity:
 
     def _follows(self, earlier: NDArray[Any], later: NDArray[Any]) -> NDArray[np.bool_]:
         """Whether each of the later samples, shape (n,), follows the earlier one."""
-        step, span = (
-            (later[field].astype(np.int64) - earlier[field].astype(np.int64)) & mask
-            for field, mask in zip(self._fields, self._masks, strict=True)
-        )
+        span = _step(earlier, later, *self._clock)
+        if not self._sequence[0]:
+            return np.asarray((span > 0) & (span <= (1 + _MOST_MISSING) * self._longest))
+        step = _step(earlier, later, *self._sequence)
         return np.asarray((step >= 1) & (step <= 1 + _MOST_MISSING) & (span > 0) & (span <= step * self._longest))
+
+
+def _step(earlier: NDArray[Any], later: NDArray[Any], field: str, mask: int) -> NDArray[np.int64]:
+    """By how much a field that wraps has grown, shape (n,)."""
+    return np.asarray((later[field].astype(np.int64) - earlier[field].astype(np.int64)) & mask)

@@ -12,7 +12,6 @@ from firmware_bridge.adxl345_device import Adxl345Options, LineFault
 from firmware_bridge.board_process import BoardProcess
 from firmware_bridge.commands import Command, encode_command, sample_at
 from firmware_bridge.frames import LPC1768_DTYPE, FrameType, SampleDecoder, Status, StreamCounts
-from firmware_bridge.packets import PacketScanner
 from firmware_bridge.physics import Conversions
 
 __all__ = ["FAULTS", "FaultOutcome", "resample_line", "run_campaign", "run_fault"]
@@ -249,7 +248,7 @@ def _keys(sequence: NDArray[np.uint16], counts: NDArray[np.int16]) -> NDArray[np
 
 def _whole_frames(data: bytes) -> list[bytes]:
     """Frames in an undamaged stream, which may begin and end, or be cut by a reset, inside a frame."""
-    scanner = PacketScanner(SampleDecoder().format.layout)
+    scanner = SampleDecoder().format.layout.scanner()
     return [frame.tobytes() for frame in scanner.feed(data)]
 
 

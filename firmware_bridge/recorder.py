@@ -132,7 +132,7 @@ def record(
     metadata: dict[str, Any] = {
         **array_metadata(carried),
         "part": part,
-        "lsb_m_s2": Part.load(part, carried.part_files).lsb,
+        "lsb_m_s2": layout.count_m_s2 or Part.load(part, carried.part_files).lsb,
         "port": port,
         "format": layout.name,
         "started_utc": datetime.now(UTC).isoformat(timespec="milliseconds"),

@@ -177,7 +177,7 @@ def _live_view(
     from gfimu.parts.part import Part
 
     carried = AccelerometerArray.load(array or frame_format(form).array)
-    lsb = Part.load(carried.chips[0].part, carried.part_files).lsb
+    lsb = frame_format(form).count_m_s2 or Part.load(carried.chips[0].part, carried.part_files).lsb
     picture = None
     if rrd is not None or view:
         from gfimu.visual.live import LivePicture
