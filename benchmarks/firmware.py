@@ -18,7 +18,7 @@ import numpy as np
 from firmware_bridge.adxl345_device import TICKS_PER_SECOND
 from firmware_bridge.board_process import BoardProcess
 from firmware_bridge.checksum import crc16
-from firmware_bridge.commands import set_rate
+from firmware_bridge.commands import sample_at
 from firmware_bridge.frames import SampleDecoder, encode_samples
 from firmware_bridge.link import Link
 from firmware_bridge.physics import RidePhysics
@@ -39,7 +39,7 @@ def run_cost(rate: int, virtual_s: float, *, fast: bool) -> float:
     before = processor_time()
     with BoardProcess(RidePhysics(Ride("paper_run")), fast=fast) as board:
         board.run_for(0.02)
-        board.receive(set_rate(rate))
+        board.receive(sample_at(rate))
         done = 0.0
         while done < virtual_s:
             board.run_for(0.5)

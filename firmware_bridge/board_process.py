@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import importlib.util
 import multiprocessing
+import threading
 from array import array
 from collections.abc import Sequence
 from multiprocessing.connection import Connection
@@ -77,6 +78,7 @@ class BoardProcess:
         compiled = importlib.util.find_spec("ziglang") is not None
         self.fast = (compiled if fast is None else fast) and not trace and not lose_every
         self._conversions = conversions or RestPhysics()
+        self._calling = threading.Lock()  # one thread may serve a port while another presses reset
         context = multiprocessing.get_context("spawn")
         self._pipe, theirs = context.Pipe()
         self._process = context.Process(
@@ -108,15 +110,16 @@ class BoardProcess:
 
     def _call(self, name: str, *arguments: Any) -> Any:
         try:
-            self._pipe.send((name, arguments))
-            while True:
-                kind, value = self._pipe.recv()
-                if kind == "conversions":
-                    self._pipe.send(self._conversions(*value))
-                elif kind == "error":
-                    raise value
-                else:
-                    return value
+            with self._calling:
+                self._pipe.send((name, arguments))
+                while True:
+                    kind, value = self._pipe.recv()
+                    if kind == "conversions":
+                        self._pipe.send(self._conversions(*value))
+                    elif kind == "error":
+                        raise value
+                    else:
+                        return value
         except (EOFError, BrokenPipeError, ConnectionResetError):
             raise GfimuError("the process of the emulated board has ended") from None
 

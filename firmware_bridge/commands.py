@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import enum
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,6 +14,7 @@ from firmware_bridge.checksum import crc16
 from gfimu.errors import InputError
 
 __all__ = [
+    "FAST_BAUD",
     "LPC1768_DIALOGUE",
     "RATES_HZ",
     "RATE_CODE_AUTO",
@@ -23,8 +24,10 @@ __all__ = [
     "Identity",
     "Reply",
     "Result",
+    "asked_rate",
     "encode_command",
     "parse_message",
+    "sample_at",
     "set_range",
     "set_rate",
 ]
@@ -36,7 +39,16 @@ RATE_CODE_AUTO = 0xFF
 RATES_HZ = (10, 3200)
 """Lowest and highest sample rate of the firmware (core.h)."""
 
+NO_TEMPERATURE = -(1 << 15)
+"""Value of the temperature field while no sensor fills it."""
+
 _LARGEST_RATE_CODE = 15
+FAST_BAUD = 1_562_500
+"""Carries every sample rate; 100 MHz / 16 / 4 exactly, bits per second."""
+
+_BOOT_LINE_HZ = 280  # samples per second that the firmware's first speed, 115,200 baud, carries with room for answers
+_SENSORS = 4  # that the bits of the identity have room for
+_LONGEST_REPLY = 10  # command, result, and at most 8 bytes of the command's payload
 _PAYLOADS = {3: "<HB", 4: "<BB", 5: "<B", 7: "<I"}
 
 
@@ -184,6 +196,21 @@ def set_rate(rate_hz: int, code: int = RATE_CODE_AUTO) -> bytes:
     return encode_command(Command.SET_RATE, rate_hz, code)
 
 
+def sample_at(rate_hz: int, code: int = RATE_CODE_AUTO) -> bytes:
+    """Encode what makes a board that has just started sample at a rate: a line that carries it, then the rate.
+
+    For an emulated board, whose host end has no speed of its own; on a port, `firmware_bridge.line_up` agrees on it.
+    """
+    speed = encode_command(Command.SET_BAUD, FAST_BAUD) if rate_hz > _BOOT_LINE_HZ else b""
+    return speed + set_rate(rate_hz, code)
+
+
+def asked_rate(commands: Sequence[bytes]) -> int:
+    """Return the sample rate that some of these commands ask for, Hz; 0 if none does."""
+    rates = [struct.unpack_from("<H", one, 4)[0] for one in commands if one[2] == Command.SET_RATE]
+    return int(rates[-1]) if rates else 0
+
+
 def set_range(range_g: int, *, full_resolution: bool = True) -> bytes:
     """Encode the command for a range of ±2, 4, 8 or 16 g."""
     if range_g not in {2, 4, 8, 16}:
@@ -192,15 +219,26 @@ def set_range(range_g: int, *, full_resolution: bool = True) -> bytes:
 
 
 def parse_message(packet: Any) -> Reply | Identity | None:
-    """Read an identity or reply frame; None for other types."""
+    """Read an identity or reply frame; None for other types, and for what the firmware does not send.
+
+    Status and temperature of both are empty, and a reply ends in zeros: junk that passes the checksum has other bytes.
+    """
     payload = np.asarray(packet["counts"], dtype="<i2").tobytes()
+    if packet["status"] != 0 or packet["temperature"] != NO_TEMPERATURE:
+        return None
     if packet["type"] == FrameType.REPLY:
+        if any(payload[_LONGEST_REPLY:]):
+            return None
         result = payload[1] if payload[1] <= max(Result) else Result.UNKNOWN_COMMAND
         return Reply(payload[0], Result(result))
     if packet["type"] != FrameType.IDENTITY:
         return None
     fields: tuple[Any, ...] = struct.unpack("<4BHBBIBBBBIHH", payload)
     _, major, minor, patch, rate, code, data_format, baud, present, cause, streaming, sensors, build, khz, drop = fields
+    if not (
+        RATES_HZ[0] <= rate <= RATES_HZ[1] and code <= _LARGEST_RATE_CODE and streaming <= 1 and sensors <= _SENSORS
+    ):
+        return None
     causes = {1: "power-on", 2: "external", 4: "watchdog", 8: "brown-out"}
     names = [name for bit, name in causes.items() if cause & bit]
     return Identity(

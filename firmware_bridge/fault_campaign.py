@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from firmware_bridge.adxl345_device import Adxl345Options, LineFault
 from firmware_bridge.board_process import BoardProcess
-from firmware_bridge.commands import Command, encode_command, set_rate
+from firmware_bridge.commands import Command, encode_command, sample_at
 from firmware_bridge.frames import LPC1768_DTYPE, FrameType, SampleDecoder, Status, StreamCounts
-from firmware_bridge.packets import PacketScanner
 from firmware_bridge.physics import Conversions
 
 __all__ = ["FAULTS", "FaultOutcome", "resample_line", "run_campaign", "run_fault"]
@@ -76,7 +75,7 @@ Scenario = Callable[[BoardProcess, np.random.Generator], _Line]
 
 def _settle(board: BoardProcess) -> None:
     board.run_for(_BOOT_S)
-    board.receive(set_rate(_RATE_HZ))
+    board.receive(sample_at(_RATE_HZ))
     board.run_for(_BOOT_S)
     board.take_sent()
 
@@ -128,7 +127,7 @@ def _brown_out(board: BoardProcess, chance: np.random.Generator) -> _Line:
     cut = len(first + middle) % _FRAME
     board.run_for(_BOOT_S)
     after = board.take_sent()[0]
-    board.receive(set_rate(_RATE_HZ))
+    board.receive(sample_at(_RATE_HZ))
     data = first + middle + after + _clean(board, 0.5)
     return _Line(data, data, f"supply dropped {cut} bytes into a frame")
 
@@ -249,7 +248,7 @@ def _keys(sequence: NDArray[np.uint16], counts: NDArray[np.int16]) -> NDArray[np
 
 def _whole_frames(data: bytes) -> list[bytes]:
     """Frames in an undamaged stream, which may begin and end, or be cut by a reset, inside a frame."""
-    scanner = PacketScanner(SampleDecoder().format.layout)
+    scanner = SampleDecoder().format.layout.scanner()
     return [frame.tobytes() for frame in scanner.feed(data)]
 
 

@@ -17,9 +17,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from firmware_bridge.checksum import crc16, crc16_rows, sum16_rows
-from firmware_bridge.commands import LPC1768_DIALOGUE, Dialogue, FrameType
-from firmware_bridge.packets import PacketLayout, PacketScanner
+from firmware_bridge.commands import LPC1768_DIALOGUE, NO_TEMPERATURE, RATES_HZ, Dialogue, FrameType
+from firmware_bridge.continuity import Continuity
+from firmware_bridge.packets import PacketLayout, StreamLayout
 from gfimu.errors import unknown_name
+from gfimu.files.model_files import list_models
 from gfimu.short_repr import short_repr
 
 __all__ = [
@@ -36,11 +38,9 @@ __all__ = [
 ]
 
 FRAME_VERSION = 1
-NO_TEMPERATURE = -(1 << 15)
-"""Value of the temperature field while no sensor fills it."""
-
 SYNC = (0xA5, 0x5A)
 _LONGEST_GAP_OVER_WRAP_S = 10.0
+_ANY_NUMBER = 0xFFFFFFFF  # of samples that carry none
 
 
 class Status(enum.IntFlag):
@@ -103,8 +103,8 @@ class FrameFormat:
     ----------
     name : str
         Name for ``--format``.
-    layout : PacketLayout
-        The packet on the wire.
+    layout : StreamLayout
+        The sample on the wire.
     clock_field : str
         Field that holds the board's time stamp, an unsigned integer.
     clock_hz : float
@@ -114,7 +114,8 @@ class FrameFormat:
     channels : tuple of int
         Columns of the counts that are the array's channels, in order.
     sequence_field : str
-        Field that holds the sequence number, an unsigned integer.
+        Field that holds the sequence number, an unsigned integer; empty if there is none: then the time stamps alone
+        say what is missing.
     counts_field : str
         Field that holds the raw counts, signed integers.
     status_field : str, optional
@@ -123,12 +124,16 @@ class FrameFormat:
         Field and its value that mark a packet as a sample; None if every packet is one.
     no_reading : int, optional
         Count that stands for a missing reading.
+    count_m_s2 : float, optional
+        Size of a count, m/s²; by default that of the array's part.
+    slowest_hz : float
+        Lowest sample rate of the board, Hz: two samples can't be farther apart.
     dialogue : Dialogue, optional
         Commands and answers of the board; None if it only sends.
     """
 
     name: str
-    layout: PacketLayout
+    layout: StreamLayout
     clock_field: str
     clock_hz: float
     array: str
@@ -138,6 +143,8 @@ class FrameFormat:
     status_field: str | None = None
     sample_type: tuple[str, int] | None = None
     no_reading: int | None = None
+    count_m_s2: float | None = None
+    slowest_hz: float = 1.0
     dialogue: Dialogue | None = None
 
     def is_sample(self, packets: NDArray[Any]) -> NDArray[np.bool_]:
@@ -160,7 +167,7 @@ class FrameFormat:
 
     def mask_of(self, field: str) -> int:
         """Largest value of an unsigned field, at which it wraps; of 8 bytes, only 63 bits are used."""
-        return (1 << min(8 * self.layout.dtype[field].itemsize, 63)) - 1
+        return 0 if not field else (1 << min(8 * self.layout.dtype[field].itemsize, 63)) - 1
 
 
 FORMATS: dict[str, FrameFormat] = {
@@ -176,6 +183,7 @@ FORMATS: dict[str, FrameFormat] = {
             status_field="status",
             sample_type=("type", FrameType.SAMPLE),
             no_reading=-(1 << 15),
+            slowest_hz=RATES_HZ[0],
             dialogue=LPC1768_DIALOGUE,
         ),
         FrameFormat(
@@ -192,12 +200,17 @@ FORMATS: dict[str, FrameFormat] = {
 
 
 def frame_format(name: str | FrameFormat) -> FrameFormat:
-    """Return a frame format given as such or by name; raises `InputError` that lists the formats."""
+    """Return a frame format given as such, by name, or as a TOML file; raises `InputError` that lists the formats."""
     if isinstance(name, FrameFormat):
         return name
-    if name not in FORMATS:
-        raise unknown_name("frame format", name, FORMATS)
-    return FORMATS[name]
+    if name in FORMATS:
+        return FORMATS[name]
+    described = list_models("frames")
+    if name in described or name.endswith(".toml"):
+        from firmware_bridge.format_file import load_format
+
+        return load_format(name)
+    raise unknown_name("frame format", name, (*FORMATS, *described))
 
 
 def encode_samples(
@@ -276,6 +289,10 @@ class Samples:
     def __len__(self) -> int:
         return len(self.ticks)
 
+    def of(self, rows: NDArray[np.bool_] | slice) -> Samples:
+        """Return some of the samples."""
+        return Samples(*(getattr(self, field.name)[rows] for field in fields(self)))
+
     @classmethod
     def join(cls, parts: Sequence[Samples]) -> Samples:
         """Put batches of one stream together."""
@@ -286,7 +303,7 @@ class Samples:
 
 @dataclass(frozen=True)
 class StreamCounts:
-    """What a stream held so far."""
+    """What a stream held so far; ``unconfirmed`` samples had the right checksum and followed no other sample."""
 
     samples: int
     messages: int
@@ -294,6 +311,7 @@ class StreamCounts:
     corrupt: int
     skipped_bytes: int
     restarts: int
+    unconfirmed: int = 0
 
 
 class SampleDecoder:
@@ -313,18 +331,29 @@ class SampleDecoder:
     def __init__(self, form: str | FrameFormat = "lpc1768") -> None:
         self.format = frame_format(form)
         self.messages: list[NDArray[Any]] = []
-        self._scanner = PacketScanner(self.format.layout)
+        self._scanner = self.format.layout.scanner()
+        self._continuity = Continuity(
+            (self.format.sequence_field, self.format.mask_of(self.format.sequence_field)),
+            (self.format.clock_field, self.format.mask_of(self.format.clock_field)),
+            self.format.clock_hz / self.format.slowest_hz,
+        )
         self._last: tuple[int, int, int] | None = None  # sequence, raw clock, unwrapped ticks
         self._recent: list[int] = []
         self._segment = 0
-        self._samples = self._messages = self._lost = 0
+        self._samples = self._messages = self._lost = self._received = 0
 
     @property
     def counts(self) -> StreamCounts:
         """Totals since the start."""
         scanner = self._scanner
         return StreamCounts(
-            self._samples, self._messages, self._lost, scanner.corrupt, scanner.skipped_bytes, self._segment
+            self._samples,
+            self._messages,
+            self._lost,
+            scanner.corrupt,
+            scanner.skipped_bytes,
+            self._segment,
+            self._continuity.refused,
         )
 
     def feed(self, data: bytes | bytearray | memoryview) -> Samples:
@@ -336,15 +365,33 @@ class SampleDecoder:
             self.messages.extend(others)
             self._messages += len(others)
             packets = packets[is_sample]
-        return self._number(packets)
+        return self._number(self._continuity.admit(packets, trust_first=self._scanner.first_at == 0))
+
+    def ticks_of(self, packet: NDArray[Any]) -> int:
+        """Board time of a packet that is no sample, in ticks, unwrapped as the nearest to the newest sample's."""
+        _, clock, ticks = self._last or (0, 0, 0)
+        mask = self.format.mask_of(self.format.clock_field)
+        ahead = (int(packet[self.format.clock_field]) - clock) & mask
+        return ticks + (ahead if ahead <= mask // 2 else ahead - mask - 1)
 
     def finish(self) -> None:
-        """Count an unfinished frame at the end of the stream as skipped."""
+        """Count an unfinished frame at the end of the stream as skipped, and one that waits as unconfirmed."""
         self._scanner.finish()
+        self._continuity.finish()
+
+    def start_anew(self) -> None:
+        """Begin a new segment with the next sample: the board's clock was set anew while nothing could be read."""
+        self._last = None
+        self._segment += 1
+
+    def gap_s(self, packet_ticks: int) -> float:
+        """Board time from the newest sample to a raw time stamp, taken modulo its width, s."""
+        _, clock, _ = self._last or (0, 0, 0)
+        return ((packet_ticks - clock) & self.format.mask_of(self.format.clock_field)) / self.format.clock_hz
 
     def break_stream(self) -> None:
         """Bytes before and after this point are not one stream: the connection was lost in between."""
-        self._scanner.finish()
+        self.finish()
 
     def _number(self, packets: NDArray[Any]) -> Samples:
         """Unwrap time and sequence, count what is missing, find the places where the board started anew."""
@@ -352,8 +399,8 @@ class SampleDecoder:
         status = self.format.status(packets)
         lost, fresh, ticks = np.zeros((3, n), dtype=np.int64)
         if n:
-            wrap = self.format.mask_of(self.format.sequence_field)
-            sequence = packets[self.format.sequence_field].astype(np.int64)
+            wrap = self.format.mask_of(self.format.sequence_field) or _ANY_NUMBER
+            sequence = self._sequence(packets).astype(np.int64)
             clock = packets[self.format.clock_field].astype(np.int64)
             last_sequence, last_clock, last_ticks = self._last or (int(sequence[0]) - 1, int(clock[0]), int(clock[0]))
             steps = np.diff(sequence, prepend=last_sequence) & wrap
@@ -382,9 +429,16 @@ class SampleDecoder:
         self._segment += int(fresh.sum())
         self._samples += n
         self._lost += int(lost.sum())
-        numbers = packets[self.format.sequence_field]
-        numbers = numbers.astype(numbers.dtype.newbyteorder("="))
+        numbers = self._sequence(packets)
+        self._received += n
         return Samples(ticks, numbers, self.format.counts(packets), status, lost, segment)
+
+    def _sequence(self, packets: NDArray[Any]) -> NDArray[Any]:
+        """Sequence numbers of the packets in the byte order of this machine; where there are none, a count of them."""
+        if not self.format.sequence_field:
+            return (self._received + np.arange(len(packets))).astype(np.uint32)
+        numbers = packets[self.format.sequence_field]
+        return numbers.astype(numbers.dtype.newbyteorder("="))
 
 
 class _RecentPeriods:

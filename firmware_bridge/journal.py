@@ -69,6 +69,7 @@ class Journal:
         self._header = ",".join(self.columns) + "\n"
         self._header_lines = len(lines) + 1
         self._size = 0
+        self._is_narrow = True  # every count fits into 16 bits
         try:
             self._write(("".join(lines) + self._header).encode())
         except JournalError:
@@ -84,6 +85,7 @@ class Journal:
         columns: list[Any] = [pa.array(np.round(t_s, 7))]
         missing = np.isnan(counts)
         whole = np.where(missing, 0, counts).astype(np.int32)
+        self._is_narrow &= bool(np.abs(whole).max(initial=0) < 1 << 15)
         for place in range(counts.shape[1]):
             mask = missing[:, place]
             columns.append(pa.array(whole[:, place], mask=mask if mask.any() else None))
@@ -154,7 +156,8 @@ class Journal:
                 file.write(block)
 
     def _finish_parquet(self, target: Path, metadata: Mapping[str, Any]) -> None:
-        types = {name: pa.float64() if name == "t_s" else pa.int16() for name in self.columns}
+        count = pa.int16() if self._is_narrow else pa.int32()
+        types = {name: pa.float64() if name == "t_s" else count for name in self.columns}
         types["status"] = pa.uint16()
         described = {key.encode(): json.dumps(value).encode() for key, value in metadata.items()}
         schema = pa.schema(list(types.items()), metadata=described)

@@ -17,7 +17,7 @@ from gfimu.errors import GfimuError, InputError
 
 __all__ = ["DEFAULT_BAUD", "Chunk", "Link"]
 
-DEFAULT_BAUD = 1_562_500
+DEFAULT_BAUD = 115_200
 _POLL_S = 0.05
 _READ_BYTES = 1 << 16
 _SOCKET_POLL_S = 0.005
@@ -143,9 +143,12 @@ class Link:
             self._serial.write(data)
 
     def set_baud(self, baud: int) -> None:
-        """Change the speed of this side of the line."""
+        """Change the speed of this side of the line, once everything written has left."""
+        if baud == self._baud:
+            return
         self._baud = baud
-        with contextlib.suppress(OSError, serial.SerialException, ValueError):
+        with self._writing, contextlib.suppress(OSError, serial.SerialException, ValueError):
+            self._serial.flush()
             self._serial.baudrate = baud
 
     def read(self, timeout_s: float = 0.2) -> Chunk | None:
@@ -163,6 +166,11 @@ class Link:
         if isinstance(chunk, GfimuError):
             raise chunk
         return chunk
+
+    @property
+    def baud(self) -> int:
+        """Speed of this side of the line, bits per second."""
+        return self._baud
 
     @property
     def backlog(self) -> int:

@@ -88,6 +88,7 @@ class LiveView:
         self._text_at = 0.0
         self._seen = 0
         self._first_s: float | None = None
+        self._ended = ""
         self.omega = np.full(3, np.nan)
         self._open = ExitStack()
         self._streams: list[Any] = [] if rrd is None else [self._open.enter_context(rrd_stream(rrd, _APPLICATION))]
@@ -107,7 +108,12 @@ class LiveView:
 
     def _work(self) -> None:
         while (item := self._batches.get()) is not None:
-            self._show(*item)
+            if self._ended:
+                continue
+            try:
+                self._show(*item)
+            except OSError as error:  # a full disk: the recording goes on as far as it can, and says so first
+                self._ended = f"the live view ended after {self._seen} samples: {error}"
 
     def _show(self, batch: Batch, counts: StreamCounts) -> None:
         if self._first_s is None:
@@ -196,6 +202,8 @@ class LiveView:
         self._batches.put(None)
         self._thread.join()
         if keep:
+            if self._ended and self._on_fault is not None:
+                self._on_fault(self._ended)
             self._open.close()
         else:
             self._open.pop_all()

@@ -9,12 +9,46 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["PacketLayout", "PacketScanner"]
+__all__ = ["PacketLayout", "PacketScanner", "StreamLayout", "StreamScanner"]
+
+
+class StreamScanner(Protocol):
+    """Streaming search for samples of one layout; attributes as of `PacketScanner`."""
+
+    accepted: int
+    corrupt: int
+    skipped_bytes: int
+    first_at: int | None
+
+    def feed(self, data: bytes | bytearray | memoryview) -> NDArray[Any]:
+        """Take the next bytes and return what is now complete, shape (n,)."""
+        ...
+
+    def finish(self) -> None:
+        """Count what is left of an unfinished sample as skipped."""
+
+
+class StreamLayout(Protocol):
+    """How samples look on the wire."""
+
+    @property
+    def dtype(self) -> np.dtype[Any]:
+        """Fields of a sample."""
+        ...
+
+    @property
+    def size(self) -> int:
+        """Usual length on the wire, bytes."""
+        ...
+
+    def scanner(self) -> StreamScanner:
+        """Return a scanner for a new stream."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -24,24 +58,35 @@ class PacketLayout:
     Parameters
     ----------
     dtype : dtype
-        Fields in the order of the bytes, packed; the last field is the checksum.
+        Fields in the order of the bytes, packed; the last field is the checksum if there is one.
     signature : tuple of (int, int)
         Offsets and values of the bytes that every packet has.
-    checksum : callable
+    checksum : callable or None
         Checksum of each row of bytes, shape (n, k) to (n,).
     """
 
     dtype: np.dtype[Any]
     signature: tuple[tuple[int, int], ...]
-    checksum: Callable[[NDArray[np.uint8]], NDArray[np.uint16]]
+    checksum: Callable[[NDArray[np.uint8]], NDArray[Any]] | None
 
     @property
     def size(self) -> int:
         """Length of a packet, bytes."""
         return self.dtype.itemsize
 
+    def scanner(self) -> PacketScanner:
+        """Return a scanner for a new stream."""
+        return PacketScanner(self)
+
+    def has_signature(self, packets: NDArray[Any]) -> NDArray[np.bool_]:
+        """Tell which packets, shape (n,), have the bytes that every packet has."""
+        rows = packets.view(np.uint8).reshape(len(packets), self.size)
+        return np.all([rows[:, offset] == value for offset, value in self.signature], axis=0) & np.ones(len(rows), bool)
+
     def is_valid(self, packets: NDArray[Any]) -> NDArray[np.bool_]:
         """Tell which packets, shape (n,), carry the right checksum."""
+        if self.checksum is None:
+            return np.ones(len(packets), dtype=bool)
         name = (self.dtype.names or ())[-1]
         covered = self.size - self.dtype[name].itemsize
         rows = packets.view(np.uint8).reshape(len(packets), self.size)  # (n, size)
@@ -59,6 +104,8 @@ class PacketScanner:
         Places where the signature stood but the checksum was wrong: damaged packets.
     skipped_bytes : int
         Bytes that belong to no packet.
+    first_at : int or None
+        Bytes before the first packet; None before it has come.
     """
 
     def __init__(self, layout: PacketLayout) -> None:
@@ -66,6 +113,7 @@ class PacketScanner:
         self.accepted = 0
         self.corrupt = 0
         self.skipped_bytes = 0
+        self.first_at: int | None = None
         self._tail = b""
 
     def feed(self, data: bytes | bytearray | memoryview) -> NDArray[Any]:
@@ -98,6 +146,8 @@ class PacketScanner:
             valid &= np.isin(candidates, chosen)
         self.corrupt += int(np.count_nonzero(~_covered(candidates, chosen, size)))
         self.accepted += len(chosen)
+        if self.first_at is None and len(chosen):
+            self.first_at = self.skipped_bytes + int(chosen[0])
         used = max(starts, int(chosen[-1]) + size if len(chosen) else 0)
         self.skipped_bytes += used - size * len(chosen)
         return packets[valid], used

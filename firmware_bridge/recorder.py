@@ -5,6 +5,7 @@ from __future__ import annotations
 import signal
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -12,15 +13,15 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 import gfimu
-from firmware_bridge.clock import ClockFit, HostClock, SampleRate
-from firmware_bridge.commands import Dialogue, Identity, Reply
-from firmware_bridge.frames import FrameFormat, SampleDecoder, Samples, Status, StreamCounts, frame_format
-from firmware_bridge.journal import Journal, JournalError
-from firmware_bridge.link import Link
+from firmware_bridge.clock import ClockFit
+from firmware_bridge.commands import Identity, asked_rate
+from firmware_bridge.finder import SPEEDS, has_speed
+from firmware_bridge.frames import FrameFormat, StreamCounts, frame_format
+from firmware_bridge.journal import JournalError
+from firmware_bridge.line_up import line_up, needed_baud
+from firmware_bridge.link import Chunk, Link
+from firmware_bridge.record_session import Batch, RecordSession, SampleClock
 from gfimu.errors import GfimuError, InputError
 from gfimu.files.outputs import RECORDING, check_outputs
 from gfimu.geometry.array import AccelerometerArray
@@ -29,30 +30,8 @@ from gfimu.recording.carried_array import array_metadata
 
 __all__ = ["Batch", "RecordReport", "SampleClock", "record"]
 
-_FLUSH_S = 0.25
 _SILENCE_S = 5.0
-_ANSWER_S = 0.5  # samples wait so long for the board to tell their scale
-_SETUP_ANSWER_S = 3.0  # and so long if they will be left out because the board was not set up yet
-_IDENTIFY_EVERY_S = 1.0
-
-
-@dataclass(frozen=True)
-class Batch:
-    """Samples as they go to the file and to whoever looks on.
-
-    Parameters
-    ----------
-    t_s : ndarray, shape (n,)
-        Time on the board's clock, s; strictly increasing through the whole recording.
-    counts : ndarray, shape (n, c)
-        Full-resolution counts; NaN where a chip did not answer.
-    status : ndarray, shape (n,)
-        Status bits.
-    """
-
-    t_s: NDArray[np.float64]
-    counts: NDArray[np.float64]
-    status: NDArray[np.uint16]
+_LOST_S = 2.0  # without a frame, after which the speed is looked for again
 
 
 @dataclass(frozen=True)
@@ -77,6 +56,8 @@ class RecordReport:
         Samples per status bit.
     faults : tuple of dict
         Faults of channels that a live view saw (`gfimu.integrity.fault.ChannelFault.entries`).
+    baud : int or None
+        Speed of the line at the end, bits per second.
     """
 
     path: Path
@@ -87,151 +68,7 @@ class RecordReport:
     identity: Identity | None
     status_counts: dict[str, int] = field(default_factory=dict)
     faults: tuple[dict[str, Any], ...] = ()
-
-
-class SampleClock:
-    """Puts samples of all segments on one time axis that never goes back.
-
-    Within a segment time is the board's own. After a restart of the board, or a break of the connection, the new
-    segment is placed as much later as the host's clock says has passed: the gap shows in the file as it was.
-    """
-
-    def __init__(self, tick_hz: float) -> None:
-        self._tick_hz = tick_hz
-        self._segment: int | None = None
-        self._origin_s = 0.0
-        self._last_s = -np.inf
-        self._last_host_s = 0.0
-
-    def place(self, samples: Samples, host_s: float) -> NDArray[np.float64]:
-        """Return times (n,), s, of samples that were read at host time ``host_s``."""
-        board = samples.ticks / self._tick_hz
-        times = np.empty(len(board))
-        for segment in np.unique(samples.segment).tolist():
-            rows = samples.segment == segment
-            mine = board[rows]
-            if segment != self._segment:
-                if self._segment is None:
-                    self._origin_s = 0.0
-                else:
-                    behind = float(board[-1] - mine[0])  # the newest sample arrived just now
-                    passed = max(host_s - behind - self._last_host_s, 0.0)
-                    step = float(np.median(np.diff(mine))) if len(mine) > 1 else 1e-3
-                    self._origin_s = self._last_s + max(passed, 2 * step) - float(mine[0])
-                self._segment = segment
-            times[rows] = mine + self._origin_s
-            self._last_s = float(times[rows][-1])
-            self._last_host_s = host_s - float(board[-1] - mine[-1])
-        return times
-
-
-class _Session:
-    """State of one recording."""
-
-    def __init__(
-        self, form: FrameFormat, array: AccelerometerArray, out: Path, metadata: dict[str, Any], *, has_setup: bool
-    ) -> None:
-        self.decoder = SampleDecoder(form)
-        self.clock = HostClock()
-        self.times = SampleClock(form.clock_hz)
-        self.rate = SampleRate(form.clock_hz)
-        self.identity: Identity | None = None
-        self.refused: list[Reply] = []
-        self.asked = False
-        self.journal: Journal | None = None
-        self.first_s: float | None = None
-        self.last_s = 0.0
-        self.status_counts: dict[str, int] = {}
-        self.waiting_for_board = form.dialogue is not None  # for its answer to the setup, which gives the scale
-        self.give_up_s = time.monotonic() + (_SETUP_ANSWER_S if has_setup else _ANSWER_S)
-        self._form, self._array, self._out, self._metadata = form, array, out, metadata
-        self._has_setup = has_setup
-        self._held: list[tuple[Samples, float]] = []
-        self._waiting: list[Batch] = []
-        self._flushed_at = 0.0
-        self._segment = 0
-
-    def take(self, data: bytes, host_s: float) -> Batch | None:
-        """Decode bytes read at ``host_s``; return the samples they complete."""
-        samples = self.decoder.feed(data)
-        if self._form.dialogue is not None:
-            for packet in self.decoder.messages:
-                self._hear(self._form.dialogue, packet)
-        self.decoder.messages.clear()
-        if not len(samples):
-            return None
-        if int(samples.segment[-1]) != self._segment:
-            self._segment = int(samples.segment[-1])
-            self.clock.restart()
-        self.clock.add(float(samples.ticks[-1]) / self._form.clock_hz, host_s)
-        if self.waiting_for_board:
-            self._held.append((samples, host_s))
-            if self.identity is None and host_s < self.give_up_s:
-                return None
-            return self.release()
-        return self._accept(samples, host_s)
-
-    def _hear(self, dialogue: Dialogue, packet: NDArray[Any]) -> None:
-        """Take an answer of the board; identities of an earlier listener do not count."""
-        message = dialogue.parse(packet)
-        if isinstance(message, Identity) and self.asked:
-            self.identity = message
-        elif isinstance(message, Reply):
-            self.asked |= message.command == dialogue.identify_code
-            if message.result:
-                self.refused.append(message)
-
-    def release(self) -> Batch | None:
-        """Take the samples that were held back until the board's answer told their scale."""
-        self.waiting_for_board = False
-        held, self._held = self._held, []
-        if not held:
-            return None
-        samples = Samples.join([part for part, _ in held])
-        if self.identity is not None and self._has_setup:
-            began = np.flatnonzero(samples.status & Status.FIRST)
-            start = int(began[-1]) if len(began) else 0  # what came before was not as asked for
-            samples = Samples(*(getattr(samples, name)[start:] for name in Samples.__dataclass_fields__))
-        return self._accept(samples, held[-1][1])
-
-    def _accept(self, samples: Samples, host_s: float) -> Batch:
-        """Scale samples and place them in time."""
-        counts = samples.counts.astype(float)
-        if self._form.no_reading is not None:
-            counts[samples.counts == self._form.no_reading] = np.nan
-        if self.identity is not None:
-            counts *= self.identity.count_size
-        batch = Batch(self.times.place(samples, host_s), counts, samples.status)
-        self.rate.add(samples)
-        for flag in Status:
-            number = int(np.count_nonzero(samples.status & flag))
-            if number:
-                name = (flag.name or "").lower()
-                self.status_counts[name] = self.status_counts.get(name, 0) + number
-        if self.first_s is None:
-            self.first_s = float(batch.t_s[0])
-        self.last_s = float(batch.t_s[-1])
-        self._waiting.append(batch)
-        return batch
-
-    def flush(self, now_s: float, *, force: bool = False) -> None:
-        """Write what waits, a few times a second."""
-        if not self._waiting or not (force or now_s - self._flushed_at >= _FLUSH_S):
-            return
-        if self.journal is None:
-            if self.identity is not None:
-                self._metadata["sample_rate_hz"] = self.identity.rate_hz
-                self._metadata["range_g"] = self.identity.range_g
-                self._metadata["firmware"] = self.identity.firmware
-            self.journal = Journal(self._out, self._array.channels, self._metadata)
-        parts = self._waiting
-        self._waiting = []
-        self._flushed_at = now_s
-        self.journal.append(
-            np.concatenate([part.t_s for part in parts]),
-            np.concatenate([part.counts for part in parts]),
-            np.concatenate([part.status for part in parts]),
-        )
+    baud: int | None = None
 
 
 def record(
@@ -241,7 +78,7 @@ def record(
     duration_s: float | None = None,
     form: str | FrameFormat = "lpc1768",
     array: str = "",
-    baud: int = 1_562_500,
+    baud: int | None = None,
     setup: tuple[bytes, ...] = (),
     reconnect_s: float | None = None,
     on_batch: Callable[[Batch, StreamCounts], None] | None = None,
@@ -261,8 +98,8 @@ def record(
         Frame format, or its name in `firmware_bridge.frames.FORMATS`.
     array : str
         Array file; by default the format's.
-    baud : int
-        Bits per second.
+    baud : int, optional
+        Bits per second. By default the speed at which the board answers or sends, raised if the sample rate needs more.
     setup : tuple of bytes
         Commands to send first (`firmware_bridge.commands`); sent again when the board started anew.
     reconnect_s : float, optional
@@ -295,7 +132,7 @@ def record(
     metadata: dict[str, Any] = {
         **array_metadata(carried),
         "part": part,
-        "lsb_m_s2": Part.load(part, carried.part_files).lsb,
+        "lsb_m_s2": layout.count_m_s2 or Part.load(part, carried.part_files).lsb,
         "port": port,
         "format": layout.name,
         "started_utc": datetime.now(UTC).isoformat(timespec="milliseconds"),
@@ -303,8 +140,8 @@ def record(
         "time_stamp_clock": "board",
         "time_stamp_tick_hz": layout.clock_hz,
     }
-    session = _Session(layout, carried, target, metadata, has_setup=bool(setup))
-    with Link(port, baud=baud, reconnect_s=reconnect_s) as link, _ask_to_stop() as asked:
+    session = RecordSession(layout, carried, target, metadata, has_setup=bool(setup))
+    with Link(port, baud=baud or SPEEDS[0], reconnect_s=reconnect_s) as link, _ask_to_stop() as asked:
         trouble = _run(
             link,
             session,
@@ -312,6 +149,7 @@ def record(
             setup,
             on_batch,
             lambda: asked() or (stop is not None and stop()),
+            baud,
         )
         breaks = link.breaks
     try:
@@ -327,8 +165,8 @@ def record(
         if isinstance(trouble, GfimuError):
             raise trouble
         raise InputError(
-            f"{port}: no {layout.name} frame came; check the port, the baud rate ({baud}) and --format "
-            f"({session.decoder.counts.skipped_bytes} bytes were no frames)"
+            f"{port}: no {layout.name} frame came{f' at {baud} baud' if baud else ''}; check the port and --format, "
+            f"or look for the board with --find ({session.decoder.counts.skipped_bytes} bytes were no frames)"
         )
     counts = session.decoder.counts
     fit = session.clock.fit()
@@ -336,6 +174,7 @@ def record(
         "frames_lost": counts.lost,
         "frames_corrupt": counts.corrupt,
         "bytes_skipped": counts.skipped_bytes,
+        "samples_unconfirmed": counts.unconfirmed,
         "board_restarts": counts.restarts,
         "connection_breaks": breaks,
         "status_counts": session.status_counts,
@@ -350,7 +189,9 @@ def record(
     if isinstance(trouble, JournalError):
         raise trouble
     duration = session.last_s - (session.first_s or 0.0)
-    return RecordReport(target, duration, counts, breaks, fit, session.identity, session.status_counts)
+    return RecordReport(
+        target, duration, counts, breaks, fit, session.identity, session.status_counts, baud=session.baud
+    )
 
 
 @contextmanager
@@ -371,24 +212,42 @@ def _ask_to_stop() -> Iterator[Callable[[], bool]]:
 
 def _run(
     link: Link,
-    session: _Session,
+    session: RecordSession,
     duration_s: float | None,
     setup: tuple[bytes, ...],
     on_batch: Callable[[Batch, StreamCounts], None] | None,
     stop: Callable[[], bool],
+    baud: int | None,
 ) -> GfimuError | None:
     """Read until the end; return what ended the recording early, if anything did."""
-    heard_at = asked_at = time.monotonic()
-    for command in setup:
-        link.write(command)
-    dialogue = session.decoder.format.dialogue
-    if dialogue is not None:
-        link.write(dialogue.identify)
+    began = time.monotonic()
+    form = session.decoder.format
+    dialogue = form.dialogue
+    least = needed_baud(form, asked_rate(setup))
+    chunks: deque[Chunk] = deque()
+
+    def find_speed() -> None:
+        found = line_up(link, form, baud, least_baud=least, stop=stop)
+        if found is not None:
+            session.baud = found[0].baud
+            if session.first_s is not None:
+                session.resume(found[1])
+            chunks.extend(() if setup and session.first_s is None else found[1])
+
+    has_to_agree = has_speed(link.port) or least > link.baud
     restarts = 0
     seen: Identity | None = None
     try:
+        while has_to_agree and session.baud is None and time.monotonic() - began < _SILENCE_S and not stop():
+            find_speed()
+        heard_at = began if session.baud is None else time.monotonic()
+        session.expect_answers()
+        for command in setup:
+            link.write(command)
         while not stop():
-            chunk = link.read()
+            if dialogue is not None:
+                session.ask(link, dialogue, time.monotonic())
+            chunk = chunks.popleft() if chunks else link.read()
             now = time.monotonic()
             if chunk is not None:
                 if chunk.after_break:
@@ -406,6 +265,9 @@ def _run(
                     heard_at = now
                     if on_batch is not None:
                         on_batch(batch, session.decoder.counts)
+            if dialogue is not None and has_to_agree and session.first_s is not None and now - heard_at > _LOST_S:
+                find_speed()  # a board that started anew is back at its first speed
+                heard_at = time.monotonic()
             if session.waiting_for_board and now >= session.give_up_s:
                 session.release()
             session.flush(now)
@@ -416,9 +278,6 @@ def _run(
                 return None
             if session.first_s is None and now - heard_at > _SILENCE_S:
                 return None
-            if dialogue is not None and session.identity is None and now - asked_at > _IDENTIFY_EVERY_S:
-                asked_at = now
-                link.write(dialogue.identify)
     except GfimuError as error:
         return error
     return None

@@ -15,6 +15,7 @@ from typing import Protocol
 
 from firmware_bridge.adxl345_device import TICKS_PER_SECOND
 from firmware_bridge.board_process import BoardProcess
+from firmware_bridge.line_speed import as_received, terminal_baud
 from gfimu.errors import InputError
 
 __all__ = ["PseudoTerminal", "ServeReport", "TcpPort", "VirtualPort", "open_port", "serve"]
@@ -25,12 +26,18 @@ _READ_BYTES = 4096
 _BUFFER_BYTES = 1 << 18
 _NOBODY_S = 1.0
 _PORTS = range(65536)
+_FRAMING_ERROR = 1 << 3  # of the UART's line status
 
 
 class VirtualPort(Protocol):
     """The board's end of a line."""
 
     name: str
+
+    @property
+    def baud(self) -> int | None:
+        """Speed that the host has set, bits per second; None on a line without one."""
+        ...
 
     def read(self) -> bytes:
         """Bytes from the host, without waiting."""
@@ -56,6 +63,11 @@ class PseudoTerminal:
         tty.setraw(self._theirs)
         os.set_blocking(self._ours, False)
         self.name = os.ttyname(self._theirs)
+
+    @property
+    def baud(self) -> int | None:
+        """Speed that the host has set, bits per second."""
+        return terminal_baud(self._ours)
 
     def read(self) -> bytes:
         """Bytes from the host, without waiting."""
@@ -96,6 +108,11 @@ class TcpPort:
         self._listener.setblocking(False)
         self._host: socket.socket | None = None
         self.name = f"socket://127.0.0.1:{self._listener.getsockname()[1]}"
+
+    @property
+    def baud(self) -> int | None:
+        """A network has no speed of characters."""
+        return None
 
     def _accept(self) -> None:
         if self._host is None:
@@ -245,6 +262,8 @@ def serve(
 ) -> ServeReport:
     """Run a board behind a port until the time is up, ``stop`` says so, or Ctrl-C.
 
+    A host that reads at another speed than the board sends gets garbage, as on a wire.
+
     Parameters
     ----------
     board : BoardProcess
@@ -269,8 +288,9 @@ def serve(
     with _Interrupted():
         while (end is None or now < end) and not (stop is not None and stop()):
             target = now + round((_SLICE_S if realtime else _FAST_SLICE_S) * TICKS_PER_SECOND)
+            before = board.baud()
             now = board.run_until(target if end is None else min(target, end))
-            line.put(board.take_sent()[0])
+            line.put(as_received(board.take_sent()[0], before, port.baud or before)[0])
             line.pass_on(0.0 if realtime else _SLICE_S)
             while not realtime and line.waiting and not (stop is not None and stop()):
                 line.pass_on(_SLICE_S)
@@ -278,7 +298,9 @@ def serve(
                 line.forget()
             asked = port.read()
             if asked:
-                board.receive(asked)
+                ours = board.baud()
+                read, errors = as_received(asked, port.baud or ours, ours)
+                board.receive(read, _FRAMING_ERROR if errors else 0)
                 received += len(asked)
             if on_progress is not None:
                 on_progress((now - first) / TICKS_PER_SECOND)

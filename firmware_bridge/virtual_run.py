@@ -18,8 +18,8 @@ from firmware_bridge.commands import (
     Identity,
     encode_command,
     parse_message,
+    sample_at,
     set_range,
-    set_rate,
 )
 from firmware_bridge.frames import SampleDecoder, Samples, StreamCounts
 from firmware_bridge.physics import RidePhysics, Scene
@@ -102,7 +102,7 @@ def record_virtual(
     progress : callable, optional
         Is told the share done, 0 to 1.
     """
-    setup = set_range(range_g, full_resolution=full_resolution) + set_rate(rate_hz, rate_code)
+    setup = set_range(range_g, full_resolution=full_resolution) + sample_at(rate_hz, rate_code)
     options = typical_chips(scene.seed) if chips is None else tuple(chips)
     decoder = SampleDecoder()
     parts: list[Samples] = []

@@ -144,6 +144,9 @@ def _run_behind_port(
 def _build(
     image: Annotated[str, typer.Argument(help="Image: gfimu or selfcheck.")] = "gfimu",
     out: Annotated[Path | None, typer.Option("--out", help="Folder for the image; else the package's own.")] = None,
+    baud: Annotated[
+        int | None, typer.Option("--baud", help="Speed of the line after power-on, bits per second; else 115200.")
+    ] = None,
     define: Annotated[
         list[str] | None,
         typer.Option("--define", metavar="NAME=VALUE", help="Preprocessor definition; may be repeated."),
@@ -152,7 +155,7 @@ def _build(
 ) -> None:
     """Compile the firmware from its C sources with the compiler of the ziglang package.
 
-    Example: gfimu firmware build --out build --define GFIMU_SPI_HZ=1000000U
+    Example: gfimu firmware build --out build --baud 460800 --define GFIMU_SPI_HZ=1000000U
     """
     from gfimu.commands.firmware import build
     from gfimu.errors import InputError
@@ -163,7 +166,7 @@ def _build(
         if not equals or not name.isidentifier():
             raise InputError(f"--define {item!r}: write NAME=VALUE")
         defines[name] = value
-    report = build(image, out=out, define=defines)
+    report = build(image, out=out, baud=baud, define=defines)
     if json:
         print_json(asdict(report))
         return

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from gfimu.cli.output import JsonOption, console, print_json, print_paths, print_table
+
+if TYPE_CHECKING:
+    from firmware_bridge.chip_selftest import AxisSelfTest
+    from firmware_bridge.finder import Found
 
 __all__ = ["register"]
 
@@ -19,8 +23,14 @@ def register(app: typer.Typer) -> None:
 
 
 def _record(
-    port: Annotated[str, typer.Option("--port", help="Device, pseudo-terminal, or socket://host:port.")],
-    out: Annotated[Path, typer.Option("--out", help="Recording to write, .csv or .parquet.")],
+    port: Annotated[str, typer.Option("--port", help="Device, pseudo-terminal, or socket://host:port.")] = "",
+    out: Annotated[Path | None, typer.Option("--out", help="Recording to write, .csv or .parquet.")] = None,
+    find: Annotated[
+        bool, typer.Option("--find", help="Look for the board: every port or --port, every speed and format.")
+    ] = False,
+    self_test: Annotated[
+        bool, typer.Option("--self-test", help="Test the chips first, at rest, against the data sheet's limits.")
+    ] = False,
     duration: Annotated[
         float | None, typer.Option("--duration", min=0.0, help="Length in s; else until Ctrl-C.")
     ] = None,
@@ -28,9 +38,13 @@ def _record(
         int | None, typer.Option("--rate", help="Ask the board for this sample rate, 10 to 3200 Hz.")
     ] = None,
     range_g: Annotated[int | None, typer.Option("--range", help="Ask the board for ±2, 4, 8 or 16 g.")] = None,
-    form: Annotated[str, typer.Option("--format", help="Frame format: lpc1768 or mimu4444.")] = "lpc1768",
+    form: Annotated[
+        str, typer.Option("--format", help="Frame format: lpc1768 or mimu4444. Else lpc1768, or what is found.")
+    ] = "",
     array: Annotated[str, typer.Option("--array", help="Array on the board; else the format's.")] = "",
-    baud: Annotated[int, typer.Option("--baud", help="Bits per second; without meaning on a socket.")] = 1_562_500,
+    baud: Annotated[
+        int | None, typer.Option("--baud", help="Bits per second; else as the board is, raised if the rate needs it.")
+    ] = None,
     reconnect: Annotated[
         float | None,
         typer.Option(
@@ -49,21 +63,39 @@ def _record(
     be read while it grows; if the program is killed, at most the last half second is missing.
 
     Example: gfimu record --port /dev/ttyUSB0 --out run.parquet --rate 800 --duration 60
+
+    Example: gfimu record --find --self-test --out run.parquet
     """
     from gfimu.commands.record import record
 
     screen = console()
     interactive = screen.is_terminal and not json
-    if interactive and reconnect and "://" not in port and not Path(port).exists():
+    if interactive and reconnect and port and "://" not in port and not Path(port).exists():
         screen.print(f"waiting for {port}, up to {reconnect:g} s")
     messages = console(stderr=True)
 
     def name_fault(text: str) -> None:
         messages.print(f"{' ' * 100}\r{text}" if interactive else f"gfimu: {text}", soft_wrap=True)
 
+    boards: list[Found] = []
+
+    def name_board(board: Found) -> None:
+        boards.append(board)
+        if not json:
+            screen.print(f"{board.port}: {_description(board)}", soft_wrap=True)
+
+    axes: list[AxisSelfTest] = []
+
+    def show_axes(tested: list[AxisSelfTest]) -> None:
+        axes.extend(tested)
+        if not json:
+            _print_self_test(tested)
+
     report = record(
         port,
         out,
+        find=find,
+        self_test=self_test,
         duration=duration,
         rate=rate,
         range_g=range_g,
@@ -75,12 +107,23 @@ def _record(
         view=view,
         on_text=(lambda text: screen.print(text, end="\r")) if interactive else None,
         on_fault=name_fault,
+        on_find=name_board,
+        on_self_test=show_axes,
+        on_try=(lambda name: screen.print(f"looking at {name} …", end="\r")) if interactive else None,
     )
+    outcome = {"boards": [asdict(board) for board in boards], "self_test": [asdict(axis) for axis in axes]}
+    if report is None or out is None:
+        if json:
+            print_json(outcome)
+        if any(axis.verdict != "passed" for axis in axes):
+            raise typer.Exit(1)
+        return
+    port = boards[0].port if boards else port
     if interactive:
         screen.print()
     written = {"recording": out} | ({"rrd": rrd} if rrd is not None else {})
     if json:
-        print_json(asdict(report) | {"files": written})
+        print_json(asdict(report) | outcome | {"files": written})
         return
     stream, clock, identity = report.stream, report.clock, report.identity
     rows = [
@@ -89,6 +132,7 @@ def _record(
         ("lost", stream.lost),
         ("corrupt", stream.corrupt),
         ("bytes skipped", stream.skipped_bytes),
+        ("samples that follow no other, refused", stream.unconfirmed),
         ("board restarts", stream.restarts),
         ("connection breaks", report.breaks),
     ]
@@ -101,6 +145,38 @@ def _record(
         if faulty:
             rows.append(("chips that do not hold their settings", faulty))
         rows.append(("firmware", f"{identity.firmware}, {identity.rate_hz} Hz, ±{identity.range_g} g"))
+    if report.baud is not None:
+        rows.append(("speed of the line", f"{report.baud} baud"))
     rows += [(f"status {name}", number) for name, number in report.status_counts.items()]
     print_table(f"recorded from {port}", ("quantity", "value"), rows)
     print_paths(written.items())
+
+
+def _description(board: Found) -> str:
+    """Return a line on a board: speed, format, and what it says about itself."""
+    line = f"{board.form} at {board.baud} baud"
+    if (identity := board.identity) is None:
+        return f"{line}, sends without answering"
+    chips = [
+        "answers" if ok else "faulty" if bad else "missing"
+        for ok, bad in zip(identity.present, identity.faulty, strict=True)
+    ]
+    return (
+        f"{line}, firmware {identity.firmware}, {identity.rate_hz} Hz, ±{identity.range_g} g, "
+        f"{'sends' if identity.streaming else 'stopped'}; chips 1 to {len(chips)}: {', '.join(chips)}; "
+        f"last reset: {identity.reset_cause}"
+    )
+
+
+def _print_self_test(tested: list[AxisSelfTest]) -> None:
+    rows = [
+        (
+            one.channel,
+            f"{one.shift_g:+.3f}",
+            f"{one.least_g:+.2f} … {one.greatest_g:+.2f}",
+            f"{1e3 * one.noise_g:.1f}",
+            one.verdict,
+        )
+        for one in tested
+    ]
+    print_table("self-test of the chips", ("channel", "shift, g", "limits, g", "noise, mg", "result"), rows)

@@ -158,11 +158,11 @@ def _behind_port(
     realtime: bool, pure_python: bool, on_open: Callable[[str], None] | None,
 ) -> ServeReport:  # fmt: skip
     """Serve the board on a port until the time is up or Ctrl-C."""
-    from firmware_bridge.commands import set_range, set_rate
+    from firmware_bridge.commands import sample_at, set_range
     from firmware_bridge.virtual_port import open_port, serve
 
     rate, range_g = setup
-    commands = set_range(range_g) + set_rate(rate)
+    commands = set_range(range_g) + sample_at(rate)
     line = open_port(port)
     try:
         with _board(ride, image, seed, pure_python=pure_python) as board:
@@ -178,7 +178,11 @@ def _behind_port(
 
 @writes(reads=("image",), out=IMAGES)
 def build(
-    image: str = "gfimu", *, out: str | Path | None = None, define: Mapping[str, str] | None = None
+    image: str = "gfimu",
+    *,
+    out: str | Path | None = None,
+    baud: int | None = None,
+    define: Mapping[str, str] | None = None,
 ) -> BuildReport:
     """Compile the firmware from its C sources with the compiler of the ziglang package.
 
@@ -188,6 +192,8 @@ def build(
         Image: gfimu or selfcheck.
     out : str or Path, optional
         Folder for the image, made if it isn't there; the package's own by default.
+    baud : int, optional
+        Speed of the line after power-on, bits per second (``GFIMU_BOOT_BAUD``); 115,200 by default.
     define : mapping of str to str, optional
         Preprocessor definitions.
 
@@ -200,7 +206,8 @@ def build(
     """
     from firmware_bridge.lpc1768.build import build as build_image
 
-    return build_image(image, out, defines=dict(define or {}))
+    speed = {} if baud is None else {"GFIMU_BOOT_BAUD": f"{baud}U"}
+    return build_image(image, out, defines={**speed, **(define or {})})
 
 
 def selftest() -> list[SelfTestRow]:
@@ -239,10 +246,10 @@ def trace(
     """
     from firmware_bridge.board.trace import write_rrd, write_vcd
     from firmware_bridge.board_process import require_emulator
-    from firmware_bridge.commands import set_rate
+    from firmware_bridge.commands import sample_at
 
     require_emulator()
-    setup = set_rate(rate)
+    setup = sample_at(rate)
     with _board(_ride(scenario, seed), image, seed, pure_python=True, trace=True) as board:
         if skip:
             board.run_for(min(skip, _BOOT_S))

@@ -7,9 +7,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from gfimu.errors import InputError
 from gfimu.files.outputs import RECORDING, RERUN, writes
 
 if TYPE_CHECKING:
+    from firmware_bridge.chip_selftest import AxisSelfTest
+    from firmware_bridge.finder import Found
     from firmware_bridge.live import LiveView
     from firmware_bridge.recorder import RecordReport
 
@@ -18,30 +21,40 @@ __all__ = ["record"]
 
 @writes(reads=("port", "array"), out=RECORDING, rrd=RERUN)
 def record(
-    port: str,
-    out: str | Path,
+    port: str = "",
+    out: str | Path | None = None,
     *,
+    find: bool = False,
+    self_test: bool = False,
     duration: float | None = None,
     rate: int | None = None,
     range_g: int | None = None,
-    form: str = "lpc1768",
+    form: str = "",
     array: str = "",
-    baud: int = 1_562_500,
+    baud: int | None = None,
     reconnect: float | None = None,
     rrd: str | Path | None = None,
     view: bool = False,
     on_text: Callable[[str], None] | None = None,
     on_fault: Callable[[str], None] | None = None,
+    on_find: Callable[[Found], None] | None = None,
+    on_try: Callable[[str], None] | None = None,
+    on_self_test: Callable[[list[AxisSelfTest]], None] | None = None,
     stop: Callable[[], bool] | None = None,
-) -> RecordReport:
+) -> RecordReport | None:
     """Record from a board, real or virtual, until the time is up, ``stop`` says so, or Ctrl-C.
 
     Parameters
     ----------
     port : str
-        Device, pseudo-terminal, or ``socket://host:port``.
-    out : str or Path
-        Recording to write, ``.csv`` or ``.parquet``; can be read while it grows.
+        Device, pseudo-terminal, or ``socket://host:port``; may be left out with ``find``.
+    out : str or Path, optional
+        Recording to write, ``.csv`` or ``.parquet``; can be read while it grows. May be left out with ``find``.
+    find : bool
+        Look for boards first: on ``port`` or every serial port, at the usual speeds, in ``form`` or every format. With
+        ``out``, the first that is found is recorded.
+    self_test : bool
+        Test the chips first, while the unit rests: the shift under self-test against the data sheet's limits at 3.3 V.
     duration : float, optional
         Length, s of board time; by default until stopped.
     rate : int, optional
@@ -49,11 +62,11 @@ def record(
     range_g : int, optional
         Ask the board for ±2, 4, 8 or 16 g (``--range``).
     form : str
-        Frame format (``--format``): a key of `firmware_bridge.frames.FORMATS`.
+        Frame format (``--format``): a key of `firmware_bridge.frames.FORMATS`; else ``lpc1768``, or what is found.
     array : str
         Array on the board; the format's by default.
-    baud : int
-        Bits per second; without meaning on a socket.
+    baud : int, optional
+        Bits per second. By default the speed at which the board is, raised if the sample rate needs more.
     reconnect : float, optional
         Wait this long for a port that is not there yet, and for a lost connection, s; by default the port has to be
         there at once, and a lost connection is waited for a minute.
@@ -66,17 +79,44 @@ def record(
     on_fault : callable, optional
         Is given a sentence when a channel contradicts the others, and when it does so no longer
         (`gfimu.integrity.live`). The recording has every channel all the same.
+    on_find, on_try : callable, optional
+        Are given each board that is found, and each port before it is tried.
+    on_self_test : callable, optional
+        Is given the results of the self-test, channel by channel.
     stop : callable, optional
         Asked often; True ends the recording.
+
+    Returns
+    -------
+    RecordReport or None
+        None if nothing was to be recorded.
 
     Raises
     ------
     InputError
-        If the port can't be opened, nothing that is a frame comes, or an output can't be written where it is asked for.
+        If the port can't be opened, nothing that is a frame comes, no board is found, or an output can't be written
+        where it is asked for.
     """
     from firmware_bridge.commands import set_range, set_rate
     from firmware_bridge.recorder import record as record_port
 
+    if find:
+        found = _found(port, form, on_find, on_try)
+        port, form = found.port, found.form
+    if self_test:
+        from firmware_bridge.chip_selftest import check_chips
+
+        tested = check_chips(_needed(port), baud=baud, form=form or "lpc1768")
+        if on_self_test is not None:
+            on_self_test(tested)
+    if out is None:
+        given = {"duration": duration, "rate": rate, "range": range_g, "rrd": rrd, "view": view or None, "baud": baud}
+        without = [f"--{name}" for name, value in given.items() if value is not None]
+        if without or not (find or self_test):
+            raise InputError(f"{', '.join(without) or 'record'}: give the recording to write with --out")
+        return None
+    port = _needed(port)
+    form = form or "lpc1768"
     setup = [set_range(range_g)] if range_g is not None else []
     setup += [set_rate(rate)] if rate is not None else []
     live = None
@@ -97,6 +137,31 @@ def record(
     return replace(report, faults=tuple(entry for fault in live.faults for entry in fault.entries()))
 
 
+def _needed(port: str) -> str:
+    if not port:
+        raise InputError("give the board's port with --port, or look for the board with --find")
+    return port
+
+
+def _found(
+    port: str, form: str, on_find: Callable[[Found], None] | None, on_try: Callable[[str], None] | None
+) -> Found:
+    """Return the first board that is found."""
+    from firmware_bridge.finder import SPEEDS, find_boards
+
+    boards = find_boards([port] if port else [], [form] if form else [], on_try=on_try)
+    if not boards:
+        speeds = ", ".join(str(speed) for speed in sorted(SPEEDS))
+        raise InputError(
+            f"{port or 'serial ports'}: no board answers or sends {form or 'a known format'} at {speeds} baud; "
+            "check power, cable and --format (docs/bench.md)"
+        )
+    for board in boards:
+        if on_find is not None:
+            on_find(board)
+    return boards[0]
+
+
 def _live_view(
     form: str,
     array: str,
@@ -112,7 +177,7 @@ def _live_view(
     from gfimu.parts.part import Part
 
     carried = AccelerometerArray.load(array or frame_format(form).array)
-    lsb = Part.load(carried.chips[0].part, carried.part_files).lsb
+    lsb = frame_format(form).count_m_s2 or Part.load(carried.chips[0].part, carried.part_files).lsb
     picture = None
     if rrd is not None or view:
         from gfimu.visual.live import LivePicture

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from firmware_bridge.adxl345_device import TICKS_PER_SECOND, Adxl345, Adxl345Options
-from firmware_bridge.commands import set_rate
+from firmware_bridge.commands import sample_at
 from firmware_bridge.lpc1768.build import SOURCES, image_path
 from firmware_bridge.lpc1768.elf import ElfImage
 
@@ -62,7 +62,7 @@ def make_board():
         board = (Board if kind == "python" else FastBoard)(loaded, sensors)
         if rate is not None:
             board.run_for(0.01)
-            board.uarts[0].receive(set_rate(rate))
+            board.uarts[0].receive(sample_at(rate))
         return board
 
     return make

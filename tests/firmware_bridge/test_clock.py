@@ -48,8 +48,74 @@ def test_memory_stays_small_and_few_arrivals_give_no_line() -> None:
     for k in range(100_000):
         clock.add(k * 1e-3, k * 1e-3 + 5.0)
     assert len(clock._points) <= 102
+
+
+def walked(seed: int, *, drift: float, walk: float, seconds: int = 600):
+    """Board and host times of samples whose board clock drifts and walks, and what arrives when."""
+    rng = np.random.default_rng(seed)
+    host = np.arange(0.0, seconds, 0.1)
+    rate = 40e-6 + drift * host + walk * np.sqrt(0.1) * np.cumsum(rng.normal(size=len(host)))
+    board = 12.0 + host - np.concatenate([[0.0], np.cumsum(rate[:-1] * 0.1)])
+    latency = 0.0005 + rng.exponential(0.004, len(host))
+    latency[rng.random(len(host)) < 0.02] += rng.exponential(0.3)
+    return board, host, host + latency
+
+
+@pytest.mark.parametrize(("drift", "walk"), [(0.0, 0.0), (5e-8, 0.0), (5e-7, 0.0), (0.0, 5e-7)])
+def test_a_clock_that_drifts_lies_within_its_uncertainty(drift, walk) -> None:
+    inside, changes = [], []
+    for seed in range(3):
+        board, host, arrived = walked(seed, drift=drift, walk=walk)
+        clock = HostClock()
+        for one, late in zip(board, arrived, strict=True):
+            clock.add(one, late)
+        fit = clock.fit()
+        error, std = fit.to_host(board) - host, fit.host_std_s(board)
+        inside.append(np.mean(np.abs(error) < 3 * std))
+        own = np.sqrt(std**2 - fit.latency_std_s**2)  # without the latency, which all times share
+        changes.append(np.mean(np.abs(error - np.median(error)) < 3 * own))
+        assert np.median(own) < 1e-4
+        assert abs(fit.rate_error - (host[-1] - host[0]) / (board[-1] - board[0]) + 1) < 4 * fit.rate_error_std
+    assert min(inside) >= 0.98
+    assert np.mean(changes) >= 0.98
+
+
+def test_answers_bound_the_shortest_latency() -> None:
+    board, host, arrived = walked(5, drift=0.0, walk=0.0)
+    clock = HostClock()
+    for one, late in zip(board, arrived + 0.006, strict=True):  # 6.5 ms at least
+        clock.add(one, late)
+    for k in range(100, len(board), 100):
+        clock.exchange(float(board[k]), float(host[k]) - 0.002)  # the way to the board took 2 ms
+    fit = clock.fit()
+    assert fit.latency_std_s == pytest.approx(0.0085 / np.sqrt(12.0), rel=0.05)
+    assert np.all(np.abs(fit.to_host(board) - host) < 3 * fit.host_std_s(board))
+
+
+def test_a_restart_keeps_the_rate_and_not_the_offset() -> None:
+    board, _, arrived = walked(6, drift=0.0, walk=0.0)
+    clock = HostClock()
+    for one, late in zip(board, arrived, strict=True):
+        clock.add(one, late)
+    before = clock.fit()
     clock.restart()
-    assert clock.fit() is None
+    for k in range(20):  # two seconds: too few for a line of their own
+        clock.add(0.1 * k, 700.0 + 0.1 * k + 0.0005)
+    fit = clock.fit()
+    assert fit.to_host(1.0) == pytest.approx(701.0, abs=3 * fit.host_std_s(1.0))
+    assert abs(fit.rate_error - before.rate_error) < 20e-6
+    assert fit.host_std_s(30.0) < fit.host_std_s(1.0) + 30 * 20e-6
+
+
+def test_the_uncertainty_grows_in_a_gap() -> None:
+    board, _, arrived = walked(7, drift=0.0, walk=1e-6)
+    clock = HostClock()
+    for one, late in zip(board, arrived, strict=True):
+        if not 200.0 < one < 400.0:
+            clock.add(one, late)
+    fit = clock.fit()
+    own = [np.sqrt(fit.host_std_s(at) ** 2 - fit.latency_std_s**2) for at in (100.0, 300.0)]
+    assert own[1] > 5 * own[0]
 
 
 def samples_at(ticks, *, status=None, lost=None, segment=None) -> Samples:

@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from firmware_bridge.checksum import crc16, crc16_rows
+from firmware_bridge.commands import parse_message
 from firmware_bridge.frames import (
     FORMATS,
     LPC1768_DTYPE,
@@ -48,6 +49,24 @@ def byte_loop(stream: bytes) -> tuple[list[bytes], int, int]:
         skipped += 1
         i += 1
     return frames, corrupt, skipped
+
+
+def follows(earlier: bytes, later: bytes) -> bool:
+    step = (int.from_bytes(later[4:6], "little") - int.from_bytes(earlier[4:6], "little")) % 2**16
+    span = (int.from_bytes(later[6:10], "little") - int.from_bytes(earlier[6:10], "little")) % 2**32
+    return 1 <= step <= 16 and 0 < span <= step * 110_000  # 10 Hz at the slowest, and a tenth more
+
+
+def confirmed(frames: list[bytes], *, at_start: bool) -> list[bytes]:
+    """The rule beside the checksum: a sample passes if it follows the last that passed, or the next follows it."""
+    passed = []
+    for k, frame in enumerate(frames):
+        goes_on = bool(passed) and follows(passed[-1], frame)
+        is_followed = k + 1 < len(frames) and follows(frame, frames[k + 1])
+        is_following = k > 0 and follows(frames[k - 1], frame) and (k == 1 or frames[k - 1] in passed)
+        if goes_on or is_followed or is_following or (k == 0 and at_start):
+            passed.append(frame)
+    return passed
 
 
 def decode_in_chunks(stream: bytes, cuts: list[int]) -> tuple[Samples, SampleDecoder]:
@@ -94,9 +113,9 @@ def test_decoder_equals_the_byte_loop_for_any_chunking(pieces: list[bytes], cuts
     stream = b"".join(pieces)
     frames, corrupt, skipped = byte_loop(stream)
     whole, decoder = decode_in_chunks(stream, cuts)
-    expected = np.frombuffer(b"".join(f for f in frames if f[3] == FrameType.SAMPLE), LPC1768_DTYPE)
-    assert np.array_equal(whole.counts, expected["counts"])
-    assert decoder.counts.samples + decoder.counts.messages == len(frames)
+    passed = confirmed(frames, at_start=bool(frames) and stream.startswith(frames[0]))
+    assert np.array_equal(whole.counts, np.frombuffer(b"".join(passed), LPC1768_DTYPE)["counts"])
+    assert decoder.counts.samples + decoder.counts.unconfirmed == len(frames)
     assert (decoder.counts.corrupt, decoder.counts.skipped_bytes) == (corrupt, skipped)
     at_once, other = decode_in_chunks(stream, [])
     for name in ("ticks", "lost_before", "segment", "status", "sequence"):
@@ -121,6 +140,33 @@ def test_damage_never_invents_a_sample_and_loses_nothing_whole(seed: int, flips:
     assert np.array_equal(samples.counts, counts[whole])
     gaps_inside = np.diff(np.flatnonzero(whole)) - 1
     assert decoder.counts.lost == gaps_inside.sum()
+
+
+def test_junk_with_a_right_checksum_is_no_sample() -> None:
+    rng = np.random.default_rng(3)
+    real = np.frombuffer(stream_of(2000)[0], np.uint8).reshape(-1, FRAME)
+    junk = np.frombuffer(
+        encode_samples(
+            rng.integers(0, 2**16, 2000), rng.integers(0, 2**32, 2000), rng.integers(-4096, 4096, (2000, 12))
+        ),
+        np.uint8,
+    ).reshape(-1, FRAME)  # each of them passed the checksum: 10^8 candidates give as many
+    mixed = real[:2].tobytes() + np.stack([real[2:], junk[2:]], axis=1).tobytes()
+    for stream, samples, refused in ((junk.tobytes(), 0, 2000), (mixed, 2000, 1998)):
+        _, decoder = decode_in_chunks(b"\x00" + stream, [1001, 40_007])
+        counts = decoder.counts
+        assert (counts.samples, counts.unconfirmed, counts.restarts, counts.lost) == (samples, refused, 0, 0)
+
+
+def test_junk_with_a_right_checksum_is_no_message() -> None:
+    rng = np.random.default_rng(4)
+    for kind in (FrameType.IDENTITY, FrameType.REPLY):
+        for _ in range(2000):
+            frame = encode_message(kind, int(rng.integers(2**16)), int(rng.integers(2**32)), rng.bytes(24))
+            packet = np.frombuffer(frame, LPC1768_DTYPE)[0].copy()
+            assert parse_message(packet) is None  # whatever the bytes below are
+            packet["status"], packet["temperature"] = rng.integers(0, 2**16), rng.integers(-(2**15), 2**15)
+            assert parse_message(packet) is None
 
 
 def test_time_and_sequence_unwrap() -> None:

@@ -95,7 +95,7 @@ class Board:
 
 def test_a_format_made_here_is_recorded(tmp_path, monkeypatch):
     """Another checksum, byte order, clock, width of the sequence number and of the counts; no commands."""
-    monkeypatch.setattr("firmware_bridge.recorder._IDENTIFY_EVERY_S", 0.05)
+    monkeypatch.setattr("firmware_bridge.record_session._IDENTIFY_EVERY_S", 0.05)
     numbers = np.delete(np.arange(800), np.arange(300, 310))  # ten are lost, across no wrap
     counts = counts_of(numbers)
     counts[5, 4] = MISSING
@@ -121,7 +121,7 @@ def test_a_format_made_here_is_recorded(tmp_path, monkeypatch):
 
 def test_a_board_without_commands_is_sent_none(tmp_path, monkeypatch):
     """The shipped format that only sends was asked for its identity every second."""
-    monkeypatch.setattr("firmware_bridge.recorder._IDENTIFY_EVERY_S", 0.05)
+    monkeypatch.setattr("firmware_bridge.record_session._IDENTIFY_EVERY_S", 0.05)
     monkeypatch.setattr("firmware_bridge.recorder._SILENCE_S", 0.5)
     board = Board(lambda board, line: time.sleep(0.1))
     with pytest.raises(InputError, match="no mimu4444 frame came"):

@@ -7,7 +7,7 @@
 #define GFIMU_SPI_HZ 5000000U
 #endif
 #ifndef GFIMU_BOOT_BAUD
-#define GFIMU_BOOT_BAUD 1562500U
+#define GFIMU_BOOT_BAUD 115200U /* what every USB-serial bridge can do */
 #endif
 #ifndef GFIMU_AUTOSTART
 #define GFIMU_AUTOSTART 1

@@ -35,6 +35,7 @@
 #define BITS_PER_FRAME (FRAME_BYTES * 10U)
 #define MICROSECONDS 1000000U
 #define SETTLE_SAMPLES 16U /* longest wait for the first conversions after a change of configuration */
+#define UNREADABLE_MAX 4U /* the change of rate itself may cost a byte or two */
 #define RETRY_US 20000U /* how often one of the missing sensors is looked for */
 
 _Static_assert((RECEIVE_RING & (RECEIVE_RING - 1U)) == 0U, "the receive ring is indexed with a mask");
@@ -63,7 +64,9 @@ static struct {
     uint32_t faulty;  /* bit mask of sensors that identify themselves but do not hold it */
     uint16_t sticky;  /* status bits to report in the next frame */
     volatile bool announce;
-    uint32_t new_baud; /* 0, or the rate to switch to once the reply has left */
+    volatile uint32_t new_baud;      /* 0, or the rate to switch to once the reply has left */
+    volatile uint32_t fallback_baud; /* 0, or the rate to go back to while no command has come at the new one */
+    uint32_t unreadable;             /* pieces of garbage since the last change of rate */
 } core;
 
 /* Frames to send. Only whole frames enter and frames never wrap, since the ring is a multiple of their size. */
@@ -365,11 +368,26 @@ void core_receive(uint8_t byte)
     }
 }
 
+/* Garbage before the first command at a new rate: the host did not follow, so the board goes back to where it is. */
+static void note_unreadable(void)
+{
+    hal_lock();
+    if ((core.fallback_baud != 0U) && (core.new_baud == 0U)) {
+        core.unreadable++;
+        if (core.unreadable >= UNREADABLE_MAX) {
+            core.new_baud = core.fallback_baud;
+            core.fallback_baud = 0U;
+        }
+    }
+    hal_unlock();
+}
+
 void core_receive_error(void)
 {
     hal_lock();
     core.sticky |= STATUS_RECEIVE_ERROR;
     hal_unlock();
+    note_unreadable();
 }
 
 static bool line_carries(uint32_t baud, uint32_t rate_hz)
@@ -438,6 +456,8 @@ static uint32_t set_baud(uint32_t baud)
     } else if (core.streaming && !line_carries(baud, core.rate_hz)) {
         result = RESULT_LINE_TOO_SLOW;
     } else {
+        core.fallback_baud = core.baud;
+        core.unreadable = 0U;
         core.new_baud = baud;
     }
     return result;
@@ -497,6 +517,7 @@ static void drop_command_bytes(uint32_t count)
 static bool parse_command(void)
 {
     if ((command_length >= 1U) && (command_bytes[0] != COMMAND_SYNC_1)) {
+        note_unreadable();
         drop_command_bytes(1U);
         return true;
     }
@@ -521,6 +542,7 @@ static bool parse_command(void)
         drop_command_bytes(1U);
         return true;
     }
+    core.fallback_baud = 0U; /* the host is at this rate */
     uint8_t reply[2U + COMMAND_PAYLOAD_MAX];
     reply[0] = command_bytes[2];
     reply[1] = (uint8_t)execute(command_bytes[2], &command_bytes[COMMAND_HEADER_BYTES], count);
@@ -586,6 +608,8 @@ void core_init(uint32_t reset_cause, uint32_t baud)
     core.sticky = ((reset_cause & RESET_WATCHDOG) != 0U) ? STATUS_WATCHDOG_RESET : 0U;
     core.announce = true;
     core.new_baud = 0U;
+    core.fallback_baud = 0U;
+    core.unreadable = 0U;
     transmit_head = 0U;
     transmit_tail = 0U;
     receive_head = 0U;
