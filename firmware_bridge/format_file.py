@@ -33,22 +33,22 @@ Unit = Literal["lsb", "m_s2", "g", "mg"]
 class Field(Table, frozen=True):
     """A field of a packet, in the order of the bytes."""
 
-    name: Annotated[str, about("`counts` (readings), `time`, `sequence`; any other name is not looked at")]
-    type: Annotated[Type, about("unsigned or signed integer and its bits")]
-    count: Annotated[int, about("how many of them follow each other", ge=1, le=4096)] = 1
-    value: Annotated[list[int] | None, about("values that the field has in every packet, such as sync bytes")] = None
+    name: Annotated[str, about("`counts` (readings), `time`, `sequence`; any other name is not looked at.")]
+    type: Annotated[Type, about("unsigned or signed integer and its bits.")]
+    count: Annotated[int, about("how many of them follow each other.", ge=1, le=4096)] = 1
+    value: Annotated[list[int] | None, about("values that the field has in every packet, such as sync bytes.")] = None
 
 
 class Packet(Table, frozen=True, tag="packet", tag_field="kind"):
     """A binary packet of one length."""
 
-    fields: Annotated[list[Field], about("the fields in the order of the bytes", min_length=1)]
-    byte_order: Annotated[Literal["little", "big"], about("order of the bytes of a number")] = "little"
-    checksum: Annotated[str, about("over all bytes before it, at the end of the packet; `none` if there is none")] = (
+    fields: Annotated[list[Field], about("the fields in the order of the bytes.", min_length=1)]
+    byte_order: Annotated[Literal["little", "big"], about("order of the bytes of a number.")] = "little"
+    checksum: Annotated[str, about("over all bytes before it, at the end of the packet; `none` if there is none.")] = (
         "crc16_ccitt_false"
     )
     framing: Annotated[
-        Literal["none", "cobs", "slip"], about("how a packet's end is marked on the wire; `none`: by nothing")
+        Literal["none", "cobs", "slip"], about("how a packet's end is marked on the wire; `none`: by nothing.")
     ] = "none"
 
 
@@ -56,32 +56,33 @@ class Text(Table, frozen=True, tag="text", tag_field="kind"):
     """A line of text."""
 
     columns: Annotated[
-        tuple[str, ...], about("what stands between separators: `time`, `sequence`, channels; an empty name is skipped")
+        tuple[str, ...],
+        about("what stands between separators: `time`, `sequence`, channels; an empty name is skipped."),
     ] = ()
-    separator: Annotated[str, about("between the columns; blanks beside it do not count", min_length=1)] = ","
+    separator: Annotated[str, about("between the columns; blanks beside it do not count.", min_length=1)] = ","
     pattern: Annotated[
-        str, about("instead of columns: regular expression of a line, with groups `time`, `sequence` and the channels")
+        str, about("instead of columns: regular expression of a line, with groups `time`, `sequence` and the channels.")
     ] = ""
     wraps_at: Annotated[
-        Positive | None, about("where the time starts over, such as 4294967296 of Arduino's micros()", default="never")
+        Positive | None, about("where the time starts over, such as 4294967296 of Arduino's micros().", default="never")
     ] = None
 
 
 class FormatFile(Table, frozen=True):
     """What a board sends."""
 
-    name: Annotated[str, about("name of the format")]
-    array: Annotated[str, about("array of the board: a name or a file", example="cube12")]
-    clock_hz: Annotated[Positive, about("units of the board's time in a second: 1e6 for µs", "Hz", example=1e6)]
-    stream: Annotated[Packet | Text, about("a packet or a line of text")]
-    description: Annotated[str, about("note for people")] = ""
-    unit: Annotated[Unit, about("unit of the readings; `lsb`: raw counts")] = "lsb"
-    lsb_m_s2: Annotated[Positive | None, about("size of a count", "m/s²", default="the part's")] = None
+    name: Annotated[str, about("name of the format.")]
+    array: Annotated[str, about("array of the board: a name or a file.", example="cube12")]
+    clock_hz: Annotated[Positive, about("units of the board's time in a second: 1e6 for µs.", "Hz", example=1e6)]
+    stream: Annotated[Packet | Text, about("a packet or a line of text.")]
+    description: Annotated[str, about("note for people.")] = ""
+    unit: Annotated[Unit, about("unit of the readings; `lsb`: raw counts.")] = "lsb"
+    lsb_m_s2: Annotated[Positive | None, about("size of a count.", "m/s²", default="the part's")] = None
     channels: Annotated[
-        list[int] | None, about("which of the counts are the array's channels, from 0", default="the first ones")
+        list[int] | None, about("which of the counts are the array's channels, from 0.", default="the first ones")
     ] = None
-    no_reading: Annotated[int | None, about("count that stands for a missing reading")] = None
-    slowest_hz: Annotated[Positive, about("lowest sample rate of the board", "Hz")] = 1.0
+    no_reading: Annotated[int | None, about("count that stands for a missing reading.")] = None
+    slowest_hz: Annotated[Positive, about("lowest sample rate of the board.", "Hz")] = 1.0
 
 
 def load_format(path: str | Path) -> FrameFormat:

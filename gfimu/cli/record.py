@@ -39,7 +39,11 @@ def _record(
     ] = None,
     range_g: Annotated[int | None, typer.Option("--range", help="Ask the board for ±2, 4, 8 or 16 g.")] = None,
     form: Annotated[
-        str, typer.Option("--format", help="Frame format: lpc1768 or mimu4444. Else lpc1768, or what is found.")
+        str,
+        typer.Option(
+            "--format",
+            help="Frame format: lpc1768 or mimu4444. Or a TOML file (gfimu new frame). Else lpc1768, or what is found.",
+        ),
     ] = "",
     array: Annotated[str, typer.Option("--array", help="Array on the board; else the format's.")] = "",
     baud: Annotated[

@@ -11,13 +11,13 @@ from gfimu.files.outputs import JSON_SCHEMA, TOML_FILE, writes
 
 __all__ = ["KINDS", "TEMPLATES", "catalogue", "new", "show"]
 
-KINDS = ("arrays", "parts", "maps", "twins", "scenarios", "effects", "formats")
+KINDS = ("arrays", "parts", "maps", "twins", "scenarios", "frames", "effects", "formats")
 """What can be listed."""
 
 TEMPLATES = tuple(FILE_KINDS)
 """What can be begun."""
 
-_FILES = ("arrays", "parts", "maps", "twins", "scenarios")
+_FILES = ("arrays", "parts", "maps", "twins", "scenarios", "frames")
 
 
 def catalogue(kind: str) -> dict[str, str]:
@@ -57,8 +57,8 @@ def show(name: str) -> str:
     Parameters
     ----------
     name : str
-        Name of an array, part, map, twin, scenario or effect; path of such a file, which is checked; or path of a
-        recording, whose array file is returned.
+        Name of an array, part, map, twin, scenario, frame or effect; path of such a file, which is checked; or path of
+        a recording, whose array file is returned.
 
     Raises
     ------
@@ -97,7 +97,7 @@ def _shown_file(name: str) -> str:
 
 @writes(out=TOML_FILE, schema=JSON_SCHEMA)
 def new(kind: str, *, out: str | Path | None = None, schema: str | Path | None = None) -> str:
-    """Return a commented file to edit: an array, a part, a column map, a twin or a scenario.
+    """Return a commented file to edit: an array, a part, a column map, a twin, a scenario or a frame.
 
     Parameters
     ----------

@@ -19,6 +19,7 @@ FILE_KINDS = {
     "map": "gfimu.importing.column_map.ColumnMap",
     "twin": "sim.twin_file.TwinFile",
     "scenario": "sim.scenario_file.ScenarioFile",
+    "frame": "firmware_bridge.format_file.FormatFile",
 }
 """Kinds of files by name, and the struct that is the schema of each."""
 
@@ -32,7 +33,14 @@ def file_schema(kind: str) -> type[msgspec.Struct]:
     return found
 
 
-_MARKS = {"array": "chip", "part": "lsb_m_s2", "map": "channels", "scenario": "motion", "twin": "array"}
+_MARKS = {
+    "array": "chip",
+    "part": "noise_lsb_rms_100_hz",
+    "frame": "stream",
+    "map": "channels",
+    "scenario": "motion",
+    "twin": "array",
+}
 """A key by which each kind of file is known, the first kind that has it."""
 
 

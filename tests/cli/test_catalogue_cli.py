@@ -4,6 +4,7 @@ import re
 
 import pytest
 
+from firmware_bridge.format_file import load_format
 from gfimu.commands.catalogue import KINDS, TEMPLATES
 from gfimu.files.model_files import find_model, list_models
 from gfimu.geometry.array import AccelerometerArray
@@ -19,6 +20,7 @@ LOADERS = {
     "map": load_map,
     "twin": Twin.load,
     "scenario": Scenario.load,
+    "frame": load_format,
 }
 
 
