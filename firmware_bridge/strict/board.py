@@ -1,0 +1,262 @@
+"""The strict board: the reference board with watches at its registers, exceptions and blocks of code."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Sequence
+from typing import Any
+
+from firmware_bridge.adxl345_device import Adxl345
+from firmware_bridge.board.board import Board
+from firmware_bridge.board.bus import Tracer
+from firmware_bridge.board.cpu import AHB_RAM_BASE, AHB_RAM_SIZE, RAM_BASE, RAM_SIZE, Cpu, RegisterSet, unicorn_parts
+from firmware_bridge.board.peripheral import Peripheral
+from firmware_bridge.lpc1768.elf import ElfImage
+from firmware_bridge.strict.findings import Finding, Ledger, Place
+from firmware_bridge.strict.rules import WATCHES
+from firmware_bridge.strict.watch import Access, Policy, Watch
+
+__all__ = ["STUCK", "StrictBoard"]
+
+STUCK: dict[str, tuple[int, int, int]] = {
+    "crystal": (0x400FC1A0, 0x40, 0),
+    "pll": (0x400FC088, 1 << 26, 0),
+    "ssp": (0x4003000C, 0x10, 0x10),
+}
+"""Status bits that a broken part leaves as they are: register, bits, their value for ever."""
+
+_LONGEST_LOOP = 4096  # blocks; longer loops are not recognised as standing still
+_PROCESS_STACK = 2
+_MEMORY_WRITE = 17  # unicorn.UC_MEM_WRITE
+_UNUSED = ctypes.c_uint8
+_BLOCK_HOOK = ctypes.CFUNCTYPE(None, _UNUSED, ctypes.c_uint32, ctypes.c_uint32)
+_MEMORY_HOOK = ctypes.CFUNCTYPE(None, _UNUSED, ctypes.c_uint32, ctypes.c_uint32, ctypes.c_int32, ctypes.c_uint32)
+
+
+class StandStill:
+    """Finds loops that repeat exactly: the same registers, no memory changed, the same values read.
+
+    Such a loop holds no counter: only time and what comes with it can end it. Found with Brent's algorithm (BIT 20
+    (1980) 176): the state is compared with one kept, and the one kept is renewed after 1, 2, 4… blocks of code.
+    """
+
+    def __init__(self) -> None:
+        self._reads: dict[int, int] = {}
+        self.moved()
+
+    def moved(self) -> None:
+        """Note that memory or a register was changed: the loop, if any, gets on."""
+        self._kept = b""
+        self._since = 0
+        self._renew_after = 1
+        self._reads.clear()
+
+    def read(self, address: int, value: int) -> None:
+        """Note what was read from a register."""
+        if self._reads.setdefault(address, value) != value:
+            self.moved()
+
+    def repeats(self, state: bytes) -> bool:
+        """Whether the program was in this state before, and nothing was changed since."""
+        if state == self._kept:
+            return True
+        self._since += 1
+        if self._since >= self._renew_after:
+            self._kept, self._since = state, 0
+            self._renew_after = min(2 * self._renew_after, _LONGEST_LOOP)
+        return False
+
+
+class StrictCpu(Cpu):
+    """The processor with a program counter that is right at every register access."""
+
+    def _install_hooks(self) -> None:
+        super()._install_hooks()
+        unicorn, _, binding = unicorn_parts()
+        self.stand_still = StandStill()
+        # Asked to call before every instruction, Unicorn keeps the program counter up to date. What is called does
+        # nothing, in C: one of the interpreter's own functions.
+        self._hook(unicorn.UC_HOOK_CODE, ctypes.pythonapi.Py_IsInitialized)
+        self._hook(unicorn.UC_HOOK_BLOCK, _BLOCK_HOOK(self._strict_block_hook()))
+        memory_hook = _MEMORY_HOOK(self._on_memory)
+        self._callbacks.append(memory_hook)
+        for base, size in ((RAM_BASE, RAM_SIZE), (AHB_RAM_BASE, AHB_RAM_SIZE)):
+            binding.uclib.uc_hook_add(
+                self._handle,
+                ctypes.byref(ctypes.c_size_t()),
+                ctypes.c_int(unicorn.UC_HOOK_MEM_READ | unicorn.UC_HOOK_MEM_WRITE),
+                ctypes.cast(memory_hook, ctypes.c_void_p),
+                None,
+                ctypes.c_uint64(base),
+                ctypes.c_uint64(base + size - 1),
+            )
+
+    def _on_memory(self, _: int, kind: int, address: int, size: int, value: int) -> None:
+        if address & (size - 1):
+            self.bus.unaligned(address, size)  # type: ignore[attr-defined]
+        if kind == _MEMORY_WRITE:
+            memory, offset = self._memory_at(address, size)
+            if int.from_bytes(memory[offset : offset + size], "little") != value & ((1 << 8 * size) - 1):
+                self.stand_still.moved()
+
+    def _strict_block_hook(self) -> Any:
+        bus, stand_still = self.bus, self.stand_still
+        _, arm, _ = unicorn_parts()
+        names = [*(f"R{number}" for number in range(13)), "LR", "XPSR", "PC", "SP", "CONTROL"]
+        core = RegisterSet(self._handle, [getattr(arm, f"UC_ARM_REG_{name}") for name in names])
+
+        def on_block(_: int, address: int, __: int) -> None:
+            registers = core.read()
+            on_main_stack = bus.nvic.active or not registers[-1] & _PROCESS_STACK
+            bus.on_block(address, registers[-2] if on_main_stack else None)  # type: ignore[attr-defined]
+            if stand_still.repeats(registers.tobytes()):
+                bus.on_stand_still()  # type: ignore[attr-defined]
+                bus.now = max(bus.now, min(bus.until, self.limit))
+
+        return on_block
+
+    def place(self) -> int:
+        """Address of the instruction that is executed."""
+        return int(self._pc.read()[0]) & ~1
+
+
+class StrictBoard(Board):
+    """A board that writes down which rules its program breaks.
+
+    Parameters
+    ----------
+    image : ElfImage
+        The firmware.
+    sensors : sequence of Adxl345
+        Chips on SSP1; none if something else hangs there.
+    policy : Policy, optional
+        Limits.
+    stuck : str, optional
+        A part that never becomes ready, one of `STUCK`.
+    """
+
+    _cpu_class = StrictCpu
+
+    def __init__(
+        self,
+        image: ElfImage,
+        sensors: Sequence[Adxl345] = (),
+        *,
+        policy: Policy | None = None,
+        stuck: str | None = None,
+    ) -> None:
+        self.ledger = Ledger(image.symbol_at, self._here)
+        self._stuck = STUCK[stuck] if stuck is not None else (0, 0, 0)
+        self._policy = policy or Policy()
+        self.watches: list[Watch] = []
+        super().__init__(image, sensors, tracer=self)
+
+    @property
+    def _strict_cpu(self) -> StrictCpu:
+        assert isinstance(self.cpu, StrictCpu)
+        return self.cpu
+
+    def _map(self) -> None:
+        self.watches = [watch(self, self.ledger, self._policy) for watch in WATCHES]
+        self._by_block = [watch for watch in self.watches if type(watch).block is not Watch.block]
+        self._by_exception = [watch for watch in self.watches if type(watch).exception is not Watch.exception]
+        self._observed = {peripheral.base: self._observers(peripheral) for peripheral in self._peripherals}
+        super()._map()
+
+    def _watching(self, peripheral: Peripheral, method: str) -> list[Any]:
+        return [
+            getattr(watch, method)
+            for watch in self.watches
+            if (watch.peripherals is None or peripheral.name in watch.peripherals)
+            and getattr(type(watch), method) is not getattr(Watch, method)
+        ]
+
+    def _observers(self, peripheral: Peripheral) -> tuple[Any, Any]:
+        before, after = self._watching(peripheral, "before"), self._watching(peripheral, "after")
+        base = peripheral.base
+        still = self._strict_cpu.stand_still
+        stuck_at, stuck_bits, stuck_value = self._stuck
+
+        def read(offset: int, size: int) -> int:
+            access = Access(base + offset, base, offset, size, 0, write=False)
+            for look in before:
+                look(access)
+            value = peripheral.read(offset, size)
+            if base + offset == stuck_at:
+                value = value & ~stuck_bits | stuck_value
+            still.read(base + offset, value)
+            access = Access(base + offset, base, offset, size, value, write=False)
+            for look in after:
+                look(access)
+            return value
+
+        def write(offset: int, value: int, size: int) -> None:
+            still.moved()
+            access = Access(base + offset, base, offset, size, value, write=True)
+            for look in before:
+                look(access)
+            peripheral.write(offset, value, size)
+            for look in after:
+                look(access)
+
+        return read, write
+
+    def _traced(self, peripheral: Peripheral, tracer: Tracer) -> tuple[Any, Any]:
+        observers: tuple[Any, Any] = self._observed[peripheral.base]
+        return observers
+
+    def read_bus(self, address: int, size: int = 4) -> int:
+        """Read as another bus master, or a bit-band alias, does; registers under the eyes of the watches."""
+        peripheral = self._peripheral_at(address)
+        if peripheral is None:
+            return super().read_bus(address, size)
+        return int(self._observed[peripheral.base][0](address - peripheral.base, size))
+
+    def write_bus(self, address: int, value: int, size: int = 4) -> None:
+        """Write as another bus master, or a bit-band alias, does; registers under the eyes of the watches."""
+        peripheral = self._peripheral_at(address)
+        if peripheral is None:
+            super().write_bus(address, value, size)
+        else:
+            self._observed[peripheral.base][1](address - peripheral.base, value, size)
+
+    def access(self, ticks: int, peripheral: str, offset: int, value: int, *, write: bool) -> None:
+        """Nothing: the watches see register accesses where they happen."""
+
+    def exception(self, ticks: int, number: int, *, entered: bool) -> None:
+        """Show the watches an exception (the board is its own tracer)."""
+        for watch in self._by_exception:
+            watch.exception(number, entered=entered)
+
+    def on_block(self, address: int, stack: int | None) -> None:
+        """Show the watches a block of code before it is executed."""
+        for watch in self._by_block:
+            watch.block(address, stack)
+
+    def unaligned(self, address: int, size: int) -> None:
+        """Show the watches an unaligned access to memory."""
+        for watch in self.watches:
+            watch.unaligned(address, size)
+
+    def on_stand_still(self) -> None:
+        """Show the watches that the program repeats itself."""
+        for watch in self.watches:
+            watch.stand_still()
+
+    def do_reset(self) -> None:
+        """Let the watches conclude, then reset."""
+        for watch in self.watches:
+            watch.end()
+        super().do_reset()
+        for watch in self.watches:
+            watch.reset()
+
+    def findings(self) -> tuple[Finding, ...]:
+        """Rules broken so far, with what is certain now."""
+        for watch in self.watches:
+            watch.end()
+        return self.ledger.findings()
+
+    def _here(self) -> Place:
+        active = self.nvic.active
+        return Place(self._strict_cpu.place(), active[-1] if active else 0, self.seconds)

@@ -1,0 +1,101 @@
+"""Stack, alignment, registers that are none (ARMv7-M ARM; UM10360 chapter 2)."""
+
+from __future__ import annotations
+
+from firmware_bridge.board.cpu import RAM_BASE, RAM_SIZE
+from firmware_bridge.strict.findings import Rule, Severity
+from firmware_bridge.strict.registers import is_register, register_name
+from firmware_bridge.strict.watch import Access, Watch
+
+__all__ = ["MultipleAccessWatch", "RegisterWatch", "StackWatch"]
+
+OVERFLOW = Rule(
+    "stack_overflow", "make arrays static or smaller, end recursion, or give the stack more room", "linker script"
+)
+LOW = Rule("stack_low", "give the stack more room", "linker script", Severity.WARNING)
+UNALIGNED = Rule(
+    "unaligned_access",
+    "align what LDM, STM, LDRD, STRD and LDREX access to words, and registers to their size",
+    "ARMv7-M ARM A3.2.1",
+)
+PART = Rule(
+    "partial_register", "access registers of the APB from their first byte, as words", "UM10360 2.3", Severity.WARNING
+)
+RESERVED = Rule(
+    "reserved_register", "the manual has no register there: look at the address", "UM10360, register tables",
+    Severity.WARNING,
+)  # fmt: skip
+
+_APB = range(0x40000000, 0x40100000)
+_SYSTEM = range(0xE0000000, 0x100000000)
+_DESCENT = 4096  # a main stack that moves further at once was exchanged by a scheduler
+
+
+class StackWatch(Watch):
+    """Follows the main stack down to the data below it."""
+
+    rules = (OVERFLOW, LOW)
+
+    def reset(self) -> None:
+        """Begin at the top of the stack."""
+        image = self.board.image
+        flash = image.flash_bytes()
+        self._top = int.from_bytes(flash[:4], "little")
+        self._limit = image.stack_limit(self._top, RAM_BASE, RAM_SIZE)
+        self._last = self._lowest = self._top
+        self._over = self._low = False
+
+    def block(self, address: int, stack: int | None) -> None:
+        """Look at the main stack pointer."""
+        if stack is None or self._limit is None:
+            return
+        if self._limit <= stack <= self._top:
+            if stack < self._lowest:
+                self._lowest = stack
+                if stack - self._limit < self.policy.stack_spare and not self._low:
+                    self._low = True
+                    self.report(LOW, f"{stack - self._limit} bytes are left above the data")
+        elif (
+            stack < self._limit and not self._over and 0 <= self._last - stack <= _DESCENT and self._last > self._limit
+        ):
+            self._over = True
+            what = f"the main stack is at {stack:#010x}, below the end of the data at {self._limit:#010x}"
+            self.report(OVERFLOW, what)
+        self._last = stack
+
+
+class MultipleAccessWatch(Watch):
+    """Looks at instructions that need words to be aligned."""
+
+    rules = (UNALIGNED,)
+
+    def unaligned(self, address: int, size: int) -> None:
+        """Look at the instruction of an unaligned access to memory."""
+        pc = self.ledger.here().pc
+        first = int.from_bytes(self.board.cpu.peek(pc, 2), "little")
+        wide = first & 0xFE00 == 0xE800  # load and store multiple, dual, exclusive
+        if size == 4 and (wide or first & 0xF000 == 0xC000):
+            self.report(UNALIGNED, f"several words at {address:#010x}: a usage fault")
+
+    def before(self, access: Access) -> None:
+        """Look at the alignment of register accesses."""
+        if access.offset & (access.size - 1):
+            name = register_name(access.base, access.offset)
+            self.report(UNALIGNED, f"{access.size} bytes at {access.address:#010x} ({name})")
+
+
+class RegisterWatch(Watch):
+    """Looks for accesses to places where no register is, or to a part of one."""
+
+    rules = (RESERVED, PART)
+
+    def before(self, access: Access) -> None:
+        """Look at the register."""
+        if access.address in _SYSTEM:
+            return
+        if not is_register(access.base, access.offset):
+            verb = "write to" if access.write else "read from"
+            self.report(RESERVED, f"{verb} {access.address:#010x}, where no register is")
+        elif access.offset & 3 and access.address in _APB:
+            name = register_name(access.base, access.offset)
+            self.report(PART, f"byte {access.offset & 3} of {name} alone")
