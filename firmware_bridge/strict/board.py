@@ -6,14 +6,16 @@ import ctypes
 from collections.abc import Sequence
 from typing import Any
 
-from firmware_bridge.adxl345_device import Adxl345
+from firmware_bridge.adxl345_device import TICKS_PER_SECOND, Adxl345
 from firmware_bridge.board.board import Board
 from firmware_bridge.board.bus import Tracer
 from firmware_bridge.board.cpu import AHB_RAM_BASE, AHB_RAM_SIZE, RAM_BASE, RAM_SIZE, Cpu, RegisterSet, unicorn_parts
+from firmware_bridge.board.faults import BoardFault, FaultKind
 from firmware_bridge.board.peripheral import Peripheral
 from firmware_bridge.lpc1768.elf import ElfImage
 from firmware_bridge.strict.findings import Finding, Ledger, Place
-from firmware_bridge.strict.rules import WATCHES
+from firmware_bridge.strict.rules import BUS_FAULT, WATCHES
+from firmware_bridge.strict.rules.memory import OVERFLOW
 from firmware_bridge.strict.watch import Access, Policy, Watch
 
 __all__ = ["STUCK", "StrictBoard"]
@@ -26,7 +28,9 @@ STUCK: dict[str, tuple[int, int, int]] = {
 """Status bits that a broken part leaves as they are: register, bits, their value for ever."""
 
 _LONGEST_LOOP = 4096  # blocks; longer loops are not recognised as standing still
+_SLICE_TICKS = TICKS_PER_SECOND // 1000
 _PROCESS_STACK = 2
+_EXCEPTION_RETURN = 0xFFFFFFF0
 _MEMORY_WRITE = 17  # unicorn.UC_MEM_WRITE
 _UNUSED = ctypes.c_uint8
 _BLOCK_HOOK = ctypes.CFUNCTYPE(None, _UNUSED, ctypes.c_uint32, ctypes.c_uint32)
@@ -116,8 +120,9 @@ class StrictCpu(Cpu):
         return on_block
 
     def place(self) -> int:
-        """Address of the instruction that is executed."""
-        return int(self._pc.read()[0]) & ~1
+        """Address of the instruction that is executed, or comes next after an exception return."""
+        pc = int(self._pc.read()[0])
+        return (self.pc if pc >= _EXCEPTION_RETURN else pc) & ~1
 
 
 class StrictBoard(Board):
@@ -250,6 +255,23 @@ class StrictBoard(Board):
         super().do_reset()
         for watch in self.watches:
             watch.reset()
+
+    def run_checked(self, seconds: float) -> bool:
+        """Run for a span of virtual time, s, in slices; False when nothing more can come of the program."""
+        end = self.now + round(seconds * TICKS_PER_SECOND)
+        while self.now < end and not self.ledger.hopeless:
+            try:
+                self.run_until(min(end, self.now + _SLICE_TICKS))
+            except BoardFault as fault:
+                self._add_fault(fault)
+        return not self.ledger.hopeless
+
+    def _add_fault(self, fault: BoardFault) -> None:
+        """Write down that the program ended in a fault of the processor."""
+        rule = OVERFLOW if fault.kind is FaultKind.STACKING else BUS_FAULT
+        detail = f": {fault.detail}" if fault.detail else ""
+        self.ledger.add(rule, fault.kind.value + detail, Place(fault.pc & ~1, fault.exception, fault.time_s))
+        self.ledger.hopeless = True
 
     def findings(self) -> tuple[Finding, ...]:
         """Rules broken so far, with what is certain now."""

@@ -116,10 +116,13 @@ class Ledger:
         Name of an address.
     here : callable
         Where the program stands now.
+    hopeless : bool
+        Whether nothing more can come of the run.
     """
 
     symbol_at: Callable[[int], str]
     here: Callable[[], Place]
+    hopeless: bool = False
     _entries: dict[Rule, dict[int, _Entry]] = field(default_factory=dict)
 
     def add(self, rule: Rule, what: str, place: Place | None = None) -> None:

@@ -48,7 +48,7 @@ class Policy:
     settle_s: float = 600e-6
     flash_late_s: float = 1e-3
     feed_share: float = 0.1
-    storm: int = 1000
+    storm: int = 300
     stack_spare: int = 128
     dead_s: float = 0.05
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 from firmware_bridge.strict.rules.chip import ChipWatch
 from firmware_bridge.strict.rules.clock import ClockWatch, FeedWatch
 from firmware_bridge.strict.rules.interrupts import InterruptWatch
-from firmware_bridge.strict.rules.memory import MultipleAccessWatch, RegisterWatch, StackWatch
+from firmware_bridge.strict.rules.memory import BUS_FAULT, MultipleAccessWatch, RegisterWatch, StackWatch
 from firmware_bridge.strict.rules.pins import GpioWatch, PinWatch, PowerWatch
 from firmware_bridge.strict.rules.ssp import SspWatch
 from firmware_bridge.strict.rules.uart import UartWatch
 from firmware_bridge.strict.rules.waiting import WaitWatch
 from firmware_bridge.strict.rules.watchdog import WatchdogWatch
 
-__all__ = ["WATCHES"]
+__all__ = ["BUS_FAULT", "WATCHES"]
 
 WATCHES = (
     ClockWatch, FeedWatch, PowerWatch, PinWatch, GpioWatch, UartWatch, SspWatch, ChipWatch, StackWatch,

@@ -31,6 +31,12 @@ CUT = Rule("deselected_while_busy", "wait until BSY in SSPnSR is clear before CS
 STALE = Rule(
     "stale_receive_fifo", "read a word for every word that was written before the next exchange", "UM10360 18.6.3"
 )
+NOBODY = Rule(
+    "no_chip_selected",
+    "set one CS low before the first word, if the words are for a chip",
+    f"{_SHEET}, Serial communications",
+    Severity.WARNING,
+)
 REST = Rule("chip_select_rest", "keep CS high for 150 ns between two accesses", f"{_SHEET}, table 10 (tCS,DIS)")
 MULTIPLE = Rule("chip_multiple_bit", "set bit 6 of the command to access several registers", f"{_SHEET}, figure 37")
 STANDBY = Rule("chip_standby", "set the measure bit of POWER_CTL before data are read", f"{_SHEET}, register 0x2D")
@@ -69,7 +75,7 @@ class ChipWatch(Watch):
     """Follows the chip-selects and the words between them."""
 
     peripherals = frozenset({"gpio", "ssp1"})
-    rules = (FAST, MODE, SIZE, TWO, CUT, STALE, REST, MULTIPLE, STANDBY, TORN, SLOW, POP, REGISTER)
+    rules = (FAST, MODE, SIZE, TWO, NOBODY, CUT, STALE, REST, MULTIPLE, STANDBY, TORN, SLOW, POP, REGISTER)
 
     def reset(self) -> None:
         """No chip selected."""
@@ -84,8 +90,12 @@ class ChipWatch(Watch):
 
     def before(self, access: Access) -> None:
         """Look at a word for the selected chip."""
-        if access.base == self._ssp.base and access.offset == 0x08 and access.write and self._low:
+        if access.base != self._ssp.base or access.offset != 0x08 or not access.write:
+            return
+        if self._low:
             self._word(access.value & 0xFFFF)
+        elif self.board.gpio.direction[_CS_PORT] & ((1 << len(self.board.sensors)) - 1):
+            self.report(NOBODY, "words are sent on SSP1, but no CS is low")
 
     def _word(self, value: int) -> None:
         ssp = self._ssp

@@ -71,16 +71,21 @@ class InterruptWatch(Watch):
         self._row = 0 if self._program_ran or number != self._left else self._row + 1
         self._program_ran = False
         if self._row == self.policy.storm:
-            self.report(STORM, f"{_title(number)} runs again and again: the program stands still")
+            place = replace(self.ledger.here(), pc=self._vector(number) & ~1)
+            self.ledger.add(STORM, f"{_title(number)} runs again and again: the program stands still", place)
+            self.ledger.hopeless = True
         reason = self._missing(number)
         if reason:
             place = self._enabled.pop(number, None)
             self.ledger.add(NO_HANDLER, f"{_title(number)} comes, but {reason}", place)
 
+    def _vector(self, exception: int) -> int:
+        return int.from_bytes(self.board.cpu.peek(self.board.nvic.vtor + 4 * exception, 4), "little")
+
     def _missing(self, exception: int) -> str:
         """Say why an exception has no handler; empty if it has one."""
         board = self.board
-        vector = int.from_bytes(board.cpu.peek(board.nvic.vtor + 4 * exception, 4), "little")
+        vector = self._vector(exception)
         address = vector & ~1
         if not vector & 1 or (address >= FLASH_SIZE and not board.image.in_memory(address)):
             return f"its vector is {vector:#010x}"

@@ -7,12 +7,17 @@ from firmware_bridge.strict.findings import Rule, Severity
 from firmware_bridge.strict.registers import is_register, register_name
 from firmware_bridge.strict.watch import Access, Watch
 
-__all__ = ["MultipleAccessWatch", "RegisterWatch", "StackWatch"]
+__all__ = ["BUS_FAULT", "OVERFLOW", "MultipleAccessWatch", "RegisterWatch", "StackWatch"]
 
 OVERFLOW = Rule(
     "stack_overflow", "make arrays static or smaller, end recursion, or give the stack more room", "linker script"
 )
 LOW = Rule("stack_low", "give the stack more room", "linker script", Severity.WARNING)
+BUS_FAULT = Rule(
+    "processor_fault",
+    "look at the address: nothing is there, or it may not be used so; the boot ROM (IAP) is not on this board",
+    "ARMv7-M ARM B1.5.14, UM10360 2.2",
+)
 UNALIGNED = Rule(
     "unaligned_access",
     "align what LDM, STM, LDRD, STRD and LDREX access to words, and registers to their size",

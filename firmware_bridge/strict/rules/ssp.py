@@ -33,6 +33,7 @@ class SspWatch(Watch):
         """Prescalers are 0, nothing was sent."""
         self._prescaler = {0: 0, 1: 0}
         self._used: set[int] = set()
+        self._emptied = {0: 0, 1: 0}
         self._overrun = False
 
     def _ssp(self, access: Access) -> tuple[int, Ssp]:
@@ -44,13 +45,20 @@ class SspWatch(Watch):
         if access.offset == 0x08 and access.write:
             self._send(number, ssp)
         elif access.offset == 0x08:
-            if number in self._used and not words_received(ssp):
-                self.report(READ_EMPTY, f"SSP{number}DR is read, but no word has arrived")
+            if not words_received(ssp):
+                self._read_empty(number)
         elif access.offset in {0x00, 0x04, 0x10} and access.write:
             if ssp.done > self.board.now and self._changes(ssp, access):
                 self.report(BUSY, f"SSP{number} is set up anew while a word is shifted")
             if access.offset == 0x10:
                 self._prescaler[number] = access.value & 0xFF
+
+    def _read_empty(self, number: int) -> None:
+        """Judge a read of nothing; programs may empty a FIFO that they have not used yet."""
+        if number not in self._used:
+            self._emptied[number] += 1
+        if number in self._used or self._emptied[number] > _DEPTH:
+            self.report(READ_EMPTY, f"SSP{number}DR is read, but no word has arrived")
 
     @staticmethod
     def _changes(ssp: Ssp, access: Access) -> bool:

@@ -43,6 +43,7 @@ class UartWatch(Watch):
         self._judged: dict[int, tuple[int, int, int]] = {}
         self._used: set[int] = set()
         self._divisor_writes: dict[int, int] = {}
+        self._emptied: dict[int, int] = {}
 
     def before(self, access: Access) -> None:
         """Look at the UART before the access changes it."""
@@ -51,7 +52,14 @@ class UartWatch(Watch):
             self._with_divisor_access(number, access)
         elif access.offset == 0 and access.write:
             self._send(number, uart, access.value & 0xFF)
-        elif access.offset == 0 and not uart.receiver and number in self._used:
+        elif access.offset == 0 and not uart.receiver:
+            self._read_empty(number)
+
+    def _read_empty(self, number: int) -> None:
+        """Judge a read of nothing; programs may empty a FIFO that they have not used yet."""
+        if number not in self._used:
+            self._emptied[number] = self._emptied.get(number, 0) + 1
+        if number in self._used or self._emptied[number] > _DEPTH:
             self.report(READ_EMPTY, f"U{number}RBR is read, but nothing has arrived")
 
     def _with_divisor_access(self, number: int, access: Access) -> None:
