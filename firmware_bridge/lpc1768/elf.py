@@ -104,6 +104,15 @@ class ElfImage:
                 return segment.file_offset + address - segment.address
         raise InputError(f"{self.name}: nothing is loaded at {address:#x}; link the vector table there")
 
+    def read(self, address: int, count: int) -> bytes:
+        """Bytes that are loaded at an address; 0xFF, as erased flash, where nothing is."""
+        content = bytearray(b"\xff" * count)
+        for segment in self.segments:
+            begin, end = max(address, segment.address), min(address + count, segment.address + len(segment.data))
+            if begin < end:
+                content[begin - address : end - address] = segment.data[begin - segment.address : end - segment.address]
+        return bytes(content)
+
     def in_memory(self, address: int) -> bool:
         """Whether a loaded segment or a writable section holds an address."""
         ranges = [(segment.address, len(segment.data)) for segment in self.segments]

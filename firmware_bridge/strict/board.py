@@ -14,7 +14,9 @@ from firmware_bridge.board.faults import BoardFault, FaultKind
 from firmware_bridge.board.peripheral import Peripheral
 from firmware_bridge.lpc1768.elf import ElfImage
 from firmware_bridge.strict.findings import Finding, Ledger, Place
+from firmware_bridge.strict.image import started_by_loader
 from firmware_bridge.strict.rules import BUS_FAULT, WATCHES
+from firmware_bridge.strict.rules.image import judge_image
 from firmware_bridge.strict.rules.memory import OVERFLOW
 from firmware_bridge.strict.watch import Access, Policy, Watch
 
@@ -138,6 +140,11 @@ class StrictBoard(Board):
         Limits.
     stuck : str, optional
         A part that never becomes ready, one of `STUCK`.
+
+    Attributes
+    ----------
+    started_at : int
+        Address of the vector table; not 0 for an image that a boot loader starts.
     """
 
     _cpu_class = StrictCpu
@@ -154,7 +161,10 @@ class StrictBoard(Board):
         self._stuck = STUCK[stuck] if stuck is not None else (0, 0, 0)
         self._policy = policy or Policy()
         self.watches: list[Watch] = []
+        image, self.started_at = started_by_loader(image)
         super().__init__(image, sensors, tracer=self)
+        self.nvic.vtor = self.started_at
+        judge_image(image, self.ledger, self.started_at)
 
     @property
     def _strict_cpu(self) -> StrictCpu:
@@ -253,17 +263,16 @@ class StrictBoard(Board):
         for watch in self.watches:
             watch.end()
         super().do_reset()
+        self.nvic.vtor = self.started_at
         for watch in self.watches:
             watch.reset()
 
-    def run_checked(self, seconds: float) -> bool:
-        """Run for a span of virtual time, s, in slices; False when nothing more can come of the program."""
-        end = self.now + round(seconds * TICKS_PER_SECOND)
-        while self.now < end and not self.ledger.hopeless:
-            try:
-                self.run_until(min(end, self.now + _SLICE_TICKS))
-            except BoardFault as fault:
-                self._add_fault(fault)
+    def run_slice(self, end: int) -> bool:
+        """Run for a millisecond of virtual time, not beyond ``end`` (ticks); False when the program can't go on."""
+        try:
+            self.run_until(min(end, self.now + _SLICE_TICKS))
+        except BoardFault as fault:
+            self._add_fault(fault)
         return not self.ledger.hopeless
 
     def _add_fault(self, fault: BoardFault) -> None:

@@ -30,19 +30,20 @@ _PROTECTION_CODES = {0x12345678: "CRP1", 0x87654321: "CRP2", 0x43218765: "CRP3",
 _SUMMED = 8
 
 
-def judge_image(image: ElfImage, ledger: Ledger) -> None:
-    """Look at the vector table and the code-protection word."""
-    flash = image.flash_bytes().ljust(_PROTECTION_AT + 4, b"\xff")
-    words = struct.unpack_from(f"<{_SUMMED}I", flash)
+def judge_image(image: ElfImage, ledger: Ledger, table: int) -> None:
+    """Look at the vector table, which is at ``table``, and the code-protection word; a boot loader has its own."""
+    words = struct.unpack(f"<{_SUMMED}I", image.read(table, 4 * _SUMMED))
     stack, reset = words[:2]
     here = Place(0, 0, 0.0)
     in_ram = RAM_BASE < stack <= RAM_BASE + RAM_SIZE or AHB_RAM_BASE < stack <= AHB_RAM_BASE + AHB_RAM_SIZE
     if not in_ram or stack & 7:
         ledger.add(VECTORS, f"the initial stack pointer is {stack:#010x}", here)
-    elif not reset & 1 or (reset & ~1) >= len(flash):
+    elif not reset & 1 or not image.in_memory(reset & ~1):
         ledger.add(VECTORS, f"the reset vector is {reset:#010x}", here)
+    elif table:
+        return
     elif sum(words) & 0xFFFFFFFF:
         ledger.add(CHECKSUM, f"the first eight words sum to {sum(words) & 0xFFFFFFFF:#010x}", here)
-    (code,) = struct.unpack_from("<I", flash, _PROTECTION_AT)
+    (code,) = struct.unpack("<I", image.read(_PROTECTION_AT, 4))
     if code in _PROTECTION_CODES:
         ledger.add(PROTECTION, f"{_PROTECTION_CODES[code]} is set: the flash may be locked for ever", here)

@@ -76,8 +76,8 @@ class InterruptWatch(Watch):
             self.ledger.hopeless = True
         reason = self._missing(number)
         if reason:
-            place = self._enabled.pop(number, None)
-            self.ledger.add(NO_HANDLER, f"{_title(number)} comes, but {reason}", place)
+            enabled_at = self._enabled.pop(number, None)
+            self.ledger.add(NO_HANDLER, f"{_title(number)} comes, but {reason}", enabled_at)
 
     def _vector(self, exception: int) -> int:
         return int.from_bytes(self.board.cpu.peek(self.board.nvic.vtor + 4 * exception, 4), "little")

@@ -44,11 +44,20 @@ class StackWatch(Watch):
     def reset(self) -> None:
         """Begin at the top of the stack."""
         image = self.board.image
-        flash = image.flash_bytes()
-        self._top = int.from_bytes(flash[:4], "little")
+        self._top = int.from_bytes(image.read(0, 4), "little")
         self._limit = image.stack_limit(self._top, RAM_BASE, RAM_SIZE)
         self._last = self._lowest = self._top
         self._over = self._low = False
+
+    @property
+    def used(self) -> int | None:
+        """Bytes of the main stack used so far; None if its end is not known."""
+        return None if self._limit is None else self._top - self._lowest
+
+    @property
+    def room(self) -> int | None:
+        """Bytes between the top of the main stack and the data below it."""
+        return None if self._limit is None else self._top - self._limit
 
     def block(self, address: int, stack: int | None) -> None:
         """Look at the main stack pointer."""

@@ -11,7 +11,7 @@ from firmware_bridge.strict.watch import Access, Watch
 __all__ = ["UNBOUNDED", "WaitWatch"]
 
 UNBOUNDED = Rule(
-    "unbounded_wait", "give the loop a time-out: what it waits for may never come", "none; every wait for hardware"
+    "unbounded_wait", "give the loop a time-out: what it waits for may never come", "any wait for hardware"
 )
 
 _LINE_STATUS, _TRANSMITTER_EMPTY, _RECEIVED = 0x14, 0x20, 0x01
