@@ -119,15 +119,14 @@ class ElfImage:
         return any(start <= address < start + length for start, length in (*ranges, *self.occupied))
 
     def stack_limit(self, top: int, ram_base: int, ram_size: int) -> int | None:
-        """End of the data below a stack that begins at ``top`` in a RAM; None if the image does not say.
+        """End of the data below a stack that begins at ``top`` in a RAM.
 
-        A stack inside a section of its own ends where that section begins.
+        None if the image does not say: a raw image, or a stack inside a section that holds data, too.
         """
         inside = [(start, start + length) for start, length in self.occupied if length]
         inside = [(start, end) for start, end in inside if ram_base <= start < top <= ram_base + ram_size]
-        if not inside:
-            return None
-        return max(start if end >= top else end for start, end in inside)
+        ends = [end for _, end in inside]
+        return max(ends) if ends and max(ends) < top else None
 
     def symbol_at(self, address: int) -> str:
         """Name an address as ``symbol+0x12``; empty when the image has no symbols there."""

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Sequence
+import mmap
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from firmware_bridge.adxl345_device import TICKS_PER_SECOND, Adxl345
 from firmware_bridge.board.board import Board
 from firmware_bridge.board.bus import Tracer
-from firmware_bridge.board.cpu import AHB_RAM_BASE, AHB_RAM_SIZE, RAM_BASE, RAM_SIZE, Cpu, RegisterSet, unicorn_parts
+from firmware_bridge.board.cpu import Cpu, RegisterSet, unicorn_parts
 from firmware_bridge.board.faults import BoardFault, FaultKind
 from firmware_bridge.board.peripheral import Peripheral
 from firmware_bridge.lpc1768.elf import ElfImage
@@ -17,7 +18,7 @@ from firmware_bridge.strict.findings import Finding, Ledger, Place
 from firmware_bridge.strict.image import started_by_loader
 from firmware_bridge.strict.rules import BUS_FAULT, WATCHES
 from firmware_bridge.strict.rules.image import judge_image
-from firmware_bridge.strict.rules.memory import OVERFLOW
+from firmware_bridge.strict.rules.memory import OVERFLOW, word_accesses
 from firmware_bridge.strict.watch import Access, Policy, Watch
 
 __all__ = ["STUCK", "StrictBoard"]
@@ -33,26 +34,30 @@ _LONGEST_LOOP = 4096  # blocks; longer loops are not recognised as standing stil
 _SLICE_TICKS = TICKS_PER_SECOND // 1000
 _PROCESS_STACK = 2
 _EXCEPTION_RETURN = 0xFFFFFFF0
-_MEMORY_WRITE = 17  # unicorn.UC_MEM_WRITE
+_REGISTERS = (*(f"R{number}" for number in range(13)), "SP", "LR", "PC", "XPSR", "CONTROL")
+_SP_NUMBER, _PC_NUMBER = 13, 15
+_WIDE = 0xE800  # a first half-word from here on begins an instruction of four bytes
 _UNUSED = ctypes.c_uint8
 _BLOCK_HOOK = ctypes.CFUNCTYPE(None, _UNUSED, ctypes.c_uint32, ctypes.c_uint32)
-_MEMORY_HOOK = ctypes.CFUNCTYPE(None, _UNUSED, ctypes.c_uint32, ctypes.c_uint32, ctypes.c_int32, ctypes.c_uint32)
 
 
 class StandStill:
-    """Finds loops that repeat exactly: the same registers, no memory changed, the same values read.
+    """Finds loops that repeat exactly: the same registers, the same memory, the same values read.
 
     Such a loop holds no counter: only time and what comes with it can end it. Found with Brent's algorithm (BIT 20
-    (1980) 176): the state is compared with one kept, and the one kept is renewed after 1, 2, 4… blocks of code.
+    (1980) 176): the state is compared with one kept, and the one kept is renewed after 1, 2, 4… blocks of code. Memory
+    is looked at only when the registers repeat.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, memories: Iterable[mmap.mmap]) -> None:
+        self._memories = tuple(memories)
         self._reads: dict[int, int] = {}
         self.moved()
 
     def moved(self) -> None:
-        """Note that memory or a register was changed: the loop, if any, gets on."""
+        """Note that a register was changed or read anew: the loop, if any, gets on."""
         self._kept = b""
+        self._memory: list[bytes] | None = None
         self._since = 0
         self._renew_after = 1
         self._reads.clear()
@@ -64,57 +69,65 @@ class StandStill:
 
     def repeats(self, state: bytes) -> bool:
         """Whether the program was in this state before, and nothing was changed since."""
-        if state == self._kept:
-            return True
         self._since += 1
+        if state == self._kept:
+            memory = [one[:] for one in self._memories]
+            if memory == self._memory:
+                return True
+            if self._memory is None:
+                self._memory = memory
+                return False
         if self._since >= self._renew_after:
-            self._kept, self._since = state, 0
+            self._kept, self._memory, self._since = state, None, 0
             self._renew_after = min(2 * self._renew_after, _LONGEST_LOOP)
         return False
 
 
 class StrictCpu(Cpu):
-    """The processor with a program counter that is right at every register access."""
+    """The processor with a program counter that is right at every register access.
+
+    No hook on memory: in unicorn 2.1 it breaks the instructions of an IT block that come after the access.
+    """
 
     def _install_hooks(self) -> None:
         super()._install_hooks()
-        unicorn, _, binding = unicorn_parts()
-        self.stand_still = StandStill()
+        unicorn, arm, _ = unicorn_parts()
+        self._all = RegisterSet(self._handle, [getattr(arm, f"UC_ARM_REG_{name}") for name in _REGISTERS])
+        self.stand_still = StandStill(memory for base, memory in self.memory.items() if base)
         # Asked to call before every instruction, Unicorn keeps the program counter up to date. What is called does
         # nothing, in C: one of the interpreter's own functions.
         self._hook(unicorn.UC_HOOK_CODE, ctypes.pythonapi.Py_IsInitialized)
         self._hook(unicorn.UC_HOOK_BLOCK, _BLOCK_HOOK(self._strict_block_hook()))
-        memory_hook = _MEMORY_HOOK(self._on_memory)
-        self._callbacks.append(memory_hook)
-        for base, size in ((RAM_BASE, RAM_SIZE), (AHB_RAM_BASE, AHB_RAM_SIZE)):
-            binding.uclib.uc_hook_add(
-                self._handle,
-                ctypes.byref(ctypes.c_size_t()),
-                ctypes.c_int(unicorn.UC_HOOK_MEM_READ | unicorn.UC_HOOK_MEM_WRITE),
-                ctypes.cast(memory_hook, ctypes.c_void_p),
-                None,
-                ctypes.c_uint64(base),
-                ctypes.c_uint64(base + size - 1),
-            )
+        self._hook_word_accesses(unicorn.UC_HOOK_CODE)
 
-    def _on_memory(self, _: int, kind: int, address: int, size: int, value: int) -> None:
-        if address & (size - 1):
-            self.bus.unaligned(address, size)  # type: ignore[attr-defined]
-        if kind == _MEMORY_WRITE:
-            memory, offset = self._memory_at(address, size)
-            if int.from_bytes(memory[offset : offset + size], "little") != value & ((1 << 8 * size) - 1):
-                self.stand_still.moved()
+    def _hook_word_accesses(self, kind: int) -> None:
+        """Ask for a call before every instruction that needs its words to be aligned."""
+        _, _, binding = unicorn_parts()
+        hook = _BLOCK_HOOK(self._on_word_access)
+        self._callbacks.append(hook)
+        for segment in self.image.segments:
+            for address in word_accesses(segment.address, segment.data):
+                place = ctypes.c_uint64(address)
+                handle = ctypes.byref(ctypes.c_size_t())
+                binding.uclib.uc_hook_add(
+                    self._handle, handle, ctypes.c_int(kind), ctypes.cast(hook, ctypes.c_void_p), None, place, place
+                )
+
+    def _on_word_access(self, _: int, address: int, __: int) -> None:
+        first = int.from_bytes(self.peek(address, 2), "little")
+        number = first >> 8 & 7 if first < _WIDE else first & 15
+        if number < _PC_NUMBER:
+            base = self._all.read()[number]
+            if base & 3:
+                self.bus.on_unaligned(base)  # type: ignore[attr-defined]
 
     def _strict_block_hook(self) -> Any:
-        bus, stand_still = self.bus, self.stand_still
-        _, arm, _ = unicorn_parts()
-        names = [*(f"R{number}" for number in range(13)), "LR", "XPSR", "PC", "SP", "CONTROL"]
-        core = RegisterSet(self._handle, [getattr(arm, f"UC_ARM_REG_{name}") for name in names])
+        bus, stand_still, everything = self.bus, self.stand_still, self._all
 
         def on_block(_: int, address: int, __: int) -> None:
-            registers = core.read()
+            registers = everything.read()
             on_main_stack = bus.nvic.active or not registers[-1] & _PROCESS_STACK
-            bus.on_block(address, registers[-2] if on_main_stack else None)  # type: ignore[attr-defined]
+            bus.on_block(address, registers[_SP_NUMBER] if on_main_stack else None)  # type: ignore[attr-defined]
             if stand_still.repeats(registers.tobytes()):
                 bus.on_stand_still()  # type: ignore[attr-defined]
                 bus.now = max(bus.now, min(bus.until, self.limit))
@@ -175,7 +188,7 @@ class StrictBoard(Board):
         self.watches = [watch(self, self.ledger, self._policy) for watch in WATCHES]
         self._by_block = [watch for watch in self.watches if type(watch).block is not Watch.block]
         self._by_exception = [watch for watch in self.watches if type(watch).exception is not Watch.exception]
-        self._observed = {peripheral.base: self._observers(peripheral) for peripheral in self._peripherals}
+        self._observed = {peripheral.base: self._observers(peripheral) for peripheral in self.peripherals}
         super()._map()
 
     def _watching(self, peripheral: Peripheral, method: str) -> list[Any]:
@@ -248,10 +261,10 @@ class StrictBoard(Board):
         for watch in self._by_block:
             watch.block(address, stack)
 
-    def unaligned(self, address: int, size: int) -> None:
-        """Show the watches an unaligned access to memory."""
+    def on_unaligned(self, address: int) -> None:
+        """Show the watches an access to several words at an address that is not a multiple of four."""
         for watch in self.watches:
-            watch.unaligned(address, size)
+            watch.unaligned(address)
 
     def on_stand_still(self) -> None:
         """Show the watches that the program repeats itself."""

@@ -122,8 +122,8 @@ class Watch:
     def block(self, address: int, stack: int | None) -> None:
         """Look before a block of code at ``address`` is executed; ``stack``: main stack pointer, if in use."""
 
-    def unaligned(self, address: int, size: int) -> None:
-        """Look at an access to memory that is not aligned to its size."""
+    def unaligned(self, address: int) -> None:
+        """Note an access to several words at an address that is not a multiple of four."""
 
     def stand_still(self) -> None:
         """Note that the program repeats itself exactly: only time, and what comes with it, can end that."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from firmware_bridge.strict.rules.chip import ChipWatch
 from firmware_bridge.strict.rules.clock import ClockWatch, FeedWatch
 from firmware_bridge.strict.rules.interrupts import InterruptWatch
-from firmware_bridge.strict.rules.memory import BUS_FAULT, MultipleAccessWatch, RegisterWatch, StackWatch
+from firmware_bridge.strict.rules.memory import BUS_FAULT, AlignmentWatch, RegisterWatch, StackWatch
 from firmware_bridge.strict.rules.pins import GpioWatch, PinWatch, PowerWatch
 from firmware_bridge.strict.rules.ssp import SspWatch
 from firmware_bridge.strict.rules.uart import UartWatch
@@ -16,6 +16,6 @@ __all__ = ["BUS_FAULT", "WATCHES"]
 
 WATCHES = (
     ClockWatch, FeedWatch, PowerWatch, PinWatch, GpioWatch, UartWatch, SspWatch, ChipWatch, StackWatch,
-    MultipleAccessWatch, RegisterWatch, InterruptWatch, WatchdogWatch, WaitWatch,
+    AlignmentWatch, RegisterWatch, InterruptWatch, WatchdogWatch, WaitWatch,
 )  # fmt: skip
 """Watches of the strict board."""

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from firmware_bridge.board.cpu import RAM_BASE, RAM_SIZE
 from firmware_bridge.strict.findings import Rule, Severity
 from firmware_bridge.strict.registers import is_register, register_name
 from firmware_bridge.strict.watch import Access, Watch
 
-__all__ = ["BUS_FAULT", "OVERFLOW", "MultipleAccessWatch", "RegisterWatch", "StackWatch"]
+__all__ = ["BUS_FAULT", "OVERFLOW", "AlignmentWatch", "RegisterWatch", "StackWatch", "word_accesses"]
 
 OVERFLOW = Rule(
     "stack_overflow", "make arrays static or smaller, end recursion, or give the stack more room", "linker script"
@@ -78,18 +80,25 @@ class StackWatch(Watch):
         self._last = stack
 
 
-class MultipleAccessWatch(Watch):
-    """Looks at instructions that need words to be aligned."""
+def word_accesses(start: int, code: bytes) -> Iterator[int]:
+    """Yield where in a code the half-words are that look like LDM, STM, LDRD, STRD, LDREX or STREX (ARMv7-M ARM A5)."""
+    for offset in range(start & 1, len(code) - 1, 2):
+        first = code[offset] | code[offset + 1] << 8
+        narrow = first & 0xF000 == 0xC000
+        # E8C. and E8D. are table branches and exclusive accesses to bytes; the stack pointer is always aligned.
+        wide = first & 0xFE00 == 0xE800 and first & 0xFFE0 != 0xE8C0 and first & 15 != 13
+        if narrow or wide:
+            yield start + offset
+
+
+class AlignmentWatch(Watch):
+    """Looks at accesses that need to be aligned."""
 
     rules = (UNALIGNED,)
 
-    def unaligned(self, address: int, size: int) -> None:
-        """Look at the instruction of an unaligned access to memory."""
-        pc = self.ledger.here().pc
-        first = int.from_bytes(self.board.cpu.peek(pc, 2), "little")
-        wide = first & 0xFE00 == 0xE800  # load and store multiple, dual, exclusive
-        if size == 4 and (wide or first & 0xF000 == 0xC000):
-            self.report(UNALIGNED, f"several words at {address:#010x}: a usage fault")
+    def unaligned(self, address: int) -> None:
+        """Note an instruction that the processor does not execute at this address."""
+        self.report(UNALIGNED, f"several words at {address:#010x}: a usage fault")
 
     def before(self, access: Access) -> None:
         """Look at the alignment of register accesses."""

@@ -69,8 +69,8 @@ class UartWatch(Watch):
             self._divisor_writes[number] = count = self._divisor_writes.get(number, 0) + 1
             if count >= _DIVISOR_WRITES:
                 self.report(DLAB, f"U{number}THR written with DLAB set: this is the divisor")
-        elif access.offset in {0x08, 0x14} and not access.write:
-            self.report(DLAB, f"U{number} is put to use with DLAB set")
+        elif access.offset == 0x14 and not access.write:
+            self.report(DLAB, f"U{number}LSR is asked with DLAB set: no character can be sent or read")
 
     def _send(self, number: int, uart: Uart, byte: int) -> None:
         self._used.add(number)

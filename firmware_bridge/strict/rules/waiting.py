@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from firmware_bridge.strict.findings import Rule
+from firmware_bridge.board.peripheral import StoredRegisters
+from firmware_bridge.strict.findings import Rule, Severity
 from firmware_bridge.strict.registers import register_name
 from firmware_bridge.strict.watch import Access, Watch
 
@@ -14,6 +15,14 @@ UNBOUNDED = Rule(
     "unbounded_wait", "give the loop a time-out: what it waits for may never come", "any wait for hardware"
 )
 
+OUTSIDE = Rule(
+    "wait_for_outside",
+    "give the loop a time-out; on this board nothing drives that pin, or the peripheral only stores what is written",
+    "any wait for hardware",
+    Severity.WARNING,
+)
+
+_GPIO_BASE = 0x2009C000
 _LINE_STATUS, _TRANSMITTER_EMPTY, _RECEIVED = 0x14, 0x20, 0x01
 _UARTS = frozenset({0x4000C000, 0x40010000, 0x40098000, 0x4009C000})
 
@@ -31,11 +40,13 @@ class _Poll:
 class WaitWatch(Watch):
     """Looks for a register that is read over and over and does not change."""
 
-    rules = (UNBOUNDED,)
+    rules = (UNBOUNDED, OUTSIDE)
 
     def reset(self) -> None:
         """Nobody waits."""
         self._polled: dict[int, _Poll] = {}
+        stored = (one.base for one in self.board.peripherals if isinstance(one, StoredRegisters))
+        self._outside = {_GPIO_BASE, *stored}
 
     def _level(self) -> int:
         active = self.board.nvic.active
@@ -54,7 +65,8 @@ class WaitWatch(Watch):
         lasted = self.board.seconds - poll.since_s
         if poll.stands and lasted > self.policy.wait_s and not self._waits_for_the_host(access):
             name = register_name(access.base, access.offset)
-            self.report(UNBOUNDED, f"{name} = {access.value:#x} for {lasted * 1e3:.0f} ms, and no count of tries")
+            rule = OUTSIDE if access.base in self._outside else UNBOUNDED
+            self.report(rule, f"{name} = {access.value:#x} for {lasted * 1e3:.0f} ms, and no count of tries")
             poll.since_s = float("inf")
 
     def stand_still(self) -> None:
