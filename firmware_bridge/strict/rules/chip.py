@@ -147,6 +147,8 @@ class ChipWatch(Watch):
             self.report(CUT, f"CS of chip {number + 1} goes high while a word is shifted")
         sent = bytes(self._sent)
         self._sent.clear()
+        if len(sent) == 1:
+            self.report(SIZE, f"chip {number + 1}: CS goes high after 8 clocks; an access takes 16 or more")
         if len(sent) < 2:
             return
         command, count = sent[0], len(sent) - 1

@@ -35,7 +35,9 @@ RESERVED = Rule(
 
 _APB = range(0x40000000, 0x40100000)
 _SYSTEM = range(0xE0000000, 0x100000000)
-_DESCENT = 4096  # a main stack that moves further at once was exchanged by a scheduler
+# Instructions that load or store words and half-words, by their first half-word (ARMv7-M ARM A5.2.4, A5.3.7, A5.3.10).
+_WORD_ACCESSES = ((0xF000, 0x6000), (0xFE00, 0x5000), (0xFE00, 0x5800), (0xF000, 0x9000), (0xFF60, 0xF840))
+_HALF_ACCESSES = ((0xF000, 0x8000), (0xFE00, 0x5200), (0xFE00, 0x5A00), (0xFE60, 0xF820))
 
 
 class StackWatch(Watch):
@@ -48,7 +50,7 @@ class StackWatch(Watch):
         image = self.board.image
         self._top = int.from_bytes(image.read(0, 4), "little")
         self._limit = image.stack_limit(self._top, RAM_BASE, RAM_SIZE)
-        self._last = self._lowest = self._top
+        self._lowest = self._top
         self._over = self._low = False
 
     @property
@@ -71,13 +73,14 @@ class StackWatch(Watch):
                 if stack - self._limit < self.policy.stack_spare and not self._low:
                     self._low = True
                     self.report(LOW, f"{stack - self._limit} bytes are left above the data")
-        elif (
-            stack < self._limit and not self._over and 0 <= self._last - stack <= _DESCENT and self._last > self._limit
-        ):
+        elif stack < self._limit and not self._over and not self._is_a_stack(stack):
             self._over = True
             what = f"the main stack is at {stack:#010x}, below the end of the data at {self._limit:#010x}"
             self.report(OVERFLOW, what)
-        self._last = stack
+
+    def _is_a_stack(self, address: int) -> bool:
+        """Whether the data there are called a stack: a scheduler may use several."""
+        return "stack" in self.board.image.symbol_at(address).lower()
 
 
 def word_accesses(start: int, code: bytes) -> Iterator[int]:
@@ -101,10 +104,17 @@ class AlignmentWatch(Watch):
         self.report(UNALIGNED, f"several words at {address:#010x}: a usage fault")
 
     def before(self, access: Access) -> None:
-        """Look at the alignment of register accesses."""
-        if access.offset & (access.size - 1):
+        """Look at the alignment of register accesses: the emulator cuts unaligned ones into bytes."""
+        if access.size == 1 and (size := self._size_of_instruction()) > 1 and access.address & (size - 1):
             name = register_name(access.base, access.offset)
-            self.report(UNALIGNED, f"{access.size} bytes at {access.address:#010x} ({name})")
+            self.report(UNALIGNED, f"{size} bytes at once at {access.address:#010x} ({name})")
+
+    def _size_of_instruction(self) -> int:
+        """Bytes that the present instruction loads or stores, as far as that is 2 or 4; else 1."""
+        first = int.from_bytes(self.board.cpu.peek(self.ledger.here().pc, 2), "little")
+        if any(first & mask == value for mask, value in _WORD_ACCESSES):
+            return 4
+        return 2 if any(first & mask == value for mask, value in _HALF_ACCESSES) else 1
 
 
 class RegisterWatch(Watch):

@@ -31,9 +31,11 @@ _POWER_BITS = {
     0x40004000: 1, 0x40008000: 2, 0x4000C000: 3, 0x40010000: 4, 0x40018000: 6, 0x4001C000: 7, 0x40020000: 8,
     0x40024000: 9, 0x40030000: 10, 0x40034000: 12, 0x2009C000: 15, 0x40028000: 15, 0x400B0000: 16, 0x400B8000: 17,
     0x400BC000: 18, 0x4005C000: 19, 0x40088000: 21, 0x40090000: 22, 0x40094000: 23, 0x40098000: 24, 0x4009C000: 25,
-    0x400A0000: 26, 0x400A8000: 27, 0x50000000: 30, 0x50004000: 29, 0x5000C000: 31,
+    0x400A0000: 26, 0x400A8000: 27, 0x50000000: 30,
+    0x50004000: 29, 0x5000C000: 31, 0x40044000: 13, 0x40048000: 14,
 }  # fmt: skip
 """Bits of PCONP, by base address (UM10360 table 46)."""
+_SLOT = 0x3FFF  # each peripheral has 16 KiB of addresses
 
 Pin = tuple[int, int, int]
 """Port, pin, function."""
@@ -80,7 +82,7 @@ class PowerWatch(Watch):
 
     def before(self, access: Access) -> None:
         """Look at the peripheral's bit."""
-        bit = _POWER_BITS.get(access.base)
+        bit = _POWER_BITS.get(access.address & ~_SLOT)
         if bit is not None and not self.board.system_control.registers.get(0x0C4, 0) >> bit & 1:
             self.report(UNPOWERED, f"{register_name(access.base, access.offset)} with PCONP bit {bit} clear")
 
