@@ -2,19 +2,7 @@
 
 from __future__ import annotations
 
-from firmware_bridge.adxl345_device import (
-    BW_RATE,
-    DATAX0,
-    DATAZ1,
-    FIFO_CTL,
-    INT_SOURCE,
-    MEASURE,
-    OFSX,
-    POWER_CTL,
-    THRESH_TAP,
-    TICKS_PER_SECOND,
-    Adxl345,
-)
+from firmware_bridge.adxl345_device import TICKS_PER_SECOND, Adxl345
 from firmware_bridge.board.ssp import Ssp
 from firmware_bridge.strict.findings import Rule, Severity
 from firmware_bridge.strict.rules.ssp import words_received
@@ -61,14 +49,12 @@ _MODE_3, _FRAME_FORMAT, _SLAVE = 0xC0, 0x30, 4
 _REST_TICKS = 150 * TICKS_PER_SECOND // 1_000_000_000
 _POP_TICKS = 5 * TICKS_PER_SECOND // 1_000_000
 _READ, _MULTIPLE, _ADDRESS = 0x80, 0x40, 0x3F
-_DATA = range(DATAX0, DATAZ1 + 1)
-_WRITABLE = frozenset([*range(THRESH_TAP, 0x2B), BW_RATE, POWER_CTL, 0x2E, 0x2F, 0x31, FIFO_CTL])
+_BW_RATE, _POWER_CTL, _FIFO_CTL, _MEASURE = 0x2C, 0x2D, 0x38, 0x08
+_DATA = range(0x32, 0x38)
+_WRITABLE = frozenset([*range(0x1D, 0x2B), *range(0x2C, 0x30), 0x31, _FIFO_CTL])
 _SPI_HZ_AT_800 = 400e3
 _CODE_800_HZ, _CODE_1600_HZ = 13, 14
 _FAST_RATES_SPI_HZ = 2e6
-
-assert OFSX in _WRITABLE
-assert INT_SOURCE not in _WRITABLE
 
 
 class ChipWatch(Watch):
@@ -166,15 +152,15 @@ class ChipWatch(Watch):
 
     def _data_read(self, number: int, sensor: Adxl345, touched: range) -> None:
         chip, now = f"chip {number + 1}", self.board.now
-        if not sensor.registers[POWER_CTL] & MEASURE:
+        if not sensor.registers[_POWER_CTL] & _MEASURE:
             self.report(STANDBY, f"{chip}: data are read in standby")
         if not all(address in touched for address in _DATA):
             self.report(TORN, f"{chip}: data registers {touched.start:#04x}…{touched.stop - 1:#04x} of 0x32…0x37 read")
-        code = sensor.registers[BW_RATE] & 15
+        code = sensor.registers[_BW_RATE] & 15
         least = _FAST_RATES_SPI_HZ if code >= _CODE_1600_HZ else _SPI_HZ_AT_800 * 2.0 ** (code - _CODE_800_HZ)
         hz = TICKS_PER_SECOND / self._ssp.bit
         if hz < least * (1.0 - _TOLERANCE):
             self.report(SLOW, f"{chip}: SPI clock {hz / 1e3:g} kHz at rate code {code}")
-        if sensor.registers[FIFO_CTL] >> 6 and now - self._popped.get(number, -_POP_TICKS) < _POP_TICKS:
+        if sensor.registers[_FIFO_CTL] >> 6 and now - self._popped.get(number, -_POP_TICKS) < _POP_TICKS:
             self.report(POP, f"{chip}: FIFO read twice within 5 µs")
         self._popped[number] = now
