@@ -32,6 +32,8 @@ class Policy:
         A watchdog fed with a smaller share of its time left was fed late.
     storm : int
         Entries of one exception in a row, without an instruction of the program between them, that make a storm.
+    storm_s, storm_least : float, int
+        A row that lasts longer, s, and has at least so many entries, is one as well.
     stack_spare : int
         Free bytes between the main stack and the data below it that are too few.
     dead_s : float
@@ -49,6 +51,8 @@ class Policy:
     flash_late_s: float = 1e-3
     feed_share: float = 0.1
     storm: int = 300
+    storm_s: float = 0.1
+    storm_least: int = 20
     stack_spare: int = 128
     dead_s: float = 0.05
 

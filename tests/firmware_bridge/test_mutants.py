@@ -1,4 +1,4 @@
-"""The strict board against mistakes that people make: each mutant of the firmware must break the rule it is meant to."""
+"""The strict board against mistakes that people make: each mutant of the firmware must break the rule meant for it."""
 
 from __future__ import annotations
 

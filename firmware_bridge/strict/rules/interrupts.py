@@ -40,6 +40,7 @@ class InterruptWatch(Watch):
         """Nothing enabled."""
         self._enabled: dict[int, Place] = {}
         self._left = self._row = 0
+        self._row_since = 0.0
         self._program_ran = False
         self._dead: Place | None = None
 
@@ -68,9 +69,11 @@ class InterruptWatch(Watch):
             self._left = number
             self._dead = None
             return
-        self._row = 0 if self._program_ran or number != self._left else self._row + 1
+        if self._program_ran or number != self._left:
+            self._row, self._row_since = 0, self.board.seconds
+        self._row += 1
         self._program_ran = False
-        if self._row == self.policy.storm:
+        if self._is_storm() and not self.ledger.hopeless:
             place = replace(self.ledger.here(), pc=self._vector(number) & ~1)
             self.ledger.add(STORM, f"{_title(number)} runs again and again: the program stands still", place)
             self.ledger.hopeless = True
@@ -78,6 +81,12 @@ class InterruptWatch(Watch):
         if reason:
             enabled_at = self._enabled.pop(number, None)
             self.ledger.add(NO_HANDLER, f"{_title(number)} comes, but {reason}", enabled_at)
+
+    def _is_storm(self) -> bool:
+        """Whether one exception has kept the program from running for too often, or for too long."""
+        policy = self.policy
+        lasted = self.board.seconds - self._row_since
+        return self._row >= policy.storm or (self._row >= policy.storm_least and lasted > policy.storm_s)
 
     def _vector(self, exception: int) -> int:
         return int.from_bytes(self.board.cpu.peek(self.board.nvic.vtor + 4 * exception, 4), "little")
