@@ -16,20 +16,14 @@ from firmware_bridge.adxl345_device import TICKS_PER_SECOND, Adxl345
 from firmware_bridge.lpc1768.elf import ElfImage
 from firmware_bridge.physics import RestPhysics
 from firmware_bridge.strict.board import STUCK, StrictBoard
-from firmware_bridge.strict.findings import Finding, Rule, Severity
+from firmware_bridge.strict.findings import Finding
 from firmware_bridge.strict.image import load_image
 from firmware_bridge.strict.rules.memory import StackWatch
-from firmware_bridge.strict.rules.waiting import UNBOUNDED
+from firmware_bridge.strict.rules.waiting import NO_TIME_OUT, UNBOUNDED
 from firmware_bridge.strict.watch import Policy
 
-__all__ = ["NO_TIME_OUT", "answer", "run_board"]
+__all__ = ["answer", "run_board"]
 
-NO_TIME_OUT = Rule(
-    "no_time_out",
-    "give the loop a count of tries, and the program a way on: a part that is broken never becomes ready",
-    "any wait for hardware",
-    Severity.WARNING,
-)
 _BROKEN_S = 1.0
 _PARTS = {"crystal": "a crystal that never starts", "pll": "PLL0 never locked", "ssp": "SSP1 busy for ever"}
 

@@ -9,12 +9,18 @@ from firmware_bridge.strict.findings import Rule, Severity
 from firmware_bridge.strict.registers import register_name
 from firmware_bridge.strict.watch import Access, Watch
 
-__all__ = ["UNBOUNDED", "WaitWatch"]
+__all__ = ["NO_TIME_OUT", "UNBOUNDED", "WaitWatch"]
 
 UNBOUNDED = Rule(
     "unbounded_wait", "give the loop a time-out: what it waits for may never come", "any wait for hardware"
 )
 
+NO_TIME_OUT = Rule(
+    "no_time_out",
+    "give the loop a count of tries, and the program a way on: a part that is broken never becomes ready",
+    "any wait for hardware",
+    Severity.WARNING,
+)
 OUTSIDE = Rule(
     "wait_for_outside",
     "give the loop a time-out; on this board nothing drives that pin, or the peripheral only stores what is written",
