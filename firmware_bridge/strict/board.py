@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import mmap
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from firmware_bridge.adxl345_device import TICKS_PER_SECOND, Adxl345
@@ -21,14 +22,33 @@ from firmware_bridge.strict.rules.image import judge_image
 from firmware_bridge.strict.rules.memory import OVERFLOW, word_accesses
 from firmware_bridge.strict.watch import Access, Policy, Watch
 
-__all__ = ["STUCK", "StrictBoard"]
+__all__ = ["STUCK", "StrictBoard", "StuckPart"]
 
-STUCK: dict[str, tuple[int, int, int]] = {
-    "crystal": (0x400FC1A0, 0x40, 0),
-    "pll": (0x400FC088, 1 << 26, 0),
-    "ssp": (0x4003000C, 0x10, 0x10),
+
+@dataclass(frozen=True)
+class StuckPart:
+    """A status bit that a broken part leaves as it is.
+
+    Parameters
+    ----------
+    title : str
+        What is broken.
+    address, bits, value : int
+        Register, its bits, and what they are for ever.
+    """
+
+    title: str
+    address: int
+    bits: int
+    value: int
+
+
+STUCK = {
+    "crystal": StuckPart("a crystal that never starts", 0x400FC1A0, 0x40, 0),
+    "pll": StuckPart("PLL0 never locked", 0x400FC088, 1 << 26, 0),
+    "ssp": StuckPart("SSP1 busy for ever", 0x4003000C, 0x10, 0x10),
 }
-"""Status bits that a broken part leaves as they are: register, bits, their value for ever."""
+"""Parts that may be broken."""
 
 _LONGEST_LOOP = 4096  # blocks; longer loops are not recognised as standing still
 _SLICE_TICKS = TICKS_PER_SECOND // 1000
@@ -171,7 +191,7 @@ class StrictBoard(Board):
         stuck: str | None = None,
     ) -> None:
         self.ledger = Ledger(image.symbol_at, self._here)
-        self._stuck = STUCK[stuck] if stuck is not None else (0, 0, 0)
+        self._stuck = STUCK[stuck] if stuck is not None else None
         self._policy = policy or Policy()
         self.watches: list[Watch] = []
         image, self.started_at = started_by_loader(image)
@@ -203,15 +223,15 @@ class StrictBoard(Board):
         before, after = self._watching(peripheral, "before"), self._watching(peripheral, "after")
         base = peripheral.base
         still = self._strict_cpu.stand_still
-        stuck_at, stuck_bits, stuck_value = self._stuck
+        stuck = self._stuck
 
         def read(offset: int, size: int) -> int:
             access = Access(base + offset, base, offset, size, 0, write=False)
             for look in before:
                 look(access)
             value = peripheral.read(offset, size)
-            if base + offset == stuck_at:
-                value = value & ~stuck_bits | stuck_value
+            if stuck is not None and base + offset == stuck.address:
+                value = value & ~stuck.bits | stuck.value
             still.read(base + offset, value)
             access = Access(base + offset, base, offset, size, value, write=False)
             for look in after:

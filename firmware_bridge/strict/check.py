@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from dataclasses import asdict, dataclass
@@ -17,7 +18,7 @@ from gfimu.errors import GfimuError, InputError
 __all__ = ["CheckOptions", "CheckReport", "check_image"]
 
 _CHIPS = 4
-_CHILD = ("-m", "firmware_bridge.strict.worker")
+_CHILD = ("-P", "-m", "firmware_bridge.strict.worker")
 
 
 @dataclass(frozen=True)
@@ -115,9 +116,11 @@ def check_image(image: str | Path = "gfimu", options: CheckOptions | None = None
     require_emulator()
     load_image(image)  # so that a wrong image is refused here, in one line
     request: dict[str, Any] = {"image": str(image), **asdict(options or CheckOptions())}
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     run = subprocess.run(
-        [sys.executable, *_CHILD], input=json.dumps(request), capture_output=True, text=True, check=False
-    )
+        [sys.executable, *_CHILD],
+        input=json.dumps(request), capture_output=True, text=True, check=False, env=environment,
+    )  # fmt: skip
     if run.returncode:
         last = (run.stderr.strip().splitlines() or ["no message"])[-1]
         raise GfimuError(f"{image}: the strict board has ended: {last}")

@@ -19,7 +19,7 @@ class Policy:
     baud : int or None
         Expected speed of every UART that sends, baud; None: the nearest of ``speeds``.
     speeds : tuple of int
-        Speeds that serial ports are opened at, baud; the last but three is this firmware's own.
+        Speeds that serial ports are opened at, baud; 1,562,500 is this firmware's own.
     baud_error : float
         Largest share by which a UART may be off: half a bit in ten is 5 %, shared by both ends.
     wait_s : float
