@@ -50,7 +50,7 @@ def _with_broken_parts(image: ElfImage, request: dict[str, Any]) -> list[Finding
     found = []
     for name, part in STUCK.items():
         board = _board(image, request, stuck=name)
-        run_board(board, min(_BROKEN_S, request["seconds"]), request["limit_s"])
+        run_board(board, _BROKEN_S, request["limit_s"])
         found += [
             replace(
                 finding, rule=NO_TIME_OUT.name, severity=NO_TIME_OUT.severity.value, remedy=NO_TIME_OUT.remedy,
