@@ -10,7 +10,7 @@ import numpy as np
 
 from firmware_bridge.checksum import CHECKSUMS
 from firmware_bridge.delimited import DelimitedLayout
-from firmware_bridge.frames import FrameFormat
+from firmware_bridge.frame_format import FrameFormat
 from firmware_bridge.packets import PacketLayout, StreamLayout
 from firmware_bridge.text_lines import TextLayout
 from gfimu.errors import InputError, unknown_name

@@ -191,6 +191,11 @@ class Board:
         """The firmware."""
         return self.cpu.image
 
+    @property
+    def peripherals(self) -> Sequence[Peripheral]:
+        """Peripherals, in the order of their events."""
+        return self._peripherals
+
     # Time
 
     @property

@@ -36,7 +36,7 @@ try:
 except ImportError:  # the extra is not installed; `require_unicorn` says so
     unicorn = None
 
-__all__ = ["Cpu", "require_unicorn", "unicorn_parts"]
+__all__ = ["Cpu", "RegisterSet", "require_unicorn", "unicorn_parts"]
 
 FLASH_SIZE, RAM_BASE, RAM_SIZE, AHB_RAM_BASE, AHB_RAM_SIZE = 512 << 10, 0x10000000, 32 << 10, 0x2007C000, 32 << 10
 _EXC_RETURN = 0xFFFFFFF0
@@ -69,7 +69,7 @@ def unicorn_parts() -> tuple[Any, Any, Any]:
     return unicorn, arm, binding
 
 
-class _Registers:
+class RegisterSet:
     """Several registers read or written with one call."""
 
     def __init__(self, handle: Any, names: list[int]) -> None:
@@ -82,10 +82,12 @@ class _Registers:
         self._places = (ctypes.c_void_p * count)(*[address + 4 * k for k in range(count)])
 
     def read(self) -> array[int]:
+        """Read all into ``values``."""
         self._read(self._handle, self._names, self._places, self._count)
         return self.values
 
     def write(self) -> None:
+        """Write all from ``values``."""
         self._write(self._handle, self._names, self._places, self._count)
 
 
@@ -172,21 +174,21 @@ class Cpu:
         for segment in image.segments:
             self.poke(segment.address, segment.data)
         r = arm
-        self._core = _Registers(
+        self._core = RegisterSet(
             self._handle,
             [r.UC_ARM_REG_R0, r.UC_ARM_REG_R1, r.UC_ARM_REG_R2, r.UC_ARM_REG_R3, r.UC_ARM_REG_R12, r.UC_ARM_REG_LR,
              r.UC_ARM_REG_XPSR, r.UC_ARM_REG_SP, r.UC_ARM_REG_CONTROL],
         )  # fmt: skip
-        self._unstack = _Registers(
+        self._unstack = RegisterSet(
             self._handle,
             [r.UC_ARM_REG_SP, r.UC_ARM_REG_R0, r.UC_ARM_REG_R1, r.UC_ARM_REG_R2, r.UC_ARM_REG_R3, r.UC_ARM_REG_R12,
              r.UC_ARM_REG_LR, r.UC_ARM_REG_XPSR],
         )  # fmt: skip
-        self._entry = _Registers(self._handle, [r.UC_ARM_REG_SP, r.UC_ARM_REG_XPSR, r.UC_ARM_REG_LR])
-        self._primask = _Registers(self._handle, [r.UC_ARM_REG_PRIMASK])
-        self._masks = _Registers(self._handle, [r.UC_ARM_REG_BASEPRI, r.UC_ARM_REG_FAULTMASK])
-        self._exit = _Registers(self._handle, [r.UC_ARM_REG_PC, r.UC_ARM_REG_SP])
-        self._pc = _Registers(self._handle, [r.UC_ARM_REG_PC])
+        self._entry = RegisterSet(self._handle, [r.UC_ARM_REG_SP, r.UC_ARM_REG_XPSR, r.UC_ARM_REG_LR])
+        self._primask = RegisterSet(self._handle, [r.UC_ARM_REG_PRIMASK])
+        self._masks = RegisterSet(self._handle, [r.UC_ARM_REG_BASEPRI, r.UC_ARM_REG_FAULTMASK])
+        self._exit = RegisterSet(self._handle, [r.UC_ARM_REG_PC, r.UC_ARM_REG_SP])
+        self._pc = RegisterSet(self._handle, [r.UC_ARM_REG_PC])
         self._callbacks: list[Any] = []
         self._install_hooks()
         self.pc = 0

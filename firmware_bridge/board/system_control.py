@@ -32,7 +32,7 @@ class SystemControl(Peripheral):
 
     def reset(self) -> None:
         """Start on the internal oscillator, PLL off; the reset cause adds up until the firmware clears it."""
-        self.registers = {0x0C4: 0x042887DE}
+        self.registers = {0x000: 0x303A, 0x0C4: 0x042887DE}
         self._feed = 0
         self._pll_control = 0
         self._pll_setting = (0, 1)

@@ -49,12 +49,15 @@ class ElfImage:
         Addresses of functions and objects; the Thumb bit is cleared.
     sizes : tuple of int
         Bytes of code, initialised data, zero data.
+    occupied : tuple of (int, int)
+        First address and length of every section that occupies memory and can be written; none in a raw image.
     """
 
     name: str
     segments: tuple[Segment, ...]
     symbols: dict[str, int]
     sizes: tuple[int, int, int]
+    occupied: tuple[tuple[int, int], ...] = ()
 
     @classmethod
     def load(cls, path: str | Path) -> ElfImage:
@@ -101,6 +104,30 @@ class ElfImage:
                 return segment.file_offset + address - segment.address
         raise InputError(f"{self.name}: nothing is loaded at {address:#x}; link the vector table there")
 
+    def read(self, address: int, count: int) -> bytes:
+        """Bytes that are loaded at an address; 0xFF, as erased flash, where nothing is."""
+        content = bytearray(b"\xff" * count)
+        for segment in self.segments:
+            begin, end = max(address, segment.address), min(address + count, segment.address + len(segment.data))
+            if begin < end:
+                content[begin - address : end - address] = segment.data[begin - segment.address : end - segment.address]
+        return bytes(content)
+
+    def in_memory(self, address: int) -> bool:
+        """Whether a loaded segment or a writable section holds an address."""
+        ranges = [(segment.address, len(segment.data)) for segment in self.segments]
+        return any(start <= address < start + length for start, length in (*ranges, *self.occupied))
+
+    def stack_limit(self, top: int, ram_base: int, ram_size: int) -> int | None:
+        """End of the data below a stack that begins at ``top`` in a RAM.
+
+        None if the image does not say: a raw image, or a stack inside a section that holds data, too.
+        """
+        inside = [(start, start + length) for start, length in self.occupied if length]
+        inside = [(start, end) for start, end in inside if ram_base <= start < top <= ram_base + ram_size]
+        ends = [end for _, end in inside]
+        return max(ends) if ends and max(ends) < top else None
+
     def symbol_at(self, address: int) -> str:
         """Name an address as ``symbol+0x12``; empty when the image has no symbols there."""
         ordered = sorted((value, name) for name, value in self.symbols.items())
@@ -125,8 +152,11 @@ def _parse(content: bytes, name: str) -> ElfImage:
             segments.append(Segment(address, content[offset : offset + length], offset))
     headers = [struct.unpack_from("<10I", content, sections + n * section_size) for n in range(section_count)]
     text = data = zero = 0
+    occupied = []
     symbols: dict[str, int] = {}
-    for _, kind, flags, _, offset, length, link, _, _, entry in headers:
+    for _, kind, flags, start, offset, length, link, _, _, entry in headers:
+        if flags & _ALLOCATED and flags & _WRITABLE and length:
+            occupied.append((start, length))
         if flags & _ALLOCATED:
             zero += length if kind == _NO_BITS else 0
             data += length if kind != _NO_BITS and flags & _WRITABLE else 0
@@ -140,4 +170,4 @@ def _parse(content: bytes, name: str) -> ElfImage:
                     symbols[content[strings + name_offset : end].decode()] = value & ~1 if info & 15 == 2 else value
     if not segments:
         raise InputError(f"{name}: the image loads nothing; link it with the linker script")
-    return ElfImage(name, tuple(segments), symbols, (text, data, zero))
+    return ElfImage(name, tuple(segments), symbols, (text, data, zero), tuple(occupied))

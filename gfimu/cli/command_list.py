@@ -108,7 +108,7 @@ JOBS: dict[str, tuple[Entry, ...]] = {
             "Simulate a scenario on the MuJoCo turntable and write what the board would have recorded.",
             "simulate",
         ),
-        Entry("firmware", "The LPC1768 image in the emulator: run, build, selftest, trace, faults.", "firmware"),
+        Entry("firmware", "The LPC1768 image in the emulator: run, build, selftest, trace, faults, check.", "firmware"),
     ),
 }
 """Commands by job, in the order of the help."""

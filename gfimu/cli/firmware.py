@@ -1,4 +1,4 @@
-"""`gfimu firmware`: the LPC1768 image in the emulator: run, build, selftest, trace, faults."""
+"""`gfimu firmware`: the LPC1768 image in the emulator: run, build, selftest, trace, faults, check."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
+from gfimu.cli.firmware_check import check
 from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, print_text, progress
 
 __all__ = ["register"]
@@ -24,12 +25,13 @@ PythonOption = Annotated[
 
 def register(app: typer.Typer) -> None:
     """Add the commands."""
-    group = typer.Typer(help="The LPC1768 image in the emulator: run, build, selftest, trace, faults.")
+    group = typer.Typer(help="The LPC1768 image in the emulator: run, build, selftest, trace, faults, check.")
     group.command(name="run")(_run)
     group.command(name="build")(_build)
     group.command(name="selftest")(_selftest)
     group.command(name="trace")(_trace)
     group.command(name="faults")(_faults)
+    group.command(name="check")(check)
     app.add_typer(group, name="firmware")
 
 

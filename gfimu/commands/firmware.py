@@ -1,4 +1,4 @@
-"""Under `gfimu firmware`: the LPC1768 image in the emulator: run, build, selftest, trace, faults."""
+"""Under `gfimu firmware`: the LPC1768 image in the emulator: run, build, selftest, trace, faults, check."""
 
 from __future__ import annotations
 
@@ -15,11 +15,12 @@ if TYPE_CHECKING:
     from firmware_bridge.fault_campaign import FaultOutcome
     from firmware_bridge.lpc1768.build import BuildReport
     from firmware_bridge.selftest import SelfTestRow
+    from firmware_bridge.strict.check import CheckReport
     from firmware_bridge.virtual_port import ServeReport
     from firmware_bridge.virtual_run import VirtualRun
     from sim.ride import Ride
 
-__all__ = ["TraceCounts", "build", "faults", "run", "selftest", "trace"]
+__all__ = ["TraceCounts", "build", "check", "faults", "run", "selftest", "trace"]
 
 _BOOT_S = 0.02
 
@@ -270,6 +271,39 @@ def faults(*, seed: int = 0, progress: Callable[[float], None] | None = None) ->
     from firmware_bridge.fault_campaign import run_campaign
 
     return run_campaign(seed=seed, progress=progress)
+
+
+def check(
+    image: str | Path = "gfimu",
+    *,
+    seconds: float = 3.0,
+    chips: int = 4,
+    baud: int | None = None,
+    time_limit: float = 60.0,
+) -> CheckReport:
+    """Run an image on a board that reports what a real LPC1768 would not forgive.
+
+    Parameters
+    ----------
+    image : str or Path
+        Image: gfimu, selfcheck, or an ELF or .bin file.
+    seconds : float
+        Virtual time to run, s.
+    chips : int
+        ADXL345s on SSP1, 0 to 4; their chip-selects are P2.0 and so on.
+    baud : int, optional
+        Speed that the UARTs are meant to send at, baud; any usual one by default.
+    time_limit : float
+        Real time to spend at most, s.
+
+    Raises
+    ------
+    InputError
+        If the emulator is not installed, an argument is wrong, or the image can't be read or does not fit the LPC1768.
+    """
+    from firmware_bridge.strict.check import CheckOptions, check_image
+
+    return check_image(image, CheckOptions(seconds, chips, baud, time_limit))
 
 
 def _ride(scenario: str | Path, seed: int) -> Ride:

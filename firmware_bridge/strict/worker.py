@@ -1,0 +1,92 @@
+"""The process of a check: reads a request from its standard input, writes the report to its standard output.
+
+Unicorn (GPL-2) is loaded in this process only.
+"""
+
+from __future__ import annotations
+
+import gc
+import json
+import sys
+import time
+from dataclasses import asdict, replace
+from typing import Any
+
+from firmware_bridge.adxl345_device import TICKS_PER_SECOND, Adxl345
+from firmware_bridge.lpc1768.elf import ElfImage
+from firmware_bridge.physics import RestPhysics
+from firmware_bridge.strict.board import STUCK, StrictBoard
+from firmware_bridge.strict.findings import Finding
+from firmware_bridge.strict.image import load_image
+from firmware_bridge.strict.rules.memory import StackWatch
+from firmware_bridge.strict.rules.waiting import NO_TIME_OUT, UNBOUNDED
+from firmware_bridge.strict.watch import Policy
+
+__all__ = ["answer", "run_board"]
+
+_BROKEN_S = 1.0
+
+
+def run_board(board: StrictBoard, seconds: float, limit_s: float) -> str:
+    """Run for a span of virtual time; return why it ended earlier, or nothing."""
+    begin = time.monotonic()
+    end = board.now + round(seconds * TICKS_PER_SECOND)
+    while board.now < end:
+        if not board.run_slice(end):
+            return "nothing more can come of the program"
+        if time.monotonic() - begin > limit_s:
+            return f"it took longer than {limit_s:g} s of real time"
+    return ""
+
+
+def _board(image: ElfImage, request: dict[str, Any], stuck: str | None = None) -> StrictBoard:
+    physics = RestPhysics()
+    chips = [Adxl345(lambda *asked, number=number: physics(number, *asked)) for number in range(int(request["chips"]))]
+    return StrictBoard(image, chips, policy=Policy(baud=request["baud"]), stuck=stuck)
+
+
+def _with_broken_parts(image: ElfImage, request: dict[str, Any]) -> list[Finding]:
+    """Run the image with one part after another that never becomes ready; waits without an end are findings."""
+    found = []
+    for name, part in STUCK.items():
+        board = _board(image, request, stuck=name)
+        run_board(board, _BROKEN_S, request["limit_s"])
+        found += [
+            replace(
+                finding, rule=NO_TIME_OUT.name, severity=NO_TIME_OUT.severity.value, remedy=NO_TIME_OUT.remedy,
+                what=f"{part.title}: {finding.what}",
+            )
+            for finding in board.findings()
+            if finding.rule == UNBOUNDED.name
+        ]  # fmt: skip
+    return found
+
+
+def answer(request: dict[str, Any]) -> dict[str, Any]:
+    """Check an image (`firmware_bridge.strict.check.CheckOptions`); return the fields of a `CheckReport`."""
+    image = load_image(request["image"])
+    board = _board(image, request)
+    gc.freeze()
+    gc.disable()  # nothing that a board does while it runs makes cycles
+    ended = run_board(board, request["seconds"], request["limit_s"])
+    findings = list(board.findings())
+    if request["broken_parts"]:
+        findings += _with_broken_parts(image, request)
+    stack = next(watch for watch in board.watches if isinstance(watch, StackWatch))
+    return {
+        "image": request["image"],
+        "virtual_s": board.seconds,
+        "ended": ended,
+        "accesses": board.accesses,
+        "exceptions": board.exceptions,
+        "resets": board.resets,
+        "sent": [len(uart.take_sent()[0]) for uart in board.uarts],
+        "stack_bytes": stack.used,
+        "stack_room": stack.room,
+        "started_at": board.started_at,
+        "findings": [asdict(finding) for finding in findings],
+    }
+
+
+if __name__ == "__main__":
+    sys.stdout.write(json.dumps(answer(json.load(sys.stdin))))
