@@ -248,8 +248,9 @@ class MonitorFilter:
         """Run the recursion over some rows; ``arrays`` are levels, omega, std and nis of them."""
         times = blocks.t[rows]
         before = blocks.t[rows.start - 1] if rows.start else blocks.t[0] - self.block_s
-        sets = self._sets(blocks, watched, rows)
+        sets = self._sets(blocks, watched, slice(max(rows.start - 1, 0), rows.stop))
         turning = turning_of(blocks, rows, self.tables.alpha_rows, sets, self.block_s / self.samples)
+        sets = sets[len(sets) - len(times) :]
         try:
             place, slot = advance(
                 self._compiled_tables(), tuning, state, blocks.means[rows], turning, np.diff(times, prepend=before),

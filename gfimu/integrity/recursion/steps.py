@@ -39,7 +39,7 @@ _TINY = 1e-14  # numerical: least variance kept on the diagonal of the covarianc
 def advance(tables, tuning, state, means, turning, steps, sets, levels, watched, omega, std, nis, base):  # type: ignore[no-untyped-def]
     """Take n blocks; stop behind one in which a fault is seen.
 
-    ``means`` (n, c), ``turning`` (n, 12) (`turning.turning_of`), ``steps`` (n,) s since the block before, ``sets`` (n,)
+    ``means`` (n, c), ``turning`` (n, 15) (`turning.turning_of`), ``steps`` (n,) s since the block before, ``sets`` (n,)
     of channels, ``levels`` (n,) measured variance of the null space over the stated one. ``omega``, ``std`` (n, 3) and
     ``nis`` (n,) are filled. ``base`` is the number of the first of the n blocks since the start of the run.
 
@@ -211,6 +211,25 @@ def _predict(tables, tuning, state, mean, turning, step, place, level, transitio
 
 
 @njit(**COMPILE)
+def _spread_within(products, turning, leak, tuning):  # type: ignore[no-untyped-def]
+    """Add ⟨δδ⟩ − s(⟨δ⟩) to s(ω), without what products of ω that remain in α add to δ: L τ with L = leak s(ω)."""
+    length = tuning.period / tuning.samples
+    square = length * length * (tuning.samples * tuning.samples - 1.0) / 12.0  # ⟨τ²⟩
+    left = np.zeros(3)
+    for a in range(3):
+        for j in range(6):
+            left[a] += leak[a, j] * products[j]
+    first = (0, 1, 2, 0, 0, 1)
+    second = (0, 1, 2, 1, 2, 2)
+    for j in range(6):
+        a = first[j]
+        b = second[j]
+        products[j] += (
+            turning[6 + j] - turning[12 + a] * left[b] - left[a] * turning[12 + b] + left[a] * left[b] * square
+        )
+
+
+@njit(**COMPILE)
 def _update(tables, tuning, state, mean, turning, place, level):  # type: ignore[no-untyped-def]
     """Measure the null space row by row, (2), with all signatures, (3); returns the normalised innovation squared."""
     c = len(mean)
@@ -221,8 +240,7 @@ def _update(tables, tuning, state, mean, turning, place, level):  # type: ignore
     for a in range(3):
         average[a] = before[a] + turning[3 + a]
     products = _products(average)
-    for j in range(6):
-        products[j] += turning[6 + j]
+    _spread_within(products, turning, tables.leak[place], tuning)
     noise = level / tuning.samples
     h = np.zeros(n)
     ph = np.zeros(n)

@@ -87,3 +87,14 @@ def test_a_sound_run_is_estimated_as_before(run):
     kept = gfimu.estimate(run, method="filter", rest_bias=True, keep_faulty=True)
     np.testing.assert_array_equal(found.omega, kept.omega)
     assert found.metadata["health"]["faults"] == []
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_readings_that_are_missing_for_a_while_make_no_channel_faulty(seed):
+    """With eleven channels products of ω remain in α, at 12 rad/s hundreds of rad/s²."""
+    run = gfimu.simulate("paper_run", seed=seed)
+    readings = run.for_array(AccelerometerArray.load("cube12")).copy()
+    readings[1000:1005, 1] = np.nan
+    readings[1700:1740, 5] = np.nan
+    found = gfimu.estimate(replace(run, readings=readings), method="filter", rest_bias=True)
+    assert found.metadata["health"]["faults"] == []
