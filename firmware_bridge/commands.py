@@ -97,7 +97,7 @@ class Identity:
     present : tuple of bool
         Which sensors answer and hold their configuration.
     reset_cause : str
-        Why the board started last.
+        Why the board started last; also ``no crystal``: it runs on its internal oscillator, whose 1 % is the clock's.
     streaming : bool
         Whether it sends samples.
     spi_khz : int
@@ -201,7 +201,7 @@ def parse_message(packet: Any) -> Reply | Identity | None:
         return None
     fields: tuple[Any, ...] = struct.unpack("<4BHBBIBBBBIHH", payload)
     _, major, minor, patch, rate, code, data_format, baud, present, cause, streaming, sensors, build, khz, drop = fields
-    causes = {1: "power-on", 2: "external", 4: "watchdog", 8: "brown-out"}
+    causes = {1: "power-on", 2: "external", 4: "watchdog", 8: "brown-out", 16: "no crystal"}
     names = [name for bit, name in causes.items() if cause & bit]
     return Identity(
         f"{major}.{minor}.{patch}",

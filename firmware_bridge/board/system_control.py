@@ -24,10 +24,17 @@ class SystemControl(Peripheral):
 
     PCLKSEL0 and PCLKSEL1 keep their value while PLL0 is connected, whatever is written: the worst that NXP's errata
     sheet ES_LPC176x allows (PCLKSELx.1, "may not take effect"). The board records a warning.
+
+    Attributes
+    ----------
+    crystal, pll_locks : bool
+        Whether the main oscillator starts and PLL0 locks; False is a fault of the board.
     """
 
     def __init__(self, bus: Bus) -> None:
         self.cause = POWER_ON
+        self.crystal = True
+        self.pll_locks = True
         super().__init__(bus, "syscon", 0x400FC000, 0x4000)
 
     def reset(self) -> None:
@@ -68,14 +75,14 @@ class SystemControl(Peripheral):
         """Return registers as written; status bits say ready and locked."""
         if offset == 0x088:
             multiplier, predivider = self._pll_setting
-            lock = 1 << 26 if self._pll_control & 1 else 0
+            lock = 1 << 26 if self._pll_control & 1 and self.pll_locks else 0
             return multiplier | predivider << 16 | self._pll_control << 24 | lock
         if offset == 0x0A8:
             return 1 << 10 | (self.registers.get(0x0A0, 0) & 3) << 8  # PLL1 (USB): locked
         if offset == 0x180:
             return self.cause
         value = self.registers.get(offset & ~3, 0)
-        if offset & ~3 == 0x1A0 and value & 0x20:
+        if offset & ~3 == 0x1A0 and value & 0x20 and self.crystal:
             value |= 0x40  # main oscillator ready
         return value >> 8 * (offset & 3)
 

@@ -14,11 +14,20 @@
 #endif
 
 #define CORE_HZ 100000000U /* CCLK; the peripherals used run at CCLK */
+#define MICROSECONDS 1000000U
 #define BAUD_MIN 9600U
 #define SSP_PRESCALER 2U
 #define SSP_DIVIDER ((CORE_HZ + (SSP_PRESCALER * GFIMU_SPI_HZ) - 1U) / (SSP_PRESCALER * GFIMU_SPI_HZ))
 #define SELECT_REST_LOOPS 5U /* of at least 5 cycles: 250 ns */
 #define SPI_PINS 0x0FU /* P2.0…P2.3: chip-selects of sensors 1…4 */
+#define SPI_WORD_BITS 16U
+#define SPI_WORDS_MAX 8U
+/* Looks at the interface, of at least 4 cycles each, in twice the time that the longest exchange takes. */
+#define SPI_LOOKS (SPI_WORDS_MAX * SPI_WORD_BITS * SSP_PRESCALER * SSP_DIVIDER * 2U / 4U)
+
+/* Looks at a status bit of the clocks, of at least 4 cycles each: 50 ms at the 4 MHz after reset, 17 ms at 12 MHz. The
+ * crystal is given 10 ms as a rule, PLL0 0.5 ms (LPC1768 data sheet, tables 8 and 12). */
+#define CLOCK_LOOKS 50000U
 
 #define WATCHDOG_TICKS 2000000U /* 2 s of the 4 MHz internal oscillator, divided by 4 */
 #define WATCHDOG_FEED_US 100000U
@@ -39,6 +48,31 @@ void SysTick_Handler(void);
 void TIMER0_Handler(void);
 void UART0_Handler(void);
 
+/* ---- watchdog ---- */
+
+static void watchdog_feed(void)
+{
+    hal_lock(); /* the two writes must follow each other (UM10360 28.4.3) */
+    WDFEED = 0xAAU;
+    WDFEED = 0x55U;
+    hal_unlock();
+}
+
+/* Runs on the internal oscillator, whatever becomes of the other clocks, and can't be turned off again. */
+static void watchdog_start(void)
+{
+    WDCLKSEL = 0U;
+    WDTC = WATCHDOG_TICKS;
+    WDMOD = WDMOD_ENABLE_RESET;
+    watchdog_feed();
+}
+
+static void await_reset(void)
+{
+    for (;;) {
+    }
+}
+
 /* ---- clocks ---- */
 
 static void pll_feed(void)
@@ -47,44 +81,63 @@ static void pll_feed(void)
     PLL0FEED = 0x55U;
 }
 
+/* Without a locked PLL0 there is no right clock: the watchdog, which runs already, resets the board for another try. */
+static void await_pll(uint32_t mask, uint32_t value)
+{
+    uint32_t looks = CLOCK_LOOKS;
+    while ((PLL0STAT & mask) != value) {
+        looks--;
+        if (looks == 0U) {
+            await_reset();
+        }
+    }
+}
+
 /* A boot loader may leave PLL0 connected: disconnect, then disable, in two feeds (UM10360 4.5.13). */
 static void pll_off(void)
 {
     PLL0CON &= ~PLL0_CONNECT;
     pll_feed();
-    while ((PLL0STAT & PLL0STAT_CONNECTED) != 0U) {
-    }
+    await_pll(PLL0STAT_CONNECTED, 0U);
     PLL0CON = 0U;
     pll_feed();
-    while ((PLL0STAT & PLL0STAT_ENABLED) != 0U) {
-    }
+    await_pll(PLL0STAT_ENABLED, 0U);
 }
 
-/* 12 MHz crystal × 2 × 100 / 6 = 400 MHz, / 4 = 100 MHz (UM10360 4.5.13).
+/* False if the crystal does not start in time. */
+static bool crystal_start(void)
+{
+    uint32_t looks = CLOCK_LOOKS;
+    SCS |= SCS_CRYSTAL_ON;
+    while (((SCS & SCS_CRYSTAL_READY) == 0U) && (looks > 0U)) {
+        looks--;
+    }
+    return looks > 0U;
+}
+
+/* 12 MHz crystal × 2 × 100 / 6 = 400 MHz, / 4 = 100 MHz (UM10360 4.5.13). Without the crystal, the internal oscillator
+ * (4 MHz ± 1 %) × 2 × 50 gives the same. Returns whether the crystal runs.
  * The peripheral clocks are selected first: written once PLL0 is connected, PCLKSEL0 and PCLKSEL1 may not take effect
  * (NXP's errata sheet ES_LPC176x, PCLKSELx.1). The flash gets its wait states before the clock gets fast. */
-static void clock_init(void)
+static bool clock_init(void)
 {
     pll_off();
     PCLKSEL0 = (1U << 2) | (1U << 4) | (1U << 6) | (1U << 20); /* TIMER0, TIMER1, UART0, SSP1 at CCLK */
     PCLKSEL1 = 0U;
-    SCS |= 1U << 5;
-    while ((SCS & (1U << 6)) == 0U) {
-    }
+    bool crystal = crystal_start();
     FLASHCFG = (FLASHCFG & 0xFFFU) | 0x4000U;
     CCLKCFG = 3U;
-    CLKSRCSEL = 1U;
-    PLL0CFG = (5U << 16) | 99U;
+    CLKSRCSEL = crystal ? CLKSRC_CRYSTAL : CLKSRC_INTERNAL;
+    PLL0CFG = crystal ? ((5U << 16) | 99U) : 49U;
     pll_feed();
     PLL0CON = PLL0_ENABLE;
     pll_feed();
-    while ((PLL0STAT & PLL0STAT_LOCKED) == 0U) {
-    }
+    await_pll(PLL0STAT_LOCKED, PLL0STAT_LOCKED);
     PLL0CON = PLL0_ENABLE | PLL0_CONNECT;
     pll_feed();
-    while ((PLL0STAT & PLL0STAT_CONNECTED) == 0U) {
-    }
+    await_pll(PLL0STAT_CONNECTED, PLL0STAT_CONNECTED);
     PCONP |= PCONP_TIMER0 | PCONP_TIMER1 | PCONP_UART0 | PCONP_SSP1 | PCONP_GPIO;
+    return crystal;
 }
 
 /* ---- SPI ---- */
@@ -108,16 +161,41 @@ static void select_rest(void)
     }
 }
 
+/* False if the words are not through in time. */
+static bool spi_await(void)
+{
+    uint32_t looks = SPI_LOOKS;
+    while (((SSP1SR & SSP_SR_BUSY) != 0U) && (looks > 0U)) {
+        looks--;
+    }
+    return looks > 0U;
+}
+
+/* After an exchange that did not end: nobody answered, and no word may be left for the next one. */
+static void spi_give_up(uint16_t *words, uint32_t count)
+{
+    SSP1CR1 = 0U;
+    for (uint32_t i = 0U; i < count; i++) {
+        words[i] = UINT16_MAX;
+    }
+    for (uint32_t i = 0U; (i < SPI_WORDS_MAX) && ((SSP1SR & SSP_SR_RECEIVED) != 0U); i++) {
+        (void)SSP1DR;
+    }
+    SSP1CR1 = SSP_CR1_ENABLE;
+}
+
 void hal_spi_exchange(uint32_t sensor, uint16_t *words, uint32_t count)
 {
     FIO2CLR = 1U << sensor;
     for (uint32_t i = 0U; i < count; i++) {
         SSP1DR = words[i];
     }
-    while ((SSP1SR & SSP_SR_BUSY) != 0U) {
-    }
-    for (uint32_t i = 0U; i < count; i++) {
-        words[i] = (uint16_t)SSP1DR;
+    if (spi_await()) {
+        for (uint32_t i = 0U; i < count; i++) {
+            words[i] = (uint16_t)SSP1DR;
+        }
+    } else {
+        spi_give_up(words, count);
     }
     FIO2SET = 1U << sensor;
     select_rest();
@@ -129,10 +207,12 @@ void hal_spi_burst(uint32_t sensor, uint16_t words[HAL_BURST_WORDS])
     for (uint32_t i = 0U; i < HAL_BURST_WORDS; i++) {
         SSP1DR = words[i];
     }
-    while ((SSP1SR & SSP_SR_BUSY) != 0U) {
-    }
-    for (uint32_t i = 0U; i < HAL_BURST_WORDS; i++) {
-        words[i] = (uint16_t)SSP1DR;
+    if (spi_await()) {
+        for (uint32_t i = 0U; i < HAL_BURST_WORDS; i++) {
+            words[i] = (uint16_t)SSP1DR;
+        }
+    } else {
+        spi_give_up(words, HAL_BURST_WORDS);
     }
     FIO2SET = 1U << sensor;
 }
@@ -146,7 +226,7 @@ uint32_t hal_spi_khz(void)
 
 static void time_init(void)
 {
-    T1PR = (CORE_HZ / 1000000U) - 1U;
+    T1PR = (CORE_HZ / MICROSECONDS) - 1U;
     T1TCR = TIMER_RESET;
     T1TCR = TIMER_ENABLE;
 }
@@ -154,6 +234,16 @@ static void time_init(void)
 uint32_t hal_time_us(void)
 {
     return T1TC;
+}
+
+/* Not longer than a loop of as many looks, of at least 4 cycles each, takes. */
+void hal_wait_us(uint32_t microseconds)
+{
+    uint32_t since_us = T1TC;
+    uint32_t looks = microseconds * (CORE_HZ / MICROSECONDS);
+    while (((T1TC - since_us) <= microseconds) && (looks > 0U)) {
+        looks--;
+    }
 }
 
 void hal_timer_start(uint32_t rate_hz)
@@ -170,6 +260,14 @@ void hal_timer_stop(void)
 {
     T0TCR = 0U;
     T0IR = 1U;
+}
+
+/* The counter goes from 0 at one sample to MR0 at the next. */
+void hal_timer_delay(uint32_t microseconds)
+{
+    uint32_t cycles = microseconds * (CORE_HZ / MICROSECONDS);
+    uint32_t count = T0TC;
+    T0TC = (count > cycles) ? (count - cycles) : 0U;
 }
 
 void TIMER0_Handler(void)
@@ -302,15 +400,7 @@ void hal_unlock(void)
     }
 }
 
-/* ---- watchdog ---- */
-
-static void watchdog_feed(void)
-{
-    hal_lock(); /* the two writes must follow each other (UM10360 28.4.3) */
-    WDFEED = 0xAAU;
-    WDFEED = 0x55U;
-    hal_unlock();
-}
+/* ---- main loop ---- */
 
 /* Wakes the main loop, which has nothing else to wake for while no samples are taken. */
 static void wake_init(void)
@@ -344,9 +434,12 @@ static void watchdog_watch(void)
 int main(void)
 {
     hal_lock();
+    watchdog_start();
     uint32_t cause = RSID & 0x0FU;
     RSID = cause; /* the flags are cleared by writing ones */
-    clock_init();
+    if (!clock_init()) {
+        cause |= RESET_NO_CRYSTAL;
+    }
     time_init();
     spi_init();
     uart_init();
@@ -355,8 +448,6 @@ int main(void)
     NVIC_PRIORITY(IRQ_UART0) = PRIORITY_UART << NVIC_PRIORITY_SHIFT;
     NVIC_ISER0 = (1U << IRQ_TIMER0) | (1U << IRQ_UART0);
     wake_init();
-    WDTC = WATCHDOG_TICKS;
-    WDMOD = WDMOD_ENABLE_RESET;
     watchdog_feed();
 #if GFIMU_AUTOSTART
     core_start();

@@ -36,6 +36,12 @@
 #define MICROSECONDS 1000000U
 #define SETTLE_SAMPLES 16U /* longest wait for the first conversions after a change of configuration */
 #define RETRY_US 20000U /* how often one of the missing sensors is looked for */
+/* Chips whose output data rate is the sample rate, or up to a tenth above it, are kept pace with: no conversion of theirs
+ * is sent twice or left out. A sample waits at most an eighth of its period for them. */
+#define PACE_NUMERATOR 11U
+#define PACE_DENOMINATOR 10U
+#define PACE_SHARE 8U
+#define MESSAGE_SLOTS 1U /* places in the ring that samples leave to identities and replies */
 
 _Static_assert((RECEIVE_RING & (RECEIVE_RING - 1U)) == 0U, "the receive ring is indexed with a mask");
 _Static_assert(HEADER_BYTES + PAYLOAD_BYTES + 6U == FRAME_BYTES, "frame layout");
@@ -45,13 +51,14 @@ static struct {
     /* configuration */
     uint32_t rate_hz;
     uint32_t baud;
-    uint8_t bw_rate;
-    uint8_t data_format;
+    struct adxl345_setup chip;
     uint8_t reset_cause;
     /* sampling */
     bool streaming;
     bool first;
     uint32_t settling; /* samples that may still be waited for */
+    uint32_t patience_us; /* what is left of the time that this sample may wait for conversions */
+    uint32_t slow; /* bit mask of sensors that had to be waited for: they are looked at before they are read */
     uint16_t sequence;
     uint16_t message_sequence;
     uint32_t last_sample_us;
@@ -64,6 +71,7 @@ static struct {
     uint16_t sticky;  /* status bits to report in the next frame */
     volatile bool announce;
     uint32_t new_baud; /* 0, or the rate to switch to once the reply has left */
+    bool resume;       /* start sampling again at the new rate */
 } core;
 
 /* Frames to send. Only whole frames enter and frames never wrap, since the ring is a multiple of their size. */
@@ -135,11 +143,17 @@ static uint32_t transmit_used(void)
     return (head >= tail) ? (head - tail) : (head + TRANSMIT_RING - tail);
 }
 
-/* A free frame in the ring, or NULL when the line can't keep up. One frame stays empty to tell full from empty. */
+/* Whether a frame finds room and leaves some places free. One frame stays empty to tell full from empty. */
+static bool frame_fits(uint32_t places_left)
+{
+    return (transmit_used() + ((2U + places_left) * FRAME_BYTES)) <= TRANSMIT_RING;
+}
+
+/* A free frame in the ring, or NULL when the line can't keep up. */
 static uint8_t *frame_open(uint32_t type, uint32_t sequence, uint32_t time_us)
 {
     uint8_t *frame = NULL;
-    if ((transmit_used() + (2U * FRAME_BYTES)) <= TRANSMIT_RING) {
+    if (frame_fits((type == FRAME_SAMPLE) ? MESSAGE_SLOTS : 0U)) {
         frame = &transmit_ring[transmit_head];
         frame[0] = SYNC_1;
         frame[1] = SYNC_2;
@@ -197,8 +211,8 @@ static void send_identity(void)
     payload[2] = FIRMWARE_MINOR;
     payload[3] = FIRMWARE_PATCH;
     put16(&payload[4], core.rate_hz);
-    payload[6] = core.bw_rate;
-    payload[7] = core.data_format;
+    payload[6] = core.chip.bw_rate;
+    payload[7] = core.chip.data_format;
     put32(&payload[8], core.baud);
     payload[12] = (uint8_t)(core.present | (core.faulty << SENSOR_COUNT));
     payload[13] = core.reset_cause;
@@ -227,14 +241,32 @@ static void set_state(uint32_t sensor, enum adxl345_state state)
 static void configure_sensors(void)
 {
     for (uint32_t sensor = 0U; sensor < SENSOR_COUNT; sensor++) {
-        set_state(sensor, adxl345_configure(sensor, core.data_format, core.bw_rate));
+        set_state(sensor, adxl345_configure(sensor, &core.chip));
     }
+}
+
+static bool keeps_pace(void)
+{
+    return core.chip.fifo_ctl == ADXL345_STREAM;
+}
+
+/* Decide how the chips are read from what they are asked for. */
+static void set_pace(void)
+{
+    uint32_t output_rate_hz = adxl345_output_rate_hz(core.chip.bw_rate);
+    bool pace = (output_rate_hz >= core.rate_hz) &&
+                ((output_rate_hz * PACE_DENOMINATOR) <= (core.rate_hz * PACE_NUMERATOR));
+    core.chip.fifo_ctl = pace ? ADXL345_STREAM : ADXL345_NEWEST;
 }
 
 void core_start(void)
 {
+    for (uint32_t sensor = 0U; keeps_pace() && (sensor < SENSOR_COUNT); sensor++) {
+        adxl345_clear_fifo(sensor, &core.chip); /* conversions from before belong to no sample */
+    }
     core.first = true;
     core.settling = SETTLE_SAMPLES;
+    core.slow = 0U;
     core.sequence = 0U;
     core.streaming = true;
     core.last_sample_us = hal_time_us();
@@ -247,6 +279,77 @@ static void stop(void)
     core.streaming = false;
 }
 
+static bool has_converted(uint32_t sensor)
+{
+    return (adxl345_flags(sensor) & ADXL345_DATA_READY) != 0U;
+}
+
+/* A chip that is slower than the sample clock: looks until its conversion is there, or patience ends. */
+static void await_conversion(uint32_t sensor)
+{
+    bool ready = has_converted(sensor);
+    uint32_t since_us = hal_time_us();
+    uint32_t waited_us = 0U;
+    for (uint32_t looks = core.patience_us; !ready && (looks > 0U) && (waited_us < core.patience_us); looks--) {
+        ready = has_converted(sensor);
+        waited_us = hal_time_us() - since_us;
+    }
+    core.patience_us -= (waited_us < core.patience_us) ? waited_us : core.patience_us;
+}
+
+/* Integer nearest to sum / count; halves go up. */
+static int32_t mean(int32_t sum, int32_t count)
+{
+    int32_t twice = (2 * sum) + count;
+    int32_t quotient = twice / (2 * count);
+    return ((twice < 0) && ((quotient * 2 * count) != twice)) ? (quotient - 1) : quotient;
+}
+
+/* A chip that is faster than the sample clock has converted more than once: reads the rest, so that nothing stays behind,
+ * and puts the mean of all in place of the first. The flags remain those of the first. */
+static bool read_rest(uint32_t sensor, struct adxl345_reading *reading)
+{
+    struct adxl345_reading next = *reading;
+    int32_t sums[3] = {reading->counts[0], reading->counts[1], reading->counts[2]};
+    int32_t count = 1;
+    bool good = true;
+    while (good && ((next.int_source & ADXL345_WATERMARK) != 0U) && (count < (int32_t)ADXL345_FIFO_DEPTH)) {
+        hal_wait_us(ADXL345_POP_US);
+        good = adxl345_read(sensor, &core.chip, &next);
+        for (uint32_t axis = 0U; axis < 3U; axis++) {
+            sums[axis] += next.counts[axis];
+        }
+        count++;
+    }
+    for (uint32_t axis = 0U; axis < 3U; axis++) {
+        reading->counts[axis] = (int16_t)mean(sums[axis], count);
+    }
+    return good;
+}
+
+/* Reads what a chip has converted since the last sample; false if it does not hold its configuration. */
+static bool read_sensor(uint32_t sensor, struct adxl345_reading *reading)
+{
+    const uint32_t bit = 1U << sensor;
+    if ((core.slow & bit) != 0U) {
+        await_conversion(sensor);
+    }
+    bool good = adxl345_read(sensor, &core.chip, reading);
+    if (good && keeps_pace()) {
+        if (((reading->int_source & ADXL345_DATA_READY) == 0U) && ((core.slow & bit) == 0U)) {
+            core.slow |= bit;
+            await_conversion(sensor);
+            good = adxl345_read(sensor, &core.chip, reading);
+        }
+        if (good && ((reading->int_source & ADXL345_WATERMARK) != 0U)) {
+            core.slow &= ~bit;
+            good = read_rest(sensor, reading);
+            reading->int_source |= ADXL345_OVERRUN;
+        }
+    }
+    return good;
+}
+
 /* Reads one sensor into six bytes of the frame; returns its status bits. */
 static uint32_t sample_sensor(uint32_t sensor, uint8_t *at)
 {
@@ -254,7 +357,7 @@ static uint32_t sample_sensor(uint32_t sensor, uint8_t *at)
     struct adxl345_reading reading;
     bool good = ((core.present >> sensor) & 1U) != 0U;
     if (good) {
-        good = adxl345_read(sensor, core.data_format, &reading);
+        good = read_sensor(sensor, &reading);
         if (!good) {
             set_state(sensor, ADXL345_ABSENT); /* until the next try tells more */
         }
@@ -288,7 +391,7 @@ static void retry_missing(uint32_t now_us)
         do {
             core.last_retried = (core.last_retried + 1U) % SENSOR_COUNT;
         } while (((core.present >> core.last_retried) & 1U) != 0U);
-        set_state(core.last_retried, adxl345_configure(core.last_retried, core.data_format, core.bw_rate));
+        set_state(core.last_retried, adxl345_configure(core.last_retried, &core.chip));
     }
 }
 
@@ -306,32 +409,41 @@ void core_sample(void)
     }
     core.last_sample_us = now_us;
     core.heartbeat++;
-    if (frame == NULL) {
-        core.sequence++;
-        core.dropped++;
-        core.sticky |= STATUS_FRAMES_DROPPED;
-        return;
-    }
+    uint8_t unsent[PAYLOAD_BYTES]; /* without room for a frame, the chips are read all the same: nothing piles up in them */
+    uint8_t *readings = (frame == NULL) ? unsent : &frame[HEADER_BYTES];
+    const uint32_t patience_us = keeps_pace() ? (period_us / PACE_SHARE) : 0U;
+    core.patience_us = patience_us;
     for (uint32_t sensor = 0U; sensor < SENSOR_COUNT; sensor++) {
-        status |= sample_sensor(sensor, &frame[HEADER_BYTES + (6U * sensor)]);
+        status |= sample_sensor(sensor, &readings[6U * sensor]);
 #if GFIMU_CHIP_GAP_US
         uint32_t since_us = hal_time_us();
         while ((hal_time_us() - since_us) < GFIMU_CHIP_GAP_US) {
         }
 #endif
     }
-    if (((status & STATUS_STALE) != 0U) && (core.settling > 0U)) {
-        core.settling--; /* some sensor has not converted yet: there is no first sample */
+    const uint32_t waited_us = patience_us - core.patience_us;
+    if (waited_us != 0U) {
+        hal_timer_delay(waited_us); /* the sample clock goes at the pace of the slowest chip */
+    }
+    if (frame == NULL) {
+        core.sequence++;
+        core.dropped++;
+        core.sticky |= STATUS_FRAMES_DROPPED;
+        return;
+    }
+    if ((((status & STATUS_STALE) != 0U) || (waited_us != 0U)) && (core.settling > 0U)) {
+        core.settling--; /* some sensor has not converted yet, or the clock not found its pace: there is no first sample */
         return;
     }
     core.settling = 0U;
     core.sequence++;
     if (core.first) {
         status &= ~STATUS_ALL_OVERRUNS; /* conversions since the chips were set up are not missed samples */
+        core.slow = 0U;                 /* nor is a chip slow that had not begun */
         status |= STATUS_FIRST;
         core.first = false;
     }
-    if ((core.data_format & ADXL345_SELF_TEST) != 0U) {
+    if ((core.chip.data_format & ADXL345_SELF_TEST) != 0U) {
         status |= STATUS_SELF_TEST;
     }
     if (core.faulty != 0U) {
@@ -400,7 +512,8 @@ static uint32_t set_rate(uint32_t rate_hz, uint32_t code)
         result = RESULT_LINE_TOO_SLOW;
     } else {
         core.rate_hz = rate_hz;
-        core.bw_rate = (code == RATE_CODE_AUTO) ? adxl345_rate_code(rate_hz) : (uint8_t)code;
+        core.chip.bw_rate = (code == RATE_CODE_AUTO) ? adxl345_rate_code(rate_hz) : (uint8_t)code;
+        set_pace();
         reconfigure();
     }
     return result;
@@ -410,8 +523,8 @@ static uint32_t set_range(uint32_t range, uint32_t full_resolution)
 {
     uint32_t result = RESULT_BAD_VALUE;
     if ((range <= 3U) && (full_resolution <= 1U)) {
-        core.data_format = (uint8_t)((core.data_format & ADXL345_SELF_TEST) | range |
-                                     ((full_resolution != 0U) ? ADXL345_FULL_RESOLUTION : 0U));
+        core.chip.data_format = (uint8_t)((core.chip.data_format & ADXL345_SELF_TEST) | range |
+                                          ((full_resolution != 0U) ? ADXL345_FULL_RESOLUTION : 0U));
         reconfigure();
         result = RESULT_DONE;
     }
@@ -422,8 +535,8 @@ static uint32_t set_self_test(uint32_t on)
 {
     uint32_t result = RESULT_BAD_VALUE;
     if (on <= 1U) {
-        core.data_format =
-            (uint8_t)((core.data_format & ~ADXL345_SELF_TEST) | ((on != 0U) ? ADXL345_SELF_TEST : 0U));
+        core.chip.data_format =
+            (uint8_t)((core.chip.data_format & ~ADXL345_SELF_TEST) | ((on != 0U) ? ADXL345_SELF_TEST : 0U));
         reconfigure();
         result = RESULT_DONE;
     }
@@ -532,36 +645,54 @@ static bool parse_command(void)
     return true;
 }
 
+/* Moves a received byte to the parser; false if there is none. */
+static bool take_byte(void)
+{
+    bool received = receive_head != receive_tail;
+    if (received) {
+        command_bytes[command_length] = receive_ring[receive_tail];
+        command_length++;
+        receive_tail = (receive_tail + 1U) & (RECEIVE_RING - 1U);
+    }
+    return received;
+}
+
 bool core_has_work(void)
 {
     return (receive_head != receive_tail) || core.announce || (core.new_baud != 0U);
 }
 
+/* No frame may be cut by the change of speed: nothing new enters while the queue empties. Returns whether the speed is the
+ * one asked for. */
+static bool change_baud(void)
+{
+    if (core.new_baud == 0U) {
+        return true;
+    }
+    if (core.streaming) {
+        stop();
+        core.resume = true;
+    }
+    if (!hal_transmit_idle()) {
+        return false;
+    }
+    core.baud = core.new_baud;
+    hal_set_baud(core.new_baud);
+    core.new_baud = 0U;
+    if (core.resume) {
+        core.resume = false;
+        core_start();
+    }
+    return true;
+}
+
+/* A command is only taken up while its reply finds room, an announcement only sent then: none is lost. Until the line has
+ * made room, received bytes wait; those that find no place to wait are reported (core_receive). */
 void core_poll(void)
 {
-    if (core.new_baud != 0U) {
-        /* No frame may be cut by the change of speed: nothing new enters while the queue empties. */
-        bool streaming = core.streaming;
-        if (streaming) {
-            stop();
-        }
-        while (!hal_transmit_idle()) {
-        }
-        core.baud = core.new_baud;
-        hal_set_baud(core.new_baud);
-        core.new_baud = 0U;
-        if (streaming) {
-            core_start();
-        }
+    while (change_baud() && frame_fits(0U) && (parse_command() || take_byte())) {
     }
-    while (receive_head != receive_tail) {
-        command_bytes[command_length] = receive_ring[receive_tail];
-        command_length++;
-        receive_tail = (receive_tail + 1U) & (RECEIVE_RING - 1U);
-        while (parse_command()) {
-        }
-    }
-    if (core.announce) {
+    if (core.announce && (core.new_baud == 0U) && frame_fits(0U)) {
         core.announce = false;
         send_identity();
     }
@@ -571,8 +702,9 @@ void core_init(uint32_t reset_cause, uint32_t baud)
 {
     core.rate_hz = GFIMU_BOOT_RATE_HZ;
     core.baud = baud;
-    core.bw_rate = adxl345_rate_code(core.rate_hz);
-    core.data_format = ADXL345_FULL_RESOLUTION | 3U; /* ±16 g, 3.9 mg per count */
+    core.chip.bw_rate = adxl345_rate_code(core.rate_hz);
+    core.chip.data_format = ADXL345_FULL_RESOLUTION | 3U; /* ±16 g, 3.9 mg per count */
+    set_pace();
     core.reset_cause = (uint8_t)reset_cause;
     core.streaming = false;
     core.sequence = 0U;
@@ -586,6 +718,7 @@ void core_init(uint32_t reset_cause, uint32_t baud)
     core.sticky = ((reset_cause & RESET_WATCHDOG) != 0U) ? STATUS_WATCHDOG_RESET : 0U;
     core.announce = true;
     core.new_baud = 0U;
+    core.resume = false;
     transmit_head = 0U;
     transmit_tail = 0U;
     receive_head = 0U;
