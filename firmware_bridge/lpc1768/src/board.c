@@ -165,10 +165,12 @@ static void select_rest(void)
 static bool spi_await(void)
 {
     uint32_t looks = SPI_LOOKS;
-    while (((SSP1SR & SSP_SR_BUSY) != 0U) && (looks > 0U)) {
+    uint32_t busy;
+    do {
+        busy = SSP1SR & SSP_SR_BUSY;
         looks--;
-    }
-    return looks > 0U;
+    } while ((uint32_t)(busy != 0U) & (uint32_t)(looks > 0U)); /* one branch: this runs for each chip of each sample */
+    return busy == 0U;
 }
 
 /* After an exchange that did not end: nobody answered, and no word may be left for the next one. */

@@ -28,6 +28,7 @@
 #define COMMAND_SYNC_2 0x3CU
 #define COMMAND_HEADER_BYTES 4U
 #define COMMAND_PAYLOAD_MAX 8U
+#define COMMAND_BYTES_MIN (COMMAND_HEADER_BYTES + 2U)
 #define COMMAND_BYTES_MAX (COMMAND_HEADER_BYTES + COMMAND_PAYLOAD_MAX + 2U)
 
 #define RECEIVE_RING 64U /* a power of two */
@@ -41,6 +42,7 @@
 #define PACE_NUMERATOR 11U
 #define PACE_DENOMINATOR 10U
 #define PACE_SHARE 8U
+#define UNHURRIED_MAX 64U
 #define MESSAGE_SLOTS 1U /* places in the ring that samples leave to identities and replies */
 
 _Static_assert((RECEIVE_RING & (RECEIVE_RING - 1U)) == 0U, "the receive ring is indexed with a mask");
@@ -57,8 +59,11 @@ static struct {
     bool streaming;
     bool first;
     uint32_t settling; /* samples that may still be waited for */
+    uint32_t late_us;  /* time between two samples that is reported: one and a half periods */
+    uint32_t pace_us;  /* longest wait for conversions, 0 if the chips are not kept pace with */
     uint32_t patience_us; /* what is left of the time that this sample may wait for conversions */
     uint32_t slow; /* bit mask of sensors that had to be waited for: they are looked at before they are read */
+    uint32_t unhurried; /* such looks in a row that found a conversion at once */
     uint16_t sequence;
     uint16_t message_sequence;
     uint32_t last_sample_us;
@@ -267,6 +272,8 @@ void core_start(void)
     core.first = true;
     core.settling = SETTLE_SAMPLES;
     core.slow = 0U;
+    core.late_us = (3U * MICROSECONDS) / (2U * core.rate_hz);
+    core.pace_us = keeps_pace() ? (MICROSECONDS / (PACE_SHARE * core.rate_hz)) : 0U;
     core.sequence = 0U;
     core.streaming = true;
     core.last_sample_us = hal_time_us();
@@ -284,12 +291,21 @@ static bool has_converted(uint32_t sensor)
     return (adxl345_flags(sensor) & ADXL345_DATA_READY) != 0U;
 }
 
-/* A chip that is slower than the sample clock: looks until its conversion is there, or patience ends. */
+/* A chip that is slower than the sample clock: looks until its conversion is there, or patience ends. One that is there at
+ * once time and again is not slow. */
 static void await_conversion(uint32_t sensor)
 {
     bool ready = has_converted(sensor);
     uint32_t since_us = hal_time_us();
     uint32_t waited_us = 0U;
+    if (ready) {
+        core.unhurried++;
+        if (core.unhurried >= UNHURRIED_MAX) {
+            core.slow = 0U;
+        }
+        return;
+    }
+    core.unhurried = 0U;
     for (uint32_t looks = core.patience_us; !ready && (looks > 0U) && (waited_us < core.patience_us); looks--) {
         ready = has_converted(sensor);
         waited_us = hal_time_us() - since_us;
@@ -306,7 +322,7 @@ static int32_t mean(int32_t sum, int32_t count)
 }
 
 /* A chip that is faster than the sample clock has converted more than once: reads the rest, so that nothing stays behind,
- * and puts the mean of all in place of the first. The flags remain those of the first. */
+ * and puts the mean of all in place of the first. */
 static bool read_rest(uint32_t sensor, struct adxl345_reading *reading)
 {
     struct adxl345_reading next = *reading;
@@ -324,6 +340,7 @@ static bool read_rest(uint32_t sensor, struct adxl345_reading *reading)
     for (uint32_t axis = 0U; axis < 3U; axis++) {
         reading->counts[axis] = (int16_t)mean(sums[axis], count);
     }
+    reading->int_source |= ADXL345_OVERRUN;
     return good;
 }
 
@@ -331,12 +348,14 @@ static bool read_rest(uint32_t sensor, struct adxl345_reading *reading)
 static bool read_sensor(uint32_t sensor, struct adxl345_reading *reading)
 {
     const uint32_t bit = 1U << sensor;
-    if ((core.slow & bit) != 0U) {
+    bool looked = (core.slow & bit) != 0U;
+    if (looked) {
         await_conversion(sensor);
     }
     bool good = adxl345_read(sensor, &core.chip, reading);
-    if (good && keeps_pace()) {
-        if (((reading->int_source & ADXL345_DATA_READY) == 0U) && ((core.slow & bit) == 0U)) {
+    uint32_t flags = reading->int_source & (ADXL345_DATA_READY | ADXL345_WATERMARK);
+    if ((flags != ADXL345_DATA_READY) && good && keeps_pace()) { /* not just one conversion */
+        if ((flags == 0U) && !looked) {
             core.slow |= bit;
             await_conversion(sensor);
             good = adxl345_read(sensor, &core.chip, reading);
@@ -344,7 +363,6 @@ static bool read_sensor(uint32_t sensor, struct adxl345_reading *reading)
         if (good && ((reading->int_source & ADXL345_WATERMARK) != 0U)) {
             core.slow &= ~bit;
             good = read_rest(sensor, reading);
-            reading->int_source |= ADXL345_OVERRUN;
         }
     }
     return good;
@@ -399,20 +417,18 @@ void core_sample(void)
 {
     uint32_t now_us = hal_time_us();
     uint32_t status = core.sticky;
-    uint32_t period_us = MICROSECONDS / core.rate_hz;
     if (!core.streaming) {
         return;
     }
     uint8_t *frame = frame_open(FRAME_SAMPLE, core.sequence, now_us);
-    if ((now_us - core.last_sample_us) > (period_us + (period_us / 2U))) {
+    if ((now_us - core.last_sample_us) > core.late_us) {
         status |= STATUS_LATE;
     }
     core.last_sample_us = now_us;
     core.heartbeat++;
     uint8_t unsent[PAYLOAD_BYTES]; /* without room for a frame, the chips are read all the same: nothing piles up in them */
     uint8_t *readings = (frame == NULL) ? unsent : &frame[HEADER_BYTES];
-    const uint32_t patience_us = keeps_pace() ? (period_us / PACE_SHARE) : 0U;
-    core.patience_us = patience_us;
+    core.patience_us = core.pace_us;
     for (uint32_t sensor = 0U; sensor < SENSOR_COUNT; sensor++) {
         status |= sample_sensor(sensor, &readings[6U * sensor]);
 #if GFIMU_CHIP_GAP_US
@@ -421,7 +437,7 @@ void core_sample(void)
         }
 #endif
     }
-    const uint32_t waited_us = patience_us - core.patience_us;
+    const uint32_t waited_us = core.pace_us - core.patience_us;
     if (waited_us != 0U) {
         hal_timer_delay(waited_us); /* the sample clock goes at the pace of the slowest chip */
     }
@@ -659,7 +675,8 @@ static bool take_byte(void)
 
 bool core_has_work(void)
 {
-    return (receive_head != receive_tail) || core.announce || (core.new_baud != 0U);
+    /* one branch: the main loop asks after every interrupt */
+    return ((receive_head ^ receive_tail) | (uint32_t)core.announce | core.new_baud) != 0U;
 }
 
 /* No frame may be cut by the change of speed: nothing new enters while the queue empties. Returns whether the speed is the
@@ -690,6 +707,9 @@ static bool change_baud(void)
  * made room, received bytes wait; those that find no place to wait are reported (core_receive). */
 void core_poll(void)
 {
+    if (!core_has_work() && (command_length < COMMAND_BYTES_MIN)) {
+        return;
+    }
     while (change_baud() && frame_fits(0U) && (parse_command() || take_byte())) {
     }
     if (core.announce && (core.new_baud == 0U) && frame_fits(0U)) {
