@@ -274,6 +274,18 @@ class ChipCore:
         active = bool(self._int_source() & self.registers[INT_ENABLE] & mapped)
         return active != bool(self.registers[DATA_FORMAT] & INT_INVERT)
 
+    @property
+    def signals(self) -> bool:
+        """Whether any interrupt output is enabled."""
+        return self.registers[INT_ENABLE] != 0
+
+    @property
+    def next_change(self) -> int:
+        """Tick of the next conversion, which may change an interrupt pin."""
+        return (
+            self.next_undecimated if self.next_conversion is None else min(self.next_conversion, self.next_undecimated)
+        )
+
     # Registers
 
     def _read(self, address: int, now: int) -> int:

@@ -7,6 +7,7 @@ from typing import Any
 
 from firmware_bridge.adxl345_device import TICKS_PER_SECOND, Adxl345, LineFault
 from firmware_bridge.board.bus import Tracer
+from firmware_bridge.board.chip_pins import ChipPins
 from firmware_bridge.board.cpu import Cpu
 from firmware_bridge.board.dwt import CycleCounter
 from firmware_bridge.board.gpdma import Gpdma
@@ -118,6 +119,7 @@ class Board:
         self.gpio_interrupts = GpioInterrupts(self)
         self.gpio = Gpio(self)
         self.gpio.on_change = self._pins_changed
+        self.chip_pins = ChipPins(self, self.sensors, self.gpio.drive)
         self.watchdog = Watchdog(self, "watchdog", 0x40000000, irq=0)
         self.cycle_counter = CycleCounter(self, "dwt", 0xE0001000)
         for name, base, size in _STORED:
@@ -127,7 +129,7 @@ class Board:
 
     def _map(self) -> None:
         for peripheral in self._peripherals:
-            if peripheral is self.systick:
+            if peripheral is self.systick or not peripheral.size:
                 continue
             read, write = peripheral.read, peripheral.write
             if self.tracer is not None:
@@ -305,6 +307,7 @@ class Board:
     def write_chip(self, sensor: int, address: int, value: int) -> None:
         """Write a register of a sensor (from 0) as a program that ran before would have done."""
         self.sensors[sensor].write_register(address, value, self.now)
+        self.chip_pins.update()
 
     def set_line_fault(self, sensor: int, fault: LineFault) -> None:
         """Break or mend the line between a sensor (from 0) and the processor."""
@@ -340,6 +343,8 @@ class Board:
             sensor = sensors[bit.bit_length() - 1]
             if levels & bit:
                 sensor.deselect(self.now)
+                if sensor.signalling:
+                    self.chip_pins.update()
             else:
                 sensor.select(self.now)
         low = ~levels & wired

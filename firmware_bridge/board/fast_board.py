@@ -18,6 +18,7 @@ import numpy as np
 
 from firmware_bridge.adxl345_device import Adxl345, LineFault
 from firmware_bridge.board.board import Board
+from firmware_bridge.board.chip_pins import ChipPins
 from firmware_bridge.board.cpu import AHB_RAM_BASE, AHB_RAM_SIZE, FLASH_SIZE, RAM_BASE, RAM_SIZE, Cpu, unicorn_parts
 from firmware_bridge.board.faults import FaultKind
 from firmware_bridge.board.gpio import Gpio
@@ -35,7 +36,15 @@ __all__ = ["FastBoard", "build_native"]
 
 _SOURCE = Path(__file__).resolve().parent / "native" / "board.c"
 _FLAGS = ("-std=gnu11", "-O2", "-g0", "-shared", "-fPIC", "-Wall", "-Wextra", "-Werror", "-fno-sanitize=undefined")
-_KINDS: dict[type[Peripheral], str] = {Nvic: "n", Timer: "t", Uart: "u", Ssp: "s", Gpio: "g", SysTick: "k"}
+_KINDS: dict[type[Peripheral], str] = {
+    Nvic: "n",
+    Timer: "t",
+    Uart: "u",
+    Ssp: "s",
+    Gpio: "g",
+    SysTick: "k",
+    ChipPins: "w",
+}
 _UNICORN_FUNCTIONS = (
     "reg_read", "reg_write", "reg_read_batch", "reg_write_batch", "emu_start", "emu_stop", "mmio_map", "hook_add",
 )  # fmt: skip
