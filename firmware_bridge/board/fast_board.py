@@ -301,8 +301,8 @@ class FastBoard(Board):
         self._give_memory()
         counters: dict[str, int] = {}
         for slot, peripheral in self._by_slot.items():
-            kind = _KINDS.get(type(peripheral), "p")
-            index = slot if kind == "p" else counters.get(kind, 0)
+            kind = _KINDS.get(type(peripheral), "p" if peripheral.size else "-")
+            index = slot if kind in "p-" else counters.get(kind, 0)
             counters[kind] = index + 1
             self._check(
                 self.native.board_map(handle, ord(kind), index, slot, peripheral.irq, peripheral.base, peripheral.size)
@@ -383,7 +383,7 @@ class FastBoard(Board):
 
     @property
     def _clocked(self) -> list[Any]:
-        return [p for kind in (Timer, Uart, Ssp) for p in self._peripherals if isinstance(p, kind)]
+        return [p for kind in (Timer, Uart, Ssp) for p in self._peripherals if type(p) is kind]
 
     def _in_python(self) -> list[Peripheral]:
         return [peripheral for peripheral in self._peripherals if type(peripheral) not in _KINDS]

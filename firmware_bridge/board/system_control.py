@@ -17,6 +17,7 @@ _CRYSTAL_HZ = 12_000_000
 _RTC_HZ = 32_768
 _CONNECTED = 3
 _PERIPHERAL_CLOCKS = (0x1A8, 0x1AC)
+_EXTERNAL_INTERRUPTS = (0x140, 0x148, 0x14C)
 
 
 class SystemControl(Peripheral):
@@ -81,6 +82,8 @@ class SystemControl(Peripheral):
             return 1 << 10 | (self.registers.get(0x0A0, 0) & 3) << 8  # PLL1 (USB): locked
         if offset == 0x180:
             return self.cause
+        if offset in _EXTERNAL_INTERRUPTS:
+            return self.bus.external_interrupts.read(offset, size)
         value = self.registers.get(offset & ~3, 0)
         if offset & ~3 == 0x1A0 and value & 0x20 and self.crystal:
             value |= 0x40  # main oscillator ready
@@ -99,6 +102,8 @@ class SystemControl(Peripheral):
             self.cause &= ~value
         elif offset in _PERIPHERAL_CLOCKS:
             self._select_peripheral_clocks(offset, value)
+        elif offset in _EXTERNAL_INTERRUPTS:
+            self.bus.external_interrupts.write(offset, value, size)
         else:
             self.registers[offset] = value
             if offset in {0x104, 0x10C}:

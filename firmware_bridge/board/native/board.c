@@ -1959,7 +1959,7 @@ PUBLIC void board_memory(struct board *b, uint8_t *flash, uint32_t flash_size, u
     b->ahb_size = ahb_size;
 }
 
-/* kind: 'n' NVIC, 't' timer, 'u' UART, 's' SSP, 'g' GPIO, 'k' SysTick and 'w' chip pins (no region of their own), 'p' Python */
+/* kind: 'n' NVIC, 't' timer, 'u' UART, 's' SSP, 'g' GPIO, 'k' SysTick and 'w' chip pins, '-' Python (no region of their own), 'p' Python */
 PUBLIC int board_map(struct board *b, int kind, int index, int slot, int irq, uint32_t base, uint32_t size)
 {
     struct region *r = &b->regions[b->region_count];
@@ -1976,6 +1976,7 @@ PUBLIC int board_map(struct board *b, int kind, int index, int slot, int irq, ui
     case 'g': r->read = gpio_read; r->write = gpio_write; break;
     case 'k': b->systick_slot = slot; return 0;
     case 'w': b->chip_pins_slot = slot; return 0;
+    case '-': return 0;
     default: r->read = python_read; r->write = python_write; break;
     }
     b->region_count++;
