@@ -86,7 +86,8 @@ void adxl345_clear_fifo(uint32_t sensor, const struct adxl345_setup *setup)
     write_register(sensor, REGISTER_FIFO_CTL, setup->fifo_ctl);
 }
 
-bool adxl345_read(uint32_t sensor, const struct adxl345_setup *setup, struct adxl345_reading *reading)
+static inline __attribute__((always_inline)) bool read_burst(uint32_t sensor, const struct adxl345_setup *setup,
+                                                             struct adxl345_reading *reading)
 {
     /* Bytes on the wire: command, 0x30 INT_SOURCE, 0x31 DATA_FORMAT, 0x32..0x37 data, 0x38 FIFO_CTL. */
     uint16_t words[HAL_BURST_WORDS];
@@ -102,6 +103,16 @@ bool adxl345_read(uint32_t sensor, const struct adxl345_setup *setup, struct adx
     reading->counts[1] = (int16_t)(uint16_t)((words[2] & 0xFFU) | (words[3] & 0xFF00U));
     reading->counts[2] = (int16_t)(uint16_t)((words[3] & 0xFFU) | (words[4] & 0xFF00U));
     return ((words[1] >> 8) == setup->data_format) && ((words[4] & 0xFFU) == setup->fifo_ctl);
+}
+
+bool adxl345_read(uint32_t sensor, const struct adxl345_setup *setup, struct adxl345_reading *reading)
+{
+    return read_burst(sensor, setup, reading);
+}
+
+SELDOM bool adxl345_read_again(uint32_t sensor, const struct adxl345_setup *setup, struct adxl345_reading *reading)
+{
+    return read_burst(sensor, setup, reading);
 }
 
 uint8_t adxl345_flags(uint32_t sensor)

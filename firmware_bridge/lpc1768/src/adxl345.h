@@ -47,6 +47,9 @@ void adxl345_clear_fifo(uint32_t sensor, const struct adxl345_setup *setup);
 /* Read flags and data in one burst; false if DATA_FORMAT or FIFO_CTL do not read back as configured. */
 bool adxl345_read(uint32_t sensor, const struct adxl345_setup *setup, struct adxl345_reading *reading);
 
+/* The same, for where it is done now and then. */
+bool adxl345_read_again(uint32_t sensor, const struct adxl345_setup *setup, struct adxl345_reading *reading);
+
 /* INT_SOURCE, for a look whether there is a conversion to read. */
 uint8_t adxl345_flags(uint32_t sensor);
 

@@ -173,13 +173,10 @@ static bool spi_await(void)
     return busy == 0U;
 }
 
-/* After an exchange that did not end: nobody answered, and no word may be left for the next one. */
-static void spi_give_up(uint16_t *words, uint32_t count)
+/* After an exchange that did not end: no word may be left for the next one. */
+SELDOM static void spi_recover(void)
 {
     SSP1CR1 = 0U;
-    for (uint32_t i = 0U; i < count; i++) {
-        words[i] = UINT16_MAX;
-    }
     for (uint32_t i = 0U; (i < SPI_WORDS_MAX) && ((SSP1SR & SSP_SR_RECEIVED) != 0U); i++) {
         (void)SSP1DR;
     }
@@ -197,7 +194,10 @@ void hal_spi_exchange(uint32_t sensor, uint16_t *words, uint32_t count)
             words[i] = (uint16_t)SSP1DR;
         }
     } else {
-        spi_give_up(words, count);
+        spi_recover();
+        for (uint32_t i = 0U; i < count; i++) {
+            words[i] = UINT16_MAX; /* nobody answered */
+        }
     }
     FIO2SET = 1U << sensor;
     select_rest();
@@ -214,7 +214,10 @@ void hal_spi_burst(uint32_t sensor, uint16_t words[HAL_BURST_WORDS])
             words[i] = (uint16_t)SSP1DR;
         }
     } else {
-        spi_give_up(words, HAL_BURST_WORDS);
+        spi_recover();
+        for (uint32_t i = 0U; i < HAL_BURST_WORDS; i++) {
+            words[i] = UINT16_MAX; /* nobody answered */
+        }
     }
     FIO2SET = 1U << sensor;
 }
@@ -239,7 +242,7 @@ uint32_t hal_time_us(void)
 }
 
 /* Not longer than a loop of as many looks, of at least 4 cycles each, takes. */
-void hal_wait_us(uint32_t microseconds)
+SELDOM void hal_wait_us(uint32_t microseconds)
 {
     uint32_t since_us = T1TC;
     uint32_t looks = microseconds * (CORE_HZ / MICROSECONDS);
@@ -265,7 +268,7 @@ void hal_timer_stop(void)
 }
 
 /* The counter goes from 0 at one sample to MR0 at the next. */
-void hal_timer_delay(uint32_t microseconds)
+SELDOM void hal_timer_delay(uint32_t microseconds)
 {
     uint32_t cycles = microseconds * (CORE_HZ / MICROSECONDS);
     uint32_t count = T0TC;

@@ -231,7 +231,7 @@ static void send_identity(void)
 
 /* ---- sampling ---- */
 
-static void set_state(uint32_t sensor, enum adxl345_state state)
+SELDOM static void set_state(uint32_t sensor, enum adxl345_state state)
 {
     uint32_t bit = 1U << sensor;
     uint32_t present = (state == ADXL345_READY) ? (core.present | bit) : (core.present & ~bit);
@@ -293,7 +293,7 @@ static bool has_converted(uint32_t sensor)
 
 /* A chip that is slower than the sample clock: looks until its conversion is there, or patience ends. One that is there at
  * once time and again is not slow. */
-static void await_conversion(uint32_t sensor)
+SELDOM static void await_conversion(uint32_t sensor)
 {
     bool ready = has_converted(sensor);
     uint32_t since_us = hal_time_us();
@@ -323,7 +323,7 @@ static int32_t mean(int32_t sum, int32_t count)
 
 /* A chip that is faster than the sample clock has converted more than once: reads the rest, so that nothing stays behind,
  * and puts the mean of all in place of the first. */
-static bool read_rest(uint32_t sensor, struct adxl345_reading *reading)
+SELDOM static bool read_rest(uint32_t sensor, struct adxl345_reading *reading)
 {
     struct adxl345_reading next = *reading;
     int32_t sums[3] = {reading->counts[0], reading->counts[1], reading->counts[2]};
@@ -331,7 +331,7 @@ static bool read_rest(uint32_t sensor, struct adxl345_reading *reading)
     bool good = true;
     while (good && ((next.int_source & ADXL345_WATERMARK) != 0U) && (count < (int32_t)ADXL345_FIFO_DEPTH)) {
         hal_wait_us(ADXL345_POP_US);
-        good = adxl345_read(sensor, &core.chip, &next);
+        good = adxl345_read_again(sensor, &core.chip, &next);
         for (uint32_t axis = 0U; axis < 3U; axis++) {
             sums[axis] += next.counts[axis];
         }
@@ -344,26 +344,19 @@ static bool read_rest(uint32_t sensor, struct adxl345_reading *reading)
     return good;
 }
 
-/* Reads what a chip has converted since the last sample; false if it does not hold its configuration. */
-static bool read_sensor(uint32_t sensor, struct adxl345_reading *reading)
+/* A chip of the same pace that had not just one conversion to read: waits for the one to come, or reads the others. */
+SELDOM static bool read_uneven(uint32_t sensor, struct adxl345_reading *reading)
 {
     const uint32_t bit = 1U << sensor;
-    bool looked = (core.slow & bit) != 0U;
-    if (looked) {
+    bool good = true;
+    if (((reading->int_source & ADXL345_DATA_READY) == 0U) && ((core.slow & bit) == 0U)) {
+        core.slow |= bit;
         await_conversion(sensor);
+        good = adxl345_read_again(sensor, &core.chip, reading);
     }
-    bool good = adxl345_read(sensor, &core.chip, reading);
-    uint32_t flags = reading->int_source & (ADXL345_DATA_READY | ADXL345_WATERMARK);
-    if ((flags != ADXL345_DATA_READY) && good && keeps_pace()) { /* not just one conversion */
-        if ((flags == 0U) && !looked) {
-            core.slow |= bit;
-            await_conversion(sensor);
-            good = adxl345_read(sensor, &core.chip, reading);
-        }
-        if (good && ((reading->int_source & ADXL345_WATERMARK) != 0U)) {
-            core.slow &= ~bit;
-            good = read_rest(sensor, reading);
-        }
+    if (good && ((reading->int_source & ADXL345_WATERMARK) != 0U)) {
+        core.slow &= ~bit;
+        good = read_rest(sensor, reading);
     }
     return good;
 }
@@ -375,7 +368,16 @@ static uint32_t sample_sensor(uint32_t sensor, uint8_t *at)
     struct adxl345_reading reading;
     bool good = ((core.present >> sensor) & 1U) != 0U;
     if (good) {
-        good = read_sensor(sensor, &reading);
+        if (((core.slow >> sensor) & 1U) != 0U) {
+            await_conversion(sensor);
+        }
+        good = adxl345_read(sensor, &core.chip, &reading);
+        uint32_t flags = reading.int_source & (ADXL345_DATA_READY | ADXL345_WATERMARK);
+        if ((flags != ADXL345_DATA_READY) && good && keeps_pace()) {
+            struct adxl345_reading uneven = reading; /* a copy, so that the other one can stay in registers */
+            good = read_uneven(sensor, &uneven);
+            reading = uneven;
+        }
         if (!good) {
             set_state(sensor, ADXL345_ABSENT); /* until the next try tells more */
         }
@@ -623,7 +625,7 @@ static void drop_command_bytes(uint32_t count)
 
 /* One step of the parser: carries out a whole command, or drops one byte that can't begin one.
  * Returns false when more bytes are needed. */
-static bool parse_command(void)
+SELDOM static bool parse_command(void)
 {
     if ((command_length >= 1U) && (command_bytes[0] != COMMAND_SYNC_1)) {
         drop_command_bytes(1U);

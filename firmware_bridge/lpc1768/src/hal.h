@@ -5,6 +5,9 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+/* What a sample as a rule does not pass through: kept out of the way of what it does. */
+#define SELDOM __attribute__((cold, noinline))
+
 /* Select one sensor, exchange 16-bit words (at most 8) in place, deselect it. All words are 0xFFFF if the interface does
  * not get done with them. */
 void hal_spi_exchange(uint32_t sensor, uint16_t *words, uint32_t count);
