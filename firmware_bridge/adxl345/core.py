@@ -152,6 +152,10 @@ class ChipCore:
             self._data_ready = True
             self.next_conversion += due * self._period
             return
+        if due == 1 and not self.fifo:  # the most frequent case
+            self.fifo.append(self._conversion(0))
+            self.next_conversion += self._period
+            return
         filling = mode == FIFO or (mode == TRIGGER and self.triggered)
         # Conversions that leave no trace: those that find a full FIFO, or those that newer ones push out.
         stored = min(due, _FIFO_DEPTH + 1)

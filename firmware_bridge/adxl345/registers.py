@@ -38,7 +38,7 @@ class LineFault(enum.IntEnum):
 
     NONE = 0
     SILENT = 1
-    """The chip neither hears nor answers: unplugged, or without power."""
+    """The chip does not take part: unplugged, or without power."""
     STUCK_LOW = 2
     """The data line to the host is shorted to ground."""
     STUCK_HIGH = 3

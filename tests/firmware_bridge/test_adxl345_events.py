@@ -182,7 +182,6 @@ def test_auto_sleep_falls_asleep_and_wakes_up(wake_up: int, period: float) -> No
     asleep = chip.first(INACTIVITY, 3000, 5.0)
     assert asleep == pytest.approx(2015, abs=20)
     assert chip.chip.registers[0x2B] & 8
-    chip.chip.i2c_start(0xA7, chip.now)
     awake = chip.first(ACTIVITY, 6000, 1.0)
     assert 4200 <= awake <= 4200 + period + 2
     assert chip.chip.registers[0x2B] == 0x40
