@@ -109,7 +109,7 @@ class Identity:
     present : tuple of bool
         Which sensors answer and hold their configuration.
     reset_cause : str
-        Why the board started last.
+        Why the board started last; also ``no crystal``: it runs on its internal oscillator, whose 1 % is the clock's.
     streaming : bool
         Whether it sends samples.
     spi_khz : int
@@ -239,7 +239,7 @@ def parse_message(packet: Any) -> Reply | Identity | None:
         RATES_HZ[0] <= rate <= RATES_HZ[1] and code <= _LARGEST_RATE_CODE and streaming <= 1 and sensors <= _SENSORS
     ):
         return None
-    causes = {1: "power-on", 2: "external", 4: "watchdog", 8: "brown-out"}
+    causes = {1: "power-on", 2: "external", 4: "watchdog", 8: "brown-out", 16: "no crystal"}
     names = [name for bit, name in causes.items() if cause & bit]
     return Identity(
         f"{major}.{minor}.{patch}",

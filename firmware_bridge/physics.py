@@ -21,6 +21,7 @@ __all__ = ["Conversions", "RestPhysics", "RidePhysics", "Scene"]
 _CHIPS = 4
 _FASTEST_HZ, _FASTEST_CODE = 3200.0, 15
 _LARGEST_RAW = 1 << 24
+_LOW_POWER, _LOW_POWER_NOISE = 0x10, 1.5  # BW_RATE bit 4: "somewhat higher noise"; the data sheet gives no figure
 
 
 class Conversions(Protocol):
@@ -128,6 +129,8 @@ class RidePhysics:
             self._walk[sensor] = walk[-1]
             reading = reading + walk
         spread = self.scene.sensor(rate).noise_std[self._columns[sensor]] * self.scene.noise_factor
+        if bw_rate & _LOW_POWER:
+            spread = spread * _LOW_POWER_NOISE
         if spread.any():
             reading = reading + chance.normal(size=(count, 3)) * spread
         raw = np.floor(reading / self.scene.lsb * RAW_PER_COUNT + 0.5)

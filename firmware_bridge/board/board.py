@@ -6,14 +6,20 @@ from collections.abc import Sequence
 from typing import Any
 
 from firmware_bridge.adxl345_device import TICKS_PER_SECOND, Adxl345, LineFault
+from firmware_bridge.board.adc import Adc
 from firmware_bridge.board.bus import Tracer
+from firmware_bridge.board.chip_pins import ChipPins
 from firmware_bridge.board.cpu import Cpu
 from firmware_bridge.board.dwt import CycleCounter
+from firmware_bridge.board.external_interrupts import ExternalInterrupts, PinConnect
 from firmware_bridge.board.gpdma import Gpdma
 from firmware_bridge.board.gpio import Gpio, GpioInterrupts
 from firmware_bridge.board.i2c import I2c
 from firmware_bridge.board.nvic import Nvic
 from firmware_bridge.board.peripheral import NEVER, Peripheral, StoredRegisters
+from firmware_bridge.board.pwm import Pwm
+from firmware_bridge.board.rit import RepetitiveTimer
+from firmware_bridge.board.rtc import Rtc
 from firmware_bridge.board.ssp import Ssp
 from firmware_bridge.board.system_control import BROWN_OUT, EXTERNAL, POWER_ON, SystemControl
 from firmware_bridge.board.systick import SysTick
@@ -28,15 +34,10 @@ _ACCESS_CYCLES = 4
 _SPI_SELECT_PORT = 2  # P2.0…P2.3 select sensors 1…4
 
 _STORED = (
-    ("pwm1", 0x40018000, 0x1000),
     ("spi", 0x40020000, 0x1000),
-    ("rtc", 0x40024000, 0x1000),
-    ("pincon", 0x4002C000, 0x1000),
-    ("adc", 0x40034000, 0x1000),
     ("can", 0x40038000, 0x10000),
     ("dac", 0x4008C000, 0x1000),
     ("i2s", 0x400A8000, 0x1000),
-    ("rit", 0x400B0000, 0x1000),
     ("mcpwm", 0x400B8000, 0x1000),
     ("qei", 0x400BC000, 0x1000),
     ("ethernet", 0x50000000, 0x4000),
@@ -115,11 +116,18 @@ class Board:
             I2c(self, "i2c2", 0x400A0000, 12, 32 + 20),
         ]
         self.ssps = [Ssp(self, "ssp0", 0x40088000, 14, 32 + 10), Ssp(self, "ssp1", 0x40030000, 15, 20)]
+        self.external_interrupts = ExternalInterrupts(self)
         self.gpio_interrupts = GpioInterrupts(self)
         self.gpio = Gpio(self)
         self.gpio.on_change = self._pins_changed
+        self.chip_pins = ChipPins(self, self.sensors, self.gpio.drive)
         self.watchdog = Watchdog(self, "watchdog", 0x40000000, irq=0)
         self.cycle_counter = CycleCounter(self, "dwt", 0xE0001000)
+        PinConnect(self, "pincon", 0x4002C000)
+        self.adc = Adc(self)
+        self.rtc = Rtc(self)
+        RepetitiveTimer(self)
+        Pwm(self)
         for name, base, size in _STORED:
             StoredRegisters(self, name, base, size)
         Gpdma(self)
@@ -127,7 +135,7 @@ class Board:
 
     def _map(self) -> None:
         for peripheral in self._peripherals:
-            if peripheral is self.systick:
+            if peripheral is self.systick or not peripheral.size:
                 continue
             read, write = peripheral.read, peripheral.write
             if self.tracer is not None:
@@ -310,6 +318,7 @@ class Board:
     def write_chip(self, sensor: int, address: int, value: int) -> None:
         """Write a register of a sensor (from 0) as a program that ran before would have done."""
         self.sensors[sensor].write_register(address, value, self.now)
+        self.chip_pins.update()
 
     def set_line_fault(self, sensor: int, fault: LineFault) -> None:
         """Break or mend the line between a sensor (from 0) and the processor."""
@@ -345,6 +354,8 @@ class Board:
             sensor = sensors[bit.bit_length() - 1]
             if levels & bit:
                 sensor.deselect(self.now)
+                if sensor.signalling:
+                    self.chip_pins.update()
             else:
                 sensor.select(self.now)
         low = ~levels & wired

@@ -5,7 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, Protocol
 
-__all__ = ["Bus", "ClockTree", "InterruptLines", "PinWatcher", "RegisterBlock", "Tracer", "TransmitLine"]
+__all__ = [
+    "Bus",
+    "ClockTree",
+    "ExternalPins",
+    "InterruptLines",
+    "PinWatcher",
+    "RegisterBlock",
+    "Tracer",
+    "TransmitLine",
+]
 
 
 class Tracer(Protocol):
@@ -55,6 +64,22 @@ class PinWatcher(Protocol):
     def pins_changed(self, port: int, changed: int, levels: int) -> None:
         """Look for enabled edges."""
 
+    def update_line(self) -> None:
+        """Set the interrupt line anew."""
+
+
+class ExternalPins(RegisterBlock, Protocol):
+    """External interrupts, which have their registers in system control and share a line with the pins."""
+
+    selected: int
+    flags: int
+
+    def select(self, pinsel4: int) -> None:
+        """Take over a selection of pins."""
+
+    def pins_changed(self, port: int, changed: int, levels: int) -> None:
+        """Look for edges and levels."""
+
 
 class TransmitLine(Protocol):
     """The pace of a UART's transmitter."""
@@ -96,6 +121,10 @@ class Bus(Protocol):
     @property
     def gpio_interrupts(self) -> PinWatcher:
         """Interrupts on pins."""
+
+    @property
+    def external_interrupts(self) -> ExternalPins:
+        """External interrupts."""
 
     @property
     def uarts(self) -> Sequence[TransmitLine]:

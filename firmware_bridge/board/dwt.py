@@ -13,13 +13,13 @@ class CycleCounter(Peripheral):
     def reset(self) -> None:
         """Stop, at zero."""
         self.control = 0x40000000
-        self.base = 0
+        self.since = 0
         self.count = 0
 
     def _now(self) -> int:
         if not self.control & 1:
             return self.count
-        return self.count + (self.bus.now - self.base) // self.bus.cycle & 0xFFFFFFFF
+        return self.count + (self.bus.now - self.since) // self.bus.cycle & 0xFFFFFFFF
 
     def read(self, offset: int, size: int) -> int:
         """DWT_CTRL and CYCCNT."""
@@ -28,7 +28,7 @@ class CycleCounter(Peripheral):
     def write(self, offset: int, value: int, size: int) -> None:
         """DWT_CTRL and CYCCNT."""
         self.count = self._now()
-        self.base = self.bus.now
+        self.since = self.bus.now
         if offset == 0x0:
             self.control = 0x40000000 | value & 1
         elif offset == 0x4:
@@ -37,4 +37,4 @@ class CycleCounter(Peripheral):
     def clock_will_change(self) -> None:
         """Keep the count."""
         self.count = self._now()
-        self.base = self.bus.now
+        self.since = self.bus.now

@@ -18,6 +18,7 @@ import numpy as np
 
 from firmware_bridge.adxl345_device import Adxl345, LineFault
 from firmware_bridge.board.board import Board
+from firmware_bridge.board.chip_pins import ChipPins
 from firmware_bridge.board.cpu import AHB_RAM_BASE, AHB_RAM_SIZE, FLASH_SIZE, RAM_BASE, RAM_SIZE, Cpu, unicorn_parts
 from firmware_bridge.board.faults import FaultKind
 from firmware_bridge.board.gpio import Gpio
@@ -35,7 +36,15 @@ __all__ = ["FastBoard", "build_native"]
 
 _SOURCE = Path(__file__).resolve().parent / "native" / "board.c"
 _FLAGS = ("-std=gnu11", "-O2", "-g0", "-shared", "-fPIC", "-Wall", "-Wextra", "-Werror", "-fno-sanitize=undefined")
-_KINDS: dict[type[Peripheral], str] = {Nvic: "n", Timer: "t", Uart: "u", Ssp: "s", Gpio: "g", SysTick: "k"}
+_KINDS: dict[type[Peripheral], str] = {
+    Nvic: "n",
+    Timer: "t",
+    Uart: "u",
+    Ssp: "s",
+    Gpio: "g",
+    SysTick: "k",
+    ChipPins: "w",
+}
 _UNICORN_FUNCTIONS = (
     "reg_read", "reg_write", "reg_read_batch", "reg_write_batch", "emu_start", "emu_stop", "mmio_map", "hook_add",
 )  # fmt: skip
@@ -292,8 +301,8 @@ class FastBoard(Board):
         self._give_memory()
         counters: dict[str, int] = {}
         for slot, peripheral in self._by_slot.items():
-            kind = _KINDS.get(type(peripheral), "p")
-            index = slot if kind == "p" else counters.get(kind, 0)
+            kind = _KINDS.get(type(peripheral), "p" if peripheral.size else "-")
+            index = slot if kind in "p-" else counters.get(kind, 0)
             counters[kind] = index + 1
             self._check(
                 self.native.board_map(handle, ord(kind), index, slot, peripheral.irq, peripheral.base, peripheral.size)
@@ -374,7 +383,7 @@ class FastBoard(Board):
 
     @property
     def _clocked(self) -> list[Any]:
-        return [p for kind in (Timer, Uart, Ssp) for p in self._peripherals if isinstance(p, kind)]
+        return [p for kind in (Timer, Uart, Ssp) for p in self._peripherals if type(p) is kind]
 
     def _in_python(self) -> list[Peripheral]:
         return [peripheral for peripheral in self._peripherals if type(peripheral) not in _KINDS]

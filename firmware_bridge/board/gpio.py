@@ -97,20 +97,27 @@ class GpioInterrupts(Peripheral):
 
     def reset(self) -> None:
         """No edge enabled."""
-        self.watching = False
+        self.edges = False
         self.status = {(port, edge): 0 for port in (0, 2) for edge in "RF"}
         self.enable = {(port, edge): 0 for port in (0, 2) for edge in "RF"}
 
+    @property
+    def watching(self) -> bool:
+        """Whether any edge is enabled, or an external interrupt has a pin."""
+        return self.edges or self.bus.external_interrupts.selected != 0
+
     def pins_changed(self, port: int, changed: int, levels: int) -> None:
         """Look for enabled edges."""
+        self.bus.external_interrupts.pins_changed(port, changed, levels)
         if port not in {0, 2}:
             return
         for edge, at in (("R", levels), ("F", ~levels)):
             self.status[port, edge] |= changed & at & self.enable[port, edge]
-        self._update()
+        self.update_line()
 
-    def _update(self) -> None:
-        self.bus.nvic.set_line(self.irq, level=any(self.status.values()))
+    def update_line(self) -> None:
+        """Set the interrupt line by the edges seen and by EINT3."""
+        self.bus.nvic.set_line(self.irq, level=any(self.status.values()) or self.bus.external_interrupts.flags & 8)
 
     def read(self, offset: int, size: int) -> int:
         """IOIntStatus, IO0IntStatR … IO2IntEnF."""
@@ -131,7 +138,7 @@ class GpioInterrupts(Peripheral):
         if place == 0x08:
             for edge in "RF":
                 self.status[port, edge] &= ~value
-            self._update()
+            self.update_line()
         elif place in {0x0C, 0x10}:
             self.enable[port, "RF"[(place - 0x0C) >> 2]] = value
-            self.watching = any(self.enable.values())
+            self.edges = any(self.enable.values())

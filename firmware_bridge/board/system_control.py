@@ -17,6 +17,7 @@ _CRYSTAL_HZ = 12_000_000
 _RTC_HZ = 32_768
 _CONNECTED = 3
 _PERIPHERAL_CLOCKS = (0x1A8, 0x1AC)
+_EXTERNAL_INTERRUPTS = (0x140, 0x148, 0x14C)
 
 
 class SystemControl(Peripheral):
@@ -24,10 +25,17 @@ class SystemControl(Peripheral):
 
     PCLKSEL0 and PCLKSEL1 keep their value while PLL0 is connected, whatever is written: the worst that NXP's errata
     sheet ES_LPC176x allows (PCLKSELx.1, "may not take effect"). The board records a warning.
+
+    Attributes
+    ----------
+    crystal, pll_locks : bool
+        Whether the main oscillator starts and PLL0 locks; False is a fault of the board.
     """
 
     def __init__(self, bus: Bus) -> None:
         self.cause = POWER_ON
+        self.crystal = True
+        self.pll_locks = True
         super().__init__(bus, "syscon", 0x400FC000, 0x4000)
 
     def reset(self) -> None:
@@ -68,14 +76,16 @@ class SystemControl(Peripheral):
         """Return registers as written; status bits say ready and locked."""
         if offset == 0x088:
             multiplier, predivider = self._pll_setting
-            lock = 1 << 26 if self._pll_control & 1 else 0
+            lock = 1 << 26 if self._pll_control & 1 and self.pll_locks else 0
             return multiplier | predivider << 16 | self._pll_control << 24 | lock
         if offset == 0x0A8:
             return 1 << 10 | (self.registers.get(0x0A0, 0) & 3) << 8  # PLL1 (USB): locked
         if offset == 0x180:
             return self.cause
+        if offset in _EXTERNAL_INTERRUPTS:
+            return self.bus.external_interrupts.read(offset, size)
         value = self.registers.get(offset & ~3, 0)
-        if offset & ~3 == 0x1A0 and value & 0x20:
+        if offset & ~3 == 0x1A0 and value & 0x20 and self.crystal:
             value |= 0x40  # main oscillator ready
         return value >> 8 * (offset & 3)
 
@@ -92,6 +102,8 @@ class SystemControl(Peripheral):
             self.cause &= ~value
         elif offset in _PERIPHERAL_CLOCKS:
             self._select_peripheral_clocks(offset, value)
+        elif offset in _EXTERNAL_INTERRUPTS:
+            self.bus.external_interrupts.write(offset, value, size)
         else:
             self.registers[offset] = value
             if offset in {0x104, 0x10C}:

@@ -14,6 +14,8 @@ _WRAP = 1 << 32
 class Timer(Peripheral):
     """The count is worked out when it is read; only matches that do something are events."""
 
+    matches = 4
+
     def __init__(self, bus: Bus, name: str, base: int, irq: int, clock_place: int) -> None:
         self.clock_place = clock_place
         super().__init__(bus, name, base, irq=irq)
@@ -24,7 +26,7 @@ class Timer(Peripheral):
         self.control = 0
         self.prescale = 0
         self.match_control = 0
-        self.match = [0, 0, 0, 0]
+        self.match = [0] * self.matches
         self.start_count = 0
         self.start = 0
         self.due = NEVER
@@ -35,6 +37,10 @@ class Timer(Peripheral):
     def _set_tick(self) -> None:
         divider = self.bus.system_control.peripheral_divider(self.clock_place)
         self.tick = self.bus.cycle * divider * (self.prescale + 1)
+
+    def flag(self, number: int) -> int:
+        """Bit of a match in the interrupt register."""
+        return 1 << number
 
     def count(self) -> int:
         """Timer counter now."""
@@ -55,7 +61,7 @@ class Timer(Peripheral):
         """Schedule the next match that does something."""
         self.due = NEVER
         if self.control == _ENABLE:
-            for number in range(4):
+            for number in range(self.matches):
                 if self.match_control >> 3 * number & 7:
                     ahead = (self.match[number] - self.start_count) % _WRAP
                     if ahead == 0 and after_match:
@@ -71,11 +77,11 @@ class Timer(Peripheral):
         reached = self.match[self.due_match]
         self.start, self.start_count = self.due, reached
         clear = False
-        for number in range(4):
+        for number in range(self.matches):
             action = self.match_control >> 3 * number & 7
             if action and self.match[number] == reached:
                 if action & 1:
-                    self.interrupts |= 1 << number
+                    self.interrupts |= self.flag(number)
                 if action & 2:
                     clear = True
                 if action & 4:

@@ -92,7 +92,7 @@ def _run_to_file(
         )
         return
     rows: list[tuple[str, Any]] = [
-        ("samples", f"{made.stream.samples} at {rate} Hz"),
+        ("samples", f"{len(made.recording.t_s)} at {made.recording.metadata.get('time_stamp_rate_hz', rate):.1f} Hz"),
         ("lost", made.stream.lost),
         ("corrupt", made.stream.corrupt),
     ]

@@ -9,7 +9,7 @@ import pytest
 
 pytest.importorskip("ziglang", reason="the C compiler is in the extra 'firmware'")
 
-from firmware_bridge.adxl345_device import TICKS_PER_SECOND, Adxl345, LineFault
+from firmware_bridge.adxl345_device import RAW_PER_COUNT, TICKS_PER_SECOND, Adxl345, Adxl345Options, LineFault
 from firmware_bridge.checksum import crc16
 from firmware_bridge.commands import (
     Command,
@@ -50,6 +50,7 @@ class Host:
 
     def _exchange(self, sensor, words, count) -> None:
         chip = self.chips[sensor]
+        self.now = max(self.now, self.library.host_time_us() * US)  # the core may have waited
         chip.select(self.now)
         for k in range(count):
             high = chip.transfer(words[k] >> 8, self.now)
@@ -57,6 +58,7 @@ class Host:
             words[k] = high << 8 | low
             self.now += 3 * US
         chip.deselect(self.now)
+        self.library.host_set_time_us(self.now // US)
 
     def advance(self, microseconds: int) -> None:
         self.now += microseconds * US
@@ -133,6 +135,7 @@ def test_chips_that_kept_their_registers_are_set_up_anew(host: Host) -> None:
             0x2C: 0x0A,
             0x2D: 0x08,
             0x31: 0x0B,
+            0x38: 0x82,
         }
     host.library.host_start()
     assert host.sample(8).counts[-1].tolist() == [1, -2, 256, 2, -2, 256, 3, -2, 256, 4, -2, 256]
@@ -301,3 +304,86 @@ def test_watchdog_reset_is_told(library) -> None:
     host = Host(library, cause=4)
     host.library.host_start()
     assert host.sample(4).status[0] & Status.WATCHDOG_RESET
+
+
+def fill_the_line(host: Host) -> None:
+    for _ in range(60):
+        host.advance(10_000)
+        host.library.host_sample()
+
+
+def test_no_reply_is_lost_while_the_line_is_full(host: Host) -> None:
+    host.library.host_start()
+    host.library.host_poll()
+    host.messages()
+    fill_the_line(host)
+    commands = [encode_command(Command.SELF_TEST, k % 2) for k in range(6)]
+    for command in commands:
+        host.send(command)  # the place that samples leave free holds one reply
+    assert host.library.host_has_work()
+    replies = []
+    for _ in range(8):
+        replies += [message for message in host.messages() if isinstance(message, Reply)]
+        host.library.host_poll()
+    assert replies == [Reply(Command.SELF_TEST, Result.DONE)] * len(commands)
+
+
+def test_bytes_that_find_no_place_to_wait_are_reported(host: Host) -> None:
+    host.library.host_start()
+    fill_the_line(host)
+    for _ in range(20):
+        host.send(encode_command(Command.IDENTIFY))
+    host.collected()
+    assert (host.sample(2).status & Status.RECEIVE_ERROR).any()
+
+
+SETTLED = 20  # samples until the chips convert
+CLOCKS = (0.02, 0.0, -0.01, -0.03)
+
+
+def conversion_numbers(first: int, period: int, count: int, bw_rate: int) -> np.ndarray:
+    """Yield conversions whose x counts up by 4."""
+    number = round(first / period) + np.arange(count)
+    return np.outer(4 * RAW_PER_COUNT * number, [1, -1, 0])
+
+
+def run_at_own_clocks(host: Host, rate_hz: int, count: int) -> Samples:
+    """Sample with chips whose clocks differ from the board's, and a sample timer that can be delayed."""
+    for chip, clock in zip(host.chips, CLOCKS, strict=True):
+        chip.options = Adxl345Options(clock_error=clock)
+        chip.source = conversion_numbers
+    host.library.host_start()
+    host.send(set_rate(rate_hz))
+    tick, parts = host.now, []
+    for _ in range(count + SETTLED):
+        before = host.library.host_delayed_us()
+        host.library.host_sample()
+        parts.append(host.collected())
+        tick += (1_000_000 // rate_hz + host.library.host_delayed_us() - before) * US
+        host.advance((tick - host.now) // US)
+    return Samples.join(parts[SETTLED:])
+
+
+@pytest.mark.parametrize("rate_hz", [100, 400])
+def test_the_slowest_chip_sets_the_pace_and_faster_ones_send_means(host: Host, rate_hz: int) -> None:
+    samples = run_at_own_clocks(host, rate_hz, 800)
+    assert not (samples.status & (Status.STALE | Status.LATE)).any()
+    slowest = 1.0 + min(CLOCKS)
+    assert np.diff(samples.ticks).mean() == pytest.approx(1e6 / (rate_hz * slowest), rel=1e-3)
+    for chip, clock in enumerate(CLOCKS):
+        merged = (samples.status >> (4 + chip) & 1).astype(float)
+        # A mean of two conversions stands half a conversion behind the newer one: each is counted exactly once.
+        newest = samples.counts[:, 3 * chip] / 4 + merged / 2
+        assert np.all(np.diff(newest) == 1 + merged[1:])
+        assert merged.mean() == pytest.approx((1.0 + clock) / slowest - 1.0, abs=2.0 / len(merged))
+        assert np.all(samples.counts[:, 3 * chip + 1] == -samples.counts[:, 3 * chip])
+
+
+def test_faster_output_is_read_newest_only(host: Host) -> None:
+    host.library.host_start()
+    host.send(set_rate(250))  # 400 Hz output: between two rates
+    assert all(chip.registers[0x38] == 0 for chip in host.chips)
+    host.send(set_rate(390))
+    assert all(chip.registers[0x38] == 0x82 for chip in host.chips)
+    host.send(set_rate(200, 12))
+    assert all(chip.registers[0x38] == 0 for chip in host.chips)

@@ -103,7 +103,6 @@ def test_the_firmware_breaks_no_rule_whatever_the_host_asks() -> None:
     assert board.uarts[0].baud == pytest.approx(115_200, rel=0.01)
 
 
-@pytest.mark.xfail(reason="waits for crystal, PLL0 and SSP1 have no time-out in this image", strict=False)
 @pytest.mark.parametrize("part", STUCK)
 def test_the_firmware_waits_for_no_part_for_ever(part: str) -> None:
     assert rules_broken(strict_board(ElfImage.load(image_path()), stuck=part), 1.0) == set()

@@ -78,6 +78,17 @@ struct adxl345 {
     double clock_error, phase;
     int32_t self_test[3];
     int wires, stuck_range, line_fault;
+    /* events.py */
+    bool asleep, signalling, stepwise;
+    bool activity_on, inactivity_on, tap_on, free_fall_on, awaits_inactivity, has_activity_reference,
+        has_inactivity_reference, quiet;
+    int32_t activity_reference[3], inactivity_reference[3];
+    ticks quiet_since, second, next_undecimated, undecimated_period;
+    int64_t falling, tap_count;
+    int tap;
+    uint32_t tap_axes;
+    int32_t fine[BLOCK][3];
+    int fine_count, fine_place;
 };
 
 struct timer {
@@ -163,6 +174,8 @@ struct board {
     uint32_t direction[PORTS], mask[PORTS], latch[PORTS], driven[PORTS], levels[PORTS];
     struct adxl345 sensors[SENSORS];
     int sensor_count;
+    int chip_pins_slot;
+    int pin_level[SENSORS][2]; /* -1: not driven yet */
     struct region regions[SLOTS];
     int region_count;
 };
@@ -823,12 +836,17 @@ static void uart_reset(struct board *b, struct uart *u)
     uart_set_character(b, u);
 }
 
-/* ---- adxl345_device.py ---- */
+/* ---- adxl345/core.py and device.py ---- */
 
 enum {
-    OFSX = 0x1E, BW_RATE = 0x2C, POWER_CTL = 0x2D, INT_SOURCE = 0x30, DATA_FORMAT = 0x31,
+    THRESH_TAP = 0x1D, OFSX = 0x1E, DUR = 0x21, LATENT = 0x22, WINDOW = 0x23, THRESH_ACT = 0x24, THRESH_INACT = 0x25,
+    TIME_INACT = 0x26, ACT_INACT_CTL = 0x27, THRESH_FF = 0x28, TIME_FF = 0x29, TAP_AXES = 0x2A, ACT_TAP_STATUS = 0x2B,
+    BW_RATE = 0x2C, POWER_CTL = 0x2D, INT_ENABLE = 0x2E, INT_MAP = 0x2F, INT_SOURCE = 0x30, DATA_FORMAT = 0x31,
     DATAX0 = 0x32, DATAZ1 = 0x37, FIFO_CTL = 0x38, FIFO_STATUS = 0x39
 };
+enum { SINGLE_TAP = 0x40, DOUBLE_TAP = 0x20, ACTIVITY = 0x10, INACTIVITY = 0x08, FREE_FALL = 0x04, EVENTS = 0x7C };
+enum { LINK = 0x20, AUTO_SLEEP = 0x10, MEASURE = 0x08, SLEEP = 0x04, ASLEEP = 0x08 };
+enum { UNDECIMATED = 0x0F };
 #define POP_TICKS (5 * TICKS_PER_SECOND / 1000000)
 #define TURN_ON_TICKS (11 * TICKS_PER_SECOND / 10000)
 #define SLOWEST_PERIOD (1024 * TICKS_PER_SECOND / 100)
@@ -851,7 +869,7 @@ static uint32_t format_count(int32_t raw, int data_format, int bw_rate)
 
 static ticks adxl_period(struct adxl345 *d)
 {
-    ticks nominal = (d->registers[POWER_CTL] & 4) ? (TICKS_PER_SECOND / 8) << (d->registers[POWER_CTL] & 3)
+    ticks nominal = (d->asleep || (d->registers[POWER_CTL] & SLEEP)) ? (TICKS_PER_SECOND / 8) << (d->registers[POWER_CTL] & 3)
                                                   : SLOWEST_PERIOD >> (d->registers[BW_RATE] & 15);
     return (ticks)rint((double)nominal / (1.0 + d->clock_error));
 }
@@ -865,6 +883,14 @@ static void adxl_restart(struct adxl345 *d, ticks start)
     d->next_conversion = start + d->period - early;
 }
 
+static void adxl_add(struct adxl345 *d, const int32_t *reading, int32_t *out)
+{
+    for (int axis = 0; axis < 3; axis++) {
+        int32_t shift = (d->registers[DATA_FORMAT] & 0x80) ? d->self_test[axis] : 0;
+        out[axis] = reading[axis] + (int8_t)d->registers[OFSX + axis] * 1024 + shift;
+    }
+}
+
 static void adxl_conversion(struct board *b, struct adxl345 *d, ticks skip, int32_t *out)
 {
     ticks place = d->block_place + skip;
@@ -875,10 +901,7 @@ static void adxl_conversion(struct board *b, struct adxl345 *d, ticks skip, int3
         place = 0;
     }
     d->block_place = (int)place + 1;
-    for (int axis = 0; axis < 3; axis++) {
-        int32_t shift = (d->registers[DATA_FORMAT] & 0x80) ? d->self_test[axis] : 0;
-        out[axis] = d->block[place][axis] + (int8_t)d->registers[OFSX + axis] * 1024 + shift;
-    }
+    adxl_add(d, d->block[place], out);
 }
 
 static void adxl_fifo_drop(struct adxl345 *d)
@@ -906,8 +929,280 @@ static void adxl_store(struct adxl345 *d, const int32_t *sample, int mode)
         d->overrun = true;
 }
 
+/* ---- adxl345/events.py ---- */
+
+enum { STEP = 16 * 256, PER_DUR = 2, PER_LATENT = 4, PER_TIME_FF = 16 };
+enum { TAP_IDLE, TAP_FIRST, TAP_LONG, TAP_WAITING, TAP_OPEN, TAP_SECOND };
+
+static void events_restart(struct adxl345 *d)
+{
+    d->activity_on = d->inactivity_on = d->tap_on = d->free_fall_on = false;
+    d->awaits_inactivity = true;
+    d->has_activity_reference = d->has_inactivity_reference = d->quiet = false;
+    d->falling = 0;
+    d->tap = TAP_IDLE;
+    d->tap_count = 0;
+    d->tap_axes = 0;
+}
+
+static void events_configure(struct adxl345 *d)
+{
+    const uint8_t *r = d->registers;
+    bool linked = r[POWER_CTL] & LINK;
+    bool activity = (r[ACT_INACT_CTL] & 0x70) && ((r[INT_ENABLE] & ACTIVITY) || linked);
+    bool inactivity = (r[ACT_INACT_CTL] & 0x07) && ((r[INT_ENABLE] & INACTIVITY) || linked);
+    if (activity && !d->activity_on)
+        d->has_activity_reference = false;
+    if (inactivity && !d->inactivity_on)
+        d->has_inactivity_reference = d->quiet = false;
+    d->activity_on = activity;
+    d->inactivity_on = inactivity;
+    d->tap_on = (r[INT_ENABLE] & (SINGLE_TAP | DOUBLE_TAP)) && r[DUR] && (r[TAP_AXES] & 7);
+    if (!d->tap_on)
+        d->tap = TAP_IDLE;
+    d->free_fall_on = r[INT_ENABLE] & FREE_FALL;
+    if (!d->free_fall_on)
+        d->falling = 0;
+}
+
+static bool events_linked(struct adxl345 *d)
+{
+    return (d->registers[POWER_CTL] & LINK) && d->activity_on && d->inactivity_on;
+}
+
+static uint32_t axes_beyond(const int32_t *sample, const int32_t *reference, int32_t limit, uint32_t axes)
+{
+    uint32_t found = 0;
+    for (int axis = 0; axis < 3; axis++) {
+        uint32_t bit = 4U >> axis;
+        if (axes & bit) {
+            int32_t distance = sample[axis] - (reference ? reference[axis] : 0);
+            if (distance > limit || distance < -limit)
+                found |= bit;
+        }
+    }
+    return found;
+}
+
+static uint32_t find_activity(struct adxl345 *d, const int32_t *sample)
+{
+    uint8_t *r = d->registers;
+    if (!d->activity_on || (events_linked(d) && d->awaits_inactivity))
+        return 0;
+    bool coupled = r[ACT_INACT_CTL] & 0x80;
+    if (coupled && !d->has_activity_reference) {
+        memcpy(d->activity_reference, sample, sizeof d->activity_reference);
+        d->has_activity_reference = true;
+    }
+    uint32_t axes = axes_beyond(sample, coupled ? d->activity_reference : NULL, r[THRESH_ACT] * STEP, r[ACT_INACT_CTL] >> 4);
+    if (!axes)
+        return 0;
+    r[ACT_TAP_STATUS] = (uint8_t)((r[ACT_TAP_STATUS] & (ASLEEP | 7)) | axes << 4);
+    memcpy(d->activity_reference, sample, sizeof d->activity_reference);
+    d->has_activity_reference = true;
+    d->awaits_inactivity = true;
+    d->has_inactivity_reference = d->quiet = false;
+    return ACTIVITY;
+}
+
+static uint32_t find_inactivity(struct adxl345 *d, const int32_t *sample, ticks now)
+{
+    const uint8_t *r = d->registers;
+    if (!d->inactivity_on || (events_linked(d) && !d->awaits_inactivity))
+        return 0;
+    bool coupled = r[ACT_INACT_CTL] & 0x08;
+    if (coupled && !d->has_inactivity_reference) {
+        memcpy(d->inactivity_reference, sample, sizeof d->inactivity_reference);
+        d->has_inactivity_reference = true;
+    }
+    if (axes_beyond(sample, coupled ? d->inactivity_reference : NULL, r[THRESH_INACT] * STEP - 1, r[ACT_INACT_CTL] & 7)) {
+        memcpy(d->inactivity_reference, sample, sizeof d->inactivity_reference);
+        d->has_inactivity_reference = true;
+        d->quiet = false;
+        return 0;
+    }
+    if (!d->quiet) {
+        d->quiet = true;
+        d->quiet_since = now;
+    }
+    if (now - d->quiet_since < r[TIME_INACT] * d->second)
+        return 0;
+    d->quiet_since = now;
+    d->awaits_inactivity = false;
+    d->has_activity_reference = false;
+    return INACTIVITY;
+}
+
+static uint32_t find_free_fall(struct adxl345 *d, const int32_t *sample)
+{
+    int32_t limit = d->registers[THRESH_FF] * STEP;
+    for (int axis = 0; axis < 3; axis++)
+        if (sample[axis] >= limit || sample[axis] <= -limit) {
+            d->falling = 0;
+            return 0;
+        }
+    d->falling++;
+    int64_t needed = PER_TIME_FF * d->registers[TIME_FF];
+    return d->falling == (needed > 1 ? needed : 1) ? FREE_FALL : 0;
+}
+
+static void tap_begin(struct adxl345 *d, int state, int count)
+{
+    d->tap = state;
+    d->tap_count = count;
+}
+
+static uint32_t tap_end(struct adxl345 *d, uint32_t events, int state)
+{
+    d->tap = state;
+    d->registers[ACT_TAP_STATUS] = (uint8_t)((d->registers[ACT_TAP_STATUS] & ~7U) | d->tap_axes);
+    return events;
+}
+
+static uint32_t find_taps(struct adxl345 *d, const int32_t *sample)
+{
+    const uint8_t *r = d->registers;
+    uint32_t axes = axes_beyond(sample, NULL, r[THRESH_TAP] * STEP, r[TAP_AXES] & 7);
+    int64_t longest = PER_DUR * r[DUR];
+    d->tap_count++;
+    switch (d->tap) {
+    case TAP_IDLE:
+        if (axes) {
+            tap_begin(d, TAP_FIRST, 1);
+            d->tap_axes = axes;
+        }
+        return 0;
+    case TAP_FIRST:
+        if (!axes) {
+            if (!(r[INT_ENABLE] & DOUBLE_TAP) || !r[LATENT] || !r[WINDOW])
+                return tap_end(d, SINGLE_TAP, TAP_IDLE);
+            tap_begin(d, TAP_WAITING, 0);
+        } else if (d->tap_count > longest) {
+            d->tap = TAP_LONG;
+        }
+        return 0;
+    case TAP_LONG:
+        if (!axes)
+            d->tap = TAP_IDLE;
+        return 0;
+    case TAP_WAITING:
+        if (axes && (r[TAP_AXES] & 8))
+            return tap_end(d, SINGLE_TAP, TAP_LONG);
+        if (d->tap_count >= PER_LATENT * r[LATENT])
+            tap_begin(d, TAP_OPEN, 0);
+        return 0;
+    case TAP_OPEN:
+        if (axes && d->tap_count == 1)
+            return tap_end(d, SINGLE_TAP, TAP_LONG);
+        if (axes)
+            tap_begin(d, TAP_SECOND, 1);
+        else if (d->tap_count >= PER_LATENT * r[WINDOW])
+            return tap_end(d, SINGLE_TAP, TAP_IDLE);
+        return 0;
+    default:
+        if (!axes)
+            return tap_end(d, SINGLE_TAP | DOUBLE_TAP, TAP_IDLE);
+        return d->tap_count > longest ? tap_end(d, SINGLE_TAP, TAP_LONG) : 0;
+    }
+}
+
+static uint32_t find_in_undecimated(struct adxl345 *d, const int32_t *sample)
+{
+    uint32_t found = 0;
+    if (d->tap_on)
+        found |= find_taps(d, sample);
+    if (d->free_fall_on)
+        found |= find_free_fall(d, sample);
+    return found | find_activity(d, sample);
+}
+
+static void adxl_raise(struct adxl345 *d, uint32_t events)
+{
+    const uint8_t *r = d->registers;
+    events &= r[INT_ENABLE] & EVENTS;
+    if (!events)
+        return;
+    d->events |= (uint8_t)events;
+    uint32_t on_pin = events & ((r[FIFO_CTL] & 0x20) ? r[INT_MAP] : ~(uint32_t)r[INT_MAP]);
+    if (r[FIFO_CTL] >> 6 == 3 && on_pin && !d->triggered) {
+        d->triggered = true;
+        while (d->fifo_count > (r[FIFO_CTL] & 31))
+            adxl_fifo_drop(d);
+    }
+}
+
+static void adxl_configure_sensing(struct adxl345 *d, ticks now)
+{
+    events_configure(d);
+    bool sleeps = d->asleep || (d->registers[POWER_CTL] & SLEEP);
+    bool undecimated = d->tap_on || d->free_fall_on || d->activity_on;
+    if (!d->converting || sleeps || !undecimated) {
+        d->next_undecimated = NEVER;
+    } else if (d->next_undecimated >= NEVER) {
+        d->fine_count = d->fine_place = 0;
+        d->next_undecimated = later(now, d->next_conversion - d->period) + d->undecimated_period;
+    }
+    d->stepwise = undecimated || d->inactivity_on || sleeps;
+}
+
+static void adxl_set_asleep(struct adxl345 *d, bool asleep, ticks now)
+{
+    d->asleep = asleep;
+    d->registers[ACT_TAP_STATUS] = (uint8_t)((d->registers[ACT_TAP_STATUS] & ~ASLEEP) | (asleep ? ASLEEP : 0));
+    adxl_restart(d, now);
+    adxl_configure_sensing(d, now);
+}
+
+static void adxl_catch_up_stepwise(struct board *b, struct adxl345 *d, ticks now)
+{
+    while (d->converting) {
+        ticks at = earlier(d->next_conversion, d->next_undecimated);
+        int32_t sample[3];
+        if (at > now)
+            return;
+        if (d->next_undecimated == at) {
+            d->next_undecimated += d->undecimated_period;
+            if (d->fine_place >= d->fine_count) {
+                b->call.conversions((int32_t)(d - b->sensors), at, d->undecimated_period, BLOCK,
+                                    d->registers[BW_RATE] | UNDECIMATED, &d->fine[0][0]);
+                d->fine_count = BLOCK;
+                d->fine_place = 0;
+            }
+            adxl_add(d, d->fine[d->fine_place++], sample);
+            adxl_raise(d, find_in_undecimated(d, sample));
+            continue;
+        }
+        adxl_conversion(b, d, 0, sample);
+        d->next_conversion += d->period;
+        if (d->asleep || (d->registers[POWER_CTL] & SLEEP)) {
+            memcpy(d->out, sample, sizeof d->out);
+            uint32_t found = find_activity(d, sample);
+            adxl_raise(d, found);
+            if (found && d->asleep)
+                adxl_set_asleep(d, false, at);
+        } else {
+            int mode = d->registers[FIFO_CTL] >> 6;
+            if (mode == 0) {
+                d->overrun = d->overrun || d->data_ready;
+                memcpy(d->out, sample, sizeof d->out);
+                d->data_ready = true;
+            } else {
+                adxl_store(d, sample, mode);
+            }
+            uint32_t found = find_inactivity(d, sample, at);
+            adxl_raise(d, found);
+            if (found && (d->registers[POWER_CTL] & (LINK | AUTO_SLEEP)) == (LINK | AUTO_SLEEP))
+                adxl_set_asleep(d, true, at);
+        }
+    }
+}
+
 static void adxl_catch_up(struct board *b, struct adxl345 *d, ticks now)
 {
+    if (d->stepwise) {
+        adxl_catch_up_stepwise(b, d, now);
+        return;
+    }
     if (!d->converting || now < d->next_conversion)
         return;
     ticks due = (now - d->next_conversion) / d->period + 1;
@@ -980,6 +1275,20 @@ static uint32_t adxl_read(struct adxl345 *d, int address, ticks now)
     return d->registers[address];
 }
 
+static void adxl_write_power(struct adxl345 *d, uint8_t old, uint8_t value, ticks now)
+{
+    bool waking = (value & MEASURE) && !(old & MEASURE), was_asleep = d->asleep;
+    uint32_t both = LINK | AUTO_SLEEP | MEASURE;
+    if (waking || ((old ^ value) & LINK))
+        events_restart(d);
+    if (was_asleep && (value & both) != both) {
+        d->asleep = false;
+        d->registers[ACT_TAP_STATUS] &= (uint8_t)~ASLEEP;
+    }
+    if (((old ^ value) & (MEASURE | SLEEP | 3)) || was_asleep != d->asleep)
+        adxl_restart(d, waking ? now + TURN_ON_TICKS : now);
+}
+
 static void adxl_write(struct adxl345 *d, int address, uint8_t value, ticks now)
 {
     bool writable = (address >= 0x1D && address <= 0x2A) || (address >= BW_RATE && address <= 0x2F) ||
@@ -990,9 +1299,8 @@ static void adxl_write(struct adxl345 *d, int address, uint8_t value, ticks now)
     d->registers[address] = value;
     if (address == BW_RATE) {
         adxl_restart(d, now);
-    } else if (address == POWER_CTL && ((old ^ value) & 0x0F)) {
-        bool waking = (value & 8) && !(old & 8);
-        adxl_restart(d, waking ? now + TURN_ON_TICKS : now);
+    } else if (address == POWER_CTL) {
+        adxl_write_power(d, old, value, now);
     } else if (address == FIFO_CTL && value >> 6 != old >> 6) {
         if (value >> 6 == 0) {
             d->fifo_count = 0;
@@ -1000,6 +1308,18 @@ static void adxl_write(struct adxl345 *d, int address, uint8_t value, ticks now)
         }
         d->triggered = false;
     }
+    if (value != old) {
+        d->signalling = true;
+        adxl_configure_sensing(d, now);
+    }
+}
+
+static bool adxl_pin(struct board *b, struct adxl345 *d, int number)
+{
+    adxl_catch_up(b, d, b->shared.now);
+    uint32_t map = d->registers[INT_MAP], mapped = number == 2 ? map : ~map;
+    bool active = adxl_int_source(d) & d->registers[INT_ENABLE] & mapped & 0xFF;
+    return active != ((d->registers[DATA_FORMAT] & 0x20) != 0);
 }
 
 static uint32_t adxl_exchange(struct board *b, struct adxl345 *d, uint8_t value, ticks now)
@@ -1060,6 +1380,13 @@ static void adxl_power_on(struct adxl345 *d)
     d->pop_done = 0;
     d->command = -1;
     d->address = 0;
+    d->asleep = d->stepwise = false;
+    d->signalling = true;
+    d->next_undecimated = NEVER;
+    d->fine_count = d->fine_place = 0;
+    d->undecimated_period = (ticks)rint((double)(SLOWEST_PERIOD >> UNDECIMATED) / (1.0 + d->clock_error));
+    d->second = (ticks)rint((double)TICKS_PER_SECOND / (1.0 + d->clock_error));
+    events_restart(d);
     d->period = adxl_period(d);
 }
 
@@ -1208,6 +1535,8 @@ static void ssp_reset(struct board *b, struct ssp *p)
 
 /* ---- gpio.py, and the wiring of board.py ---- */
 
+static void chip_pins_update(struct board *b);
+
 static void pins_changed(struct board *b, int port, uint32_t changed, uint32_t levels)
 {
     if (port != 2)
@@ -1216,9 +1545,11 @@ static void pins_changed(struct board *b, int port, uint32_t changed, uint32_t l
     for (int k = 0; k < b->sensor_count; k++) {
         uint32_t bit = 1U << k;
         if (changed & bit) {
-            if (levels & bit)
+            if (levels & bit) {
                 adxl_deselect(&b->sensors[k], b->shared.now);
-            else
+                if (b->sensors[k].signalling)
+                    chip_pins_update(b);
+            } else
                 adxl_select(b, &b->sensors[k], b->shared.now);
         }
         if (!(levels & bit))
@@ -1238,6 +1569,34 @@ static void gpio_update(struct board *b, int port)
         if (b->shared.gpio_watching)
             b->call.pins(port, changed, levels);
     }
+}
+
+/* chip_pins.py */
+static void chip_pins_update(struct board *b)
+{
+    static const int pins[SENSORS][2] = {{15, 23}, {16, 24}, {17, 25}, {18, 26}};
+    ticks following = NEVER;
+    for (int k = 0; k < b->sensor_count; k++) {
+        struct adxl345 *d = &b->sensors[k];
+        if (!d->signalling)
+            continue;
+        for (int output = 0; output < 2; output++) {
+            int level = adxl_pin(b, d, output + 1);
+            if (level != b->pin_level[k][output]) {
+                b->pin_level[k][output] = level;
+                if (level)
+                    b->driven[0] |= 1U << pins[k][output];
+                else
+                    b->driven[0] &= ~(1U << pins[k][output]);
+                gpio_update(b, 0);
+            }
+        }
+        d->signalling = d->registers[INT_ENABLE] != 0;
+        if (d->signalling)
+            following = earlier(following, d->converting ? earlier(d->next_conversion, d->next_undecimated)
+                                                         : d->next_undecimated);
+    }
+    schedule(b, b->chip_pins_slot, following);
 }
 
 static uint32_t gpio_read(struct board *b, int index, uint32_t offset, uint32_t size)
@@ -1292,6 +1651,10 @@ static void slot_event(struct board *b, int slot)
 {
     if (slot == b->systick_slot) {
         systick_event(b);
+        return;
+    }
+    if (slot == b->chip_pins_slot) {
+        chip_pins_update(b);
         return;
     }
     for (int k = 0; k < TIMERS; k++)
@@ -1564,7 +1927,7 @@ PUBLIC struct board *board_new(void *uc, const struct unicorn *api, const struct
     b->shared.reset_requested = -1;
     b->intr_error = -1;
     b->polled_slot = -1;
-    b->systick_slot = -1;
+    b->systick_slot = b->chip_pins_slot = -1;
     size_t handle;
     b->api.hook_add(uc, &handle, 1, (void *)on_interrupt, b, 1, 0);
     b->api.hook_add(uc, &handle, 8, (void *)on_block, b, 1, 0);
@@ -1596,7 +1959,7 @@ PUBLIC void board_memory(struct board *b, uint8_t *flash, uint32_t flash_size, u
     b->ahb_size = ahb_size;
 }
 
-/* kind: 'n' NVIC, 't' timer, 'u' UART, 's' SSP, 'g' GPIO, 'k' SysTick (no region of its own), 'p' Python */
+/* kind: 'n' NVIC, 't' timer, 'u' UART, 's' SSP, 'g' GPIO, 'k' SysTick and 'w' chip pins, '-' Python (no region of their own), 'p' Python */
 PUBLIC int board_map(struct board *b, int kind, int index, int slot, int irq, uint32_t base, uint32_t size)
 {
     struct region *r = &b->regions[b->region_count];
@@ -1612,6 +1975,8 @@ PUBLIC int board_map(struct board *b, int kind, int index, int slot, int irq, ui
     case 's': r->read = ssp_read; r->write = ssp_write; b->ssps[index].slot = slot; b->ssps[index].irq = irq; break;
     case 'g': r->read = gpio_read; r->write = gpio_write; break;
     case 'k': b->systick_slot = slot; return 0;
+    case 'w': b->chip_pins_slot = slot; return 0;
+    case '-': return 0;
     default: r->read = python_read; r->write = python_write; break;
     }
     b->region_count++;
@@ -1642,6 +2007,7 @@ PUBLIC void board_write_chip(struct board *b, int index, uint32_t address, uint3
 {
     adxl_catch_up(b, &b->sensors[index], b->shared.now);
     adxl_write(&b->sensors[index], (int)(address & 63), (uint8_t)value, b->shared.now);
+    chip_pins_update(b);
 }
 
 PUBLIC void board_schedule(struct board *b, int slot, ticks when) { schedule(b, slot, when); }
@@ -1735,6 +2101,10 @@ PUBLIC void board_reset(struct board *b, const int32_t *dividers)
         b->direction[port] = b->mask[port] = b->latch[port] = 0;
         b->driven[port] = b->levels[port] = 0xFFFFFFFFU;
     }
+    memset(b->pin_level, -1, sizeof b->pin_level);
+    for (int k = 0; k < b->sensor_count; k++)
+        b->sensors[k].signalling = true;
+    chip_pins_update(b);
 }
 
 PUBLIC void board_receive(struct board *b, int index, const uint8_t *bytes, size_t count, int errors)

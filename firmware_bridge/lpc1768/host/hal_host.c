@@ -17,13 +17,15 @@ typedef void (*exchange_function)(uint32_t sensor, uint16_t *words, uint32_t cou
 static exchange_function exchange;
 static uint32_t time_us;
 static uint32_t timer_hz;
+static uint32_t delayed_us;
 static uint32_t baud;
 static int32_t lock_depth;
-static bool idle = true;
 
 PUBLIC void host_set_exchange(exchange_function function) { exchange = function; }
 PUBLIC void host_set_time_us(uint32_t value) { time_us = value; }
+PUBLIC uint32_t host_time_us(void) { return time_us; }
 PUBLIC uint32_t host_timer_hz(void) { return timer_hz; }
+PUBLIC uint32_t host_delayed_us(void) { return delayed_us; }
 PUBLIC uint32_t host_baud(void) { return baud; }
 PUBLIC int32_t host_lock_depth(void) { return lock_depth; }
 
@@ -42,10 +44,16 @@ void hal_spi_exchange(uint32_t sensor, uint16_t *words, uint32_t count) { exchan
 void hal_spi_burst(uint32_t sensor, uint16_t words[HAL_BURST_WORDS]) { exchange(sensor, words, HAL_BURST_WORDS); }
 uint32_t hal_spi_khz(void) { return 5000U; }
 uint32_t hal_time_us(void) { return time_us; }
+void hal_wait_us(uint32_t microseconds) { time_us += microseconds; }
 void hal_timer_start(uint32_t rate_hz) { timer_hz = rate_hz; }
 void hal_timer_stop(void) { timer_hz = 0U; }
+void hal_timer_delay(uint32_t microseconds) { delayed_us += microseconds; }
 void hal_transmit_kick(void) {}
-bool hal_transmit_idle(void) { return idle; }
+bool hal_transmit_idle(void)
+{
+    const uint8_t *bytes;
+    return core_transmit_peek(&bytes) == 0U;
+}
 bool hal_baud_possible(uint32_t rate) { return (rate >= 9600U) && (rate <= 6250000U); }
 void hal_set_baud(uint32_t rate) { baud = rate; }
 void hal_lock(void) { lock_depth++; }

@@ -18,8 +18,8 @@
 
 #define DEVICE_ID 0xE5U
 #define MEASURE 0x08U
-#define FIFO_BYPASS 0x00U
 #define RATE_CODE_100_HZ 0x0AU
+#define RATE_CODE_MASK 0x0FU
 #define DETECTION_WORDS 7U /* an address and the 13 registers 0x1E…0x2A */
 
 static void write_register(uint32_t sensor, uint32_t address, uint8_t value)
@@ -55,11 +55,11 @@ static bool detection_is_clear(uint32_t sensor)
     return found == 0U;
 }
 
-enum adxl345_state adxl345_configure(uint32_t sensor, uint8_t data_format, uint8_t bw_rate)
+enum adxl345_state adxl345_configure(uint32_t sensor, const struct adxl345_setup *setup)
 {
     /* A reset of the processor leaves the chip as it was. The format comes first, unseen: a chip in 3-wire mode hears
      * but its answers go to the wrong pin. */
-    write_register(sensor, REGISTER_DATA_FORMAT, data_format);
+    write_register(sensor, REGISTER_DATA_FORMAT, setup->data_format);
     if (read_register(sensor, REGISTER_DEVID) != DEVICE_ID) {
         return ADXL345_ABSENT;
     }
@@ -67,20 +67,27 @@ enum adxl345_state adxl345_configure(uint32_t sensor, uint8_t data_format, uint8
     clear_detection(sensor);
     write_register(sensor, REGISTER_INT_ENABLE, 0U);
     write_register(sensor, REGISTER_INT_MAP, 0U);
-    write_register(sensor, REGISTER_BW_RATE, bw_rate);
-    write_register(sensor, REGISTER_FIFO_CTL, FIFO_BYPASS);
+    write_register(sensor, REGISTER_BW_RATE, setup->bw_rate);
+    adxl345_clear_fifo(sensor, setup);
     write_register(sensor, REGISTER_POWER_CTL, MEASURE);
     bool good = detection_is_clear(sensor);
-    good = (read_register(sensor, REGISTER_DATA_FORMAT) == data_format) && good;
-    good = (read_register(sensor, REGISTER_BW_RATE) == bw_rate) && good;
+    good = (read_register(sensor, REGISTER_DATA_FORMAT) == setup->data_format) && good;
+    good = (read_register(sensor, REGISTER_BW_RATE) == setup->bw_rate) && good;
     good = (read_register(sensor, REGISTER_POWER_CTL) == MEASURE) && good;
     good = (read_register(sensor, REGISTER_INT_ENABLE) == 0U) && good;
     good = (read_register(sensor, REGISTER_INT_MAP) == 0U) && good;
-    good = (read_register(sensor, REGISTER_FIFO_CTL) == FIFO_BYPASS) && good;
+    good = (read_register(sensor, REGISTER_FIFO_CTL) == setup->fifo_ctl) && good;
     return good ? ADXL345_READY : ADXL345_FAULTY;
 }
 
-bool adxl345_read(uint32_t sensor, uint8_t data_format, struct adxl345_reading *reading)
+void adxl345_clear_fifo(uint32_t sensor, const struct adxl345_setup *setup)
+{
+    write_register(sensor, REGISTER_FIFO_CTL, ADXL345_NEWEST); /* the mode that empties it */
+    write_register(sensor, REGISTER_FIFO_CTL, setup->fifo_ctl);
+}
+
+static inline __attribute__((always_inline)) bool read_burst(uint32_t sensor, const struct adxl345_setup *setup,
+                                                             struct adxl345_reading *reading)
 {
     /* Bytes on the wire: command, 0x30 INT_SOURCE, 0x31 DATA_FORMAT, 0x32..0x37 data, 0x38 FIFO_CTL. */
     uint16_t words[HAL_BURST_WORDS];
@@ -95,7 +102,28 @@ bool adxl345_read(uint32_t sensor, uint8_t data_format, struct adxl345_reading *
     reading->counts[0] = (int16_t)(uint16_t)((words[1] & 0xFFU) | (words[2] & 0xFF00U));
     reading->counts[1] = (int16_t)(uint16_t)((words[2] & 0xFFU) | (words[3] & 0xFF00U));
     reading->counts[2] = (int16_t)(uint16_t)((words[3] & 0xFFU) | (words[4] & 0xFF00U));
-    return ((words[1] >> 8) == data_format) && ((words[4] & 0xFFU) == FIFO_BYPASS);
+    return ((words[1] >> 8) == setup->data_format) && ((words[4] & 0xFFU) == setup->fifo_ctl);
+}
+
+bool adxl345_read(uint32_t sensor, const struct adxl345_setup *setup, struct adxl345_reading *reading)
+{
+    return read_burst(sensor, setup, reading);
+}
+
+SELDOM bool adxl345_read_again(uint32_t sensor, const struct adxl345_setup *setup, struct adxl345_reading *reading)
+{
+    return read_burst(sensor, setup, reading);
+}
+
+uint8_t adxl345_flags(uint32_t sensor)
+{
+    return read_register(sensor, REGISTER_INT_SOURCE);
+}
+
+uint32_t adxl345_output_rate_hz(uint8_t code)
+{
+    uint32_t steps = code & RATE_CODE_MASK;
+    return (3200U << steps) >> ADXL345_RATE_CODE_MAX;
 }
 
 uint8_t adxl345_rate_code(uint32_t rate_hz)

@@ -9,16 +9,29 @@
 #ifndef GFIMU_BOOT_BAUD
 #define GFIMU_BOOT_BAUD 115200U /* what every USB-serial bridge can do */
 #endif
+#define LED_MBED (1U << 18)       /* P1.18: LED1 of the mbed */
+#define LED_LPCXPRESSO (1U << 22) /* P0.22: LED2 of an LPCXpresso */
+#define LED_IDLE_US 500000U
+#define LED_STREAMING_US 250000U
 #ifndef GFIMU_AUTOSTART
 #define GFIMU_AUTOSTART 1
 #endif
 
 #define CORE_HZ 100000000U /* CCLK; the peripherals used run at CCLK */
+#define MICROSECONDS 1000000U
 #define BAUD_MIN 9600U
 #define SSP_PRESCALER 2U
 #define SSP_DIVIDER ((CORE_HZ + (SSP_PRESCALER * GFIMU_SPI_HZ) - 1U) / (SSP_PRESCALER * GFIMU_SPI_HZ))
 #define SELECT_REST_LOOPS 5U /* of at least 5 cycles: 250 ns */
 #define SPI_PINS 0x0FU /* P2.0…P2.3: chip-selects of sensors 1…4 */
+#define SPI_WORD_BITS 16U
+#define SPI_WORDS_MAX 8U
+/* Looks at the interface, of at least 4 cycles each, in twice the time that the longest exchange takes. */
+#define SPI_LOOKS (SPI_WORDS_MAX * SPI_WORD_BITS * SSP_PRESCALER * SSP_DIVIDER * 2U / 4U)
+
+/* Looks at a status bit of the clocks, of at least 4 cycles each: 50 ms at the 4 MHz after reset, 17 ms at 12 MHz. The
+ * crystal is given 10 ms as a rule, PLL0 0.5 ms (LPC1768 data sheet, tables 8 and 12). */
+#define CLOCK_LOOKS 50000U
 
 #define WATCHDOG_TICKS 2000000U /* 2 s of the 4 MHz internal oscillator, divided by 4 */
 #define WATCHDOG_FEED_US 100000U
@@ -39,6 +52,31 @@ void SysTick_Handler(void);
 void TIMER0_Handler(void);
 void UART0_Handler(void);
 
+/* ---- watchdog ---- */
+
+static void watchdog_feed(void)
+{
+    hal_lock(); /* the two writes must follow each other (UM10360 28.4.3) */
+    WDFEED = 0xAAU;
+    WDFEED = 0x55U;
+    hal_unlock();
+}
+
+/* Runs on the internal oscillator, whatever becomes of the other clocks, and can't be turned off again. */
+static void watchdog_start(void)
+{
+    WDCLKSEL = 0U;
+    WDTC = WATCHDOG_TICKS;
+    WDMOD = WDMOD_ENABLE_RESET;
+    watchdog_feed();
+}
+
+static void await_reset(void)
+{
+    for (;;) {
+    }
+}
+
 /* ---- clocks ---- */
 
 static void pll_feed(void)
@@ -47,44 +85,63 @@ static void pll_feed(void)
     PLL0FEED = 0x55U;
 }
 
+/* Without a locked PLL0 there is no right clock: the watchdog, which runs already, resets the board for another try. */
+static void await_pll(uint32_t mask, uint32_t value)
+{
+    uint32_t looks = CLOCK_LOOKS;
+    while ((PLL0STAT & mask) != value) {
+        looks--;
+        if (looks == 0U) {
+            await_reset();
+        }
+    }
+}
+
 /* A boot loader may leave PLL0 connected: disconnect, then disable, in two feeds (UM10360 4.5.13). */
 static void pll_off(void)
 {
     PLL0CON &= ~PLL0_CONNECT;
     pll_feed();
-    while ((PLL0STAT & PLL0STAT_CONNECTED) != 0U) {
-    }
+    await_pll(PLL0STAT_CONNECTED, 0U);
     PLL0CON = 0U;
     pll_feed();
-    while ((PLL0STAT & PLL0STAT_ENABLED) != 0U) {
-    }
+    await_pll(PLL0STAT_ENABLED, 0U);
 }
 
-/* 12 MHz crystal × 2 × 100 / 6 = 400 MHz, / 4 = 100 MHz (UM10360 4.5.13).
+/* False if the crystal does not start in time. */
+static bool crystal_start(void)
+{
+    uint32_t looks = CLOCK_LOOKS;
+    SCS |= SCS_CRYSTAL_ON;
+    while (((SCS & SCS_CRYSTAL_READY) == 0U) && (looks > 0U)) {
+        looks--;
+    }
+    return looks > 0U;
+}
+
+/* 12 MHz crystal × 2 × 100 / 6 = 400 MHz, / 4 = 100 MHz (UM10360 4.5.13). Without the crystal, the internal oscillator
+ * (4 MHz ± 1 %) × 2 × 50 gives the same. Returns whether the crystal runs.
  * The peripheral clocks are selected first: written once PLL0 is connected, PCLKSEL0 and PCLKSEL1 may not take effect
  * (NXP's errata sheet ES_LPC176x, PCLKSELx.1). The flash gets its wait states before the clock gets fast. */
-static void clock_init(void)
+static bool clock_init(void)
 {
     pll_off();
     PCLKSEL0 = (1U << 2) | (1U << 4) | (1U << 6) | (1U << 20); /* TIMER0, TIMER1, UART0, SSP1 at CCLK */
     PCLKSEL1 = 0U;
-    SCS |= 1U << 5;
-    while ((SCS & (1U << 6)) == 0U) {
-    }
+    bool crystal = crystal_start();
     FLASHCFG = (FLASHCFG & 0xFFFU) | 0x4000U;
     CCLKCFG = 3U;
-    CLKSRCSEL = 1U;
-    PLL0CFG = (5U << 16) | 99U;
+    CLKSRCSEL = crystal ? CLKSRC_CRYSTAL : CLKSRC_INTERNAL;
+    PLL0CFG = crystal ? ((5U << 16) | 99U) : 49U;
     pll_feed();
     PLL0CON = PLL0_ENABLE;
     pll_feed();
-    while ((PLL0STAT & PLL0STAT_LOCKED) == 0U) {
-    }
+    await_pll(PLL0STAT_LOCKED, PLL0STAT_LOCKED);
     PLL0CON = PLL0_ENABLE | PLL0_CONNECT;
     pll_feed();
-    while ((PLL0STAT & PLL0STAT_CONNECTED) == 0U) {
-    }
+    await_pll(PLL0STAT_CONNECTED, PLL0STAT_CONNECTED);
     PCONP |= PCONP_TIMER0 | PCONP_TIMER1 | PCONP_UART0 | PCONP_SSP1 | PCONP_GPIO;
+    return crystal;
 }
 
 /* ---- SPI ---- */
@@ -108,16 +165,43 @@ static void select_rest(void)
     }
 }
 
+/* False if the words are not through in time. */
+static bool spi_await(void)
+{
+    uint32_t looks = SPI_LOOKS;
+    uint32_t busy;
+    do {
+        busy = SSP1SR & SSP_SR_BUSY;
+        looks--;
+    } while ((uint32_t)(busy != 0U) & (uint32_t)(looks > 0U)); /* one branch: this runs for each chip of each sample */
+    return busy == 0U;
+}
+
+/* After an exchange that did not end: no word may be left for the next one. */
+SELDOM static void spi_recover(void)
+{
+    SSP1CR1 = 0U;
+    for (uint32_t i = 0U; (i < SPI_WORDS_MAX) && ((SSP1SR & SSP_SR_RECEIVED) != 0U); i++) {
+        (void)SSP1DR;
+    }
+    SSP1CR1 = SSP_CR1_ENABLE;
+}
+
 void hal_spi_exchange(uint32_t sensor, uint16_t *words, uint32_t count)
 {
     FIO2CLR = 1U << sensor;
     for (uint32_t i = 0U; i < count; i++) {
         SSP1DR = words[i];
     }
-    while ((SSP1SR & SSP_SR_BUSY) != 0U) {
-    }
-    for (uint32_t i = 0U; i < count; i++) {
-        words[i] = (uint16_t)SSP1DR;
+    if (spi_await()) {
+        for (uint32_t i = 0U; i < count; i++) {
+            words[i] = (uint16_t)SSP1DR;
+        }
+    } else {
+        spi_recover();
+        for (uint32_t i = 0U; i < count; i++) {
+            words[i] = UINT16_MAX; /* nobody answered */
+        }
     }
     FIO2SET = 1U << sensor;
     select_rest();
@@ -129,10 +213,15 @@ void hal_spi_burst(uint32_t sensor, uint16_t words[HAL_BURST_WORDS])
     for (uint32_t i = 0U; i < HAL_BURST_WORDS; i++) {
         SSP1DR = words[i];
     }
-    while ((SSP1SR & SSP_SR_BUSY) != 0U) {
-    }
-    for (uint32_t i = 0U; i < HAL_BURST_WORDS; i++) {
-        words[i] = (uint16_t)SSP1DR;
+    if (spi_await()) {
+        for (uint32_t i = 0U; i < HAL_BURST_WORDS; i++) {
+            words[i] = (uint16_t)SSP1DR;
+        }
+    } else {
+        spi_recover();
+        for (uint32_t i = 0U; i < HAL_BURST_WORDS; i++) {
+            words[i] = UINT16_MAX; /* nobody answered */
+        }
     }
     FIO2SET = 1U << sensor;
 }
@@ -146,7 +235,7 @@ uint32_t hal_spi_khz(void)
 
 static void time_init(void)
 {
-    T1PR = (CORE_HZ / 1000000U) - 1U;
+    T1PR = (CORE_HZ / MICROSECONDS) - 1U;
     T1TCR = TIMER_RESET;
     T1TCR = TIMER_ENABLE;
 }
@@ -154,6 +243,16 @@ static void time_init(void)
 uint32_t hal_time_us(void)
 {
     return T1TC;
+}
+
+/* Not longer than a loop of as many looks, of at least 4 cycles each, takes. */
+SELDOM void hal_wait_us(uint32_t microseconds)
+{
+    uint32_t since_us = T1TC;
+    uint32_t looks = microseconds * (CORE_HZ / MICROSECONDS);
+    while (((T1TC - since_us) <= microseconds) && (looks > 0U)) {
+        looks--;
+    }
 }
 
 void hal_timer_start(uint32_t rate_hz)
@@ -170,6 +269,14 @@ void hal_timer_stop(void)
 {
     T0TCR = 0U;
     T0IR = 1U;
+}
+
+/* The counter goes from 0 at one sample to MR0 at the next. */
+SELDOM void hal_timer_delay(uint32_t microseconds)
+{
+    uint32_t cycles = microseconds * (CORE_HZ / MICROSECONDS);
+    uint32_t count = T0TC;
+    T0TC = (count > cycles) ? (count - cycles) : 0U;
 }
 
 void TIMER0_Handler(void)
@@ -302,15 +409,7 @@ void hal_unlock(void)
     }
 }
 
-/* ---- watchdog ---- */
-
-static void watchdog_feed(void)
-{
-    hal_lock(); /* the two writes must follow each other (UM10360 28.4.3) */
-    WDFEED = 0xAAU;
-    WDFEED = 0x55U;
-    hal_unlock();
-}
+/* ---- main loop ---- */
 
 /* Wakes the main loop, which has nothing else to wake for while no samples are taken. */
 static void wake_init(void)
@@ -326,6 +425,30 @@ void SysTick_Handler(void)
 }
 
 /* Fed while the main loop runs and, when streaming, samples are taken as they should be. */
+/* Blinks while the main loop runs: once a second, twice when samples are taken. */
+static void led_show(uint32_t now_us)
+{
+    static uint32_t changed_us;
+    static bool is_on;
+    if ((now_us - changed_us) >= (core_is_streaming() ? LED_STREAMING_US : LED_IDLE_US)) {
+        changed_us = now_us;
+        is_on = !is_on;
+        if (is_on) {
+            FIO1SET = LED_MBED;
+            FIO0SET = LED_LPCXPRESSO;
+        } else {
+            FIO1CLR = LED_MBED;
+            FIO0CLR = LED_LPCXPRESSO;
+        }
+    }
+}
+
+static void led_init(void)
+{
+    FIO1DIR |= LED_MBED;
+    FIO0DIR |= LED_LPCXPRESSO;
+}
+
 static void watchdog_watch(void)
 {
     static uint32_t fed_us;
@@ -338,16 +461,21 @@ static void watchdog_watch(void)
             fed_us = now_us;
             watchdog_feed();
         }
+        led_show(now_us);
     }
 }
 
 int main(void)
 {
     hal_lock();
+    watchdog_start();
     uint32_t cause = RSID & 0x0FU;
     RSID = cause; /* the flags are cleared by writing ones */
-    clock_init();
+    if (!clock_init()) {
+        cause |= RESET_NO_CRYSTAL;
+    }
     time_init();
+    led_init();
     spi_init();
     uart_init();
     core_init(cause, GFIMU_BOOT_BAUD);
@@ -355,8 +483,6 @@ int main(void)
     NVIC_PRIORITY(IRQ_UART0) = PRIORITY_UART << NVIC_PRIORITY_SHIFT;
     NVIC_ISER0 = (1U << IRQ_TIMER0) | (1U << IRQ_UART0);
     wake_init();
-    WDTC = WATCHDOG_TICKS;
-    WDMOD = WDMOD_ENABLE_RESET;
     watchdog_feed();
 #if GFIMU_AUTOSTART
     core_start();

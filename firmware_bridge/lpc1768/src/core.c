@@ -28,6 +28,7 @@
 #define COMMAND_SYNC_2 0x3CU
 #define COMMAND_HEADER_BYTES 4U
 #define COMMAND_PAYLOAD_MAX 8U
+#define COMMAND_BYTES_MIN (COMMAND_HEADER_BYTES + 2U)
 #define COMMAND_BYTES_MAX (COMMAND_HEADER_BYTES + COMMAND_PAYLOAD_MAX + 2U)
 
 #define RECEIVE_RING 64U /* a power of two */
@@ -37,6 +38,13 @@
 #define SETTLE_SAMPLES 16U /* longest wait for the first conversions after a change of configuration */
 #define UNREADABLE_MAX 4U /* the change of rate itself may cost a byte or two */
 #define RETRY_US 20000U /* how often one of the missing sensors is looked for */
+/* Chips whose output data rate is the sample rate, or up to a tenth above it, are kept pace with: no conversion of theirs
+ * is sent twice or left out. A sample waits at most an eighth of its period for them. */
+#define PACE_NUMERATOR 11U
+#define PACE_DENOMINATOR 10U
+#define PACE_SHARE 8U
+#define UNHURRIED_MAX 64U
+#define MESSAGE_SLOTS 1U /* places in the ring that samples leave to identities and replies */
 
 _Static_assert((RECEIVE_RING & (RECEIVE_RING - 1U)) == 0U, "the receive ring is indexed with a mask");
 _Static_assert(HEADER_BYTES + PAYLOAD_BYTES + 6U == FRAME_BYTES, "frame layout");
@@ -46,13 +54,17 @@ static struct {
     /* configuration */
     uint32_t rate_hz;
     uint32_t baud;
-    uint8_t bw_rate;
-    uint8_t data_format;
+    struct adxl345_setup chip;
     uint8_t reset_cause;
     /* sampling */
     bool streaming;
     bool first;
     uint32_t settling; /* samples that may still be waited for */
+    uint32_t late_us;  /* time between two samples that is reported: one and a half periods */
+    uint32_t pace_us;  /* longest wait for conversions, 0 if the chips are not kept pace with */
+    uint32_t patience_us; /* what is left of the time that this sample may wait for conversions */
+    uint32_t slow; /* bit mask of sensors that had to be waited for: they are looked at before they are read */
+    uint32_t unhurried; /* such looks in a row that found a conversion at once */
     uint16_t sequence;
     uint16_t message_sequence;
     uint32_t last_sample_us;
@@ -67,6 +79,7 @@ static struct {
     volatile uint32_t new_baud;      /* 0, or the rate to switch to once the reply has left */
     volatile uint32_t fallback_baud; /* 0, or the rate to go back to while no command has come at the new one */
     uint32_t unreadable;             /* pieces of garbage since the last change of rate */
+    bool resume;       /* start sampling again at the new rate */
 } core;
 
 /* Frames to send. Only whole frames enter and frames never wrap, since the ring is a multiple of their size. */
@@ -138,11 +151,17 @@ static uint32_t transmit_used(void)
     return (head >= tail) ? (head - tail) : (head + TRANSMIT_RING - tail);
 }
 
-/* A free frame in the ring, or NULL when the line can't keep up. One frame stays empty to tell full from empty. */
+/* Whether a frame finds room and leaves some places free. One frame stays empty to tell full from empty. */
+static bool frame_fits(uint32_t places_left)
+{
+    return (transmit_used() + ((2U + places_left) * FRAME_BYTES)) <= TRANSMIT_RING;
+}
+
+/* A free frame in the ring, or NULL when the line can't keep up. */
 static uint8_t *frame_open(uint32_t type, uint32_t sequence, uint32_t time_us)
 {
     uint8_t *frame = NULL;
-    if ((transmit_used() + (2U * FRAME_BYTES)) <= TRANSMIT_RING) {
+    if (frame_fits((type == FRAME_SAMPLE) ? MESSAGE_SLOTS : 0U)) {
         frame = &transmit_ring[transmit_head];
         frame[0] = SYNC_1;
         frame[1] = SYNC_2;
@@ -200,8 +219,8 @@ static void send_identity(void)
     payload[2] = FIRMWARE_MINOR;
     payload[3] = FIRMWARE_PATCH;
     put16(&payload[4], core.rate_hz);
-    payload[6] = core.bw_rate;
-    payload[7] = core.data_format;
+    payload[6] = core.chip.bw_rate;
+    payload[7] = core.chip.data_format;
     put32(&payload[8], core.baud);
     payload[12] = (uint8_t)(core.present | (core.faulty << SENSOR_COUNT));
     payload[13] = core.reset_cause;
@@ -215,7 +234,7 @@ static void send_identity(void)
 
 /* ---- sampling ---- */
 
-static void set_state(uint32_t sensor, enum adxl345_state state)
+SELDOM static void set_state(uint32_t sensor, enum adxl345_state state)
 {
     uint32_t bit = 1U << sensor;
     uint32_t present = (state == ADXL345_READY) ? (core.present | bit) : (core.present & ~bit);
@@ -230,14 +249,34 @@ static void set_state(uint32_t sensor, enum adxl345_state state)
 static void configure_sensors(void)
 {
     for (uint32_t sensor = 0U; sensor < SENSOR_COUNT; sensor++) {
-        set_state(sensor, adxl345_configure(sensor, core.data_format, core.bw_rate));
+        set_state(sensor, adxl345_configure(sensor, &core.chip));
     }
+}
+
+static bool keeps_pace(void)
+{
+    return core.chip.fifo_ctl == ADXL345_STREAM;
+}
+
+/* Decide how the chips are read from what they are asked for. */
+static void set_pace(void)
+{
+    uint32_t output_rate_hz = adxl345_output_rate_hz(core.chip.bw_rate);
+    bool pace = (output_rate_hz >= core.rate_hz) &&
+                ((output_rate_hz * PACE_DENOMINATOR) <= (core.rate_hz * PACE_NUMERATOR));
+    core.chip.fifo_ctl = pace ? ADXL345_STREAM : ADXL345_NEWEST;
 }
 
 void core_start(void)
 {
+    for (uint32_t sensor = 0U; keeps_pace() && (sensor < SENSOR_COUNT); sensor++) {
+        adxl345_clear_fifo(sensor, &core.chip); /* conversions from before belong to no sample */
+    }
     core.first = true;
     core.settling = SETTLE_SAMPLES;
+    core.slow = 0U;
+    core.late_us = (3U * MICROSECONDS) / (2U * core.rate_hz);
+    core.pace_us = keeps_pace() ? (MICROSECONDS / (PACE_SHARE * core.rate_hz)) : 0U;
     core.sequence = 0U;
     core.streaming = true;
     core.last_sample_us = hal_time_us();
@@ -250,6 +289,81 @@ static void stop(void)
     core.streaming = false;
 }
 
+static bool has_converted(uint32_t sensor)
+{
+    return (adxl345_flags(sensor) & ADXL345_DATA_READY) != 0U;
+}
+
+/* A chip that is slower than the sample clock: looks until its conversion is there, or patience ends. One that is there at
+ * once time and again is not slow. */
+SELDOM static void await_conversion(uint32_t sensor)
+{
+    bool ready = has_converted(sensor);
+    uint32_t since_us = hal_time_us();
+    uint32_t waited_us = 0U;
+    if (ready) {
+        core.unhurried++;
+        if (core.unhurried >= UNHURRIED_MAX) {
+            core.slow = 0U;
+        }
+        return;
+    }
+    core.unhurried = 0U;
+    for (uint32_t looks = core.patience_us; !ready && (looks > 0U) && (waited_us < core.patience_us); looks--) {
+        ready = has_converted(sensor);
+        waited_us = hal_time_us() - since_us;
+    }
+    core.patience_us -= (waited_us < core.patience_us) ? waited_us : core.patience_us;
+}
+
+/* Integer nearest to sum / count; halves go up. */
+static int32_t mean(int32_t sum, int32_t count)
+{
+    int32_t twice = (2 * sum) + count;
+    int32_t quotient = twice / (2 * count);
+    return ((twice < 0) && ((quotient * 2 * count) != twice)) ? (quotient - 1) : quotient;
+}
+
+/* A chip that is faster than the sample clock has converted more than once: reads the rest, so that nothing stays behind,
+ * and puts the mean of all in place of the first. */
+SELDOM static bool read_rest(uint32_t sensor, struct adxl345_reading *reading)
+{
+    struct adxl345_reading next = *reading;
+    int32_t sums[3] = {reading->counts[0], reading->counts[1], reading->counts[2]};
+    int32_t count = 1;
+    bool good = true;
+    while (good && ((next.int_source & ADXL345_WATERMARK) != 0U) && (count < (int32_t)ADXL345_FIFO_DEPTH)) {
+        hal_wait_us(ADXL345_POP_US);
+        good = adxl345_read_again(sensor, &core.chip, &next);
+        for (uint32_t axis = 0U; axis < 3U; axis++) {
+            sums[axis] += next.counts[axis];
+        }
+        count++;
+    }
+    for (uint32_t axis = 0U; axis < 3U; axis++) {
+        reading->counts[axis] = (int16_t)mean(sums[axis], count);
+    }
+    reading->int_source |= ADXL345_OVERRUN;
+    return good;
+}
+
+/* A chip of the same pace that had not just one conversion to read: waits for the one to come, or reads the others. */
+SELDOM static bool read_uneven(uint32_t sensor, struct adxl345_reading *reading)
+{
+    const uint32_t bit = 1U << sensor;
+    bool good = true;
+    if (((reading->int_source & ADXL345_DATA_READY) == 0U) && ((core.slow & bit) == 0U)) {
+        core.slow |= bit;
+        await_conversion(sensor);
+        good = adxl345_read_again(sensor, &core.chip, reading);
+    }
+    if (good && ((reading->int_source & ADXL345_WATERMARK) != 0U)) {
+        core.slow &= ~bit;
+        good = read_rest(sensor, reading);
+    }
+    return good;
+}
+
 /* Reads one sensor into six bytes of the frame; returns its status bits. */
 static uint32_t sample_sensor(uint32_t sensor, uint8_t *at)
 {
@@ -257,7 +371,16 @@ static uint32_t sample_sensor(uint32_t sensor, uint8_t *at)
     struct adxl345_reading reading;
     bool good = ((core.present >> sensor) & 1U) != 0U;
     if (good) {
-        good = adxl345_read(sensor, core.data_format, &reading);
+        if (((core.slow >> sensor) & 1U) != 0U) {
+            await_conversion(sensor);
+        }
+        good = adxl345_read(sensor, &core.chip, &reading);
+        uint32_t flags = reading.int_source & (ADXL345_DATA_READY | ADXL345_WATERMARK);
+        if ((flags != ADXL345_DATA_READY) && good && keeps_pace()) {
+            struct adxl345_reading uneven = reading; /* a copy, so that the other one can stay in registers */
+            good = read_uneven(sensor, &uneven);
+            reading = uneven;
+        }
         if (!good) {
             set_state(sensor, ADXL345_ABSENT); /* until the next try tells more */
         }
@@ -291,7 +414,7 @@ static void retry_missing(uint32_t now_us)
         do {
             core.last_retried = (core.last_retried + 1U) % SENSOR_COUNT;
         } while (((core.present >> core.last_retried) & 1U) != 0U);
-        set_state(core.last_retried, adxl345_configure(core.last_retried, core.data_format, core.bw_rate));
+        set_state(core.last_retried, adxl345_configure(core.last_retried, &core.chip));
     }
 }
 
@@ -299,42 +422,49 @@ void core_sample(void)
 {
     uint32_t now_us = hal_time_us();
     uint32_t status = core.sticky;
-    uint32_t period_us = MICROSECONDS / core.rate_hz;
     if (!core.streaming) {
         return;
     }
     uint8_t *frame = frame_open(FRAME_SAMPLE, core.sequence, now_us);
-    if ((now_us - core.last_sample_us) > (period_us + (period_us / 2U))) {
+    if ((now_us - core.last_sample_us) > core.late_us) {
         status |= STATUS_LATE;
     }
     core.last_sample_us = now_us;
     core.heartbeat++;
-    if (frame == NULL) {
-        core.sequence++;
-        core.dropped++;
-        core.sticky |= STATUS_FRAMES_DROPPED;
-        return;
-    }
+    uint8_t unsent[PAYLOAD_BYTES]; /* without room for a frame, the chips are read all the same: nothing piles up in them */
+    uint8_t *readings = (frame == NULL) ? unsent : &frame[HEADER_BYTES];
+    core.patience_us = core.pace_us;
     for (uint32_t sensor = 0U; sensor < SENSOR_COUNT; sensor++) {
-        status |= sample_sensor(sensor, &frame[HEADER_BYTES + (6U * sensor)]);
+        status |= sample_sensor(sensor, &readings[6U * sensor]);
 #if GFIMU_CHIP_GAP_US
         uint32_t since_us = hal_time_us();
         while ((hal_time_us() - since_us) < GFIMU_CHIP_GAP_US) {
         }
 #endif
     }
-    if (((status & STATUS_STALE) != 0U) && (core.settling > 0U)) {
-        core.settling--; /* some sensor has not converted yet: there is no first sample */
+    const uint32_t waited_us = core.pace_us - core.patience_us;
+    if (waited_us != 0U) {
+        hal_timer_delay(waited_us); /* the sample clock goes at the pace of the slowest chip */
+    }
+    if (frame == NULL) {
+        core.sequence++;
+        core.dropped++;
+        core.sticky |= STATUS_FRAMES_DROPPED;
+        return;
+    }
+    if ((((status & STATUS_STALE) != 0U) || (waited_us != 0U)) && (core.settling > 0U)) {
+        core.settling--; /* some sensor has not converted yet, or the clock not found its pace: there is no first sample */
         return;
     }
     core.settling = 0U;
     core.sequence++;
     if (core.first) {
         status &= ~STATUS_ALL_OVERRUNS; /* conversions since the chips were set up are not missed samples */
+        core.slow = 0U;                 /* nor is a chip slow that had not begun */
         status |= STATUS_FIRST;
         core.first = false;
     }
-    if ((core.data_format & ADXL345_SELF_TEST) != 0U) {
+    if ((core.chip.data_format & ADXL345_SELF_TEST) != 0U) {
         status |= STATUS_SELF_TEST;
     }
     if (core.faulty != 0U) {
@@ -418,7 +548,8 @@ static uint32_t set_rate(uint32_t rate_hz, uint32_t code)
         result = RESULT_LINE_TOO_SLOW;
     } else {
         core.rate_hz = rate_hz;
-        core.bw_rate = (code == RATE_CODE_AUTO) ? adxl345_rate_code(rate_hz) : (uint8_t)code;
+        core.chip.bw_rate = (code == RATE_CODE_AUTO) ? adxl345_rate_code(rate_hz) : (uint8_t)code;
+        set_pace();
         reconfigure();
     }
     return result;
@@ -428,8 +559,8 @@ static uint32_t set_range(uint32_t range, uint32_t full_resolution)
 {
     uint32_t result = RESULT_BAD_VALUE;
     if ((range <= 3U) && (full_resolution <= 1U)) {
-        core.data_format = (uint8_t)((core.data_format & ADXL345_SELF_TEST) | range |
-                                     ((full_resolution != 0U) ? ADXL345_FULL_RESOLUTION : 0U));
+        core.chip.data_format = (uint8_t)((core.chip.data_format & ADXL345_SELF_TEST) | range |
+                                          ((full_resolution != 0U) ? ADXL345_FULL_RESOLUTION : 0U));
         reconfigure();
         result = RESULT_DONE;
     }
@@ -440,8 +571,8 @@ static uint32_t set_self_test(uint32_t on)
 {
     uint32_t result = RESULT_BAD_VALUE;
     if (on <= 1U) {
-        core.data_format =
-            (uint8_t)((core.data_format & ~ADXL345_SELF_TEST) | ((on != 0U) ? ADXL345_SELF_TEST : 0U));
+        core.chip.data_format =
+            (uint8_t)((core.chip.data_format & ~ADXL345_SELF_TEST) | ((on != 0U) ? ADXL345_SELF_TEST : 0U));
         reconfigure();
         result = RESULT_DONE;
     }
@@ -514,7 +645,7 @@ static void drop_command_bytes(uint32_t count)
 
 /* One step of the parser: carries out a whole command, or drops one byte that can't begin one.
  * Returns false when more bytes are needed. */
-static bool parse_command(void)
+SELDOM static bool parse_command(void)
 {
     if ((command_length >= 1U) && (command_bytes[0] != COMMAND_SYNC_1)) {
         note_unreadable();
@@ -554,36 +685,58 @@ static bool parse_command(void)
     return true;
 }
 
-bool core_has_work(void)
+/* Moves a received byte to the parser; false if there is none. */
+static bool take_byte(void)
 {
-    return (receive_head != receive_tail) || core.announce || (core.new_baud != 0U);
-}
-
-void core_poll(void)
-{
-    if (core.new_baud != 0U) {
-        /* No frame may be cut by the change of speed: nothing new enters while the queue empties. */
-        bool streaming = core.streaming;
-        if (streaming) {
-            stop();
-        }
-        while (!hal_transmit_idle()) {
-        }
-        core.baud = core.new_baud;
-        hal_set_baud(core.new_baud);
-        core.new_baud = 0U;
-        if (streaming) {
-            core_start();
-        }
-    }
-    while (receive_head != receive_tail) {
+    bool received = receive_head != receive_tail;
+    if (received) {
         command_bytes[command_length] = receive_ring[receive_tail];
         command_length++;
         receive_tail = (receive_tail + 1U) & (RECEIVE_RING - 1U);
-        while (parse_command()) {
-        }
     }
-    if (core.announce) {
+    return received;
+}
+
+bool core_has_work(void)
+{
+    /* one branch: the main loop asks after every interrupt */
+    return ((receive_head ^ receive_tail) | (uint32_t)core.announce | core.new_baud) != 0U;
+}
+
+/* No frame may be cut by the change of speed: nothing new enters while the queue empties. Returns whether the speed is the
+ * one asked for. */
+static bool change_baud(void)
+{
+    if (core.new_baud == 0U) {
+        return true;
+    }
+    if (core.streaming) {
+        stop();
+        core.resume = true;
+    }
+    if (!hal_transmit_idle()) {
+        return false;
+    }
+    core.baud = core.new_baud;
+    hal_set_baud(core.new_baud);
+    core.new_baud = 0U;
+    if (core.resume) {
+        core.resume = false;
+        core_start();
+    }
+    return true;
+}
+
+/* A command is only taken up while its reply finds room, an announcement only sent then: none is lost. Until the line has
+ * made room, received bytes wait; those that find no place to wait are reported (core_receive). */
+void core_poll(void)
+{
+    if (!core_has_work() && (command_length < COMMAND_BYTES_MIN)) {
+        return;
+    }
+    while (change_baud() && frame_fits(0U) && (parse_command() || take_byte())) {
+    }
+    if (core.announce && (core.new_baud == 0U) && frame_fits(0U)) {
         core.announce = false;
         send_identity();
     }
@@ -593,8 +746,9 @@ void core_init(uint32_t reset_cause, uint32_t baud)
 {
     core.rate_hz = GFIMU_BOOT_RATE_HZ;
     core.baud = baud;
-    core.bw_rate = adxl345_rate_code(core.rate_hz);
-    core.data_format = ADXL345_FULL_RESOLUTION | 3U; /* ±16 g, 3.9 mg per count */
+    core.chip.bw_rate = adxl345_rate_code(core.rate_hz);
+    core.chip.data_format = ADXL345_FULL_RESOLUTION | 3U; /* ±16 g, 3.9 mg per count */
+    set_pace();
     core.reset_cause = (uint8_t)reset_cause;
     core.streaming = false;
     core.sequence = 0U;
@@ -610,6 +764,7 @@ void core_init(uint32_t reset_cause, uint32_t baud)
     core.new_baud = 0U;
     core.fallback_baud = 0U;
     core.unreadable = 0U;
+    core.resume = false;
     transmit_head = 0U;
     transmit_tail = 0U;
     receive_head = 0U;

@@ -14,7 +14,7 @@
 #define FRAME_SLOTS 32U
 
 #define FIRMWARE_MAJOR 1U
-#define FIRMWARE_MINOR 1U
+#define FIRMWARE_MINOR 2U
 #define FIRMWARE_PATCH 0U
 
 #define RATE_MIN_HZ 10U
@@ -58,6 +58,8 @@ enum result {
 #define RESET_EXTERNAL 2U
 #define RESET_WATCHDOG 4U
 #define RESET_BROWN_OUT 8U
+/* Not of RSID, but reported beside them: the crystal did not start, the clock is the internal oscillator's (± 1 %). */
+#define RESET_NO_CRYSTAL 16U
 
 /* Take over the defaults, configure the sensors, announce the board. Call with interrupts off. */
 void core_init(uint32_t reset_cause, uint32_t baud);

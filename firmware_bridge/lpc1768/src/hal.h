@@ -5,7 +5,11 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-/* Select one sensor, exchange 16-bit words (at most 8) in place, deselect it. */
+/* What a sample as a rule does not pass through: kept out of the way of what it does. */
+#define SELDOM __attribute__((cold, noinline))
+
+/* Select one sensor, exchange 16-bit words (at most 8) in place, deselect it. All words are 0xFFFF if the interface does
+ * not get done with them. */
 void hal_spi_exchange(uint32_t sensor, uint16_t *words, uint32_t count);
 
 /* The same for HAL_BURST_WORDS words, the longest loop of a sample. */
@@ -18,9 +22,15 @@ uint32_t hal_spi_khz(void);
 /* Free-running time, microseconds since reset. */
 uint32_t hal_time_us(void);
 
+/* Let at least this time pass. */
+void hal_wait_us(uint32_t microseconds);
+
 /* Start the sample timer at rate_hz, or stop it. */
 void hal_timer_start(uint32_t rate_hz);
 void hal_timer_stop(void);
+
+/* Let the next sample, and all after it, come later. For the sample timer's interrupt; at most the time since it. */
+void hal_timer_delay(uint32_t microseconds);
 
 /* Tell the transmitter that bytes are waiting. */
 void hal_transmit_kick(void);
