@@ -41,6 +41,7 @@ __all__ = [
 _FEWEST = 50  # samples
 _LEAST_NOISE = 0.3  # of the data sheet's: from that on a channel surely has noise of its own
 _ALIKE = 1.5  # ratio of the costs of two ways that can't be separated
+_AS_GOOD = 0.05  # of the contradiction is left: as good as nothing, whatever another way leaves
 _RATE_RATIO = 1.5  # between the rate by the times and the metadata's, for a refusal
 _SLOWEST = 2.0  # Hz, a rate that is plausible for a moving body
 
@@ -323,7 +324,10 @@ def _decide(evidence: Evidence) -> list[Finding]:
     if not found:
         return []
     best = found[0]
-    alike = [one.way for one in found[1:] if one.left < _ALIKE * best.left]
+    # A whole chip is in another unit more often than one of its axes; one axis alone shows in the noise of the others.
+    wider = [one for one in found if one.way.kind == best.way.kind and one.left < max(_AS_GOOD, _ALIKE * best.left)]
+    best = max(wider, key=lambda one: len(one.way.channels))
+    alike = [one.way for one in found if one is not best and one.left < _ALIKE * best.left]
     return [_finding(best.way, alike, refused=best.refused)]
 
 

@@ -30,7 +30,7 @@ def test_run_to_a_file(gfimu_command, tmp_path) -> None:
     assert found["stream"]["lost"] == 0
     assert found["identity"]["rate_hz"] == 200
     recording = Recording.read(out)
-    assert recording.sample_rate == pytest.approx(200)
+    assert recording.sample_rate == pytest.approx(200, rel=0.02)  # the pace of the chips, whose clocks are 0.5 % off
     assert "tacho_rad_s" in recording.reference
 
 
@@ -55,7 +55,7 @@ def test_run_behind_a_port_and_record_from_it(tmp_path) -> None:
     found = json.loads(done.stdout)
     assert found["stream"]["lost"] == found["stream"]["corrupt"] == 0
     assert found["identity"]["rate_hz"] == 800
-    assert len(Recording.read(out)) >= 1600
+    assert len(Recording.read(out)) >= 1600 * 0.98  # the pace of the chips
     assert (tmp_path / "live.rrd").read_bytes()[:3] == b"RRF"
 
 

@@ -119,7 +119,7 @@ def test_the_strict_board_sends_what_the_board_sends(make_board) -> None:
 
 
 def test_a_speed_that_is_not_the_expected_one_is_named() -> None:
-    board = strict_board(ElfImage.load(image_path()), policy=Policy(baud=115_200))
+    board = strict_board(ElfImage.load(image_path()), policy=Policy(baud=460_800))
     assert rules_broken(board, 0.02) == {"uart_speed"}
 
 

@@ -12,7 +12,7 @@ pytest.importorskip("unicorn", reason="the emulator is in the extra 'firmware'")
 
 from firmware_bridge.adxl345_device import TICKS_PER_SECOND, Adxl345Options, format_count
 from firmware_bridge.board_process import BoardProcess
-from firmware_bridge.commands import set_rate
+from firmware_bridge.commands import sample_at, set_rate
 from firmware_bridge.frames import SampleDecoder, Status
 from firmware_bridge.physics import RidePhysics
 from firmware_bridge.recorder import record
@@ -59,7 +59,7 @@ def test_every_conversion_of_every_chip_is_sent_once(rate: int) -> None:
     code = {200: 0x0B, 3200: 0x0F}[rate]
     with BoardProcess(physics, chips=CHIPS) as board:
         board.run_for(0.02)
-        board.receive(set_rate(rate))
+        board.receive(sample_at(rate))
         board.run_for(0.1)
         board.take_sent()
         board.run_for(800 / rate)
