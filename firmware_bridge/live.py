@@ -217,7 +217,8 @@ def _watched_filter(array: AccelerometerArray, rate: float) -> WatchedRateFilter
     from gfimu.rate.sensing import SensorErrors
 
     errors, period = SensorErrors.from_parts(array, rate), 1.0 / rate
-    return WatchedRateFilter(LiveRateFilter(array, errors, period), LiveWatch(array, errors, period))
+    watch = LiveWatch(array, errors.with_part_gains(array), period)  # raw counts: nothing is calibrated
+    return WatchedRateFilter(LiveRateFilter(array, errors, period), watch)
 
 
 def _flush(stream: Any) -> None:

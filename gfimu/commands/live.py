@@ -123,7 +123,9 @@ def live(
         from gfimu.rate.live import LiveRateFilter
 
         live = LiveRateFilter(geometry, errors, 1.0 / rate, settings, gyro=gyro)
-        watched = WatchedRateFilter(live, LiveWatch(geometry, errors, 1.0 / rate, at_rest=not unknown_start))
+        is_sure = scale_std > 0.0 or "calibration" in metadata
+        stated = errors if is_sure else errors.with_part_gains(geometry)
+        watched = WatchedRateFilter(live, LiveWatch(geometry, stated, 1.0 / rate, at_rest=not unknown_start))
     return filter_stream(lines, geometry, errors, 1.0 / rate, settings, fuse_gyro=gyro, watched=watched)
 
 

@@ -95,6 +95,7 @@ def watched_readings(
     *,
     omega0: NDArray[np.float64] | None,
     watch: bool,
+    calibrated: bool,
 ) -> UsedReadings:
     """Look for stuck channels, and for channels that contradict the others.
 
@@ -112,6 +113,8 @@ def watched_readings(
         Angular rate at the first sample, rad/s, where it is known.
     watch : bool
         Whether to look for channels that contradict the others.
+    calibrated : bool
+        Whether the gains and axes were calibrated: otherwise they are as sure as the parts' data sheets say.
     """
     rate = 1.0 / float(np.median(np.diff(used.t_s)))
     errors = SensorErrors.from_parts(array, rate, step=step_of_readings(readings), noise_std=noise)
@@ -121,6 +124,8 @@ def watched_readings(
     if watch:
         from gfimu.integrity.watch import watch_from_rest, watch_in_motion
 
+        if not calibrated:
+            errors = errors.with_part_gains(array)
         if omega0 is not None and not omega0.any():
             health = watch_from_rest(array, used.t_s, readings, errors)
         health = health or watch_in_motion(array, used.t_s, readings, errors, omega0=omega0)

@@ -277,7 +277,10 @@ def estimate(
     noise = np.broadcast_to(noise, array.n_channels)
     used = UsedReadings(recording.t_s, missing, saturated)
     if chosen.recursive:
-        used = watched_readings(used, array, readings, noise, omega0=rate0, watch=not keep_faulty)
+        calibrated = "calibration" in recording.metadata
+        used = watched_readings(
+            used, array, readings, noise, omega0=rate0, watch=not keep_faulty, calibrated=calibrated
+        )
         readings = np.where(used.excluded, np.nan, readings)
     linear = linear_solution(array, readings, noise, form=form)
     usable = np.isfinite(linear.motion).all(axis=1)

@@ -13,8 +13,8 @@ and every smaller set of channels sees linear combinations of those: A' = A + K 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -131,6 +131,14 @@ class SensorErrors:
         if "bias_std" in fields:
             bias = [np.broadcast_to(np.asarray(fields.pop("bias_std"), dtype=float), (array.n_channels,))]
         return cls(np.concatenate(noise), np.concatenate(bias), **fields)
+
+    def with_part_gains(self, array: AccelerometerArray) -> Self:
+        """Return the errors of channels that were not calibrated: gains and axes as sure as the data sheets say."""
+        parts = [PartFile.load(chip.part, array.part_files) for chip in array.chips]
+        typical = max(
+            np.hypot(part.sensitivity_std, np.hypot(part.cross_axis_std, part.misalignment_std_rad)) for part in parts
+        )
+        return replace(self, scale_std=max(self.scale_std, float(typical)))
 
     @property
     def white_only(self) -> bool:

@@ -98,3 +98,10 @@ def test_readings_that_are_missing_for_a_while_make_no_channel_faulty(seed):
     readings[1700:1740, 5] = np.nan
     found = gfimu.estimate(replace(run, readings=readings), method="filter", rest_bias=True)
     assert found.metadata["health"]["faults"] == []
+
+
+@pytest.mark.parametrize("seed", [10, 30, 73])
+def test_gains_that_were_not_calibrated_are_no_faults(seed):
+    """Parts as bought: 1 % of the centripetal acceleration is 8 mm/s² here, for as long as the table turns."""
+    found = gfimu.estimate(gfimu.simulate("paper_run", seed=seed), method="filter", rest_bias=True)
+    assert found.metadata["health"]["faults"] == []
