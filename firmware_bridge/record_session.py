@@ -21,7 +21,7 @@ from gfimu.geometry.array import AccelerometerArray
 __all__ = ["Batch", "RecordSession", "SampleClock"]
 
 _FLUSH_S = 0.25
-_ANSWER_S = 0.5  # samples wait so long for the board to tell their scale
+_ANSWER_S = 0.5  # samples wait so long for the board to give their scale
 _SETUP_ANSWER_S = 3.0  # and so long if they will be left out because the board was not set up yet
 _SAME_CLOCK_S = 0.5  # by how much board and host may differ about a gap, with the latency of both its ends
 _IDENTIFY_EVERY_S = 1.0
@@ -127,7 +127,7 @@ class RecordSession:
         samples = self.decoder.feed(data)
         if self._form.dialogue is not None:
             for packet in self.decoder.messages:
-                self._hear(self._form.dialogue, packet)
+                self._take_message(self._form.dialogue, packet)
         self.decoder.messages.clear()
         if not len(samples):
             return None
@@ -153,7 +153,7 @@ class RecordSession:
                     self.decoder.start_anew()
                 return
 
-    def _hear(self, dialogue: Dialogue, packet: NDArray[Any]) -> None:
+    def _take_message(self, dialogue: Dialogue, packet: NDArray[Any]) -> None:
         """Take an answer of the board; identities of an earlier listener do not count."""
         message = dialogue.parse(packet)
         if isinstance(message, Identity) and self.answers:
@@ -183,7 +183,7 @@ class RecordSession:
         self._unanswered_s.clear()
 
     def release(self) -> Batch | None:
-        """Take the samples that were held back until the board's answer told their scale."""
+        """Take the samples that were held back until the board's answer gave their scale."""
         self.waiting_for_board = False
         held, self._held = self._held, []
         if not held:
