@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import importlib.util
 import multiprocessing
+import sys
 import threading
 from array import array
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from multiprocessing.connection import Connection
 from pathlib import Path
-from types import TracebackType
+from types import ModuleType, TracebackType
 from typing import Any, Self
 
 from firmware_bridge.adxl345_device import TICKS_PER_SECOND, Adxl345, Adxl345Options, LineFault
@@ -84,7 +86,8 @@ class BoardProcess:
         self._process = context.Process(
             target=_work, args=(theirs, path, tuple(chips), self.fast, trace, lose_every), daemon=True
         )
-        self._process.start()
+        with _without_main():
+            self._process.start()
         theirs.close()
         self._call("ready")
 
@@ -186,6 +189,17 @@ class BoardProcess:
     def take_trace(self) -> Any:
         """Events noted since the last call (`firmware_bridge.board.trace.Event`)."""
         return self._call("take_trace")
+
+
+@contextmanager
+def _without_main() -> Iterator[None]:
+    """Hide the program's main module: a new process would run it again, and a plain script has no guard."""
+    main = sys.modules["__main__"]
+    sys.modules["__main__"] = ModuleType("__main__")
+    try:
+        yield
+    finally:
+        sys.modules["__main__"] = main
 
 
 def _work(

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import pickle
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -202,3 +204,17 @@ def test_the_line_too_slow_drops_no_bytes_inside_frames(make_board) -> None:
     samples, decoder = decode(run_slices(board, 0.2, 0))
     assert decoder.counts.corrupt == 0
     assert len(samples) >= 19
+
+
+def test_a_board_runs_in_a_plain_script(tmp_path) -> None:
+    """Without the guard that multiprocessing asks for."""
+    script = tmp_path / "plain.py"
+    script.write_text(
+        "from firmware_bridge.board_process import BoardProcess\n"
+        "with BoardProcess() as board:\n"
+        "    board.run_for(0.1)\n"
+        "    print(len(board.take_sent()[0]) > 100)\n",
+        encoding="utf-8",
+    )
+    run = subprocess.run([sys.executable, script], capture_output=True, text=True, timeout=60, check=False)
+    assert (run.stdout, run.stderr) == ("True\n", "")
