@@ -5,6 +5,8 @@ from __future__ import annotations
 import binascii
 import re
 import struct
+import threading
+import time
 
 import numpy as np
 import pytest
@@ -15,7 +17,10 @@ from firmware_bridge.checksum import CHECKSUMS
 from firmware_bridge.delimited import decode_cobs, decode_slip
 from firmware_bridge.format_file import load_format
 from firmware_bridge.frames import SampleDecoder, Samples, frame_format
+from firmware_bridge.recorder import record
+from firmware_bridge.virtual_port import TcpPort
 from gfimu.errors import InputError
+from gfimu.recording import Recording
 
 CHECK = {  # of "123456789", from the CRC catalogue; sums by hand: 9 · 0x35, and 1 xor … xor 9
     "crc8": 0xF4, "crc16_ccitt_false": 0x29B1, "crc16_modbus": 0x4B37, "crc32": 0xCBF43926,
@@ -163,3 +168,29 @@ def test_a_wrong_file_is_one_line(tmp_path, case: str) -> None:
 def test_an_unknown_name_lists_the_formats() -> None:
     with pytest.raises(InputError, match="arduino_csv"):
         frame_format("arduino")
+
+
+def test_a_board_that_a_file_describes_is_recorded(tmp_path) -> None:
+    port, done = TcpPort(0), threading.Event()
+
+    def play() -> None:
+        for k in range(10_000):
+            if done.is_set():
+                return
+            port.read()
+            port.write(f"{1000 * k},{','.join(map(str, COUNTS[k % 50]))}\n".encode(), 0.1)
+            time.sleep(0.001)
+
+    thread = threading.Thread(target=play)
+    thread.start()
+    try:
+        report = record(port.name, tmp_path / "run.parquet", form="arduino_csv", duration_s=0.5)
+    finally:
+        done.set()
+        thread.join()
+        port.close()
+    recording = Recording.read(tmp_path / "run.parquet", unit="lsb")
+    assert report.stream.lost == 0
+    assert recording.sample_rate == pytest.approx(1000)
+    place = np.flatnonzero((recording.readings[0] == COUNTS).all(axis=1))[0]
+    assert np.array_equal(recording.readings[:20], np.roll(COUNTS, -place, axis=0)[:20])

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from firmware_bridge import journal
+from firmware_bridge.clock import ClockFit
 from firmware_bridge.frames import encode_samples
 from firmware_bridge.journal import Journal, JournalError
 from firmware_bridge.link import Link
@@ -234,6 +235,8 @@ def test_a_recording_states_the_rate_of_its_time_stamps(feed, tmp_path) -> None:
     assert stated["host_clock_rate_hz"] == pytest.approx(
         stated["time_stamp_rate_hz"] / (1 + stated["host_clock"]["rate_error"])
     )
+    clock = ClockFit(**stated["host_clock"])  # as docs/firmware.md says
+    assert clock.to_host(clock.mean_board_s) == pytest.approx(clock.mean_board_s + clock.offset_s)
 
 
 def test_write_errors_are_no_bad_input() -> None:
