@@ -15,14 +15,14 @@ import time
 
 import numpy as np
 
-from firmware_bridge.adxl345_device import TICKS_PER_SECOND
-from firmware_bridge.board_process import BoardProcess
-from firmware_bridge.checksum import crc16
-from firmware_bridge.commands import sample_at
-from firmware_bridge.frames import SampleDecoder, encode_samples
-from firmware_bridge.link import Link
-from firmware_bridge.physics import RidePhysics
-from firmware_bridge.virtual_port import PseudoTerminal
+from firmware_bridge.adxl345.registers import TICKS_PER_SECOND
+from firmware_bridge.frames.checksum import crc16
+from firmware_bridge.frames.commands import sample_at
+from firmware_bridge.frames.decoder import SampleDecoder, encode_samples
+from firmware_bridge.host.link import Link
+from firmware_bridge.loop.board_process import BoardProcess
+from firmware_bridge.loop.physics import RidePhysics
+from firmware_bridge.loop.virtual_port import PseudoTerminal
 from sim.ride import Ride
 
 RATES = (100, 800, 3200)

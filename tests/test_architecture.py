@@ -267,6 +267,33 @@ ROOMS = {
     },
     "gfimu.own_rig": {"gfimu.files", "gfimu.geometry.array", "gfimu.generic_basis", "gfimu.world_model"},
     "gfimu.position_drift": {"gfimu.geometry", "gfimu.motion", "gfimu.rate.integration"},
+    "firmware_bridge.adxl345": set(),
+    "firmware_bridge.frames": {"gfimu.files", "gfimu.geometry.array"},
+    "firmware_bridge.host": {
+        "firmware_bridge.frames",
+        "gfimu.files",
+        "gfimu.geometry.array",
+        "gfimu.integrity",
+        "gfimu.parts",
+        "gfimu.rate",
+        "gfimu.recording",
+    },
+    "firmware_bridge.loop": {
+        "firmware_bridge.adxl345",
+        "firmware_bridge.board.worker",
+        "firmware_bridge.frames",
+        "firmware_bridge.host",
+        "firmware_bridge.lpc1768",
+        "gfimu.geometry.array",
+        "gfimu.recording",
+        "sim.adxl345",
+    },
+    "firmware_bridge.strict": {
+        "firmware_bridge.adxl345",
+        "firmware_bridge.board",
+        "firmware_bridge.loop",
+        "firmware_bridge.lpc1768",
+    },
 }
 """Folders, and what of this project each may import besides itself and the common modules."""
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from firmware_bridge.adxl345_device import TICKS_PER_SECOND, Adxl345, LineFault
+from firmware_bridge.adxl345.device import Adxl345
+from firmware_bridge.adxl345.registers import TICKS_PER_SECOND, LineFault
 from firmware_bridge.board.adc import Adc
 from firmware_bridge.board.bus import Tracer
 from firmware_bridge.board.chip_pins import ChipPins

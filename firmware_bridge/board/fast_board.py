@@ -16,7 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from firmware_bridge.adxl345_device import Adxl345, LineFault
+from firmware_bridge.adxl345.device import Adxl345
+from firmware_bridge.adxl345.registers import LineFault
 from firmware_bridge.board.board import Board
 from firmware_bridge.board.chip_pins import ChipPins
 from firmware_bridge.board.cpu import AHB_RAM_BASE, AHB_RAM_SIZE, FLASH_SIZE, RAM_BASE, RAM_SIZE, Cpu, unicorn_parts

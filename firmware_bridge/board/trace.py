@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from firmware_bridge.adxl345_device import TICKS_PER_SECOND
+from firmware_bridge.adxl345.registers import TICKS_PER_SECOND
 from gfimu.files.atomic_file import atomic_path
 from gfimu.files.rerun_stream import rrd_stream
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from array import array
 from collections import deque
 
-from firmware_bridge.adxl345_device import TICKS_PER_SECOND
+from firmware_bridge.adxl345.registers import TICKS_PER_SECOND
 from firmware_bridge.board.bus import Bus
 from firmware_bridge.board.peripheral import NEVER, Peripheral
 

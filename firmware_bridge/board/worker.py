@@ -1,4 +1,4 @@
-"""What the board's process does on request (`firmware_bridge.board_process`)."""
+"""What the board's process does on request (`firmware_bridge.loop.board_process`)."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from array import array
 from collections.abc import Sequence
 from pathlib import Path
 
-from firmware_bridge.adxl345_device import Adxl345, LineFault
+from firmware_bridge.adxl345.device import Adxl345
+from firmware_bridge.adxl345.registers import LineFault
 from firmware_bridge.board.board import Board
 from firmware_bridge.board.fast_board import FastBoard
 from firmware_bridge.board.nvic import FIRST_IRQ

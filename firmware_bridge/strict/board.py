@@ -8,7 +8,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from firmware_bridge.adxl345_device import TICKS_PER_SECOND, Adxl345
+from firmware_bridge.adxl345.device import Adxl345
+from firmware_bridge.adxl345.registers import TICKS_PER_SECOND
 from firmware_bridge.board.board import Board
 from firmware_bridge.board.bus import Tracer
 from firmware_bridge.board.cpu import Cpu, RegisterSet, unicorn_parts

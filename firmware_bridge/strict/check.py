@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from firmware_bridge.board_process import require_emulator
+from firmware_bridge.loop.board_process import require_emulator
 from firmware_bridge.strict.findings import Finding
 from firmware_bridge.strict.image import load_image
 from gfimu.errors import GfimuError, InputError

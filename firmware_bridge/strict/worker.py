@@ -12,9 +12,10 @@ import time
 from dataclasses import asdict, replace
 from typing import Any
 
-from firmware_bridge.adxl345_device import TICKS_PER_SECOND, Adxl345
+from firmware_bridge.adxl345.device import Adxl345
+from firmware_bridge.adxl345.registers import TICKS_PER_SECOND
+from firmware_bridge.loop.physics import RestPhysics
 from firmware_bridge.lpc1768.elf import ElfImage
-from firmware_bridge.physics import RestPhysics
 from firmware_bridge.strict.board import STUCK, StrictBoard
 from firmware_bridge.strict.findings import Finding
 from firmware_bridge.strict.image import load_image

@@ -11,8 +11,8 @@ import typer
 from gfimu.cli.output import JsonOption, console, print_json, print_paths, print_table
 
 if TYPE_CHECKING:
-    from firmware_bridge.chip_selftest import AxisSelfTest
-    from firmware_bridge.finder import Found
+    from firmware_bridge.host.chip_selftest import AxisSelfTest
+    from firmware_bridge.host.finder import Found
 
 __all__ = ["register"]
 

@@ -19,7 +19,7 @@ FILE_KINDS = {
     "map": "gfimu.importing.column_map.ColumnMap",
     "twin": "sim.twin_file.TwinFile",
     "scenario": "sim.scenario_file.ScenarioFile",
-    "frame": "firmware_bridge.format_file.FormatFile",
+    "frame": "firmware_bridge.frames.format_file.FormatFile",
 }
 """Kinds of files by name, and the struct that is the schema of each."""
 

@@ -11,13 +11,13 @@ from gfimu.errors import InputError
 from gfimu.files.outputs import RECORDING, TRACE, OutputFolder, writes
 
 if TYPE_CHECKING:
-    from firmware_bridge.board_process import BoardProcess
-    from firmware_bridge.fault_campaign import FaultOutcome
+    from firmware_bridge.loop.board_process import BoardProcess
+    from firmware_bridge.loop.fault_campaign import FaultOutcome
+    from firmware_bridge.loop.selftest import SelfTestRow
+    from firmware_bridge.loop.virtual_port import ServeReport
+    from firmware_bridge.loop.virtual_run import VirtualRun
     from firmware_bridge.lpc1768.build import BuildReport
-    from firmware_bridge.selftest import SelfTestRow
     from firmware_bridge.strict.check import CheckReport
-    from firmware_bridge.virtual_port import ServeReport
-    from firmware_bridge.virtual_run import VirtualRun
     from sim.ride import Ride
 
 __all__ = ["TraceCounts", "build", "check", "faults", "run", "selftest", "trace"]
@@ -135,7 +135,7 @@ def run(
         If the emulator is not installed, an argument is wrong, the port can't be opened, or the output can't be written
         where it is asked for.
     """
-    from firmware_bridge.board_process import require_emulator
+    from firmware_bridge.loop.board_process import require_emulator
 
     require_emulator()
     if port is not None and out is not None:
@@ -143,7 +143,7 @@ def run(
     ride = _ride(scenario, seed)
     if port is not None:
         return _behind_port(ride, port, duration, (rate, range_g), seed, image, realtime, pure_python, on_open)
-    from firmware_bridge.virtual_run import record_virtual
+    from firmware_bridge.loop.virtual_run import record_virtual
 
     result = record_virtual(
         ride, duration or ride.duration, rate_hz=rate, range_g=range_g, image=image,
@@ -159,8 +159,8 @@ def _behind_port(
     realtime: bool, pure_python: bool, on_open: Callable[[str], None] | None,
 ) -> ServeReport:  # fmt: skip
     """Serve the board on a port until the time is up or Ctrl-C."""
-    from firmware_bridge.commands import sample_at, set_range
-    from firmware_bridge.virtual_port import open_port, serve
+    from firmware_bridge.frames.commands import sample_at, set_range
+    from firmware_bridge.loop.virtual_port import open_port, serve
 
     rate, range_g = setup
     commands = set_range(range_g) + sample_at(rate)
@@ -213,7 +213,7 @@ def build(
 
 def selftest() -> list[SelfTestRow]:
     """Check the emulator and the firmware: interrupts, the chips' self-test, the image, both ways of running."""
-    from firmware_bridge.selftest import run_selftest
+    from firmware_bridge.loop.selftest import run_selftest
 
     return run_selftest()
 
@@ -246,8 +246,8 @@ def trace(
         If the emulator is not installed, or the output can't be written where it is asked for.
     """
     from firmware_bridge.board.trace import write_rrd, write_vcd
-    from firmware_bridge.board_process import require_emulator
-    from firmware_bridge.commands import sample_at
+    from firmware_bridge.frames.commands import sample_at
+    from firmware_bridge.loop.board_process import require_emulator
 
     require_emulator()
     setup = sample_at(rate)
@@ -268,7 +268,7 @@ def trace(
 
 def faults(*, seed: int = 0, progress: Callable[[float], None] | None = None) -> list[FaultOutcome]:
     """Break the wire, the supply and the chips, one after another, and return what the host makes of it."""
-    from firmware_bridge.fault_campaign import run_campaign
+    from firmware_bridge.loop.fault_campaign import run_campaign
 
     return run_campaign(seed=seed, progress=progress)
 
@@ -313,9 +313,9 @@ def _ride(scenario: str | Path, seed: int) -> Ride:
 
 
 def _board(ride: Ride, image: str | Path, seed: int, *, pure_python: bool, trace: bool = False) -> BoardProcess:
-    from firmware_bridge.board_process import BoardProcess
-    from firmware_bridge.physics import RidePhysics
-    from firmware_bridge.virtual_run import typical_chips
+    from firmware_bridge.loop.board_process import BoardProcess
+    from firmware_bridge.loop.physics import RidePhysics
+    from firmware_bridge.loop.virtual_run import typical_chips
 
     fast = False if pure_python else None
     return BoardProcess(RidePhysics(ride), image=image, chips=typical_chips(seed), fast=fast, trace=trace)

@@ -11,10 +11,10 @@ from gfimu.errors import InputError
 from gfimu.files.outputs import RECORDING, RERUN, writes
 
 if TYPE_CHECKING:
-    from firmware_bridge.chip_selftest import AxisSelfTest
-    from firmware_bridge.finder import Found
-    from firmware_bridge.live import LiveView
-    from firmware_bridge.recorder import RecordReport
+    from firmware_bridge.host.chip_selftest import AxisSelfTest
+    from firmware_bridge.host.finder import Found
+    from firmware_bridge.host.live import LiveView
+    from firmware_bridge.host.recorder import RecordReport
 
 __all__ = ["record"]
 
@@ -62,7 +62,8 @@ def record(
     range_g : int, optional
         Ask the board for ±2, 4, 8 or 16 g (``--range``).
     form : str
-        Frame format (``--format``): a key of `firmware_bridge.frames.FORMATS`; else ``lpc1768``, or what is found.
+        Frame format (``--format``): a key of `firmware_bridge.frames.frame_format.FORMATS`; else ``lpc1768``, or
+        what is found.
     array : str
         Array on the board; the format's by default.
     baud : int, optional
@@ -97,14 +98,14 @@ def record(
         If the port can't be opened, nothing that is a frame comes, no board is found, or an output can't be written
         where it is asked for.
     """
-    from firmware_bridge.commands import set_range, set_rate
-    from firmware_bridge.recorder import record as record_port
+    from firmware_bridge.frames.commands import set_range, set_rate
+    from firmware_bridge.host.recorder import record as record_port
 
     if find:
         found = _found(port, form, on_find, on_try)
         port, form = found.port, found.form
     if self_test:
-        from firmware_bridge.chip_selftest import check_chips
+        from firmware_bridge.host.chip_selftest import check_chips
 
         tested = check_chips(_needed(port), baud=baud, form=form or "lpc1768")
         if on_self_test is not None:
@@ -147,7 +148,7 @@ def _found(
     port: str, form: str, on_find: Callable[[Found], None] | None, on_try: Callable[[str], None] | None
 ) -> Found:
     """Return the first board that is found."""
-    from firmware_bridge.finder import SPEEDS, find_boards
+    from firmware_bridge.host.finder import SPEEDS, find_boards
 
     boards = find_boards([port] if port else [], [form] if form else [], on_try=on_try)
     if not boards:
@@ -171,8 +172,8 @@ def _live_view(
     *,
     view: bool,
 ) -> LiveView:
-    from firmware_bridge.frames import frame_format
-    from firmware_bridge.live import LiveView
+    from firmware_bridge.frames.decoder import frame_format
+    from firmware_bridge.host.live import LiveView
     from gfimu.geometry.array import AccelerometerArray
     from gfimu.parts.part import Part
 

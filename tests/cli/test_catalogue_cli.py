@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from firmware_bridge.format_file import load_format
+from firmware_bridge.frames.format_file import load_format
 from gfimu.commands.catalogue import KINDS, TEMPLATES
 from gfimu.files.model_files import find_model, list_models
 from gfimu.geometry.array import AccelerometerArray

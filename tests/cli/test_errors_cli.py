@@ -182,8 +182,8 @@ def test_an_atomic_write_that_fails_keeps_what_was_there(tmp_path, monkeypatch):
 
 
 def test_a_check_that_fails_is_code_1(gfimu_command, monkeypatch):
-    pytest.importorskip("firmware_bridge.selftest")
-    from firmware_bridge.selftest import SelfTestRow
+    pytest.importorskip("firmware_bridge.loop.selftest")
+    from firmware_bridge.loop.selftest import SelfTestRow
 
     monkeypatch.setattr("gfimu.commands.firmware.selftest", lambda: [SelfTestRow("chips", False, "[nothing]")])
     result = gfimu_command("firmware", "selftest")

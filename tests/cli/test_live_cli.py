@@ -12,7 +12,7 @@ import threading
 import numpy as np
 import pytest
 
-from firmware_bridge.journal import Journal
+from firmware_bridge.host.journal import Journal
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.rate.filter import filter_rate
 from gfimu.rate.sensing import SensorErrors

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from firmware_bridge import board_process
-from firmware_bridge.frames import FORMATS
+from firmware_bridge.frames.decoder import FORMATS
+from firmware_bridge.loop import board_process
 from gfimu.recording import Recording
 
 pytestmark = pytest.mark.skipif(not board_process.emulator_available(), reason="the emulator is in the extra")
@@ -116,13 +116,13 @@ def test_a_full_disk_at_the_end_of_a_virtual_run(gfimu_command, tmp_path, monkey
 
 
 def test_an_interrupted_recording_is_whole(tmp_path) -> None:
-    from firmware_bridge.virtual_port import TcpPort
+    from firmware_bridge.loop.virtual_port import TcpPort
 
     port = TcpPort(0)
     out = tmp_path / "run.parquet"
     process = subprocess.Popen([GFIMU, "record", "--port", port.name, "--out", out, "--json"], stdout=subprocess.PIPE)
     try:
-        from firmware_bridge.frames import encode_samples
+        from firmware_bridge.frames.decoder import encode_samples
 
         end = time.monotonic() + 30
         number = 0

@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from firmware_bridge.adxl345_device import TICKS_PER_SECOND, Adxl345, Adxl345Options
-from firmware_bridge.commands import sample_at
+from firmware_bridge.adxl345.device import Adxl345
+from firmware_bridge.adxl345.registers import TICKS_PER_SECOND, Adxl345Options
+from firmware_bridge.frames.commands import sample_at
 from firmware_bridge.lpc1768.build import SOURCES, image_path
 from firmware_bridge.lpc1768.elf import ElfImage
 

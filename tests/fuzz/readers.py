@@ -222,7 +222,7 @@ def _calibration(folder: Path) -> tuple[tuple[bytes, str], ...]:
 
 
 def _sent() -> tuple[tuple[bytes, str], ...]:
-    from firmware_bridge.frames import encode_samples
+    from firmware_bridge.frames.decoder import encode_samples
 
     counts = np.arange(40 * 12).reshape(40, 12).astype(np.int16)
     times = np.arange(40) * 10_000
@@ -230,7 +230,7 @@ def _sent() -> tuple[tuple[bytes, str], ...]:
 
 
 def _frames(path: Path) -> None:
-    from firmware_bridge.frames import SampleDecoder
+    from firmware_bridge.frames.decoder import SampleDecoder
     from gfimu.files.input_file import read_bytes
 
     decoder = SampleDecoder()

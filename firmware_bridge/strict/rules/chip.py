@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from firmware_bridge.adxl345_device import TICKS_PER_SECOND, Adxl345
+from firmware_bridge.adxl345.device import Adxl345
+from firmware_bridge.adxl345.registers import TICKS_PER_SECOND
 from firmware_bridge.board.ssp import Ssp
 from firmware_bridge.strict.findings import Rule, Severity
 from firmware_bridge.strict.rules.ssp import words_received

@@ -124,7 +124,7 @@ def test_the_viewer_listens_on_this_machine_only(mode):
 
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 def test_the_virtual_port_listens_on_this_machine_only():
-    from firmware_bridge.virtual_port import TcpPort
+    from firmware_bridge.loop.virtual_port import TcpPort
 
     before = set(listening(os.getsid(0)))
     port = TcpPort(0)

@@ -10,7 +10,7 @@ import time
 
 import pytest
 
-from firmware_bridge import live
+from firmware_bridge.host import live
 from gfimu.errors import GfimuError
 from gfimu.files import rerun_stream
 from gfimu.files.rerun_stream import rrd_stream, viewer_command, viewer_stream

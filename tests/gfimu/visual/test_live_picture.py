@@ -7,9 +7,9 @@ import pytest
 from numpy.testing import assert_allclose
 from rerun.chunk import RrdReader
 
-from firmware_bridge.frames import StreamCounts
-from firmware_bridge.live import LiveView
-from firmware_bridge.recorder import Batch
+from firmware_bridge.frames.decoder import StreamCounts
+from firmware_bridge.host.live import LiveView
+from firmware_bridge.host.recorder import Batch
 from gfimu import AccelerometerArray
 from gfimu.visual.colours import chip_colour
 from gfimu.visual.live import LivePicture

@@ -1,0 +1,146 @@
+"""Which board is on which port, at which speed: by listening, and by asking for its identity."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from firmware_bridge.frames.commands import Identity
+from firmware_bridge.frames.decoder import FORMATS, FrameFormat, SampleDecoder, frame_format
+from firmware_bridge.host.link import Chunk, Link
+from gfimu.errors import InputError
+
+__all__ = ["SPEEDS", "Found", "Listener", "find_boards", "has_speed", "search_speed"]
+
+SPEEDS = (115_200, 1_562_500, 921_600, 460_800, 1_000_000, 230_400, 57_600, 9_600)
+"""Speeds to try, the usual ones first, bits per second."""
+
+_LISTEN_S = 0.5  # long enough for four samples at 10 Hz and for an answer
+_SAMPLES = 3  # in a row, for a board that is only listened to
+
+
+@dataclass(frozen=True)
+class Found:
+    """A board that answers or sends.
+
+    Parameters
+    ----------
+    port : str
+        Where it is.
+    baud : int
+        Speed at which it was understood, bits per second.
+    form : str
+        Frame format.
+    identity : Identity or None
+        What it says about itself; None if it only sends.
+    """
+
+    port: str
+    baud: int
+    form: str
+    identity: Identity | None
+
+
+class Listener:
+    """Listens to a line at one speed until something in one of the formats is understood."""
+
+    def __init__(self, forms: Sequence[FrameFormat]) -> None:
+        self._decoders = [SampleDecoder(form) for form in forms]
+        self.chunks: list[Chunk] = []
+
+    def listen(self, link: Link, seconds: float = _LISTEN_S) -> tuple[FrameFormat, Identity | None] | None:
+        """Ask, and return the format that is understood with the identity if one came; None if there is none."""
+        for decoder in self._decoders:
+            if decoder.format.dialogue is not None:
+                link.write(decoder.format.dialogue.identify)
+        begin = time.monotonic()
+        end = begin + seconds
+        best: FrameFormat | None = None
+        while (remaining := end - time.monotonic()) > 0.0:
+            chunk = link.read(min(remaining, 0.05))
+            if chunk is None or chunk.host_s < begin:  # what was read before may be of another speed
+                continue
+            self.chunks.append(chunk)
+            for decoder in self._decoders:
+                decoder.feed(chunk.data)
+                identity = _identity(decoder)
+                if identity is not None:
+                    return decoder.format, identity
+                if decoder.counts.samples >= _SAMPLES:
+                    best = decoder.format
+            if best is not None and best.dialogue is None:
+                break
+        return None if best is None else (best, None)
+
+
+def _identity(decoder: SampleDecoder) -> Identity | None:
+    """Return the newest identity among the messages."""
+    dialogue = decoder.format.dialogue
+    found = [] if dialogue is None else [dialogue.parse(packet) for packet in decoder.messages]
+    return next((message for message in reversed(found) if isinstance(message, Identity)), None)
+
+
+def search_speed(
+    link: Link, forms: Sequence[FrameFormat], speeds: Sequence[int], stop: Callable[[], bool] = lambda: False
+) -> tuple[Found, list[Chunk]] | None:
+    """Try one speed after another on an open port; return what was found, and what was read at its speed."""
+    for baud in speeds:
+        if stop():
+            break
+        link.set_baud(baud)
+        listener = Listener(forms)
+        understood = listener.listen(link)
+        if understood is not None:
+            form, identity = understood
+            return Found(link.port, baud, form.name, identity), listener.chunks
+    return None
+
+
+def find_boards(
+    ports: Sequence[str] = (),
+    forms: Sequence[str] = (),
+    *,
+    on_try: Callable[[str], None] | None = None,
+) -> list[Found]:
+    """Find the boards on some ports, or on all serial ports of this computer.
+
+    Parameters
+    ----------
+    ports : sequence of str
+        Ports to try; by default those that the system lists.
+    forms : sequence of str
+        Names of the frame formats to try; by default all.
+    on_try : callable, optional
+        Is given the name of each port before it is tried.
+
+    Raises
+    ------
+    InputError
+        If there is no port, or if a port that was named can't be opened.
+    """
+    from serial.tools.list_ports import comports
+
+    names = list(ports) or sorted(port.device for port in comports() if port.hwid != "n/a")
+    if not names:
+        raise InputError("no serial port on this computer; plug in the board, or name a port with --port")
+    tried = [frame_format(name) for name in forms or FORMATS]
+    found = []
+    for name in names:
+        if on_try is not None:
+            on_try(name)
+        try:
+            with Link(name, baud=SPEEDS[0]) as link:
+                result = search_speed(link, tried, SPEEDS if has_speed(name) else SPEEDS[:1])
+        except InputError:
+            if ports:
+                raise
+            continue  # another program has it, or this user may not open it
+        if result is not None:
+            found.append(result[0])
+    return found
+
+
+def has_speed(port: str) -> bool:
+    """Whether a port has a speed that both ends have to agree on."""
+    return "://" not in port

@@ -1,0 +1,283 @@
+"""Recording from a port: bytes to samples to a file, with clocks, gaps and what the board says about itself."""
+
+from __future__ import annotations
+
+import signal
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import gfimu
+from firmware_bridge.frames.commands import Identity, asked_rate
+from firmware_bridge.frames.decoder import FrameFormat, StreamCounts, frame_format
+from firmware_bridge.host.clock import ClockFit
+from firmware_bridge.host.finder import SPEEDS, has_speed
+from firmware_bridge.host.journal import JournalError
+from firmware_bridge.host.line_up import line_up, needed_baud
+from firmware_bridge.host.link import Chunk, Link
+from firmware_bridge.host.record_session import Batch, RecordSession, SampleClock
+from gfimu.errors import GfimuError, InputError
+from gfimu.files.outputs import RECORDING, check_outputs
+from gfimu.geometry.array import AccelerometerArray
+from gfimu.parts.part import Part
+from gfimu.recording.carried_array import array_metadata
+
+__all__ = ["Batch", "RecordReport", "SampleClock", "record"]
+
+_SILENCE_S = 5.0
+_LOST_S = 2.0  # without a frame, after which the speed is looked for again
+
+
+@dataclass(frozen=True)
+class RecordReport:
+    """What was recorded.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    duration_s : float
+        From the first to the last sample, board time, s.
+    stream : StreamCounts
+        Samples, lost, corrupt, skipped bytes, restarts of the board.
+    breaks : int
+        Times the connection was lost.
+    clock : ClockFit or None
+        Board clock against host clock.
+    identity : Identity or None
+        What the board said about itself.
+    status_counts : dict of str to int
+        Samples per status bit.
+    faults : tuple of dict
+        Faults of channels that a live view saw (`gfimu.integrity.fault.ChannelFault.entries`).
+    baud : int or None
+        Speed of the line at the end, bits per second.
+    """
+
+    path: Path
+    duration_s: float
+    stream: StreamCounts
+    breaks: int
+    clock: ClockFit | None
+    identity: Identity | None
+    status_counts: dict[str, int] = field(default_factory=dict)
+    faults: tuple[dict[str, Any], ...] = ()
+    baud: int | None = None
+
+
+def record(
+    port: str,
+    out: str | Path,
+    *,
+    duration_s: float | None = None,
+    form: str | FrameFormat = "lpc1768",
+    array: str = "",
+    baud: int | None = None,
+    setup: tuple[bytes, ...] = (),
+    reconnect_s: float | None = None,
+    on_batch: Callable[[Batch, StreamCounts], None] | None = None,
+    stop: Callable[[], bool] | None = None,
+) -> RecordReport:
+    """Record from a port until the time is up, ``stop`` says so, or Ctrl-C.
+
+    Parameters
+    ----------
+    port : str
+        Device, pseudo-terminal or ``socket://host:port``.
+    out : str or Path
+        ``.csv`` or ``.parquet``; can be read at any moment, at most half a second behind.
+    duration_s : float, optional
+        Length of the recording, s of board time; by default until stopped.
+    form : str or FrameFormat
+        Frame format, or its name in `firmware_bridge.frames.decoder.FORMATS`.
+    array : str
+        Array file; by default the format's.
+    baud : int, optional
+        Bits per second. By default the speed at which the board answers or sends, raised if the sample rate needs more.
+    setup : tuple of bytes
+        Commands to send first (`firmware_bridge.frames.commands`); sent again when the board started anew.
+    reconnect_s : float, optional
+        How long to wait for a port that is not there yet, and for a lost connection, s; by default the port has to be
+        there at once, and a lost connection is waited for a minute.
+    on_batch : callable, optional
+        Is given each batch and the totals so far.
+    stop : callable, optional
+        Asked often; True ends the recording.
+
+    Raises
+    ------
+    InputError
+        If the file can't be written (found before the port is opened), the port can't be opened or is in use, or
+        nothing that is a frame comes.
+    JournalError
+        If the disk is full; what was written until then can be read.
+    """
+    target = Path(out)
+    check_outputs([("out", target, RECORDING)])
+    layout = frame_format(form)
+    if setup and layout.dialogue is None:
+        raise InputError(f"format {layout.name} has no commands: rate and range can't be set; leave them out")
+    carried = AccelerometerArray.load(array or layout.array)
+    if carried.n_channels != len(layout.channels):
+        raise InputError(
+            f"array {carried.name!r} has {carried.n_channels} channels, {layout.name} {len(layout.channels)}"
+        )
+    part = carried.chips[0].part
+    metadata: dict[str, Any] = {
+        **array_metadata(carried),
+        "part": part,
+        "lsb_m_s2": layout.count_m_s2 or Part.load(part, carried.part_files).lsb,
+        "port": port,
+        "format": layout.name,
+        "started_utc": datetime.now(UTC).isoformat(timespec="milliseconds"),
+        "software_version": gfimu.__version__,
+        "time_stamp_clock": "board",
+        "time_stamp_tick_hz": layout.clock_hz,
+    }
+    session = RecordSession(layout, carried, target, metadata, has_setup=bool(setup))
+    with Link(port, baud=baud or SPEEDS[0], reconnect_s=reconnect_s) as link, _ask_to_stop() as asked:
+        trouble = _run(
+            link,
+            session,
+            duration_s,
+            setup,
+            on_batch,
+            lambda: asked() or (stop is not None and stop()),
+            baud,
+        )
+        breaks = link.breaks
+    try:
+        session.release()
+        session.flush(time.monotonic(), force=True)
+    except JournalError as error:
+        trouble = trouble if isinstance(trouble, JournalError) else error
+    session.decoder.finish()
+    if session.refused and not session.journal:
+        refusal = session.refused[0]
+        raise InputError(f"{port}: the board refused command {refusal.command}: {refusal.result.name.lower()}")
+    if session.journal is None:
+        if isinstance(trouble, GfimuError):
+            raise trouble
+        raise InputError(
+            f"{port}: no {layout.name} frame came{f' at {baud} baud' if baud else ''}; check the port and --format, "
+            f"or look for the board with --find ({session.decoder.counts.skipped_bytes} bytes were no frames)"
+        )
+    counts = session.decoder.counts
+    fit = session.clock.fit()
+    final = {
+        "frames_lost": counts.lost,
+        "frames_corrupt": counts.corrupt,
+        "bytes_skipped": counts.skipped_bytes,
+        "samples_unconfirmed": counts.unconfirmed,
+        "board_restarts": counts.restarts,
+        "connection_breaks": breaks,
+        "status_counts": session.status_counts,
+        **session.rate.metadata(fit),
+        **({} if fit is None else {"host_clock": fit.__dict__}),
+        **({} if trouble is None else {"ended_by": str(trouble)}),
+    }
+    try:
+        session.journal.finish(final)
+    except JournalError as error:
+        trouble = trouble if isinstance(trouble, JournalError) else error
+    if isinstance(trouble, JournalError):
+        raise trouble
+    duration = session.last_s - (session.first_s or 0.0)
+    return RecordReport(
+        target, duration, counts, breaks, fit, session.identity, session.status_counts, baud=session.baud
+    )
+
+
+@contextmanager
+def _ask_to_stop() -> Iterator[Callable[[], bool]]:
+    """Turn Ctrl-C and a polite kill into a question, so that neither strikes in the middle of a write."""
+    asked = threading.Event()
+    if threading.current_thread() is not threading.main_thread():
+        yield asked.is_set
+        return
+    numbers = (signal.SIGINT, signal.SIGTERM)
+    before = [signal.signal(number, lambda *_: asked.set()) for number in numbers]
+    try:
+        yield asked.is_set
+    finally:
+        for number, handler in zip(numbers, before, strict=True):
+            signal.signal(number, handler)
+
+
+def _run(
+    link: Link,
+    session: RecordSession,
+    duration_s: float | None,
+    setup: tuple[bytes, ...],
+    on_batch: Callable[[Batch, StreamCounts], None] | None,
+    stop: Callable[[], bool],
+    baud: int | None,
+) -> GfimuError | None:
+    """Read until the end; return what ended the recording early, if anything did."""
+    began = time.monotonic()
+    form = session.decoder.format
+    dialogue = form.dialogue
+    least = needed_baud(form, asked_rate(setup))
+    chunks: deque[Chunk] = deque()
+
+    def find_speed() -> None:
+        found = line_up(link, form, baud, least_baud=least, stop=stop)
+        if found is not None:
+            session.baud = found[0].baud
+            if session.first_s is not None:
+                session.resume(found[1])
+            chunks.extend(() if setup and session.first_s is None else found[1])
+
+    has_to_agree = has_speed(link.port) or least > link.baud
+    restarts = 0
+    seen: Identity | None = None
+    try:
+        while has_to_agree and session.baud is None and time.monotonic() - began < _SILENCE_S and not stop():
+            find_speed()
+        heard_at = began if session.baud is None else time.monotonic()
+        session.expect_answers()
+        for command in setup:
+            link.write(command)
+        while not stop():
+            if dialogue is not None:
+                session.ask(link, dialogue, time.monotonic())
+            chunk = chunks.popleft() if chunks else link.read()
+            now = time.monotonic()
+            if chunk is not None:
+                if chunk.after_break:
+                    session.decoder.break_stream()
+                batch = session.take(chunk.data, chunk.host_s)
+                if session.identity is not seen:
+                    seen = session.identity
+                    if dialogue is not None and seen is not None and not seen.streaming:
+                        link.write(dialogue.start)  # someone stopped it
+                if session.decoder.counts.restarts > restarts:
+                    restarts = session.decoder.counts.restarts
+                    for command in setup:
+                        link.write(command)
+                if batch is not None:
+                    heard_at = now
+                    if on_batch is not None:
+                        on_batch(batch, session.decoder.counts)
+            if dialogue is not None and has_to_agree and session.first_s is not None and now - heard_at > _LOST_S:
+                find_speed()  # a board that started anew is back at its first speed
+                heard_at = time.monotonic()
+            if session.waiting_for_board and now >= session.give_up_s:
+                session.release()
+            session.flush(now)
+            if session.refused and session.journal is None:
+                return None
+            started = session.first_s is not None and duration_s is not None
+            if started and session.last_s - session.first_s >= duration_s:  # type: ignore[operator]
+                return None
+            if session.first_s is None and now - heard_at > _SILENCE_S:
+                return None
+    except GfimuError as error:
+        return error
+    return None
