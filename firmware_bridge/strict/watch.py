@@ -31,7 +31,7 @@ class Policy:
     feed_share : float
         A watchdog fed with a smaller share of its time left was fed late.
     storm : int
-        Entries of one exception in a row, without an instruction of the program between them, that make a storm.
+        Exceptions in a row, without an instruction of the program between them, that make a storm.
     storm_s, storm_least : float, int
         A row that lasts longer, s, and has at least so many entries, is one as well.
     stack_spare : int
