@@ -106,7 +106,7 @@ class Nvic(Peripheral):
 
     @property
     def wakes(self) -> bool:
-        """Whether something pending wakes the processor from WFI: it would preempt what runs (ARMv7-M ARM B1.5.19).
+        """Whether something pending wakes the processor from WFI: it would preempt what runs (UM10360 34.3.5.2.1).
 
         PRIMASK does not matter; inside a handler, an exception of no higher priority does not wake.
         """

@@ -25,7 +25,7 @@ class Policy:
     wait_s : float
         A program that polls one unchanged register for longer waits without an end, s. A crystal takes 10 ms.
     settle_s : float
-        PLL0 counts as locked after so long, even if nobody looked, s (UM10360 4.5.6: 500 µs + 200 reference periods).
+        PLL0 counts as locked after so long, even if nobody looked, s (UM10360 4.5.13, step 8).
     flash_late_s : float
         Wait states that come later than this after the clock has risen have not come, s.
     feed_share : float
@@ -47,7 +47,7 @@ class Policy:
     )  # fmt: skip
     baud_error: float = 0.025
     wait_s: float = 0.5
-    settle_s: float = 600e-6
+    settle_s: float = 500e-6
     flash_late_s: float = 1e-3
     feed_share: float = 0.1
     storm: int = 300

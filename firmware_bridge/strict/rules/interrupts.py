@@ -19,7 +19,7 @@ NO_HANDLER = Rule(
     "no_handler", "write the handler under the name that the vector table expects, or do not enable it", "UM10360 6.3"
 )
 PRIORITY = Rule(
-    "priority_bits", "shift priorities left by 3: the LPC1768 has the upper five bits only", "UM10360 6.5.8, 34.4.2"
+    "priority_bits", "shift priorities left by 3: the LPC1768 has the upper five bits only", "UM10360 6.5.11, 34.4.2.7"
 )
 STORM = Rule("interrupt_storm", "clear the interrupt's flag in its handler", "UM10360, the peripheral's chapter")
 DEEP_SLEEP = Rule(

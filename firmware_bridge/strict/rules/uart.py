@@ -14,22 +14,22 @@ DIVISOR = Rule(
     "UM10360 14.4.12",
 )
 BAUD = Rule("uart_speed", "work out DLL, DLM and FDR from PCLK = CCLK over PCLKSELx", "UM10360 14.4.12.1")
-DLAB = Rule("uart_dlab", "clear DLAB in LCR after the divisors are written", "UM10360 14.4.2, 14.4.8")
-WORD = Rule("uart_word_length", "write 0x03 to LCR for 8 bits, no parity, one stop bit", "UM10360 14.4.8")
+DLAB = Rule("uart_dlab", "clear DLAB in LCR after the divisors are written", "UM10360 14.4.2, 14.4.7")
+WORD = Rule("uart_word_length", "write 0x03 to LCR for 8 bits, no parity, one stop bit", "UM10360 14.4.7")
 PARITY = Rule(
     "uart_parity",
     "write 0x03 to LCR for 8N1, if the other end is not set to parity as well",
-    "UM10360 14.4.8",
+    "UM10360 14.4.7",
     Severity.WARNING,
 )
 NO_FIFO = Rule(
     "uart_fifo_off", "set bit 0 of FCR: a UART without its FIFOs must not be used", "UM10360 14.4.6", Severity.WARNING
 )
 READ_EMPTY = Rule(
-    "read_empty_fifo", "read only what has arrived: look at RDR in UnLSR, RNE in SSPnSR", "UM10360 14.4.11, 18.6.4"
+    "read_empty_fifo", "read only what has arrived: look at RDR in UnLSR, RNE in SSPnSR", "UM10360 14.4.8, 18.6.4"
 )
 WRITE_FULL = Rule(
-    "write_full_fifo", "write only while there is room: look at THRE in UnLSR, TNF in SSPnSR", "UM10360 14.4.11, 18.6.4"
+    "write_full_fifo", "write only while there is room: look at THRE in UnLSR, TNF in SSPnSR", "UM10360 14.4.8, 18.6.4"
 )
 
 _DEPTH = 16
