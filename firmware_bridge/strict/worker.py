@@ -79,7 +79,7 @@ def _with_broken_parts(image: ElfImage, request: dict[str, Any]) -> list[Finding
 
 
 def _character(line_control: int) -> str:
-    """Bits, parity and stop bits of a UART, as in ``8N1`` (UM10360 14.4.8)."""
+    """Bits, parity and stop bits of a UART, as in ``8N1`` (UM10360 14.4.7)."""
     parity = _PARITIES[line_control >> 4 & 3] if line_control & _PARITY else "N"
     return f"{5 + (line_control & _WORD_BITS)}{parity}{2 if line_control & _STOP_BIT else 1}"
 
