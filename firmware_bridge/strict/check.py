@@ -132,5 +132,5 @@ def check_image(image: str | Path = "gfimu", options: CheckOptions | None = None
         raise GfimuError(f"{image}: the strict board has ended: {last}")
     answer = json.loads(run.stdout)
     findings = tuple(Finding(**finding) for finding in answer.pop("findings"))
-    per_uart = {name: tuple(answer.pop(name)) for name in ("sent", "baud", "character")}
+    per_uart: dict[str, Any] = {name: tuple(answer.pop(name)) for name in ("sent", "baud", "character")}
     return CheckReport(**answer, **per_uart, findings=findings)
