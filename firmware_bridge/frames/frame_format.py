@@ -145,10 +145,10 @@ class FrameFormat:
         if n_channels == len(self.channels):
             return self
         if self.no_reading is None or rest or n_channels > len(self.channels):
-            fewer = "" if self.no_reading is None else f" or, with fewer chips, a multiple of {_AXES}"
-            raise InputError(
-                f"array {name!r} has {n_channels} channels, {self.name} {len(self.channels)}{fewer}; give another --array"
+            own = f"{self.name} {len(self.channels)}" + (
+                "" if self.no_reading is None else f", or {_AXES} for each chip"
             )
+            raise InputError(f"array {name!r} has {n_channels} channels, {own}; give another --array")
         others = sum((Status.SENSOR_1_MISSING | Status.SENSOR_1_OVERRUN) << chip for chip in range(chips, _SENSORS))
         return replace(self, channels=self.channels[:n_channels], status_mask=self.status_mask & ~others)
 

@@ -78,7 +78,8 @@ def check_chips(
         If no board answers, or it takes no commands.
     """
     layout = frame_format(form)
-    if layout.dialogue is None or layout.status_field is None:
+    dialogue = layout.dialogue
+    if dialogue is None or layout.status_field is None:
         raise InputError(f"format {layout.name} has no command for the self-test; use a board that has")
     carried = AccelerometerArray.load(array or layout.array)
     layout = layout.for_array(carried.name, carried.n_channels)
@@ -88,7 +89,7 @@ def check_chips(
             raise InputError(f"{port}: no {layout.name} board answers; look for it with --find")
         decoder = SampleDecoder(layout)
         scale = found[0].identity.count_size
-        link.write(layout.dialogue.start)
+        link.write(dialogue.start)
         runs = []
         try:
             for state in (False, True):
