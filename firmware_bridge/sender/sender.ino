@@ -13,7 +13,7 @@ uint32_t gfimu_port_time_us(void) { return micros(); }
 void gfimu_port_exchange(uint8_t chip, uint8_t *bytes, uint8_t count) {
   SPI.beginTransaction(SPISettings(SPI_HZ, MSBFIRST, SPI_MODE3));
   digitalWrite(SELECT_PINS[chip], LOW);
-  for (uint8_t i = 0; i < count; i++) bytes[i] = SPI.transfer(bytes[i]);
+  SPI.transfer(bytes, count);
   digitalWrite(SELECT_PINS[chip], HIGH);
   SPI.endTransaction();
 }

