@@ -174,6 +174,15 @@ def test_the_sample_clock_keeps_the_rate_that_is_no_whole_number_of_microseconds
     assert np.minimum(late_us, 1_000_000 / 300 - late_us).max() <= 21
 
 
+def test_the_first_sample_comes_a_period_after_the_start(sender_library) -> None:
+    sender = Sender(sender_library)
+    begun_us, beat = sender.now // US, sender_library.core_heartbeat()
+    sender.run(begun_us + 9_900)
+    assert sender_library.core_heartbeat() == beat
+    sender.run(begun_us + 10_300)
+    assert sender_library.core_heartbeat() == beat + 1
+
+
 def test_periods_that_the_loop_missed_are_over_and_the_next_sample_is_late(sender_library) -> None:
     sender = Sender(sender_library)
     data = sender.run(200_000)
