@@ -14,6 +14,7 @@ from firmware_bridge.frames.checksum import crc16, crc16_rows, sum16_rows
 from firmware_bridge.frames.commands import LPC1768_DIALOGUE, NO_TEMPERATURE, RATES_HZ, Dialogue, FrameType
 from firmware_bridge.frames.packets import PacketLayout, StreamLayout
 from gfimu.errors import InputError
+from gfimu.geometry.array import AccelerometerArray
 
 __all__ = ["FORMATS", "LPC1768_DTYPE", "MIMU4444_DTYPE", "FrameFormat", "Status", "encode_message", "encode_samples"]
 
@@ -131,26 +132,26 @@ class FrameFormat:
     slowest_hz: float = 1.0
     dialogue: Dialogue | None = None
 
-    def for_array(self, name: str, n_channels: int) -> FrameFormat:
+    def for_array(self, array: AccelerometerArray) -> FrameFormat:
         """Return this format for an array of its own number of channels, or of fewer chips where one may be missing.
 
-        Then the array's chips are the first ones, and the others are not looked at.
+        Then the array's chips, of three axes each, are the first ones, and the others are not looked at.
 
         Raises
         ------
         InputError
             If the array has more channels, or the format has no reading for a chip that is missing.
         """
-        chips, rest = divmod(n_channels, _AXES)
-        if n_channels == len(self.channels):
+        chips, channels, own = len(array.chips), array.n_channels, len(self.channels)
+        if channels == own:
             return self
-        if self.no_reading is None or rest or n_channels > len(self.channels):
-            own = f"{self.name} {len(self.channels)}" + (
-                "" if self.no_reading is None else f", or {_AXES} for each chip"
+        if self.no_reading is None or channels != _AXES * chips or channels > own:
+            fewer = "" if self.no_reading is None else f", or {_AXES} for each chip"
+            raise InputError(
+                f"array {array.name!r} has {channels} channels, {self.name} {own}{fewer}; give another --array"
             )
-            raise InputError(f"array {name!r} has {n_channels} channels, {own}; give another --array")
         others = sum((Status.SENSOR_1_MISSING | Status.SENSOR_1_OVERRUN) << chip for chip in range(chips, _SENSORS))
-        return replace(self, channels=self.channels[:n_channels], status_mask=self.status_mask & ~others)
+        return replace(self, channels=self.channels[:channels], status_mask=self.status_mask & ~others)
 
     def is_sample(self, packets: NDArray[Any]) -> NDArray[np.bool_]:
         """Tell which packets, shape (n,), carry a sample."""

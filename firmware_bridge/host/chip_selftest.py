@@ -82,7 +82,7 @@ def check_chips(
     if dialogue is None or layout.status_field is None:
         raise InputError(f"format {layout.name} has no command for the self-test; use a board that has")
     carried = AccelerometerArray.load(array or layout.array)
-    layout = layout.for_array(carried.name, carried.n_channels)
+    layout = layout.for_array(carried)
     with Link(port, baud=baud or DEFAULT_BAUD) as link:
         found = line_up(link, layout, baud)
         if found is None or found[0].identity is None:

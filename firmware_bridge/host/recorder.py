@@ -124,7 +124,7 @@ def record(
     if setup and layout.dialogue is None:
         raise InputError(f"format {layout.name} has no commands: rate and range can't be set; leave them out")
     carried = AccelerometerArray.load(array or layout.array)
-    layout = layout.for_array(carried.name, carried.n_channels)
+    layout = layout.for_array(carried)
     part = carried.chips[0].part
     metadata: dict[str, Any] = {
         **array_metadata(carried),

@@ -47,7 +47,9 @@ void gfimu_port_set_baud(uint32_t baud) {
 
 void gfimu_port_alive(bool light) {
 #ifdef LED_BUILTIN
-  if (LED_BUILTIN != SCK) digitalWrite(LED_BUILTIN, light);  // on an Uno they are one pin
+  static bool shown;
+  if (LED_BUILTIN != SCK && light != shown) digitalWrite(LED_BUILTIN, light);  // on an Uno they are one pin
+  shown = light;
 #else
   (void)light;
 #endif

@@ -72,8 +72,9 @@ def test_two_of_four_chips_that_answer(program, tmp_path) -> None:
         gfimu.record(port, tmp_path / "two.csv", duration=0.5, array="toolhead_pair")
         with pytest.raises(InputError, match="array 'one_adxl345' has 1 chip, but 2 answer"):
             gfimu.record(port, tmp_path / "one.csv", duration=0.5, array="one_adxl345")
-        with pytest.raises(InputError, match="'corners8' has 24 channels, lpc1768 12, or 3 for each chip"):
-            gfimu.record(port, tmp_path / "eight.csv", duration=0.5, array="corners8")
+        for other in ("corners8", "nap_3_2_2_2"):  # the second has three times three channels, on four chips
+            with pytest.raises(InputError, match=f"'{other}' has .* channels, lpc1768 12, or 3 for each chip"):
+                gfimu.record(port, tmp_path / "other.csv", duration=0.5, array=other)
     assert report.status_counts["sensor_3_missing"] == report.stream.samples
     assert np.isnan(gfimu.Recording.read(tmp_path / "all.csv").readings[:, 6:]).all()
     two = gfimu.Recording.read(tmp_path / "two.csv")
