@@ -106,8 +106,11 @@ class Nvic(Peripheral):
 
     @property
     def wakes(self) -> bool:
-        """Whether something pending wakes the processor from WFI (masks do not matter)."""
-        return bool(self.pending & self.enabled)
+        """Whether something pending wakes the processor from WFI: it would preempt what runs (UM10360 34.3.5.2.1).
+
+        PRIMASK does not matter; inside a handler, an exception of no higher priority does not wake.
+        """
+        return bool(self.best())
 
     # Registers
 

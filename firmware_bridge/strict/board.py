@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import mmap
+import random
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -198,7 +199,17 @@ class StrictBoard(Board):
         image, self.started_at = started_by_loader(image)
         super().__init__(image, sensors, tracer=self)
         self.nvic.vtor = self.started_at
+        self._fill_memory(image)
         judge_image(image, self.ledger, self.started_at)
+
+    def _fill_memory(self, image: ElfImage) -> None:
+        """Fill the RAM with what is there after power-on: anything but zeros."""
+        junk = random.Random(0)  # noqa: S311 - the same at every run
+        for base, memory in self.cpu.memory.items():
+            if base:
+                memory[:] = junk.randbytes(len(memory))
+        for segment in image.segments:
+            self.cpu.poke(segment.address, segment.data)
 
     @property
     def _strict_cpu(self) -> StrictCpu:

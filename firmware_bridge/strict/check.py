@@ -70,6 +70,10 @@ class CheckReport:
         Register accesses, exceptions handled, resets after the first start.
     sent : tuple of int
         Bytes that each UART sent.
+    baud : tuple of float
+        Speed of each UART at the end, baud.
+    character : tuple of str
+        Bits, parity and stop bits of each UART at the end, as in ``8N1``.
     stack_bytes : int or None
         Bytes of the main stack that were used; None if the image does not say where it ends.
     stack_room : int or None
@@ -87,6 +91,8 @@ class CheckReport:
     exceptions: int
     resets: int
     sent: tuple[int, ...]
+    baud: tuple[float, ...]
+    character: tuple[str, ...]
     stack_bytes: int | None
     stack_room: int | None
     started_at: int
@@ -126,4 +132,5 @@ def check_image(image: str | Path = "gfimu", options: CheckOptions | None = None
         raise GfimuError(f"{image}: the strict board has ended: {last}")
     answer = json.loads(run.stdout)
     findings = tuple(Finding(**finding) for finding in answer.pop("findings"))
-    return CheckReport(**{**answer, "sent": tuple(answer["sent"]), "findings": findings})
+    per_uart: dict[str, Any] = {name: tuple(answer.pop(name)) for name in ("sent", "baud", "character")}
+    return CheckReport(**answer, **per_uart, findings=findings)

@@ -25,13 +25,13 @@ class Policy:
     wait_s : float
         A program that polls one unchanged register for longer waits without an end, s. A crystal takes 10 ms.
     settle_s : float
-        PLL0 counts as locked after so long, even if nobody looked, s (UM10360 4.5.6: 500 µs + 200 reference periods).
+        PLL0 counts as locked after so long, even if nobody looked, s (UM10360 4.5.13, step 8).
     flash_late_s : float
         Wait states that come later than this after the clock has risen have not come, s.
     feed_share : float
         A watchdog fed with a smaller share of its time left was fed late.
     storm : int
-        Entries of one exception in a row, without an instruction of the program between them, that make a storm.
+        Exceptions in a row, without an instruction of the program between them, that make a storm.
     storm_s, storm_least : float, int
         A row that lasts longer, s, and has at least so many entries, is one as well.
     stack_spare : int
@@ -47,7 +47,7 @@ class Policy:
     )  # fmt: skip
     baud_error: float = 0.025
     wait_s: float = 0.5
-    settle_s: float = 600e-6
+    settle_s: float = 500e-6
     flash_late_s: float = 1e-3
     feed_share: float = 0.1
     storm: int = 300

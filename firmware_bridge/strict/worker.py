@@ -23,9 +23,12 @@ from firmware_bridge.strict.rules.memory import StackWatch
 from firmware_bridge.strict.rules.waiting import NO_TIME_OUT, UNBOUNDED
 from firmware_bridge.strict.watch import Policy
 
-__all__ = ["answer", "run_board"]
+__all__ = ["answer", "run_board", "run_with_input"]
 
 _BROKEN_S = 1.0
+_TYPED = b"gfimu ?\r\n"
+_WORD_BITS, _STOP_BIT, _PARITY = 3, 4, 8
+_PARITIES = "OE10"
 
 
 def run_board(board: StrictBoard, seconds: float, limit_s: float) -> str:
@@ -38,6 +41,18 @@ def run_board(board: StrictBoard, seconds: float, limit_s: float) -> str:
         if time.monotonic() - begin > limit_s:
             return f"it took longer than {limit_s:g} s of real time"
     return ""
+
+
+def run_with_input(board: StrictBoard, seconds: float, limit_s: float) -> str:
+    """Run as `run_board` does; half-way, somebody types at every UART that was set up."""
+    begin = time.monotonic()
+    ended = run_board(board, seconds / 2.0, limit_s)
+    if ended:
+        return ended
+    for uart in board.uarts:
+        if uart.divisor > 1:
+            uart.receive(_TYPED)
+    return run_board(board, seconds / 2.0, max(0.0, limit_s - (time.monotonic() - begin)))
 
 
 def _board(image: ElfImage, request: dict[str, Any], stuck: str | None = None) -> StrictBoard:
@@ -63,13 +78,19 @@ def _with_broken_parts(image: ElfImage, request: dict[str, Any]) -> list[Finding
     return found
 
 
+def _character(line_control: int) -> str:
+    """Bits, parity and stop bits of a UART, as in ``8N1`` (UM10360 14.4.7)."""
+    parity = _PARITIES[line_control >> 4 & 3] if line_control & _PARITY else "N"
+    return f"{5 + (line_control & _WORD_BITS)}{parity}{2 if line_control & _STOP_BIT else 1}"
+
+
 def answer(request: dict[str, Any]) -> dict[str, Any]:
     """Check an image (`firmware_bridge.strict.check.CheckOptions`); return the fields of a `CheckReport`."""
     image = load_image(request["image"])
     board = _board(image, request)
     gc.freeze()
     gc.disable()  # nothing that a board does while it runs makes cycles
-    ended = run_board(board, request["seconds"], request["limit_s"])
+    ended = run_with_input(board, request["seconds"], request["limit_s"])
     findings = list(board.findings())
     if request["broken_parts"]:
         findings += _with_broken_parts(image, request)
@@ -82,6 +103,8 @@ def answer(request: dict[str, Any]) -> dict[str, Any]:
         "exceptions": board.exceptions,
         "resets": board.resets,
         "sent": [len(uart.take_sent()[0]) for uart in board.uarts],
+        "baud": [uart.baud for uart in board.uarts],
+        "character": [_character(uart.line_control) for uart in board.uarts],
         "stack_bytes": stack.used,
         "stack_room": stack.room,
         "started_at": board.started_at,

@@ -53,8 +53,12 @@ def _print_report(report: CheckReport) -> None:
         ("register accesses", str(report.accesses)),
         ("exceptions", str(report.exceptions)),
         ("resets", str(report.resets)),
-        ("sent", ", ".join(f"U{n}: {count} bytes" for n, count in enumerate(report.sent) if count) or "nothing"),
     ]
+    for n, count in enumerate(report.sent):
+        if count:
+            rows.append((f"sent by UART{n}", f"{count} bytes, {report.baud[n]:.0f} baud {report.character[n]}"))
+    if not any(report.sent):
+        rows.append(("sent", "nothing"))
     if report.stack_room is not None:
         rows.append(("main stack", f"{report.stack_bytes} of {report.stack_room} bytes used"))
     print_table(f"{report.image} on the strict board", ("quantity", "value"), rows)

@@ -13,7 +13,9 @@ __all__ = ["ChipWatch"]
 
 _SHEET = "ADXL345 data sheet Rev. E"
 FAST = Rule("spi_too_fast", "keep the SPI clock at 5 MHz or less: PCLK / (CPSDVSR · (SCR + 1))", f"{_SHEET}, table 9")
-MODE = Rule("spi_mode", "set CPOL and CPHA (mode 3), SPI frame format, master", f"{_SHEET}, Serial communications")
+MODE = Rule(
+    "spi_mode", "set CPOL and CPHA (mode 3), SPI frame format, master, no loop-back", f"{_SHEET}, Serial communications"
+)
 SIZE = Rule("spi_frame_size", "exchange whole bytes: 8 or 16 bits per word", f"{_SHEET}, figures 36 to 39")
 TWO = Rule("two_chips_selected", "set every other CS high before one goes low", f"{_SHEET}, Serial communications")
 CUT = Rule("deselected_while_busy", "wait until BSY in SSPnSR is clear before CS goes high", "UM10360 18.6.4")
@@ -48,7 +50,7 @@ REGISTER = Rule("chip_register", "write the registers 0x1D…0x2A, 0x2C…0x2F, 
 
 _CS_PORT = 2
 _SPI_MAX_HZ, _TOLERANCE = 5e6, 1e-3
-_MODE_3, _FRAME_FORMAT, _SLAVE = 0xC0, 0x30, 4
+_MODE_3, _FRAME_FORMAT, _SLAVE, _LOOP_BACK = 0xC0, 0x30, 4, 1
 _REST_TICKS = 150 * TICKS_PER_SECOND // 1_000_000_000
 _POP_TICKS = 5 * TICKS_PER_SECOND // 1_000_000
 _READ, _MULTIPLE, _ADDRESS = 0x80, 0x40, 0x3F
@@ -102,6 +104,8 @@ class ChipWatch(Watch):
             self.report(MODE, f"SPI mode {mode}")
         if ssp.control1 & _SLAVE:
             self.report(MODE, "SSP1 is a slave")
+        if ssp.control1 & _LOOP_BACK:
+            self.report(MODE, "SSP1 reads what it sends itself (loop-back)")
         if ssp.bits == 16:
             self._sent += bytes((value >> 8, value & 0xFF))
         elif ssp.bits == 8:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from dataclasses import replace
 
 from firmware_bridge.board.cpu import FLASH_SIZE
 from firmware_bridge.board.nvic import FIRST_IRQ, SYSTICK
 from firmware_bridge.board.trace import exception_name
-from firmware_bridge.strict.findings import Place, Rule
+from firmware_bridge.strict.findings import Place, Rule, Severity
+from firmware_bridge.strict.rules.clock import RESERVED_BITS
 from firmware_bridge.strict.watch import Access, Watch
 
 __all__ = ["InterruptWatch"]
@@ -17,16 +19,23 @@ NO_HANDLER = Rule(
     "no_handler", "write the handler under the name that the vector table expects, or do not enable it", "UM10360 6.3"
 )
 PRIORITY = Rule(
-    "priority_bits", "shift priorities left by 3: the LPC1768 has the upper five bits only", "UM10360 6.5.8, 34.4.2"
+    "priority_bits", "shift priorities left by 3: the LPC1768 has the upper five bits only", "UM10360 6.5.11, 34.4.2.7"
 )
 STORM = Rule("interrupt_storm", "clear the interrupt's flag in its handler", "UM10360, the peripheral's chapter")
+DEEP_SLEEP = Rule(
+    "deep_sleep",
+    "leave SLEEPDEEP in SCR clear, or set up PLL0 anew after every WFI: it stops PLL0 and the peripherals' clocks",
+    "UM10360 4.8.2",
+    Severity.WARNING,
+)
 DEAD = Rule("dead_handler", "find what raised the exception: the program stays in its handler", "ARMv7-M ARM B1.5")
 
 _BRANCH_TO_SELF, _BREAKPOINT = 0xE7FE, 0xBE00
 _PRIORITY_REGISTERS = (range(0x400, 0x424), range(0xD18, 0xD24))
 _PRIORITY_BITS, _ALL_ONES = 0xF8, 0xFF
 _ENABLE_REGISTERS = range(0x100, 0x108)
-_SYSTICK_CONTROL, _SYSTICK_ON = 0x010, 3
+_SYSTICK_CONTROL, _SYSTICK_ON, _SYSTICK_RELOAD, _SYSTICK_MOST = 0x010, 3, 0x014, 0xFFFFFF
+_SYSTEM_CONTROL, _SLEEPDEEP = 0xD10, 4
 _DEFAULT_NAMES = re.compile(r"(default|dummy|unused|unexpected|unhandled)_?\w*|\w*(infinite_loop)", re.IGNORECASE)
 
 
@@ -34,14 +43,13 @@ class InterruptWatch(Watch):
     """Looks at what is enabled, entered and left."""
 
     peripherals = frozenset({"nvic"})
-    rules = (NO_HANDLER, PRIORITY, STORM, DEAD)
+    rules = (NO_HANDLER, PRIORITY, STORM, DEAD, DEEP_SLEEP, RESERVED_BITS)
 
     def reset(self) -> None:
         """Nothing enabled."""
         self._enabled: dict[int, Place] = {}
-        self._left = self._row = 0
+        self._row: Counter[int] = Counter()
         self._row_since = 0.0
-        self._program_ran = False
         self._dead: Place | None = None
 
     def before(self, access: Access) -> None:
@@ -55,6 +63,12 @@ class InterruptWatch(Watch):
                     self._enabled.setdefault(first + bit, self.ledger.here())
         elif access.offset == _SYSTICK_CONTROL and access.value & _SYSTICK_ON == _SYSTICK_ON:
             self._enabled.setdefault(SYSTICK, self.ledger.here())
+        elif access.offset == _SYSTICK_RELOAD and access.value > _SYSTICK_MOST:
+            self.report(
+                RESERVED_BITS, f"SYST_RVR = {access.value:#x} becomes {access.value & _SYSTICK_MOST:#x}: 24 bits"
+            )
+        elif access.offset == _SYSTEM_CONTROL and access.value & _SLEEPDEEP:
+            self.report(DEEP_SLEEP, "SLEEPDEEP is set")
         elif any(access.offset in registers for registers in _PRIORITY_REGISTERS):
             for byte in range(access.size):
                 value = access.value >> 8 * byte & 0xFF
@@ -66,27 +80,31 @@ class InterruptWatch(Watch):
     def exception(self, number: int, *, entered: bool) -> None:
         """Look at the handler, and at handlers that run again at once."""
         if not entered:
-            self._left = number
             self._dead = None
             return
-        if self._program_ran or number != self._left:
-            self._row, self._row_since = 0, self.board.seconds
-        self._row += 1
-        self._program_ran = False
-        if self._is_storm() and not self.ledger.hopeless:
-            place = replace(self.ledger.here(), pc=self._vector(number) & ~1)
-            self.ledger.add(STORM, f"{_title(number)} runs again and again: the program stands still", place)
-            self.ledger.hopeless = True
+        if len(self.board.nvic.active) == 1:
+            self._enter_from_program(number)
         reason = self._missing(number)
         if reason:
             enabled_at = self._enabled.pop(number, None)
             self.ledger.add(NO_HANDLER, f"{_title(number)} comes, but {reason}", enabled_at)
 
+    def _enter_from_program(self, number: int) -> None:
+        """Count what comes in place of the program, and not within another handler."""
+        if not self._row:
+            self._row_since = self.board.seconds
+        self._row[number] += 1
+        if self._is_storm() and not self.ledger.hopeless:
+            worst = self._row.most_common(1)[0][0]
+            place = replace(self.ledger.here(), pc=self._vector(worst) & ~1)
+            self.ledger.add(STORM, f"{_title(worst)} runs again and again: the program stands still", place)
+            self.ledger.hopeless = True
+
     def _is_storm(self) -> bool:
-        """Whether one exception has kept the program from running for too often, or for too long."""
-        policy = self.policy
+        """Whether exceptions have kept the program from running for too often, or for too long."""
+        policy, count = self.policy, self._row.total()
         lasted = self.board.seconds - self._row_since
-        return self._row >= policy.storm or (self._row >= policy.storm_least and lasted > policy.storm_s)
+        return count >= policy.storm or (count >= policy.storm_least and lasted > policy.storm_s)
 
     def _vector(self, exception: int) -> int:
         return int.from_bytes(self.board.cpu.peek(self.board.nvic.vtor + 4 * exception, 4), "little")
@@ -109,7 +127,7 @@ class InterruptWatch(Watch):
     def block(self, address: int, stack: int | None) -> None:
         """Note that the program gets on."""
         if not self.board.nvic.active:
-            self._program_ran = True
+            self._row.clear()
 
     def stand_still(self) -> None:
         """Note that the program stands in an exception."""

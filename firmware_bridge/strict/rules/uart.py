@@ -14,20 +14,26 @@ DIVISOR = Rule(
     "UM10360 14.4.12",
 )
 BAUD = Rule("uart_speed", "work out DLL, DLM and FDR from PCLK = CCLK over PCLKSELx", "UM10360 14.4.12.1")
-DLAB = Rule("uart_dlab", "clear DLAB in LCR after the divisors are written", "UM10360 14.4.2, 14.4.8")
-WORD = Rule("uart_word_length", "write 0x03 to LCR for 8 bits, no parity, one stop bit", "UM10360 14.4.8")
+DLAB = Rule("uart_dlab", "clear DLAB in LCR after the divisors are written", "UM10360 14.4.2, 14.4.7")
+WORD = Rule("uart_word_length", "write 0x03 to LCR for 8 bits, no parity, one stop bit", "UM10360 14.4.7")
+PARITY = Rule(
+    "uart_parity",
+    "write 0x03 to LCR for 8N1, if the other end is not set to parity as well",
+    "UM10360 14.4.7",
+    Severity.WARNING,
+)
 NO_FIFO = Rule(
     "uart_fifo_off", "set bit 0 of FCR: a UART without its FIFOs must not be used", "UM10360 14.4.6", Severity.WARNING
 )
 READ_EMPTY = Rule(
-    "read_empty_fifo", "read only what has arrived: look at RDR in UnLSR, RNE in SSPnSR", "UM10360 14.4.11, 18.6.4"
+    "read_empty_fifo", "read only what has arrived: look at RDR in UnLSR, RNE in SSPnSR", "UM10360 14.4.8, 18.6.4"
 )
 WRITE_FULL = Rule(
-    "write_full_fifo", "write only while there is room: look at THRE in UnLSR, TNF in SSPnSR", "UM10360 14.4.11, 18.6.4"
+    "write_full_fifo", "write only while there is room: look at THRE in UnLSR, TNF in SSPnSR", "UM10360 14.4.8, 18.6.4"
 )
 
 _DEPTH = 16
-_DIVISOR_ACCESS = 0x80
+_DIVISOR_ACCESS, _PARITY = 0x80, 8
 _DIVISOR_WRITES = 4  # a divisor is written once, or twice; data are written on and on
 _RESET_DIVISOR = 1
 
@@ -36,7 +42,7 @@ class UartWatch(Watch):
     """Looks at the speed when a UART sends, and at its FIFOs."""
 
     peripherals = frozenset({"uart0", "uart1", "uart2", "uart3"})
-    rules = (DIVISOR, BAUD, DLAB, WORD, NO_FIFO, READ_EMPTY, WRITE_FULL)
+    rules = (DIVISOR, BAUD, DLAB, WORD, PARITY, NO_FIFO, READ_EMPTY, WRITE_FULL)
 
     def reset(self) -> None:
         """Nothing sent."""
@@ -82,6 +88,8 @@ class UartWatch(Watch):
         bits = 5 + (uart.line_control & 3)
         if byte >> bits:
             self.report(WORD, f"U{number} sends {byte:#04x} in {bits} bits")
+        if uart.line_control & _PARITY:
+            self.report(PARITY, f"U{number} sends with parity")
         setting = (uart.divisor, uart.fraction, uart.character)
         if self._judged.get(number) != setting:
             self._judged[number] = setting

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from firmware_bridge.board.nvic import FIRST_IRQ
 from firmware_bridge.board.peripheral import NEVER
 from firmware_bridge.board.system_control import WATCHDOG
 from firmware_bridge.strict.findings import Place, Rule, Severity
@@ -11,10 +12,16 @@ __all__ = ["WatchdogWatch"]
 
 RESET = Rule("watchdog_reset", "feed the watchdog in time, or find where the program stands", "UM10360 28.3")
 LATE = Rule("watchdog_late", "feed the watchdog earlier, or set WDTC longer", "UM10360 28.3", Severity.WARNING)
+NO_RESET = Rule(
+    "watchdog_without_reset",
+    "set WDRESET in WDMOD, or enable the watchdog's interrupt",
+    "UM10360 28.4.1",
+    Severity.WARNING,
+)
 NOT_STARTED = Rule("watchdog_not_started", "feed the watchdog once: WDMOD alone does not start it", "UM10360 28.4.1")
 
 _WDMOD, _WDTC, _WDFEED = 0x00, 0x04, 0x08
-_ENABLE, _LAST = 1, 0x55
+_ENABLE, _RESETS, _LAST = 1, 2, 0x55
 _MINIMUM = 0xFF
 
 
@@ -22,11 +29,12 @@ class WatchdogWatch(Watch):
     """Looks at each feed and at the time that was left."""
 
     peripherals = frozenset({"watchdog"})
-    rules = (RESET, LATE, NOT_STARTED)
+    rules = (RESET, LATE, NO_RESET, NOT_STARTED)
 
     def reset(self) -> None:
         """Off."""
         self._enabled: Place | None = None
+        self._toothless: Place | None = None
         self._span = 0
         self._before = NEVER
 
@@ -41,6 +49,7 @@ class WatchdogWatch(Watch):
             return
         if access.offset == _WDMOD and access.value & _ENABLE and watchdog.expires >= NEVER:
             self._enabled = self.ledger.here()
+            self._toothless = None if watchdog.mode & _RESETS else self._enabled
         elif access.offset == _WDTC and access.value < _MINIMUM:
             self.report(LATE, f"WDTC = {access.value} is less than the least, {_MINIMUM}")
         elif access.offset == _WDFEED and access.value & 0xFF == _LAST and watchdog.expires < NEVER:
@@ -57,3 +66,6 @@ class WatchdogWatch(Watch):
         elif self._enabled is not None:
             self.ledger.add(NOT_STARTED, "the watchdog is enabled, but never fed", self._enabled)
             self._enabled = None
+        if self._toothless is not None and not self.board.nvic.enabled >> (FIRST_IRQ + self.board.watchdog.irq) & 1:
+            self.ledger.add(NO_RESET, "the watchdog neither resets nor interrupts when it ends", self._toothless)
+            self._toothless = None

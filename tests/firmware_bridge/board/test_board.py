@@ -218,3 +218,11 @@ def test_a_board_runs_in_a_plain_script(tmp_path) -> None:
     )
     run = subprocess.run([sys.executable, script], capture_output=True, text=True, timeout=60, check=False)
     assert (run.stdout, run.stderr) == ("True\n", "")
+
+
+@pytest.mark.parametrize("address", [0x40038000, 0x4003C000, 0x40040000, 0x40044000, 0x40048000])
+def test_what_is_not_emulated_stores_what_is_written(make_board, address) -> None:
+    """CAN: memory and registers of the filter, common registers, both controllers (UM10360 16.6)."""
+    board = make_board()
+    board.write_bus(address, 0x12345678)
+    assert board.read_bus(address) == 0x12345678

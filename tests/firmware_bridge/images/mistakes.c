@@ -190,6 +190,35 @@ CASE stack_low(void)
     FOR_EVER
 }
 
+CASE watchdog_without_reset(void)
+{
+    R(0x40000004) = 100000;
+    R(0x40000000) = 1;
+    R(0x40000008) = 0xAA;
+    R(0x40000008) = 0x55;
+    FOR_EVER
+}
+
+CASE deep_sleep(void)
+{
+    R(0xE000ED10) = 4;
+    FOR_EVER
+}
+
+CASE uart_parity(void)
+{
+    powered();
+    R(0x4002C000) |= 1U << 4 | 1U << 6;
+    R(0x4000C00C) = 0x9B;
+    R(0x4000C000) = 13;
+    R(0x4000C004) = 0;
+    R(0x4000C028) = 0x10;
+    R(0x4000C00C) = 0x1B;
+    R(0x4000C008) = 7;
+    R(0x4000C000) = 'x';
+    FOR_EVER
+}
+
 CASE wait_for_outside(void)
 {
     while (R(0x2009C014) & 1) {

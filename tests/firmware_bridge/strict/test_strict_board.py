@@ -58,7 +58,8 @@ def start_at(compile_image):
 MISTAKES = (
     "reserved_bits", "flash_wait_late", "input_pin_not_selected", "partial_register", "ssp_disabled",
     "ssp_changed_while_busy", "ssp_overrun", "torn_sample", "spi_too_slow", "chip_fifo_rest", "watchdog_late",
-    "dead_handler", "stack_low",
+    "dead_handler", "stack_low", "watchdog_without_reset", "uart_parity",
+    "deep_sleep",
 )  # fmt: skip
 
 
