@@ -288,6 +288,7 @@ ROOMS = {
         "gfimu.recording",
         "sim.adxl345",
     },
+    "firmware_bridge.sender": {"firmware_bridge.lpc1768.build"},
     "firmware_bridge.strict": {
         "firmware_bridge.adxl345",
         "firmware_bridge.board",

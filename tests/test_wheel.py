@@ -64,3 +64,10 @@ def test_a_scenario_runs_outside_the_checkout(installed: Path, tmp_path: Path) -
     done = _run(installed, "simulate", "rest", "--out", "rest.parquet", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "rest.parquet").is_file()
+
+
+def test_the_files_of_a_sender_are_in_the_wheel(installed: Path, tmp_path: Path) -> None:
+    done = _run(installed, "new", "sender", "mine", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert {"core.c", "sender.c", "gfimu_port.h", "mine.ino"} <= {file.name for file in (tmp_path / "mine").iterdir()}
+    assert len(list((tmp_path / "mine" / "ports").iterdir())) == 4

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import enum
 import struct
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,12 +13,16 @@ from numpy.typing import ArrayLike, NDArray
 from firmware_bridge.frames.checksum import crc16, crc16_rows, sum16_rows
 from firmware_bridge.frames.commands import LPC1768_DIALOGUE, NO_TEMPERATURE, RATES_HZ, Dialogue, FrameType
 from firmware_bridge.frames.packets import PacketLayout, StreamLayout
+from gfimu.errors import InputError
+from gfimu.geometry.array import AccelerometerArray
 
 __all__ = ["FORMATS", "LPC1768_DTYPE", "MIMU4444_DTYPE", "FrameFormat", "Status", "encode_message", "encode_samples"]
 
 FRAME_VERSION = 1
 
 SYNC = (0xA5, 0x5A)
+
+_AXES, _SENSORS = 3, 4  # of a chip, and chips, in `lpc1768`
 
 
 class Status(enum.IntFlag):
@@ -98,6 +102,8 @@ class FrameFormat:
         Field that holds the raw counts, signed integers.
     status_field : str, optional
         Field with status bits as in `Status`; None if there is none.
+    status_mask : int
+        Status bits that count.
     sample_type : tuple of (str, int), optional
         Field and its value that mark a packet as a sample; None if every packet is one.
     no_reading : int, optional
@@ -119,11 +125,33 @@ class FrameFormat:
     sequence_field: str = "sequence"
     counts_field: str = "counts"
     status_field: str | None = None
+    status_mask: int = 0xFFFF
     sample_type: tuple[str, int] | None = None
     no_reading: int | None = None
     count_m_s2: float | None = None
     slowest_hz: float = 1.0
     dialogue: Dialogue | None = None
+
+    def for_array(self, array: AccelerometerArray) -> FrameFormat:
+        """Return this format for an array of its own number of channels, or of fewer chips where one may be missing.
+
+        Then the array's chips, of three axes each, are the first ones, and the others are not looked at.
+
+        Raises
+        ------
+        InputError
+            If the array has more channels, or the format has no reading for a chip that is missing.
+        """
+        chips, channels, own = len(array.chips), array.n_channels, len(self.channels)
+        if channels == own:
+            return self
+        if self.no_reading is None or channels != _AXES * chips or channels > own:
+            fewer = "" if self.no_reading is None else f", or {_AXES} for each chip"
+            raise InputError(
+                f"array {array.name!r} has {channels} channels, {self.name} {own}{fewer}; give another --array"
+            )
+        others = sum((Status.SENSOR_1_MISSING | Status.SENSOR_1_OVERRUN) << chip for chip in range(chips, _SENSORS))
+        return replace(self, channels=self.channels[:channels], status_mask=self.status_mask & ~others)
 
     def is_sample(self, packets: NDArray[Any]) -> NDArray[np.bool_]:
         """Tell which packets, shape (n,), carry a sample."""
@@ -136,7 +164,7 @@ class FrameFormat:
         """Status bits of the packets, shape (n,); zero in formats without them."""
         if self.status_field is None:
             return np.zeros(len(packets), dtype=np.uint16)
-        return packets[self.status_field].astype(np.uint16)
+        return packets[self.status_field].astype(np.uint16) & np.uint16(self.status_mask)
 
     def counts(self, packets: NDArray[Any]) -> NDArray[Any]:
         """Raw counts of the array's channels, shape (n, c), in the byte order of this machine."""

@@ -55,7 +55,7 @@ class AxisSelfTest:
 
 
 def check_chips(
-    port: str, *, baud: int | None = None, form: str = "lpc1768", at_3v3: bool = True
+    port: str, *, baud: int | None = None, form: str = "lpc1768", array: str = "", at_3v3: bool = True
 ) -> list[AxisSelfTest]:
     """Switch the self-test of the chips on and off over a port while the unit rests.
 
@@ -67,6 +67,8 @@ def check_chips(
         Bits per second; by default as the board is.
     form : str
         Frame format; it needs a board that takes commands.
+    array : str
+        Array on the board; by default the format's. With fewer chips only those are tested.
     at_3v3 : bool
         Whether the chips run from 3.3 V, as on the mbed, rather than from 2.5 V: the limits are wider.
 
@@ -76,15 +78,18 @@ def check_chips(
         If no board answers, or it takes no commands.
     """
     layout = frame_format(form)
-    if layout.dialogue is None or layout.status_field is None:
+    dialogue = layout.dialogue
+    if dialogue is None or layout.status_field is None:
         raise InputError(f"format {layout.name} has no command for the self-test; use a board that has")
+    carried = AccelerometerArray.load(array or layout.array)
+    layout = layout.for_array(carried)
     with Link(port, baud=baud or DEFAULT_BAUD) as link:
         found = line_up(link, layout, baud)
         if found is None or found[0].identity is None:
             raise InputError(f"{port}: no {layout.name} board answers; look for it with --find")
         decoder = SampleDecoder(layout)
         scale = found[0].identity.count_size
-        link.write(layout.dialogue.start)
+        link.write(dialogue.start)
         runs = []
         try:
             for state in (False, True):
@@ -93,7 +98,7 @@ def check_chips(
         finally:
             link.write(encode_command(Command.SELF_TEST, 0))
     off, on = (np.where(run.counts == layout.no_reading, np.nan, run.counts * (scale / _COUNTS_PER_G)) for run in runs)
-    return judge(off, on, AccelerometerArray.load(layout.array).channels, at_3v3=at_3v3)
+    return judge(off, on, carried.channels, at_3v3=at_3v3)
 
 
 def judge(

@@ -51,11 +51,11 @@ class Listener:
 
     def listen(self, link: Link, seconds: float = _LISTEN_S) -> tuple[FrameFormat, Identity | None] | None:
         """Ask, and return the format that is understood with the identity if one came; None if there is none."""
+        begin = time.monotonic()  # before the question: some answer at once
+        end = begin + seconds
         for decoder in self._decoders:
             if decoder.format.dialogue is not None:
                 link.write(decoder.format.dialogue.identify)
-        begin = time.monotonic()
-        end = begin + seconds
         best: FrameFormat | None = None
         while (remaining := end - time.monotonic()) > 0.0:
             chunk = link.read(min(remaining, 0.05))

@@ -16,6 +16,7 @@ from firmware_bridge.frames.decoder import FrameFormat, SampleDecoder, Samples, 
 from firmware_bridge.host.clock import HostClock, SampleRate
 from firmware_bridge.host.journal import Journal
 from firmware_bridge.host.link import Chunk, Link
+from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
 
 __all__ = ["Batch", "RecordSession", "SampleClock"]
@@ -164,6 +165,16 @@ class RecordSession:
             if message.result:
                 self.refused.append(message)
 
+    def _refuse_more_chips(self, identity: Identity) -> None:
+        """Nothing that answers is left out of a recording."""
+        chips = len(self._array.chips)
+        if any(identity.present[chips:]):
+            answers = sum(identity.present)
+            raise InputError(
+                f"array {self._array.name!r} has {chips} chip{'' if chips == 1 else 's'}, but {answers} answer on the "
+                "board; give the array of all with --array"
+            )
+
     def ask(self, link: Link, dialogue: Dialogue, now_s: float) -> None:
         """Ask the board who it is: now and then, as command and answer bound the latency of the line."""
         due_s = _IDENTIFY_EVERY_S if self.identity is None or self.answers < _FIRST_ANSWERS else _EXCHANGE_EVERY_S
@@ -225,6 +236,7 @@ class RecordSession:
             return
         if self.journal is None:
             if self.identity is not None:
+                self._refuse_more_chips(self.identity)
                 self._metadata["sample_rate_hz"] = self.identity.rate_hz
                 self._metadata["range_g"] = self.identity.range_g
                 self._metadata["firmware"] = self.identity.firmware

@@ -97,7 +97,7 @@ def record(
     form : str or FrameFormat
         Frame format, or its name in `firmware_bridge.frames.decoder.FORMATS`.
     array : str
-        Array file; by default the format's.
+        Array file; by default the format's. With fewer chips than the format has, they are the first ones.
     baud : int, optional
         Bits per second. By default the speed at which the board answers or sends, raised if the sample rate needs more.
     setup : tuple of bytes
@@ -124,10 +124,7 @@ def record(
     if setup and layout.dialogue is None:
         raise InputError(f"format {layout.name} has no commands: rate and range can't be set; leave them out")
     carried = AccelerometerArray.load(array or layout.array)
-    if carried.n_channels != len(layout.channels):
-        raise InputError(
-            f"array {carried.name!r} has {carried.n_channels} channels, {layout.name} {len(layout.channels)}"
-        )
+    layout = layout.for_array(carried)
     part = carried.chips[0].part
     metadata: dict[str, Any] = {
         **array_metadata(carried),

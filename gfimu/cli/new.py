@@ -1,4 +1,4 @@
-"""`gfimu new`: a commented file to start from."""
+"""`gfimu new`: a commented file to start from, or the C files of a sender."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from gfimu.cli.output import print_paths
-from gfimu.commands.catalogue import TEMPLATES
+from gfimu.commands.catalogue import SENDER, TEMPLATES
 
 __all__ = ["register"]
 
@@ -19,7 +19,10 @@ def register(app: typer.Typer) -> None:
 
 
 def _new(
-    kind: Annotated[str, typer.Argument(help=f"What to begin: {', '.join(TEMPLATES)}.")],
+    kind: Annotated[str, typer.Argument(help=f"What to begin: {', '.join((*TEMPLATES, SENDER))}.")],
+    folder: Annotated[
+        Path | None, typer.Argument(help="Of a sender: folder to write; without it, what to do with it is printed.")
+    ] = None,
     out: Annotated[Path | None, typer.Option("--out", help="File to write (.toml); printed without it.")] = None,
     schema: Annotated[
         Path | None, typer.Option("--schema", help="JSON schema to write (.json), for completion in an editor.")
@@ -27,13 +30,17 @@ def _new(
 ) -> None:
     """Write a commented file to edit.
 
+    A sender is a folder of C files: with them a microcontroller of yours sends what gfimu record reads.
+
     Example: gfimu new array --out my_array.toml --schema array.schema.json
+
+    Example: gfimu new sender my_sender
     """
     from gfimu.commands.catalogue import new
 
-    text = new(kind, out=out, schema=schema)
-    if out is None and schema is None:
+    text = new(kind, folder, out=out, schema=schema)
+    if folder is None and out is None and schema is None:
         typer.echo(text, nl=False)
     else:
-        written = {kind: out, "schema": schema}
+        written = {kind: folder or out, "schema": schema}
         print_paths([(what, path) for what, path in written.items() if path is not None])

@@ -7,15 +7,18 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from gfimu.commands.file_kinds import FILE_KINDS
-from gfimu.files.outputs import JSON_SCHEMA, TOML_FILE, writes
+from gfimu.files.outputs import JSON_SCHEMA, TOML_FILE, OutputFolder, writes
 
-__all__ = ["KINDS", "TEMPLATES", "catalogue", "new", "show"]
+__all__ = ["KINDS", "SENDER", "TEMPLATES", "catalogue", "new", "show"]
 
 KINDS = ("arrays", "parts", "maps", "twins", "scenarios", "frames", "effects", "formats")
 """What can be listed."""
 
 TEMPLATES = tuple(FILE_KINDS)
-"""What can be begun."""
+"""Files that can be begun."""
+
+SENDER = "sender"
+"""The folder that can be begun: C files with which a board of one's own sends frames."""
 
 _FILES = ("arrays", "parts", "maps", "twins", "scenarios", "frames")
 
@@ -95,14 +98,22 @@ def _shown_file(name: str) -> str:
     return Path(name).read_text(encoding="utf-8")
 
 
-@writes(out=TOML_FILE, schema=JSON_SCHEMA)
-def new(kind: str, *, out: str | Path | None = None, schema: str | Path | None = None) -> str:
+@writes(folder=OutputFolder(()), out=TOML_FILE, schema=JSON_SCHEMA)
+def new(
+    kind: str,
+    folder: str | Path | None = None,
+    *,
+    out: str | Path | None = None,
+    schema: str | Path | None = None,
+) -> str:
     """Return a commented file to edit: an array, a part, a column map, a twin, a scenario or a frame.
 
     Parameters
     ----------
     kind : str
-        One of `TEMPLATES`.
+        One of `TEMPLATES`, or `SENDER`: then what is returned says what to do with the C files.
+    folder : str or Path, optional
+        Of `SENDER`: folder to write, with the C files for a board of one's own. One that holds files is not touched.
     out : str or Path, optional
         File to write, ``.toml``; one that is there is not replaced.
     schema : str or Path, optional
@@ -112,7 +123,7 @@ def new(kind: str, *, out: str | Path | None = None, schema: str | Path | None =
     Raises
     ------
     InputError
-        If the kind is unknown, or the file is there already.
+        If the kind is unknown, the file or folder is there already, or a file is asked for where a folder is written.
     """
     from gfimu.commands.file_kinds import file_schema
     from gfimu.errors import InputError, unknown_name
@@ -120,8 +131,16 @@ def new(kind: str, *, out: str | Path | None = None, schema: str | Path | None =
     from gfimu.files.model_files import find_model
     from gfimu.files.schema_keys import json_schema
 
+    if kind == SENDER:
+        if out is not None or schema is not None:
+            raise InputError(
+                "a sender is a folder of C files, without schema; name the folder: gfimu new sender FOLDER"
+            )
+        return _new_sender(folder)
     if kind not in TEMPLATES:
-        raise unknown_name("kind", kind, TEMPLATES)
+        raise unknown_name("kind", kind, (*TEMPLATES, SENDER))
+    if folder is not None:
+        raise InputError(f"a new {kind} is one file; name it with --out")
     text = find_model("templates", kind).read_text(encoding="utf-8")
     if out is not None and Path(out).exists():
         raise InputError(f"{out}: is there already; choose another name")
@@ -132,6 +151,14 @@ def new(kind: str, *, out: str | Path | None = None, schema: str | Path | None =
     if out is not None:
         write_text(out, text)
     return text
+
+
+def _new_sender(folder: str | Path | None) -> str:
+    from firmware_bridge.sender.project import readme, write_project
+
+    if folder is not None:
+        write_project(folder)
+    return readme(SENDER if folder is None else Path(folder).resolve().name)
 
 
 def _described(kind: str) -> Iterator[tuple[str, str]]:

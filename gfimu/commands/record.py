@@ -65,7 +65,8 @@ def record(
         Frame format (``--format``): a key of `firmware_bridge.frames.frame_format.FORMATS`; else ``lpc1768``, or
         what is found.
     array : str
-        Array on the board; the format's by default.
+        Array on the board; the format's by default. A board of the format ``lpc1768`` may have fewer chips than four:
+        then the array's chips are the first ones.
     baud : int, optional
         Bits per second. By default the speed at which the board is, raised if the sample rate needs more.
     reconnect : float, optional
@@ -107,7 +108,7 @@ def record(
     if self_test:
         from firmware_bridge.host.chip_selftest import check_chips
 
-        tested = check_chips(_needed(port), baud=baud, form=form or "lpc1768")
+        tested = check_chips(_needed(port), baud=baud, form=form or "lpc1768", array=array)
         if on_self_test is not None:
             on_self_test(tested)
     if out is None:

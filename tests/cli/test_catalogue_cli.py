@@ -48,6 +48,23 @@ def test_a_file_to_start_from_can_be_used(gfimu_command, tmp_path, kind):
     assert "is there already" in again.stderr
 
 
+def test_a_sender_is_a_folder(gfimu_command, tmp_path):
+    readme = gfimu_command("new", "sender").stdout
+    assert readme.startswith("# A sender for gfimu")
+    folder = tmp_path / "mine"
+    assert gfimu_command("new", "sender", folder).code == 0
+    assert (folder / "README.md").read_text() == readme.replace("sender.ino", "mine.ino")
+    again = gfimu_command("new", "sender", folder)
+    assert (again.code, "not empty; choose another name" in again.stderr) == (2, True)
+    for words in (
+        ("new", "sender", "--out", "x.toml"),
+        ("new", "sender", "--schema", "x.json"),
+        ("new", "array", folder),
+    ):
+        wrong = gfimu_command(*words)
+        assert (wrong.code, wrong.stderr.count("\n")) == (2, 1)
+
+
 @pytest.mark.parametrize("name", ["cube12", "adxl355", "klipper", "cube12_turntable", "rest", "table_tilt"])
 def test_what_has_a_name_is_shown(gfimu_command, name):
     result = gfimu_command("show", name)

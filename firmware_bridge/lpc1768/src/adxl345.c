@@ -123,7 +123,7 @@ uint8_t adxl345_flags(uint32_t sensor)
 uint32_t adxl345_output_rate_hz(uint8_t code)
 {
     uint32_t steps = code & RATE_CODE_MASK;
-    return (3200U << steps) >> ADXL345_RATE_CODE_MAX;
+    return ((uint32_t)3200U << steps) >> ADXL345_RATE_CODE_MAX;
 }
 
 uint8_t adxl345_rate_code(uint32_t rate_hz)
