@@ -102,6 +102,7 @@ class ChannelMonitor:
         self._past_doubts: list[ChannelFault] = []
         self._base = 0  # number of the oldest block that is kept; all numbers of blocks below are of the whole run
         self._place = 0  # next block
+        self._changed = 0  # block from which on the channels in use are those of now
         self._noise: dict[bytes, BlockNoise] = {}
         self._open: dict[int, tuple[int, int]] = {}  # channel: its fault's number, block from which it is judged
         self._patience = np.full(c, self.policy.readmission_s)
@@ -144,6 +145,7 @@ class ChannelMonitor:
                 self.faults[number] = replace(self.faults[number], end_s=end)
             self._open.clear()
             self.watched[:] = True
+            self._changed = self.total_blocks
             self.follower.state.ages[:] = 0.0
         self._refuses = refuses
 
@@ -225,7 +227,7 @@ class ChannelMonitor:
             else:
                 self._end_suspicion(place)
             if back < place:  # again from before the onset, without the channels
-                self._place = back
+                self._place = self._changed = back
                 follower.state.go_back(back)
             else:
                 self._readmit(place)
@@ -278,8 +280,11 @@ class ChannelMonitor:
                 sets = tuple(tuple(self.array.channels[i] for i in entry.channels) for entry in rivals)
                 fault = replace(fault, isolated=False, alternatives=sets)
             if self._may_exclude(blamed, fewest=None if alone else 0):
+                back, fault = self._since_when(
+                    place, self._before(place - self.follower.span(int(used[best.slot]))), fault
+                )
                 self._add(place, blamed, fault)
-                return self._before(place - self._span(used, chosen)), False
+                return back, False
             if alone:
                 break
             suspicion.doubtful, suspicion.unexplained = replace(fault, excluded=False), False
@@ -301,15 +306,29 @@ class ChannelMonitor:
             return False
         watched = self.watched.copy()
         watched[entry.channels] = False
-        rows = slice(self._before(place - self._span(used, entry)) - self._base, place - self._base)
+        rows = slice(self._before(place - self.follower.span(int(used[entry.slot]))) - self._base, place - self._base)
         levels = self._noise_of().levels
         rest = self.follower.unexplained_without(self.blocks, rows, watched, levels, base=self._base)
         return rest < self.policy.unexplained
 
-    def _span(self, used: NDArray[np.int64], entry: Explanation) -> int:
-        """Return how many blocks ago a fault may have begun at most: the onset lies near one of those followed."""
-        ages = self.follower.state.ages[used]
-        return int(ages[max(0, entry.slot - 1)]) - 1 if entry.slot else int(ages[0])
+    def _since_when(self, place: int, back: int, fault: ChannelFault) -> tuple[int, ChannelFault]:
+        """Return the block to go on from, and the fault with its onset, at or before those given.
+
+        A fault that grows, as a wrong gain does when the reading changes, may be seen at a later step of it. Of a
+        channel that is at fault less evidence suffices: what may not remain unexplained after an exclusion.
+        """
+        first = max(self._base, self._changed, place - round(self.policy.oldest_s / self.block_s))
+        if back <= first:
+            return back, fault
+        found = self.follower.first_contradiction(
+            self.blocks, slice(first - self._base, back - self._base), self.watched, self._noise_of().levels,
+            base=self._base, suspects=np.isin(self.array.channels, fault.channels), threshold=self.policy.unexplained,
+        )  # fmt: skip
+        if found is None:
+            return back, fault
+        onset, before = found
+        earlier = replace(fault, onset_s=float(self.blocks.t[onset] - 0.5 * self.block_s))
+        return max(first, self._before(self._base + before)), earlier
 
     def _before(self, block: int) -> int:
         """Return the block from which to go on if a fault began at this one."""
@@ -384,6 +403,7 @@ class ChannelMonitor:
             self._patience[channel] = min(2.0 * self._patience[channel], self.policy.longest_readmission_s)
             del self._open[channel]
             self.watched[channel] = True
+            self._changed = place
             self.follower.state.ages[:] = 0.0
             if not any(other == number for other, _ in self._open.values()):
                 end = float(self.blocks.t[place - 1 - self._base] + 0.5 * self.block_s)

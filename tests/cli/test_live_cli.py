@@ -105,9 +105,10 @@ def test_faults_are_told_and_survived(stream):
         (("--from", "127.0.0.1:1"), "", "start the server first"),
     ],
 )
-def test_bad_input(options, text, message):
-    result = run_live(*options, text=text)
-    assert result.returncode == 2
+def test_bad_input(gfimu_command, monkeypatch, options, text, message):
+    monkeypatch.setattr(sys, "stdin", io.StringIO(text))
+    result = gfimu_command("live", "--array", "cube12", "--rate", "100", *options)
+    assert result.code == 2
     assert message in result.stderr
     assert "Traceback" not in result.stderr
 

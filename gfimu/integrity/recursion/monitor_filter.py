@@ -219,17 +219,58 @@ class MonitorFilter:
 
         The parameters are those of `advance`.
         """
-        state = self.state.copy()
-        state.go_back(base + rows.start)
-        count = rows.stop - rows.start
-        self._run(
-            state, blocks, rows, watched, self._blind(), base=base,
-            levels=levels[rows], omega=np.empty((count, 3)), std=np.empty((count, 3)), nis=np.empty(count),
-        )  # fmt: skip
+        state, _, _ = self._again(blocks, rows, watched, levels, base=base, tuning=self._blind())
         if _lost(state):
             return np.inf
         _, information, score = self.evidence(state)
         return float(max(strongest(*pair, watched)[1] for pair in zip(information, score, strict=True)))
+
+    def first_contradiction(
+        self,
+        blocks: Blocks,
+        rows: slice,
+        watched: NDArray[np.bool_],
+        levels: NDArray[np.float64],
+        *,
+        base: int,
+        suspects: NDArray[np.bool_],
+        threshold: float,
+    ) -> tuple[int, int] | None:
+        """Return the row from which one of some channels contradicts the others, and that of the onset before it.
+
+        The parameters are those of `advance`, the ``suspects`` among the watched channels, shape (c,), and the
+        statistic from which they contradict. None where they don't.
+        """
+        tuning = self._tuning._replace(threshold=threshold)
+        state, place, slot = self._again(blocks, rows, watched, levels, base=base, tuning=tuning, suspects=suspects)
+        if slot < 0 or _lost(state):
+            return None
+        return rows.start + place - int(state.ages[slot]), rows.start + place - _span(state, slot)
+
+    def span(self, slot: int) -> int:
+        """Return how many blocks ago a fault of a slot in use may have begun: after the onset before it."""
+        return _span(self.state, slot)
+
+    def _again(
+        self,
+        blocks: Blocks,
+        rows: slice,
+        watched: NDArray[np.bool_],
+        levels: NDArray[np.float64],
+        *,
+        base: int,
+        tuning: MonitorTuning,
+        suspects: NDArray[np.bool_] | None = None,
+    ) -> tuple[MonitorState, int, int]:
+        """Run over ``rows`` as if only these channels had been used; returns the state, and what `_run` returns."""
+        state = self.state.copy()
+        state.go_back(base + rows.start)
+        count = rows.stop - rows.start
+        place, slot = self._run(
+            state, blocks, rows, watched, tuning, base=base, suspects=suspects,
+            levels=levels[rows], omega=np.empty((count, 3)), std=np.empty((count, 3)), nis=np.empty(count),
+        )  # fmt: skip
+        return state, place, slot
 
     def _blind(self) -> MonitorTuning:
         return self._tuning._replace(threshold=np.inf)
@@ -243,18 +284,23 @@ class MonitorFilter:
         tuning: MonitorTuning,
         *,
         base: int,
+        suspects: NDArray[np.bool_] | None = None,
         **arrays: NDArray[np.float64],
     ) -> tuple[int, int]:
-        """Run the recursion over some rows; ``arrays`` are levels, omega, std and nis of them."""
+        """Run the recursion over some rows; ``arrays`` are levels, omega, std and nis of them.
+
+        Faults are looked for on the ``suspects``, by default all channels in use.
+        """
         times = blocks.t[rows]
         before = blocks.t[rows.start - 1] if rows.start else blocks.t[0] - self.block_s
         sets = self._sets(blocks, watched, slice(max(rows.start - 1, 0), rows.stop))
         turning = turning_of(blocks, rows, self.tables.alpha_rows, sets, self.block_s / self.samples)
         sets = sets[len(sets) - len(times) :]
+        looked_at = watched if suspects is None else suspects
         try:
             place, slot = advance(
                 self._compiled_tables(), tuning, state, blocks.means[rows], turning, np.diff(times, prepend=before),
-                sets, arrays["levels"], watched, arrays["omega"], arrays["std"], arrays["nis"], base + rows.start,
+                sets, arrays["levels"], looked_at, arrays["omega"], arrays["std"], arrays["nis"], base + rows.start,
             )  # fmt: skip
         except np.linalg.LinAlgError:  # the filter ran away
             state.omega[:] = np.nan
@@ -278,6 +324,10 @@ class MonitorFilter:
 
 def _bits(channels: NDArray[np.bool_]) -> int:
     return sum(1 << int(channel) for channel in np.flatnonzero(channels))
+
+
+def _span(state: MonitorState, slot: int) -> int:
+    return int(state.ages[slot - 1]) - 1 if slot else int(state.ages[0])
 
 
 def _lost(state: MonitorState) -> bool:

@@ -42,6 +42,7 @@ _ROWS = 200  # of them that are compared
 _RATE = 100.0  # Hz, to which faster recordings are averaged
 _NOMINAL_RATES = (4.0, 20_000.0)  # Hz; outside of them rest is looked for as if at 100 Hz
 _LEAST_PARITY = 3  # combinations free of all motion that make the integration of α needless
+_DIAGONAL = np.diag_indices(6)
 _ITERATIONS = 15
 _NO_LEAK = 1e-6  # rad/s² per rad²/s²
 _WEAK = 0.1  # products seen more weakly than this share of the best are not used to clean α
@@ -363,18 +364,18 @@ def _unexplained(
             if np.isfinite(energy) and energy < best:
                 done = best - energy < 1e-4 * energy
                 best, kept, damping = energy, point, 0.2 * damping
-                normal = slopes + np.diag(weight)
+                normal = slopes
+                normal[_DIAGONAL] += weight
                 pull = inner - weight * point
                 if done:
                     break
             else:
                 damping = max(10.0 * damping, 1e-4)
-            if not np.isfinite(normal).all():
+            lifted = normal.copy()
+            lifted[_DIAGONAL] += damping * normal[_DIAGONAL] + 1e-12 * normal[_DIAGONAL].sum()
+            if not (np.isfinite(lifted).all() and lifted.any()):
                 break
-            lifted = normal + damping * np.diag(np.diag(normal)) + 1e-12 * np.trace(normal) * np.eye(6)
-            if not lifted.any():
-                break
-            point = kept + np.linalg.lstsq(lifted, pull, rcond=None)[0]
+            point = kept + np.linalg.solve(lifted, pull)  # lifted is positive definite
     return best, kept
 
 

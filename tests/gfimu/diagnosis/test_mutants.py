@@ -4,10 +4,11 @@ A mutant acts on the diagnosis only; the world is drawn before.
 """
 
 import sys
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
+from few_effects import having
 from hidden_cases import HiddenCase, group, hidden_cases
 from hidden_pins import LEAST_REMOVED, Pins, problems, removed_share
 
@@ -30,22 +31,6 @@ def diagnosed(hidden, world, twin=None):
         found = {"verdict": "error", "error": repr(error), "causes": [], "unexplained": False, "signature": ""}
     limits = {"reached": world.reached, "left_by": world.left_by, "drive_unknown": world.drive_unknown}
     return {"key": hidden.name, **hidden.case.to_dict(), **limits, **found}
-
-
-@dataclass(frozen=True)
-class FewEffects(Twin):
-    """A twin whose library has a few effects only: a search of it takes half a second."""
-
-    few: tuple[str, ...] = ()
-
-    def families(self):
-        library = super().families()
-        return {name: library[name] for name in self.few}
-
-
-def having(twin, *few):
-    """The twin with a few effects in its library."""
-    return FewEffects(array=twin.array, array_name=twin.array_name, sample_rate=twin.sample_rate, few=few)
 
 
 def expected_noise_tripled(patch):

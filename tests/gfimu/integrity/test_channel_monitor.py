@@ -64,6 +64,19 @@ def test_a_gain_is_found_while_the_reading_changes():
     assert (fault.channels, fault.kind) == ((NAMES[4],), "gain")
 
 
+@pytest.mark.parametrize("kind", ["rest", "tumble"])
+def test_a_fault_that_is_seen_when_it_grows_has_the_onset_at_which_it_began(kind):
+    for seed in (0, 3):
+        t, y, _ = readings(kind, seed)
+        y[t >= 8.0, 4] += (3 if kind == "rest" else 4) * MG  # below the threshold until the next step
+        y[t >= 12.0, 4] += 20 * MG
+        health = watch_channels(CUBE, t, y, CALIBRATED)
+        (fault,) = health.faults
+        assert fault.found_s > 12.0
+        assert fault.onset_s == pytest.approx(8.0, abs=0.35)
+        assert health.excluded[t >= 8.0, 4].all()
+
+
 @pytest.mark.parametrize(("kind", "motion"), [("drift", "rest"), ("stuck", "tumble"), ("noise", "turn")])
 def test_the_kind_of_a_fault_is_named(kind, motion):
     t, y, _ = readings(motion, 4)

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from few_effects import having
 
 from gfimu.diagnosis.data.stretch import make_stretches
 from gfimu.diagnosis.diagnose import diagnose, prepare
@@ -16,7 +17,9 @@ from gfimu.geometry.array import AccelerometerArray
 from sim.campaign import Measurement, measure
 from sim.twin import Twin
 
-TWIN = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
+TWIN = having(
+    Twin(array=AccelerometerArray.load("cube12"), array_name="cube12"), "eccentricity", "scale_factor", "table_tilt"
+)
 
 
 @pytest.fixture(scope="module")
