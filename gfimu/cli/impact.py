@@ -26,7 +26,7 @@ def _impact(
     array: Annotated[
         str | None, typer.Option("--array", help="Array, a name or .toml file; else the recording's own.")
     ] = None,
-    channel_class: Annotated[
+    cfc: Annotated[
         float, typer.Option("--cfc", help="Channel frequency class: 1000 (head), 600, 180, 60, or another.")
     ] = 1000.0,
     standard: Annotated[str, typer.Option("--standard", help="Of the filter: sae (J211-1) or iso (6487).")] = "sae",
@@ -56,7 +56,7 @@ def _impact(
     found = impact(
         recording,
         array,
-        channel_class=channel_class,
+        cfc=cfc,
         standard=standard,
         threshold_g=threshold_g,
         direction=direction,
@@ -73,7 +73,7 @@ def _impact(
     if json:
         print_json(found.to_dict() | {"files": files})
         return
-    print_table(f"{recording}, {standard.upper()} class {channel_class:g}", ("quantity", "value"), _rows(found))
+    print_table(f"{recording}, {standard.upper()} class {cfc:g}", ("quantity", "value"), _rows(found))
     for warning in found.warnings:
         print_text(warning, style="yellow")
     print_paths(list(files.items()))

@@ -24,7 +24,7 @@ def impact(
     recording: Recording | str | Path | MappedFile,
     array: AccelerometerArray | str | Path | None = None,
     *,
-    channel_class: float = 1000.0,
+    cfc: float = 1000.0,
     standard: str = "sae",
     threshold_g: float = 5.0,
     direction: str = "",
@@ -44,7 +44,7 @@ def impact(
         The recording, or its file; the largest impact in it is measured.
     array : AccelerometerArray, str or Path, optional
         The array, its name or file; the recording's own by default.
-    channel_class : float
+    cfc : float
         Channel frequency class: 1000 (head), 600, 180, 60, or another.
     standard : {"sae", "iso"}
         SAE J211-1 or ISO 6487.
@@ -83,7 +83,7 @@ def impact(
     from gfimu.recording.checks import examine
     from gfimu.units import STANDARD_GRAVITY
 
-    settings = ImpactSettings(channel_class, standard, threshold_g * STANDARD_GRAVITY, direction=direction)
+    settings = ImpactSettings(cfc, standard, threshold_g * STANDARD_GRAVITY, direction=direction)
     run, geometry = as_calibrated_run(by_map(recording, column_map, map_set), array, calibration)
     examine(run, geometry, source=name_of(recording), force=force)
     measured = measure_impact(run, geometry, settings)

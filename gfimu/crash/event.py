@@ -11,18 +11,16 @@ from numpy.typing import NDArray
 
 from gfimu.crash.channel_class import channel_filter
 from gfimu.crash.criteria import head_injury_criterion
+from gfimu.crash.polarity import DIRECTIONS, direction_remark, moved, sign_remark
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.geometry.kinematics import pseudo_inverse
-from gfimu.motion.estimation import Estimate, estimate
+from gfimu.motion.estimation import Estimate
 from gfimu.parts.limits import PartLimits
 from gfimu.recording import Recording
 from gfimu.units import STANDARD_GRAVITY
 
-__all__ = ["DIRECTIONS", "Impact", "ImpactSettings", "measure_impact", "time_zero"]
-
-DIRECTIONS = {f"{sign}{axis}": (k, 1.0 if sign == "+" else -1.0) for k, axis in enumerate("xyz") for sign in "+-"}
-"""Directions along a body axis: its number and sign."""
+__all__ = ["Impact", "ImpactSettings", "measure_impact", "time_zero"]
 
 _HIC_S = 0.015
 _NEAR_END = 0.98  # share of a channel's range
@@ -188,20 +186,24 @@ def measure_impact(recording: Recording, array: AccelerometerArray, settings: Im
     zeroed = Recording.from_arrays(
         time[last_quiet:], filtered[last_quiet:] - offset, array, metadata=dict(recording.metadata)
     )
-    motion = estimate(zeroed, array, quaternion0=(1.0, 0.0, 0.0, 0.0), force=True, findings=())
+    motion = moved(zeroed, array)
     limits = PartLimits.of(array, rate)
     if "calibration" in recording.metadata:
         limits = replace(limits, gain_std=np.zeros(array.n_channels))
     noise = (quiet - offset).std(axis=0)
     found = _figures(settings, motion, zeroed, noise, limits, array)
     beyond = np.abs(readings).max(axis=0) >= _NEAR_END * limits.full_range
-    warnings = [*_polarity(settings.direction, found["velocity_change_m_s"]), *_cut_off(array.channels, beyond)]
+    warnings = [
+        direction_remark(settings.direction, found["velocity_change_m_s"]) if settings.direction else "",
+        sign_remark(zeroed, array, motion),
+        _cut_off(array.channels, beyond),
+    ]
     return Impact(
         time_zero_s=float(recording.t_s[first]),
         offset_m_s2=dict(zip(array.channels, map(float, offset), strict=True)),
         motion=motion,
         recording=zeroed,
-        warnings=tuple(warnings),
+        warnings=tuple(filter(None, warnings)),
         **found,
     )
 
@@ -239,19 +241,7 @@ def _figures(
     }
 
 
-def _polarity(direction: str, change: NDArray[np.float64]) -> list[str]:
-    """Compare where the body was accelerated with where it was meant to be."""
-    if not direction:
-        return []
-    axis, sign = DIRECTIONS[direction]
-    strongest = int(np.abs(change).argmax())
-    if strongest == axis and sign * change[axis] > 0.0:
-        return []
-    seen = f"{'+' if change[strongest] > 0 else '-'}{'xyz'[strongest]}"
-    return [f"polarity: the body is accelerated along {seen}, not {direction}; look at the signs of the axes"]
-
-
-def _cut_off(channels: Sequence[str], beyond: NDArray[np.bool_]) -> list[str]:
+def _cut_off(channels: Sequence[str], beyond: NDArray[np.bool_]) -> str:
     """Name the channels that were at the end of their range."""
     names = ", ".join(name for name, one in zip(channels, beyond, strict=True) if one)
-    return [f"{names}: at the end of the range; the peak may be cut off"] if names else []
+    return f"{names}: at the end of the range; the peak may be cut off" if names else ""

@@ -30,7 +30,7 @@ def blow(tmp_path, monkeypatch):
 def test_channels_motion_and_picture_are_written(gfimu_command, blow):
     words = ("impact", "drop.csv", "--direction", "+x", "--out", "out.csv", "--estimate", "e.csv", "--picture", "p.png")
     run = gfimu_command(*words, "--json")
-    assert run.exit_code == 0, run.output
+    assert run.code == 0, run.stderr
     assert json.loads(run.stdout)["peak_alpha_rad_s2"] == pytest.approx(PEAK, rel=0.02)
     assert (blow / "p.png").stat().st_size > 10_000
     assert Recording.read("out.csv").t_s[0] == pytest.approx(-0.005, abs=1e-3)
@@ -43,5 +43,5 @@ def test_the_table_names_peaks_and_polarity(gfimu_command, blow):
 
 def test_a_class_too_high_for_the_sample_rate_is_refused(gfimu_command, blow):
     run = gfimu_command("impact", "drop.csv", "--cfc", "5000")
-    assert run.exit_code == 2
-    assert "take class 1000" in run.output
+    assert run.code == 2
+    assert "take class 1000" in run.stderr

@@ -1,5 +1,7 @@
 """An impact on the nine-accelerometer package: figures against the motion that was put in."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -55,6 +57,24 @@ def test_a_reversed_array_is_a_warning_where_the_direction_is_known():
     assert not any("polarity" in one for one in right.warnings)
     turned = measure_impact(blow(), NAP, ImpactSettings(direction="-x"))
     assert "accelerated along +x, not -x" in turned.warnings[0]
+
+
+@pytest.mark.parametrize("name", ["nap_3_2_2_2", "cube12"])
+@pytest.mark.parametrize("number", [1, 5, 7])
+def test_a_reversed_channel_is_named_among_those_with_its_signature(name, number):
+    array = AccelerometerArray.load(name)
+    run = blow(array, gain_std=0.01)
+    readings = run.readings.copy()
+    readings[:, number] *= -1.0
+    (remark,) = (one for one in measure_impact(replace(run, readings=readings), array).warnings if "range" not in one)
+    assert array.channels[number] in remark
+    assert "turn the sign" in remark
+    assert len(remark.split(" or ")) <= 2
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_gain_errors_of_the_data_sheet_are_no_reversal(seed):
+    assert not any("rigid body" in one for one in measure_impact(blow(seed=seed, gain_std=0.01), NAP).warnings)
 
 
 def test_a_cut_off_peak_is_a_warning():
