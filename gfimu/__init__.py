@@ -50,6 +50,7 @@ if TYPE_CHECKING:
     from gfimu.commands.drift import axis_drift as axis_drift
     from gfimu.commands.drift import drift as drift
     from gfimu.commands.estimate import estimate as estimate
+    from gfimu.commands.impact import impact as impact
     from gfimu.commands.inspect import inspect as inspect
     from gfimu.commands.join import join as join
     from gfimu.commands.live import live as live
@@ -137,6 +138,7 @@ _PUBLIC = {
     "firmware": "gfimu.commands",
     "gdop": "gfimu.geometry.dilution",
     "identify_noise": "gfimu.sensor_noise",
+    "impact": "gfimu.commands.impact",
     "integrate_attitude": "gfimu.motion.attitude",
     "integrate_rate": "gfimu.rate.integration",
     "joint_form": "gfimu.geometry.kinematics",

@@ -248,6 +248,13 @@ ROOMS = {
     "gfimu.geometry": {"gfimu.bounds.sample", "gfimu.files", "gfimu.parts.files"},
     "gfimu.importing": {"gfimu.files", "gfimu.geometry.array"},
     "gfimu.recording": {"gfimu.files", "gfimu.geometry", "gfimu.importing", "gfimu.parts", "gfimu.rate.integration"},
+    "gfimu.crash": {
+        "gfimu.geometry",
+        "gfimu.motion.estimation",
+        "gfimu.parts.limits",
+        "gfimu.recording",
+        "gfimu.visual.colours",
+    },
     "gfimu.exporting": {
         "gfimu.calibration",
         "gfimu.geometry",

@@ -199,14 +199,14 @@ def estimate_run(
     InputError
         As `estimate`.
     """
-    from gfimu.commands.opened import by_map, name_of
+    from gfimu.commands.opened import as_calibrated_run, by_map, name_of
     from gfimu.errors import InputError, naming
     from gfimu.motion.estimation import estimate as solve
     from gfimu.motion.rest_bias import estimate_from_rest
     from gfimu.recording.carried_array import warn_of_other_array
     from gfimu.recording.reference_times import reference_on_rows
 
-    run, geometry = _opened(by_map(recording, column_map, map_set), array, calibration)
+    run, geometry = as_calibrated_run(by_map(recording, column_map, map_set), array, calibration)
     if array is not None and calibration is None:
         warn_of_other_array(run.metadata, geometry, "the recording", whose="the given")
     run = reference_on_rows(run)
@@ -255,25 +255,6 @@ def _with_axis(array: AccelerometerArray, estimate: Estimate) -> AccelerometerAr
 
     axis = estimate.metadata.get("turning_axis")
     return array if axis is None else replace(array, turning_axis=TurningAxis.from_dict(axis, source=array.name))
-
-
-def _opened(
-    recording: Recording | str | Path | MappedFile,
-    array: AccelerometerArray | str | Path | None,
-    calibration: Calibration | str | Path | None,
-) -> tuple[Recording, AccelerometerArray]:
-    """Return recording and array, corrected by the calibration where there is one."""
-    from gfimu.calibration.run_file import open_calibrated_run
-    from gfimu.commands.opened import as_array, as_calibration, as_run
-    from gfimu.recording import Recording
-
-    if calibration is None:
-        return as_run(recording, array)
-    unit = as_calibration(calibration)
-    if isinstance(recording, Recording):
-        run, geometry = as_run(recording, array)
-        return unit.apply(run), unit.calibrated_array(geometry)
-    return open_calibrated_run(recording, unit, None if array is None else as_array(array))
 
 
 def _turning(

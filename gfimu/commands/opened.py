@@ -141,6 +141,24 @@ def as_calibration(calibration: Calibration | str | Path) -> Calibration:
     return load_calibration(calibration)
 
 
+def as_calibrated_run(
+    recording: Recording | str | Path | MappedFile,
+    array: AccelerometerArray | str | Path | None,
+    calibration: Calibration | str | Path | None,
+) -> tuple[Recording, AccelerometerArray]:
+    """Return recording and array, corrected by the calibration where there is one."""
+    from gfimu.calibration.run_file import open_calibrated_run
+    from gfimu.recording import Recording
+
+    if calibration is None:
+        return as_run(recording, array)
+    unit = as_calibration(calibration)
+    if isinstance(recording, Recording):
+        run, geometry = as_run(recording, array)
+        return unit.apply(run), unit.calibrated_array(geometry)
+    return open_calibrated_run(recording, unit, None if array is None else as_array(array))
+
+
 def as_twin(twin: WorldModel | str | Path) -> WorldModel:
     """Return a twin given as such, by name, as a twin file, or as a world model of one's own (``rig.py:function``).
 

@@ -52,6 +52,7 @@ CALLS = {
     "design": {"effects": "bias", "twin": "cube12_turntable"},
     "calibrate": {"method": "array", "recording": "in.csv", "out": "made.json"},
     "noise": {"recording": "in.csv"},
+    "impact": {"recording": "in.csv", "array": "cube12", "out": "made.csv"},
     "record": {"port": "socket://127.0.0.1:1", "out": "made.csv"},
     "view": {"file": "in.csv"},
     "optimize": {"chips": "4", "restarts": "1"},
