@@ -271,6 +271,7 @@ ROOMS = {
     "firmware_bridge.frames": {"gfimu.files", "gfimu.geometry.array"},
     "firmware_bridge.host": {
         "firmware_bridge.frames",
+        "firmware_bridge.sources",
         "gfimu.files",
         "gfimu.geometry.array",
         "gfimu.integrity",
@@ -288,6 +289,7 @@ ROOMS = {
         "gfimu.recording",
         "sim.adxl345",
     },
+    "firmware_bridge.sources": {"firmware_bridge.frames", "gfimu.geometry.array", "gfimu.importing.piece"},
     "firmware_bridge.strict": {
         "firmware_bridge.adxl345",
         "firmware_bridge.board",

@@ -23,7 +23,14 @@ def register(app: typer.Typer) -> None:
 
 
 def _record(
-    port: Annotated[str, typer.Option("--port", help="Device, pseudo-terminal, or socket://host:port.")] = "",
+    port: Annotated[
+        str,
+        typer.Option(
+            "--port",
+            help="Device, pseudo-terminal, socket://host:port, udp://address:port, klipper:///socket?chip=NAME, or "
+            "phyphox://address:port.",
+        ),
+    ] = "",
     out: Annotated[Path | None, typer.Option("--out", help="Recording to write, .csv or .parquet.")] = None,
     find: Annotated[
         bool, typer.Option("--find", help="Look for the board: every port or --port, every speed and format.")
@@ -69,6 +76,8 @@ def _record(
     Example: gfimu record --port /dev/ttyUSB0 --out run.parquet --rate 800 --duration 60
 
     Example: gfimu record --find --self-test --out run.parquet
+
+    Example: gfimu record --port "klipper:///tmp/klippy_uds?chip=hotend,bed" --array pair.toml --out run.parquet
     """
     from gfimu.commands.record import record
 
