@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import socket
 import time
+from collections.abc import Iterable, Iterator
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
@@ -77,6 +78,8 @@ class KlipperSource:
         self._merger = ChipMerger(self._chips or ("",))
         self._socket: socket.socket | None = None
         self._waiting = b""
+        self._early: list[dict[str, Any]] = []  # batches that came before the answer to the last request
+        self._trouble: Exception | None = None  # raised once what came before it is passed on
         self._heard_s: list[float] = []
         self._errors: dict[str, int] = {}
         self._overflows: dict[str, int] = {}
@@ -95,7 +98,7 @@ class KlipperSource:
         if not hasattr(socket, "AF_UNIX"):
             raise InputError(f"{self._port}: this system has no unix domain sockets; record on the printer's computer")
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-        self._waiting = b""
+        self._waiting, self._early, self._trouble = b"", [], None
         self._merger.start_anew()
         try:
             self._socket.settimeout(_ANSWER_S)
@@ -140,12 +143,14 @@ class KlipperSource:
         return tuple(name.split()[-1] for name in map(str, sections) if name.split()[:1] == [_SECTION])
 
     def _ask(self, method: str, parameters: dict[str, Any]) -> dict[str, Any]:
-        """Return the result of a request; what else comes meanwhile are batches too early to be used."""
+        """Return the result of a request."""
         assert self._socket is not None
         self._socket.sendall(json.dumps({"id": method, "method": method, "params": parameters}).encode() + _END)
         until = time.monotonic() + _ANSWER_S
         while time.monotonic() < until:
-            for message in self._messages():
+            messages = list(self._messages())
+            self._early += [message for message in messages if message.get("id") != method]
+            for message in messages:
                 if message.get("id") != method:
                     continue
                 if "error" in message:
@@ -160,8 +165,8 @@ class KlipperSource:
                 raise self._garbage()
         raise TimeoutError(f"no answer to {method} in {_ANSWER_S:g} s")
 
-    def _messages(self) -> list[dict[str, Any]]:
-        """Read once, and return the messages that are complete."""
+    def _messages(self) -> Iterator[dict[str, Any]]:
+        """Read once, and yield the messages that are complete."""
         assert self._socket is not None
         data = self._socket.recv(_READ_BYTES)
         if not data:
@@ -169,28 +174,37 @@ class KlipperSource:
         *texts, self._waiting = (self._waiting + data).split(_END)
         if len(self._waiting) > _LONGEST_MESSAGE:
             raise self._garbage()
-        try:
-            messages = [json.loads(text) for text in texts]
-        except (ValueError, RecursionError):
-            raise self._garbage() from None
-        if not all(isinstance(message, dict) for message in messages):
-            raise self._garbage()
-        return messages
+        for text in texts:
+            try:
+                message = json.loads(text)
+            except (ValueError, RecursionError):
+                message = None
+            if not isinstance(message, dict):
+                raise self._garbage()
+            yield message
 
     def read(self, size: int, /) -> bytes:
         """Return the samples that are complete."""
+        if self._trouble is not None:
+            raise self._trouble
         now = time.monotonic()
         if self._heard_s and now - min(self._heard_s) > _SILENT_S:
             raise ConnectionError(f"a chip sent nothing for {_SILENT_S:g} s")
         try:
-            messages = self._messages()
+            self._take_all(self._early, now)
+            self._early = []
+            self._take_all(self._messages(), now)
         except TimeoutError:
-            return b""
+            pass
+        except (OSError, GfimuError) as error:
+            self._trouble = error
+        t_s, readings = self._merger.take()
+        return pack_samples(self._form, t_s, readings) if len(t_s) else b""
+
+    def _take_all(self, messages: Iterable[dict[str, Any]], now: float) -> None:
         for message in messages:
             if message.get("chip") in self._chips and isinstance(message.get("params"), dict):
                 self._take(self._chips.index(message["chip"]), message["params"], now)
-        t_s, readings = self._merger.take()
-        return pack_samples(self._form, t_s, readings) if len(t_s) else b""
 
     def _take(self, chip: int, batch: dict[str, Any], now_s: float) -> None:
         """Take a batch of one chip: rows of time, s, and three readings, mm/s²."""

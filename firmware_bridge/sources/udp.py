@@ -55,8 +55,11 @@ class UdpSource:
         self._board: tuple[str, int] | None = None
         self._newest: int | None = None
         self._others = self._late = 0
-        reach = " (only from this computer)" if self._address[0] == _LOOPBACK else ""
-        self.hint = f"let the board send to port {number} of this computer's address{reach}; udp://0.0.0.0 takes any"
+        self.hint = (
+            f"{_LOOPBACK} takes what this computer sends itself; give udp://0.0.0.0:{number} for a board on the network"
+            if self._address[0] == _LOOPBACK
+            else f"let the board send to port {number} of this computer's address, and open it in the firewall"
+        )
 
     def open(self) -> None:
         """Bind the port."""

@@ -37,6 +37,7 @@ class FakeKlippy:
         self.listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         self.listener.bind(str(path))
         self.listener.listen(1)
+        self.listener.settimeout(0.05)
         self.done = threading.Event()
         self.thread = threading.Thread(target=self._serve, daemon=True)
 
@@ -46,16 +47,17 @@ class FakeKlippy:
 
     def __exit__(self, *_):
         self.done.set()
-        self.listener.close()
         self.thread.join(5.0)
+        self.listener.close()
 
     def _serve(self) -> None:
         for start in self.starts:
-            self.listener.settimeout(5.0)
-            try:
-                connection, _ = self.listener.accept()
-            except OSError:
-                return
+            connection = None
+            while connection is None:
+                with suppress(TimeoutError):
+                    connection, _ = self.listener.accept()
+                if self.done.is_set():
+                    return
             with connection, suppress(OSError):
                 self._talk(connection, start)
 
@@ -73,14 +75,16 @@ class FakeKlippy:
             except TimeoutError:
                 pass
             if len(templates) == len(self.rates) and sent < self.batches:
+                connection.settimeout(5.0)
                 for name, template in templates.items():
                     if name not in self.silent:
                         self._send(connection, {**template, "params": self._batch(name, start, sent)})
+                connection.settimeout(0.02)
                 sent += 1
             if sent == self.batches:
                 if self.garbage:
                     connection.sendall(self.garbage)
-                if not self.hold_open:
+                if not self.hold_open and start != self.starts[-1]:
                     return
                 self.done.wait(0.02)
 

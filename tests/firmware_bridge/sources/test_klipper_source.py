@@ -96,7 +96,7 @@ def test_a_printer_that_is_not_ready(path, tmp_path) -> None:
 
 
 def test_no_socket(tmp_path) -> None:
-    with pytest.raises(InputError, match="can't be opened.*start Klipper with -a"):
+    with pytest.raises(InputError, match=r"can't be opened.*start Klipper with -a"):
         record(f"klipper://{tmp_path}/nothing", tmp_path / "run.csv")
 
 
