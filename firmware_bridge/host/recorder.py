@@ -59,6 +59,8 @@ class RecordReport:
         Faults of channels that a live view saw (`gfimu.integrity.fault.ChannelFault.entries`).
     baud : int or None
         Speed of the line at the end, bits per second.
+    source : dict
+        What a source says of itself (`firmware_bridge.sources`); also in the recording's metadata.
     """
 
     path: Path
@@ -70,6 +72,7 @@ class RecordReport:
     status_counts: dict[str, int] = field(default_factory=dict)
     faults: tuple[dict[str, Any], ...] = ()
     baud: int | None = None
+    source: dict[str, Any] = field(default_factory=dict)
 
 
 def record(
@@ -178,6 +181,7 @@ def record(
         )
     counts = session.decoder.counts
     fit = session.clock.fit()
+    of_source = {} if link.source is None else link.source.facts()
     final = {
         "frames_lost": counts.lost,
         "frames_corrupt": counts.corrupt,
@@ -187,7 +191,7 @@ def record(
         "connection_breaks": breaks,
         "status_counts": session.status_counts,
         **session.rate.metadata(fit),
-        **({} if link.source is None else link.source.facts()),
+        **of_source,
         **({} if fit is None else {"host_clock": fit.__dict__}),
         **({} if trouble is None else {"ended_by": str(trouble)}),
     }
@@ -199,8 +203,9 @@ def record(
         raise trouble
     duration = session.last_s - (session.first_s or 0.0)
     return RecordReport(
-        target, duration, counts, breaks, fit, session.identity, session.status_counts, baud=session.baud
-    )
+        target, duration, counts, breaks, fit, session.identity, session.status_counts,
+        baud=session.baud, source=of_source,
+    )  # fmt: skip
 
 
 @contextmanager
