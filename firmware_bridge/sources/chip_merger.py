@@ -13,8 +13,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.importing.piece import at_times
-
 __all__ = ["ChipMerger", "noise_factor", "spline_error"]
 
 _MARGIN = 16  # samples around a place after which a spline's end no longer shows: (2 − √3)^16 = 7e-10
@@ -66,6 +64,14 @@ class _Chip:
         self.t_s = np.concatenate([self.t_s, t_s])
         self.readings = np.concatenate([self.readings, readings])
 
+    def at(self, t_s: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the readings (m, 3) at other times (m,); NaN in gaps and outside."""
+        from gfimu.importing.piece import at_times  # see `ChipMerger`
+
+        if not len(t_s):
+            return np.empty((0, 3))
+        return np.column_stack([at_times(t_s, self.t_s, column) for column in self.readings.T])
+
     def drop_before(self, place: int) -> None:
         self.t_s, self.readings = self.t_s[max(place, 0) :], self.readings[max(place, 0) :]
 
@@ -86,8 +92,10 @@ class ChipMerger:
     def __init__(self, names: tuple[str, ...]) -> None:
         self.names = names
         self._chips = [_Chip() for _ in names]
+        self._have_begun = False
         if len(names) > 1:
-            importlib.import_module("scipy.interpolate")  # takes seconds, for which no sample should wait
+            for module in ("scipy.interpolate", "gfimu.importing.piece"):
+                importlib.import_module(module)  # takes seconds, for which no sample should wait
 
     def start_anew(self) -> None:
         """Forget the samples that wait: the stream was broken; the rates stay."""
@@ -103,29 +111,28 @@ class ChipMerger:
         """Take samples of a chip: times (n,), s, increasing, and readings (n, 3), m/s²."""
         self._chips[chip].add(t_s, readings)
 
-    def take(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def take(self, *, rest: bool = False) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return what is complete: times (n,), s, of the first chip and the readings (n, 3 k) of all, m/s².
 
-        A chip that is behind by more than a second is missing (NaN) in the samples that waited for it.
+        A chip that is behind by more than a second is missing (NaN) in the samples that waited for it; with ``rest``,
+        at the end of a stream, nothing waits any more.
         """
         first, *others = self._chips
-        if not len(first.t_s) or (others and not all(len(chip.t_s) for chip in others)):
+        if not len(first.t_s) or not (self._have_begun or all(len(chip.t_s) for chip in others)):
             return np.empty(0), np.empty((0, 3 * len(self._chips)))
         until = min([float(first.t_s[-1]), *(_settled_s(chip.t_s) for chip in others)])
-        until = max(until, float(first.t_s[-1]) - _LONGEST_WAIT_S)
+        until = max(until, float(first.t_s[-1]) - (0.0 if rest else _LONGEST_WAIT_S))
         end = int(np.searchsorted(first.t_s, until, side="right"))
         t_s, mine = first.t_s[:end], first.readings[:end]
-        theirs = [
-            np.column_stack([at_times(t_s, chip.t_s, column) for column in chip.readings.T])
-            if len(t_s) else np.empty((0, 3))
-            for chip in others
-        ]  # fmt: skip
-        begun = t_s >= max((float(chip.t_s[0]) for chip in others), default=-np.inf)
-        readings = np.column_stack([mine, *theirs])
+        readings = np.column_stack([mine, *(chip.at(t_s) for chip in others)])
+        start = 0
+        if not self._have_begun:
+            start = int(np.searchsorted(t_s, max((float(chip.t_s[0]) for chip in others), default=-np.inf)))
+            self._have_begun = start < end
         first.drop_before(end)
         for chip in others if end else ():
             chip.drop_before(int(np.searchsorted(chip.t_s, t_s[-1])) - _MARGIN)
-        return t_s[begun], readings[begun]
+        return t_s[start:], readings[start:]
 
     def facts(self) -> dict[str, Any]:
         """Rates of the chips, how much they differ, and what the interpolation adds, for the metadata."""

@@ -80,7 +80,7 @@ class KlipperSource:
         self._waiting = b""
         self._early: list[dict[str, Any]] = []  # batches that came before the answer to the last request
         self._trouble: Exception | None = None  # raised once what came before it is passed on
-        self._heard_s: list[float] = []
+        self._heard_s: dict[int, float] = {}  # since it was opened; the first chip from then on
         self._errors: dict[str, int] = {}
         self._overflows: dict[str, int] = {}
         self._unordered = 0
@@ -108,7 +108,7 @@ class KlipperSource:
         except BaseException:
             self._socket.close()
             raise
-        self._heard_s = [time.monotonic()] * len(self._chips)
+        self._heard_s = {0: time.monotonic()}
 
     def _subscribe(self) -> None:
         """Ask for the chips by their names in the configuration."""
@@ -188,9 +188,9 @@ class KlipperSource:
         if self._trouble is not None:
             raise self._trouble
         now = time.monotonic()
-        if self._heard_s and now - min(self._heard_s) > _SILENT_S:
-            raise ConnectionError(f"a chip sent nothing for {_SILENT_S:g} s")
         try:
+            if now - min(self._heard_s.values()) > _SILENT_S:
+                raise ConnectionError(f"a chip sent nothing for {_SILENT_S:g} s")
             self._take_all(self._early, now)
             self._early = []
             self._take_all(self._messages(), now)
@@ -198,7 +198,7 @@ class KlipperSource:
             pass
         except (OSError, GfimuError) as error:
             self._trouble = error
-        t_s, readings = self._merger.take()
+        t_s, readings = self._merger.take(rest=self._trouble is not None)
         return pack_samples(self._form, t_s, readings) if len(t_s) else b""
 
     def _take_all(self, messages: Iterable[dict[str, Any]], now: float) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import socket
-from contextlib import suppress
+import time
 
 import numpy as np
 import pytest
@@ -152,6 +152,31 @@ def test_a_chip_that_sends_nothing_is_named(path, tmp_path, monkeypatch) -> None
     assert not (tmp_path / "run.csv").exists()
 
 
+def test_a_chip_that_dies_is_missing_and_the_other_goes_on(path, tmp_path, monkeypatch) -> None:
+    """It is subscribed to once more, and then no longer waited for."""
+    monkeypatch.setattr(klipper, "_SILENT_S", 0.3)
+    out = tmp_path / "run.parquet"
+    klippy = FakeKlippy(path, TWO, batches=40, starts=(100.0, 102.6))
+    whole = klippy._batch
+
+    def batch(name, start, number):
+        time.sleep(0.02)
+        if start == 102.6 or number == 9:
+            klippy.silent = {"bed"}
+        return whole(name, start, number)
+
+    klippy._batch = batch
+    with klippy:
+        report = record(f"klipper://{path}?chip=hotend,bed", out, duration_s=2.2, array="toolhead_pair")
+    recording = Recording.read(out)
+    assert report.breaks == 1
+    assert np.isfinite(recording.readings[:, :3]).all()
+    late = recording.t_s > 101.1
+    assert np.isfinite(recording.readings[~late & (recording.t_s < 100.9)]).all()
+    assert np.isnan(recording.readings[late, 3:]).all()
+    assert recording.t_s[-1] > 102.1
+
+
 def test_a_subscription_that_klipper_gave_up_is_made_again(path, tmp_path, monkeypatch) -> None:
     """Klipper says nothing when reading a chip fails: the batches just end."""
     monkeypatch.setattr(klipper, "_SILENT_S", 0.3)
@@ -159,5 +184,4 @@ def test_a_subscription_that_klipper_gave_up_is_made_again(path, tmp_path, monke
     with FakeKlippy(path, ONE, batches=5, starts=(100.0, 101.0)):
         report = record(f"klipper://{path}", out, duration_s=1.3)
     assert report.breaks == 1
-    with suppress(KeyError):
-        assert "ended_by" not in Recording.read(out).metadata
+    assert "ended_by" not in Recording.read(out).metadata
