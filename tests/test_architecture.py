@@ -278,6 +278,7 @@ ROOMS = {
     "firmware_bridge.frames": {"gfimu.files", "gfimu.geometry.array"},
     "firmware_bridge.host": {
         "firmware_bridge.frames",
+        "firmware_bridge.sources",
         "gfimu.files",
         "gfimu.geometry.array",
         "gfimu.integrity",
@@ -296,6 +297,7 @@ ROOMS = {
         "sim.adxl345",
     },
     "firmware_bridge.sender": {"firmware_bridge.lpc1768.build"},
+    "firmware_bridge.sources": {"firmware_bridge.frames", "gfimu.geometry.array", "gfimu.importing.piece"},
     "firmware_bridge.strict": {
         "firmware_bridge.adxl345",
         "firmware_bridge.board",

@@ -1,4 +1,4 @@
-"""The link to a board: a serial device, a pseudo-terminal or a TCP port; it comes back after an unplug."""
+"""The link to a board: a serial device, a pseudo-terminal, a TCP port or a source; it comes back after an unplug."""
 
 from __future__ import annotations
 
@@ -13,6 +13,9 @@ from typing import Any, Self
 
 import serial
 
+from firmware_bridge.frames.frame_format import FrameFormat
+from firmware_bridge.sources.ports import source_of
+from firmware_bridge.sources.source import Source
 from gfimu.errors import GfimuError, InputError
 
 __all__ = ["DEFAULT_BAUD", "Chunk", "Link"]
@@ -25,6 +28,7 @@ _QUEUE_CHUNKS = 4096
 _FIRST_RETRY_S, _LONGEST_RETRY_S = 0.1, 2.0
 _LOST_FOR_S = 60.0
 _TAKEN = {errno.EAGAIN, errno.EWOULDBLOCK, errno.EBUSY}
+_TAKEN_ADDRESS = {errno.EADDRINUSE, errno.EADDRNOTAVAIL}
 _NOT_THERE_YET = {errno.ENOENT, errno.ENODEV, errno.ENXIO, errno.EIO, errno.EACCES}  # EACCES: until udev is through
 
 
@@ -60,12 +64,15 @@ class Link:
     Parameters
     ----------
     port : str
-        Device (``/dev/ttyUSB0``, ``COM3``), pseudo-terminal, or ``socket://host:port``.
+        Device (``/dev/ttyUSB0``, ``COM3``), pseudo-terminal, ``socket://host:port``, or a source
+        (`firmware_bridge.sources`).
     baud : int
-        Bits per second; without meaning on pseudo-terminals and sockets.
+        Bits per second; without meaning on pseudo-terminals, sockets and sources.
     reconnect_s : float, optional
         How long to wait for a port that is not there yet, and for a connection that was lost, s. By default a port has
         to be there at once, and a lost connection is waited for a minute.
+    form : FrameFormat, optional
+        Format in which a source gives its samples.
 
     Raises
     ------
@@ -77,11 +84,19 @@ class Link:
     A serial device or pseudo-terminal is opened for this program alone: two readers would share out its bytes.
     """
 
-    def __init__(self, port: str, *, baud: int = DEFAULT_BAUD, reconnect_s: float | None = None) -> None:
+    def __init__(
+        self,
+        port: str,
+        *,
+        baud: int = DEFAULT_BAUD,
+        reconnect_s: float | None = None,
+        form: FrameFormat | None = None,
+    ) -> None:
         self.port = port
         self.breaks = 0
         self._baud = baud
         self._reconnect_s = _LOST_FOR_S if reconnect_s is None else reconnect_s
+        self.source = source_of(port, form)
         self._is_socket = port.startswith("socket://")
         self._serial = self._open_first(reconnect_s or 0.0)
         self._chunks: queue.Queue[Chunk | GfimuError | None] = queue.Queue(_QUEUE_CHUNKS)
@@ -99,6 +114,8 @@ class Link:
         self.close()
 
     def _open(self) -> Any:
+        if self.source is not None:
+            return self._open_source(self.source)
         timeout = _SOCKET_POLL_S if self._is_socket else _POLL_S
         exclusive = None if "://" in self.port else True  # a lock on the device (flock); on Windows always
         try:
@@ -116,6 +133,18 @@ class Link:
             raise (_NotYetError if may_pass else InputError)(
                 f"{self.port}: can't be opened ({reason}); give a device, a pseudo-terminal or socket://host:port"
             ) from None
+
+    def _open_source(self, source: Source) -> Source:
+        try:
+            source.open()
+        except InputError:
+            raise
+        except OSError as error:
+            if error.errno in _TAKEN_ADDRESS:
+                raise InputError(f"{self.port}: {error.strerror}; {source.hint}") from None
+            reason = error.strerror or str(error) or type(error).__name__
+            raise _NotYetError(f"{self.port}: can't be opened ({reason}); {source.hint}") from None
+        return source
 
     def _open_first(self, wait_s: float) -> Any:
         """Open the port, or wait for it to appear."""
@@ -182,6 +211,9 @@ class Link:
         while not self._closing.is_set():
             try:
                 data = self._read_some()
+            except GfimuError as error:  # a source that goes on no more
+                self._put(error)
+                return
             except (serial.SerialException, OSError, TypeError):  # pyserial: TypeError when closed while reading
                 if self._closing.is_set():
                     return
@@ -197,7 +229,7 @@ class Link:
 
     def _read_some(self) -> bytes:
         """Bytes that are there, or an empty string after a short wait."""
-        if self._is_socket:  # does not tell how many bytes wait
+        if self._is_socket or self.source is not None:  # does not tell how many bytes wait
             return bytes(self._serial.read(_READ_BYTES))
         data = bytes(self._serial.read(1))
         return data + bytes(self._serial.read(min(self._serial.in_waiting, _READ_BYTES))) if data else data

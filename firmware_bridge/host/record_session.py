@@ -150,7 +150,7 @@ class RecordSession:
             samples = SampleDecoder(self._form).feed(chunk.data)
             if len(samples):
                 passed_s = chunk.host_s - self._read_at_s
-                if abs(self.decoder.gap_s(int(samples.ticks[0])) - passed_s) > _SAME_CLOCK_S:
+                if abs(self.decoder.gap_s(int(samples.ticks[-1])) - passed_s) > _SAME_CLOCK_S:
                     self.decoder.start_anew()
                 return
 

@@ -15,13 +15,14 @@ from typing import Any
 
 import gfimu
 from firmware_bridge.frames.commands import Identity, asked_rate
-from firmware_bridge.frames.decoder import FrameFormat, StreamCounts, frame_format
+from firmware_bridge.frames.decoder import FrameFormat, StreamCounts
 from firmware_bridge.host.clock import ClockFit
 from firmware_bridge.host.finder import SPEEDS, has_speed
 from firmware_bridge.host.journal import JournalError
 from firmware_bridge.host.line_up import line_up, needed_baud
 from firmware_bridge.host.link import Chunk, Link
 from firmware_bridge.host.record_session import Batch, RecordSession, SampleClock
+from firmware_bridge.sources.ports import port_format
 from gfimu.errors import GfimuError, InputError
 from gfimu.files.outputs import RECORDING, check_outputs
 from gfimu.geometry.array import AccelerometerArray
@@ -58,6 +59,8 @@ class RecordReport:
         Faults of channels that a live view saw (`gfimu.integrity.fault.ChannelFault.entries`).
     baud : int or None
         Speed of the line at the end, bits per second.
+    source : dict
+        What a source says of itself (`firmware_bridge.sources`); also in the recording's metadata.
     """
 
     path: Path
@@ -69,6 +72,7 @@ class RecordReport:
     status_counts: dict[str, int] = field(default_factory=dict)
     faults: tuple[dict[str, Any], ...] = ()
     baud: int | None = None
+    source: dict[str, Any] = field(default_factory=dict)
 
 
 def record(
@@ -76,7 +80,7 @@ def record(
     out: str | Path,
     *,
     duration_s: float | None = None,
-    form: str | FrameFormat = "lpc1768",
+    form: str | FrameFormat = "",
     array: str = "",
     baud: int | None = None,
     setup: tuple[bytes, ...] = (),
@@ -89,13 +93,15 @@ def record(
     Parameters
     ----------
     port : str
-        Device, pseudo-terminal or ``socket://host:port``.
+        Device, pseudo-terminal, ``socket://host:port``, or a source (`firmware_bridge.sources`): ``udp://``,
+        ``klipper://``, ``phyphox://``.
     out : str or Path
         ``.csv`` or ``.parquet``; can be read at any moment, at most half a second behind.
     duration_s : float, optional
         Length of the recording, s of board time; by default until stopped.
     form : str or FrameFormat
-        Frame format, or its name in `firmware_bridge.frames.decoder.FORMATS`.
+        Frame format, or its name in `firmware_bridge.frames.decoder.FORMATS`; by default that of this project's board,
+        and of a source that delivers samples its own.
     array : str
         Array file; by default the format's. With fewer chips than the format has, they are the first ones.
     baud : int, optional
@@ -120,7 +126,7 @@ def record(
     """
     target = Path(out)
     check_outputs([("out", target, RECORDING)])
-    layout = frame_format(form)
+    layout = port_format(port, form, array)
     if setup and layout.dialogue is None:
         raise InputError(f"format {layout.name} has no commands: rate and range can't be set; leave them out")
     carried = AccelerometerArray.load(array or layout.array)
@@ -138,7 +144,10 @@ def record(
         "time_stamp_tick_hz": layout.clock_hz,
     }
     session = RecordSession(layout, carried, target, metadata, has_setup=bool(setup))
-    with Link(port, baud=baud or SPEEDS[0], reconnect_s=reconnect_s) as link, _ask_to_stop() as asked:
+    with (
+        Link(port, baud=baud or SPEEDS[0], reconnect_s=reconnect_s, form=layout) as link,
+        _ask_to_stop() as asked,
+    ):
         trouble = _run(
             link,
             session,
@@ -161,12 +170,15 @@ def record(
     if session.journal is None:
         if isinstance(trouble, GfimuError):
             raise trouble
+        if link.source is not None and not session.decoder.counts.skipped_bytes:
+            raise InputError(f"{port}: nothing came; {link.source.hint}")
         raise InputError(
             f"{port}: no {layout.name} frame came{f' at {baud} baud' if baud else ''}; check the port and --format, "
             f"or look for the board with --find ({session.decoder.counts.skipped_bytes} bytes were no frames)"
         )
     counts = session.decoder.counts
     fit = session.clock.fit()
+    of_source = {} if link.source is None else link.source.facts()
     final = {
         "frames_lost": counts.lost,
         "frames_corrupt": counts.corrupt,
@@ -176,6 +188,7 @@ def record(
         "connection_breaks": breaks,
         "status_counts": session.status_counts,
         **session.rate.metadata(fit),
+        **of_source,
         **({} if fit is None else {"host_clock": fit.__dict__}),
         **({} if trouble is None else {"ended_by": str(trouble)}),
     }
@@ -187,8 +200,9 @@ def record(
         raise trouble
     duration = session.last_s - (session.first_s or 0.0)
     return RecordReport(
-        target, duration, counts, breaks, fit, session.identity, session.status_counts, baud=session.baud
-    )
+        target, duration, counts, breaks, fit, session.identity, session.status_counts,
+        baud=session.baud, source=of_source,
+    )  # fmt: skip
 
 
 @contextmanager
@@ -247,8 +261,10 @@ def _run(
             chunk = chunks.popleft() if chunks else link.read()
             now = time.monotonic()
             if chunk is not None:
-                if chunk.after_break:
+                if chunk.after_break and (link.source is None or session.first_s is None):
                     session.decoder.break_stream()
+                elif chunk.after_break:  # its samples have no numbers: only the clocks can say what is missing
+                    session.resume([chunk])
                 batch = session.take(chunk.data, chunk.host_s)
                 if session.identity is not seen:
                     seen = session.identity

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -23,7 +23,14 @@ def register(app: typer.Typer) -> None:
 
 
 def _record(
-    port: Annotated[str, typer.Option("--port", help="Device, pseudo-terminal, or socket://host:port.")] = "",
+    port: Annotated[
+        str,
+        typer.Option(
+            "--port",
+            help="Device, pseudo-terminal, socket://host:port, udp://address:port, klipper:///socket?chip=NAME, or "
+            "phyphox://address:port.",
+        ),
+    ] = "",
     out: Annotated[Path | None, typer.Option("--out", help="Recording to write, .csv or .parquet.")] = None,
     find: Annotated[
         bool, typer.Option("--find", help="Look for the board: every port or --port, every speed and format.")
@@ -69,6 +76,8 @@ def _record(
     Example: gfimu record --port /dev/ttyUSB0 --out run.parquet --rate 800 --duration 60
 
     Example: gfimu record --find --self-test --out run.parquet
+
+    Example: gfimu record --port "klipper:///tmp/klippy_uds?chip=hotend,bed" --array pair.toml --out run.parquet
     """
     from gfimu.commands.record import record
 
@@ -152,8 +161,18 @@ def _record(
     if report.baud is not None:
         rows.append(("speed of the line", f"{report.baud} baud"))
     rows += [(f"status {name}", number) for name, number in report.status_counts.items()]
+    rows += [(name.replace("_", " "), _short(value)) for name, value in report.source.items()]
     print_table(f"recorded from {port}", ("quantity", "value"), rows)
     print_paths(written.items())
+
+
+def _short(value: Any) -> str:
+    """Return a fact on a source as text: numbers to six digits, parts with their names."""
+    if isinstance(value, dict):
+        return ", ".join(f"{name} {_short(part)}" for name, part in value.items())
+    if isinstance(value, list):
+        return ", ".join(map(_short, value))
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
 def _description(board: Found) -> str:

@@ -11,6 +11,7 @@ from gfimu.errors import InputError
 from gfimu.files.outputs import RECORDING, RERUN, writes
 
 if TYPE_CHECKING:
+    from firmware_bridge.frames.frame_format import FrameFormat
     from firmware_bridge.host.chip_selftest import AxisSelfTest
     from firmware_bridge.host.finder import Found
     from firmware_bridge.host.live import LiveView
@@ -47,7 +48,8 @@ def record(
     Parameters
     ----------
     port : str
-        Device, pseudo-terminal, or ``socket://host:port``; may be left out with ``find``.
+        Device, pseudo-terminal, ``socket://host:port``, ``udp://address:port``, ``klipper:///socket?chip=NAME``, or
+        ``phyphox://address:port``; may be left out with ``find``.
     out : str or Path, optional
         Recording to write, ``.csv`` or ``.parquet``; can be read while it grows. May be left out with ``find``.
     find : bool
@@ -63,7 +65,7 @@ def record(
         Ask the board for ±2, 4, 8 or 16 g (``--range``).
     form : str
         Frame format (``--format``): a key of `firmware_bridge.frames.frame_format.FORMATS`; else ``lpc1768``, or
-        what is found.
+        what is found. Klipper and phyphox send samples and have none.
     array : str
         Array on the board; the format's by default. A board of the format ``lpc1768`` may have fewer chips than four:
         then the array's chips are the first ones.
@@ -101,7 +103,10 @@ def record(
     """
     from firmware_bridge.frames.commands import set_range, set_rate
     from firmware_bridge.host.recorder import record as record_port
+    from firmware_bridge.sources.ports import has_own_samples, port_format
 
+    if (find or self_test) and has_own_samples(port):
+        raise InputError(f"{port}: --find and --self-test are for boards that answer; leave them out")
     if find:
         found = _found(port, form, on_find, on_try)
         port, form = found.port, found.form
@@ -118,12 +123,11 @@ def record(
             raise InputError(f"{', '.join(without) or 'record'}: give the recording to write with --out")
         return None
     port = _needed(port)
-    form = form or "lpc1768"
     setup = [set_range(range_g)] if range_g is not None else []
     setup += [set_rate(rate)] if rate is not None else []
     live = None
     if on_text is not None or on_fault is not None or rrd is not None or view:
-        live = _live_view(form, array, on_text, on_fault, rrd, view=view)
+        live = _live_view(port_format(port, form, array), array, on_text, on_fault, rrd, view=view)
     try:
         report = record_port(
             port, out, duration_s=duration, form=form, array=array, baud=baud, setup=tuple(setup),
@@ -165,7 +169,7 @@ def _found(
 
 
 def _live_view(
-    form: str,
+    form: FrameFormat,
     array: str,
     on_text: Callable[[str], None] | None,
     on_fault: Callable[[str], None] | None,
@@ -173,13 +177,12 @@ def _live_view(
     *,
     view: bool,
 ) -> LiveView:
-    from firmware_bridge.frames.decoder import frame_format
     from firmware_bridge.host.live import LiveView
     from gfimu.geometry.array import AccelerometerArray
     from gfimu.parts.part import Part
 
-    carried = AccelerometerArray.load(array or frame_format(form).array)
-    lsb = frame_format(form).count_m_s2 or Part.load(carried.chips[0].part, carried.part_files).lsb
+    carried = AccelerometerArray.load(array or form.array)
+    lsb = form.count_m_s2 or Part.load(carried.chips[0].part, carried.part_files).lsb
     picture = None
     if rrd is not None or view:
         from gfimu.visual.live import LivePicture

@@ -17,7 +17,7 @@ from gfimu.importing.raw_table import RawFile, RawTable
 from gfimu.importing.recognise import fitting_maps
 from gfimu.importing.splitting import split_file
 
-__all__ = ["Piece", "merged_piece", "piece_of"]
+__all__ = ["Piece", "at_times", "merged_piece", "piece_of"]
 
 _GAP = 1.5  # sample periods, from which values are not interpolated
 
@@ -65,7 +65,7 @@ def piece_of(raw: RawFile, chosen: ColumnMap) -> Piece:
             others[other.name] = times_of(other, chosen.time, raw.source, drop=chosen.drop)
             notes += [note for note in others[other.name].notes if note not in notes]
         theirs = others[other.name]
-        columns[name] = _at(times.t_s + (times.origin_s - theirs.origin_s), theirs.t_s, values[theirs.rows])
+        columns[name] = at_times(times.t_s + (times.origin_s - theirs.origin_s), theirs.t_s, values[theirs.rows])
     channels = {name: columns[name] for name in chosen.channels if name in columns}
     if any(spec.table and spec.table != table.name for spec in chosen.channels.values()):
         notes.append(f"{raw.source}: chips of other tables are interpolated to the sample times of {table.name!r}")
@@ -165,7 +165,7 @@ def merged_piece(pieces: Sequence[Piece]) -> Piece:
         notes.append(f"{piece.source}: interpolated to the sample times of {first.source}")
         for name, values in piece.channels.items():
             chip, axis = name[:-1], name[-1]
-            channels[f"{_chip_name(chips, chip, number)}{axis}"] = _at(t, piece.times.t_s + shift, values)
+            channels[f"{_chip_name(chips, chip, number)}{axis}"] = at_times(t, piece.times.t_s + shift, values)
     return Piece(
         first.source,
         replace(first.times, t_s=t, notes=tuple(notes)),
@@ -186,7 +186,7 @@ def _chip_name(chips: Sequence[str], chip: str, number: int) -> str:
     return f"{letters}{int(digits or 0) + number * len(chips)}"
 
 
-def _at(t: NDArray[np.float64], times: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
+def at_times(t: NDArray[np.float64], times: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return values at other times by a cubic spline, (n,); NaN outside and in gaps."""
     known = np.isfinite(values)
     if known.sum() < 4:
