@@ -21,7 +21,16 @@ if TYPE_CHECKING:
     import rerun as rr
     import rerun.blueprint as rrb
 
-__all__ = ["LOOPBACK", "WEB_VIEWER", "quiet_sdk", "rrd_stream", "viewer_command", "viewer_listens", "viewer_stream"]
+__all__ = [
+    "LOOPBACK",
+    "WEB_VIEWER",
+    "has_display",
+    "quiet_sdk",
+    "rrd_stream",
+    "viewer_command",
+    "viewer_listens",
+    "viewer_stream",
+]
 
 LOOPBACK = "127.0.0.1"
 """The viewer's own default is 0.0.0.0: every machine on the network could read along and send."""
@@ -79,6 +88,11 @@ def quiet_sdk() -> None:
     os.environ.setdefault("RUST_LOG", "off")
 
 
+def has_display() -> bool:
+    """Whether a window can be opened here."""
+    return not sys.platform.startswith("linux") or any(map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY")))
+
+
 def viewer_command(*arguments: str | Path) -> list[str]:
     """Return the command line of the viewer, bound to this machine."""
     return [sys.executable, "-m", "rerun", "--bind", LOOPBACK, *map(str, arguments)]
@@ -90,11 +104,16 @@ def viewer_stream(application: str) -> Any:
     Raises
     ------
     GfimuError
-        If the viewer does not start; the message says what to do instead.
+        If there is no display, or the viewer does not start; the message says what to do instead.
     """
     import rerun as rr
 
     if not viewer_listens():
+        if not has_display():
+            raise GfimuError(
+                f"no display here for the rerun viewer; run `{WEB_VIEWER}` first and open the address it prints in a "
+                "browser, or write a file with --rrd and look at it later"
+            )
         viewer = subprocess.Popen(
             viewer_command("--port", str(_PORT), "--expect-data-soon"),
             stdout=subprocess.DEVNULL,

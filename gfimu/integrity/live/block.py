@@ -64,8 +64,6 @@ class LiveBlock:
         Angular rate in body axes and its standard deviation, rad/s.
     sign_probability : ndarray, shape (m,)
         Probability that ``omega`` and not ``−omega`` is the rate.
-    rest : ndarray of bool, shape (m,)
-        Samples recognised as rest.
     health : tuple of Health
         Health of the channels, where it was looked at.
     states : tuple of StreamState
@@ -80,7 +78,6 @@ class LiveBlock:
     omega: NDArray[np.float64]
     omega_std: NDArray[np.float64]
     sign_probability: NDArray[np.float64]
-    rest: NDArray[np.bool_]
     health: tuple[Health, ...] = ()
     states: tuple[StreamState, ...] = ()
     events: tuple[Event, ...] = ()
@@ -88,10 +85,11 @@ class LiveBlock:
     @classmethod
     def of(cls, t: NDArray[np.float64], readings: NDArray[np.float64], rates: Sequence[RateEstimate] = ()) -> LiveBlock:
         """Return a block of readings (n, c), m/s², at times (n,), s, and of estimates that became ready."""
-        made = [cls(t, readings, np.empty(0), *np.empty((2, 0, 3)), np.empty(0), np.empty(0, dtype=np.bool_))]
+        none = np.empty(0)
+        made = [cls(t, readings, none, np.empty((0, 3)), np.empty((0, 3)), none)]
         for one in rates:
             chance = np.ones(len(one)) if one.sign_probability is None else one.sign_probability
-            made.append(cls(t[:0], readings[:0], one.t_s, one.omega, one.std, chance, one.rest))
+            made.append(cls(t[:0], readings[:0], one.t_s, one.omega, one.std, chance))
         return cls.join(made)
 
     @classmethod
