@@ -38,7 +38,7 @@ _VIEWER_EVERY_S = 1.0  # numerical: between looks whether the viewer is still th
 _FIRST_SAMPLES = 4  # from which the sample rate is found
 _CATCHING_UP_S = 1.0  # the rate is said to be behind from here on
 _APPLICATION = "gfimu_record"
-_COMPILES = "the rate filter is being compiled, once per installation, about a minute; the recording goes on meanwhile"
+_COMPILES = "the filter is compiled on first use, about a minute; the recording goes on"
 _FLUSH_S = 5.0
 
 

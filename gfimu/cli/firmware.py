@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -122,7 +121,6 @@ def _run_behind_port(
         if not json:
             print_text(f"board on {name}; Ctrl-C ends it")
             print_text(f"  gfimu record --port {name} --out run.parquet")
-            sys.stdout.flush()  # a script that reads a file or pipe sees the name at once
 
     report = run(
         scenario=scenario, port=port, duration=duration, rate=rate, range_g=range_g, realtime=realtime, seed=seed,

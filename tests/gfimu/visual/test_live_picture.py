@@ -48,7 +48,7 @@ def batches(array: AccelerometerArray, rate: int, seconds: float, readings, size
 
 
 def recorded(tmp_path, name: str, texts: list[str]) -> dict[str, dict[str, list]]:
-    """Columns of every entity of the live picture of an array at rest for a second, channels reading 1 m/s² and more."""
+    """Columns of every entity of the live picture of an array for a second, with channels that read 1 m/s² and more."""
     array = AccelerometerArray.load(name)
     view = LiveView(array, 1.0, on_text=texts.append, rrd=tmp_path / "live.rrd", picture=LivePicture(array))
     for batch in batches(array, 100, 1.0, 1.0 + np.arange(array.n_channels)):
