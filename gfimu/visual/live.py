@@ -113,7 +113,7 @@ class LivePicture:
                 rrb.Horizontal(*self._lanes()),
                 rrb.Horizontal(sign, *stream),
             ]
-            shares = [9, 7, 3]
+            shares = [9, 6, 4]
         left = rrb.Vertical(
             self._scene.view(scene_title(array)),
             rrb.Tabs(
