@@ -246,6 +246,19 @@ def test_the_body_turns_with_the_rate_and_its_tilt_follows_the_specific_force():
     assert turned[2] == pytest.approx((about + np.pi) % (2 * np.pi) - np.pi, abs=0.01)
 
 
+def test_a_rate_that_errs_does_not_tip_a_body_at_rest_over():
+    """0.05 rad/s about x for 10 s would be 0.5 rad; with a tilt that follows gravity within a second it is 0.05 rad."""
+    stream = Stream()
+    drawing = LiveDrawing(stream, CUBE, 0.01)
+    readings = specific_force(CUBE, [[0.0, 0.0, STANDARD_GRAVITY]], np.zeros((1, 3)), np.zeros((1, 3)))
+    t = np.arange(1000) / 100.0
+    for first in range(0, 1000, 10):
+        part = t[first : first + 10]
+        drawing.add(block(part, np.tile(readings, (10, 1)), part, np.tile([0.05, 0.0, 0.0], (10, 1))))
+    last = Rotation.from_quat(stream.sent["scene/array"]["quaternion"][-1][1][0])
+    assert last.magnitude() == pytest.approx(0.05, rel=0.2)
+
+
 def test_a_body_on_its_head_is_drawn_so():
     stream = Stream()
     drawing = LiveDrawing(stream, CUBE, 0.01)
