@@ -77,12 +77,12 @@ class LiveView:
         Is given a sentence when a channel is found faulty, or used again.
     on_note : callable, optional
         Is given a sentence on the view itself: that the filter is being compiled, that a viewer was closed.
-    rrd : Path, optional
-        Write a rerun recording when the view is closed.
-    viewer : bool
-        Open the rerun viewer, which listens to this machine only, and send to it.
     picture : StreamPicture, optional
-        Draws what comes.
+        Draws what comes, for a file or a viewer.
+    rrd : Path, optional
+        Write the picture as a rerun recording when the view is closed.
+    viewer : bool
+        Show the picture in the rerun viewer, which listens to this machine only; one is started unless it is there.
 
     Raises
     ------
@@ -98,9 +98,9 @@ class LiveView:
         on_text: Callable[[str], None] | None = None,
         on_fault: Callable[[str], None] | None = None,
         on_note: Callable[[str], None] | None = None,
+        picture: StreamPicture | None = None,
         rrd: Path | None = None,
         viewer: bool = False,
-        picture: StreamPicture | None = None,
     ) -> None:
         self._array, self._lsb = array, lsb
         self._on_text, self._on_fault, self._on_note = on_text, on_fault, on_note
