@@ -118,8 +118,9 @@ class LiveDrawing:
                 self._send(f"health/{channel}", now, rr.StateChange.columns(state=[_WORDS[code]]))
         if health.codes != self._codes:
             bad = [code in _BAD for code in health.codes]
+            along = 1.3 * self._axes.vectors[bad]  # through the chip: one end may lie in the body
             arrows = rr.Arrows3D.columns(
-                origins=self._axes.origins[bad], vectors=1.3 * self._axes.vectors[bad],
+                origins=self._axes.origins[bad] - along, vectors=2.0 * along,
                 colors=[HEALTH["excluded"]] * sum(bad), radii=[2.5 * self._axes.radius] * sum(bad),
             )  # fmt: skip
             self._send(f"{BODY}/not_used", now, arrows.partition([sum(bad)]))
