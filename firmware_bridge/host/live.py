@@ -7,6 +7,7 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import ExitStack, suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -15,40 +16,54 @@ from numpy.typing import NDArray
 
 from firmware_bridge.frames.decoder import StreamCounts
 from firmware_bridge.host.recorder import Batch
+from firmware_bridge.host.stream_meter import GroupMeans, StreamMeter
 from gfimu.errors import GfimuError
-from gfimu.files.rerun_stream import rrd_stream, viewer_stream
+from gfimu.files.rerun_stream import rrd_stream, viewer_listens, viewer_stream
 from gfimu.geometry.array import AccelerometerArray
 
 if TYPE_CHECKING:  # imported by the view's own thread: that takes longer than a recording should wait
     from gfimu.integrity.fault import ChannelFault
-    from gfimu.integrity.live.watched_filter import WatchedRateFilter
+    from gfimu.integrity.live.background import BackgroundFilter
+    from gfimu.integrity.live.block import Event, LiveBlock
 
-__all__ = ["LiveView", "StreamPicture"]
+__all__ = ["LiveView", "StreamDrawing", "StreamPicture"]
 
 _VIEW_HZ = 100.0
-_TEXT_EVERY_S = 0.25
+"""Most samples per second that are filtered and drawn; of a faster stream means over groups."""
+
+_LOOK_EVERY_S = 0.1  # numerical: between looks at what came, and pictures to a viewer
+_FILE_EVERY_S = 1.0  # numerical: between pictures to a file, which nobody looks at yet
+_TEXT_EVERY_S = 0.25  # numerical
+_VIEWER_EVERY_S = 1.0  # numerical: between looks whether the viewer is still there
+_FIRST_SAMPLES = 4  # from which the sample rate is found
+_CATCHING_UP_S = 1.0  # the rate is said to be behind from here on
 _APPLICATION = "gfimu_record"
+_COMPILES = "the filter is compiled on first use, about a minute; the recording goes on"
 _FLUSH_S = 5.0
-_LANE = 0.7  # numerical: height of a lane
+
+
+class StreamDrawing(Protocol):
+    """A picture on one rerun stream."""
+
+    def add(self, block: LiveBlock) -> None:
+        """Draw what came."""
+        ...
 
 
 class StreamPicture(Protocol):
-    """What draws a stream beside its plain lines: the array and its readings, say (`gfimu.visual.live`)."""
+    """Draws an array, its readings, rate and health in rerun (`gfimu.visual.live`)."""
 
-    def open(self, stream: Any) -> None:
-        """Send what does not change, before any reading."""
-        ...
-
-    def add(self, stream: Any, times: Any, readings: NDArray[np.float64]) -> None:
-        """Send readings (n, c), m/s², at the times of a rerun time column."""
+    def open(self, stream: Any) -> StreamDrawing:
+        """Send what does not change, and return what draws the rest."""
         ...
 
 
 class LiveView:
-    """Is given each batch of a recording; estimates the rate at up to 100 Hz, in a thread of its own.
+    """Is given each batch of a recording; estimates the rate at up to 100 Hz, in threads of its own.
 
-    The recording never waits for the view: the filter is compiled on first use, which takes a while. If the recording
-    begins with a rest, channels that contradict the others are reported and left out of the rate, not of the recording.
+    The recording never waits for the view. On first use the filter is compiled, which takes a while: readings and state
+    of the stream are shown meanwhile, and the rate follows. If the recording begins with a rest, channels that
+    contradict the others are reported and left out of the rate, not of the recording.
 
     Parameters
     ----------
@@ -60,12 +75,19 @@ class LiveView:
         Is given a line of text a few times a second.
     on_fault : callable, optional
         Is given a sentence when a channel is found faulty, or used again.
-    rrd : Path, optional
-        Write a rerun recording when the view is closed.
-    viewer : bool
-        Open the rerun viewer, which listens to this machine only, and send to it.
+    on_note : callable, optional
+        Is given a sentence on the view itself: that the filter is being compiled, that a viewer was closed.
     picture : StreamPicture, optional
-        Draws the array and its readings.
+        Draws what comes, for a file or a viewer.
+    rrd : Path, optional
+        Write the picture as a rerun recording when the view is closed.
+    viewer : bool
+        Show the picture in the rerun viewer, which listens to this machine only; one is started unless it is there.
+
+    Raises
+    ------
+    GfimuError
+        If the viewer does not start.
     """
 
     def __init__(
@@ -75,189 +97,220 @@ class LiveView:
         *,
         on_text: Callable[[str], None] | None = None,
         on_fault: Callable[[str], None] | None = None,
+        on_note: Callable[[str], None] | None = None,
+        picture: StreamPicture | None = None,
         rrd: Path | None = None,
         viewer: bool = False,
-        picture: StreamPicture | None = None,
     ) -> None:
-        self._array, self._lsb, self._on_text, self._on_fault = array, lsb, on_text, on_fault
-        self._filter: WatchedRateFilter | None = None
-        self._picture, self._without_rate = picture, ""
-        self._sum = np.zeros(array.n_channels)
-        self._times: list[float] = []
-        self._group = 0
+        self._array, self._lsb = array, lsb
+        self._on_text, self._on_fault, self._on_note = on_text, on_fault, on_note
+        self._filter: BackgroundFilter | None = None
+        self._means: GroupMeans | None = None
+        self._meter = StreamMeter()
+        self._without_rate = ""
         self._text_at = 0.0
-        self._seen = 0
-        self._first_s: float | None = None
         self._ended = ""
+        self._is_last = False  # nothing comes any more
         self.omega = np.full(3, np.nan)
         self._open = ExitStack()
-        self._streams: list[Any] = [] if rrd is None else [self._open.enter_context(rrd_stream(rrd, _APPLICATION))]
-        if viewer:
-            self._streams.append(viewer_stream(_APPLICATION))
-            self._open.callback(_flush, self._streams[-1])
-        if picture is not None:
-            for stream in self._streams:
-                picture.open(stream)
-        self._batches: queue.SimpleQueue[tuple[Batch, StreamCounts] | None] = queue.SimpleQueue()
+        self._sinks: list[_Sink] = []
+        self._viewer: Any = None
+        if viewer and picture is not None:
+            self._viewer = viewer_stream(_APPLICATION)
+            self._sinks.append(_Sink(picture.open(self._viewer), _LOOK_EVERY_S))
+        if rrd is not None and picture is not None:
+            stream = self._open.enter_context(rrd_stream(rrd, _APPLICATION))
+            self._sinks.append(_Sink(picture.open(stream), _FILE_EVERY_S))
+        self._viewer_seen_at = time.monotonic()
+        self._arrivals: queue.SimpleQueue[tuple[Batch, StreamCounts, float] | None] = queue.SimpleQueue()
         self._thread = threading.Thread(target=self._work, name="live view", daemon=True)
         self._thread.start()
 
     def __call__(self, batch: Batch, counts: StreamCounts) -> None:
         """Take one batch and the totals so far; returns at once."""
-        self._batches.put((batch, counts))
+        self._arrivals.put((batch, counts, time.monotonic()))
 
     def _work(self) -> None:
-        while (item := self._batches.get()) is not None:
-            if self._ended:
-                continue
-            try:
-                self._show(*item)
-            except OSError as error:  # a full disk: the recording goes on as far as it can, and says so first
-                self._ended = f"the live view ended after {self._seen} samples: {error}"
+        try:
+            self._follow()
+        except OSError as error:  # a full disk: the recording goes on as far as it can, and says so first
+            self._ended = f"the live view ended after {self._meter.samples} samples: {error}"
+            while not self._is_last:
+                self._gather([])
 
-    def _show(self, batch: Batch, counts: StreamCounts) -> None:
-        if self._first_s is None:
-            self._first_s = float(batch.t_s[0])
-        self._seen += len(batch.t_s)
-        if self._group == 0:
-            span = float(batch.t_s[-1] - batch.t_s[0])
-            if len(batch.t_s) < 2 or span <= 0:
-                return
-            rate = (len(batch.t_s) - 1) / span
-            self._group = max(1, round(rate / _VIEW_HZ))
-            shown = rate / self._group
-            try:
-                self._filter = _watched_filter(self._array, float(shown))
-            except GfimuError as error:  # an array that can't see all six motions still has readings
-                self._without_rate = f"no rate: {error}"
-        times, readings = self._averaged(batch)
-        if not len(times):
-            return
-        omega = self._estimate(times, readings)
-        self._report_faults()
-        for stream in self._streams:
-            _log(stream, self._array, times, readings, omega)
-            if self._filter is not None and (health := self._filter.health) is not None:
-                _log_health(stream, self._array, times, health)
-            if self._picture is not None:
-                import rerun as rr
+    def _follow(self) -> None:
+        """Look at what comes, now and then, until nothing comes any more and all of it is filtered."""
+        waiting: list[tuple[Batch, StreamCounts, float]] = []
+        while not self._is_last:
+            self._gather(waiting)
+            if waiting and (self._means is not None or sum(len(one.t_s) for one, _, _ in waiting) >= _FIRST_SAMPLES):
+                self._look(waiting)
+                waiting.clear()
+        if self._filter is not None:
+            self._filter.finish()
+            self._draw(np.empty(0), np.empty((0, self._array.n_channels)), [])
+        for sink in self._sinks:
+            sink.flush()
 
-                self._picture.add(stream, rr.TimeColumn("t", duration=times), readings)
+    def _gather(self, waiting: list[tuple[Batch, StreamCounts, float]]) -> None:
+        """Gather what comes until the next look is due, or nothing comes any more."""
+        due = time.monotonic() + _LOOK_EVERY_S
+        with suppress(queue.Empty):
+            while not self._is_last and (left := due - time.monotonic()) > 0:
+                item = self._arrivals.get(timeout=left)
+                if item is None:
+                    self._is_last = True
+                else:
+                    waiting.append(item)
+
+    def _look(self, arrivals: list[tuple[Batch, StreamCounts, float]]) -> None:
+        """Filter and draw what came."""
+        times = np.concatenate([batch.t_s for batch, _, _ in arrivals])
+        raw = self._lsb * np.concatenate([batch.counts for batch, _, _ in arrivals])
+        for batch, counts, host_s in arrivals:
+            self._meter.add(batch.t_s, counts, host_s)
+        events = self._begin(times) if self._means is None else []
+        assert self._means is not None
+        t, readings = self._means.add(times, raw)
+        if self._filter is not None and len(t):
+            self._filter.push(t, readings, self._means.saturated)
+        self._draw(t, readings, events)
         now = time.monotonic()
         if self._on_text is not None and now - self._text_at >= _TEXT_EVERY_S:
             self._text_at = now
-            self._on_text(self._line(batch, counts))
+            self._on_text(self._line())
 
-    def _averaged(self, batch: Batch) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Means over groups of samples: times (m,) and readings (m, c), m/s²."""
-        times, readings = [], []
-        for t, row in zip(batch.t_s.tolist(), batch.counts * self._lsb, strict=True):
-            self._sum += row
-            self._times.append(t)
-            if len(self._times) == self._group:
-                times.append(sum(self._times) / self._group)
-                readings.append(self._sum / self._group)
-                self._sum = np.zeros(self._array.n_channels)
-                self._times.clear()
-        return np.array(times), np.array(readings).reshape(-1, self._array.n_channels)
+    def _begin(self, times: NDArray[np.float64]) -> list[Event]:
+        """Start the filter for the rate of the first samples; return what is to be said of it."""
+        from gfimu.integrity.live.background import BackgroundFilter
+        from gfimu.integrity.live.block import Event
+        from gfimu.rate.sensing import SensorErrors
 
-    def _estimate(self, times: NDArray[np.float64], readings: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Angular rate (m, 3) as far as it is ready, rad/s; the newest is kept."""
-        if self._filter is None:
-            return np.empty((0, 3))
+        rate = 1.0 / float(np.median(np.diff(times)))
+        group = max(1, round(rate / _VIEW_HZ))
+        self._means = GroupMeans(group, 1.0 / rate, SensorErrors.from_parts(self._array, rate).limits)
+        shown = f"shown as means of {group}" if group > 1 else "all shown"
+        said = [f"first sample of array {self._array.name}; {rate:.0f} samples per second, {shown}"]
         try:
-            result = self._filter.push(times, readings)
-        except GfimuError:
-            return np.empty((0, 3))
-        if len(result.omega):
-            self.omega = result.omega[-1]
-        return result.omega
+            self._filter = BackgroundFilter(self._array, rate / group)
+        except GfimuError as error:  # an array that can't see all six motions still has readings
+            self._without_rate = f"no rate: {error}"
+            said.append(self._without_rate)
+        else:
+            if self._filter.must_compile:
+                said.append(_COMPILES)
+                self._note(_COMPILES)
+        return [Event(float(times[0]), text) for text in said]
 
-    def _report_faults(self) -> None:
-        """Pass on the faults of channels that were found, measured, or are over."""
-        for event in [] if self._filter is None else self._filter.take_events():
-            if self._on_fault is not None and event.fault is not None:
-                self._on_fault(f"{event.text} (at {event.t_s:.1f} s on the board's clock)")
+    def _draw(self, t: NDArray[np.float64], readings: NDArray[np.float64], events: list[Event]) -> None:
+        """Take what the filter has done, pass faults on, and hand all that is new to the pictures."""
+        from gfimu.integrity.live.block import Event, LiveBlock
+
+        done = [] if self._filter is None else self._filter.take()
+        for part in done:
+            for event in part.events:
+                events.append(Event(event.t_s, event.text, event.fault is not None))
+                if self._on_fault is not None and event.fault is not None:
+                    self._on_fault(f"{event.text} (at {event.t_s:.1f} s on the board's clock)")
+        rates = [part.rate for part in done if len(part.rate)]
+        if rates:
+            self.omega = rates[-1].omega[-1]
+        if not self._sinks:
+            return
+        behind = 0.0 if self._filter is None else self._filter.behind_s
+        block = LiveBlock.of(t, readings, rates)
+        block = replace(
+            block, health=tuple(part.health for part in done), states=(self._meter.state(behind),), events=tuple(events)
+        )
+        self._look_for_viewer()
+        for sink in self._sinks:
+            sink.add(block)
+
+    def _look_for_viewer(self) -> None:
+        """Go on without a viewer that was closed."""
+        now = time.monotonic()
+        if self._viewer is None or now - self._viewer_seen_at < _VIEWER_EVERY_S:
+            return
+        self._viewer_seen_at = now
+        if not viewer_listens():
+            self._viewer = None
+            del self._sinks[0]
+            self._note("the viewer was closed; the recording goes on")
+
+    def _note(self, text: str) -> None:
+        if self._on_note is not None:
+            self._on_note(text)
 
     @property
     def faults(self) -> tuple[ChannelFault, ...]:
         """Faults of channels that were found so far; times on the board's clock."""
-        return () if self._filter is None else self._filter.watch.faults
+        return () if self._filter is None else self._filter.faults
 
-    def _line(self, batch: Batch, counts: StreamCounts) -> str:
-        elapsed = float(batch.t_s[-1]) - (self._first_s or 0.0)
-        rate = self._seen / elapsed if elapsed > 0 else 0.0
-        omega = " ".join(f"{value:+7.3f}" for value in self.omega)
-        motion = self._without_rate or f"ω {omega} rad/s"
-        return f"{elapsed:8.1f} s  {rate:6.1f} Hz  lost {counts.lost}  corrupt {counts.corrupt}  {motion}"
+    def _line(self) -> str:
+        state = self._meter.state(0.0)
+        rate = "…" if np.isnan(state.rate_hz) else f"{state.rate_hz:.1f}"
+        motion = self._without_rate or f"ω {' '.join(f'{value:+7.3f}' for value in self.omega)} rad/s"
+        if self._filter is not None and self._filter.behind_s > _CATCHING_UP_S:
+            why = "being compiled" if self._filter.must_compile else "catching up"
+            motion = f"ω {self._filter.behind_s:.0f} s behind, {why}"
+        counts = f"lost {state.lost}  corrupt {state.corrupt}"
+        return f"{self._meter.elapsed_s:8.1f} s  {rate:>6} Hz  {counts}  {motion}"
 
     def close(self, *, keep: bool = True) -> None:
         """Show what still waits, and write the rerun recording if it is to be kept.
+
+        Ctrl-C while the filter catches up leaves the rest of the rate out.
 
         Raises
         ------
         WriteError
             If it can't be written.
         """
-        self._batches.put(None)
-        self._thread.join()
+        if not keep and self._filter is not None:
+            self._filter.abandon()
+        self._arrivals.put(None)
+        try:
+            self._thread.join(_CATCHING_UP_S)
+            if self._thread.is_alive() and keep:
+                self._note("the recording is complete; its rate is being caught up with, Ctrl-C leaves that out")
+            self._thread.join()
+        except KeyboardInterrupt:
+            if self._filter is not None:
+                self._filter.abandon()
+            self._thread.join()
         if keep:
             if self._ended and self._on_fault is not None:
                 self._on_fault(self._ended)
+            _flush(self._viewer)
             self._open.close()
         else:
             self._open.pop_all()
 
 
-def _watched_filter(array: AccelerometerArray, rate: float) -> WatchedRateFilter:
-    """Return a filter for a sample rate, Hz, that watches its channels."""
-    from gfimu.integrity.live.channel_watch import LiveWatch
-    from gfimu.integrity.live.watched_filter import WatchedRateFilter
-    from gfimu.rate.live import LiveRateFilter
-    from gfimu.rate.sensing import SensorErrors
+class _Sink:
+    """A picture that is added to at its own pace, so that the number of pieces sent is bounded."""
 
-    errors, period = SensorErrors.from_parts(array, rate), 1.0 / rate
-    watch = LiveWatch(array, errors.with_part_gains(array), period)  # raw counts: nothing is calibrated
-    return WatchedRateFilter(LiveRateFilter(array, errors, period), watch)
+    def __init__(self, drawing: StreamDrawing, every_s: float) -> None:
+        self._drawing, self._every_s = drawing, every_s
+        self._waiting: list[LiveBlock] = []
+        self._sent_at = -np.inf
+
+    def add(self, block: LiveBlock) -> None:
+        """Take a block; draw it with what waits if the time has come."""
+        self._waiting.append(block)
+        if time.monotonic() - self._sent_at >= self._every_s:
+            self.flush()
+
+    def flush(self) -> None:
+        """Draw what waits."""
+        if self._waiting:
+            self._drawing.add(type(self._waiting[0]).join(self._waiting))
+            self._waiting.clear()
+            self._sent_at = time.monotonic()
 
 
 def _flush(stream: Any) -> None:
     """Send what still waits; a viewer that was closed meanwhile is no fault of the recording."""
-    with suppress(RuntimeError):
-        stream.flush(timeout_sec=_FLUSH_S)
-
-
-def _log_health(stream: Any, array: AccelerometerArray, times: NDArray[np.float64], health: list[int]) -> None:
-    """Send the health of each channel at the newest time, in a lane for each, the first at the top.
-
-    A line stands at the bottom of its lane while the channel is used, in the middle in doubt, at the top when not used.
-    """
-    import rerun as rr
-
-    from gfimu.integrity.fault import HealthCode
-
-    index = [rr.TimeColumn("t", duration=times[-1:])]
-    for lane, (channel, code) in enumerate(zip(array.channels, health, strict=True)):
-        height = {HealthCode.USED: 0.0, HealthCode.DOUBTED: 0.5}.get(HealthCode(code), 1.0)
-        place = _LANE * height - lane
-        rr.send_columns(f"health/{channel}", index, rr.Scalars.columns(scalars=[place]), recording=stream)
-
-
-def _log(
-    stream: Any,
-    array: AccelerometerArray,
-    times: NDArray[np.float64],
-    readings: NDArray[np.float64],
-    omega: NDArray[np.float64],
-) -> None:
-    """Send a batch to rerun, by columns."""
-    import rerun as rr
-
-    index = [rr.TimeColumn("t", duration=times)]
-    for place, channel in enumerate(array.channels):
-        rr.send_columns(f"readings/{channel}", index, rr.Scalars.columns(scalars=readings[:, place]), recording=stream)
-    if len(omega):
-        late = [rr.TimeColumn("t", duration=times[-len(omega) :] if len(omega) <= len(times) else times)]
-        shown = omega[-len(times) :]
-        for place, axis in enumerate("xyz"):
-            rr.send_columns(f"omega/{axis}", late, rr.Scalars.columns(scalars=shown[:, place]), recording=stream)
+    if stream is not None:
+        with suppress(RuntimeError):
+            stream.flush(timeout_sec=_FLUSH_S)

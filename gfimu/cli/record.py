@@ -65,7 +65,9 @@ def _record(
         ),
     ] = None,
     rrd: Annotated[Path | None, typer.Option("--rrd", help="Rerun recording to write while recording.")] = None,
-    view: Annotated[bool, typer.Option("--view", help="Open the rerun viewer and show what comes in.")] = False,
+    live: Annotated[
+        bool, typer.Option("--live", "--view", help="Show rate, health and scene in the rerun viewer meanwhile.")
+    ] = False,
     json: JsonOption = False,
 ) -> None:
     """Record from a board (real or virtual), with the angular rate shown as it comes.
@@ -87,7 +89,7 @@ def _record(
         screen.print(f"waiting for {port}, up to {reconnect:g} s")
     messages = console(stderr=True)
 
-    def name_fault(text: str) -> None:
+    def say(text: str) -> None:
         messages.print(f"{' ' * 100}\r{text}" if interactive else f"gfimu: {text}", soft_wrap=True)
 
     boards: list[Found] = []
@@ -117,9 +119,10 @@ def _record(
         baud=baud,
         reconnect=reconnect,
         rrd=rrd,
-        view=view,
+        live=live,
         on_text=(lambda text: screen.print(text, end="\r")) if interactive else None,
-        on_fault=name_fault,
+        on_fault=say,
+        on_note=say,
         on_find=name_board,
         on_self_test=show_axes,
         on_try=(lambda name: screen.print(f"looking at {name} …", end="\r")) if interactive else None,

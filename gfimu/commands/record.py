@@ -35,9 +35,10 @@ def record(
     baud: int | None = None,
     reconnect: float | None = None,
     rrd: str | Path | None = None,
-    view: bool = False,
+    live: bool = False,
     on_text: Callable[[str], None] | None = None,
     on_fault: Callable[[str], None] | None = None,
+    on_note: Callable[[str], None] | None = None,
     on_find: Callable[[Found], None] | None = None,
     on_try: Callable[[str], None] | None = None,
     on_self_test: Callable[[list[AxisSelfTest]], None] | None = None,
@@ -76,13 +77,16 @@ def record(
         there at once, and a lost connection is waited for a minute.
     rrd : str or Path, optional
         Rerun recording to write while recording.
-    view : bool
-        Open the rerun viewer and show what comes in.
+    live : bool
+        Open the rerun viewer and show what comes in: rate, health of the channels, readings, scene (``--live``, also
+        ``--view``). A viewer that is closed does not end the recording.
     on_text : callable, optional
         Is given a line of text with the angular rate a few times a second.
     on_fault : callable, optional
         Is given a sentence when a channel contradicts the others, and when it does so no longer
         (`gfimu.integrity.live`). The recording has every channel all the same.
+    on_note : callable, optional
+        Is given a sentence on what is shown: that the filter is being compiled, that it catches up.
     on_find, on_try : callable, optional
         Are given each board that is found, and each port before it is tried.
     on_self_test : callable, optional
@@ -117,7 +121,7 @@ def record(
         if on_self_test is not None:
             on_self_test(tested)
     if out is None:
-        given = {"duration": duration, "rate": rate, "range": range_g, "rrd": rrd, "view": view or None, "baud": baud}
+        given = {"duration": duration, "rate": rate, "range": range_g, "rrd": rrd, "live": live or None, "baud": baud}
         without = [f"--{name}" for name, value in given.items() if value is not None]
         if without or not (find or self_test):
             raise InputError(f"{', '.join(without) or 'record'}: give the recording to write with --out")
@@ -125,22 +129,22 @@ def record(
     port = _needed(port)
     setup = [set_range(range_g)] if range_g is not None else []
     setup += [set_rate(rate)] if rate is not None else []
-    live = None
-    if on_text is not None or on_fault is not None or rrd is not None or view:
-        live = _live_view(port_format(port, form, array), array, on_text, on_fault, rrd, view=view)
+    view = None
+    if on_text is not None or on_fault is not None or rrd is not None or live:
+        view = _live_view(port_format(port, form, array), array, (on_text, on_fault, on_note), rrd, live=live)
     try:
         report = record_port(
             port, out, duration_s=duration, form=form, array=array, baud=baud, setup=tuple(setup),
-            reconnect_s=reconnect, on_batch=live, stop=stop,
+            reconnect_s=reconnect, on_batch=view, stop=stop,
         )  # fmt: skip
     except BaseException:
-        if live is not None:
-            live.close(keep=False)
+        if view is not None:
+            view.close(keep=False)
         raise
-    if live is None:
+    if view is None:
         return report
-    live.close()
-    return replace(report, faults=tuple(entry for fault in live.faults for entry in fault.entries()))
+    view.close()
+    return replace(report, faults=tuple(entry for fault in view.faults for entry in fault.entries()))
 
 
 def _needed(port: str) -> str:
@@ -171,11 +175,10 @@ def _found(
 def _live_view(
     form: FrameFormat,
     array: str,
-    on_text: Callable[[str], None] | None,
-    on_fault: Callable[[str], None] | None,
+    say: tuple[Callable[[str], None] | None, Callable[[str], None] | None, Callable[[str], None] | None],
     rrd: str | Path | None,
     *,
-    view: bool,
+    live: bool,
 ) -> LiveView:
     from firmware_bridge.host.live import LiveView
     from gfimu.geometry.array import AccelerometerArray
@@ -184,11 +187,15 @@ def _live_view(
     carried = AccelerometerArray.load(array or form.array)
     lsb = form.count_m_s2 or Part.load(carried.chips[0].part, carried.part_files).lsb
     picture = None
-    if rrd is not None or view:
+    if rrd is not None or live:
+        from gfimu.files.rerun_stream import quiet_sdk
+
+        quiet_sdk()
         from gfimu.visual.live import LivePicture
 
         picture = LivePicture(carried)
+    on_text, on_fault, on_note = say
     return LiveView(
-        carried, lsb, on_text=on_text, on_fault=on_fault, rrd=None if rrd is None else Path(rrd), viewer=view,
-        picture=picture,
+        carried, lsb, on_text=on_text, on_fault=on_fault, on_note=on_note, rrd=None if rrd is None else Path(rrd),
+        viewer=live, picture=picture,
     )  # fmt: skip

@@ -21,7 +21,16 @@ if TYPE_CHECKING:
     import rerun as rr
     import rerun.blueprint as rrb
 
-__all__ = ["LOOPBACK", "WEB_VIEWER", "rrd_stream", "viewer_command", "viewer_stream"]
+__all__ = [
+    "LOOPBACK",
+    "WEB_VIEWER",
+    "has_display",
+    "quiet_sdk",
+    "rrd_stream",
+    "viewer_command",
+    "viewer_listens",
+    "viewer_stream",
+]
 
 LOOPBACK = "127.0.0.1"
 """The viewer's own default is 0.0.0.0: every machine on the network could read along and send."""
@@ -74,6 +83,16 @@ def rrd_stream(
         temporary.write_bytes(data)
 
 
+def quiet_sdk() -> None:
+    """Keep the SDK's own log off standard error: a viewer that is closed would be lines of it. Before its import."""
+    os.environ.setdefault("RUST_LOG", "off")
+
+
+def has_display() -> bool:
+    """Whether a window can be opened here."""
+    return not sys.platform.startswith("linux") or any(map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY")))
+
+
 def viewer_command(*arguments: str | Path) -> list[str]:
     """Return the command line of the viewer, bound to this machine."""
     return [sys.executable, "-m", "rerun", "--bind", LOOPBACK, *map(str, arguments)]
@@ -85,11 +104,16 @@ def viewer_stream(application: str) -> Any:
     Raises
     ------
     GfimuError
-        If the viewer does not start; the message says what to do instead.
+        If there is no display, or the viewer does not start; the message says what to do instead.
     """
     import rerun as rr
 
-    if not _listens():
+    if not viewer_listens():
+        if not has_display():
+            raise GfimuError(
+                f"no display here for the rerun viewer; run `{WEB_VIEWER}` first and open the address it prints in a "
+                "browser, or write a file with --rrd and look at it later"
+            )
         viewer = subprocess.Popen(
             viewer_command("--port", str(_PORT), "--expect-data-soon"),
             stdout=subprocess.DEVNULL,
@@ -97,7 +121,7 @@ def viewer_stream(application: str) -> Any:
             start_new_session=True,  # Ctrl-C ends the recording and leaves the picture
         )
         end = time.monotonic() + _START_S
-        while not _listens():
+        while not viewer_listens():
             if viewer.poll() is not None or time.monotonic() > end:
                 _end(viewer)
                 raise GfimuError("the rerun viewer does not start here; write a file with --rrd and look at it later")
@@ -117,8 +141,8 @@ def _end(viewer: subprocess.Popen[bytes]) -> None:
     viewer.wait()
 
 
-def _listens() -> bool:
-    """Whether something listens on the viewer's port."""
+def viewer_listens() -> bool:
+    """Whether a viewer listens on this machine."""
     with socket.socket() as probe:
         probe.settimeout(1.0)
         return probe.connect_ex((LOOPBACK, _PORT)) == 0

@@ -27,6 +27,7 @@ __all__ = [
     "ESTIMATE",
     "ESTIMATE_BAND",
     "GRAVITY",
+    "HEALTH",
     "INK",
     "MEASURED",
     "METAL",
@@ -86,6 +87,17 @@ TONES: Mapping[str, Colour] = {
     "alarm": (176, 48, 48),
 }
 """Of the verdicts of a diagnosis, which are written beside them."""
+
+HEALTH: Mapping[str, Colour] = {
+    "not watched": (104, 110, 120),
+    "used": (40, 130, 96),
+    "in doubt": (226, 166, 40),
+    "excluded": (205, 50, 50),
+    "missing": (44, 48, 56),
+    "saturated": (150, 86, 200),
+    "stuck": (64, 132, 224),
+}
+"""Of the health of a channel, by the word that is written in its lane."""
 
 SEPARATED: Mapping[str, Mapping[str, Colour]] = {
     "run": {"truth": TRUTH, "estimate": ESTIMATE, "tacho": TACHO, "command": COMMAND},

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from gfimu.visual.colours import Colour
 from gfimu.visual.scene import TIMELINE
 
-__all__ = ["LONGEST_LEGEND", "Line", "Plot"]
+__all__ = ["LONGEST_LEGEND", "Line", "Plot", "broken_at_gaps"]
 
 LONGEST_LEGEND = 12
 """Lines that a legend names; a longer one would cover the plot."""
@@ -75,7 +75,7 @@ class Plot:
         """Write the lines, by columns."""
         for number, line in enumerate(self.lines):
             entity = f"{self.entity}/{number:02d}_{_entity_part(line.name)}"
-            t, values = _broken_at_gaps(line.t, line.values.reshape(len(line.t), -1))
+            t, values = broken_at_gaps(line.t, line.values.reshape(len(line.t), -1))
             count = values.shape[1]
             style = rr.SeriesLines(names=[line.name] * count, colors=[line.colour] * count, widths=[line.width] * count)
             stream.log(entity, style, static=True)
@@ -135,7 +135,7 @@ def _entity_part(text: str) -> str:
     return re.sub(r"[^\w]+", "_", text).strip("_")
 
 
-def _broken_at_gaps(
+def broken_at_gaps(
     t: NDArray[np.float64], values: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Insert a NaN into every gap of more than 1.5 sample periods: lost samples show as a break, not as a line."""

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
-import sys
 from pathlib import Path
 
 from gfimu.errors import GfimuError, InputError
-from gfimu.files.rerun_stream import WEB_VIEWER, viewer_command
+from gfimu.files.rerun_stream import WEB_VIEWER, has_display, viewer_command
 
 __all__ = ["open_viewer"]
 
@@ -30,7 +28,7 @@ def open_viewer(path: str | Path) -> None:
                 raise InputError(f"{file}: not a rerun recording; give a .rrd file that gfimu wrote")
     except OSError as error:
         raise InputError(f"{file}: {error.strerror or error}; check the path") from None
-    if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+    if not has_display():
         raise GfimuError(
             f"no display here to open {file}; run `{WEB_VIEWER} {file}` and open the address it prints in a "
             "browser, or copy the file to a machine with a display and run `rerun` on it there"

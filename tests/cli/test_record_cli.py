@@ -10,6 +10,7 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from firmware_bridge.frames.decoder import FORMATS
@@ -143,6 +144,59 @@ def test_an_interrupted_recording_is_whole(tmp_path) -> None:
         port.close()
     assert out.read_bytes()[:4] == b"PAR1"
     assert len(Recording.read(out)) > 0
+
+
+@pytest.mark.parametrize("name", ["run.csv", "run.parquet"])
+def test_live_follows_what_record_is_writing(tmp_path, name) -> None:
+    """Both processes at once: every sample comes through with its size, and live ends with the recording."""
+    from firmware_bridge.frames.decoder import encode_samples
+    from firmware_bridge.loop.virtual_port import TcpPort
+
+    chance, port, out, shown = np.random.default_rng(0), TcpPort(0), tmp_path / name, tmp_path / "shown"
+    record = subprocess.Popen([GFIMU, "record", "--port", port.name, "--out", out, "--json"], stdout=subprocess.PIPE)
+    live, number, last = None, 0, None
+    end = time.monotonic() + 120.0
+    try:
+        while last is None or number < last:  # a second more once live has shown something
+            assert time.monotonic() < end
+            port.read()
+            counts = np.round(chance.normal(0.0, 1.0, (5, 12)) + np.tile([0, 0, 256], 4)).astype(int).tolist()
+            numbers = range(number, number + 5)
+            port.write(encode_samples(numbers, [10_000 * k for k in numbers], counts), 1.0)
+            number += 5
+            time.sleep(0.05)
+            if live is None and out.exists() and out.read_bytes().count(b"\n") > 100:
+                follow = [GFIMU, "live", "--from", out, "--follow", "--rate", "100"]
+                live = subprocess.Popen(follow, stdout=shown.open("w"))
+            if last is None and live is not None and shown.stat().st_size:
+                last = number + 100
+        assert record.poll() is None
+        record.send_signal(2)
+        assert record.wait(60) == 0
+        assert live.wait(60) == 0
+    finally:
+        for process in (record, live):
+            if process is not None:
+                process.kill()
+        port.close()
+    recording = Recording.read(out)
+    lines = [line for line in map(json.loads, shown.read_text().splitlines()) if "event" not in line]
+    np.testing.assert_allclose([line["t_s"] for line in lines], recording.t_s)
+    assert len(lines) >= 200
+
+
+@pytest.mark.parametrize("option", ["--live", "--view"])
+def test_without_a_display_a_live_picture_is_one_line_before_anything_is_written(
+    gfimu_command, tmp_path, monkeypatch, option
+) -> None:
+    monkeypatch.setattr("gfimu.files.rerun_stream.has_display", lambda: False)
+    monkeypatch.setattr("gfimu.files.rerun_stream.viewer_listens", lambda: False)
+    result = gfimu_command("record", "--port", "/dev/nothing", "--out", tmp_path / "run.csv", option)
+    assert result.code == 1
+    assert "no display here" in result.stderr
+    assert "--rrd" in result.stderr
+    assert result.stderr.strip().count("\n") == 0
+    assert not list(tmp_path.iterdir())
 
 
 def test_the_help_lists_every_format(gfimu_command) -> None:

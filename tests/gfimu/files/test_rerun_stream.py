@@ -10,12 +10,13 @@ import time
 
 import pytest
 
-from firmware_bridge.host import live
+from firmware_bridge.host.live import LiveView
 from gfimu.errors import GfimuError
 from gfimu.files import rerun_stream
 from gfimu.files.rerun_stream import rrd_stream, viewer_command, viewer_stream
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.visual import viewer
+from gfimu.visual.live import LivePicture
 
 
 @pytest.fixture
@@ -51,15 +52,10 @@ def test_a_block_that_fails_leaves_no_file_and_says_nothing(tmp_path, capfd):
     assert capfd.readouterr().err == ""
 
 
-def test_a_live_view_keeps_or_drops_its_picture(tmp_path, monkeypatch, capfd):
-    class Closed:
-        def flush(self, timeout_sec):
-            raise RuntimeError
-
-    monkeypatch.setattr(live, "viewer_stream", lambda _: Closed())
+def test_a_live_view_keeps_or_drops_its_picture(tmp_path, capfd):
     cube = AccelerometerArray.load("cube12")
-    live.LiveView(cube, 0.04, rrd=tmp_path / "kept.rrd", viewer=True).close()
-    live.LiveView(cube, 0.04, rrd=tmp_path / "dropped.rrd").close(keep=False)
+    LiveView(cube, 0.04, rrd=tmp_path / "kept.rrd", picture=LivePicture(cube)).close()
+    LiveView(cube, 0.04, rrd=tmp_path / "dropped.rrd", picture=LivePicture(cube)).close(keep=False)
     gc.collect()
     assert [file.name for file in tmp_path.iterdir()] == ["kept.rrd"]
     assert capfd.readouterr().err == ""
@@ -91,11 +87,15 @@ def test_remedies_say_so_too(picture, monkeypatch):
     monkeypatch.delenv("DISPLAY")
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
     monkeypatch.setattr(sys, "platform", "linux")
+    monkeypatch.setattr(rerun_stream, "_PORT", free_port())
+    with pytest.raises(GfimuError, match=r"rerun --web-viewer --bind 127\.0\.0\.1` first .*--rrd"):
+        viewer_stream("test")
     with pytest.raises(GfimuError, match=r"rerun --web-viewer --bind 127\.0\.0\.1 .*look\.rrd"):
         viewer.open_viewer(picture)
 
 
 def test_a_viewer_that_does_not_start_is_one_line(monkeypatch):
+    monkeypatch.setenv("DISPLAY", ":0")
     monkeypatch.setattr(rerun_stream, "_PORT", free_port())
     monkeypatch.setattr(rerun_stream, "viewer_command", lambda *_: [sys.executable, "-c", "raise SystemExit(3)"])
     with pytest.raises(GfimuError, match="does not start here"):
@@ -113,6 +113,7 @@ def test_record_opens_a_viewer_on_this_machine_only(monkeypatch):
 
     popen = subprocess.Popen
     processes = []
+    monkeypatch.setenv("DISPLAY", ":0")
     monkeypatch.setattr(rerun_stream, "_PORT", port)
     monkeypatch.setattr(rerun_stream, "viewer_command", command)
     monkeypatch.setattr(

@@ -21,7 +21,7 @@ from gfimu.integrity.fault import HealthCode
 from gfimu.recording.formats import open_run
 from gfimu.visual import Box, Cylinder, ExpectedDrift, KnownMotion, Line, Mesh, Plot, write_comparison, write_run
 from gfimu.visual.picture import picture_of, picture_path
-from gfimu.visual.plots import _broken_at_gaps, _emptiest_corner
+from gfimu.visual.plots import _emptiest_corner, broken_at_gaps
 from gfimu.visual.scene import _cylinder_mesh
 from gfimu.visual.viewer import open_viewer
 
@@ -201,7 +201,7 @@ def test_a_free_body_has_no_table(tmp_path, run):
 
 def test_lost_samples_break_the_line_and_leave_out_the_pose(tmp_path, run):
     t = np.delete(run.recording.t_s, slice(100, 150))
-    broken_t, broken = _broken_at_gaps(t, np.ones((len(t), 1)))
+    broken_t, broken = broken_at_gaps(t, np.ones((len(t), 1)))
     assert len(broken_t) == len(t) + 1
     assert np.flatnonzero(np.isnan(broken[:, 0])).tolist() == [100]
     assert np.all(np.diff(broken_t) > 0)
