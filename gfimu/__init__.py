@@ -49,6 +49,7 @@ if TYPE_CHECKING:
     from gfimu.commands.diagnose import diagnose as diagnose
     from gfimu.commands.drift import axis_drift as axis_drift
     from gfimu.commands.drift import drift as drift
+    from gfimu.commands.drift import drift_from_position as drift_from_position
     from gfimu.commands.estimate import estimate as estimate
     from gfimu.commands.impact import impact as impact
     from gfimu.commands.inspect import inspect as inspect
@@ -129,6 +130,7 @@ _PUBLIC = {
     "diagnose": "gfimu.commands.diagnose",
     "axis_drift": "gfimu.commands.drift",
     "drift": "gfimu.commands.drift",
+    "drift_from_position": "gfimu.commands.drift",
     "drift_budget": "gfimu.position_drift",
     "equivalent_p_bias": "gfimu.motion.equivalent_errors",
     "equivalent_rate_drift": "gfimu.motion.equivalent_errors",

@@ -12,6 +12,7 @@ from gfimu.cli.output import JsonOption, print_json, print_table, print_text, pr
 from gfimu.errors import InputError
 
 if TYPE_CHECKING:
+    from gfimu.commands.drift import EquivalentErrors
     from gfimu.known_axis.accuracy.drift import AxisDrift
     from gfimu.position_drift import DriftBudget
     from gfimu.position_drift.monte_carlo import DriftSample
@@ -46,18 +47,46 @@ def _drift(
     hub_noise: Annotated[
         float, typer.Option("--hub-noise-m-s2-rthz", help="Of a free hub: density of its own force, m/s²/√Hz.")
     ] = 0.1,
+    from_position: Annotated[
+        tuple[float, float, float] | None,
+        typer.Option(help="Measured position error x y z after --time, m, z up: which bias or drift would explain it?"),
+    ] = None,
+    known_bias_mg: Annotated[
+        tuple[float, float, float],
+        typer.Option(help="With --from-position: known bias of p, x y z, mg; its share is taken off first."),
+    ] = (0.0, 0.0, 0.0),
+    latitude: Annotated[
+        float | None, typer.Option(help="With --from-position: latitude, degrees, for the Earth's share.")
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Position-drift budget of an array: closed forms, their validity limit, Monte Carlo beside.
 
     Example: `gfimu drift --array cube12 --time 0.3 --bias-mg 35 --noise-ug 290 --monte-carlo 400`
 
+    The paper's inversion: `gfimu drift --from-position 6.42 0 0 --known-bias-mg 1 0 0 --latitude 35.7`
+
     One chip on a table: `gfimu drift --array arm.toml --axis z --rate 6 --time 60 --bias-mg 5 --noise-ug 290`
     """
-    from gfimu.commands.drift import axis_drift, drift
+    from gfimu.commands.drift import axis_drift, drift, drift_from_position
     from gfimu.commands.known_axis import known_axis, turning_axis
     from gfimu.commands.opened import as_array
 
+    if from_position is not None:
+        if bias_mg or noise_ug or walk_ug or rate_drift_deg_h or rate or monte_carlo or any(offset) or axis is not None:
+            raise InputError(
+                "--from-position works errors out; give it with --time, --known-bias-mg, --latitude, --gravity"
+            )
+        found = drift_from_position(
+            from_position, time=time, known_bias_mg=known_bias_mg, latitude=latitude, gravity=gravity
+        )
+        if as_json:
+            print_json(found.to_dict())
+        else:
+            _print_equivalent(found)
+        return
+    if any(known_bias_mg) or latitude is not None:
+        raise InputError("--known-bias-mg and --latitude go with --from-position")
     turning = known_axis(turning_axis(axis, axis_point, hub, inclination_rad), as_array(array))
     if turning is not None:
         if rate_drift_deg_h or monte_carlo or any(offset):
@@ -109,6 +138,25 @@ def _drift(
     )
     for line in _remarks(budget, sample):
         print_text(line, style="" if budget.valid else "yellow")
+
+
+def _print_equivalent(found: EquivalentErrors) -> None:
+    """Print what would explain a position error."""
+    rows = [
+        ("position error, m", *(f"{value:.4g}" for value in found.position_m)),
+        ("bias of p that explains it, mg: 2 r/t²", *(f"{value:.4g}" for value in found.bias_mg)),
+    ]
+    if any(found.known_bias_mg):
+        rows.append(("known bias of p, mg", *(f"{value:.4g}" for value in found.known_bias_mg)))
+        rows.append(("position error without its share, m", *(f"{value:.4g}" for value in found.left_m)))
+    about_x, about_y, _ = found.rate_drift_deg_h
+    rows.append(("drift about the axis, °/h: 6 r/(g t³)", f"{about_x:.4g}", f"{about_y:.4g}", "none"))
+    print_table(f"What explains a position error after {found.time_s:g} s at rest", ("", "x", "y", "z"), rows)
+    if found.earth_share_m is not None:
+        print_text(
+            f"The Earth's rate has {found.earth_rate_deg_h:.3g} °/h in the horizontal: {found.earth_share_m:.3g} m in a "
+            "unit that takes the Earth for still, in a direction that its heading decides."
+        )
 
 
 def _print_about_axis(found: AxisDrift) -> None:

@@ -5,6 +5,9 @@ import json
 import numpy as np
 import pytest
 
+import gfimu
+from gfimu.position_drift.closed_forms import position_error
+
 MG = 9.80665e-3
 
 
@@ -75,3 +78,32 @@ def test_bad_input_is_one_line_and_code_2(gfimu_command, arguments, words):
     assert words in result.stderr
     assert "Traceback" not in result.stderr
     assert result.stderr.count("\n") == 1
+
+
+def test_a_position_error_is_inverted_with_the_known_bias_taken_off(gfimu_command):
+    """GF-IMU paper: about 30 °/h stand for 6.42 m after 30 s; 12.2 °/h of Earth rate at 35.7° N for 2.61 m of it."""
+    run = gfimu_command("drift", "--from-position", 6.42, 0, 0, "--latitude", 35.7, "--json")
+    found = json.loads(run.stdout)
+    assert found["rate_drift_deg_h"] == pytest.approx([0.0, 30.0, 0.0], abs=0.05)
+    assert found["earth_rate_deg_h"] == pytest.approx(12.2, abs=0.05)
+    assert found["earth_share_m"] == pytest.approx(2.61, abs=0.01)
+    half = gfimu_command("drift", "--from-position", 6.42, -6.42, 0, "--known-bias-mg", 0.7273, -0.7273, 0, "--json")
+    assert json.loads(half.stdout)["rate_drift_deg_h"] == pytest.approx([15.0, 15.0, 0.0], abs=0.05)
+    assert "none" in gfimu_command("drift", "--from-position", 6.42, 1, 2, "--known-bias-mg", 1, 0, 0).stdout
+
+
+def test_the_inversion_undoes_the_drift_model():
+    """Against the closed form of the budget: a drift about each axis comes back."""
+    for drift in ([3.0, 0.0, 0.0], [0.0, -7.0, 0.0]):
+        rates = np.radians(np.array(drift) / 3600.0)
+        error = position_error(20.0, rate_drift=rates)
+        found = gfimu.drift_from_position(tuple(error), time=20.0)
+        assert found.rate_drift_deg_h == pytest.approx(drift, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    "words", ["--from-position 1 0 0 --bias-mg 1", "--latitude 30 --bias-mg 1", "--from-position 1 0 0 --time 0",
+              "--from-position 1 0 0 --latitude 91"],
+)  # fmt: skip
+def test_the_inversion_refuses_what_has_no_use(gfimu_command, words):
+    assert gfimu_command("drift", *words.split()).code == 2

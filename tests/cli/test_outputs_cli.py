@@ -93,7 +93,7 @@ def parameters_of(name):
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_every_option_is_an_argument_of_the_function(name):
-    functions = [COMMANDS[name][1], *([gfimu.axis_drift] if name == "drift" else [])]  # two kinds of result
+    functions = [COMMANDS[name][1], *([gfimu.axis_drift, gfimu.drift_from_position] if name == "drift" else [])]
     arguments = {argument for function in functions for argument in inspect.signature(function).parameters}
     assert {argument_of(parameter) for parameter in parameters_of(name)} <= arguments
 
