@@ -15,6 +15,7 @@ from gfimu.diagnosis.data.rounding import between_steps
 from gfimu.diagnosis.data.time_grid import TimeGrid, time_grid
 from gfimu.errors import InputError
 from gfimu.recording import Recording
+from gfimu.recording.conversion_times import conversion_times, output_data_rate
 from gfimu.recording.reference_times import reference_times
 from gfimu.units import TIME_COLUMNS
 from gfimu.world_model import WorldModel
@@ -95,7 +96,11 @@ class Run:
     impossible : int
         Number of values left out because no sensor reads them.
     late : ndarray or None, shape (n,)
-        How long after its sample each reference value was read, s, at most half a sample period; None if not at all.
+        How long after its sample each reference value was read, s; None if not at all.
+    converted : ndarray or None, shape (n, k)
+        How long after its sample each chip converted its reading, s; negative before it, None if not known.
+    converts_at : float or None
+        Rate at which the chips convert, Hz; None for once a sample.
     """
 
     t: NDArray[np.float64]
@@ -113,6 +118,13 @@ class Run:
     jitter: float = 0.0
     impossible: int = 0
     late: NDArray[np.float64] | None = None
+    converted: NDArray[np.float64] | None = None
+    converts_at: float | None = None
+
+    @property
+    def output_data_rate(self) -> float:
+        """Rate at which the chips convert, Hz: the noise of a reading is that of this rate."""
+        return self.converts_at or 1.0 / self.sample_period
 
     @property
     def sample_period(self) -> float:
@@ -150,6 +162,8 @@ class Run:
             jitter=self.jitter,
             impossible=self.impossible,
             late=None if self.late is None else self.late[part],
+            converted=None if self.converted is None else self.converted[part],
+            converts_at=self.converts_at,
         )
 
 
@@ -225,7 +239,19 @@ def prepare_run(recording: Recording, model: WorldModel, *, name: str = "run") -
         jitter=grid.jitter,
         impossible=impossible,
         late=late,
+        converted=_converted(recording, grid, len(model.array.chips)),
+        converts_at=output_data_rate(recording),
     )
+
+
+def _converted(recording: Recording, grid: TimeGrid, chips: int) -> NDArray[np.float64] | None:
+    """Return how long after its place on the grid each chip converted its reading (n, k), s; None if not known."""
+    times = conversion_times(recording, chips)
+    if times is None:
+        return None
+    after = np.zeros((grid.size, chips))
+    after[grid.place] = times - grid.t[grid.place, None]
+    return after
 
 
 def _on_grid(
@@ -236,7 +262,11 @@ def _on_grid(
     if TIME_COLUMNS.get(column) not in recording.reference:
         place = grid.place[known]
         values[place], valid[place] = drive[known], True
-        return values, valid, None
+        if output_data_rate(recording) is None:
+            return values, valid, None
+        late = np.zeros(grid.size)
+        late[place] = recording.t_s[known] - grid.t[place]  # stamps of a clock that follows the chips' are no jitter
+        return values, valid, late
     t, read_at = grid.t, reference_times(recording, column)
     place = np.rint((read_at - t[0]) / grid.period).astype(int)
     known &= (place >= 0) & (place < grid.size)
