@@ -52,53 +52,68 @@ def conversion_times(recording: Recording, chips: int) -> NDArray[np.float64] | 
     if status is None or len(bits) != chips:
         return read - 0.5 * period
     steps = np.maximum(np.rint(np.diff(recording.t_s, prepend=read[0, 0]) / recording.sample_period).astype(int), 1)
-    flags, asked = np.asarray(status).astype(int), 1.0 / float(metadata.get("sample_rate_hz", stated))
-    several = (flags[:, None] >> np.array(bits) & 1) == 1  # (n, k)
-    columns = zip(read.T, several.T, strict=True)
-    return np.column_stack([_of_chip(t, steps, marked, period, asked) for t, marked in columns])
+    several = (np.asarray(status).astype(int)[:, None] >> np.array(bits) & 1) == 1  # (n, k)
+    ahead = several & (steps == 1)[:, None]  # after a lost sample several are no more than were due
+    waited = _waited(recording.t_s, steps, 1.0 / float(metadata.get("sample_rate_hz", stated)))
+    slowest = int(np.argmin(ahead.any(axis=0)))  # the first that is never ahead
+    read[:, slowest:] += waited[:, None]  # the chips behind it are read after the wait
+    columns = zip(read.T, several.T, ahead.T, strict=True)
+    return np.column_stack([_of_chip(t, steps, *marks, waited > 0.0, period) for t, *marks in columns])
+
+
+def _waited(t: NDArray[np.float64], steps: NDArray[np.intp], asked: float) -> NDArray[np.float64]:
+    """Return how long each sample (n,) waited for the slowest chip, s: so much later than asked for comes the next."""
+    excess = np.append(np.where(steps[1:] == 1, np.diff(t) - asked, 0.0), 0.0)
+    return np.where(excess > _WAITED, excess, 0.0)
 
 
 def _of_chip(
-    t: NDArray[np.float64], steps: NDArray[np.intp], several: NDArray[np.bool_], period: float, asked: float
+    read: NDArray[np.float64],
+    steps: NDArray[np.intp],
+    several: NDArray[np.bool_],
+    ahead: NDArray[np.bool_],
+    waited: NDArray[np.bool_],
+    period: float,
 ) -> NDArray[np.float64]:
     """Return the conversion times (n,) of one chip, s.
 
     Parameters
     ----------
-    t : ndarray, shape (n,)
+    read : ndarray, shape (n,)
         When the chip was read, s.
     steps : ndarray of int, shape (n,)
         Sample periods since the row before.
-    several : ndarray of bool, shape (n,)
-        Which rows hold the mean of several conversions.
-    period, asked : float
-        Output period by the data sheet, and the sample period asked for, s.
+    several, ahead : ndarray of bool, shape (n,)
+        Which rows hold the mean of several conversions, and of one more than was due.
+    waited : ndarray of bool, shape (n,)
+        Which samples waited for the slowest chip.
+    period : float
+        Output period by the data sheet, s.
     """
     place = np.cumsum(steps)
-    marks = np.flatnonzero(several & (steps == 1))  # after a lost sample several are no more than were due
-    if len(marks):
-        newest, period = _between_marks(t, place, several & (steps == 1), marks)
+    if ahead.any():
+        newest, period = _between_marks(read, place, ahead)
     else:
-        newest, period = _without_marks(t, place, period, asked)
+        newest, period = _without_marks(read, place, waited, period)
     count = np.where(several, np.maximum(steps, 2), 1)
     return newest - 0.5 * (count - 1) * period
 
 
 def _between_marks(
-    t: NDArray[np.float64], place: NDArray[np.intp], ahead: NDArray[np.bool_], marks: NDArray[np.intp]
+    read: NDArray[np.float64], place: NDArray[np.intp], ahead: NDArray[np.bool_]
 ) -> tuple[NDArray[np.float64], float]:
     """Return the newest conversion of each row (n,), s, and the chip's period, s, from rows that were one ahead.
 
     In such a row the newest conversion came just before: the one before it had not come a row earlier.
     """
-    number = place + np.cumsum(ahead)  # of the newest conversion
-    sampled = float(t[-1] - t[0]) / float(place[-1] - place[0])
+    marks, number = np.flatnonzero(ahead), place + np.cumsum(ahead)  # number of the newest conversion
+    sampled = float(read[-1] - read[0]) / float(place[-1] - place[0])
     if len(marks) > 1:
-        period = float(t[marks[-1]] - t[marks[0]]) / float(number[marks[-1]] - number[marks[0]])
-    else:  # by how much it is faster is known from how long it took to be one ahead, at least
+        period = float(read[marks[-1]] - read[marks[0]]) / float(number[marks[-1]] - number[marks[0]])
+    else:  # how long it took at least to be one ahead bounds by how much it is faster
         longest = max(int(place[-1] - place[marks[0]]), int(place[marks[0]] - place[0]), 1)
         period = sampled * (1.0 - 0.5 / longest)
-    at = t[marks] - 0.5 * (sampled - period)
+    at = read[marks] - 0.5 * (sampled - period)
     newest = np.interp(number, number[marks], at)
     before, after = number < number[marks[0]], number > number[marks[-1]]
     newest[before] = at[0] - period * (number[marks[0]] - number[before])
@@ -107,16 +122,15 @@ def _between_marks(
 
 
 def _without_marks(
-    t: NDArray[np.float64], place: NDArray[np.intp], period: float, asked: float
+    read: NDArray[np.float64], place: NDArray[np.intp], waited: NDArray[np.bool_], period: float
 ) -> tuple[NDArray[np.float64], float]:
     """Return the newest conversion of each row (n,), s, and the chip's period, s, of a chip that is never ahead.
 
-    Where the board has waited, it is the slowest, and converts at the time of the row from then on. Otherwise its clock
-    is as fast as the board's, and nothing shows its phase: half a period before the row.
+    Where the board has waited, it is the slowest, and converts when it is read from then on. Otherwise its clock is as
+    fast as the board's, and nothing shows its phase: half a period before.
     """
-    waited = np.flatnonzero((np.diff(t) > asked + _WAITED) & (np.diff(place) == 1))
-    if not len(waited) or place[-1] == place[waited[0]]:
-        return t - 0.5 * period, period
-    since = int(waited[0])
-    period = float(t[-1] - t[since]) / float(place[-1] - place[since])
-    return np.where(place < place[since], t[since] - period * (place[since] - place), t), period
+    since = int(np.argmax(waited))
+    if not waited.any() or place[-1] == place[since]:
+        return read - 0.5 * period, period
+    period = float(read[-1] - read[since]) / float(place[-1] - place[since])
+    return np.where(place < place[since], read[since] - period * (place[since] - place), read), period
