@@ -63,7 +63,7 @@ def errors_of(rate: int, code: int) -> NDArray[np.float64]:
     scene = Sawtooth(rate / 10.0)
     recording = record_virtual(scene, 8.0, rate_hz=rate, rate_code=code, chips=CHIPS).recording
     turn = recording.readings[:, ::3] / (2.0 * LARGEST) + 0.5  # of the tooth, (n, 4)
-    stated = conversion_times(recording, 4) - recording.t_s[:, None]
+    stated = conversion_times(recording, 4).times - recording.t_s[:, None]
     seconds = recording.reference["tacho_rad_s"][:, None] + stated
     late = ((seconds * scene.frequency - turn + 0.5) % 1.0 - 0.5) / scene.frequency
     return np.where(np.abs(late) < 1.0 / rate, late, np.nan)

@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 from scipy.ndimage import gaussian_filter1d
 
+from gfimu.diagnosis.data.conversions import Conversions
 from gfimu.diagnosis.data.rounding import between_steps
 from gfimu.diagnosis.data.time_grid import TimeGrid, time_grid
 from gfimu.errors import InputError
 from gfimu.recording import Recording
-from gfimu.recording.conversion_times import conversion_times, output_data_rate
+from gfimu.recording.conversion_times import output_data_rate
 from gfimu.recording.reference_times import reference_times
 from gfimu.units import TIME_COLUMNS
 from gfimu.world_model import WorldModel
@@ -97,8 +98,8 @@ class Run:
         Number of values left out because no sensor reads them.
     late : ndarray or None, shape (n,)
         How long after its sample each reference value was read, s; None if not at all.
-    converted : ndarray or None, shape (n, k)
-        How long after its sample each chip converted its reading, s; negative before it, None if not known.
+    conversions : Conversions or None
+        When the chips converted the samples; None if the recording does not say.
     converts_at : float or None
         Rate at which the chips convert, Hz; None for once a sample.
     """
@@ -118,7 +119,7 @@ class Run:
     jitter: float = 0.0
     impossible: int = 0
     late: NDArray[np.float64] | None = None
-    converted: NDArray[np.float64] | None = None
+    conversions: Conversions | None = None
     converts_at: float | None = None
 
     @property
@@ -162,7 +163,7 @@ class Run:
             jitter=self.jitter,
             impossible=self.impossible,
             late=None if self.late is None else self.late[part],
-            converted=None if self.converted is None else self.converted[part],
+            conversions=None if self.conversions is None else self.conversions.rows(part),
             converts_at=self.converts_at,
         )
 
@@ -239,19 +240,9 @@ def prepare_run(recording: Recording, model: WorldModel, *, name: str = "run") -
         jitter=grid.jitter,
         impossible=impossible,
         late=late,
-        converted=_converted(recording, grid, len(model.array.chips)),
+        conversions=Conversions.of(recording, grid, len(model.array.chips)),
         converts_at=output_data_rate(recording),
     )
-
-
-def _converted(recording: Recording, grid: TimeGrid, chips: int) -> NDArray[np.float64] | None:
-    """Return how long after its place on the grid each chip converted its reading (n, k), s; None if not known."""
-    times = conversion_times(recording, chips)
-    if times is None:
-        return None
-    after = np.zeros((grid.size, chips))
-    after[grid.place] = times - grid.t[grid.place, None]
-    return after
 
 
 def _on_grid(

@@ -153,8 +153,8 @@ class Stretch:
         period = self.run.sample_period
         if self.run.late is not None:
             predicted[:, -1] = moved(predicted[:, -1], self.run.late / period)
-        if self.run.converted is not None:
-            after = self.run.converted[:, self.model.array.chip_of_channel]  # (n, c)
+        if self.run.conversions is not None:
+            after = self.run.conversions.after[:, self.model.array.chip_of_channel]  # (n, c)
             predicted[:, :-1] = moved(predicted[:, :-1], after / period)
         return predicted
 
@@ -203,8 +203,8 @@ class Stretch:
         times = self.start + self.model.sample_times(self.run.t - self.start, [*self.known, *effects])
         if self.run.late is not None:
             times[:, -1] += self.run.late
-        if self.run.converted is not None:
-            times[:, :-1] += self.run.converted
+        if self.run.conversions is not None:
+            times[:, :-1] += self.run.conversions.after
         return times
 
     def counted_times(self, effects: Sequence[Effect] = ()) -> NDArray[np.float64]:

@@ -48,7 +48,7 @@ class PacedBoard:
 @pytest.mark.parametrize("rate", [100.0, 3200.0])
 def test_the_times_of_all_chips_are_found_from_the_marks(rate: float):
     board = PacedBoard([-5e-4, -6e-3, 4.2e-3, 2e-3], 3000, rate)
-    error = conversion_times(board.recording(), 4) - board.times[4:]
+    error = conversion_times(board.recording(), 4).times - board.times[4:]
     age = board.t[4:, None] - board.times[4:]
     assert np.all(np.ptp(age[:, [0, 2, 3]], axis=0) > 0.9 / rate)  # the ages sweep through a period
     assert np.sqrt(np.mean(error**2)) < 0.01 / rate + 1e-6  # of the period; stamps are whole microseconds
@@ -58,7 +58,7 @@ def test_a_single_mark_gives_the_times_beside_it():
     board = PacedBoard([0.0, -6e-3, 3e-3, 2.5e-3], 420)
     mark = int(np.flatnonzero(board.status >> BITS[2] & 1)[1])
     rows = slice(mark - 30, mark + 40)
-    error = np.abs(conversion_times(board.recording(rows), 4) - board.times[rows])[:, 2]
+    error = np.abs(conversion_times(board.recording(rows), 4).times - board.times[rows])[:, 2]
     assert error[29:32].max() < 2e-4
     assert error.max() < 0.5 / board.rate  # the chip's rate is not known: the age is between none and a period
 
@@ -72,7 +72,7 @@ def test_lost_interrupts_make_means_of_all_that_came_and_no_marks():
     board.times[lost + 1] = 0.5 * (board.times[lost] + board.times[lost + 1])
     board.status[lost + 1] |= 0xF0
     usual = kept & (np.roll(board.status, 1) & 0xF0 == 0)
-    error = (conversion_times(board.recording(kept), 4) - board.times[kept])[usual[kept]]
+    error = (conversion_times(board.recording(kept), 4).times - board.times[kept])[usual[kept]]
     assert np.median(np.abs(error)) < 1e-4
 
 
@@ -80,13 +80,13 @@ def test_clocks_that_agree_with_the_board_s_leave_half_a_period():
     t = np.arange(500) / 100.0
     stated = {"sample_rate_hz": 100.0, "output_data_rate_hz": 100.0, "paced_status_bits": BITS}
     still = Recording(t, np.zeros((500, 12)), CHANNELS, {}, stated, {"status": np.zeros(500, dtype=np.uint16)})
-    np.testing.assert_allclose(conversion_times(still, 4), np.tile(t[:, None] - 5e-3, 4), atol=1e-12)
+    np.testing.assert_allclose(conversion_times(still, 4).times, np.tile(t[:, None] - 5e-3, 4), atol=1e-12)
 
 
 def test_the_newest_conversion_is_half_an_output_period_old_when_its_chip_is_read():
     t = np.arange(100) / 100.0
     stated = {"output_data_rate_hz": 400.0, "read_spacing_s": 16e-6}
-    found = conversion_times(Recording(t, np.zeros((100, 12)), CHANNELS, {}, stated), 4)
+    found = conversion_times(Recording(t, np.zeros((100, 12)), CHANNELS, {}, stated), 4).times
     np.testing.assert_allclose(found, t[:, None] - 1.25e-3 + 16e-6 * np.arange(4), atol=1e-12)
 
 
