@@ -1,11 +1,11 @@
 """When the chips converted what a row of a recording holds.
 
-Chips convert by clocks of their own. A reading is older than its row's time by up to a period of the chip's output data
-rate, and where a board keeps pace with chips of the same rate, that age grows from row to row until the chip is a whole
-conversion ahead. Such a recording states in its metadata ``output_data_rate_hz``, the time from reading one chip to the
-next (``read_spacing_s``), and in ``paced_status_bits`` the bit of its column ``status``, for each chip, that marks a row
-whose reading is the mean of several conversions. Each mark says when the chip's clock passed the board's, so that all
-conversions between two marks are known. The slowest chip has none: the board waits for it.
+Chips convert by clocks of their own. A reading is older than its row's time by up to a period of the chip's output
+data rate, and where a board keeps pace with chips of the same rate, that age grows from row to row until the chip is a
+whole conversion ahead. Such a recording states in its metadata ``output_data_rate_hz``, the time from reading one chip
+to the next (``read_spacing_s``), and in ``paced_status_bits`` the bit of its column ``status``, for each chip, that
+marks a row whose reading is the mean of several conversions. Each mark says when the chip's clock passed the board's,
+so that all conversions between two marks are known. The slowest chip has none: the board waits for it.
 """
 
 from __future__ import annotations
@@ -44,8 +44,7 @@ class ConversionTimes:
 
 def output_data_rate(recording: Recording) -> float | None:
     """Return the rate at which the chips convert, Hz, where the recording states one."""
-    stated = recording.metadata.get("output_data_rate_hz")
-    return float(stated) if isinstance(stated, int | float) and stated > 0.0 else None
+    return _positive(recording, "output_data_rate_hz")
 
 
 def conversion_times(recording: Recording, chips: int) -> ConversionTimes | None:
@@ -68,15 +67,14 @@ def conversion_times(recording: Recording, chips: int) -> ConversionTimes | None
     stated = output_data_rate(recording)
     if stated is None or len(recording) < 2:
         return None
-    metadata, period = recording.metadata, 1.0 / stated
-    read = recording.t_s[:, None] + float(metadata.get("read_spacing_s", 0.0)) * np.arange(chips)  # (n, k)
-    bits, status = metadata.get("paced_status_bits", []), recording.extra.get("status")
-    if status is None or len(bits) != chips:
+    period = 1.0 / stated
+    read = recording.t_s[:, None] + (_positive(recording, "read_spacing_s") or 0.0) * np.arange(chips)  # (n, k)
+    several = _marked(recording, chips)
+    if several is None:
         return ConversionTimes(read - 0.5 * period, np.zeros((2, *read.shape)))
     steps = np.maximum(np.rint(np.diff(recording.t_s, prepend=read[0, 0]) / recording.sample_period).astype(int), 1)
-    several = (np.asarray(status).astype(int)[:, None] >> np.array(bits) & 1) == 1  # (n, k)
     ahead = several & (steps == 1)[:, None]  # after a lost sample several are no more than were due
-    waited = _waited(recording.t_s, steps, 1.0 / float(metadata.get("sample_rate_hz", stated)))
+    waited = _waited(recording.t_s, steps, 1.0 / (_positive(recording, "sample_rate_hz") or stated))
     unmarked = np.flatnonzero(~ahead.any(axis=0))
     if len(unmarked):
         read[:, unmarked[0] :] += waited[:, None]  # the slowest chip and those behind it are read after the wait
@@ -90,6 +88,21 @@ def conversion_times(recording: Recording, chips: int) -> ConversionTimes | None
         times[:, chip] = found.newest - 0.5 * (count - 1) * found.period
         unknown[0, :, chip], unknown[1, :, chip] = found.phase, found.rate
     return ConversionTimes(times, unknown)
+
+
+def _positive(recording: Recording, key: str) -> float | None:
+    """Return a positive number that the metadata state; None where they do not."""
+    value = recording.metadata.get(key)
+    return float(value) if isinstance(value, int | float) and value > 0.0 else None
+
+
+def _marked(recording: Recording, chips: int) -> NDArray[np.bool_] | None:
+    """Return the rows that hold the mean of several conversions, for each chip (n, k); None where no column says so."""
+    bits, status = recording.metadata.get("paced_status_bits"), recording.extra.get("status")
+    if status is None or not isinstance(bits, list) or len(bits) != chips or {*map(type, bits)} != {int}:
+        return None
+    flags = np.nan_to_num(np.asarray(status, dtype=float)).astype(int)
+    return np.asarray((flags[:, None] >> np.array(bits) & 1) == 1)
 
 
 def _waited(t: NDArray[np.float64], steps: NDArray[np.intp], asked: float) -> NDArray[np.float64]:
@@ -130,8 +143,8 @@ def _between_marks(read: NDArray[np.float64], place: NDArray[np.intp], ahead: ND
 def _possible_periods(read: NDArray[np.float64], number: NDArray[np.intp]) -> tuple[float, float]:
     """Return mean and standard deviation, s, of the periods with which every row holds the newest conversion.
 
-    ``read`` and ``number`` (n,) count from a row whose conversion came just before it was read: conversion m came by the
-    time of its row, and the one after it had not.
+    ``read`` and ``number`` (n,) count from a row whose conversion came just before it was read: conversion m came by
+    the time of its row, and the one after it had not.
     """
     later, earlier, before = number > 0, number < 0, number < -1
     most = np.concatenate([read[later] / number[later], read[before] / (number[before] + 1)])

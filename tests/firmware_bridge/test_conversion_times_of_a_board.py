@@ -32,11 +32,14 @@ class Sawtooth:
     """
 
     frequency: float
-    array: AccelerometerArray = AccelerometerArray.load("cube12")
     seed: int = 1
     lsb: float = STANDARD_GRAVITY / 256.0
     noise_factor: float = 1.0
     bias_walk: float = 0.0
+
+    @property
+    def array(self) -> AccelerometerArray:
+        return AccelerometerArray.load("cube12")
 
     @property
     def metadata(self) -> dict[str, Any]:

@@ -40,9 +40,7 @@ class PacedBoard:
     def recording(self, kept: slice | NDArray[np.bool_] = slice(4, None), **metadata: object) -> Recording:
         t = self.t[kept]
         stated = {"sample_rate_hz": self.rate, "output_data_rate_hz": self.rate, "paced_status_bits": BITS}
-        return Recording(
-            t, np.zeros((len(t), 12)), CHANNELS, {}, {**stated, **metadata}, {"status": self.status[kept]}
-        )
+        return Recording(t, np.zeros((len(t), 12)), CHANNELS, {}, {**stated, **metadata}, {"status": self.status[kept]})
 
 
 @pytest.mark.parametrize("rate", [100.0, 3200.0])
@@ -88,6 +86,22 @@ def test_the_newest_conversion_is_half_an_output_period_old_when_its_chip_is_rea
     stated = {"output_data_rate_hz": 400.0, "read_spacing_s": 16e-6}
     found = conversion_times(Recording(t, np.zeros((100, 12)), CHANNELS, {}, stated), 4).times
     np.testing.assert_allclose(found, t[:, None] - 1.25e-3 + 16e-6 * np.arange(4), atol=1e-12)
+
+
+def test_the_period_of_a_chip_with_one_mark_lies_where_every_row_allows_it():
+    board = PacedBoard([-1e-3, -7e-4, 3e-3, 2.5e-3], 3000)
+    found = conversion_times(board.recording(), 4)
+    assert (board.status[4:] >> BITS[1] & 1).sum() == 1
+    error, unknown = (found.times - board.times[4:])[:, 1], np.abs(found.unknown[:, :, 1]).sum(axis=0)
+    assert np.abs(error).max() < 2.0 * unknown.max()  # a uniform prior ends at 1.7 standard deviations
+    assert not found.unknown[:, :, [0, 2, 3]].any()
+
+
+def test_bits_that_are_no_numbers_mark_nothing():
+    t = np.arange(100) / 100.0
+    stated = {"output_data_rate_hz": 100.0, "paced_status_bits": ["4", "5", "6", "7"], "sample_rate_hz": "fast"}
+    recording = Recording(t, np.zeros((100, 12)), CHANNELS, {}, stated, {"status": np.full(100, np.nan)})
+    np.testing.assert_allclose(conversion_times(recording, 4).times, np.tile(t[:, None] - 5e-3, 4), atol=1e-12)
 
 
 @pytest.mark.parametrize("stated", [{}, {"output_data_rate_hz": 0.0}, {"output_data_rate_hz": "fast"}])
