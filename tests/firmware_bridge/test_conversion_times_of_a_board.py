@@ -16,7 +16,7 @@ from firmware_bridge.adxl345_device import Adxl345Options
 from firmware_bridge.commands import RATE_CODE_AUTO, Identity
 from firmware_bridge.virtual_run import record_virtual
 from gfimu.geometry.array import AccelerometerArray
-from gfimu.recording.conversion_times import conversion_times
+from gfimu.recording.timing.conversion_times import conversion_times
 from gfimu.units import STANDARD_GRAVITY
 from sim.adxl345 import SensorErrors
 

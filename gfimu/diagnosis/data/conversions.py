@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from gfimu.diagnosis.data.time_grid import TimeGrid
 from gfimu.recording import Recording
-from gfimu.recording.conversion_times import conversion_times
+from gfimu.recording.timing.conversion_times import conversion_times
 from gfimu.short_repr import short_repr
 
 if TYPE_CHECKING:

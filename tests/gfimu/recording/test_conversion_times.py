@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from gfimu.recording import Recording
-from gfimu.recording.conversion_times import conversion_times
+from gfimu.recording.timing.conversion_times import conversion_times
 
 BITS = [4, 5, 6, 7]
 CHANNELS = tuple(f"a{chip}{axis}" for chip in range(1, 5) for axis in range(1, 4))
