@@ -18,6 +18,7 @@ from firmware_bridge.lpc1768.elf import ElfImage
 __all__ = ["Worker"]
 
 _TIMER0 = FIRST_IRQ + 1
+_TIMER_COUNTER = 0x08
 
 
 class Worker:
@@ -83,6 +84,10 @@ class Worker:
     def word(self, symbol: str) -> int:
         """Value of a variable of the firmware."""
         return self._board.word(symbol)
+
+    def timer(self, number: int) -> int:
+        """Counter of a timer."""
+        return self._board.read_bus(self._board.timers[number].base + _TIMER_COUNTER)
 
     def counters(self) -> dict[str, int]:
         """Exceptions handled, register accesses, resets."""

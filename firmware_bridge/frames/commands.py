@@ -43,6 +43,10 @@ NO_TEMPERATURE = -(1 << 15)
 """Value of the temperature field while no sensor fills it."""
 
 _LARGEST_RATE_CODE = 15
+_FASTEST_OUTPUT_HZ = 3200.0  # of the chips, at that code
+_SEVERAL_BITS = (4, 5, 6, 7)  # status bits of the sensors that converted more than once since the sample before
+_BITS_OF_A_READ = 5 * 16  # of SPI, per sensor
+_PACED_SINCE = (1, 2, 0)  # firmware that keeps pace with its chips
 FAST_BAUD = 1_562_500
 """Carries every sample rate; 100 MHz / 16 / 4 exactly, bits per second."""
 
@@ -142,6 +146,15 @@ class Identity:
     def full_resolution(self) -> bool:
         """Whether a count is 3.9 mg in every range."""
         return bool(self.data_format & 8)
+
+    @property
+    def conversions(self) -> dict[str, Any]:
+        """What a recording states of when its chips convert (`gfimu.recording.timing.conversion_times`)."""
+        output_rate_hz = _FASTEST_OUTPUT_HZ / 2.0 ** (_LARGEST_RATE_CODE - self.rate_code)
+        paced = output_rate_hz >= self.rate_hz and output_rate_hz * 10 <= self.rate_hz * 11  # set_pace in core.c
+        since = tuple(int(part) for part in self.firmware.split(".")) >= _PACED_SINCE
+        bits = {"paced_status_bits": list(_SEVERAL_BITS[: len(self.present)])} if paced and since else {}
+        return {"output_data_rate_hz": output_rate_hz, "read_spacing_s": _BITS_OF_A_READ / (1e3 * self.spi_khz), **bits}
 
     @property
     def count_size(self) -> int:

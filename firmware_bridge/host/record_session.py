@@ -240,6 +240,7 @@ class RecordSession:
                 self._metadata["sample_rate_hz"] = self.identity.rate_hz
                 self._metadata["range_g"] = self.identity.range_g
                 self._metadata["firmware"] = self.identity.firmware
+                self._metadata.update(self.identity.conversions)
             self.journal = Journal(self._out, self._array.channels, self._metadata)
         parts = self._waiting
         self._waiting = []

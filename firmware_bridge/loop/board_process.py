@@ -182,6 +182,10 @@ class BoardProcess:
         """Value of a 32-bit variable of the firmware."""
         return int(self._call("word", symbol))
 
+    def timer(self, number: int) -> int:
+        """Counter of TIMER0…3 as it stands."""
+        return int(self._call("timer", number))
+
     def counters(self) -> dict[str, int]:
         """Exceptions handled, register accesses, resets."""
         result: dict[str, int] = self._call("counters")

@@ -33,6 +33,7 @@ _BOOT_S = 0.02
 _SETUP_S = 0.05
 _SLICE_S = 0.5
 _NO_READING = -(1 << 15)
+_CLOCK_TIMER = 1  # of the firmware's time stamps: it begins some time after power-on
 _CLOCK_ERROR_STD = 0.005
 
 
@@ -113,6 +114,7 @@ def record_virtual(
         board.receive(setup)
         board.receive(encode_command(Command.IDENTIFY))
         now = board.run_for(_SETUP_S)
+        clock_began = now / TICKS_PER_SECOND - board.timer(_CLOCK_TIMER) / decoder.format.clock_hz
         decoder.feed(board.take_sent()[0])  # samples from before the board was set up
         end = round(duration_s * TICKS_PER_SECOND)
         while now < end:
@@ -136,7 +138,7 @@ def record_virtual(
         t,
         readings,
         scene.array.channels,
-        scene.references(t),
+        scene.references(t + clock_began),
         {
             **array_metadata(scene.array),
             "part": scene.array.chips[0].part,
@@ -145,6 +147,7 @@ def record_virtual(
             "source": "emulated LPC1768",
             "software_version": gfimu.__version__,
             "frames_lost": decoder.counts.lost,
+            **({} if identity is None else identity.conversions),
             **rate.metadata(),
             **scene.metadata,
         },

@@ -105,7 +105,7 @@ def white_factor(
     # A run has one level for all of its stretches; of several runs it is the rms.
     ratios, factors = [], []
     for stretch, mine in zip(stretches, levels, strict=True):
-        expected = stretch.model.expected_noise(1.0 / stretch.run.sample_period)
+        expected = stretch.model.expected_noise(stretch.run.output_data_rate)
         measured = mine.white[:-1]
         coarse = bool(stretch.steps.channels)
         rounding = 0.0 if coarse else expected.quantum**2 / 12.0

@@ -76,7 +76,7 @@ def check_integrity(model: WorldModel, run: Run, prediction: NDArray[np.float64]
         What the simulation predicts for the run, m/s².
     """
     known, library = {effect.name for effect in model.effects}, model.families()
-    step, expected = _resolution(run), model.expected_noise(1.0 / run.sample_period)
+    step, expected = _resolution(run), model.expected_noise(run.output_data_rate)
     counts = _Counts(max(step or 0.0, expected.quantum), _range_factors(model.effects, model), expected)
     wiring = _wiring(model, _alive(model, run, prediction, counts), prediction, expected.white, known)
     rewired = [library[name](parameters) for name, parameters, _ in wiring if name in library]

@@ -81,7 +81,7 @@ def refuse_implausible(
     InputError
         Says what is wrong with the file and how to mend it.
     """
-    expected = model.expected_noise(1.0 / run.sample_period)
+    expected = model.expected_noise(run.output_data_rate)
     misfit = _misfit(run, prediction, expected.white)
     if misfit.varying < _REVERSED_RMS**2 and misfit.whole < SIGNIFICANT_RMS**2:
         return

@@ -9,13 +9,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gfimu.diagnosis.data.conversions import settled
 from gfimu.diagnosis.data.integrity import IntegrityReport, check_integrity
 from gfimu.diagnosis.data.plausibility import refuse_implausible
-from gfimu.diagnosis.data.run import Run, prepare_run
+from gfimu.diagnosis.data.run import Run, prepare_run, smooth_rate
 from gfimu.diagnosis.data.samples import reference_spikes
 from gfimu.errors import InputError, RecordingWarning
 from gfimu.recording import Recording
-from gfimu.world_model import Effect, WorldModel
+from gfimu.world_model import Effect, WorldModel, reads_place
 
 __all__ = ["PreparedRuns"]
 
@@ -80,6 +81,9 @@ class PreparedRuns:
             run = replace(
                 run, reference=np.where(wrong, 0.0, run.reference), reference_valid=run.reference_valid & ~wrong
             )
+            if run.conversions is not None:
+                rate = smooth_rate(run, is_angle=reads_place(model))
+                run = settled(run, predict(model, run), model.array.chip_of_channel, rate)
             checked = _check(model, run, predict, force=force)
             runs.append(checked.run)
             effects.append(list(checked.effects))

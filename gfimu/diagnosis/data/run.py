@@ -11,11 +11,13 @@ from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 from scipy.ndimage import gaussian_filter1d
 
+from gfimu.diagnosis.data.conversions import Conversions
 from gfimu.diagnosis.data.rounding import between_steps
 from gfimu.diagnosis.data.time_grid import TimeGrid, time_grid
 from gfimu.errors import InputError
 from gfimu.recording import Recording
 from gfimu.recording.reference_times import reference_times
+from gfimu.recording.timing.conversion_times import output_data_rate
 from gfimu.units import TIME_COLUMNS
 from gfimu.world_model import WorldModel
 
@@ -95,7 +97,11 @@ class Run:
     impossible : int
         Number of values left out because no sensor reads them.
     late : ndarray or None, shape (n,)
-        How long after its sample each reference value was read, s, at most half a sample period; None if not at all.
+        How long after its sample each reference value was read, s; None if not at all.
+    conversions : Conversions or None
+        When the chips converted the samples; None if the recording does not say.
+    converts_at : float or None
+        Rate at which the chips convert, Hz; None for once a sample.
     """
 
     t: NDArray[np.float64]
@@ -113,6 +119,13 @@ class Run:
     jitter: float = 0.0
     impossible: int = 0
     late: NDArray[np.float64] | None = None
+    conversions: Conversions | None = None
+    converts_at: float | None = None
+
+    @property
+    def output_data_rate(self) -> float:
+        """Rate at which the chips convert, Hz: the noise of a reading is that of this rate."""
+        return self.converts_at or 1.0 / self.sample_period
 
     @property
     def sample_period(self) -> float:
@@ -150,6 +163,8 @@ class Run:
             jitter=self.jitter,
             impossible=self.impossible,
             late=None if self.late is None else self.late[part],
+            conversions=None if self.conversions is None else self.conversions.rows(part),
+            converts_at=self.converts_at,
         )
 
 
@@ -225,6 +240,8 @@ def prepare_run(recording: Recording, model: WorldModel, *, name: str = "run") -
         jitter=grid.jitter,
         impossible=impossible,
         late=late,
+        conversions=Conversions.of(recording, grid, len(model.array.chips)),
+        converts_at=output_data_rate(recording),
     )
 
 
@@ -236,7 +253,11 @@ def _on_grid(
     if TIME_COLUMNS.get(column) not in recording.reference:
         place = grid.place[known]
         values[place], valid[place] = drive[known], True
-        return values, valid, None
+        if output_data_rate(recording) is None:
+            return values, valid, None
+        late = np.zeros(grid.size)
+        late[place] = recording.t_s[known] - grid.t[place]  # stamps of a clock that follows the chips' are no jitter
+        return values, valid, late
     t, read_at = grid.t, reference_times(recording, column)
     place = np.rint((read_at - t[0]) / grid.period).astype(int)
     known &= (place >= 0) & (place < grid.size)

@@ -134,7 +134,7 @@ class Stretch:
     @cached_property
     def first_levels(self) -> NoiseLevels:
         """Noise to begin with: the data sheet's, and of the reference what its third differences show."""
-        expected = self.model.expected_noise(1.0 / self.run.sample_period)
+        expected = self.model.expected_noise(self.run.output_data_rate)
         reference = self.run.reference[self.run.reference_valid]
         _, noise = Steps.of_reference(reference, difference_noise(reference))
         channels = expected.analogue if self.steps.channels else expected.white
@@ -150,8 +150,12 @@ class Stretch:
     def predict(self, effects: Sequence[Effect], drive: Spin) -> NDArray[np.float64]:
         """Predict channels and reference, shape (n, c + 1), for a drive and effects besides the known ones."""
         predicted = self._at_samples(effects, drive)
+        period = self.run.sample_period
         if self.run.late is not None:
-            predicted[:, -1] = moved(predicted[:, -1], self.run.late / self.run.sample_period)
+            predicted[:, -1] = moved(predicted[:, -1], self.run.late / period)
+        if self.run.conversions is not None:
+            after = self.run.conversions.after[:, self.model.array.chip_of_channel]  # (n, c)
+            predicted[:, :-1] = moved(predicted[:, :-1], after / period)
         return predicted
 
     def _at_samples(self, effects: Sequence[Effect], drive: Spin) -> NDArray[np.float64]:
@@ -199,6 +203,8 @@ class Stretch:
         times = self.start + self.model.sample_times(self.run.t - self.start, [*self.known, *effects])
         if self.run.late is not None:
             times[:, -1] += self.run.late
+        if self.run.conversions is not None:
+            times[:, :-1] += self.run.conversions.after
         return times
 
     def counted_times(self, effects: Sequence[Effect] = ()) -> NDArray[np.float64]:
@@ -280,28 +286,30 @@ def _parts(counted: NDArray[np.bool_], first: int, end: int, count: int) -> list
 
 def _coarse_step(model: WorldModel, run: Run, faults: Sequence[Effect]) -> float:
     """Return the step of the readings where it is coarse, m/s²; 0 where it is finer than their noise."""
-    expected = model.expected_noise(1.0 / run.sample_period)
+    expected = model.expected_noise(run.output_data_rate)
     found = [float(one.parameters["step_m_s2"]) for one in faults if one.name == "coarse_resolution"]
     quantum = found[-1] if found else expected.quantum
     return quantum if quantum > COARSE * float(np.median(expected.analogue)) else 0.0
 
 
 def moved(values: NDArray[np.float64], share: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return smooth values (n,) moved by shares of a sample (n,), by the cubic through the four nearest.
+    """Return smooth values (n, …) moved by shares of a sample (n, …), by the cubic through the four nearest.
 
     Lagrange's form (Abramowitz and Stegun, 25.2.13); at the ends the cubic through the outermost four.
     """
     if len(values) < 4:
         return values
-    first = np.clip(np.arange(len(values)) - 1, 0, len(values) - 4)
-    u = np.arange(len(values)) + share - first
+    at = np.arange(len(values)).reshape(-1, *[1] * (values.ndim - 1)) + share
+    first = np.clip(np.floor(at).astype(int) - 1, 0, len(values) - 4)
+    u = at - first
     weights = (
         -(u - 1.0) * (u - 2.0) * (u - 3.0) / 6.0,
         u * (u - 2.0) * (u - 3.0) / 2.0,
         -u * (u - 1.0) * (u - 3.0) / 2.0,
         u * (u - 1.0) * (u - 2.0) / 6.0,
     )
-    return np.asarray(sum(weight * values[first + place] for place, weight in enumerate(weights)))
+    near = (np.take_along_axis(values, first + place, axis=0) for place in range(len(weights)))
+    return np.asarray(sum(weight * one for weight, one in zip(weights, near, strict=True)))
 
 
 def _known_walk(model: WorldModel) -> float:

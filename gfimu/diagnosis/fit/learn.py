@@ -218,7 +218,7 @@ def learn_noise(
         shares = np.maximum(counts, 1e-9) / np.maximum(counts, 1e-9).sum(axis=0)  # (stretches, c + 1)
         white = np.sqrt(sum(share * lefts[place].white ** 2 for share, place in zip(shares, mine, strict=True)))
         first = stretches[mine[0]]
-        quantum = first.model.expected_noise(1.0 / first.run.sample_period).quantum
+        quantum = first.model.expected_noise(first.run.output_data_rate).quantum
         white[:-1] = np.maximum(white[:-1], 0.5 * quantum / np.sqrt(12.0))
         white[-1] = max(white[-1], first.finest)
         walk = point.levels[mine[0]].walk

@@ -257,7 +257,7 @@ def conclude(
     residual = Residual.of_views(runs, array.channels, floor)
     extension, of_time = _extension(believed, described, array, unknown=unknown, confirmed=gain.of_other_recording)
     twin = model.extended([*_library_effects(model, found), *_residue(explanation), *extension])
-    expected = model.expected_noise(1.0 / first.run.sample_period)
+    expected = model.expected_noise(first.run.output_data_rate)
     noise: dict[str, Any] = {
         "white_over_data_sheet": float(np.median(levels.white[:-1] / expected.white)),
         "bias_instability_m_s2": float(np.median(levels.flicker[:-1])),

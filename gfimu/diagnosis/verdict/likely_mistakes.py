@@ -63,7 +63,7 @@ def likely_mistake(model: WorldModel, runs: Sequence[Run], predict: Predict) -> 
     predict : callable
         Predicts the channels (n, c), m/s², of a run by a model that its reference drives.
     """
-    white = model.expected_noise(1.0 / runs[0].sample_period).white
+    white = model.expected_noise(runs[0].output_data_rate).white
     predictions = [predict(model, run) for run in runs]
     before = _Misfit.of(runs, predictions, white)
     if before.squares < NOISE:

@@ -75,11 +75,26 @@ def test_interrupts_dropped_now_and_then(tmp_path: Path) -> None:
     assert "dropped_frames" in [cause.effect for cause in found.causes]
 
 
-def test_chips_read_one_after_another(tmp_path: Path) -> None:
+# 2 ms between two chips leave little time for the line: at 115,200 baud a fifth of the frames would find no room.
+SKEWED = {"GFIMU_CHIP_GAP_US": "2000U", "GFIMU_BOOT_BAUD": "460800U"}
+
+
+@pytest.mark.parametrize("seed", [1, 22])
+def test_chips_read_one_after_another(tmp_path: Path, seed: int) -> None:
     pytest.importorskip("ziglang", reason="the C compiler is in the extra 'firmware'")
-    image = build("gfimu", tmp_path, defines={"GFIMU_CHIP_GAP_US": "2000U"}).elf
+    image = build("gfimu", tmp_path, defines=SKEWED).elf
     scenario = tmp_path / "swinging.toml"
     scenario.write_text(SWINGING)
-    run = record_virtual(Ride(scenario, seed=1), 24.0, rate_hz=100, rate_code=12, image=image)
+    run = record_virtual(Ride(scenario, seed=seed), 24.0, rate_hz=100, rate_code=12, image=image)
     found = diagnosed(run.recording, tmp_path)
-    assert "channel_skew" in [cause.effect for cause in found.causes]
+    assert [cause.effect for cause in found.causes] == ["channel_skew"]
+    assert found.causes[0].parameters["per_chip_s"] == pytest.approx(2.02e-3, abs=1.5e-4)
+
+
+@pytest.mark.parametrize(("seed", "rate", "code"), [(1, 100, 255), (1, 100, 12), (13, 400, 255)])
+def test_nothing_is_found_where_nothing_is_hidden(tmp_path: Path, seed: int, rate: int, code: int) -> None:
+    """Chips whose clocks differ by half a percent: the ages of their readings sweep through a period."""
+    scenario = tmp_path / "swinging.toml"
+    scenario.write_text(SWINGING)
+    run = record_virtual(Ride(scenario, seed=seed), 24.0, rate_hz=rate, rate_code=code)
+    assert diagnosed(run.recording, tmp_path).verdict == "nothing_found"

@@ -232,7 +232,7 @@ class _Part:
     ) -> _Part:
         """Divide the residual (n, c) of a stretch, the table at ``angle`` (n,), its channels ``alive`` (c,)."""
         period, n = stretch.run.sample_period, len(stretch.run.t)
-        white = stretch.model.expected_noise(1.0 / period).white[alive]
+        white = stretch.model.expected_noise(stretch.run.output_data_rate).white[alive]
         mounting = Rotation.from_rotvec(stretch.run.mounting).as_matrix()
         columns = motion_columns(stretch.model.array, mounting)[alive] / white[:, None]
         frequency = np.arange(n) / (2.0 * n * period)

@@ -82,7 +82,7 @@ def prepare_body_run(recording: Recording, model: WorldModel, *, name: str = "ru
         known = np.isfinite(column)
         column[~known] = np.interp(run.t[~known], run.t[known], column[known])
     valid = ~binary_dilation(missing, iterations=_BESIDE_A_GAP) if missing.any() else ~missing
-    rest = _rest(run, gyro, model.expected_noise(1.0 / run.sample_period).white) & valid
+    rest = _rest(run, gyro, model.expected_noise(run.output_data_rate).white) & valid
     bias = gyro[rest].mean(axis=0) if rest.any() else np.zeros(3)
     smooth = smooth_gyro(gyro - bias, missing, run.sample_period)
     axes = 1.0 if model.array.turning_axis is None else 3.0  # about a known axis all of the error is along that

@@ -90,7 +90,7 @@ class BodyStretch(Stretch):
     def change(self) -> NDArray[np.float64]:
         """How fast the readings change, shape (n,), m/s³: rms over the channels, noise taken off."""
         readings, period = self.run.bridged[:, self.alive], self.run.sample_period
-        white = self.model.expected_noise(1.0 / period).white[self.alive]
+        white = self.model.expected_noise(self.run.output_data_rate).white[self.alive]
         step = np.zeros_like(readings)
         step[1:-1] = readings[2:] - readings[:-2]
         power = np.mean(step**2, axis=1) - 2 * np.mean(white**2)

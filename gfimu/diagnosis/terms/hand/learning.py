@@ -23,7 +23,7 @@ __all__ = ["first_noise", "learnt_noise"]
 
 def first_noise(stretch: BodyStretch) -> BodyNoise:
     """Return the noise to begin with: the data sheet's."""
-    white = np.where(stretch.alive, stretch.model.expected_noise(1.0 / stretch.run.sample_period).white, np.inf)
+    white = np.where(stretch.alive, stretch.model.expected_noise(stretch.run.output_data_rate).white, np.inf)
     return BodyNoise.of(white, Policy.usual_flicker / 4, stretch.run.acceleration_error)
 
 
@@ -44,7 +44,7 @@ def learnt_noise(stretch: BodyStretch, drive: HandDrive, causes: Sequence[Cause]
 def _fast_noise(stretch: BodyStretch, residual: NDArray[np.float64]) -> BodyNoise:
     """Return white noise and what grows with the motion, from a residual (n, c), m/s²."""
     array = stretch.model.array
-    expected = stretch.model.expected_noise(1.0 / stretch.run.sample_period)
+    expected = stretch.model.expected_noise(stretch.run.output_data_rate)
     sensed = np.hstack([array.axes, array.regression_matrix[:, :3] / array.length_unit]) * stretch.alive[:, None]
     projector = (np.eye(len(sensed)) - sensed @ np.linalg.pinv(sensed)) * stretch.alive
     white = white_from_rows(residual @ projector, projector, stretch.change, stretch.use, expected.white)

@@ -1,0 +1,1 @@
+"""When what a row holds was measured."""
