@@ -77,13 +77,13 @@ def _drift(
             raise InputError(
                 "--from-position works errors out; give it with --time, --known-bias-mg, --latitude, --gravity"
             )
-        found = drift_from_position(
+        explained = drift_from_position(
             from_position, time=time, known_bias_mg=known_bias_mg, latitude=latitude, gravity=gravity
         )
         if as_json:
-            print_json(found.to_dict())
+            print_json(explained.to_dict())
         else:
-            _print_equivalent(found)
+            _print_equivalent(explained)
         return
     if any(known_bias_mg) or latitude is not None:
         raise InputError("--known-bias-mg and --latitude go with --from-position")
@@ -154,8 +154,8 @@ def _print_equivalent(found: EquivalentErrors) -> None:
     print_table(f"What explains a position error after {found.time_s:g} s at rest", ("", "x", "y", "z"), rows)
     if found.earth_share_m is not None:
         print_text(
-            f"The Earth's rate has {found.earth_rate_deg_h:.3g} °/h in the horizontal: {found.earth_share_m:.3g} m in a "
-            "unit that takes the Earth for still, in a direction that its heading decides."
+            f"The Earth's rate has {found.earth_rate_deg_h:.3g} °/h in the horizontal: {found.earth_share_m:.3g} m in "
+            "a unit that takes the Earth for still, in a direction that its heading decides."
         )
 
 

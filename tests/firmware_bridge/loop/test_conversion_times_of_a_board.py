@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 pytest.importorskip("unicorn", reason="the emulator is in the extra 'firmware'")
 
-from firmware_bridge.adxl345_device import Adxl345Options
-from firmware_bridge.commands import RATE_CODE_AUTO, Identity
-from firmware_bridge.virtual_run import record_virtual
+from firmware_bridge.adxl345.registers import Adxl345Options
+from firmware_bridge.frames.commands import RATE_CODE_AUTO, Identity
+from firmware_bridge.loop.virtual_run import record_virtual
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording.timing.conversion_times import conversion_times
 from gfimu.units import STANDARD_GRAVITY
