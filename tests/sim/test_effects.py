@@ -14,13 +14,14 @@ from independent_effects import DRAWS, SIZELESS, rig_with
 from independent_table import Rig, TableRun, drive_table
 from independent_world import Setting, noise_free
 from scipy.interpolate import CubicSpline
-from scipy.signal import lsim
+from scipy.signal import lsim, lti
 
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
 from sim import forward
 from sim.campaign import random_profile
 from sim.effects import EFFECTS, Effect, apply_effects, make_effect
+from sim.effects.low_pass import low_pass
 from sim.motion import SpinState, SplineSpin
 from sim.profiles import Chirp, Hold, Ramp, spin_profile
 from sim.turntable import prescribed_readings, turntable_model
@@ -416,6 +417,22 @@ def test_lag_passes_a_sine_as_the_transfer_function_says(twin):
         response = 1 / (1 + 2j * np.pi * 3.0 * tau)
         expected = np.imag(response * np.exp(2j * np.pi * 3.0 * t))
         np.testing.assert_allclose(passed[500:-20, 0], expected[500:-20], rtol=0, atol=5e-6)
+
+
+@pytest.mark.parametrize("damping", [0.3, 2.0])
+def test_a_mass_on_a_spring_is_a_lag_while_it_is_fast(damping):
+    """GF-IMU paper, eq. 2: M x″ + D x′ + k x = −M a. Far below its resonance the reading lags by D/k, and no more."""
+    hertz, resonance = 5.0, 100.0
+    t = np.arange(0.0, 4.0, 1e-3)
+    wave = np.sin(2 * np.pi * hertz * t)
+    natural = 2 * np.pi * resonance  # √(k/M), rad/s
+    spring = lti([natural**2], [1.0, 2 * damping * natural, natural**2])  # reading k x/M over −a
+    reading = lsim(spring, wave, t)[1]
+    lag = low_pass(wave[:, None], t, 2 * damping / natural)[:, 0]
+    settled = slice(2000, -20)
+    limit = (hertz / resonance) ** 2
+    assert np.abs(reading - lag)[settled].max() == pytest.approx(limit, rel=0.1)
+    assert np.abs(reading - wave)[settled].max() > 5 * limit  # so the lag is not to be left out
 
 
 def test_apply_effects_leaves_the_given_world_alone(cube12, twin):

@@ -114,6 +114,21 @@ def test_closed_form_of_the_cube_as_built_takes_the_paper_s_channels():
     assert [np.count_nonzero(row) for row in by_channel] == [8, 8, 8, 4, 4, 4]
 
 
+def test_a_leaning_table_alone_makes_no_ripple_of_the_rate():
+    """The GF-IMU paper explains its ripple by the lean; gravity is the same at all chips, so gains must differ too."""
+    array = AccelerometerArray.load("cube12_as_built")
+    angle, lean, gain = np.linspace(0.0, 2 * np.pi, 360, endpoint=False), 0.018, 0.01
+    p = 9.80665 * np.column_stack([lean * np.cos(angle), lean * np.sin(angle), np.ones(360)])
+    readings = specific_force(array, p, np.zeros((360, 3)), np.tile([0.0, 0.0, 4.0], (360, 1)))
+    assert np.abs(closed_form(array, readings).alpha).max() < 1e-12
+    rng, ripples = np.random.default_rng(3), []
+    for _ in range(400):
+        about_z = closed_form(array, readings * (1.0 + gain * rng.normal(size=12))).alpha[:, 2]
+        ripples.append(2.0 * abs(np.mean(about_z * np.exp(-1j * angle))))
+    # Four channels along x, four along y, each gain g lean / (4 L): √8 of that, 0.0125 rad/s² here.
+    assert np.sqrt(np.mean(np.square(ripples))) == pytest.approx(np.sqrt(8.0) * gain * 9.80665 * lean / 0.4, rel=0.1)
+
+
 @pytest.mark.parametrize("order", ["C", "F"])
 def test_closed_form_reads_any_memory_order_and_writes_where_told(order):
     array = AccelerometerArray.load("cube12")

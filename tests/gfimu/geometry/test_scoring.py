@@ -234,16 +234,20 @@ def test_bad_arguments_are_refused():
         gdop(np.zeros((4, 3)), np.zeros((5, 3)))
 
 
+def figures_of(matrix):
+    """κ and GDOP of a regression matrix (c, 6)."""
+    return np.linalg.cond(matrix), math.sqrt(np.trace(np.linalg.inv(matrix.T @ matrix)))
+
+
 def test_the_printed_j_has_one_column_twice():
     """GF-IMU paper, printed J: its second column has the same non-zero entries as the third."""
     array = AccelerometerArray.load("cube12")
     derived = array.regression_matrix / np.array([0.05] * 3 + [1.0] * 3)
-    printed = derived.copy()
-    printed[1] = printed[2]
-    for matrix, figures in ((derived, (1.4142, 1.0607)), (printed, (2.0236, 1.1146))):
-        condition = np.linalg.cond(matrix)
-        dilution = math.sqrt(np.trace(np.linalg.inv(matrix.T @ matrix)))
-        assert (condition, dilution) == pytest.approx(figures, abs=5e-5)
+    assert figures_of(derived) == pytest.approx((1.4142, 1.0607), abs=5e-5)
+    for signs in itertools.product((1.0, -1.0), repeat=2):  # those of the print are lost: they change neither figure
+        printed = derived.copy()
+        printed[1] = derived[2] * [*signs, 1.0, 1.0, 1.0, 1.0]
+        assert figures_of(printed) == pytest.approx((2.0236, 1.1146), abs=5e-5)
     assert "print has one column twice" in array.description
 
 

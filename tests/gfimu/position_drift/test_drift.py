@@ -239,6 +239,8 @@ def test_papers_inversion():
     error = position_error(30.0, rate_drift=[0.0, drift, 0.0], p_bias=[2.7 * MG, 0.0, 0.0])[0]
     assert equivalent_rate_drift(error, 30.0, p_bias=2.7 * MG) == pytest.approx(30.0)
     assert equivalent_rate_drift([6.42, -6.42], 30.0) == pytest.approx([30.0, -30.0], rel=1e-3)
+    # The bias that the paper reads off would move the unit further than the drift.
+    assert position_error(30.0, p_bias=[2.7 * MG, 0.0, 0.0])[0] == pytest.approx(11.9, abs=0.05)
     with pytest.raises(InputError, match="above zero"):
         equivalent_rate_drift(1.0, 0.0)
 
