@@ -69,8 +69,7 @@ JOBS: dict[str, tuple[Entry, ...]] = {
         Entry("estimate", "Estimate p, α, ω, attitude and table angle from a recording.", "estimate"),
         Entry(
             "impact",
-            "Measure one impact: channels zeroed and filtered to a class (SAE J211, ISO 6487), time zero, polarity, "
-            "peaks of p, α and ω.",
+            "Measure one impact: channels zeroed and filtered to a class, time zero, polarity, peaks of p, α and ω.",
             "impact",
         ),
         Entry(
