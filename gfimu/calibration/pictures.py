@@ -11,6 +11,7 @@ import matplotlib as mpl
 import numpy as np
 from numpy.typing import NDArray
 
+from gfimu.calibration.check_poses import rest_means
 from gfimu.calibration.result import Calibration
 from gfimu.files.atomic_file import atomic_path
 from gfimu.recording import Recording
@@ -157,7 +158,7 @@ def _magnitudes(figure: Figure, calibration: Calibration, recording: Recording, 
     panels = figure.subplots(len(shown), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
     poses = np.arange(len(rest))
     for panel, (title, readings, colour) in zip(panels, shown, strict=True):
-        off = np.linalg.norm(_rest_means(readings, calibration, rest), axis=2) - calibration.gravity  # (p, k)
+        off = np.linalg.norm(rest_means(readings, calibration, rest), axis=2) - calibration.gravity  # (p, k)
         rms = float(np.sqrt(np.nanmean(off**2)))
         for number, (chip, values) in enumerate(zip(calibration.chips, off.T, strict=True)):
             hue = css(chip_colour(number, on_paper=True))
@@ -178,17 +179,9 @@ def _magnitudes(figure: Figure, calibration: Calibration, recording: Recording, 
 
 def _up(corrected: Recording, calibration: Calibration, rest: Rest) -> NDArray[np.float64]:
     """Return the specific force of each pose in body axes, (p, 3); in the first chip's axes where no array is known."""
-    means = _rest_means(corrected, calibration, rest)  # (p, k, 3)
+    means = rest_means(corrected, calibration, rest)  # (p, k, 3)
     array = corrected.array
     if array is None or not set(calibration.channels) <= set(array.channels):
         return means[:, 0]
     axes = array.axes[[array.index(channel) for channel in calibration.channels]]  # (3k, 3)
     return np.asarray(means.reshape(len(means), -1) @ np.linalg.pinv(axes).T)
-
-
-def _rest_means(recording: Recording, calibration: Calibration, rest: Rest) -> NDArray[np.float64]:
-    """Return the mean reading of every rest, chip and axis, (p, k, 3)."""
-    columns = [recording.channels.index(channel) for channel in calibration.channels]
-    parts = zip(rest.start, rest.stop, strict=True)
-    means = np.array([np.nanmean(recording.readings[a:b, columns], axis=0) for a, b in parts])
-    return means.reshape(len(means), -1, 3)

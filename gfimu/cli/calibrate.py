@@ -70,6 +70,9 @@ def _calibrate(
         float | None,
         typer.Option("--bias-walk", help="With --update: random walk of a bias between poses, m/s²/√s; 0 by default."),
     ] = None,
+    check: Annotated[
+        Path | None, typer.Option("--check", help="Other poses at rest, which the fit does not see: |a| − g on them.")
+    ] = None,
     picture: Annotated[Path | None, typer.Option("--picture", help="Picture to write (.png, .svg, .pdf).")] = None,
     force: ForceOption = False,
     column_map: MapOption = None,
@@ -79,6 +82,8 @@ def _calibrate(
     """Calibrate the accelerometers of a recording, each parameter with its standard deviation.
 
     Example: gfimu calibrate multi-position poses.csv --latitude 52.3 --height 80 --out calibration.json
+
+    Checked on other poses: gfimu calibrate multi-position poses.csv --out calibration.json --check others.csv
     """
     from gfimu.commands.calibrate import calibrate
 
@@ -103,6 +108,7 @@ def _calibrate(
             update=update,
             turn_on_std=turn_on_std,
             bias_walk=bias_walk,
+            check=check,
             picture=picture,
             force=force,
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -30,7 +31,7 @@ _OPTION_NAMES = {
 """What the options are that some methods do not use, by the field of the task."""
 
 
-@writes(reads=("recording", "array", "motion", "update", "column_map"), out=CALIBRATION, picture=PICTURE)
+@writes(reads=("recording", "array", "motion", "update", "check", "column_map"), out=CALIBRATION, picture=PICTURE)
 def calibrate(
     method: str,
     recording: Recording | str | Path | MappedFile,
@@ -51,6 +52,7 @@ def calibrate(
     update: Calibration | str | Path | None = None,
     turn_on_std: float | None = None,
     bias_walk: float | None = None,
+    check: Recording | str | Path | MappedFile | None = None,
     picture: str | Path | None = None,
     force: bool = False,
     progress: Callable[[float], object] | None = None,
@@ -96,8 +98,11 @@ def calibrate(
     turn_on_std, bias_walk : float, optional
         With ``update``: change of a bias between power-ons, m/s², 0.03 by default; random walk between poses, m/s²/√s,
         0 by default.
+    check : Recording, str or Path, optional
+        Other poses at rest, which the fit does not see: |a| − g on them goes into the statistics
+        (`gfimu.calibration.check_poses`).
     picture : str or Path, optional
-        Picture to write, ``.png``, ``.svg`` or ``.pdf``.
+        Picture to write, ``.png``, ``.svg`` or ``.pdf``; its magnitudes are those of ``check``, where that is given.
     force : bool
         Go on, with a warning, where the checks of a recording would refuse it.
     progress : callable, optional
@@ -109,6 +114,7 @@ def calibrate(
         If the method is unknown, an option has no use with it, a recording is refused by its checks, the data are
         faulty, the poses don't suffice, or an output can't be written where it is asked for.
     """
+    from gfimu.calibration.check_poses import check_on_poses
     from gfimu.calibration.methods import CalibrationTask, run_calibration
     from gfimu.calibration.registry import calibration_method
     from gfimu.commands.opened import as_array, as_calibration, by_map, name_of
@@ -135,6 +141,10 @@ def calibrate(
     turned = None if motion is None else _uncalibrated(by_map(motion, column_map, map_set), drawing)
     if turned is not None:
         examine(turned, drawing, source=name_of(motion), force=force)
+    others = None if check is None else _uncalibrated(by_map(check, column_map, map_set), drawing)
+    if others is not None:
+        examine(others, drawing, source=name_of(check), force=force)
+        _refuse_the_same(run, others, name_of(check))
     task = CalibrationTask(
         run,
         gravity=local_gravity,
@@ -151,13 +161,23 @@ def calibrate(
         progress=progress,
     )
     result = run_calibration(chosen, task)
+    if others is not None:
+        rested = {} if task.min_rest_s is None else {"min_rest_s": task.min_rest_s}
+        figures = check_on_poses(result, others, rest_threshold=rest_threshold, **rested)
+        result = replace(result, statistics={**result.statistics, **figures})
     if out is not None:
         result.save(out)
     if picture is not None:
         from gfimu.calibration.pictures import calibration_picture
 
-        calibration_picture(picture, result, run)
+        calibration_picture(picture, result, others or run)
     return result
+
+
+def _refuse_the_same(run: Recording, others: Recording, name: str) -> None:
+    """Refuse to check a calibration on what it was made from."""
+    if len(run) == len(others) and run.channels == others.channels and (run.t_s == others.t_s).all():
+        raise InputError(f"{name}: this is the recording of the fit; --check needs other poses")
 
 
 def _refuse_unused(method: CalibrationMethod, **given: object) -> None:
