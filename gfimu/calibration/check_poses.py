@@ -1,4 +1,4 @@
-"""A calibration on poses at rest that it has not seen: |a| − g, and whether it is as large as the calibration states."""
+"""A calibration on poses at rest that it has not seen: |a| − g, and whether that is as large as it states."""
 
 from __future__ import annotations
 
