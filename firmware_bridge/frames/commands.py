@@ -149,7 +149,12 @@ class Identity:
 
     @property
     def conversions(self) -> dict[str, Any]:
-        """What a recording states of when its chips convert (`gfimu.recording.timing.conversion_times`)."""
+        """What a recording states of when its chips convert (`gfimu.recording.timing.conversion_times`).
+
+        Nothing where the board does not say how fast it reads them.
+        """
+        if not self.spi_khz:
+            return {}
         output_rate_hz = _FASTEST_OUTPUT_HZ / 2.0 ** (_LARGEST_RATE_CODE - self.rate_code)
         paced = output_rate_hz >= self.rate_hz and output_rate_hz * 10 <= self.rate_hz * 11  # set_pace in core.c
         since = tuple(int(part) for part in self.firmware.split(".")) >= _PACED_SINCE

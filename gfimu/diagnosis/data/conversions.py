@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from gfimu.diagnosis.data.run import Run
 
 __all__ = ["Conversions", "settled"]
-
-_JUMP = 0.1  # of a sample period, from row to row: there the age of a reading begins anew
 
 
 @dataclass(frozen=True)
@@ -35,6 +33,9 @@ class Conversions:
 
     after: NDArray[np.float64]
     unknown: NDArray[np.float64]
+
+    JUMP: ClassVar[float] = 0.1
+    """Share of a sample period by which an age differs from the row before where it begins anew."""
 
     __repr__ = short_repr
 
@@ -80,7 +81,7 @@ def settled(run: Run, prediction: NDArray[np.float64], chip: NDArray[np.intp], r
     other = np.column_stack([np.ones(len(rate)), rate, rate**2, np.gradient(rate, run.sample_period)])
     normal, right = np.diag([0.0, *[1.0] * len(columns)]), np.zeros(len(columns) + 1)
     for channel, k in enumerate(chip):
-        jump = np.abs(np.diff(times.after[:, k], prepend=times.after[0, k])) > _JUMP * run.sample_period
+        jump = np.abs(np.diff(times.after[:, k], prepend=times.after[0, k])) > Conversions.JUMP * run.sample_period
         used = run.valid[:, channel] & ~(jump | np.roll(jump, -1))
         slope = slopes[used, channel]
         mine = np.column_stack([slope, *(slope * times.unknown[mode, used, k] * (k == of) for mode, of in columns)])
