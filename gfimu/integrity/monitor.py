@@ -146,7 +146,7 @@ class ChannelMonitor:
             self._open.clear()
             self.watched[:] = True
             self._changed = self.total_blocks
-            self.follower.state.ages[:] = 0.0
+            self.follower.state.forget_onsets()
         self._refuses = refuses
 
     @property
@@ -257,13 +257,19 @@ class ChannelMonitor:
         suspicion.next_trial = place + max(1, waited // 4)
         used, information, score = self.follower.evidence()
         late = waited * self.block_s >= policy.wait_s
-        for kind in explanations(information, score, self.watched, self.array.chip_of_channel, policy.tried):
-            explains = [self._explains(place, used, entry) for entry in kind]
+        kinds = list(explanations(information, score, self.watched, self.array.chip_of_channel, policy.tried))
+        for number, kind in enumerate(kinds):
+            # What more channels would explain beyond it, a set leaves unexplained.
+            more = max((entry.statistic for other in kinds[number + 1 :] for entry in other), default=0.0)
+            explains = [
+                more - entry.statistic < max(policy.unexplained, self._inexact(used, entry) * more)
+                and self._explains(place, used, entry)
+                for entry in kind
+            ]
             if not any(explains):
                 continue
             best = kind[explains.index(True)]
-            age = float(self.follower.state.ages[used[best.slot]])
-            needed = max(policy.isolation, (policy.relative + policy.first_block / age) * best.statistic)
+            needed = max(policy.isolation, self._inexact(used, best) * best.statistic)
             several = len(best.channels) > 1  # two equal faults may look exactly like two others at first
             rivals = [
                 entry
@@ -291,6 +297,10 @@ class ChannelMonitor:
             return place, False
         suspicion.unexplained = suspicion.doubtful is None
         return place, suspicion.unexplained
+
+    def _inexact(self, used: NDArray[np.int64], entry: Explanation) -> float:
+        """Return the share by which the statistic of a large fault is off, by its onset within a block among others."""
+        return self.policy.relative + self.policy.first_block / float(self.follower.state.ages[used[entry.slot]])
 
     def _end_suspicion(self, place: int) -> None:
         """Keep a fault that was not isolated and is not seen any longer."""
@@ -404,7 +414,7 @@ class ChannelMonitor:
             del self._open[channel]
             self.watched[channel] = True
             self._changed = place
-            self.follower.state.ages[:] = 0.0
+            self.follower.state.forget_onsets()
             if not any(other == number for other, _ in self._open.values()):
                 end = float(self.blocks.t[place - 1 - self._base] + 0.5 * self.block_s)
                 self.faults[number] = replace(self.faults[number], end_s=end)

@@ -74,6 +74,9 @@ class MonitorPolicy:
     screen : float
         Share of the threshold below which errors of gains and positions are not taken out of a statistic, as they only
         lower it; saves time.
+    sharp : float
+        An onset whose statistic is larger than that of all others by this factor is kept: a fault is so large that the
+        neighbouring onsets do not show it. Of 20 mg and less they show more than half of it.
     tried : int
         Sets of each kind (channels, pairs, chips) of which it is tried whether they explain a fault.
     least_age : int
@@ -142,6 +145,7 @@ class MonitorPolicy:
     sound_scatter: float = 2.0
     fewest_null: int = 3
     screen: float = 0.6
+    sharp: float = 4.5
     tried: int = 4
     least_age: int = 3
     first_block: float = 0.25

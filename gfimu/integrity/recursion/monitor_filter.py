@@ -57,7 +57,7 @@ class MonitorFilter:
         self.samples = policy.samples(period)
         self.block_s = self.samples * period
         self.tables = ChannelTables(array, errors)
-        c, slots = array.n_channels, policy.slots
+        c, slots = array.n_channels, policy.slots + 1  # one may be held beside the others
         self.threshold = policy.threshold(c, self.block_s)
         self._tuning = MonitorTuning(
             follow=True,
@@ -65,6 +65,7 @@ class MonitorFilter:
             period=self.block_s,
             threshold=self.threshold,
             screen=policy.screen,
+            sharp=policy.sharp,
             oldest=policy.oldest_s / self.block_s,
             walk=policy.bias_walk,
             forget=min(1.0, self.block_s / policy.range_memory_s),
@@ -85,6 +86,8 @@ class MonitorFilter:
             low=np.zeros(c),
             high=np.zeros(c),
             ages=np.zeros(slots),
+            leading=np.full(1, -1),
+            held=np.full(1, -1),
             signature=np.zeros((slots, 3 + c, c)),
             information=np.zeros((slots, c, c)),
             score=np.zeros((slots, c)),
@@ -179,7 +182,7 @@ class MonitorFilter:
         state, tuning = self.state.copy(), self._blind()._replace(follow=False)
         if base is not None:
             state.go_back(base)
-        state.ages[:] = 0.0
+        state.forget_onsets()
         if errors is not None:
             tuning = tuning._replace(scale_std=errors.scale_std, placement_std=errors.placement_std)
         nis = np.zeros(count)
@@ -194,7 +197,7 @@ class MonitorFilter:
         """Reckon with other errors of gains, axes and positions from now on; onsets begin anew."""
         self.errors = errors
         self._tuning = self._tuning._replace(scale_std=errors.scale_std, placement_std=errors.placement_std)
-        self.state.ages[:] = 0.0
+        self.state.forget_onsets()
 
     def evidence(
         self, state: MonitorState | None = None

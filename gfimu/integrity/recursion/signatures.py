@@ -11,39 +11,80 @@ from numba import njit
 from gfimu.integrity.recursion.isolation import deflate, strongest
 from gfimu.rate.recursion_data import COMPILE
 
-__all__ = ["carry_signatures", "new_slot", "strongest_slot"]
+__all__ = ["carry_signatures", "forget_onsets", "new_slot", "strongest_slot"]
 
 _LARGEST = 1e12  # numerical: statistics of a filter that has run away
 
 
 @njit(**COMPILE)
 def new_slot(state, oldest):  # type: ignore[no-untyped-def]
-    """Begin an onset with this block; of too many the one goes whose neighbours are nearest, on a scale of log age."""
+    """Begin an onset with this block; of too many the one goes whose neighbours are nearest, on a scale of log age.
+
+    One that shows far more than all others is held beside them when its turn to go comes: of a large fault even the
+    next block is no longer the onset.
+    """
     ages = state.ages
-    used = 0
-    for s in range(len(ages)):
-        if ages[s] > 0.0:
-            used += 1
-    if used == len(ages):
+    if state.held[0] >= 0 and state.held[0] != state.leading[0]:
+        _drop_slot(state, state.held[0])
+    held = state.held[0]
+    used = _count_used(ages)
+    if used - (1 if held >= 0 else 0) == len(ages) - 1:
         drop = 0
         least = np.inf
         for s in range(used):
-            if s == 0:
-                gap = 1e8 if ages[0] < oldest else -1.0
+            if s == held:
+                continue
+            older = s - 1 if s - 1 != held else s - 2
+            younger = s + 1 if s + 1 != held else s + 2
+            if older < 0:
+                gap = 1e8 if ages[s] < oldest else -1.0
             else:
-                younger = ages[s + 1] if s < used - 1 else 0.0
-                gap = (ages[s - 1] - younger) / (ages[s] + 1.0)
+                gap = (ages[older] - (ages[younger] if younger < used else 0.0)) / (ages[s] + 1.0)
             if gap < least:
                 least = gap
                 drop = s
-        for s in range(drop, used - 1):
-            _move_slot(state, s + 1, s)
-            ages[s] = ages[s + 1]
-        used -= 1
+        if drop == state.leading[0]:
+            state.held[0] = drop
+        else:
+            _drop_slot(state, drop)
+            used -= 1
     state.signature[used] = 0.0
     state.information[used] = 0.0
     state.score[used] = 0.0
     ages[used] = 0.5  # half of the step before lies behind the onset; set to 1 after this block
+
+
+@njit(**COMPILE)
+def forget_onsets(state):  # type: ignore[no-untyped-def]
+    """Follow no onset for now."""
+    state.ages[:] = 0.0
+    state.leading[0] = -1
+    state.held[0] = -1
+
+
+@njit(**COMPILE)
+def _count_used(ages):  # type: ignore[no-untyped-def]
+    """Return how many slots are in use; they stand at the front."""
+    used = 0
+    for s in range(len(ages)):
+        if ages[s] > 0.0:
+            used += 1
+    return used
+
+
+@njit(**COMPILE)
+def _drop_slot(state, drop):  # type: ignore[no-untyped-def]
+    """Forget an onset; the younger ones move up."""
+    used = _count_used(state.ages)
+    for s in range(drop, used - 1):
+        _move_slot(state, s + 1, s)
+        state.ages[s] = state.ages[s + 1]
+    state.ages[used - 1] = 0.0
+    for mark in (state.leading, state.held):
+        if mark[0] == drop:
+            mark[0] = -1
+        elif mark[0] > drop:
+            mark[0] -= 1
 
 
 @njit(**COMPILE)
@@ -99,10 +140,17 @@ def strongest_slot(state, tuning, model_std, watched):  # type: ignore[no-untype
     """Return the slot in which a channel exceeds the threshold most, beyond what model errors explain; −1 if none."""
     found = -1
     best = tuning.threshold
+    most = beside = 0.0
+    state.leading[0] = -1
     for s in range(len(state.ages)):
         if state.ages[s] < 2.0:
             continue
         raw = strongest(state.information[s], state.score[s], watched)[1]
+        if raw > most:
+            most, beside = raw, most
+            state.leading[0] = s
+        elif raw > beside:
+            beside = raw
         if not tuning.screen * tuning.threshold < raw < _LARGEST:
             continue
         information, score = deflate(state.information[s], state.score[s], model_std)
@@ -111,4 +159,6 @@ def strongest_slot(state, tuning, model_std, watched):  # type: ignore[no-untype
         if value > best:
             best = value
             found = s
+    if most < tuning.screen * tuning.threshold or most < tuning.sharp * beside:
+        state.leading[0] = -1
     return found

@@ -29,6 +29,7 @@ class MonitorTuning(NamedTuple):
     period: float  # of the blocks, s
     threshold: float  # of a fault
     screen: float  # share of it, below which model errors are not taken out
+    sharp: float  # statistic of the right onset over that of its neighbours, of a large fault
     oldest: float  # blocks
     walk: float  # (m/s²)²/s
     forget: float  # of the range of readings, per block
@@ -52,6 +53,8 @@ class MonitorState(NamedTuple):
     information: NDArray[np.float64]  # (slots, c, c) C
     score: NDArray[np.float64]  # (slots, c) d
     started: NDArray[np.bool_]  # (1,)
+    leading: NDArray[np.int64]  # (1,) slot that showed far more than the others in the last block; −1: none
+    held: NDArray[np.int64]  # (1,) slot that is kept beside the others for that; −1: none
     largest: NDArray[np.float64]  # (1,) statistic of a channel so far, beyond what model errors explain
     past_rate: NDArray[np.float64]  # (h, 3) before each of the last blocks, rings; block k at k mod h
     past_bias: NDArray[np.float64]  # (h, c)
@@ -62,6 +65,11 @@ class MonitorState(NamedTuple):
         """Return a state that shares nothing with this one."""
         return MonitorState._make(field.copy() for field in self)
 
+    def forget_onsets(self) -> None:
+        """Follow no onset for now."""
+        self.ages[:] = 0.0
+        self.leading[0] = self.held[0] = -1
+
     def go_back(self, block: int) -> None:
         """Return to the state before a block; it must be one of the last h."""
         place = block % len(self.past_rate)
@@ -69,5 +77,5 @@ class MonitorState(NamedTuple):
         self.bias[:] = self.past_bias[place]
         self.covariance[:] = self.past_covariance[place]
         self.last[:], self.low[:], self.high[:] = self.past_means[place]
-        self.ages[:] = 0.0
+        self.forget_onsets()
         self.started[0] = block > 0

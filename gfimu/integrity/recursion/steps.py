@@ -27,7 +27,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from gfimu.integrity.recursion.signatures import carry_signatures, new_slot, strongest_slot
+from gfimu.integrity.recursion.signatures import carry_signatures, forget_onsets, new_slot, strongest_slot
 from gfimu.rate.recursion_data import COMPILE
 
 __all__ = ["advance", "model_errors"]
@@ -63,7 +63,7 @@ def advance(tables, tuning, state, means, turning, steps, sets, levels, watched,
             pending = step
             omega[k] = state.omega
             std[k] = np.inf
-            state.ages[:] = 0.0
+            forget_onsets(state)
             k += 1
             continue
         pending = 0.0
@@ -73,7 +73,7 @@ def advance(tables, tuning, state, means, turning, steps, sets, levels, watched,
             step = 0.5 * tuning.period * (1.0 - 1.0 / tuning.samples)
         _predict(tables, tuning, state, means[k], turning[k], step, place, level, transition)
         if step > 1.5 * tuning.period:
-            state.ages[:] = 0.0
+            forget_onsets(state)
         if tuning.follow:
             new_slot(state, tuning.oldest)
             carry_signatures(tables, state, transition, step, place)

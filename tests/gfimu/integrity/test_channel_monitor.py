@@ -6,6 +6,8 @@ from watched_world import CALIBRATED, CUBE, GRAVITY, RATE_HZ, readings
 
 from gfimu.errors import InputError
 from gfimu.integrity import HealthCode, MonitorPolicy, watch_channels
+from gfimu.integrity.recursion.monitor_filter import MonitorFilter
+from gfimu.integrity.recursion.signatures import new_slot
 from gfimu.integrity.watch import watch_from_rest, watch_in_motion
 from gfimu.rate.sensing import SensorErrors
 
@@ -208,3 +210,26 @@ def test_bad_input_is_refused():
         watch_channels(CUBE, t[::-1], y, CALIBRATED)
     with pytest.raises(InputError, match="block_s"):
         MonitorPolicy(block_s=0.0)
+
+
+def test_the_onset_that_shows_far_more_than_the_others_is_not_thinned_out():
+    """Ages double as a rule; of a fault of 1.5 m/s² the onsets a block beside the right one show hardly anything."""
+    state = MonitorFilter(
+        CUBE, CALIBRATED, 1.0 / RATE_HZ, omega0=np.zeros(3), omega0_std=1e-3, policy=MonitorPolicy()
+    ).state
+    ages = [111.0, 47.0, 31.0, 15.0, 7.0, 3.0, 2.0, 1.0]
+    state.ages[: len(ages)] = ages
+    new_slot(state, 200.0)
+    assert state.ages.tolist() == [111.0, 47.0, 31.0, 15.0, 7.0, 3.0, 1.0, 0.5, 0.0]
+
+    state.ages[:] = [*ages, 0.0]
+    state.leading[0] = 6
+    new_slot(state, 200.0)
+    assert state.ages.tolist() == [*ages, 0.5]
+    assert state.held[0] == 6
+
+    state.leading[0] = -1  # no longer: it goes before any other
+    new_slot(state, 200.0)
+    assert 2.0 not in state.ages
+    assert state.held[0] == -1
+    assert np.count_nonzero(state.ages) == 8
