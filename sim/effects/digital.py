@@ -63,7 +63,7 @@ class BiasRandomWalk(_Discrete):
     """Offsets that wander."""
 
     name = "bias_random_walk"
-    summary = "offsets wander as a random walk"
+    summary = "biases follow a random walk (acceleration random walk)"
     place = "noise"
     other_units: ClassVar = {"strength_m_s2_rts": "m/s²/√s"}
     separated_by = "a long rest at constant temperature"

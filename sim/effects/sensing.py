@@ -69,7 +69,7 @@ class Bias(_PerChannel):
     """Constant offset per channel."""
 
     name = "bias"
-    summary = "a constant offset per channel"
+    summary = "a bias: a constant offset per channel"
     suffix = "_m_s2"
     unit = "m/s²"
     tolerance = 0.3 * _MG
@@ -88,7 +88,7 @@ class ScaleFactor(_PerChannel):
     """Gain error per channel."""
 
     name = "scale_factor"
-    summary = "a gain error per channel (another supply voltage, say)"
+    summary = "a scale-factor error per channel (another supply voltage, say)"
     tolerance = 5e-4
     of_pose = True
     prior_std = 0.02
@@ -128,7 +128,7 @@ class BiasTemperature(_PerChannel):
     """Offsets that follow the board's temperature."""
 
     name = "bias_temperature"
-    summary = "offsets follow the board's temperature"
+    summary = "biases follow the board's temperature"
     suffix = "_m_s2_K"
     unit = "m/s²/K"
     needs_temperature = True
@@ -149,7 +149,7 @@ class WarmUp(_PerChannel):
     """Offsets that settle exponentially after power-on."""
 
     name = "warm_up"
-    summary = "offsets settle exponentially after power-on"
+    summary = "biases settle exponentially after turn-on (warm-up)"
     suffix = "_m_s2"
     unit = "m/s²"
     prior_std = 10 * _MG
@@ -177,7 +177,7 @@ class ColdStart(WarmUp):
     """Offsets that decay from power-on: a unit that was calibrated warm and starts cold."""
 
     name = "cold_start"
-    summary = "offsets decay exponentially after power-on (calibrated warm, started cold)"
+    summary = "biases decay exponentially after turn-on (calibrated warm, started cold)"
     rarity = 30.0  # times rarer than offsets that settle, by choice
 
     @classmethod
@@ -225,7 +225,7 @@ class CrossAxis(Effect):
     """A channel that picks up its neighbour on the same chip."""
 
     name = "cross_axis"
-    summary = "a channel picks up its neighbour on the same chip"
+    summary = "cross-axis sensitivity: a channel picks up its neighbour on the same chip"
     place = "sensing"
     of_pose = True
     separated_by = "static poses on several sides and several speeds"
@@ -319,7 +319,7 @@ class Hysteresis(Effect):
     """Play in the reading: it follows the specific force only after the play is taken up."""
 
     name = "hysteresis"
-    summary = "play in the reading: it depends on the direction from which it came"
+    summary = "hysteresis: a reading depends on the direction from which it came"
     place = "sensing"
     separated_by = "slow reversals of the rate"
     shape_limits: ClassVar = {"width_m_s2": (1e-3, 20.0)}

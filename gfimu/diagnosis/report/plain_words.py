@@ -136,7 +136,7 @@ def story(diagnosis: Diagnosis) -> str:
     level = float(diagnosis.noise.get("bias_instability_largest_m_s2", 0.0))
     if level > 0.0:
         name = diagnosis.noise["bias_instability_largest_channel"]
-        parts.append(f"The largest slow noise is that of {name}, {level / STANDARD_GRAVITY * 1e3:.2g} mg. ")
+        parts.append(f"The largest bias instability is that of {name}, {level / STANDARD_GRAVITY * 1e3:.2g} mg. ")
     return (text + "".join(parts)).strip()
 
 

@@ -318,7 +318,7 @@ def _loud(loudest: LoudestChannel, policy: Policy) -> str:
     if not loudest.stands_out(policy):
         return ""
     return (
-        f"the slow noise of channel {loudest.name} is {loudest.ratio:.1f} times the median of the other channels: "
+        f"the bias instability of channel {loudest.name} is {loudest.ratio:.1f} times the median of the other channels: "
         "something else is in it"
     )
 

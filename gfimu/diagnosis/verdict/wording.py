@@ -30,7 +30,7 @@ class Notes:
     terms : int, optional
         Number of terms that describe an unknown, where it was tried.
     loudest : tuple of (str, float, float), optional
-        Channel with the largest slow noise, its level, m/s², and that over the median of the others.
+        Channel with the largest bias instability, its level, m/s², and that over the median of the others.
     rest : str
         What the strongest of the lack of fit looks like.
     """
@@ -116,7 +116,7 @@ def _noted(notes: Notes) -> list[str]:
     if notes.loudest is not None and notes.loudest[1] > 0.0:
         name, level, ratio = notes.loudest
         words.append(
-            f"The largest slow noise is that of channel {name}: {level / STANDARD_GRAVITY * 1e3:.2f} mg, "
+            f"The largest bias instability is that of channel {name}: {level / STANDARD_GRAVITY * 1e3:.2f} mg, "
             f"{ratio:.1f} times the median of the other channels."
         )
     if notes.residue > 0.0:
