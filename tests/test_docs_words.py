@@ -1,4 +1,4 @@
-"""The words of the documentation are the field's: the glossary's names exist, and words that say nothing exact do not."""
+"""The words of the documentation are the field's: the glossary's names exist, vague words are not used."""
 
 import re
 
@@ -11,7 +11,7 @@ VAGUE = re.compile(
     r"|\bleft over\b",
     re.IGNORECASE,
 )
-"""Of data, a drive or a tool: each has an exact word (reported, estimated, modelled, confounded, random walk, large)."""
+"""Each has an exact word: reported, estimated, modelled, confounded, random walk, large."""
 
 OUTSIDE = {"diagnosis-study.md"}  # names the runs of the stored study, which are called so
 

@@ -24,6 +24,7 @@ __all__ = [
     "NOT_OF_AN_ENCODER",
     "NOT_OF_A_BODY",
     "NOT_OF_A_CARRIAGE",
+    "SIMULATED_EFFECTS",
     "TABLE_EFFECTS",
     "added_effects",
     "apply_effects",
@@ -138,6 +139,9 @@ CARRIAGE_EFFECTS: dict[str, type[Effect]] = {
 TABLE_EFFECTS: dict[str, type[Effect]] = EFFECTS | FURTHER_EFFECTS
 """Every effect of a rig on its table whose reference is a rate."""
 
+SIMULATED_EFFECTS: dict[str, type[Effect]] = {sensing.ProofMass.name: sensing.ProofMass}
+"""What scenarios and twins may have and no diagnosis looks for, as the usual effects hold its limit."""
+
 ENCODER_EFFECTS: dict[str, type[Effect]] = {
     name: effect for name, effect in TABLE_EFFECTS.items() if name not in NOT_OF_AN_ENCODER
 }
@@ -169,7 +173,8 @@ def make_effect(
     name: str, parameters: Mapping[str, Any] | None = None, array: AccelerometerArray | None = None
 ) -> Effect:
     """Build an effect by name; raises `InputError` for an unknown name or, given the array, an unknown key."""
-    known = CARRIAGE_EFFECTS | TABLE_EFFECTS | BODY_EFFECTS | INCLINED_EFFECTS | {Unknown.name: Unknown}
+    known = CARRIAGE_EFFECTS | TABLE_EFFECTS | BODY_EFFECTS | INCLINED_EFFECTS | SIMULATED_EFFECTS
+    known = known | {Unknown.name: Unknown}
     if name not in known:
         known = known | added_effects()
     if name not in known:
@@ -192,7 +197,7 @@ _CHAIN = (
         "axis_wobble",
     ),
     *("cross_axis", "scale_factor", "gain_drift", "quadratic", "vibration_rectification", "hysteresis"),
-    *("bias", "bias_temperature", "warm_up", "cold_start", "interference_tone", "sensor_lag", "unknown"),
+    *("bias", "bias_temperature", "warm_up", "cold_start", "interference_tone", "sensor_lag", "proof_mass", "unknown"),
 )
 
 

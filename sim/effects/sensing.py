@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.units import RATIO, STANDARD_GRAVITY
 from sim.effects.base import LARGEST_TURN, Effect, Pattern, Size, channel_patterns
-from sim.effects.low_pass import low_pass
+from sim.effects.low_pass import low_pass, mass_on_spring
 from sim.effects.scans import tone_shapes
 from sim.world import SensingStep, World
 
@@ -23,6 +23,7 @@ __all__ = [
     "GainDrift",
     "Hysteresis",
     "InterferenceTone",
+    "ProofMass",
     "Quadratic",
     "ScaleFactor",
     "SensorLag",
@@ -301,6 +302,33 @@ class SensorLag(Effect):
         """Pass the readings through a first-order low pass."""
         tau = abs(self.value("time_constant_s"))
         return _with_step(world, lambda readings, context: low_pass(readings, context.t, tau)) if tau else world
+
+
+class ProofMass(Effect):
+    """A sensing chain of second order: the chip's mass on its spring, with its damper (GF-IMU paper, eq. 2).
+
+    Far below the resonance it is `SensorLag` with the time constant damping_ratio / (π resonance_hz). So it is a part
+    of simulations only: a diagnosis names the lag.
+    """
+
+    name = "proof_mass"
+    summary = "a mass on a spring: the sensing chain resonates (its limit far below is sensor_lag)"
+    place = "sensing"
+    separated_by = "motion near the resonance, sampled at more than twice its frequency"
+    other_units: ClassVar = {"damping_ratio": RATIO}
+
+    @classmethod
+    def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
+        """Resonance frequency; zero is none."""
+        return (Size("resonance_hz", "Hz", 1e3, positive=True),)
+
+    def apply(self, world: World) -> World:
+        """Pass the readings through the second-order low pass."""
+        natural = 2.0 * np.pi * abs(self.value("resonance_hz"))
+        damping = abs(self.value("damping_ratio", 0.7))
+        if not natural:
+            return world
+        return _with_step(world, lambda readings, context: mass_on_spring(readings, context.t, natural, damping))
 
 
 @njit(cache=True)

@@ -318,8 +318,8 @@ def _loud(loudest: LoudestChannel, policy: Policy) -> str:
     if not loudest.stands_out(policy):
         return ""
     return (
-        f"the bias instability of channel {loudest.name} is {loudest.ratio:.1f} times the median of the other channels: "
-        "something else is in it"
+        f"the bias instability of channel {loudest.name} is {loudest.ratio:.1f} times the median of the other "
+        "channels: something else is in it"
     )
 
 
