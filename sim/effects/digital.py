@@ -60,7 +60,7 @@ class Noise(_Discrete):
 
 
 class BiasRandomWalk(_Discrete):
-    """Offsets that wander."""
+    """Biases that follow a random walk."""
 
     name = "bias_random_walk"
     summary = "biases follow a random walk (acceleration random walk)"

@@ -94,8 +94,8 @@ NOT_OF_A_BODY: dict[str, str] = {
     "sensor_lag": "against a motion that is itself unknown a lag of all channels is a delay: gyro_latency",
     "tacho_scale": "a gyro has three gains: gyro_scale",
     "interference_tone": "what all channels share looks like the body's own specific force",
-    "hysteresis": "what depends on the past of a motion that is itself unknown can't be told from it",
-    "bias_random_walk": "slow wander is part of the noise that is fitted",
+    "hysteresis": "what depends on the past of a motion that is itself unknown can't be separated from it",
+    "bias_random_walk": "a slow random walk is part of the noise that is fitted",
 }
 """Effects that a diagnosis of a free body does not look for, and why."""
 
@@ -210,7 +210,7 @@ def apply_effects(world: World, effects: Sequence[Effect]) -> World:
     """Apply effects in the order of the chain, whatever the order they are given in.
 
     From the chip in the array to the table in the world; from the proof mass (axes, gain, curvature) to the offset of
-    the circuit and its filter. Those that neither place nor chain tell apart keep their order.
+    the circuit and its filter. Those that neither place nor chain order keep their order.
     """
     for effect in sorted(effects, key=_place_in_chain):
         world = effect.apply(world)

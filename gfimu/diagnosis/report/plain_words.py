@@ -261,7 +261,7 @@ def _calibrate_first(diagnosis: Diagnosis) -> list[str]:
         return []
     step = (
         f"If the unit is not calibrated, do that first: {_joined(every)} on all channels is what such a unit looks "
-        "like, and one run can't tell many wrong numbers from each other. Record static poses; then "
+        "like, and one run can't separate many wrong numbers. Record static poses; then "
         "gfimu calibrate twelve-position POSES --array ARRAY --out cal.json and "
         "gfimu diagnose RUN --calibration cal.json."
     )

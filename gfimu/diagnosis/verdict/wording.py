@@ -98,16 +98,16 @@ def _held_out(residual: Residual, gain: Gain) -> list[str]:
 def _left_over(verdict: str, residual: Residual, unexplained: Unexplained, rest: str) -> list[str]:
     """Say what the causes leave; an unknown verdict says it at first."""
     if unexplained.significant:
-        told = f"Something is left that nothing in the library explains: {unexplained.signature}."
-        return [] if verdict == "unknown" else [told]
+        sentence = f"Something is left that nothing in the library explains: {unexplained.signature}."
+        return [] if verdict == "unknown" else [sentence]
     over = residual.rms_after / max(residual.noise_floor, 1e-12)
     if verdict != "explained" or over <= 1.0 + Policy.small:
         return []
-    told = (
+    sentence = (
         f"What is left is {over:.2f} times the noise{f' ({rest})' if rest else ''}: "
         "little against what is explained, and ± holds it."
     )
-    return [told]
+    return [sentence]
 
 
 def _noted(notes: Notes) -> list[str]:
@@ -143,11 +143,11 @@ def _far_below(residual: Residual, gain: Gain) -> list[str]:
     share = gain.share_of_excess_removed
     if share + 2.0 * float(np.nan_to_num(gain.share_std)) > fitted - Policy.sizeable:
         return []
-    told = (
+    sentence = (
         f"On the fitted data {fitted:.0%} of it is gone: so much more than on unseen data that the sizes may belong to "
         "this recording alone; confirm them on another one."
     )
-    return [told]
+    return [sentence]
 
 
 def _headline(verdict: str, causes: Sequence[NamedCause], unexplained: Unexplained, residue: float, gain: Gain) -> str:
