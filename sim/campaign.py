@@ -26,10 +26,17 @@ __all__ = [
     "bias_instability",
     "detectability",
     "discrete_parameters",
+    "drawn_profile",
     "hidden_effect",
+    "level_factors",
     "measure",
+    "profile_grid",
     "random_profile",
+    "temperature_course",
 ]
+
+GRID, SMOOTHING = 5e-3, 0.08
+"""Step of a drawn profile and standard deviation of the Gaussian that smooths it, s."""
 
 _MG = STANDARD_GRAVITY / 1000.0
 _POWERS = (0.25, 0.5, 2.0, 4.0)
@@ -72,6 +79,19 @@ def random_profile(rng: np.random.Generator, duration: float, *, top_rate: float
     top_rate : float
         Largest plateau rate, rad/s.
     """
+    fine = profile_grid(duration)
+    return SplineSpin.through(fine, gaussian_filter1d(drawn_profile(rng, fine, duration, top_rate), SMOOTHING / GRID))
+
+
+def profile_grid(duration: float) -> NDArray[np.float64]:
+    """Return the times at which a profile of a length is drawn, s; they begin and end 2 s beyond it."""
+    return np.arange(-2.0, duration + 2.0, GRID)
+
+
+def drawn_profile(
+    rng: np.random.Generator, fine: NDArray[np.float64], duration: float, top_rate: float = 15.0
+) -> NDArray[np.float64]:
+    """Draw the rates of `random_profile` at times of `profile_grid`, rad/s, before they are smoothed."""
     knots, rates = [-5.0, -1.0], [0.0, 0.0]
     now, rate = -1.0, 0.0
     while now < duration + 1.0:
@@ -82,13 +102,12 @@ def random_profile(rng: np.random.Generator, duration: float, *, top_rate: float
         rate = rng.uniform(-top_rate, top_rate) if rng.random() > 0.2 else 0.0
         knots.append(now)
         rates.append(rate)
-    fine = np.arange(-2.0, duration + 2.0, 5e-3)
     profile = np.interp(fine, knots, rates)
     begin = rng.uniform(0.1, 0.7) * duration
-    sweep = (fine > begin) & (fine < begin + 0.15 * duration)
-    since = fine - begin
-    profile = profile + 2.0 * sweep * np.sin(2 * np.pi * (0.3 * since + 0.1 * since**2))
-    return SplineSpin.through(fine, gaussian_filter1d(profile, 0.08 / 5e-3))
+    first, last = np.searchsorted(fine, [begin, begin + 0.15 * duration])
+    since = fine[first:last] - begin
+    profile[first:last] += 2.0 * np.sin(2 * np.pi * (0.3 * since + 0.1 * since**2))
+    return profile
 
 
 def bias_instability(rng: np.random.Generator, n: int, channels: int, rms: float) -> NDArray[np.float64]:
@@ -100,6 +119,17 @@ def bias_instability(rng: np.random.Generator, n: int, channels: int, rms: float
     noise = np.fft.irfft(spectrum / np.sqrt(frequency)[:, None], long, axis=0)
     noise *= rms / noise.std(axis=0)
     return noise[:n]
+
+
+def temperature_course(rng: np.random.Generator, t: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Draw the temperature of a board that warms up in a room that sways, (n,), °C."""
+    temperature = 25.0 + rng.uniform(1.0, 4.0) * (1 - np.exp(-t / rng.uniform(8.0, 30.0)))
+    return temperature + 0.5 * np.sin(2 * np.pi * t / rng.uniform(12.0, 40.0) + rng.uniform(0, 6))
+
+
+def level_factors(rng: np.random.Generator, channels: int) -> NDArray[np.float64]:
+    """Draw how the bias instability of each channel differs from the usual one, (channels,)."""
+    return np.exp(0.3 * rng.standard_normal(channels))
 
 
 def measure(
@@ -131,13 +161,12 @@ def measure(
     spin = random_profile(rng, setting.duration) if motion is None else motion
     t = np.arange(round(setting.duration * setting.sample_rate)) / setting.sample_rate
     world = twin.world(effects, mounting)
-    temperature = 25.0 + rng.uniform(1.0, 4.0) * (1 - np.exp(-t / rng.uniform(8.0, 30.0)))
-    temperature += 0.5 * np.sin(2 * np.pi * t / rng.uniform(12.0, 40.0) + rng.uniform(0, 6))
+    temperature = temperature_course(rng, t)
     readings = forward.channels(world, spin, t, temperature)
     expected = twin.expected_noise(setting.sample_rate)
     white = np.sqrt(expected.white**2 - expected.quantum**2 / 12.0) * world.noise_factor
     readings = readings + white * rng.standard_normal(readings.shape)
-    level = setting.bias_instability * np.exp(0.3 * rng.standard_normal(readings.shape[1]))
+    level = setting.bias_instability * level_factors(rng, readings.shape[1])
     readings += bias_instability(rng, readings.shape[0], readings.shape[1], 1.0) * level
     if world.bias_walk:
         step = world.bias_walk / np.sqrt(setting.sample_rate)
