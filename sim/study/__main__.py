@@ -17,7 +17,8 @@ from sim.study.compare import compare, load_outcomes
 from sim.study.gate import GATE, choose_gate, gate_cases
 from sim.study.outcome_file import read_outcomes
 from sim.study.report import summarise, write_report
-from sim.study.runner import open_executor, run_study
+from sim.study.runner import run_study
+from sim.sweep.executors import open_executor
 
 STORED = "docs/diagnosis-study.jsonl.xz"
 """Outcomes of the study page, seen from the project's root."""

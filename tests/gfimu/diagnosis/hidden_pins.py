@@ -23,7 +23,7 @@ from hidden_cases import HiddenCase, hidden_cases
 
 from sim.study.outcome import run_case
 from sim.study.report import score, visible
-from sim.study.runner import open_executor
+from sim.sweep.executors import open_executor
 
 PINS = Path(__file__).with_name("hidden_cases.toml")
 

@@ -1,0 +1,125 @@
+"""Under `gfimu campaign`: many simulated cases by a plan, kept as one dataset that a second call goes on with."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from gfimu.files.outputs import OutputFolder, writes
+
+if TYPE_CHECKING:
+    from sim.sweep.summary import Group
+
+__all__ = ["CampaignResult", "campaign"]
+
+
+@dataclass(frozen=True)
+class CampaignResult:
+    """What is in the folder of a campaign.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder: ``plan.toml`` and one Parquet file per batch.
+    cases : int
+        Cases of the plan.
+    done : int
+        Cases whose row is there, failed ones included.
+    failures : dict of str to int
+        How many cases failed, by the reason.
+    groups : tuple of Group
+        Quantiles of each result by the values of the factors.
+    """
+
+    folder: Path
+    cases: int
+    done: int
+    failures: dict[str, int]
+    groups: tuple[Group, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the content for JSON."""
+        return {
+            "folder": str(self.folder),
+            "cases": self.cases,
+            "done": self.done,
+            "failures": self.failures,
+            "groups": [group.to_dict() for group in self.groups],
+        }
+
+
+@writes(reads=("plan",), out=OutputFolder(()))
+def campaign(
+    plan: str | Path,
+    *,
+    out: str | Path | None = None,
+    by: Sequence[str] = (),
+    workers: int | None = None,
+    cluster: str = "",
+    progress: Callable[[int, int], None] | None = None,
+) -> CampaignResult:
+    """Run the cases of a plan that the folder lacks, and summarise them; or summarise a folder.
+
+    Parameters
+    ----------
+    plan : str or Path
+        The plan (.toml), or the folder of a campaign, of which nothing is run.
+    out : str or Path, optional
+        Folder of the campaign, with a plan.
+    by : sequence of str
+        Factors by whose values the results are grouped; all that are lists of values by default.
+    workers : int, optional
+        Worker processes; by default as many as this process has processors.
+    cluster : str
+        Address of a Dask scheduler, such as ``tcp://host:8786``, in place of processes of this machine.
+    progress : callable, optional
+        Called with the number of cases that are done and of all.
+
+    Returns
+    -------
+    CampaignResult
+        Counts, failures and quantiles.
+
+    Raises
+    ------
+    InputError
+        If the plan is wrong, a folder is needed or holds another campaign, or Dask is not installed.
+    """
+    import os
+
+    from gfimu.commands.campaign_cases import KINDS, check_factors
+    from gfimu.errors import InputError
+    from sim.sweep.dataset import Dataset
+    from sim.sweep.design import Design
+    from sim.sweep.engine import run_campaign
+    from sim.sweep.executors import open_executor
+    from sim.sweep.plan import load_plan
+    from sim.sweep.summary import failures, grouped
+
+    if workers is not None and workers < 1:
+        raise InputError(f"--workers {workers}: must be at least 1")
+    if Path(plan).is_dir():
+        if out is not None:
+            raise InputError(f"{plan}: is the folder of a campaign; --out goes with a plan")
+        dataset = Dataset.open(plan)
+    else:
+        found = load_plan(plan)
+        check_factors(found, Design(found)[0], str(plan))
+        if out is None:
+            raise InputError(f"{plan}: give the folder of the campaign with --out")
+        dataset = Dataset.create(out, plan)
+        count = workers or len(os.sched_getaffinity(0))
+        run_campaign(
+            dataset,
+            KINDS[found.kind],
+            lambda number: open_executor(number, cluster),
+            count,
+            progress=progress,
+        )
+    design = Design(dataset.plan)
+    rows = dataset.read(list(design.batches()))
+    return CampaignResult(
+        dataset.folder, len(design), len(rows), failures(rows), tuple(grouped(rows, dataset.plan, list(by)))
+    )

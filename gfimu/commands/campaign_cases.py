@@ -1,0 +1,163 @@
+"""What a case of a campaign does: simulate and estimate, or hide an effect and diagnose."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gfimu.errors import InputError, unknown_name
+
+if TYPE_CHECKING:
+    from gfimu.calibration.result import Calibration
+    from gfimu.recording import Recording
+    from sim.scenarios import Scenario
+    from sim.sweep.design import Case
+    from sim.sweep.plan import PlanFile, Value
+
+__all__ = ["KINDS", "check_factors", "diagnose_case", "estimate_case"]
+
+_SCENARIO = "paper_run"
+_CALIBRATIONS = ("none", "rest", "poses")
+_SHORT = {"array": "array", "part": "sensor.part", "duration_s": "duration_s", "sample_rate_hz": "sample_rate_hz"}
+"""Factors of `estimate_case` with a short name, and the key of the scenario file that they set."""
+
+_OF_STUDY = {
+    "effect": "effects",
+    "d_prime": "size",
+    "duration_s": "duration",
+    "sample_rate_hz": "sample_rate",
+    "bias_instability_mg": "bias_instability_mg",
+    "tacho_noise_rad_s": "tacho_noise",
+    "array": "array",
+    "residue": "residue",
+    "encoder_counts": "encoder_counts",
+}
+"""Factors of `diagnose_case`, and the fields of `sim.study.cases.Case`."""
+
+
+def estimate_case(case: Case) -> Mapping[str, float]:
+    """Simulate a scenario, calibrate the unit if asked for, estimate its motion, and compare that with the truth.
+
+    Factors: ``scenario``, ``method`` (of the angular rate), ``calibration`` (``none``; ``rest``: biases read at the first
+    rest; ``poses``: a calibration from poses of the same chips), ``array``, ``part``, ``duration_s``,
+    ``sample_rate_hz``, and any key of the scenario file.
+
+    Returns
+    -------
+    dict
+        Root mean square errors of α, ω (norms) and p, that of ω at the end, and the error of the position at the end.
+    """
+    from gfimu.commands.estimate import estimate
+    from sim.scenarios import simulate
+
+    scenario, method, calibration = _setting(case.values)
+    recording = simulate(scenario, seed=case.seed)
+    found = estimate(
+        recording,
+        method=method,
+        calibration=_calibrated(scenario, case.seed) if calibration == "poses" else None,
+        rest_bias=calibration == "rest",
+        position=True,
+    )
+    alpha, omega = found.alpha - _truth(recording, "alpha", "rad_s2"), found.omega - _truth(recording, "omega", "rad_s")
+    results = {
+        "alpha_rms_rad_s2": _rms(alpha),
+        "omega_rms_rad_s": _rms(omega),
+        "omega_end_rad_s": float(np.linalg.norm(omega[-1])),
+    }
+    if found.position is not None:
+        true = _truth(recording, "position", "m")
+        results["position_end_m"] = float(np.linalg.norm(found.position[-1] - (true[-1] - true[0])))
+    return results
+
+
+def diagnose_case(case: Case) -> Mapping[str, Any]:
+    """Hide an effect in a world of the study and diagnose the recording.
+
+    Factors: ``effect`` (a name, or ``none``), ``d_prime``, ``duration_s``, ``sample_rate_hz``, ``bias_instability_mg``,
+    ``tacho_noise_rad_s``, ``array``, ``residue``, ``encoder_counts``.
+
+    Returns
+    -------
+    dict
+        Verdict, names of the causes, whether exactly what is hidden was named, whether a wrong name was, and the share
+        of excess removed.
+    """
+    from sim.study.cases import Case as StudyCase
+    from sim.study.outcome import run_case
+
+    values = {_OF_STUDY[name]: value for name, value in case.values.items()}
+    hidden = values.pop("effects", "none")
+    effects = () if hidden == "none" else (str(hidden),)
+    outcome = run_case(StudyCase("campaign", case.seed, effects, **values))  # type: ignore[arg-type]
+    names = sorted(cause["effect"] for cause in outcome["causes"])
+    return {
+        "verdict": outcome["verdict"],
+        "causes": ", ".join(names),
+        "exact": outcome["verdict"] == ("explained" if effects else "nothing_found") and names == sorted(effects),
+        "wrong": outcome["verdict"] == "explained" and not set(names) <= set(effects),
+        "share_of_excess_removed": outcome["share_of_excess_removed"],
+    }
+
+
+KINDS: dict[str, Callable[[Case], Mapping[str, Any]]] = {"estimate": estimate_case, "diagnose": diagnose_case}
+"""What a case does, by the plan's ``kind``."""
+
+
+def check_factors(plan: PlanFile, first: Case, source: str) -> None:
+    """Raise `InputError` where the kind or a factor of a plan is unknown, or its first case can't be set up."""
+    if plan.kind not in KINDS:
+        raise unknown_name("kind", plan.kind, KINDS)
+    if plan.kind == "diagnose":
+        for name in plan.factors:
+            if name not in _OF_STUDY:
+                raise unknown_name("factor of kind 'diagnose'", name, _OF_STUDY)
+        return
+    try:
+        _setting(first.values)
+    except InputError as error:
+        raise InputError(f"{source}: [factors]: {error}") from None
+
+
+def _setting(values: Mapping[str, Value]) -> tuple[Scenario, str, str]:
+    """Return scenario, method and calibration of a case of `estimate_case`."""
+    from gfimu.rate.registry import RATE_METHODS
+    from sim.scenarios import Scenario
+
+    rest = dict(values)
+    name, method = str(rest.pop("scenario", _SCENARIO)), str(rest.pop("method", "smoother"))
+    calibration = str(rest.pop("calibration", "none"))
+    if method not in RATE_METHODS:
+        raise unknown_name("method", method, RATE_METHODS)
+    if calibration not in _CALIBRATIONS:
+        raise unknown_name("calibration", calibration, _CALIBRATIONS)
+    changes = [f"{_SHORT.get(key, key)}={_as_set(value)}" for key, value in rest.items()]
+    return Scenario.load(name, changes=changes), method, calibration
+
+
+def _as_set(value: Value) -> str:
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def _calibrated(scenario: Scenario, seed: int) -> Calibration:
+    """Calibrate the chips of a scenario from poses: the same seed draws the same chips."""
+    from gfimu.calibration.array_calibration import calibrate_array
+    from sim.pose_sequence import PoseSequence
+    from sim.scenarios import simulate
+
+    sequence = PoseSequence()
+    poses = simulate(replace(scenario, motion=sequence, duration=sequence.duration), seed=seed)
+    return calibrate_array(poses, scenario.array, gravity=scenario.gravity)
+
+
+def _truth(recording: Recording, quantity: str, unit: str) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """Return a vector of the true motion, (n, 3)."""
+    return np.column_stack([recording.extra[f"truth_{quantity}_{axis}_{unit}"] for axis in "xyz"])
+
+
+def _rms(errors: np.ndarray[Any, np.dtype[np.float64]]) -> float:
+    """Return the root of the mean square of the norms of errors (n, 3), without samples that have none."""
+    return float(np.sqrt(np.nanmean(np.sum(errors**2, axis=1))))

@@ -1,0 +1,94 @@
+"""The dataset of a campaign: the plan, and one Parquet file per batch whose name is the hash of what it holds."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from gfimu.errors import InputError
+from gfimu.files.atomic_file import atomic_path
+from sim.sweep.plan import PlanFile, load_plan
+
+__all__ = ["Dataset"]
+
+_PLAN = "plan.toml"
+_FORMAT = 1  # of rows; another one makes other names
+
+
+@dataclass(frozen=True)
+class Dataset:
+    """Folder of a campaign.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder.
+    plan : PlanFile
+        Its plan.
+    """
+
+    folder: Path
+    plan: PlanFile
+
+    @classmethod
+    def create(cls, folder: str | Path, plan: str | Path) -> Dataset:
+        """Open the folder of a plan, or begin it.
+
+        Raises
+        ------
+        InputError
+            If the folder holds another plan.
+        """
+        found, path = load_plan(plan), Path(folder)
+        kept = path / _PLAN
+        if kept.exists() and load_plan(kept) != found:
+            raise InputError(f"{path}: holds another plan; give another --out, or run its own {kept}")
+        if path.exists() and not kept.exists() and any(path.iterdir()):
+            raise InputError(f"{path}: is not empty and no campaign; give another --out")
+        path.mkdir(parents=True, exist_ok=True)
+        if not kept.exists():
+            with atomic_path(kept) as part:
+                Path(part).write_bytes(Path(plan).read_bytes())
+        return cls(path, found)
+
+    @classmethod
+    def open(cls, folder: str | Path) -> Dataset:
+        """Open the folder of a campaign; raises `InputError` if it is none."""
+        path = Path(folder)
+        if not (path / _PLAN).is_file():
+            raise InputError(f"{path}: no campaign; gfimu campaign PLAN.toml --out {path} makes one")
+        return cls(path, load_plan(path / _PLAN))
+
+    def shard(self, batch: range) -> Path:
+        """Return the file of a batch."""
+        spec = {"format": _FORMAT, "plan": msgspec.to_builtins(self.plan), "cases": [batch.start, batch.stop]}
+        digest = hashlib.sha256(json.dumps(spec, sort_keys=True).encode()).hexdigest()
+        return self.folder / f"{batch.start:08d}-{digest[:16]}.parquet"
+
+    def write(self, batch: range, rows: Sequence[Mapping[str, Any]]) -> None:
+        """Write the rows of a batch, all or nothing; the same rows give the same bytes."""
+        columns: dict[str, list[Any]] = {}
+        for row in rows:
+            for key in row:
+                columns.setdefault(key, [])
+        for row in rows:
+            for key, values in columns.items():
+                values.append(row.get(key))
+        with atomic_path(self.shard(batch)) as part:
+            pq.write_table(pa.table(columns), part)
+
+    def read(self, batches: Sequence[range]) -> list[dict[str, Any]]:
+        """Return the rows of all batches that are there, by number."""
+        rows: list[dict[str, Any]] = []
+        for batch in batches:
+            if self.shard(batch).exists():
+                rows += pq.read_table(self.shard(batch)).to_pylist()
+        return rows
