@@ -91,6 +91,7 @@ def _content(certificate: Certificate) -> Mapping[str, Any]:
         "conditions": {
             word: certificate.conditions[key] for key, word in _CONDITIONS.items() if key in certificate.conditions
         },
+        "statements": _merged(certificate.statements, certificate.chips),
         "missing": list(_missing(certificate.chips).items()),
         "factors": _range([term.coverage_factor for term in certificate.terms if term.coverage_factor is not None]),
         "budget": _budget(certificate),
@@ -162,6 +163,22 @@ def _missing(chips: Sequence[ChipCertificate]) -> Mapping[str, str]:
     terms = [term for chip in chips for term in chip.terms]
     stated = {term.symbol for term in terms if term.value is not None}
     return {term.symbol: term.meaning for term in terms if term.symbol not in stated}
+
+
+def _merged(statements: Sequence[str], chips: Sequence[ChipCertificate]) -> list[str]:
+    """Print a sentence that several chips have with other figures once, with the figures of the first."""
+    groups: dict[str, dict[str, str]] = {}
+    for statement in statements:
+        chip, _, text = statement.partition(": ")
+        if chip not in {one.chip for one in chips}:
+            chip, text = "", statement
+        groups.setdefault(re.sub(r"\d[\d.e−-]*", "", text), {})[chip] = text
+    lines = []
+    for texts in groups.values():
+        first = next(iter(texts.values()))
+        others = "" if len(set(texts.values())) == 1 else f" (figures of {next(iter(texts))})"
+        lines.append(f"{', '.join(texts)}: {first}{others}".removeprefix(": "))
+    return lines
 
 
 def _range(values: Sequence[float]) -> str:
