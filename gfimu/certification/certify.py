@@ -30,6 +30,7 @@ def certify(
     calibration: Calibration,
     *,
     components: Iterable[Component] = (),
+    explained_misfit: float = 0.0,
     angular_sensor: Sheet | None = None,
     conditions: Mapping[str, str] | None = None,
     date: str = "",
@@ -45,6 +46,8 @@ def certify(
     components : iterable of Component
         Further components of the budget, by name of the term (those of type B); what the covariance of the calibration
         already holds must not be among them.
+    explained_misfit : float
+        What of the misfit of the fit these components explain, vᵀPv over the redundancy; it is not counted again.
     angular_sensor : Sheet, optional
         The array as an angular sensor.
     conditions : mapping of str to str, optional
@@ -66,7 +69,7 @@ def certify(
     units = {term.name: term.unit for terms in blank for one in terms for term in one}
     further = tuple(components)
     _check_components(further, units, source)
-    fitted = [part for chip, *parts in stated for part in _fit(calibration, chip.chip, parts, units)]
+    fitted = [part for chip, *parts in stated for part in _fit(calibration, chip.chip, parts, units, explained_misfit)]
     budget = (*fitted, *further)
     known = uncertainties(budget)
     return Certificate(
@@ -130,12 +133,13 @@ def _valued(term: Term, values: Mapping[str, float], defined: set[str]) -> Term:
 
 
 def _fit(
-    calibration: Calibration, chip: str, parts: Iterable[Quantities], units: Mapping[str, str]
+    calibration: Calibration, chip: str, parts: Iterable[Quantities], units: Mapping[str, str], explained: float
 ) -> Iterator[Component]:
     """Components of the fit: its noise, and what the misfit adds to it (degrees of freedom: the redundancy).
 
     The covariance of the calibration is the cofactor of the noise times a factor that the misfit of the poses gave. The
-    share 1 / factor has the many degrees of freedom of the samples, the rest the few of the misfit.
+    share 1 / factor has the many degrees of freedom of the samples, the rest the few of the misfit. What other components
+    explain of the misfit is left out.
     """
     factor = max(_statistic(calibration, chip, "covariance_factor", 1.0), 1.0)
     freedom = _statistic(calibration, chip, "redundancy", 0.0)
@@ -145,8 +149,8 @@ def _fit(
             if std == 0.0:
                 continue
             yield Component(name, _NOISE, "A", "normal", std / math.sqrt(factor), units[name])
-            if factor > 1.0:
-                misfit = std * math.sqrt(1.0 - 1.0 / factor)
+            if factor > 1.0 + explained:
+                misfit = std * math.sqrt((factor - 1.0 - explained) / factor)
                 yield Component(name, _MISFIT, "A", "t", misfit, units[name], freedom if freedom > 0.0 else None)
 
 

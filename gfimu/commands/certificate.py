@@ -12,19 +12,24 @@ from gfimu.files.outputs import OutputFolder, writes
 if TYPE_CHECKING:
     from gfimu.calibration.result import Calibration
     from gfimu.certification.certificate import Certificate
+    from gfimu.uncertainty.stage import Stage
 
 __all__ = ["FOLDER", "certificate"]
+
+_SEED = 0
+"""Numerical: of the simulated calibrations, so that a certificate comes out the same again."""
 
 FOLDER = OutputFolder(("certificate.json", "certificate.html"))
 """What a certificate writes."""
 
 
-@writes(reads=("calibration", "compare"), out=FOLDER)
+@writes(reads=("calibration", "compare", "stage"), out=FOLDER)
 def certificate(
     calibration: Calibration | str | Path,
     *,
     out: str | Path | None = None,
     compare: Calibration | Certificate | str | Path | None = None,
+    stage: Stage | str | Path | None = None,
     item: str = "",
     date: str = "",
 ) -> Certificate:
@@ -38,6 +43,9 @@ def certificate(
         Folder to write: ``certificate.json``, ``certificate.html``.
     compare : Calibration, Certificate, str or Path, optional
         Another calibration or certificate of the same chips, or its file: E_n of every common quantity.
+    stage : Stage, str or Path, optional
+        What the laboratory states of the errors of its stage and of gravity, or its file (``gfimu new stage``): components
+        of type B, by simulated calibrations.
     item : str
         What was calibrated, such as part and serial number.
     date : str
@@ -54,13 +62,28 @@ def certificate(
         If the calibration can't be read, is of a gyro or without covariance, the other is of another unit or other
         chips, or the folder can't be written where it is asked for.
     """
+    import numpy as np
+
     from gfimu.certification.certify import certify
     from gfimu.certification.comparison import compare as compared
     from gfimu.certification.page import write_certificate
     from gfimu.commands.opened import as_calibration
+    from gfimu.uncertainty.components import stage_components
+    from gfimu.uncertainty.stage import Stage
 
     source = str(calibration) if isinstance(calibration, str | Path) else "calibration"
-    found = certify(as_calibration(calibration), item=item, date=date, source=source)
+    stated = Stage.load(stage) if isinstance(stage, str | Path) else stage
+    fitted = as_calibration(calibration)
+    simulated = stage_components(fitted, stated, rng=np.random.default_rng(_SEED))
+    found = certify(
+        fitted,
+        components=simulated.components,
+        explained_misfit=simulated.misfit,
+        item=item,
+        date=date,
+        source=source,
+    )
+    found = replace(found, statements=(*found.statements, simulated.statement))
     if compare is not None:
         name = str(compare) if isinstance(compare, str | Path) else "the other"
         found = replace(found, comparison=compared(found, _other(compare, name), other=name))
