@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gfimu import __version__
+from gfimu.calibration.fit_quality import mean_factor
 from gfimu.calibration.result import Calibration
 from gfimu.certification.certificate import Certificate, ChipCertificate, Component, Sheet, Term
 from gfimu.certification.chip_parameters import ChipParameters, chip_parameters
@@ -22,8 +23,8 @@ __all__ = ["certify", "fit_components"]
 
 Floats = NDArray[np.float64]
 
-_NOISE = "fit: noise of the readings and priors of the adjustment"
-_MISFIT = "fit: what does not average out of a rest, from the misfit of the poses"
+_NOISE = "fit: noise of the readings, priors"
+_MISFIT = "fit: misfit of the poses"
 
 
 def certify(
@@ -128,8 +129,8 @@ def _terms(chip: ChipParameters, model: Quantities, intrinsic: Quantities) -> tu
 def _valued(term: Term, values: Mapping[str, float], defined: set[str]) -> Term:
     if term.name not in values:
         return replace(term, note="not determined")
-    note = "zero by definition of the frame" if term.name in defined else term.note
-    return replace(term, value=values[term.name] + 0.0, note=note)
+    note = "zero by definition of the frame" if term.name in defined else ""
+    return replace(term, value=values[term.name] + 0.0, note=note)  # 0.0: no −0
 
 
 def _fit(
@@ -142,6 +143,7 @@ def _fit(
     explain of the misfit is left out.
     """
     factor = max(_statistic(calibration, chip, "covariance_factor", 1.0), 1.0)
+    further = _unexplained(calibration, explained, factor)
     freedom = _statistic(calibration, chip, "redundancy", 0.0)
     for part in parts:
         variance = np.diag(part.covariance(calibration.covariance))
@@ -149,9 +151,18 @@ def _fit(
             if std == 0.0:
                 continue
             yield Component(name, _NOISE, "A", "normal", std / math.sqrt(factor), units[name])
-            if factor > 1.0 + explained:
-                misfit = std * math.sqrt((factor - 1.0 - explained) / factor)
+            if further > 1.0:
+                misfit = std * math.sqrt((further - 1.0) / factor)
                 yield Component(name, _MISFIT, "A", "t", misfit, units[name], freedom if freedom > 0.0 else None)
+
+
+def _unexplained(calibration: Calibration, explained: float, factor: float) -> float:
+    """Return the factor of the noise that the misfit of all chips gives, less what other components explain of it."""
+    freedom = [_statistic(calibration, chip, "redundancy", 0.0) for chip in calibration.chips]
+    misfit = [_statistic(calibration, chip, "variance_factor", math.nan) for chip in calibration.chips]
+    if explained <= 0.0 or min(freedom) <= 0.0 or not all(map(math.isfinite, misfit)):
+        return factor
+    return mean_factor(float(np.average(misfit, weights=freedom)), int(sum(freedom)), explained)
 
 
 def _statistic(calibration: Calibration, chip: str, key: str, default: float) -> float:
@@ -190,7 +201,7 @@ def _chip(
 def _with_uncertainty(term: Term, known: Mapping[str, Uncertainty]) -> Term:
     found = known.get(term.name)
     if found is None:
-        return term
+        return replace(term, note=term.note or "no uncertainty in the calibration")
     return replace(
         term,
         std=found.std,
@@ -201,9 +212,20 @@ def _with_uncertainty(term: Term, known: Mapping[str, Uncertainty]) -> Term:
 
 
 def _conditions(calibration: Calibration) -> dict[str, str]:
-    """Return what the calibration was made from, from its statistics."""
-    return {
-        key: value if isinstance(value, str) else f"{value:.6g}"
-        for key, value in calibration.statistics.items()
-        if isinstance(value, str) or math.isfinite(value)
-    }
+    """Return what the calibration was made from: its statistics, those of several chips in one text."""
+    found: dict[str, list[float | str]] = {}
+    for name, value in calibration.statistics.items():
+        chip, _, rest = name.partition("_")
+        if isinstance(value, str) or math.isfinite(value):
+            found.setdefault(rest if chip in calibration.chips else name, []).append(value)
+    return {key: _of_all(values) for key, values in found.items()}
+
+
+def _of_all(values: Sequence[float | str]) -> str:
+    """Return one text for the values of all chips: the value, their range, or all texts."""
+    numbers = [value for value in values if not isinstance(value, str)]
+    texts = [value for value in values if isinstance(value, str)]
+    if not numbers or texts:
+        return ", ".join(dict.fromkeys(map(str, values)))
+    low, high = f"{min(numbers):.4g}", f"{max(numbers):.4g}"
+    return low if low == high else f"{low} to {high}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,7 +12,7 @@ from gfimu.files.outputs import OutputFolder, writes
 
 if TYPE_CHECKING:
     from gfimu.calibration.result import Calibration
-    from gfimu.certification.certificate import Certificate
+    from gfimu.certification.certificate import Certificate, Component, Sheet
     from gfimu.uncertainty.stage import Stage
 
 __all__ = ["FOLDER", "certificate"]
@@ -32,6 +33,8 @@ def certificate(
     stage: Stage | str | Path | None = None,
     item: str = "",
     date: str = "",
+    components: Iterable[Component] = (),
+    angular_sensor: Sheet | None = None,
 ) -> Certificate:
     """State a calibration in the terms of IEEE 1293 and NIST, with expanded uncertainties and their budget.
 
@@ -50,6 +53,10 @@ def certificate(
         What was calibrated, such as part and serial number.
     date : str
         When it was calibrated.
+    components : iterable of Component
+        Further components of type B for the budget, by name of the term.
+    angular_sensor : Sheet, optional
+        The array as an angular sensor.
 
     Returns
     -------
@@ -77,13 +84,14 @@ def certificate(
     simulated = stage_components(fitted, stated, rng=np.random.default_rng(_SEED))
     found = certify(
         fitted,
-        components=simulated.components,
+        components=(*components, *simulated.components),
         explained_misfit=simulated.misfit,
+        angular_sensor=angular_sensor,
         item=item,
         date=date,
         source=source,
     )
-    found = replace(found, statements=(*found.statements, simulated.statement))
+    found = replace(found, statements=(*found.statements, *simulated.statements))
     if compare is not None:
         name = str(compare) if isinstance(compare, str | Path) else "the other"
         found = replace(found, comparison=compared(found, _other(compare, name), other=name))

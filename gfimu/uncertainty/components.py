@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +12,7 @@ from gfimu.certification.certificate import Component
 from gfimu.certification.chip_parameters import chip_parameters
 from gfimu.certification.quantities import stated_quantities
 from gfimu.certification.words import intrinsic_terms, model_terms
+from gfimu.uncertainty.simulated_calibration import simulated_method
 from gfimu.uncertainty.stage import Stage
 from gfimu.uncertainty.type_b import RUNS, type_b
 
@@ -27,13 +29,13 @@ class StageComponents:
         Every source that the stage file states, and gravity, of every stated quantity.
     misfit : float
         What of the misfit of the fit they explain (`gfimu.certification.certify.certify`, ``explained_misfit``).
-    statement : str
+    statements : tuple of str
         What the budget holds of the stage.
     """
 
     components: tuple[Component, ...]
     misfit: float
-    statement: str
+    statements: tuple[str, ...]
 
 
 def stage_components(
@@ -53,7 +55,7 @@ def stage_components(
         Simulated calibrations per source.
     """
     if calibration.unit == "rad_s":
-        return StageComponents((), 0.0, "")
+        return StageComponents((), 0.0, ())
     names = stated_quantities(calibration).names
     units = {
         term.name: term.unit
@@ -69,8 +71,12 @@ def stage_components(
         for share in found.shares
         for name, std in zip(names, share.standard.tolist(), strict=True)
     )
-    if stage is None:
-        text = "no stage file was given: errors of levelling, angles and mounting are not in the budget"
-    else:
-        text = f"stage: {stage.stage}" + (f"; {stage.source}" if stage.source else "")
-    return StageComponents(components, found.misfit, text)
+    return StageComponents(components, found.misfit, tuple(_statements(calibration, stage)))
+
+
+def _statements(calibration: Calibration, stage: Stage | None) -> Iterator[str]:
+    method = simulated_method(calibration)
+    if stage is not None:
+        yield f"stage: {stage.stage}" + (f"; {stage.source}" if stage.source else "")
+    elif method is not None and "face" in method.needs:
+        yield "no stage file was given: errors of levelling, angles and mounting are not in the budget"
