@@ -139,8 +139,8 @@ def _fit(
     """Components of the fit: its noise, and what the misfit adds to it (degrees of freedom: the redundancy).
 
     The covariance of the calibration is the cofactor of the noise times a factor that the misfit of the poses gave. The
-    share 1 / factor has the many degrees of freedom of the samples, the rest the few of the misfit. What other components
-    explain of the misfit is left out.
+    share 1 / factor has the many degrees of freedom of the samples, the rest the few of the misfit. What other
+    components explain of the misfit is left out.
     """
     factor = max(_statistic(calibration, chip, "covariance_factor", 1.0), 1.0)
     further = _unexplained(calibration, explained, factor)

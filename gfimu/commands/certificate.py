@@ -47,8 +47,8 @@ def certificate(
     compare : Calibration, Certificate, str or Path, optional
         Another calibration or certificate of the same chips, or its file: E_n of every common quantity.
     stage : Stage, str or Path, optional
-        What the laboratory states of the errors of its stage and of gravity, or its file (``gfimu new stage``): components
-        of type B, by simulated calibrations.
+        What the laboratory states of the errors of its stage and of gravity, or its file (``gfimu new stage``):
+        components of type B, by simulated calibrations.
     item : str
         What was calibrated, such as part and serial number.
     date : str

@@ -62,9 +62,7 @@ def stage_components(
         for chip in chip_parameters(calibration)
         for term in (*model_terms(chip), *intrinsic_terms(chip))
     }
-    found = type_b(
-        calibration, stage or Stage(stage=""), lambda one: stated_quantities(one).values, rng=rng, runs=runs
-    )
+    found = type_b(calibration, stage or Stage(stage=""), lambda one: stated_quantities(one).values, rng=rng, runs=runs)
     dof = None if stage is None or stage.reliability == 0.0 else 0.5 / stage.reliability**2  # JCGM 100, eq. G.3
     components = tuple(
         Component(name, share.source, "B", "normal", std, units[name], dof)

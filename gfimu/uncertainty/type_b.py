@@ -147,9 +147,9 @@ def _gravity(calibration: Calibration, stage: Stage) -> tuple[float, str]:
 def _of_scale(calibration: Calibration, stage: Stage, figures: Figures, note: str) -> Iterator[Share]:
     """Yield the shares of a calibration whose conditions hold no direction: scales of M and of the positions.
 
-    True gravity larger than the given one by the ratio δ makes M larger by it and every position r smaller. A table that
-    turns faster than it reads by δ makes r larger, by 2 δ from the centripetal field and by δ from α: the first is
-    taken. In a spin calibration it is M that grows so, where the radius is known.
+    True gravity larger than the given one by the ratio δ makes M larger by it and every position r smaller. A table
+    that turns faster than it reads by δ makes r larger, by 2 δ from the centripetal field and by δ from α: the first
+    is taken. In a spin calibration it is M that grows so, where the radius is known.
     """
     kinds = np.array([name.split("_")[1] for name in calibration.names])
     wanted = figures(calibration)

@@ -30,9 +30,9 @@ def coverage(name, keys, options, *, runs, explained=True):
     rng, (method, _) = np.random.default_rng(9), METHODS[name]
     stage = Stage(stage="s", gravity_std_m_s2=1e-3, **keys)
     ideal = calibration_of(name, **options)
-    ideal = replace(ideal, statistics={**ideal.statistics, "a1_mean_noise": NOISE})
+    ideal = replace(ideal, statistics={**ideal.statistics, "a1_mean_noise_m_s2": NOISE})
     poses, truth = poses_of(ideal), stated_quantities(ideal).values
-    found = stage_components(ideal, stage, rng=rng, runs=200)
+    found = stage_components(ideal, stage, rng=rng, runs=100)
     force = specific_force(poses, draw_errors(stage, poses, runs, rng), GRAVITY)
     inside = []
     for one in force:

@@ -11,7 +11,7 @@ from tests.gfimu.uncertainty.stage_cases import calibration_of
 
 
 def test_the_end_gauge_of_example_h_1():
-    """Components 25, 9.7, 2.9 and 16.6 nm with 18, 25.6, 50 and 2 degrees of freedom: u = 32 nm, ν = 16, U_99 = 93 nm."""
+    """25, 9.7, 2.9 and 16.6 nm with 18, 25.6, 50 and 2 degrees of freedom: u = 32 nm, ν = 16, U_99 = 93 nm."""
     parts = zip((25.0, 9.7, 2.9, 16.6), (18.0, 25.6, 50.0, 2.0), strict=True)
     found = uncertainties([Component("l", "source", "A", "normal", std, "nm", dof) for std, dof in parts])["l"]
     assert round(found.std) == 32

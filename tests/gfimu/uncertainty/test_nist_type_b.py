@@ -3,8 +3,9 @@
 Geist & Gaitan, J. Res. NIST 126, 126038 (2021), abstract: upper bounds of the standard uncertainties "of the order of"
 1e-5 (intrinsic sensitivities), 2e-5 (diagonal elements), 5e-5 (off-diagonal elements) and 2e-4 (zero-acceleration
 offsets), relative to a sensitivity of 1, and 5e-3 degrees (intrinsic angles), from alignment of the gimbals and step
-sizes. The stage errors that were put in, the poses and the triad are in the text of the paper, which is not at hand. So
-here stands what follows without them: one ratio, and that no bound is exceeded by the stage error that one of them gives.
+sizes. The stage errors that were put in, the poses and the triad are in the text of the paper, which is not at hand.
+So here stands what follows without them: one ratio, and that no bound is exceeded by the stage error that one of them
+gives.
 """
 
 import numpy as np
@@ -15,11 +16,14 @@ from tests.gfimu.calibration.calibration_cases import GRAVITY
 from tests.gfimu.uncertainty.stage_cases import calibration_of, intrinsic
 
 SENSITIVITY, DIAGONAL, OFF_DIAGONAL, OFFSET, ANGLE = 1e-5, 2e-5, 5e-5, 2e-4, np.deg2rad(5e-3)
-RUNS = 400
+RUNS = 200
 
 
 def spread(stage):
-    """Standard uncertainty (root mean square over the axes) of sensitivities, diagonal, off-diagonal, offsets (relative) and angles (rad)."""
+    """Standard uncertainties, root mean square over the axes.
+
+    Of intrinsic sensitivities, diagonal and off-diagonal elements, offsets (all relative to 1 g) and angles (rad).
+    """
 
     def figures(calibration):
         m, nine = calibration.models["a1"].sensitivity, intrinsic(calibration)

@@ -54,7 +54,7 @@ def test_levelling_of_each_face_spreads_the_six_position_parameters_as_theory_sa
 
 
 def test_a_tilted_base_and_a_turned_unit_rotate_the_reference_axes_in_full(rng):
-    std, runs = 1e-3, 400
+    std, runs = 1e-3, 200
     calibration = calibration_of("six-position", PERFECT)
     for key in ("mounting_std_rad", "angle_zero_std_rad"):
         found = type_b(calibration, stage(**{key: std}), values, rng=rng, runs=runs).shares[0].standard
@@ -122,7 +122,7 @@ def test_the_misfit_that_the_stage_explains(rng):
     """Tilts of σ g in each of two axes per face, of which 6 of 12 directions are left after 12 parameters of 18."""
     std, noise = 1e-3, 1e-3
     calibration = calibration_of("six-position", PERFECT)
-    calibration = replace(calibration, statistics={**calibration.statistics, "a1_mean_noise": noise})
+    calibration = replace(calibration, statistics={**calibration.statistics, "a1_mean_noise_m_s2": noise})
     found = type_b(calibration, stage(pose_tilt_std_rad=std), values, rng=rng, runs=400)
     # Residual of an axis: 2 degrees of freedom, shared by the tilts of four faces and no error of two: 2 · (4/6) / 2.
     assert abs(found.misfit / ((GRAVITY * std / noise) ** 2 * 2.0 / 3.0) - 1.0) < 0.15
