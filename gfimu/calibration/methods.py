@@ -190,7 +190,8 @@ def _weights(observations: Observations) -> dict[str, float]:
     found: dict[str, float] = {}
     for chip in observations.chips:
         one = observations.of_chip(chip)
-        found[f"{chip}_mean_noise_{one.unit}"] = float(np.sqrt(np.einsum("pcc->", one.mean_covariance) / (3.0 * one.n_poses)))
+        variance = np.einsum("pcc->pc", one.mean_covariance).mean()
+        found[f"{chip}_mean_noise_{one.unit}"] = float(np.sqrt(variance))
         if one.bends:
             found[f"{chip}_quadratic_prior_std_per_{one.unit}"] = float(one.quadratic_prior.max())
     return found

@@ -96,7 +96,10 @@ def _fit(calibration: Calibration, chip: str, force: Floats, error: Floats) -> C
     """Calibrate one chip from the specific forces (p, 3) of its poses and errors of the readings (p, 3), both m/s²."""
     model = calibration.models[chip]
     scale = float(np.mean(np.linalg.norm(model.sensitivity, axis=1)))  # reading unit per m/s²
-    noise = chip_statistic(calibration, chip, f"mean_noise_{calibration.unit}") or _NOISE_SHARE * calibration.gravity * scale
+    noise = (
+        chip_statistic(calibration, chip, f"mean_noise_{calibration.unit}")
+        or _NOISE_SHARE * calibration.gravity * scale
+    )
     bends = quadratic_names((chip,))
     prior = chip_statistic(calibration, chip, f"quadratic_prior_std_per_{calibration.unit}")
     observations = Observations.from_means(

@@ -5,10 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
+import msgspec
+
 from gfimu.files.model_files import read_toml
-from gfimu.files.schema import NotNegative, Table, about, read
+from gfimu.files.schema import Table, about, read
 
 __all__ = ["Stage"]
+
+Angle = Annotated[float, msgspec.Meta(ge=0, le=0.05)]
+"""rad; beyond 3° a face is no face."""
 
 
 class Stage(Table, frozen=True):
@@ -22,32 +27,30 @@ class Stage(Table, frozen=True):
     ]
     source: Annotated[str, about("Where the figures are from: certificate or data sheet, with number and date.")] = ""
     pose_tilt_std_rad: Annotated[
-        NotNegative,
+        Angle,
         about("Tilt of each pose by itself about each horizontal axis: hand levelling, faces out of square.", "rad"),
     ] = 0.0
     base_tilt_std_rad: Annotated[
-        NotNegative,
+        Angle,
         about("Tilt of the base, and so of the outer axis, about each horizontal axis; equal in all poses.", "rad"),
     ] = 0.0
     orthogonality_std_rad: Annotated[
-        NotNegative, about("Angle by which the inner axis misses the right angle to the outer one.", "rad")
+        Angle, about("Angle by which the inner axis misses the right angle to the outer one.", "rad")
     ] = 0.0
     angle_setting_std_rad: Annotated[
-        NotNegative, about("Error of each setting of either axis, new at every setting.", "rad")
+        Angle, about("Error of each setting of either axis, new at every setting.", "rad")
     ] = 0.0
-    angle_zero_std_rad: Annotated[
-        NotNegative, about("Error of the zero of either axis, equal in all poses.", "rad")
-    ] = 0.0
+    angle_zero_std_rad: Annotated[Angle, about("Error of the zero of either axis, equal in all poses.", "rad")] = 0.0
     angle_step_std_rad: Annotated[
-        NotNegative,
+        Angle,
         about("Error of a step of 90° of either axis, in proportion for other steps; equal in all poses.", "rad"),
     ] = 0.0
     mounting_std_rad: Annotated[
-        NotNegative,
+        Angle,
         about("Rotation of the unit against the stage about each of its axes; equal in all poses.", "rad"),
     ] = 0.0
     gravity_std_m_s2: Annotated[
-        NotNegative | None,
+        Annotated[float, msgspec.Meta(ge=0, le=0.1)] | None,
         about(
             "Local gravity that the calibration was given.",
             "m/s²",
@@ -55,11 +58,12 @@ class Stage(Table, frozen=True):
         ),
     ] = None
     resolution_m_s2: Annotated[
-        NotNegative,
+        Annotated[float, msgspec.Meta(ge=0, le=1)],
         about("Step of the readings where their noise is too small to average it out; 0: it is in the noise.", "m/s²"),
     ] = 0.0
     table_rate_std: Annotated[
-        NotNegative, about("Relative error of the rate of the table that gave the positions, a ratio.")
+        Annotated[float, msgspec.Meta(ge=0, le=0.1)],
+        about("Relative error of the rate of the table that gave the positions, a ratio."),
     ] = 0.0
     reliability: Annotated[
         float,
