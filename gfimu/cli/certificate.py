@@ -79,6 +79,7 @@ def _print(found: Certificate) -> None:
             for row in found.comparison.rows
         ]
         print_table(f"compared with {found.comparison.other}", ("quantity", "this", "other", "unit", "E_n"), rows)
+        print_text(found.comparison.summary)
         for text in found.comparison.left_out:
             print_text(f"not compared: {text}")
     for text in found.statements:
