@@ -1,6 +1,7 @@
 """Type B uncertainty of a calibration's figures: their spread over simulated calibrations on an erroneous stage.
 
-Each source of the stage acts alone in a number of simulated calibrations of the same unit by the same estimator. The
+Each source of the stage acts alone in a number of simulated calibrations of the same unit by the same estimator. What
+gravity and the rate of a table do is exact: they scale the sensitivities and positions. The
 standard uncertainty of a figure is the root mean square of its deviation from the calibration without errors, so that a
 shift of second order counts as well as the scatter (JCGM 100:2008, F.2.4.5; propagation as in JCGM 101:2008, 5).
 """
@@ -46,6 +47,8 @@ _SAME_GRAVITY = 1e-9
 
 _ROUNDING = 1e-12
 """Numerical: relative to the figure; what is below is rounding of the arithmetic."""
+
+_SIMULATED = tuple(key for key in SOURCES if key != "gravity_std_m_s2")
 
 _UNITS = {"rad": "rad", "m_s2": "m/s²"}
 
@@ -101,27 +104,22 @@ def type_b(
     runs : int
         Simulated calibrations per source.
     """
-    gravity_std, note = _gravity(calibration, stage)
-    stage = msgspec.structs.replace(stage, gravity_std_m_s2=gravity_std)
-    if simulated_method(calibration) is None:
-        return TypeB(tuple(_of_scale(calibration, stage, figures, note)), 0.0)
-    directions = poses_of(calibration)
-    ideal = draw_errors(stage, directions, 1, rng, ())
-    wanted = figures(calibrate_under(calibration, directions, ideal)[0].calibration)
     shares, misfit = [], 0.0
-    for key, source in SOURCES.items():
-        acting, remark = (stage, note) if key == "gravity_std_m_s2" else _acting(calibration, stage, key)
-        if not remark:
-            continue
-        standard = np.zeros(len(wanted))
-        if getattr(acting, key) > 0.0:
-            fits = calibrate_under(calibration, directions, draw_errors(acting, directions, runs, rng, (key,)))
-            off = np.array([figures(one.calibration) for one in fits]) - wanted  # (n, t)
-            standard = np.sqrt(np.mean(off**2, axis=0))
-            standard[standard < _ROUNDING * np.abs(wanted)] = 0.0
-            misfit += float(np.mean([one.misfit for one in fits]))
-        shares.append(Share(f"{source}: {remark}", standard))
-    return TypeB(tuple(shares), misfit)
+    sources = {key: found for key in _SIMULATED if (found := _acting(calibration, stage, key))[1]}
+    if sources and simulated_method(calibration) is not None:
+        directions = poses_of(calibration)
+        ideal = draw_errors(stage, directions, 1, rng, ())
+        wanted = figures(calibrate_under(calibration, directions, ideal)[0].calibration)
+        for key, (acting, remark) in sources.items():
+            standard = np.zeros(len(wanted))
+            if getattr(acting, key) > 0.0:
+                fits = calibrate_under(calibration, directions, draw_errors(acting, directions, runs, rng, (key,)))
+                off = np.array([figures(one.calibration) for one in fits]) - wanted  # (n, t)
+                standard = np.sqrt(np.mean(off**2, axis=0))
+                standard[standard < _ROUNDING * np.abs(wanted)] = 0.0
+                misfit += float(np.mean([one.misfit for one in fits]))
+            shares.append(Share(f"{SOURCES[key]}: {remark}", standard))
+    return TypeB((*shares, *_of_scale(calibration, stage, figures)), misfit)
 
 
 def _acting(calibration: Calibration, stage: Stage, key: str) -> tuple[Stage, str]:
@@ -148,8 +146,8 @@ def _gravity(calibration: Calibration, stage: Stage) -> tuple[float, str]:
     return FORMULA_GRAVITY_STD, f"{FORMULA_GRAVITY_STD:g} m/s², what local anomalies leave of a formula"
 
 
-def _of_scale(calibration: Calibration, stage: Stage, figures: Figures, note: str) -> Iterator[Share]:
-    """Yield the shares of a calibration whose conditions hold no direction: scales of M and of the positions.
+def _of_scale(calibration: Calibration, stage: Stage, figures: Figures) -> Iterator[Share]:
+    """Yield the shares that scale M and the positions, whatever the method.
 
     True gravity larger than the given one by the ratio δ makes M larger by it and every position r smaller. A table
     that turns faster than it reads by δ makes r larger, by 2 δ from the centripetal field and by δ from α: the first
@@ -160,10 +158,12 @@ def _of_scale(calibration: Calibration, stage: Stage, figures: Figures, note: st
 
     def moved(m: float, r: float) -> Floats:
         factor = np.where(kinds == "M", m, np.where(kinds == "r", r, 1.0))
-        return np.abs(figures(replace(calibration, values=calibration.values * factor)) - wanted)
+        standard = np.abs(figures(replace(calibration, values=calibration.values * factor)) - wanted)
+        return np.where(standard < _ROUNDING * np.abs(wanted), 0.0, standard)
 
-    scale = 1.0 + (stage.gravity_std_m_s2 or 0.0) / calibration.gravity
-    yield Share(f"{SOURCES['gravity_std_m_s2']}: {note}", moved(scale, 1.0 / scale))
+    std, remark = _gravity(calibration, stage)
+    scale = 1.0 + std / calibration.gravity
+    yield Share(f"{SOURCES['gravity_std_m_s2']}: {remark}", moved(scale, 1.0 / scale))
     if stage.table_rate_std > 0.0:
         square = (1.0 + stage.table_rate_std) ** 2
         source = f"rate of the table: {stage.table_rate_std:.2g} (relative)"
