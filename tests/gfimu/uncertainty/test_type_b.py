@@ -118,6 +118,7 @@ def test_levelling_that_the_fit_was_given_is_not_counted_again(rng):
     rest = share(type_b(calibration, stage(pose_tilt_std_rad=both), values, rng=rng, runs=runs), "levelling, each")
     expected, allowed = 7e-4 / np.sqrt(2.0), 0.02 + 4.0 / np.sqrt(2.0 * runs)  # 2 %: the triad is not perfect
     np.testing.assert_allclose(rest.standard[:9][OFF_DIAGONAL], expected, rtol=allowed)
+    assert rest.standard[9:].max() < 0.1 * GRAVITY * 7e-4 / 3.0  # the fit takes b from the faces that tilts don't move
     assert "of 0.0012 rad" in rest.source
 
 
@@ -137,16 +138,18 @@ def test_gravity_without_a_statement_is_that_of_a_formula_or_of_the_whole_earth(
     assert f"{STANDARD_GRAVITY_STD:g} m/s²" in source
 
 
-def test_rounding_that_noise_does_not_average_out(rng):
-    runs = 400
-    found = type_b(calibration_of("six-position", PERFECT), stage(resolution_m_s2=0.04), values, rng=rng, runs=runs)
-    expected = 0.04 / np.sqrt(12.0 * 6.0)
+@pytest.mark.parametrize("counts", [1.0, 25.0])
+def test_rounding_that_noise_does_not_average_out(counts, rng):
+    """A step of 0.04 m/s² in each of six poses, in the unit of the readings."""
+    runs, triad = 300, ErrorModel(counts * np.eye(3), np.zeros(3))
+    found = type_b(calibration_of("six-position", triad), stage(resolution_m_s2=0.04), values, rng=rng, runs=runs)
+    expected = counts * 0.04 / np.sqrt(12.0 * 6.0)
     np.testing.assert_allclose(share(found, "resolution").standard[9:], expected, rtol=4.0 / np.sqrt(2.0 * runs))
 
 
 def test_the_misfit_that_the_stage_explains(rng):
     """Tilts of σ g in each of two axes per face, of which 6 of 12 directions are left after 12 parameters of 18."""
-    std, noise = 1e-3, 1e-3
+    std, noise = 1e-3, 2e-3
     calibration = calibration_of("six-position", PERFECT)
     calibration = replace(calibration, statistics={**calibration.statistics, "a1_mean_noise_m_s2": noise})
     found = type_b(calibration, stage(pose_tilt_std_rad=std), values, rng=rng, runs=400)
@@ -185,15 +188,32 @@ def test_the_closed_form_of_a_whole_array_is_that_of_its_fit(array_calibration, 
     np.testing.assert_allclose(found, np.abs(again.values - calibration.values), atol=1e-7)
 
 
-def test_an_error_of_the_rate_of_the_table_goes_into_the_positions_twice(array_calibration, rng):
-    _, _, calibration = array_calibration
-    one = replace(
+def with_position(calibration):
+    return replace(
         calibration,
         names=(*calibration.names, "a1_r_x"),
         values=np.append(calibration.values, 0.05),
         covariance=np.pad(calibration.covariance, (0, 1)),
         null_space=np.empty((0, 0)),
     )
+
+
+def test_an_error_of_the_rate_of_the_table_goes_into_the_positions_twice(array_calibration, rng):
+    one = with_position(array_calibration[2])
     found = share(type_b(one, stage(table_rate_std=1e-3), values, rng=rng), "rate of the table").standard
     np.testing.assert_allclose(found[-1], 0.05 * (1.001**2 - 1.0))
     assert not found[:-1].any()
+
+
+def test_gravity_makes_positions_smaller_by_what_it_makes_sensitivities_larger(array_calibration, rng):
+    """A specific force a = M⁻¹ (l − b) is too small by the ratio, and so is r = a / ω²."""
+    one = with_position(array_calibration[2])
+    found = share(type_b(one, stage(gravity_std_m_s2=0.1), values, rng=rng), "local gravity").standard
+    np.testing.assert_allclose(found[-1], 0.05 * (1.0 - GRAVITY / (GRAVITY + 0.1)))
+
+
+def test_an_error_of_the_rate_in_a_spin_calibration_goes_into_the_sensitivities(rng):
+    spun = replace(calibration_of("six-position"), method="spin")
+    found = share(type_b(spun, stage(table_rate_std=1e-3), values, rng=rng), "rate of the table").standard
+    np.testing.assert_allclose(found[:9], np.abs(spun.values[:9]) * (1.001**2 - 1.0))
+    assert not found[9:].any()
