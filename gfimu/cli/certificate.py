@@ -64,7 +64,7 @@ def _print(found: Certificate) -> None:
     for chip in found.chips:
         stated = [term for term in (*chip.terms, *chip.intrinsic) if term.value is not None]
         print_table(f"{chip.chip}: {chip.frame_meaning}", header, [_row(term) for term in stated])
-        missing = [term.name for term in chip.terms if term.value is None]
+        missing = [term.name for term in (*chip.terms, *chip.intrinsic) if term.value is None]
         if missing:
             print_text(f"not determined: {', '.join(missing)}")
     if found.comparison is not None:
