@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from gfimu.files.outputs import OutputFolder, writes
 
@@ -69,29 +69,21 @@ def certificate(
         If the calibration can't be read, is of a gyro or without covariance, the other is of another unit or other
         chips, or the folder can't be written where it is asked for.
     """
-    import numpy as np
-
-    from gfimu.certification.certify import certify
     from gfimu.certification.comparison import compare as compared
     from gfimu.certification.page import write_certificate
     from gfimu.commands.opened import as_calibration
-    from gfimu.uncertainty.components import stage_components
     from gfimu.uncertainty.stage import Stage
 
     source = str(calibration) if isinstance(calibration, str | Path) else "calibration"
-    stated = Stage.load(stage) if isinstance(stage, str | Path) else stage
-    fitted = as_calibration(calibration)
-    simulated = stage_components(fitted, stated, rng=np.random.default_rng(_SEED))
-    found = certify(
-        fitted,
-        components=(*components, *simulated.components),
-        explained_misfit=simulated.misfit,
+    found = _certified(
+        as_calibration(calibration),
+        Stage.load(stage) if isinstance(stage, str | Path) else stage,
+        components=components,
         angular_sensor=angular_sensor,
         item=item,
         date=date,
         source=source,
     )
-    found = replace(found, statements=(*found.statements, *simulated.statements))
     if compare is not None:
         name = str(compare) if isinstance(compare, str | Path) else "the other"
         found = replace(found, comparison=compared(found, _other(compare, name), other=name))
@@ -100,18 +92,36 @@ def certificate(
     return found
 
 
+def _certified(
+    calibration: Calibration, stage: Stage | None, *, components: Iterable[Component] = (), **stated: Any
+) -> Certificate:
+    """Certify a calibration with the components of the stage, and others."""
+    import numpy as np
+
+    from gfimu.certification.certify import certify
+    from gfimu.uncertainty.components import stage_components
+
+    simulated = stage_components(calibration, stage, rng=np.random.default_rng(_SEED))
+    found = certify(
+        calibration,
+        components=(*components, *simulated.components),
+        explained_misfit=simulated.misfit,
+        **stated,
+    )
+    return replace(found, statements=(*found.statements, *simulated.statements))
+
+
 def _other(given: Calibration | Certificate | str | Path, name: str) -> Certificate:
     """Return a certificate given as such, as a calibration, or as the file of either."""
     from gfimu.calibration.result import Calibration
     from gfimu.certification.certificate import FORMAT, Certificate
-    from gfimu.certification.certify import certify
     from gfimu.errors import InputError
     from gfimu.files.input_file import check_input
 
     if isinstance(given, Certificate):
         return given
     if isinstance(given, Calibration):
-        return certify(given, source=name)
+        return _certified(given, None, source=name)
     file = check_input(given)
     try:
         data = json.loads(file.read_text(encoding="utf-8"))
@@ -121,4 +131,4 @@ def _other(given: Calibration | Certificate | str | Path, name: str) -> Certific
         raise InputError(f"{file}: neither a calibration nor a certificate; make one with `gfimu calibrate`") from None
     if isinstance(data, dict) and data.get("format") == FORMAT:
         return Certificate.from_dict(data, source=name)
-    return certify(Calibration.from_dict(data, source=name), source=name)
+    return _certified(Calibration.from_dict(data, source=name), None, source=name)
