@@ -38,7 +38,8 @@ class SimulatedCalibration:
     calibration : Calibration
         What the estimator returned, all chips.
     misfit : float
-        Mean variance factor of the chips: vᵀPv over the redundancy that the stage errors alone leave in the fit.
+        Mean variance factor of the chips: vᵀPv over the redundancy that the stage errors alone leave in the fit; zero
+        where the calibration does not state the noise of its means.
     """
 
     calibration: Calibration
@@ -89,17 +90,14 @@ def calibrate_under(calibration: Calibration, directions: Floats, errors: StageE
         [_fit(calibration, chip, one, rounding) for chip in calibration.chips]
         for one, rounding in zip(force, errors.reading, strict=True)
     ]
-    return [SimulatedCalibration(combine(fits), float(np.mean([_misfit(fit) for fit in fits]))) for fits in each]
+    return [SimulatedCalibration(combine(fits), _misfit(calibration, fits)) for fits in each]
 
 
 def _fit(calibration: Calibration, chip: str, force: Floats, error: Floats) -> Calibration:
     """Calibrate one chip from the specific forces (p, 3) of its poses and errors of the readings (p, 3), both m/s²."""
     model = calibration.models[chip]
     scale = float(np.mean(np.linalg.norm(model.sensitivity, axis=1)))  # reading unit per m/s²
-    noise = (
-        chip_statistic(calibration, chip, f"mean_noise_{calibration.unit}")
-        or _NOISE_SHARE * calibration.gravity * scale
-    )
+    noise = _mean_noise(calibration, chip) or _NOISE_SHARE * calibration.gravity * scale
     bends = quadratic_names((chip,))
     prior = chip_statistic(calibration, chip, f"quadratic_prior_std_per_{calibration.unit}")
     observations = Observations.from_means(
@@ -120,6 +118,13 @@ def _fit(calibration: Calibration, chip: str, force: Floats, error: Floats) -> C
     return fit
 
 
-def _misfit(fit: Calibration) -> float:
-    factor = float(fit.statistics["variance_factor"])
-    return factor if np.isfinite(factor) else 0.0
+def _misfit(calibration: Calibration, fits: list[Calibration]) -> float:
+    """Return the mean variance factor, in units of the noise that the calibration states."""
+    if any(_mean_noise(calibration, chip) is None for chip in calibration.chips):
+        return 0.0
+    factors = np.array([fit.statistics["variance_factor"] for fit in fits], dtype=float)
+    return float(np.mean(np.where(np.isfinite(factors), factors, 0.0)))
+
+
+def _mean_noise(calibration: Calibration, chip: str) -> float | None:
+    return chip_statistic(calibration, chip, f"mean_noise_{calibration.unit}")

@@ -1,9 +1,9 @@
 """Type B uncertainty of a calibration's figures: their spread over simulated calibrations on an erroneous stage.
 
-Each source of the stage acts alone in a number of simulated calibrations of the same unit by the same estimator. What
-gravity and the rate of a table do is exact: they scale the sensitivities and positions. The
+Each source of the stage acts alone in a number of simulated calibrations of the same unit by the same estimator. The
 standard uncertainty of a figure is the root mean square of its deviation from the calibration without errors, so that a
-shift of second order counts as well as the scatter (JCGM 100:2008, F.2.4.5; propagation as in JCGM 101:2008, 5).
+shift of second order counts as well as the scatter (distributions are propagated as in JCGM 101:2008). Gravity and the
+rate of a table scale the sensitivities and positions, which needs no simulation.
 """
 
 from __future__ import annotations
@@ -16,12 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.calibration.result import Calibration
-from gfimu.uncertainty.simulated_calibration import (
-    calibrate_under,
-    chip_statistic,
-    poses_of,
-    simulated_method,
-)
+from gfimu.uncertainty.simulated_calibration import calibrate_under, chip_statistic, poses_of, simulated_method
 from gfimu.uncertainty.stage import Stage
 from gfimu.uncertainty.stage_errors import SOURCES, draw_errors
 from gfimu.units import STANDARD_GRAVITY

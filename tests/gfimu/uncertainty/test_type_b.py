@@ -151,6 +151,7 @@ def test_the_misfit_that_the_stage_explains(rng):
     """Tilts of σ g in each of two axes per face, of which 6 of 12 directions are left after 12 parameters of 18."""
     std, noise = 1e-3, 2e-3
     calibration = calibration_of("six-position", PERFECT)
+    assert type_b(calibration, stage(pose_tilt_std_rad=std), values, rng=rng, runs=3).misfit == 0.0  # noise not stated
     calibration = replace(calibration, statistics={**calibration.statistics, "a1_mean_noise_m_s2": noise})
     found = type_b(calibration, stage(pose_tilt_std_rad=std), values, rng=rng, runs=400)
     # Residual of an axis: 2 degrees of freedom, shared by the tilts of four faces and no error of two: 2 · (4/6) / 2.
