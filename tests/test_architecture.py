@@ -275,6 +275,7 @@ ROOMS = {
     },
     "gfimu.own_rig": {"gfimu.files", "gfimu.geometry.array", "gfimu.generic_basis", "gfimu.world_model"},
     "gfimu.position_drift": {"gfimu.geometry", "gfimu.motion", "gfimu.rate.integration"},
+    "gfimu.uncertainty": {"gfimu.calibration", "gfimu.certification", "gfimu.files"},
     "firmware_bridge.adxl345": set(),
     "firmware_bridge.frames": {"gfimu.files", "gfimu.geometry.array"},
     "firmware_bridge.host": {

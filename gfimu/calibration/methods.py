@@ -17,7 +17,7 @@ from gfimu.calibration.faults import (
 )
 from gfimu.calibration.fit_quality import mean_factor
 from gfimu.calibration.nonlinearity import quadratic_std
-from gfimu.calibration.observations import observations_from
+from gfimu.calibration.observations import Observations, observations_from
 from gfimu.calibration.registry import METHODS, CalibrationMethod, calibration_method
 from gfimu.calibration.result import Calibration, combine
 from gfimu.errors import InputError
@@ -180,8 +180,21 @@ def calibrate_triads(method: CalibrationMethod, task: CalibrationTask) -> Calibr
             "rest_threshold_chosen_by": "data" if rest.chosen_by_data else "user",
             "poses_found": float(len(rest)),
             "noise_correlation_factor": observations.correlation_factor,
+            **_weights(observations),
         },
     )
+
+
+def _weights(observations: Observations) -> dict[str, float]:
+    """Return what the weights of each chip were made from, by name: its mean noise and the prior of its bends."""
+    found: dict[str, float] = {}
+    for chip in observations.chips:
+        one = observations.of_chip(chip)
+        variance = np.einsum("pcc->pc", one.mean_covariance).mean()
+        found[f"{chip}_mean_noise_{one.unit}"] = float(np.sqrt(variance))
+        if one.bends:
+            found[f"{chip}_quadratic_prior_std_per_{one.unit}"] = float(one.quadratic_prior.max())
+    return found
 
 
 def _common_factor(results: list[Calibration]) -> float | None:

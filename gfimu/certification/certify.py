@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu import __version__
+from gfimu.calibration.fit_quality import mean_factor
 from gfimu.calibration.result import Calibration
 from gfimu.certification.certificate import Certificate, ChipCertificate, Component, Sheet, Term
 from gfimu.certification.chip_parameters import ChipParameters, chip_parameters
@@ -30,6 +31,7 @@ def certify(
     calibration: Calibration,
     *,
     components: Iterable[Component] = (),
+    explained_misfit: float = 0.0,
     angular_sensor: Sheet | None = None,
     conditions: Mapping[str, str] | None = None,
     date: str = "",
@@ -45,6 +47,8 @@ def certify(
     components : iterable of Component
         Further components of the budget, by name of the term (those of type B); what the covariance of the calibration
         already holds must not be among them.
+    explained_misfit : float
+        What of the misfit of the fit these components explain, vᵀPv over the redundancy; it is not counted again.
     angular_sensor : Sheet, optional
         The array as an angular sensor.
     conditions : mapping of str to str, optional
@@ -66,7 +70,7 @@ def certify(
     units = {term.name: term.unit for terms in blank for one in terms for term in one}
     further = tuple(components)
     _check_components(further, units, source)
-    fitted = [part for chip, *parts in stated for part in _fit(calibration, chip.chip, parts, units)]
+    fitted = [part for chip, *parts in stated for part in _fit(calibration, chip.chip, parts, units, explained_misfit)]
     budget = (*fitted, *further)
     known = uncertainties(budget)
     return Certificate(
@@ -125,14 +129,16 @@ def _valued(term: Term, values: Mapping[str, float], defined: set[str]) -> Term:
 
 
 def _fit(
-    calibration: Calibration, chip: str, parts: Iterable[Quantities], units: Mapping[str, str]
+    calibration: Calibration, chip: str, parts: Iterable[Quantities], units: Mapping[str, str], explained: float
 ) -> Iterator[Component]:
     """Components of the fit: its noise, and what the misfit adds to it (degrees of freedom: the redundancy).
 
     The covariance of the calibration is the cofactor of the noise times a factor that the misfit of the poses gave. The
-    share 1 / factor has the many degrees of freedom of the samples, the rest the few of the misfit.
+    share 1 / factor has the many degrees of freedom of the samples, the rest the few of the misfit. What other
+    components explain of the misfit is left out.
     """
     factor = max(_statistic(calibration, chip, "covariance_factor", 1.0), 1.0)
+    further = _unexplained(calibration, explained, factor)
     freedom = _statistic(calibration, chip, "redundancy", 0.0)
     for part in parts:
         variance = np.diag(part.covariance(calibration.covariance))
@@ -140,9 +146,18 @@ def _fit(
             if std == 0.0:
                 continue
             yield Component(name, _NOISE, "A", "normal", std / math.sqrt(factor), units[name])
-            if factor > 1.0:
-                misfit = std * math.sqrt(1.0 - 1.0 / factor)
+            if further > 1.0:
+                misfit = std * math.sqrt((further - 1.0) / factor)
                 yield Component(name, _MISFIT, "A", "t", misfit, units[name], freedom if freedom > 0.0 else None)
+
+
+def _unexplained(calibration: Calibration, explained: float, factor: float) -> float:
+    """Return the factor of the noise that the misfit of all chips gives, less what other components explain of it."""
+    freedom = [_statistic(calibration, chip, "redundancy", 0.0) for chip in calibration.chips]
+    misfit = [_statistic(calibration, chip, "variance_factor", math.nan) for chip in calibration.chips]
+    if explained <= 0.0 or min(freedom) <= 0.0 or not all(map(math.isfinite, misfit)):
+        return factor
+    return mean_factor(float(np.average(misfit, weights=freedom)), int(sum(freedom)), explained)
 
 
 def _statistic(calibration: Calibration, chip: str, key: str, default: float) -> float:

@@ -29,6 +29,12 @@ def _certificate(
         Path | None,
         typer.Option("--compare", help="Another calibration or certificate of the same chips: E_n of each quantity."),
     ] = None,
+    stage: Annotated[
+        Path | None,
+        typer.Option(
+            "--stage", help="Errors of stage and gravity, for the budget (.toml); gfimu new stage writes one to edit."
+        ),
+    ] = None,
     item: Annotated[str, typer.Option("--item", help="What was calibrated: part, serial number.")] = "",
     date: Annotated[str, typer.Option("--date", help="When it was calibrated.")] = "",
     json: JsonOption = False,
@@ -37,12 +43,14 @@ def _certificate(
 
     Example: gfimu certificate calibration.json --item "cube no. 7" --date 2026-11-27 --out certificate
 
+    With the stage: gfimu certificate calibration.json --stage plate.toml --out certificate
+
     Two laboratories: gfimu certificate calibration.json --compare theirs.json
     """
     from gfimu.certification.page import FILES
     from gfimu.commands.certificate import certificate
 
-    found = certificate(calibration, out=out, compare=compare, item=item, date=date)
+    found = certificate(calibration, out=out, compare=compare, stage=stage, item=item, date=date)
     files = {} if out is None else {meaning: out / name for name, meaning in FILES.items()}
     if json:
         print_json(found.to_dict() | {"files": files})

@@ -6,26 +6,31 @@ import json
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from gfimu.files.outputs import OutputFolder, writes
 
 if TYPE_CHECKING:
     from gfimu.calibration.result import Calibration
     from gfimu.certification.certificate import Certificate, Component, Sheet
+    from gfimu.uncertainty.stage import Stage
 
 __all__ = ["FOLDER", "certificate"]
+
+_SEED = 0
+"""Numerical: of the simulated calibrations, so that a certificate comes out the same again."""
 
 FOLDER = OutputFolder(("certificate.json", "certificate.html"))
 """What a certificate writes."""
 
 
-@writes(reads=("calibration", "compare"), out=FOLDER)
+@writes(reads=("calibration", "compare", "stage"), out=FOLDER)
 def certificate(
     calibration: Calibration | str | Path,
     *,
     out: str | Path | None = None,
     compare: Calibration | Certificate | str | Path | None = None,
+    stage: Stage | str | Path | None = None,
     item: str = "",
     date: str = "",
     components: Iterable[Component] = (),
@@ -41,12 +46,15 @@ def certificate(
         Folder to write: ``certificate.json``, ``certificate.html``.
     compare : Calibration, Certificate, str or Path, optional
         Another calibration or certificate of the same chips, or its file: E_n of every common quantity.
+    stage : Stage, str or Path, optional
+        What the laboratory states of the errors of its stage and of gravity, or its file (``gfimu new stage``):
+        components of type B, by simulated calibrations.
     item : str
         What was calibrated, such as part and serial number.
     date : str
         When it was calibrated.
     components : iterable of Component
-        Components of type B for the budget, by name of the term.
+        Further components of type B for the budget, by name of the term.
     angular_sensor : Sheet, optional
         The array as an angular sensor.
 
@@ -61,14 +69,15 @@ def certificate(
         If the calibration can't be read, is of a gyro or without covariance, the other is of another unit or other
         chips, or the folder can't be written where it is asked for.
     """
-    from gfimu.certification.certify import certify
     from gfimu.certification.comparison import compare as compared
     from gfimu.certification.page import write_certificate
     from gfimu.commands.opened import as_calibration
+    from gfimu.uncertainty.stage import Stage
 
     source = str(calibration) if isinstance(calibration, str | Path) else "calibration"
-    found = certify(
+    found = _certified(
         as_calibration(calibration),
+        Stage.load(stage) if isinstance(stage, str | Path) else stage,
         components=components,
         angular_sensor=angular_sensor,
         item=item,
@@ -83,18 +92,36 @@ def certificate(
     return found
 
 
+def _certified(
+    calibration: Calibration, stage: Stage | None, *, components: Iterable[Component] = (), **stated: Any
+) -> Certificate:
+    """Certify a calibration with the components of the stage, and others."""
+    import numpy as np
+
+    from gfimu.certification.certify import certify
+    from gfimu.uncertainty.components import stage_components
+
+    simulated = stage_components(calibration, stage, rng=np.random.default_rng(_SEED))
+    found = certify(
+        calibration,
+        components=(*components, *simulated.components),
+        explained_misfit=simulated.misfit,
+        **stated,
+    )
+    return replace(found, statements=(*found.statements, *simulated.statements))
+
+
 def _other(given: Calibration | Certificate | str | Path, name: str) -> Certificate:
     """Return a certificate given as such, as a calibration, or as the file of either."""
     from gfimu.calibration.result import Calibration
     from gfimu.certification.certificate import FORMAT, Certificate
-    from gfimu.certification.certify import certify
     from gfimu.errors import InputError
     from gfimu.files.input_file import check_input
 
     if isinstance(given, Certificate):
         return given
     if isinstance(given, Calibration):
-        return certify(given, source=name)
+        return _certified(given, None, source=name)
     file = check_input(given)
     try:
         data = json.loads(file.read_text(encoding="utf-8"))
@@ -104,4 +131,4 @@ def _other(given: Calibration | Certificate | str | Path, name: str) -> Certific
         raise InputError(f"{file}: neither a calibration nor a certificate; make one with `gfimu calibrate`") from None
     if isinstance(data, dict) and data.get("format") == FORMAT:
         return Certificate.from_dict(data, source=name)
-    return certify(Calibration.from_dict(data, source=name), source=name)
+    return _certified(Calibration.from_dict(data, source=name), None, source=name)
