@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from gfimu.commands.catalogue import catalogue as catalogue
     from gfimu.commands.catalogue import new as new
     from gfimu.commands.catalogue import show as show
+    from gfimu.commands.certificate import certificate as certificate
     from gfimu.commands.check import check as check
     from gfimu.commands.convert import convert as convert
     from gfimu.commands.demo import demo as demo
@@ -120,6 +121,7 @@ _PUBLIC = {
     "calibrate_array": "gfimu.calibration.array_calibration",
     "centripetal_agreement": "gfimu.motion.estimate_summary",
     "catalogue": "gfimu.commands.catalogue",
+    "certificate": "gfimu.commands.certificate",
     "check": "gfimu.commands.check",
     "closed_form": "gfimu.geometry.kinematics",
     "convert": "gfimu.commands.convert",

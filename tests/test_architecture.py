@@ -255,6 +255,7 @@ ROOMS = {
         "gfimu.recording",
         "gfimu.visual.colours",
     },
+    "gfimu.certification": {"gfimu.calibration"},
     "gfimu.exporting": {
         "gfimu.calibration",
         "gfimu.geometry",

@@ -61,6 +61,11 @@ JOBS: dict[str, tuple[Entry, ...]] = {
             "calibrate",
         ),
         Entry(
+            "certificate",
+            "State a calibration in the terms of IEEE 1293 and NIST, with expanded uncertainties and their budget.",
+            "certificate",
+        ),
+        Entry(
             "noise",
             "Identify velocity random walk N, bias instability B, acceleration random walk K, "
             "quantisation Q and ramp R.",

@@ -51,6 +51,7 @@ CALLS = {
     "diagnose": {"recordings": "in.csv", "twin": "cube12_turntable", "out": "made"},
     "design": {"effects": "bias", "twin": "cube12_turntable"},
     "calibrate": {"method": "array", "recording": "in.csv", "out": "made.json"},
+    "certificate": {"calibration": "in.json", "out": "made"},
     "noise": {"recording": "in.csv"},
     "impact": {"recording": "in.csv", "array": "cube12", "out": "made.csv"},
     "record": {"port": "socket://127.0.0.1:1", "out": "made.csv"},

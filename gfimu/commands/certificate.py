@@ -1,0 +1,93 @@
+"""Under `gfimu certificate`: a calibration stated in the terms of the standards, with its uncertainty budget."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from gfimu.files.outputs import OutputFolder, writes
+
+if TYPE_CHECKING:
+    from gfimu.calibration.result import Calibration
+    from gfimu.certification.certificate import Certificate
+
+__all__ = ["FOLDER", "certificate"]
+
+FOLDER = OutputFolder(("certificate.json", "certificate.html"))
+"""What a certificate writes."""
+
+
+@writes(reads=("calibration", "compare"), out=FOLDER)
+def certificate(
+    calibration: Calibration | str | Path,
+    *,
+    out: str | Path | None = None,
+    compare: Calibration | Certificate | str | Path | None = None,
+    item: str = "",
+    date: str = "",
+) -> Certificate:
+    """State a calibration in the terms of IEEE 1293 and NIST, with expanded uncertainties and their budget.
+
+    Parameters
+    ----------
+    calibration : Calibration, str or Path
+        The calibration of accelerometers, or its file.
+    out : str or Path, optional
+        Folder to write: ``certificate.json``, ``certificate.html``.
+    compare : Calibration, Certificate, str or Path, optional
+        Another calibration or certificate of the same chips, or its file: E_n of every common quantity.
+    item : str
+        What was calibrated, such as part and serial number.
+    date : str
+        When it was calibrated.
+
+    Returns
+    -------
+    Certificate
+        `gfimu.certification.certificate.Certificate`.
+
+    Raises
+    ------
+    InputError
+        If the calibration can't be read, is of a gyro or without covariance, the other is of another unit or other
+        chips, or the folder can't be written where it is asked for.
+    """
+    from gfimu.certification.certify import certify
+    from gfimu.certification.comparison import compare as compared
+    from gfimu.certification.page import write_certificate
+    from gfimu.commands.opened import as_calibration
+
+    source = str(calibration) if isinstance(calibration, str | Path) else "calibration"
+    found = certify(as_calibration(calibration), item=item, date=date, source=source)
+    if compare is not None:
+        name = str(compare) if isinstance(compare, str | Path) else "the other"
+        found = replace(found, comparison=compared(found, _other(compare, name), other=name))
+    if out is not None:
+        write_certificate(out, found)
+    return found
+
+
+def _other(given: Calibration | Certificate | str | Path, name: str) -> Certificate:
+    """Return a certificate given as such, as a calibration, or as the file of either."""
+    from gfimu.calibration.result import Calibration
+    from gfimu.certification.certificate import FORMAT, Certificate
+    from gfimu.certification.certify import certify
+    from gfimu.errors import InputError
+    from gfimu.files.input_file import check_input
+
+    if isinstance(given, Certificate):
+        return given
+    if isinstance(given, Calibration):
+        return certify(given, source=name)
+    file = check_input(given)
+    try:
+        data = json.loads(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"{file}: {error.strerror or error}; check the path") from None
+    except (ValueError, RecursionError):
+        raise InputError(f"{file}: neither a calibration nor a certificate; make one with `gfimu calibrate`") from None
+    if isinstance(data, dict) and data.get("format") == FORMAT:
+        return Certificate.from_dict(data, source=name)
+    return certify(Calibration.from_dict(data, source=name), source=name)
