@@ -11,7 +11,9 @@ from gfimu.files.outputs import OutputFolder, writes
 
 if TYPE_CHECKING:
     from gfimu.calibration.result import Calibration
-    from gfimu.certification.certificate import Certificate
+    from gfimu.certification.certificate import Certificate, Sheet
+    from gfimu.geometry.array import AccelerometerArray
+    from gfimu.recording import Recording
 
 __all__ = ["FOLDER", "certificate"]
 
@@ -19,12 +21,14 @@ FOLDER = OutputFolder(("certificate.json", "certificate.html"))
 """What a certificate writes."""
 
 
-@writes(reads=("calibration", "compare"), out=FOLDER)
+@writes(reads=("calibration", "compare", "array", "rest"), out=FOLDER)
 def certificate(
     calibration: Calibration | str | Path,
     *,
     out: str | Path | None = None,
     compare: Calibration | Certificate | str | Path | None = None,
+    array: AccelerometerArray | str | Path | None = None,
+    rest: Recording | str | Path | None = None,
     item: str = "",
     date: str = "",
 ) -> Certificate:
@@ -38,6 +42,11 @@ def certificate(
         Folder to write: ``certificate.json``, ``certificate.html``.
     compare : Calibration, Certificate, str or Path, optional
         Another calibration or certificate of the same chips, or its file: E_n of every common quantity.
+    array : AccelerometerArray, str or Path, optional
+        The array, its name or file: adds the sheet of the whole array as an angular sensor (IEEE 671).
+    rest : Recording, str or Path, optional
+        Recording at rest: noise, bias and bias instability of that sheet; else the data sheets of the parts. The array
+        is the recording's own where none is given.
     item : str
         What was calibrated, such as part and serial number.
     date : str
@@ -60,13 +69,30 @@ def certificate(
     from gfimu.commands.opened import as_calibration
 
     source = str(calibration) if isinstance(calibration, str | Path) else "calibration"
-    found = certify(as_calibration(calibration), item=item, date=date, source=source)
+    fitted = as_calibration(calibration)
+    sheet = None if array is None and rest is None else _sheet(fitted, array, rest)
+    found = certify(fitted, angular_sensor=sheet, item=item, date=date, source=source)
     if compare is not None:
         name = str(compare) if isinstance(compare, str | Path) else "the other"
         found = replace(found, comparison=compared(found, _other(compare, name), other=name))
     if out is not None:
         write_certificate(out, found)
     return found
+
+
+def _sheet(
+    calibration: Calibration,
+    array: AccelerometerArray | str | Path | None,
+    rest: Recording | str | Path | None,
+) -> Sheet:
+    """Return the sheet of the array as an angular sensor."""
+    from gfimu.certification.angular import angular_sensor_sheet
+    from gfimu.commands.opened import as_array, as_calibrated_run, as_run
+
+    if rest is None:
+        return angular_sensor_sheet(calibration, as_array(array))
+    corrected, _ = as_calibrated_run(rest, array, calibration)
+    return angular_sensor_sheet(calibration, as_run(rest, array)[1], rest=corrected)
 
 
 def _other(given: Calibration | Certificate | str | Path, name: str) -> Certificate:
