@@ -27,7 +27,6 @@ from gfimu.calibration.spin.prior import SensorPrior, sensor_prior
 from gfimu.calibration.spin.report import spin_statements, spin_statistics
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
-from gfimu.importing.oddities import rails_of
 from gfimu.recording import Recording
 from gfimu.units import STANDARD_GRAVITY
 
@@ -38,6 +37,7 @@ Floats = NDArray[np.float64]
 _ITERATIONS = 20  # numerical
 _SETTLED = 1e-3  # numerical: of a standard deviation
 _FEWEST_SPEEDS = 2
+_ACROSS = 0.7  # cosine: a sensing axis nearer to the table's axis than 45° is not across it
 
 
 def spin(
@@ -91,10 +91,9 @@ def spin(
         array,
         gravity=gravity,
         turn_on_std_m_s2=turn_on_std_m_s2,
-        largest=np.nanmax(np.abs(run.readings - np.nanmean(run.readings, axis=0)), axis=0),
+        largest=np.maximum(np.nanmax(np.abs(run.readings), axis=0), np.finfo(float).eps),
         policy=table,
     )
-    run, warnings = _without_rails(run)
     gains = np.concatenate([np.linalg.norm(one.sensitivity, axis=1) for one in nominal.calibration.models.values()])
     plateaus = find_plateaus(run, gains * gravity * table.lean_std_rad, min_plateau_s, table)
     speeds = plateaus.speeds(table.distinct)
@@ -111,11 +110,10 @@ def spin(
     result = problem.result(solution)
     return replace(
         result,
-        statements=(
-            *result.statements,
-            *spin_statements(nominal, result, plateaus, solution.covariance, problem.at, table),
+        statements=spin_statements(
+            nominal, result, plateaus, solution.covariance, problem.at, problem.arms(), table
         ),
-        warnings=(*warnings, *doubts),
+        warnings=(*_saturation(plateaus, array.channels), *doubts),
         statistics={
             **spin_statistics(plateaus, solution.values, solution.covariance, problem.at, table),
             "lean_rad": problem.lean,
@@ -136,19 +134,14 @@ def _in_order(recording: Recording, array: AccelerometerArray) -> Recording:
     return replace(recording, readings=recording.readings[:, columns], channels=array.channels)
 
 
-def _without_rails(recording: Recording) -> tuple[Recording, tuple[str, ...]]:
-    """Return the run with readings at a rail as missing, and a warning for each channel that has some."""
-    readings, texts = recording.readings.copy(), []
-    for place, name in enumerate(recording.channels):
-        if not np.nanmedian(np.abs(np.diff(recording.readings[:, place]))) > 0.0:
-            continue  # computed, without noise: a level held is no rail
-        for rail in rails_of(recording.readings[:, place]):
-            readings[rail.on, place] = np.nan
-            texts.append(
-                f"channel {name} reads its rail ({rail.level:.4g} {recording.unit}) in {int(rail.on.sum())} samples; "
-                "plateaus with them are left out for it: set a wider range, or turn more slowly"
-            )
-    return replace(recording, readings=readings), tuple(texts)
+def _saturation(plateaus: Plateaus, channels: tuple[str, ...]) -> tuple[str, ...]:
+    """Name the channels that are saturated on a plateau, a sentence each."""
+    return tuple(
+        f"channel {name} is saturated on {count} of {len(plateaus)} plateaus, which are left out for it: set a wider range, "
+        "or turn more slowly"
+        for name, count in zip(channels, plateaus.saturated.sum(axis=0).tolist(), strict=True)
+        if count
+    )
 
 
 @dataclass(frozen=True)
@@ -237,7 +230,7 @@ class _Problem:
             total = cho_factor(slopes @ spread + np.diag(noise), lower=True)
             gain = cho_solve(total, spread.T).T
             before, values = values, self.values + gain @ (measured - predicted - slopes @ (self.values - values))
-            if np.all(np.abs(values - before) <= _SETTLED * np.maximum(std, np.finfo(float).tiny)):
+            if np.all(np.abs(values - before) <= _SETTLED * std):
                 break
         else:
             raise InputError(
@@ -263,6 +256,20 @@ class _Problem:
 
         std = np.sqrt(np.diag(self.covariance))[count:]
         return read_plateaus(self.geometry, values[count:], std, models, place, count)
+
+    def arms(self) -> dict[str, Floats]:
+        """Return the arm along each sensing axis across the table's, as weights of the unknowns, by name of its K1."""
+        across, axis = self.geometry.frame[:2], self.geometry.frame[2]
+        found = {}
+        for number, chip in enumerate(self.geometry.array.chips):
+            for sensing, letter in zip(chip.axes, "xyz", strict=True):
+                if abs(float(sensing @ axis)) < _ACROSS:
+                    weights = np.zeros(len(self.values))
+                    weights[self.at["radii"][3 * number : 3 * number + 3]] = sensing
+                    weights[self.at["offset"]] = -across @ sensing
+                    weights[self.at["drawing"]] = np.cross(chip.position, sensing)
+                    found[f"{chip.name}_M_{letter}{letter}"] = weights
+        return found
 
     def result(self, solution: _Solution) -> Calibration:
         """Return the parameters of the sensing axes, and positions where the earlier calibration has them."""

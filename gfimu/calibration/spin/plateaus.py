@@ -18,7 +18,7 @@ __all__ = ["Plateaus", "find_plateaus"]
 Floats = NDArray[np.float64]
 
 _NOISE_OF_SLOPE = 4.0
-_LEAST_NOISE = 1e-5  # numerical: of the wave's standard deviation; computed readings have no noise
+_LEAST_NOISE = 1e-3  # numerical: of the wave's standard deviation; computed readings have no noise
 _MAD = 1.4826  # numerical: standard deviation over median absolute deviation of normal numbers
 
 
@@ -46,6 +46,8 @@ class Plateaus:
         Cosine and sine of that wave, reading unit; zero of a rest.
     turns : ndarray, shape (k,)
         Turns in it.
+    saturated : ndarray of bool, shape (k, c)
+        Whether the channel sits at its limit there; its mean is then left out.
     """
 
     start_s: Floats
@@ -58,6 +60,7 @@ class Plateaus:
     variance: Floats
     wave: Floats
     turns: Floats
+    saturated: NDArray[np.bool_]
 
     def __len__(self) -> int:
         return len(self.rate)
@@ -100,11 +103,15 @@ def find_plateaus(recording: Recording, wave_std: Floats, min_duration_s: float,
     if tacho is None or not np.isfinite(tacho).any():
         raise InputError("spin needs the table's rate: the recording has no tacho_rad_s column")
     stretches, noise = _stretches(recording, tacho, min_duration_s, policy)
-    rows = [_average(recording, tacho, slice(start, stop), noise, wave_std, policy) for start, stop in stretches]
+    saturated = _saturated(recording.readings, stretches, policy)
+    rows = [
+        (*_average(recording, tacho, slice(*stretch), noise, wave_std, out, policy), out)
+        for stretch, out in zip(stretches, saturated, strict=True)
+    ]
     if not any(row[3] > 0.0 for row in rows):
         raise InputError(
-            f"no plateau of constant rate: hold each speed for {min_duration_s:g} s or more, to "
-            f"{policy.slope_rad_s2:g} rad/s² steady"
+            "no plateau of constant rate: hold each speed for "
+            f"{min_duration_s + 3.0 * policy.slope_window_s:g} s or more, to {policy.slope_rad_s2:g} rad/s² steady"
         )
     columns = list(zip(*rows, strict=True))
     return Plateaus(*(np.array(column) for column in columns))
@@ -131,9 +138,9 @@ def _stretches(
     smooth = savgol_filter(filled, window, 1)
     found = []
     for start, stop in zip(edges[::2], edges[1::2], strict=True):
-        # A slope within the limit may be that of a window which already reaches into a ramp.
-        first = start + window // 2 if start else 0
-        last = stop - window // 2 if stop < len(filled) else stop
+        # A slope within the limit may be that of a window which reaches into a ramp; as long again, the table settles.
+        first = start + window if start else 0
+        last = stop - window if stop < len(filled) else stop
         if (last - first) * period < min_duration_s:
             continue
         mean = float(smooth[first:last].mean())
@@ -142,10 +149,31 @@ def _stretches(
     return found, noise
 
 
+def _saturated(readings: Floats, stretches: list[tuple[int, int]], policy: SpinPolicy) -> NDArray[np.bool_]:
+    """Return where a channel sits at its own extreme, (k, c), although its noise is wider than a count elsewhere."""
+    extremes = np.nanmax(readings, axis=0), np.nanmin(readings, axis=0)
+    parts = [readings[start:stop] for start, stop in stretches]
+    at_limit = np.array([[np.mean(part == one, axis=0) for one in extremes] for part in parts])  # (k, 2, c)
+    at_own = [
+        np.maximum(np.mean(part == part.max(axis=0), axis=0), np.mean(part == part.min(axis=0), axis=0))
+        for part in parts
+    ]
+    if not parts:
+        return np.empty((0, readings.shape[1]), dtype=bool)
+    noisy = np.median(at_own, axis=0) < policy.own_extreme_share
+    return np.asarray((at_limit.max(axis=1) > policy.saturated_share) & noisy)
+
+
 def _average(
-    recording: Recording, tacho: Floats, rows: slice, noise: float, wave_std: Floats, policy: SpinPolicy
+    recording: Recording,
+    tacho: Floats,
+    rows: slice,
+    noise: float,
+    wave_std: Floats,
+    left_out: NDArray[np.bool_],
+    policy: SpinPolicy,
 ) -> tuple[object, ...]:
-    """Return the fields of `Plateaus` for one plateau, in their order."""
+    """Return the fields of `Plateaus` but the last for one plateau, in their order."""
     t, rate, readings = recording.t_s[rows], tacho[rows], recording.readings[rows]
     n, mean = len(t), float(rate.mean())
     still = abs(mean) < policy.rest_rad_s
@@ -160,7 +188,7 @@ def _average(
     design = np.ones((n, 1)) if still else np.column_stack([np.ones(n), np.cos(angle), np.sin(angle)])
     for channel in range(c):
         values = readings[:, channel]
-        if not np.isfinite(values).all():
+        if left_out[channel] or not np.isfinite(values).all():
             continue
         spread = max(float(np.var(np.diff(values)) / 2.0), (_LEAST_NOISE * wave_std[channel]) ** 2)
         prior = np.zeros(design.shape[1])

@@ -44,6 +44,9 @@ class SpinPolicy:
         Largest deviation of the smoothed rate from its mean over a plateau: this share of it and this much, rad/s.
     rest_rad_s : float
         Rate below which a plateau is a rest, rad/s.
+    saturated_share, own_extreme_share : float
+        Share of a plateau's samples at the channel's extreme from which it is saturated there, if the typical share at a
+        plateau's own extreme is below the other: then noise spreads its readings over several counts.
     distinct : float
         Ratio from which two speeds are two.
     undetermined : float
@@ -57,14 +60,16 @@ class SpinPolicy:
     tacho_scale_std: float = 1e-4
     lean_std_rad: float = 0.0175
     axis_std_rad: float = 0.1
-    offset_std_m: float = 0.1
+    offset_std_m: float = 0.03
     frame_std_rad: float = 0.02
     cubic_of_poses: float = 0.8
     unknown_nonlinearity: float = 0.05
-    slope_rad_s2: float = 0.2
+    slope_rad_s2: float = 0.1
     slope_window_s: float = 0.5
     spread: float = 0.02
     spread_rad_s: float = 0.05
     rest_rad_s: float = 0.05
+    saturated_share: float = 0.2
+    own_extreme_share: float = 0.1
     distinct: float = 1.1
     undetermined: float = 0.9

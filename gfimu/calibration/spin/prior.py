@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -33,10 +34,13 @@ class SensorPrior:
         With q and c of every axis; the positions of an earlier one stay in it.
     source : str
         For people.
+    bends_std : mapping of str to float
+        Standard deviation of each q and c before any run on a table.
     """
 
     calibration: Calibration
     source: str
+    bends_std: Mapping[str, float]
 
     def models(self, values: Floats) -> list[ErrorModel]:
         """Return the error model of each chip for other values of the parameters."""
@@ -103,7 +107,11 @@ def sensor_prior(
         raise InputError(f"the calibration is of {', '.join(start.channels)}, not of array {array.name!r}")
     else:
         start = _with_turn_on(start, turn_on_std_m_s2)
-    return SensorPrior(_with_bends(start, recording, array, gravity, largest, policy), source)
+    stated = _bends(start, recording, array, largest, policy)
+    found = _with_bends(start, stated, gravity, policy)
+    if start.method != "spin":
+        stated = {name: found.std_of(name) for name in stated}
+    return SensorPrior(found, source, stated)
 
 
 def _of_data_sheets(recording: Recording, array: AccelerometerArray) -> Calibration:
@@ -144,43 +152,47 @@ def _with_turn_on(start: Calibration, std_m_s2: float) -> Calibration:
     return replace(start, covariance=covariance)
 
 
+def _bends(
+    start: Calibration, recording: Recording, array: AccelerometerArray, largest: Floats, policy: SpinPolicy
+) -> dict[str, float]:
+    """Return the standard deviation of every q and c by the data sheets, where they state one."""
+    wide = policy.unknown_nonlinearity
+    found = {}
+    for names, stated, unknown in (
+        (quadratic_names(start.chips), quadratic_std(recording, array), wide / largest),
+        (cubic_names(start.chips), cubic_std(recording, array), wide / largest**2),
+    ):
+        found |= dict(zip(names, np.where(stated > 0.0, stated, unknown).tolist(), strict=True))
+    return found
+
+
 def _with_bends(
-    start: Calibration,
-    recording: Recording,
-    array: AccelerometerArray,
-    gravity: float,
-    largest: Floats,
-    policy: SpinPolicy,
+    start: Calibration, stated: Mapping[str, float], gravity: float, policy: SpinPolicy
 ) -> Calibration:
     """Return a calibration with q and c of every axis: those it has, else zero with the data sheet's prior.
 
     A model of poses that has no c takes a part of c (K1 g)² for gain: the two are correlated from then on.
     """
-    gains = np.concatenate([np.linalg.norm(model.sensitivity, axis=1) for model in start.models.values()])
-    names, values = list(start.names), list(start.values)
-    count = len(names)
-    added = []
-    wide = policy.unknown_nonlinearity
-    for new, stated, unknown in (
-        (quadratic_names(start.chips), quadratic_std(recording, array), wide / largest),
-        (cubic_names(start.chips), cubic_std(recording, array), wide / largest**2),
-    ):
-        if new[0] not in names:
-            names += new
-            values += [0.0] * len(new)
-            added += list(np.where(stated > 0.0, stated, unknown))
+    added = [name for name in stated if name not in start.names]
+    names, count = (*start.names, *added), len(start.names)
     size = len(names)
     covariance = np.zeros((size, size))
     covariance[:count, :count] = start.covariance
-    covariance[range(count, size), range(count, size)] = np.square(added)
-    if cubic_names(start.chips)[0] not in start.names and start.method != "data-sheet":
+    covariance[range(count, size), range(count, size)] = np.square([stated[name] for name in added])
+    if start.method != "data-sheet":
         mix = np.eye(size)
-        for channel, name in enumerate(cubic_names(start.chips)):
-            chip, _, axis = name.rpartition("_c_")
-            share = policy.cubic_of_poses * gravity**2 * gains[channel] ** 3
-            mix[names.index(f"{chip}_M_{axis}{axis}"), names.index(name)] = -share
+        for name in added:
+            chip, kind, axis = name.rsplit("_", 2)
+            if kind == "c":
+                gain = float(np.linalg.norm(start.models[chip].sensitivity["xyz".index(axis)]))
+                share = policy.cubic_of_poses * gravity**2 * gain**3
+                mix[names.index(f"{chip}_M_{axis}{axis}"), names.index(name)] = -share
         covariance = mix @ covariance @ mix.T
-    null_space = np.vstack([start.null_space, np.zeros((size - count, start.null_space.shape[1]))])
     return replace(
-        start, names=tuple(names), values=np.array(values), covariance=covariance, null_space=null_space, gravity=gravity
+        start,
+        names=names,
+        values=np.concatenate([start.values, np.zeros(len(added))]),
+        covariance=covariance,
+        null_space=np.vstack([start.null_space, np.zeros((len(added), start.null_space.shape[1]))]),
+        gravity=gravity,
     )

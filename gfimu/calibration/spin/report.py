@@ -15,6 +15,9 @@ from gfimu.calibration.spin.prior import SensorPrior
 __all__ = ["spin_statements", "spin_statistics"]
 
 Floats = NDArray[np.float64]
+_OPEN, _BUCKING = "spin, not determined", "spin, bucking"
+"""How the statements begin that another run replaces."""
+
 Places = Mapping[str, NDArray[np.intp]]
 
 
@@ -24,6 +27,7 @@ def spin_statements(
     plateaus: Plateaus,
     covariance: Floats,
     at: Places,
+    arms: Mapping[str, Floats],
     table: SpinPolicy,
 ) -> tuple[str, ...]:
     """Say what the run shows and what it does not, a sentence each.
@@ -40,6 +44,8 @@ def spin_statements(
         Of all unknowns after the run.
     at : mapping of str to ndarray of int
         Where they stand.
+    arms : mapping of str to ndarray, shape (u,)
+        Arm along each sensing axis across the table's, as weights of the unknowns, by the name of its K1.
     table : SpinPolicy
         Priors of the table.
     """
@@ -47,17 +53,18 @@ def spin_statements(
     lines = [
         f"spin: {int(plateaus.spinning.sum())} plateaus that turn, at {speeds} rad/s; K0, K1 and alignment start from "
         f"{prior.source}",
-        f"priors of the table, standard deviations: radius of a chip {1e3 * table.radius_std_m:.3g} mm per coordinate, "
+        f"spin, priors of the table, standard deviations: radius of a chip {1e3 * table.radius_std_m:.3g} mm per coordinate, "
         f"arm stretch {table.stretch_std_s2_rad2:.3g} s²/rad², dynamic levelling "
         f"{table.dynamic_levelling_std_s2_rad:.3g} s²/rad, scale of the tachometer {table.tacho_scale_std:.3g}",
     ]
-    weak = _undetermined(prior.calibration, result, table.undetermined)
+    weak = [name for name, std in prior.bends_std.items() if result.std_of(name) > table.undetermined * std]
     if weak:
         lines.append(
-            f"not determined by this run: {', '.join(weak)} (standard deviations above {table.undetermined:.0%} of those "
-            "before it); they need faster plateaus, or a run with these axes across the table's axis"
+            f"{_OPEN}: {', '.join(weak)} (standard deviations above {table.undetermined:.0%} of those before it); they need "
+            "faster plateaus, or a run with these axes across the table's axis"
         )
-    return (*lines, _bucking(result, covariance, at))
+    earlier = [text for text in prior.calibration.statements if not text.startswith((_OPEN, _BUCKING))]
+    return (*earlier, *lines, _bucking(result, covariance, at, arms))
 
 
 def spin_statistics(
@@ -83,38 +90,26 @@ def spin_statistics(
     return found
 
 
-def _undetermined(before: Calibration, after: Calibration, share: float) -> list[str]:
-    """Return the bends whose standard deviation is hardly smaller than before."""
-    return [
-        name
-        for name, old, new in zip(after.names, before.std, after.std, strict=True)
-        if name.split("_")[1] in "qc" and new > share * old
-    ]
-
-
-def _bucking(result: Calibration, covariance: Floats, at: Places) -> str:
+def _bucking(result: Calibration, covariance: Floats, at: Places, arms: Mapping[str, Floats]) -> str:
     """Name the largest correlations of each kind, which the standard calls bucking."""
-    std = np.sqrt(np.maximum(np.diag(covariance), np.finfo(float).tiny))
-    correlation = covariance / np.outer(std, std)
     place = dict(zip(result.names, at["parameters"].tolist(), strict=True))
 
-    def strongest(kind: str, others: dict[str, NDArray[np.intp]]) -> str:
-        pairs = {
-            name: float(max(correlation[place[name], others[name]], key=abs))
-            for name in result.names
-            if name in others and name.split("_")[1] == kind
-        }
-        worst = max(pairs, key=lambda name: abs(pairs[name]))
-        return f"{pairs[worst]:+.2f} ({worst})"
+    def unit(index: int) -> Floats:
+        return np.eye(1, len(covariance), index)[0]
+
+    def strongest(pairs: Mapping[str, tuple[Floats, Floats]]) -> str:
+        found = {}
+        for name, (first, second) in pairs.items():
+            size = float(np.sqrt((first @ covariance @ first) * (second @ covariance @ second)))
+            found[name] = float(first @ covariance @ second) / max(size, float(np.finfo(float).tiny))
+        worst = max(found, key=lambda name: abs(found[name]))
+        return f"{found[worst]:+.2f} ({worst})"
 
     bends = [name for name in result.names if name.split("_")[1] == "q"]
-    cubic = {name: np.array([place[name.replace("_q_", "_c_")]]) for name in bends}
-    stretch = {name: at["stretch"] for name in bends}
-    radii = {}
-    for number, chip in enumerate(result.chips):
-        own = at["radii"][3 * number : 3 * number + 3]
-        radii |= {f"{chip}_M_{axis}{axis}": own for axis in "xyz"}
+    stretch = unit(int(at["stretch"][0]))
+    cubic = strongest({name: (unit(place[name]), unit(place[name.replace("_q_", "_c_")])) for name in bends})
+    stretched = strongest({name: (unit(place[name]), stretch) for name in bends})
+    radius = strongest({name: (unit(place[name]), arm) for name, arm in arms.items()})
     return (
-        f"bucking, largest correlations: q with c {strongest('q', cubic)}, q with arm stretch {strongest('q', stretch)}, "
-        f"M with the radius {strongest('M', radii)}"
+        f"{_BUCKING}, largest correlations: q with c {cubic}, q with arm stretch {stretched}, K1 with the radius {radius}"
     )

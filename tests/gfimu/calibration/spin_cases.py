@@ -74,7 +74,7 @@ class Unit:
         errors = self.sensor.errors
         return replace(self, sensor=replace(self.sensor, errors=replace(errors, bias=errors.bias + rng.normal(size=12) * 0.03)))
 
-    def turn(self, rng, mounting=UPRIGHT, speeds=SPEEDS, hold=6.0, policy=SpinPolicy(), tacho_noise=0.005):
+    def turn(self, rng, mounting=UPRIGHT, speeds=SPEEDS, hold=6.0, policy=SpinPolicy(), tacho_noise=0.005, stretch=None, lean_std=5e-3):
         """Record a run on a table that leans, stretches and tilts the array, drawn from the priors."""
         motion = spin_profile(speed_sweep(speeds, hold=hold))
         t = np.arange(int((2 * 2.0 + len(speeds) * (hold + 1.0) + 1.0) * RATE)) / RATE
@@ -83,8 +83,8 @@ class Unit:
             self.array,
             cube_offset=np.array([*rng.normal(size=2) * 2e-3, 0.06]),
             mount_rotvec=np.array(mounting) + rng.normal(size=3) * 0.01,
-            axis_rotvec=np.array([*rng.normal(size=2) * 5e-3, 0.0]),
-            stretch=policy.stretch_std_s2_rad2 * rng.normal(),
+            axis_rotvec=np.array([*rng.normal(size=2) * lean_std, 0.0]),
+            stretch=policy.stretch_std_s2_rad2 * rng.normal() if stretch is None else stretch,
             leans=(Lean(np.array([*levelling, 0.0]) / np.linalg.norm(levelling), lambda s: np.linalg.norm(levelling) * s.rate**2),),
         )
         geometry = table_geometry(world)
@@ -96,7 +96,7 @@ class Unit:
 
 
 def normalised_errors(seed, sides=(UPRIGHT, ON_ITS_SIDE), settings=None):
-    """Errors of q and c over their standard deviations, each (12,), the latter, and those before; after runs on some sides."""
+    """Errors of q and c over their standard deviations after runs on some sides, and the latter, each (12,)."""
     rng = np.random.default_rng([836, seed])
     unit = Unit.draw(rng, settings)
     result = unit.static(rng)
@@ -108,4 +108,4 @@ def normalised_errors(seed, sides=(UPRIGHT, ON_ITS_SIDE), settings=None):
         names = [f"{chip}_{kind}_{axis}" for chip in result.chips for axis in "xyz"]
         std = np.array([result.std_of(name) for name in names])
         found[kind] = (np.array([result.value(name) for name in names]) - truth) / std, std
-    return found, result
+    return found
