@@ -1,5 +1,7 @@
 """Write docs/files.md, the reference of the files that a user writes by hand, from their schemas.
 
+The JSON schema of a certificate, which `gfimu certificate` writes, is published with it.
+
 Run ``python docs/make_files_reference.py``.
 """
 
@@ -7,6 +9,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from gfimu.certification.schema import SCHEMA_FILE, certificate_schema
 from gfimu.commands.file_kinds import FILE_KINDS, file_schema
 from gfimu.files.schema_keys import TableRows, table_rows
 
@@ -76,3 +79,4 @@ def _cell(text: str) -> str:
 
 if __name__ == "__main__":
     PAGE.write_text(files_page(), encoding="utf-8")
+    SCHEMA_FILE.write_text(certificate_schema(), encoding="utf-8")

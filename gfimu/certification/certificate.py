@@ -2,9 +2,9 @@
 
 Two further parts plug in by arguments of `gfimu.certification.certify.certify`:
 
-- ``components``: what no fit shows (errors of levelling, table and reference, by simulation: type B). Each `Component` names
-  a term (``a11_K0``) and has its unit; `gfimu.certification.quantities.stated_quantities` computes the same terms from
-  any calibration, such as a simulated one.
+- ``components``: what no fit shows (errors of levelling, table and reference, by simulation: type B). Each `Component`
+  names a term (``a11_K0``) and has its unit; `gfimu.certification.quantities.stated_quantities` computes the same terms
+  from any calibration, such as a simulated one.
 - ``angular_sensor``: the whole array as an angular sensor (IEEE 671), a `Sheet` of `Term`.
 
 K2 comes from the parameters ``a1_q_x`` …, K3 from ``a1_c_x`` … (1 per reading unit squared: l = b + y + q y² + c y³).
@@ -13,6 +13,7 @@ K2 comes from the parameters ``a1_q_x`` …, K3 from ``a1_c_x`` … (1 per readi
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -174,7 +175,21 @@ class Sheet:
 
 @dataclass(frozen=True)
 class ComparisonRow:
-    """One quantity in two certificates: values and expanded uncertainties in ``unit``, and E_n."""
+    """One quantity in two certificates.
+
+    Parameters
+    ----------
+    name : str
+        Name of the term.
+    unit : str
+        Unit of the values and uncertainties.
+    value, expanded : float
+        In this certificate: value and expanded uncertainty.
+    other_value, other_expanded : float
+        In the other one.
+    e_n : float
+        Difference of the values over the root of the sum of squares of the expanded uncertainties.
+    """
 
     name: str
     unit: str
@@ -243,6 +258,8 @@ class Certificate:
         Model equation of an input axis.
     software : str
         Program and version.
+    format, format_version : constant
+        What the file is.
     """
 
     item: str
@@ -299,6 +316,10 @@ class Certificate:
                 "make the certificate again"
             )
         try:
-            return msgspec.convert(data, cls)
+            found = msgspec.convert(data, cls)
         except msgspec.ValidationError as error:
             raise InputError(f"{source}: damaged certificate ({error}); make it again") from None
+        for term in found.terms:
+            if not all(math.isfinite(number or 0.0) for number in (term.value, term.std, term.expanded)):
+                raise InputError(f"{source}: {term.name} is not finite; make the certificate again")
+        return found

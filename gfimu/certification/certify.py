@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -22,8 +22,8 @@ __all__ = ["certify", "fit_components"]
 
 Floats = NDArray[np.float64]
 
-_NOISE = "fit: noise of the readings and priors of the adjustment"
-_MISFIT = "fit: what does not average out of a rest, from the misfit of the poses"
+_NOISE = "fit: noise of the readings, priors"
+_MISFIT = "fit: misfit of the poses"
 
 
 def certify(
@@ -125,8 +125,8 @@ def _terms(chip: ChipParameters, model: Quantities, intrinsic: Quantities) -> tu
 def _valued(term: Term, values: Mapping[str, float], defined: set[str]) -> Term:
     if term.name not in values:
         return replace(term, note="not determined")
-    note = "zero by definition of the frame" if term.name in defined else term.note
-    return replace(term, value=values[term.name] + 0.0, note=note)
+    note = "zero by definition of the frame" if term.name in defined else ""
+    return replace(term, value=values[term.name] + 0.0, note=note)  # 0.0: no −0
 
 
 def _fit(
@@ -186,7 +186,7 @@ def _chip(
 def _with_uncertainty(term: Term, known: Mapping[str, Uncertainty]) -> Term:
     found = known.get(term.name)
     if found is None:
-        return term
+        return replace(term, note=term.note or "no uncertainty in the calibration")
     return replace(
         term,
         std=found.std,
@@ -197,9 +197,20 @@ def _with_uncertainty(term: Term, known: Mapping[str, Uncertainty]) -> Term:
 
 
 def _conditions(calibration: Calibration) -> dict[str, str]:
-    """Return what the calibration was made from, from its statistics."""
-    return {
-        key: value if isinstance(value, str) else f"{value:.6g}"
-        for key, value in calibration.statistics.items()
-        if isinstance(value, str) or math.isfinite(value)
-    }
+    """Return what the calibration was made from: its statistics, those of several chips in one text."""
+    found: dict[str, list[float | str]] = {}
+    for name, value in calibration.statistics.items():
+        chip, _, rest = name.partition("_")
+        if isinstance(value, str) or math.isfinite(value):
+            found.setdefault(rest if chip in calibration.chips else name, []).append(value)
+    return {key: _of_all(values) for key, values in found.items()}
+
+
+def _of_all(values: Sequence[float | str]) -> str:
+    """Return one text for the values of all chips: the value, their range, or all texts."""
+    numbers = [value for value in values if not isinstance(value, str)]
+    texts = [value for value in values if isinstance(value, str)]
+    if not numbers or texts:
+        return ", ".join(dict.fromkeys(map(str, values)))
+    low, high = f"{min(numbers):.4g}", f"{max(numbers):.4g}"
+    return low if low == high else f"{low} to {high}"

@@ -31,7 +31,7 @@ def compare(first: Certificate, second: Certificate, *, other: str) -> Compariso
     Raises
     ------
     InputError
-        If the chips differ, or no quantity has an uncertainty in both.
+        If the instruments or the chips differ, or no quantity has an uncertainty in both.
     UnitError
         If the units of the readings differ.
     """
@@ -39,12 +39,18 @@ def compare(first: Certificate, second: Certificate, *, other: str) -> Compariso
         raise UnitError(f"{other}: is in {second.unit}, not in {first.unit}; compare certificates in one unit")
     theirs = {chip.chip: chip for chip in second.chips}
     shared = [(chip, theirs[chip.chip]) for chip in first.chips if chip.chip in theirs]
+    if first.item and second.item and first.item != second.item:
+        raise InputError(
+            f"{other}: is of {second.item!r}, not of {first.item!r}; compare certificates of one instrument"
+        )
     if not shared or len(shared) < max(len(first.chips), len(second.chips)):
         raise InputError(
             f"{other}: is of {', '.join(theirs)}, not of {', '.join(chip.chip for chip in first.chips)}; "
             "compare certificates of the same chips"
         )
     rows = tuple(row for pair in shared for row in _rows(*pair))
+    if not rows:
+        raise InputError(f"{other}: has no quantity in common with an uncertainty in both; calibrate again")
     left_out = tuple(text for pair in shared for text in _left_out(*pair))
     return Comparison(other, rows, left_out)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,7 +12,7 @@ from gfimu.files.outputs import OutputFolder, writes
 
 if TYPE_CHECKING:
     from gfimu.calibration.result import Calibration
-    from gfimu.certification.certificate import Certificate, Sheet
+    from gfimu.certification.certificate import Certificate, Component, Sheet
     from gfimu.geometry.array import AccelerometerArray
     from gfimu.recording import Recording
 
@@ -31,6 +32,8 @@ def certificate(
     rest: Recording | str | Path | None = None,
     item: str = "",
     date: str = "",
+    components: Iterable[Component] = (),
+    angular_sensor: Sheet | None = None,
 ) -> Certificate:
     """State a calibration in the terms of IEEE 1293 and NIST, with expanded uncertainties and their budget.
 
@@ -51,6 +54,10 @@ def certificate(
         What was calibrated, such as part and serial number.
     date : str
         When it was calibrated.
+    components : iterable of Component
+        Components of type B for the budget, by name of the term.
+    angular_sensor : Sheet, optional
+        The array as an angular sensor.
 
     Returns
     -------
@@ -71,7 +78,9 @@ def certificate(
     source = str(calibration) if isinstance(calibration, str | Path) else "calibration"
     fitted = as_calibration(calibration)
     sheet = None if array is None and rest is None else _sheet(fitted, array, rest)
-    found = certify(fitted, angular_sensor=sheet, item=item, date=date, source=source)
+    found = certify(
+        fitted, components=components, angular_sensor=sheet or angular_sensor, item=item, date=date, source=source
+    )
     if compare is not None:
         name = str(compare) if isinstance(compare, str | Path) else "the other"
         found = replace(found, comparison=compared(found, _other(compare, name), other=name))
