@@ -110,7 +110,7 @@ class SensorErrors:
     scale_temperature : ndarray, shape (c,)
         Relative change of the gain per K.
     cubic : ndarray, shape (c,), or float
-        Third-order non-linearity, s⁴/m²: reading + cubic · reading³. No data sheet states one of its own, so none is drawn.
+        Third-order non-linearity, s⁴/m²: reading + cubic · reading³. No data sheet states one, so none is drawn.
     """
 
     bias: NDArray[np.float64]

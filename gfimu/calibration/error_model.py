@@ -1,4 +1,4 @@
-"""Error model of a sensor triad: l = M a + b, and its other ways of writing; where the axes bend, l = b + y + q y² + c y³.
+"""Error model of a sensor triad: l = M a + b, and other ways of writing it; axes that bend: l = b + y + q y² + c y³.
 
 l is what the triad reads (counts, or m/s²), a the true input (specific force, m/s²), M the sensitivity matrix, b the
 bias. With a full M there are 12 parameters; with a triangular one there are 9, and the zeros of M fix the frame in
@@ -59,8 +59,8 @@ class ErrorModel:
     quadratic : ndarray, shape (3,), optional
         q of each sensing axis, 1 per reading unit: l = b + y + q y² with y = M a; zero by default.
     cubic : ndarray, shape (3,), optional
-        c of each sensing axis, 1 per reading unit squared; zero by default. Exactly, q and c are the coefficients of the
-        correction M a = u − q u² − c u³ with u = l − b; `series` gives those of the reading.
+        c of each sensing axis, 1 per reading unit squared; zero by default. Exactly, q and c are the coefficients of
+        the correction M a = u − q u² − c u³ with u = l − b; `series` gives those of the reading.
     """
 
     sensitivity: NDArray[np.float64]

@@ -4,7 +4,7 @@ A data sheet states the deviation from a straight line at full scale; of an ADXL
 3 mm/s² at 1 g: more than the noise of a mean over a rest, and the same whenever a pose is repeated, so that no
 averaging removes it and no scatter of the poses shows all of it. The coefficient q of every axis is therefore estimated
 with the other parameters, under the prior of the data sheet. What the poses do not show of it (in poses about the
-six faces, much) enters the standard deviations of bias and sensitivity. Poses show nothing of a cubic coefficient c; the
+six faces, much) enters the standard deviations of bias and sensitivity. Poses show nothing of a cubic coefficient c; a
 turntable does (`gfimu.calibration.spin`).
 """
 

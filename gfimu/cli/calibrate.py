@@ -78,7 +78,8 @@ def _calibrate(
         typer.Option("--calibration", help="spin: static calibration to start from, or that of another spin."),
     ] = None,
     radius_std: Annotated[
-        float | None, typer.Option("--radius-std", help="spin: standard deviation of a chip's place, m; 5e-4 by default.")
+        float | None,
+        typer.Option("--radius-std", help="spin: standard deviation of a chip's place, m; 5e-4 by default."),
     ] = None,
     stretch_std: Annotated[
         float | None,

@@ -35,7 +35,9 @@ def _certificate(
     ] = None,
     rest: Annotated[
         Path | None,
-        typer.Option("--rest", help="Recording at rest: noise and bias of that sheet; else the data sheets of the parts."),
+        typer.Option(
+            "--rest", help="Recording at rest: noise and bias of that sheet; else the data sheets of the parts."
+        ),
     ] = None,
     item: Annotated[str, typer.Option("--item", help="What was calibrated: part, serial number.")] = "",
     date: Annotated[str, typer.Option("--date", help="When it was calibrated.")] = "",
@@ -45,7 +47,7 @@ def _certificate(
 
     Example: gfimu certificate calibration.json --item "cube no. 7" --date 2026-11-27 --out certificate
 
-    The array as an angular sensor: gfimu certificate calibration.json --array cube12 --rest rest.parquet --out certificate
+    The array as an angular sensor: gfimu certificate calibration.json --array cube12 --rest rest.parquet
 
     Two laboratories: gfimu certificate calibration.json --compare theirs.json
     """

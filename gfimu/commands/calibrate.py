@@ -34,7 +34,11 @@ _OPTION_NAMES = {
 """What the options are that some methods do not use, by the field of the task."""
 
 
-@writes(reads=("recording", "array", "motion", "update", "calibration", "check", "column_map"), out=CALIBRATION, picture=PICTURE)
+@writes(
+    reads=("recording", "array", "motion", "update", "calibration", "check", "column_map"),
+    out=CALIBRATION,
+    picture=PICTURE,
+)
 def calibrate(
     method: str,
     recording: Recording | str | Path | MappedFile,

@@ -77,7 +77,7 @@ def certificate(
 
     source = str(calibration) if isinstance(calibration, str | Path) else "calibration"
     fitted = as_calibration(calibration)
-    sheet = None if array is None and rest is None else _sheet(fitted, array, rest)
+    sheet = _sheet(fitted, array, rest)
     found = certify(
         fitted, components=components, angular_sensor=sheet or angular_sensor, item=item, date=date, source=source
     )
@@ -93,13 +93,13 @@ def _sheet(
     calibration: Calibration,
     array: AccelerometerArray | str | Path | None,
     rest: Recording | str | Path | None,
-) -> Sheet:
-    """Return the sheet of the array as an angular sensor."""
+) -> Sheet | None:
+    """Return the sheet of the array as an angular sensor; None where neither array nor recording is given."""
     from gfimu.certification.angular import angular_sensor_sheet
     from gfimu.commands.opened import as_array, as_calibrated_run, as_run
 
     if rest is None:
-        return angular_sensor_sheet(calibration, as_array(array))
+        return None if array is None else angular_sensor_sheet(calibration, as_array(array))
     corrected, _ = as_calibrated_run(rest, array, calibration)
     return angular_sensor_sheet(calibration, as_run(rest, array)[1], rest=corrected)
 

@@ -2,8 +2,8 @@
 
 At a constant rate a chip at the arm ρ reads its bias, gravity along the axis, and ω² ρ: with several speeds the powers
 ω², ω⁴, ω⁶ of the reading separate K1 ρ, K2 and K3. What the table adds has a prior and is an unknown of the fit: the
-radius of every chip, arm stretch, dynamic levelling, the direction and place of the axis, the tachometer. A radius error
-cannot be told from K1; arm stretch adds to ω⁴ as K2 does, with the sign of the arm (the standard calls it bucking). All
+radius of every chip, arm stretch, dynamic levelling, direction and place of the axis, the tachometer. A radius error
+looks like one of K1; arm stretch adds to ω⁴ as K2 does, with the sign of the arm (the standard calls it bucking). All
 channels are fitted together, so that what they share shows as such; their correlations are reported.
 
 The powers of the rate that each error makes, and the names, are those of the definitions in clause 3 of IEEE Std
@@ -99,8 +99,8 @@ def spin(
     speeds = plateaus.speeds(table.distinct)
     if len(speeds) < _FEWEST_SPEEDS:
         raise InputError(
-            f"one speed only ({speeds[0]:.3g} rad/s): non-linearity shows in how the reading grows from speed to speed; "
-            "hold three or more"
+            f"one speed only ({speeds[0]:.3g} rad/s): non-linearity shows in how the reading grows from speed to "
+            "speed; hold three or more"
         )
     problem = _Problem.of(nominal, plateaus, array, gravity, table)
     solution = problem.solve()
@@ -110,9 +110,7 @@ def spin(
     result = problem.result(solution)
     return replace(
         result,
-        statements=spin_statements(
-            nominal, result, plateaus, solution.covariance, problem.at, problem.arms(), table
-        ),
+        statements=spin_statements(nominal, result, plateaus, solution.covariance, problem.at, problem.arms(), table),
         warnings=(*_saturation(plateaus, array.channels), *doubts),
         statistics={
             **spin_statistics(plateaus, solution.values, solution.covariance, problem.at, table),
@@ -137,8 +135,8 @@ def _in_order(recording: Recording, array: AccelerometerArray) -> Recording:
 def _saturation(plateaus: Plateaus, channels: tuple[str, ...]) -> tuple[str, ...]:
     """Name the channels that are saturated on a plateau, a sentence each."""
     return tuple(
-        f"channel {name} is saturated on {count} of {len(plateaus)} plateaus, which are left out for it: set a wider range, "
-        "or turn more slowly"
+        f"channel {name} is saturated on {count} of {len(plateaus)} plateaus, which are left out for it: set a wider "
+        "range, or turn more slowly"
         for name, count in zip(channels, plateaus.saturated.sum(axis=0).tolist(), strict=True)
         if count
     )
@@ -304,8 +302,8 @@ def _axis(
     size = float(np.linalg.norm(up))
     if not 0.8 * gravity < size < 1.2 * gravity:
         raise InputError(
-            f"at no rate the readings amount to {size:.3g} m/s², not to gravity: wrong unit, calibration or array, or an "
-            "axis that is not vertical"
+            f"at no rate the readings amount to {size:.3g} m/s², not to gravity: wrong unit, calibration or array, or "
+            "an axis that is not vertical"
         )
     n = up / size
     across = np.linalg.svd(n[None])[2][1:]

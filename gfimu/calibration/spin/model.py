@@ -5,8 +5,9 @@ In the array's frame the table's axis is the line through o along the unit vecto
 
     a = g n − ω² (1 + s ω²) ρ + ω̇ n × ρ,    n and o of a plateau: n + ω² d and o + ω² h,
 
-with arm stretch s, and dynamic levelling: with the load the array leans against the axis (d) and moves across it (h). At rest the lean of the axis
-adds a constant across n. ω² is that of the tachometer times (1 + 2 e), e being its scale error.
+with arm stretch s, and dynamic levelling: with the load the array leans against the axis (d) and moves across it (h).
+At rest the lean of the axis adds a constant across n. ω² is that of the tachometer times (1 + 2 e), e being its scale
+error.
 """
 
 from __future__ import annotations
@@ -49,8 +50,8 @@ class Geometry:
     leans : slice
         Lean of the vertical against the axis at each rest, two per rest, rad.
     drawing : slice
-        Drawing against the frame of the calibration, three, rad: the mean rotation of the sensing axes, which defines that
-        frame, is not that of the chips' places.
+        Drawing against the frame of the calibration, three, rad: the mean rotation of the sensing axes, which defines
+        that frame, is not that of the chips' places.
     rotations : slice
         Frame of each chip against that of the array, three per chip, rad; empty where it is the array's own.
     """

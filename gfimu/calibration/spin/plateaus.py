@@ -1,4 +1,4 @@
-"""Plateaus of constant table rate: their rates by the tachometer, and the mean readings with the wave of the lean off."""
+"""Plateaus of constant table rate: rates by the tachometer, and mean readings without the wave of the lean."""
 
 from __future__ import annotations
 

@@ -14,8 +14,8 @@ class SpinPolicy:
     Parameters
     ----------
     radius_std_m : float
-        Each coordinate of a chip against its drawing, m. The sensing element of a chip is up to 0.4 mm from the middle of
-        its package (the MIMU4444 of docs/calibration.md), and a board is soldered to some 0.2 mm.
+        Each coordinate of a chip against its drawing, m. The sensing element is up to 0.4 mm from the middle of its
+        package (the MIMU4444 of docs/calibration.md), and a board is soldered to some 0.2 mm.
     stretch_std_s2_rad2 : float
         Arm stretch s, s²/rad²: arms r (1 + s ω²). An aluminium arm of 0.3 m stretches by ρ ω² r²/3E = 1e-9 ω², and its
         joints by more; 1e-7 is one part in 10⁴ at 30 rad/s.
@@ -45,8 +45,8 @@ class SpinPolicy:
     rest_rad_s : float
         Rate below which a plateau is a rest, rad/s.
     saturated_share, own_extreme_share : float
-        Share of a plateau's samples at the channel's extreme from which it is saturated there, if the typical share at a
-        plateau's own extreme is below the other: then noise spreads its readings over several counts.
+        Share of a plateau's samples at the channel's extreme from which it is saturated there, if the typical share at
+        a plateau's own extreme is below the other: then noise spreads its readings over several counts.
     distinct : float
         Ratio from which two speeds are two.
     undetermined : float

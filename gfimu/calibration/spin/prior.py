@@ -100,9 +100,7 @@ def sensor_prior(
     if start is None:
         start = _of_data_sheets(recording, array)
     elif start.unit != recording.unit:
-        raise UnitError(
-            f"the readings are in {recording.unit}, the calibration in {start.unit}; give both in one unit"
-        )
+        raise UnitError(f"the readings are in {recording.unit}, the calibration in {start.unit}; give both in one unit")
     elif start.channels != array.channels:
         raise InputError(f"the calibration is of {', '.join(start.channels)}, not of array {array.name!r}")
     else:
@@ -157,7 +155,7 @@ def _bends(
 ) -> dict[str, float]:
     """Return the standard deviation of every q and c by the data sheets, where they state one."""
     wide = policy.unknown_nonlinearity
-    found = {}
+    found: dict[str, float] = {}
     for names, stated, unknown in (
         (quadratic_names(start.chips), quadratic_std(recording, array), wide / largest),
         (cubic_names(start.chips), cubic_std(recording, array), wide / largest**2),
@@ -166,9 +164,7 @@ def _bends(
     return found
 
 
-def _with_bends(
-    start: Calibration, stated: Mapping[str, float], gravity: float, policy: SpinPolicy
-) -> Calibration:
+def _with_bends(start: Calibration, stated: Mapping[str, float], gravity: float, policy: SpinPolicy) -> Calibration:
     """Return a calibration with q and c of every axis: those it has, else zero with the data sheet's prior.
 
     A model of poses that has no c takes a part of c (K1 g)² for gain: the two are correlated from then on.

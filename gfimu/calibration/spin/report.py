@@ -50,18 +50,22 @@ def spin_statements(
         Priors of the table.
     """
     speeds = ", ".join(f"{speed:.3g}" for speed in plateaus.speeds(table.distinct))
-    lines = [
+    seen = (
         f"spin: {int(plateaus.spinning.sum())} plateaus that turn, at {speeds} rad/s; K0, K1 and alignment start from "
-        f"{prior.source}",
-        f"spin, priors of the table, standard deviations: radius of a chip {1e3 * table.radius_std_m:.3g} mm per coordinate, "
-        f"arm stretch {table.stretch_std_s2_rad2:.3g} s²/rad², dynamic levelling "
-        f"{table.dynamic_levelling_std_s2_rad:.3g} s²/rad, scale of the tachometer {table.tacho_scale_std:.3g}",
-    ]
+        f"{prior.source}"
+    )
+    taken = (
+        f"spin, priors of the table, standard deviations: radius of a chip {1e3 * table.radius_std_m:.3g} mm per "
+        f"coordinate, arm stretch {table.stretch_std_s2_rad2:.3g} s²/rad², dynamic levelling "
+        f"{table.dynamic_levelling_std_s2_rad:.3g} s²/rad and {table.shift_std_m_s2_rad2:.3g} m s²/rad², scale of the "
+        f"tachometer {table.tacho_scale_std:.3g}"
+    )
+    lines = [seen, taken]
     weak = [name for name, std in prior.bends_std.items() if result.std_of(name) > table.undetermined * std]
     if weak:
         lines.append(
-            f"{_OPEN}: {', '.join(weak)} (standard deviations above {table.undetermined:.0%} of those before it); they need "
-            "faster plateaus, or a run with these axes across the table's axis"
+            f"{_OPEN}: {', '.join(weak)} (standard deviations above {table.undetermined:.0%} of those before it); they "
+            "need faster plateaus, or a run with these axes across the table's axis"
         )
     earlier = [text for text in prior.calibration.statements if not text.startswith((_OPEN, _BUCKING))]
     return (*earlier, *lines, _bucking(result, covariance, at, arms))
@@ -111,5 +115,6 @@ def _bucking(result: Calibration, covariance: Floats, at: Places, arms: Mapping[
     stretched = strongest({name: (unit(place[name]), stretch) for name in bends})
     radius = strongest({name: (unit(place[name]), arm) for name, arm in arms.items()})
     return (
-        f"{_BUCKING}, largest correlations: q with c {cubic}, q with arm stretch {stretched}, K1 with the radius {radius}"
+        f"{_BUCKING}, largest correlations: q with c {cubic}, q with arm stretch {stretched}, "
+        f"K1 with the radius {radius}"
     )

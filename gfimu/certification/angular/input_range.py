@@ -24,10 +24,9 @@ def specific_force_limits(calibration: Calibration, limits: PartLimits) -> tuple
     models = list(calibration.models.values())
     gain = count * np.concatenate([np.diag(model.sensitivity) for model in models])
     bias = count * np.concatenate([model.bias for model in models])
-    of_gain, of_bias = (
-        count * np.array([calibration.std_of(f"{chip}_{kind(axis)}") for chip in calibration.chips for axis in "xyz"])
-        for kind in (lambda axis: f"M_{axis}{axis}", lambda axis: f"b_{axis}")
-    )
+    axes = [(chip, axis) for chip in calibration.chips for axis in "xyz"]
+    of_gain = count * np.array([calibration.std_of(f"{chip}_M_{axis}{axis}") for chip, axis in axes])
+    of_bias = count * np.array([calibration.std_of(f"{chip}_b_{axis}") for chip, axis in axes])
     limit = (limits.full_range - np.abs(bias)) / gain
     return limit, np.hypot(of_bias, limit * of_gain) / gain
 

@@ -34,11 +34,11 @@ class Response:
     array : AccelerometerArray
         With the positions that the calibration fitted.
     response_std : ndarray, shape (3, 6)
-        Standard deviation of H: output about x, y, z; by α about x, y, z (a ratio) and by p along them (rad/s² per m/s²).
+        Standard deviation of H: output about x, y, z; by α about x, y, z (a ratio), by p along them (rad/s² per m/s²).
     bias_std : ndarray, shape (3,)
         Of the output at α = p = 0, rad/s².
     rate_squared, rate_squared_std : ndarray, shape (3,)
-        Largest output per squared rate about any axis where ω is not corrected for, a ratio (rad/s² per rad²/s²), and the
+        Largest output per squared rate about any axis where ω is not corrected for, rad/s² per rad²/s², and the
         standard deviation by the positions, the root of the sum of squares over the six products of ω.
     position_std : ndarray, shape (k, 3)
         Standard deviation of each chip's coordinates, m.
@@ -83,7 +83,7 @@ def response(calibration: Calibration, array: AccelerometerArray, position_std_m
     j = placed.regression_matrix  # (c, 6)
     if np.linalg.matrix_rank(j) < 6:
         raise GeometryError(f"array {array.name!r} can't see every angular acceleration; it is no angular sensor")
-    alpha_rows = np.linalg.pinv(j)[:3]
+    alpha_rows = np.asarray(np.linalg.pinv(j)[:3], dtype=np.float64)
     count = len(calibration.names)
     moved = [f"{chip.name}_r_{axis}" for chip in placed.chips for axis in "xyz"]
     fitted = moved[0] in calibration.names
@@ -114,7 +114,7 @@ def response(calibration: Calibration, array: AccelerometerArray, position_std_m
         std[:, :6],
         std[:, 6],
         _largest_rate_squared(alpha_rows @ placed.centripetal_matrix),
-        np.linalg.norm(std[:, 7:], axis=1),
+        np.asarray(np.linalg.norm(std[:, 7:], axis=1), dtype=np.float64),
         np.sqrt(np.diag(covariance)[places]).reshape(-1, 3),
     )
 

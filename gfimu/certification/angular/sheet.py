@@ -69,7 +69,9 @@ def angular_sensor_sheet(
     rate = noise.rate_hz or _SAMPLE_RATE
     limits = PartLimits.of(array, rate)
     fitted = bool(calibration.positions)
-    places = "positions as fitted" if fitted else f"positions as drawn, to {1e3 * position_std_m:.3g} mm (taken for granted)"
+    places = (
+        "positions as fitted" if fitted else f"positions as drawn, to {1e3 * position_std_m:.3g} mm (taken for granted)"
+    )
     terms = (
         *_ranges(calibration, found, limits, places),
         *_noise(noise, found),
@@ -86,8 +88,7 @@ def angular_sensor_sheet(
         "correction": "readings corrected by this calibration, α by J⁺",
     }
     statements = [
-        "angular acceleration is the measured quantity; the rate is its integral, and its white noise becomes a random walk "
-        "of the rate",
+        "the angular acceleration is measured; the rate is its integral, in which white noise is a random walk"
     ]
     if noise.instability is None:
         statements.append("bias instability is not stated: data sheets have none, and no recording at rest was given")
@@ -133,7 +134,14 @@ def _ranges(calibration: Calibration, found: Response, limits: PartLimits, place
             finite = bool(np.isfinite(value))
             note = f"first channel to saturate, in any attitude; {source}" if finite else "no channel sees it"
             yield _term(
-                f"range_{which}_{letter}", symbol, meaning, unit, value if finite else None, std, note, (familiar, _DEGREES)
+                f"range_{which}_{letter}",
+                symbol,
+                meaning,
+                unit,
+                value if finite else None,
+                std,
+                note,
+                (familiar, _DEGREES),
             )
 
 
@@ -153,7 +161,9 @@ def _noise(noise: AlphaNoise, found: Response) -> Iterator[Term]:
         else:
             value, std = noise.bias[axis]
             note = f"mean after correction, {noise.source}"
-        yield _term(f"bias_{letter}", "B_α", "bias of the angular acceleration", "rad/s²", value, std, note, ("°/s²", _DEGREES))
+        yield _term(
+            f"bias_{letter}", "B_α", "bias of the angular acceleration", "rad/s²", value, std, note, ("°/s²", _DEGREES)
+        )
     for axis, letter in enumerate("xyz"):
         meaning = "bias instability of the angular acceleration"
         if noise.instability is None:
@@ -171,7 +181,9 @@ def _bandwidth(array: AccelerometerArray, rate: float, *, recorded: bool) -> Ter
         PartFile.load(array.chips[chip].part, array.part_files).bandwidth_over_output_data_rate
         for chip in array.chip_of_channel
     ]
-    note = "data sheets of the parts, at " + ("the recorded rate" if recorded else f"{rate:g} Hz, or the array file's rate")
+    note = "data sheets of the parts, at " + (
+        "the recorded rate" if recorded else f"{rate:g} Hz, or the array file's rate"
+    )
     return _term("bandwidth", "f_3", "bandwidth, −3 dB", "Hz", float(np.min(rates * ratio)), None, note)
 
 
@@ -179,16 +191,12 @@ def _response(found: Response, places: str) -> Iterator[Term]:
     source = f"covariance of the calibration, {places}"
     std = found.response_std
     for axis, letter in enumerate("xyz"):
-        yield _term(
-            f"scale_factor_{letter}", "S_α", "scale factor", "1", 1.0, std[axis, axis], f"corrected; {source}"
-        )
+        yield _term(f"scale_factor_{letter}", "S_α", "scale factor", "1", 1.0, std[axis, axis], f"corrected; {source}")
     for axis, letter in enumerate("xyz"):
         others = [other for other in range(3) if other != axis]
         across = float(np.linalg.norm(std[axis, others]))
         meaning = "input-axis misalignment (cross-axis sensitivity), over both directions"
-        yield _term(
-            f"misalignment_{letter}", "δ_α", meaning, "rad", 0.0, across, f"corrected; {source}", ("mrad", 1e3)
-        )
+        yield _term(f"misalignment_{letter}", "δ_α", meaning, "rad", 0.0, across, f"corrected; {source}", ("mrad", 1e3))
     for axis, letter in enumerate("xyz"):
         pull = float(np.linalg.norm(std[axis, 3:]))
         meaning = "acceleration sensitivity (g-sensitivity), over all directions"

@@ -72,9 +72,21 @@ class Unit:
     def switched_on_again(self, rng):
         """Return the unit with other biases."""
         errors = self.sensor.errors
-        return replace(self, sensor=replace(self.sensor, errors=replace(errors, bias=errors.bias + rng.normal(size=12) * 0.03)))
+        return replace(
+            self, sensor=replace(self.sensor, errors=replace(errors, bias=errors.bias + rng.normal(size=12) * 0.03))
+        )
 
-    def turn(self, rng, mounting=UPRIGHT, speeds=SPEEDS, hold=6.0, policy=SpinPolicy(), tacho_noise=0.005, stretch=None, lean_std=5e-3):
+    def turn(
+        self,
+        rng,
+        mounting=UPRIGHT,
+        speeds=SPEEDS,
+        hold=6.0,
+        policy=SpinPolicy(),
+        tacho_noise=0.005,
+        stretch=None,
+        lean_std=5e-3,
+    ):
         """Record a run on a table that leans, stretches and tilts the array, drawn from the priors."""
         motion = spin_profile(speed_sweep(speeds, hold=hold))
         t = np.arange(int((2 * 2.0 + len(speeds) * (hold + 1.0) + 1.0) * RATE)) / RATE
@@ -85,7 +97,12 @@ class Unit:
             mount_rotvec=np.array(mounting) + rng.normal(size=3) * 0.01,
             axis_rotvec=np.array([*rng.normal(size=2) * lean_std, 0.0]),
             stretch=policy.stretch_std_s2_rad2 * rng.normal() if stretch is None else stretch,
-            leans=(Lean(np.array([*levelling, 0.0]) / np.linalg.norm(levelling), lambda s: np.linalg.norm(levelling) * s.rate**2),),
+            leans=(
+                Lean(
+                    np.array([*levelling, 0.0]) / np.linalg.norm(levelling),
+                    lambda s: np.linalg.norm(levelling) * s.rate**2,
+                ),
+            ),
         )
         geometry = table_geometry(world)
         state = motion.at(t)

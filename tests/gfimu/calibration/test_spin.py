@@ -48,10 +48,9 @@ def exact_start(bias=1e-4, gain=1e-5):
 
 def table(**changes):
     """A table without imperfections, but for those named."""
-    still = {
-        name: 1e-15
-        for name in ("stretch_std_s2_rad2", "dynamic_levelling_std_s2_rad", "shift_std_m_s2_rad2", "tacho_scale_std")
-    }
+    still = dict.fromkeys(
+        ("stretch_std_s2_rad2", "dynamic_levelling_std_s2_rad", "shift_std_m_s2_rad2", "tacho_scale_std"), 1e-15
+    )
     return SpinPolicy(**{"radius_std_m": 1e-9, "cubic_of_poses": 0.0, **still, **changes})
 
 
@@ -99,7 +98,9 @@ def test_the_prior_of_c_is_the_data_sheets():
 def steady(rate, ripple=0.0, wave=0.0, seconds=8.0):
     """One channel triad on a table that turns at a rate with a ripple, after a ramp from rest."""
     t = np.arange(round((seconds + 3.0) * RATE)) / RATE
-    tacho = np.where(t < 2.0, 0.0, np.where(t < 3.0, rate * (t - 2.0) / 1.0, rate + ripple * np.sin(2 * np.pi * 2.0 * t)))
+    tacho = np.where(
+        t < 2.0, 0.0, np.where(t < 3.0, rate * (t - 2.0) / 1.0, rate + ripple * np.sin(2 * np.pi * 2.0 * t))
+    )
     angle = np.concatenate([[0.0], np.cumsum((tacho[1:] + tacho[:-1]) / 2) / RATE])
     readings = np.column_stack([1.0 + wave * np.cos(angle + 0.7), 2.0 + wave * np.sin(angle), np.full(len(t), 3.0)])
     return Recording(t, readings, ("a11", "a12", "a13"), {"tacho_rad_s": tacho})
@@ -141,7 +142,15 @@ def test_derivatives_of_the_readings():
     std = np.full(layout.size, 1e-3)
     std[layout.stretch], std[layout.levelling], std[layout.shift] = 1e-6, 1e-6, 1e-6
     x = std * rng.normal(size=layout.size)
-    models = [ErrorModel(np.eye(3) + 0.01 * rng.normal(size=(3, 3)), rng.normal(size=3), 1e-4 * rng.normal(size=3), 1e-6 * rng.normal(size=3)) for _ in range(4)]
+    models = [
+        ErrorModel(
+            np.eye(3) + 0.01 * rng.normal(size=(3, 3)),
+            rng.normal(size=3),
+            1e-4 * rng.normal(size=3),
+            1e-6 * rng.normal(size=3),
+        )
+        for _ in range(4)
+    ]
     kinds = [f"{k}_{i}" for k in "bqc" for i in "xyz"] + [f"M_{i}{j}" for i in "xyz" for j in "xyz"]
 
     def place(number, kind):
@@ -149,8 +158,12 @@ def test_derivatives_of_the_readings():
 
     def readings(values):
         of = [
-            ErrorModel(*(values[[place(number, f"M_{i}{j}") for i in "xyz" for j in "xyz"]].reshape(3, 3),
-                         *(values[[place(number, f"{k}_{i}") for i in "xyz"]] for k in "bqc")))
+            ErrorModel(
+                *(
+                    values[[place(number, f"M_{i}{j}") for i in "xyz" for j in "xyz"]].reshape(3, 3),
+                    *(values[[place(number, f"{k}_{i}") for i in "xyz"]] for k in "bqc"),
+                )
+            )
             for number in range(4)
         ]
         return read_plateaus(geometry, values[72:], std, of, place, 72)
@@ -173,7 +186,10 @@ def test_derivatives_of_the_readings():
 
 def test_bends_of_a_table_without_errors_are_found():
     rng = np.random.default_rng(4)
-    truth = {"q": 1e-5 * rng.normal(size=12), "c": 4e-8 * rng.normal(size=12)}  # 5 q c y⁴ of the inverse is below the atol
+    truth = {
+        "q": 1e-5 * rng.normal(size=12),
+        "c": 4e-8 * rng.normal(size=12),
+    }  # 5 q c y⁴ of the inverse is below the atol
     unit = quiet_unit(rng, quadratic=truth["q"], cubic=truth["c"])
     perfect = table()
     for side, seen in ((spin_cases.UPRIGHT, ACROSS), (ON_ITS_SIDE, np.array([0, 2, 3, 5, 6, 8, 9, 11]))):
@@ -186,7 +202,8 @@ def test_bends_of_a_table_without_errors_are_found():
 def test_mujocos_run_of_the_shipped_scenario_gives_its_bends():
     """MuJoCo's rigid body and the effect of a quadratic axis, against the plateaus of this package's own model."""
     scenario = Scenario.load(
-        "centrifuge", changes=["sensor.perfect=true", 'effect=[{name="quadratic", parameters={a11_s2_m=2e-4, a32_s2_m=-1e-4}}]']
+        "centrifuge",
+        changes=["sensor.perfect=true", 'effect=[{name="quadratic", parameters={a11_s2_m=2e-4, a32_s2_m=-1e-4}}]'],
     )
     result = spin(simulate(scenario), CUBE, start=exact_start(), policy=table())
     expected = np.zeros(12)
@@ -202,7 +219,13 @@ def test_a_radius_error_is_in_the_gain_and_not_in_the_bends():
     unit = quiet_unit(rng, radius=1e-3, quadratic=quadratic, cubic=cubic)
     open_gain = exact_start(gain=3e-3)
     tolerant = table(radius_std_m=1e-3)
-    result = spin(unit.turn(rng, policy=table(), tacho_noise=0.0, lean_std=0.0), CUBE, start=open_gain, turn_on_std_m_s2=1e-4, policy=tolerant)
+    result = spin(
+        unit.turn(rng, policy=table(), tacho_noise=0.0, lean_std=0.0),
+        CUBE,
+        start=open_gain,
+        turn_on_std_m_s2=1e-4,
+        policy=tolerant,
+    )
     np.testing.assert_allclose(bends(result, "q")[ACROSS], unit.truth["q"][ACROSS], atol=1.5e-6)
     np.testing.assert_allclose(bends(result, "c")[ACROSS], unit.truth["c"][ACROSS], atol=2e-8)
     strongest = float(result.statements[-1].rsplit("K1 with the radius ", 1)[1].split()[0])
@@ -313,14 +336,16 @@ def test_counts_need_a_calibration_of_counts():
 
 def test_standard_deviations_hold_on_simulated_parts():
     """Two runs: upright, then on the side. All 12 channels have a q and a c: 48 errors, correlated within a run."""
-    errors = np.concatenate([np.concatenate([found[kind][0] for kind in "qc"]) for found in map(normalised_errors, range(1000, 1002))])
+    errors = np.concatenate(
+        [np.concatenate([found[kind][0] for kind in "qc"]) for found in map(normalised_errors, range(1000, 1002))]
+    )
     assert np.sqrt(np.mean(errors**2)) == pytest.approx(1.0, abs=4.0 / np.sqrt(2 * 48))
     assert np.mean(np.abs(errors) < 1.96) > 0.88
 
 
 @pytest.mark.study
 def test_intervals_of_k2_and_k3_cover():
-    """300 runs with chips, biases, poses and tables drawn anew: 95 % intervals cover 95 ± 3 %, over all and per channel."""
+    """300 runs with chips, biases, poses and tables drawn anew: 95 % intervals cover 95 ± 3 %, of all and each."""
     runs = [normalised_errors(seed) for seed in range(300)]
     for kind in "qc":
         covered = np.abs(np.array([run[kind][0] for run in runs])) < 1.96

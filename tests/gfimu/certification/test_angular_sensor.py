@@ -31,7 +31,14 @@ def calibration(array=CUBE, *, gain=1e-4, bias=2e-3, values=None, unit="m_s2", s
     nominal = np.tile(np.concatenate([scale * np.eye(3).ravel(), np.zeros(3)]), len(array.chips))
     std = scale * np.tile(np.concatenate([np.full(9, gain), np.full(3, bias)]), len(array.chips))
     return Calibration(
-        "array", unit, array.channels, gauge, GRAVITY, tuple(names), nominal if values is None else values, np.diag(std**2)
+        "array",
+        unit,
+        array.channels,
+        gauge,
+        GRAVITY,
+        tuple(names),
+        nominal if values is None else values,
+        np.diag(std**2),
     )
 
 
@@ -92,7 +99,9 @@ def spin_readings(mount, rate, acceleration, attitude):
     """Largest reading over a turn of the cube about the vertical or a horizontal axis, by the forward model."""
     angle = np.linspace(0.0, 2 * np.pi, 721)
     spin = SpinState(angle, np.full_like(angle, rate), np.full_like(angle, acceleration))
-    world = World(CUBE, gravity=GRAVITY, cube_offset=np.zeros(3), mount_rotvec=mount, axis_rotvec=np.array([attitude, 0.0, 0.0]))
+    world = World(
+        CUBE, gravity=GRAVITY, cube_offset=np.zeros(3), mount_rotvec=mount, axis_rotvec=np.array([attitude, 0.0, 0.0])
+    )
     return np.abs(rigid_readings(world, spin)).max()
 
 
@@ -134,7 +143,9 @@ def test_what_is_corrected_scatters_as_stated():
     runs, by_alpha, by_force, at_zero = 400, [], [], []
     for _ in range(runs):
         true = replace(stated, values=rng.normal(stated.values, stated.std))
-        moved = CUBE.with_geometry(CUBE.chip_positions + tolerance * rng.normal(size=(4, 3)), [c.axes for c in CUBE.chips])
+        moved = CUBE.with_geometry(
+            CUBE.chip_positions + tolerance * rng.normal(size=(4, 3)), [c.axes for c in CUBE.chips]
+        )
 
         def alpha(force, acceleration, moved=moved, true=true):
             ideal = specific_force(moved, force, acceleration, np.zeros_like(acceleration))
@@ -151,7 +162,9 @@ def test_what_is_corrected_scatters_as_stated():
         others = [k for k in range(3) if k != place]
         assert np.mean(scale[:, place]) == near(1.0, abs=4 * scale[:, place].std() / np.sqrt(runs))
         assert found[f"scale_factor_{axis}"].std == near(scale[:, place].std(), rel=tol)
-        assert found[f"misalignment_{axis}"].std == near(np.sqrt(np.mean(np.sum(scale[:, others] ** 2, axis=1))), rel=tol)
+        assert found[f"misalignment_{axis}"].std == near(
+            np.sqrt(np.mean(np.sum(scale[:, others] ** 2, axis=1))), rel=tol
+        )
         assert found[f"g_sensitivity_{axis}"].std == near(
             np.sqrt(np.mean(np.sum(np.array(by_force)[:, place] ** 2, axis=1))), rel=tol
         )
@@ -210,9 +223,9 @@ def test_what_is_no_angular_sensor_is_refused():
     line = CUBE.with_geometry([[0, 0, z] for z in (0.0, 0.02, 0.04, 0.06)], [chip.axes for chip in CUBE.chips])
     with pytest.raises(GeometryError, match="can't see every angular acceleration"):
         angular_sensor_sheet(calibration(), line)
+    values = calibration().values.copy()
+    values[9] = 150.0
     with pytest.raises(InputError, match="saturates by gravity alone"):
-        values = calibration().values.copy()
-        values[9] = 150.0
         angular_sensor_sheet(calibration(values=values), CUBE)
 
 
