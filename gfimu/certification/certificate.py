@@ -223,6 +223,12 @@ class Comparison:
     rows: tuple[ComparisonRow, ...]
     left_out: tuple[str, ...] = ()
 
+    @property
+    def summary(self) -> str:
+        """How many quantities agree, in words."""
+        good = sum(row.satisfactory for row in self.rows)
+        return f"{good} of {len(self.rows)} quantities have E_n between −1 and 1"
+
 
 @dataclass(frozen=True)
 class Certificate:

@@ -18,7 +18,7 @@ from gfimu.certification.quantities import MODEL_EQUATION, Quantities, intrinsic
 from gfimu.certification.words import intrinsic_terms, model_terms
 from gfimu.errors import InputError
 
-__all__ = ["certify", "fit_components"]
+__all__ = ["certify"]
 
 Floats = NDArray[np.float64]
 
@@ -87,11 +87,6 @@ def certify(
         model_equation=MODEL_EQUATION,
         software=f"gfimu {__version__}",
     )
-
-
-def fit_components(calibration: Calibration) -> tuple[Component, ...]:
-    """Return the components of type A of all terms: the covariance of the calibration."""
-    return certify(calibration).budget
 
 
 def _check(calibration: Calibration, source: str) -> None:

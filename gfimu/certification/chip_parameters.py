@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.calibration.error_model import GAUGES
+from gfimu.calibration.error_model import GAUGES, free_elements
 from gfimu.calibration.result import Calibration
 
 __all__ = ["ChipParameters", "chip_parameters"]
@@ -44,6 +44,8 @@ class ChipParameters:
         Derivatives of these four by the p parameters of the calibration, (p, 3, 3) and three of (p, 3).
     has_quadratic, has_cubic : bool
         Whether the calibration has these coefficients.
+    undetermined : ndarray, shape (p, k)
+        Directions of its parameters that the data did not determine, rotations of the frame apart.
     """
 
     chip: str
@@ -58,6 +60,7 @@ class ChipParameters:
     slopes: tuple[Floats, Floats, Floats, Floats]
     has_quadratic: bool
     has_cubic: bool
+    undetermined: Floats
 
 
 def chip_parameters(calibration: Calibration) -> tuple[ChipParameters, ...]:
@@ -93,7 +96,9 @@ def _of_chip(calibration: Calibration, number: int, chip: str) -> ChipParameters
         (slopes[0], slopes[1], slopes[2], slopes[3]),
         has_quadratic=f"{chip}_q_x" in place,
         has_cubic=f"{chip}_c_x" in place,
+        undetermined=np.empty((count, 0)),
     )
+    found = replace(found, undetermined=_undetermined(calibration, found))
     return _in_own_frame(found) if _rotation_is_open(calibration, found) else found
 
 
@@ -102,11 +107,26 @@ def _rotation_is_open(calibration: Calibration, chip: ChipParameters) -> bool:
     null_space = calibration.null_space
     if not null_space.size or any(key.endswith("levelling_std_rad") for key in calibration.statistics):
         return False
-    basis = np.linalg.qr(null_space)[0]
-    turned = chip.sensitivity @ np.cross(np.eye(3), np.eye(3)[:, None])  # (3, 3, 3): M [e_k x] for each axis k
-    directions = np.einsum("pij,kij->pk", chip.slopes[0], turned)  # (p, 3)
-    outside = directions - basis @ (basis.T @ directions)
-    return bool(np.linalg.norm(outside) < _IN_SPAN * np.linalg.norm(directions))
+    basis, turns = np.linalg.qr(null_space)[0], _rotations(chip)
+    return bool(np.linalg.norm(turns - basis @ (basis.T @ turns)) < _IN_SPAN)
+
+
+def _rotations(chip: ChipParameters) -> Floats:
+    """Return how the parameters change by small rotations of the frame, M [e_k ×], orthonormal, (p, 3)."""
+    turned = chip.sensitivity @ np.cross(np.eye(3), np.eye(3)[:, None])  # (3, 3, 3)
+    return np.asarray(np.linalg.qr(np.einsum("pij,kij->pk", chip.slopes[0], turned))[0], dtype=np.float64)
+
+
+def _undetermined(calibration: Calibration, chip: ChipParameters) -> Floats:
+    """Return the null space within the parameters of this chip, without its rotations: those only choose the frame."""
+    own = np.array([name.startswith(f"{chip.chip}_") for name in calibration.names])  # (p,)
+    part = calibration.null_space * own[:, None]
+    beside = part
+    if len(free_elements(calibration.gauge)) == 9:
+        turns = _rotations(chip)
+        beside = part - turns @ (turns.T @ part)
+    _, size, columns = np.linalg.svd(beside, full_matrices=False)
+    return np.asarray(part @ columns[size > _IN_SPAN].T, dtype=np.float64)
 
 
 def _in_own_frame(chip: ChipParameters) -> ChipParameters:

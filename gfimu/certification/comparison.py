@@ -7,7 +7,7 @@ E_n = (x₁ − x₂) / √(U₁² + U₂²) with the expanded uncertainties of 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from gfimu.certification.certificate import Certificate, ChipCertificate, Comparison, ComparisonRow, Term
 from gfimu.errors import InputError, UnitError
@@ -51,13 +51,12 @@ def compare(first: Certificate, second: Certificate, *, other: str) -> Compariso
     rows = tuple(row for pair in shared for row in _rows(*pair))
     if not rows:
         raise InputError(f"{other}: has no quantity in common with an uncertainty in both; calibrate again")
-    left_out = tuple(text for pair in shared for text in _left_out(*pair))
-    return Comparison(other, rows, left_out)
+    return Comparison(other, rows, tuple(_left_out(shared)))
 
 
 def _rows(ours: ChipCertificate, theirs: ChipCertificate) -> Iterator[ComparisonRow]:
     groups = [(ours.intrinsic, theirs.intrinsic)]
-    if not _left_out(ours, theirs):
+    if _same_frame(ours, theirs):
         groups.append((ours.terms, theirs.terms))
     for mine, others in groups:
         by_name = {(term.name, term.unit): term for term in others}
@@ -74,10 +73,17 @@ def _row(ours: Term, theirs: Term) -> Iterator[ComparisonRow]:
         yield ComparisonRow(ours.name, ours.unit, x1, u1, x2, u2, (x1 - x2) / math.hypot(u1, u2))
 
 
-def _left_out(ours: ChipCertificate, theirs: ChipCertificate) -> tuple[str, ...]:
-    """Say why the terms of the model are not compared; empty where they are."""
-    if ours.frame == theirs.frame and ours.frame in _OWN_FRAMES:
-        return ()
-    return (
-        f"{ours.chip}: terms of the model: the reference axes ({ours.frame}, {theirs.frame}) depend on the mounting",
-    )
+def _same_frame(ours: ChipCertificate, theirs: ChipCertificate) -> bool:
+    """Whether the terms of the model have the same reference axes in both."""
+    return ours.frame == theirs.frame and ours.frame in _OWN_FRAMES
+
+
+def _left_out(pairs: Iterable[tuple[ChipCertificate, ChipCertificate]]) -> Iterator[str]:
+    """Say of which chips the terms of the model are not compared, and why."""
+    chips: dict[tuple[str, str], list[str]] = {}
+    for ours, theirs in pairs:
+        if not _same_frame(ours, theirs):
+            chips.setdefault((ours.frame, theirs.frame), []).append(ours.chip)
+    for (frame, other), names in chips.items():
+        reason = f"the reference axes ({frame}, {other}) depend on the mounting"
+        yield f"terms of the model of {', '.join(names)}: {reason}"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -129,16 +129,16 @@ def _rows(terms: Sequence[Term], *, both: bool) -> Iterator[_Row]:
     for term in terms:
         groups.setdefault(_kind(term), []).append(term)
     for symbol, group in groups.items():
-        if any(term.value is not None for term in group):
-            first = group[0]
-            si = _Row(symbol, first.meaning, first.unit, tuple(_cell(term, 1.0) for term in group))
-            familiar = _Row("", "", first.familiar_unit, tuple(_cell(term, term.familiar_factor) for term in group))
-            if both or not first.familiar_unit:
-                yield si
-            if both and first.familiar_unit:
-                yield familiar
-            elif first.familiar_unit:
-                yield _Row(symbol, first.meaning, first.familiar_unit, familiar.cells)
+        if all(term.value is None for term in group):
+            continue
+        first = group[0]
+        units = [(first.unit, 1.0)]
+        if first.familiar_unit:
+            familiar = (first.familiar_unit, first.familiar_factor)
+            units = [*units, familiar] if both else [familiar]
+        for line, (unit, factor) in enumerate(units):
+            head = ("", "") if line else (symbol, first.meaning)
+            yield _Row(*head, unit, tuple(_cell(term, factor) for term in group))
 
 
 def _kind(term: Term) -> str:
@@ -167,9 +167,9 @@ def _sheet_rows(terms: Sequence[Term]) -> Iterator[tuple[_Row, str]]:
 
 def _missing(chips: Sequence[ChipCertificate]) -> Mapping[str, str]:
     """Symbols that no axis has a value of, with their meanings."""
-    terms = [term for chip in chips for term in chip.terms]
-    stated = {term.symbol for term in terms if term.value is not None}
-    return {term.symbol: term.meaning for term in terms if term.symbol not in stated}
+    terms = [term for chip in chips for term in (*chip.terms, *chip.intrinsic)]
+    stated = {_kind(term) for term in terms if term.value is not None}
+    return {_kind(term): term.meaning for term in terms if _kind(term) not in stated}
 
 
 def _merged(statements: Sequence[str], chips: Sequence[ChipCertificate]) -> list[str]:
@@ -218,7 +218,7 @@ def _budget(certificate: Certificate) -> Mapping[str, Any]:
     }
 
 
-def _freedom(components: Iterator[Component] | Any) -> str:
+def _freedom(components: Iterable[Component]) -> str:
     values = [one.degrees_of_freedom for one in components]
     finite = [value for value in values if value is not None]
     return f"{min(finite):.3g}" if finite else "∞"

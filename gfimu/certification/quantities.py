@@ -31,6 +31,7 @@ MODEL_EQUATION = (
     "E = K1 (K0 + a_i + K2 a_i² + K3 a_i³ + δ_o a_p − δ_p a_o + K_ip a_i a_p + K_io a_i a_o + K_po a_p a_o)"
 )
 
+_STILL = 1e-6  # numerical: relative slope along a direction that changes nothing
 _PAIRS = ((0, 1), (0, 2), (1, 2))
 _AXES = "xyz"
 
@@ -56,6 +57,12 @@ class Quantities:
     def covariance(self, parameters: Floats) -> Floats:
         """Covariance of the values, (m, m), from that of the parameters, (p, p)."""
         return self.jacobian @ parameters @ self.jacobian.T
+
+    def without(self, undetermined: Floats) -> Quantities:
+        """Leave out what changes along directions of the parameters that were not determined, (p, k)."""
+        moved = np.linalg.norm(self.jacobian @ undetermined, axis=1)
+        kept = np.flatnonzero(moved <= _STILL * np.linalg.norm(self.jacobian, axis=1))
+        return Quantities(tuple(self.names[k] for k in kept), self.values[kept], self.jacobian[kept])
 
     def __add__(self, other: Quantities) -> Quantities:
         return Quantities(
@@ -96,7 +103,7 @@ def model_quantities(chip: ChipParameters) -> Quantities:
             state(f"{channel}_K3", third * k1**2, by_third * k1**2 + 2.0 * third * k1 * by_k1)
         state(f"{channel}_delta_o", m[i, p] / k1, by_m[:, i, p] / k1 - m[i, p] / k1**2 * by_k1)
         state(f"{channel}_delta_p", -m[i, o] / k1, m[i, o] / k1**2 * by_k1 - by_m[:, i, o] / k1)
-    return Quantities(tuple(names), np.array(values), np.array(rows))
+    return Quantities(tuple(names), np.array(values), np.array(rows)).without(chip.undetermined)
 
 
 def intrinsic_quantities(chip: ChipParameters) -> Quantities:
@@ -115,4 +122,5 @@ def intrinsic_quantities(chip: ChipParameters) -> Quantities:
         *(f"{chip.chip}_angle_{_AXES[i]}{_AXES[j]}" for i, j in _PAIRS),
     )
     values = np.concatenate([size, chip.bias, np.arctan2(sine, cosine)])
-    return Quantities(names, values, np.concatenate([by_size.T, by_b.T, -by_cosine / sine[:, None]]))
+    jacobian = np.concatenate([by_size.T, by_b.T, -by_cosine / sine[:, None]])
+    return Quantities(names, values, jacobian).without(chip.undetermined)

@@ -68,7 +68,7 @@ def _print(found: Certificate) -> None:
     for chip in found.chips:
         stated = [term for term in (*chip.terms, *chip.intrinsic) if term.value is not None]
         print_table(f"{chip.chip}: {chip.frame_meaning}", header, [_row(term) for term in stated])
-        missing = [term.name for term in chip.terms if term.value is None]
+        missing = [term.name for term in (*chip.terms, *chip.intrinsic) if term.value is None]
         if missing:
             print_text(f"not determined: {', '.join(missing)}")
     if found.angular_sensor is not None:
@@ -87,6 +87,7 @@ def _print(found: Certificate) -> None:
             for row in found.comparison.rows
         ]
         print_table(f"compared with {found.comparison.other}", ("quantity", "this", "other", "unit", "E_n"), rows)
+        print_text(found.comparison.summary)
         for text in found.comparison.left_out:
             print_text(f"not compared: {text}")
     for text in found.statements:

@@ -43,7 +43,7 @@ def file(calibration, tmp_path):
 
 @pytest.mark.parametrize(("method", "count"), METHODS)
 def test_calibrations_of_every_method_become_certificates(poses, reference, method, count, tmp_path):
-    """The intrinsic parameters by the methods that fit these chips agree: all 36 |E_n| of the same poses are below 2."""
+    """The intrinsic parameters by the methods that fit these chips agree: all |E_n| of the same poses are below 2."""
     found = gfimu.certificate(gfimu.calibrate(method, poses, parameters=count), out=tmp_path / "made")
     stated = [term for chip in found.chips for term in chip.intrinsic]
     assert len(found.chips) == 4

@@ -68,12 +68,14 @@ def test_the_page_needs_nothing_outside_and_runs_nothing(found):
 
 def test_the_sheet_and_the_comparison_have_pages_of_their_own(found):
     sheet = Sheet(
-        "As an angular sensor", (Term("r", "R", "range", "rad/s", 40.0, 1.0, 2.0, 2.0),), {"at": "20 °C"}, ("n",)
+        "As an angular sensor", (Term("r", "R<i>_max", "range", "rad/s", 40.0, 1.0, 2.0, 2.0),), {"at": "20 °C"}, ("n",)
     )
     both = replace(found, angular_sensor=sheet, comparison=compare(found, found, other="theirs.json"))
     reader = Reader(certificate_html(both))
     assert "As an angular sensor" in reader.text
     assert "40.0 ± 2.0" in reader.text
+    assert "R<i>max" in reader.text  # escaped, its index below the line
+    assert "21 of 21 quantities" in reader.text
     assert "Comparison with theirs.json" in reader.text
     assert reader.attributes.count("newpage") == 2
     assert Reader(certificate_html(found)).attributes.count("newpage") == 0

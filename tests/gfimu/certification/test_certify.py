@@ -191,6 +191,14 @@ def test_a_damaged_file_is_refused(calibration, change, words):
         Certificate.from_dict(certify(calibration).to_dict() | change, source="theirs.json")
 
 
+@pytest.mark.parametrize("key", ["value", "std", "expanded"])
+def test_a_number_that_is_not_finite_is_refused(calibration, key):
+    data = certify(calibration).to_dict()
+    data["chips"][0]["terms"][1][key] = math.nan
+    with pytest.raises(InputError, match=r"theirs\.json: a11_K1 is not finite"):
+        Certificate.from_dict(data, source="theirs.json")
+
+
 def test_rotating_the_fixture_changes_the_model_and_not_the_intrinsic_parameters(rng):
     model, covariance = random_model(rng), random_covariance(rng)
     ours = certify(calibration_of(model, covariance))

@@ -41,7 +41,7 @@ def test_terms_are_compared_where_the_sensing_axes_define_the_frame(rng):
     assert max(abs(row.e_n) for row in rows.values()) < 1e-5
     full = certify(calibration_of(model, covariance))
     assert compare(full, full, other="theirs").left_out == (
-        "a1: terms of the model: the reference axes (poses, poses) depend on the mounting",
+        "terms of the model of a1: the reference axes (poses, poses) depend on the mounting",
     )
 
 

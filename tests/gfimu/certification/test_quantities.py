@@ -182,6 +182,26 @@ def test_an_open_rotation_is_no_misalignment(rng):
     assert chip.frame == "coarse"
 
 
+@pytest.mark.parametrize(
+    ("parameter", "lost"),
+    [
+        ("a1_q_x", {"a11_K2"}),
+        ("a1_b_y", {"a12_K0", "a12_offset"}),
+        ("a1_M_zy", {"a13_delta_p", "a13_sensitivity", "a1_angle_xz", "a1_angle_yz"}),
+    ],
+)
+def test_what_changes_along_the_null_space_is_not_stated(rng, parameter, lost):
+    calibration = calibration_of(random_model(rng), random_covariance(rng))
+    place = calibration.names.index(parameter)
+    kept = np.delete(np.eye(len(calibration.names)), place, axis=1)
+    blind = replace(
+        calibration,
+        null_space=np.eye(len(kept))[:, [place]],
+        covariance=kept @ kept.T @ calibration.covariance @ kept @ kept.T,
+    )
+    assert set(stated_quantities(calibration).names) - set(stated_quantities(blind).names) == lost
+
+
 def test_nine_and_twelve_parameters_of_the_same_poses_state_the_same(rng):
     """A real adjustment in both gauges: values to 1e-9, standard deviations to 1e-6."""
     model = replace(random_model(rng), quadratic=np.zeros(3))
