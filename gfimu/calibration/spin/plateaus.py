@@ -132,10 +132,10 @@ def _stretches(
     limit = policy.slope_rad_s2 + _NOISE_OF_SLOPE * noise * float(
         np.linalg.norm(savgol_coeffs(window, 1, deriv=1, delta=period))
     )
-    steady = known & (np.abs(slope) <= limit)
+    smooth = savgol_filter(filled, window, 1)
+    steady = known & (np.abs(slope) <= limit + policy.slope_share_s * np.abs(smooth))
     steady[recording.gaps] = False
     edges = np.flatnonzero(np.diff(np.concatenate([[0], steady.astype(int), [0]])))
-    smooth = savgol_filter(filled, window, 1)
     found = []
     for start, stop in zip(edges[::2], edges[1::2], strict=True):
         # A slope within the limit may be that of a window which reaches into a ramp; as long again, the table settles.

@@ -37,9 +37,10 @@ class SpinPolicy:
         Share c (K1 g)² of the gain that poses take for gain where their model has no c: 2/3 to 1 by the poses.
     unknown_nonlinearity : float
         Deviation from a straight line at the largest input, a ratio, where no data sheet states one.
-    slope_rad_s2, slope_window_s : float
-        Largest rate of change of a plateau, rad/s², over a window of that length, s, beside four standard deviations of
-        the tachometer's noise in it.
+    slope_rad_s2, slope_share_s, slope_window_s : float
+        Largest rate of change of a plateau over a window of that length, s: this much, rad/s², and this share of the
+        rate per second (tables ripple once per turn; the mean of ω² holds that), beside four standard deviations of the
+        tachometer's noise in it.
     spread, spread_rad_s : float
         Largest deviation of the smoothed rate from its mean over a plateau: this share of it and this much, rad/s.
     rest_rad_s : float
@@ -65,6 +66,7 @@ class SpinPolicy:
     cubic_of_poses: float = 0.8
     unknown_nonlinearity: float = 0.05
     slope_rad_s2: float = 0.1
+    slope_share_s: float = 0.02
     slope_window_s: float = 0.5
     spread: float = 0.02
     spread_rad_s: float = 0.05

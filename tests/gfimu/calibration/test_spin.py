@@ -107,17 +107,29 @@ def steady(rate, ripple=0.0, wave=0.0, seconds=8.0):
 
 
 def test_the_square_of_the_rate_is_without_the_tachometers_noise():
-    run, rng, noise, runs = steady(2.0, ripple=0.05), np.random.default_rng(1), 0.1, 60
+    run, rng, noise, runs = steady(2.0), np.random.default_rng(1), 0.1, 60
     found = []
     for _ in range(runs):
         tacho = run.reference["tacho_rad_s"] + noise * rng.normal(size=len(run))
         plateaus = find_plateaus(replace(run, reference={"tacho_rad_s": tacho}), np.full(3, 0.1), 1.0, SpinPolicy())
         place = int(np.argmax(plateaus.samples * plateaus.spinning))
-        found.append((plateaus.square[place], plateaus.square_std[place], plateaus.samples[place]))
-    square, std, samples = np.array(found).T
+        found.append([getattr(plateaus, name)[place] for name in ("square", "square_std", "samples", "rate")])
+    square, std, samples, rate = np.array(found).T
     assert std == pytest.approx(2 * 2.0 * noise / np.sqrt(samples), rel=0.15)
     assert square.std() == pytest.approx(std.mean(), rel=4 / np.sqrt(2 * runs))
-    assert square.mean() == pytest.approx(4.0 + 0.05**2 / 2, abs=3.5 * std.mean() / np.sqrt(runs))  # noise² is more
+    assert square.mean() == pytest.approx(4.0, abs=3.5 * std.mean() / np.sqrt(runs))
+    assert np.mean(square - rate**2) == pytest.approx(0.0, abs=0.1 * noise**2)  # a mean of squares has noise² more
+
+
+def test_a_table_that_ripples_has_plateaus():
+    run = steady(10.0, ripple=0.05)
+    found = find_plateaus(run, np.full(3, 0.1), 1.0, SpinPolicy())
+    (place,) = np.flatnonzero(found.spinning)
+    assert found.samples[place] > 650
+    first = int(round(found.start_s[place] * RATE))
+    rates = run.reference["tacho_rad_s"][first : first + found.samples[place]]
+    assert found.square[place] == pytest.approx(np.mean(rates**2), abs=1e-3)
+    assert np.ptp(rates) > 0.09
 
 
 def test_a_wave_of_less_than_a_turn_is_in_the_uncertainty_of_the_mean():
