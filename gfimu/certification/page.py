@@ -36,6 +36,8 @@ _CONDITIONS = {
 
 _UNITS = {"lsb": "counts (lsb)", "m_s2": "m/s²"}
 
+_ROUNDING = 1e-6  # numerical: a share of the combined uncertainty that is nothing
+
 _CORRELATED = 0.9
 _MOST_PAIRS = 6
 """Correlations shown: largest ones from this size on, so many at most (of the layout)."""
@@ -75,7 +77,7 @@ def certificate_html(certificate: Certificate) -> str:
 
 def _symbol(text: str) -> Markup:
     """Symbol or equation with its indices below the line: ``K_ip``, ``K0``."""
-    lowered = re.sub(r"_([a-z]+)|(?<=K)(\d)", lambda found: f"<sub>{found[1] or found[2]}</sub>", str(escape(text)))
+    lowered = re.sub(r"_(\w+)|(?<=K)(\d)", lambda found: f"<sub>{found[1] or found[2]}</sub>", str(escape(text)))
     return Markup(lowered)  # noqa: S704  the text was escaped
 
 
@@ -211,11 +213,19 @@ def _budget(certificate: Certificate) -> Mapping[str, Any]:
     return {
         "kinds": units,
         "rows": [
-            (*key, _freedom(row.values()), [f"{row[kind].std:.2g}" if kind in row else "" for kind in units])
+            (
+                *key,
+                _freedom(row.values()),
+                [_share(row[kind].std, combined[kind]) if kind in row else "" for kind in units],
+            )
             for key, row in largest.items()
         ],
         "combined": [f"{combined[kind]:.2g}" for kind in units],
     }
+
+
+def _share(std: float, combined: float) -> str:
+    return f"{std:.2g}" if std > _ROUNDING * combined else "0"
 
 
 def _freedom(components: Iterable[Component]) -> str:

@@ -68,13 +68,13 @@ def test_the_page_needs_nothing_outside_and_runs_nothing(found):
 
 def test_the_sheet_and_the_comparison_have_pages_of_their_own(found):
     sheet = Sheet(
-        "As an angular sensor", (Term("r", "R<i>_max", "range", "rad/s", 40.0, 1.0, 2.0, 2.0),), {"at": "20 °C"}, ("n",)
+        "As an angular sensor", (Term("r", "R<i>_α", "range", "rad/s", 40.0, 1.0, 2.0, 2.0),), {"at": "20 °C"}, ("n",)
     )
     both = replace(found, angular_sensor=sheet, comparison=compare(found, found, other="theirs.json"))
     reader = Reader(certificate_html(both))
     assert "As an angular sensor" in reader.text
     assert "40.0 ± 2.0" in reader.text
-    assert "R<i>max" in reader.text  # escaped, its index below the line
+    assert "R<i>α" in reader.text  # escaped, its index below the line
     assert "21 of 21 quantities" in reader.text
     assert "Comparison with theirs.json" in reader.text
     assert reader.attributes.count("newpage") == 2
@@ -83,10 +83,13 @@ def test_the_sheet_and_the_comparison_have_pages_of_their_own(found):
 
 def test_the_budget_names_the_largest_of_each_source(found):
     table = [Component(f"a1{i}_K0", "table", "B", "uniform", 0.1 * i, "m/s²", 5.0) for i in (1, 2, 3)]
+    table.append(Component("a11_K0", "gravity", "B", "normal", 1e-18, "m/s²"))
     calibration = calibration_of(random_model(np.random.default_rng(1)), random_covariance(np.random.default_rng(1)))
     page = certificate_html(certify(calibration, components=table))
     (row,) = re.findall(r"<tr><td>table</td>.*?</tr>", page, re.DOTALL)
     assert re.findall(r">([^<>\n]*)</td>", row)[:5] == ["table", "B", "uniform", "5", "0.3"]
+    (nothing,) = re.findall(r"<tr><td>gravity</td>.*?</tr>", page, re.DOTALL)
+    assert re.findall(r">([^<>\n]*)</td>", nothing)[3:5] == ["∞", "0"]
 
 
 def test_sentences_of_several_chips_are_printed_once(found):

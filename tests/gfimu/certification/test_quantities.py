@@ -202,6 +202,23 @@ def test_what_changes_along_the_null_space_is_not_stated(rng, parameter, lost):
     assert set(stated_quantities(calibration).names) - set(stated_quantities(blind).names) == lost
 
 
+def test_a_common_rotation_of_an_array_only_chooses_the_frame(rng):
+    """Two chips, whose common rotation is in the null space: all terms of both are stated in the array's frame."""
+    chips = [calibration_of(random_model(rng), random_covariance(rng), "array") for _ in range(2)]
+    turns = [open_rotation(chip).null_space for chip in chips]
+    second = tuple(name.replace("a1_", "b1_") for name in chips[1].names)
+    array = replace(
+        chips[0],
+        channels=("a11", "a12", "a13", "b11", "b12", "b13"),
+        names=(*chips[0].names, *second),
+        values=np.concatenate([chip.values for chip in chips]),
+        covariance=block_diag(*(chip.covariance for chip in chips)),
+        null_space=np.concatenate(turns) / np.sqrt(2.0),
+    )
+    assert {chip.frame for chip in chip_parameters(array)} == {"array"}
+    assert len(stated_quantities(array).names) == 2 * (15 + 9)
+
+
 def test_nine_and_twelve_parameters_of_the_same_poses_state_the_same(rng):
     """A real adjustment in both gauges: values to 1e-9, standard deviations to 1e-6."""
     model = replace(random_model(rng), quadratic=np.zeros(3))
