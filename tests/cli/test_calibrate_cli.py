@@ -244,7 +244,17 @@ def test_spin(gfimu_command, turned):
     assert abs(found.value("a1_q_x") - 1e-4) < 4 * found.std_of("a1_q_x")
     assert found.value("a1_q_x") > 3 * found.std_of("a1_q_x")
     again = gfimu_command(
-        *("calibrate", "spin", turned, "--calibration", out, "--turn-on-std", 0.01, "--out", turned.with_name("again.json"))
+        *(
+            "calibrate",
+            "spin",
+            turned,
+            "--calibration",
+            out,
+            "--turn-on-std",
+            0.01,
+            "--out",
+            turned.with_name("again.json"),
+        )
     )
     assert again.code == 0
     assert "K0, K1 and alignment start from the spin calibration" in " ".join(again.stdout.split())

@@ -126,7 +126,7 @@ def test_a_table_that_ripples_has_plateaus():
     found = find_plateaus(run, np.full(3, 0.1), 1.0, SpinPolicy())
     (place,) = np.flatnonzero(found.spinning)
     assert found.samples[place] > 650
-    first = int(round(found.start_s[place] * RATE))
+    first = round(float(found.start_s[place]) * RATE)
     rates = run.reference["tacho_rad_s"][first : first + found.samples[place]]
     assert found.square[place] == pytest.approx(np.mean(rates**2), abs=1e-3)
     assert np.ptp(rates) > 0.09
