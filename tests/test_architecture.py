@@ -255,7 +255,13 @@ ROOMS = {
         "gfimu.recording",
         "gfimu.visual.colours",
     },
-    "gfimu.certification": {"gfimu.calibration"},
+    "gfimu.certification": {
+        "gfimu.calibration",
+        "gfimu.geometry.array",
+        "gfimu.parts",
+        "gfimu.recording",
+        "gfimu.sensor_noise",
+    },
     "gfimu.exporting": {
         "gfimu.calibration",
         "gfimu.geometry",

@@ -20,6 +20,7 @@ from gfimu.calibration.nonlinearity import quadratic_std
 from gfimu.calibration.observations import Observations, observations_from
 from gfimu.calibration.registry import METHODS, CalibrationMethod, calibration_method
 from gfimu.calibration.result import Calibration, combine
+from gfimu.calibration.spin.policy import SpinPolicy
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.parts.part import Part
@@ -31,6 +32,7 @@ __all__ = [
     "METHODS",
     "CalibrationTask",
     "calibrate",
+    "calibrate_by_spin",
     "calibrate_gyro",
     "calibrate_reference_gyro",
     "calibrate_triads",
@@ -65,8 +67,13 @@ class CalibrationTask:
         Recording with the motion, if it is another one.
     update : Calibration, optional
         Calibration of an earlier run to carry over.
+    start : Calibration, optional
+        Calibration that a spin starts from.
+    radius_std_m, stretch_std_s2_rad2 : float, optional
+        Of a spin: standard deviations of a chip's radius and of the arm stretch; those of its policy if not given.
     turn_on_std_m_s2, bias_walk_m_s2_rt_s : float
-        With ``update``: change of a bias between power-ons, m/s², and random walk between poses, m/s²/√s.
+        With ``update`` or ``start``: change of a bias between power-ons, m/s²; with ``update`` random walk between
+        poses, m/s²/√s.
     progress : callable, optional
         Called with the share done of a fit that takes long, 0 to 1.
     """
@@ -81,6 +88,9 @@ class CalibrationTask:
     array: AccelerometerArray | None = None
     motion: Recording | None = None
     update: Calibration | None = None
+    start: Calibration | None = None
+    radius_std_m: float | None = None
+    stretch_std_s2_rad2: float | None = None
     turn_on_std_m_s2: float = 0.03
     bias_walk_m_s2_rt_s: float = 0.0
     progress: Callable[[float], object] | None = None
@@ -230,6 +240,33 @@ def calibrate_whole_array(method: CalibrationMethod, task: CalibrationTask) -> C
         progress=task.progress,
     )
     return result
+
+
+def calibrate_by_spin(method: CalibrationMethod, task: CalibrationTask) -> Calibration:
+    """Find the non-linearity of an array on a turntable; runner of ``spin``.
+
+    Raises
+    ------
+    InputError
+        As `gfimu.calibration.spin.spin`; also without the array, or of a standard deviation that is not positive.
+    """
+    if task.array is None:
+        raise InputError(f"calibration method {method.name!r} needs the array; give its name or file")
+    given = {"radius_std_m": task.radius_std_m, "stretch_std_s2_rad2": task.stretch_std_s2_rad2}
+    changes = {name: value for name, value in given.items() if value is not None}
+    for name, value in changes.items():
+        if not 0.0 < value < np.inf:
+            raise InputError(f"{name} = {value:g}: a standard deviation is positive")
+    result: Calibration = method.fit(
+        task.recording,
+        task.array,
+        start=task.start,
+        gravity=task.gravity,
+        min_plateau_s=_min_rest(method, task),
+        turn_on_std_m_s2=task.turn_on_std_m_s2,
+        policy=replace(SpinPolicy(), **changes),
+    )
+    return replace(result, warnings=(*check_gravity(task.gravity), *result.warnings))
 
 
 def calibrate_reference_gyro(method: CalibrationMethod, task: CalibrationTask) -> Calibration:

@@ -120,6 +120,15 @@ _RECORDS = (
         min_rest_s=2.0,
     ),
     CalibrationMethod(
+        "spin",
+        "gfimu.calibration.spin.fit:spin",
+        "gfimu.calibration.methods:calibrate_by_spin",
+        needs="a turntable with a tachometer, three or more speeds held",
+        estimates="q and c (K2, K3) of every axis across the table's axis, with M and b",
+        source="spin reduction of IEEE Std 836",
+        options=frozenset({"array", "start", "radius_std_m", "stretch_std_s2_rad2"}),
+    ),
+    CalibrationMethod(
         "gyro",
         "gfimu.calibration.multi_position:multi_position_gyro",
         "gfimu.calibration.methods:calibrate_reference_gyro",

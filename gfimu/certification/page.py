@@ -98,7 +98,7 @@ def _content(certificate: Certificate) -> Mapping[str, Any]:
         "factors": _range([term.coverage_factor for term in certificate.terms if term.coverage_factor is not None]),
         "budget": _budget(certificate),
         "correlations": _correlations(certificate.chips),
-        "sheet_rows": [] if sheet is None else [_sheet_row(term) for term in sheet.terms],
+        "sheet_rows": [] if sheet is None else list(_sheet_rows(sheet.terms)),
         "comparison_rows": []
         if comparison is None
         else [
@@ -156,8 +156,15 @@ def _cell(term: Term, factor: float) -> str:
     return plus_minus(term.value * factor, term.expanded * factor)
 
 
-def _sheet_row(term: Term) -> tuple[str, str, str, str]:
-    return (term.symbol, term.meaning, _cell(term, 1.0), term.unit)
+def _sheet_rows(terms: Sequence[Term]) -> Iterator[tuple[_Row, str]]:
+    """Rows of a sheet, axes side by side, each with where it is from; a quantity of the whole has one cell."""
+    groups: dict[tuple[str, str], list[Term]] = {}
+    for term in terms:
+        groups.setdefault((term.symbol, term.meaning), []).append(term)
+    for (symbol, meaning), group in groups.items():
+        cells = tuple(_cell(term, 1.0) for term in group)
+        notes = "; ".join(dict.fromkeys(term.note for term in group if term.note))
+        yield _Row(symbol, meaning, group[0].unit, cells), notes
 
 
 def _missing(chips: Sequence[ChipCertificate]) -> Mapping[str, str]:

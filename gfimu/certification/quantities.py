@@ -6,8 +6,8 @@ docs/certificate.md), without the terms that no method here determines:
     E = K1 (K0 + a_i + K2 a_i² + K3 a_i³ + δ_o a_p − δ_p a_o + K_ip a_i a_p + K_io a_i a_o + K_po a_p a_o)
 
 i, p, o are right-handed: x, y, z for the first input axis, then cyclic, so that δ_o and δ_p are right-handed rotations
-of the sensing axis about o and p. With l = b + y + q y² + c y³, y = M a: K1 = M_ii, K0 = b_i / M_ii, δ_o = M_ip / M_ii,
-δ_p = −M_io / M_ii, K2 = q_i M_ii, K3 = c_i M_ii².
+of the sensing axis about o and p. With l = b + y + q y² + (c + 2 q²) y³, y = M a (`ErrorModel.series`): K1 = M_ii,
+K0 = b_i / M_ii, δ_o = M_ip / M_ii, δ_p = −M_io / M_ii, K2 = q_i M_ii, K3 = (c_i + 2 q_i²) M_ii².
 
 Intrinsic parameters (Geist, Afridi, McGray & Gaitan, J. Res. NIST 122, 32 (2017)): norms of the rows of M, readings at
 zero input, and angles between the rows. A rotation of the frame, M R, changes none of them.
@@ -99,7 +99,8 @@ def model_quantities(chip: ChipParameters) -> Quantities:
         if chip.has_quadratic:
             state(f"{channel}_K2", q[i] * k1, by_q[:, i] * k1 + q[i] * by_k1)
         if chip.has_cubic:
-            state(f"{channel}_K3", c[i] * k1**2, by_c[:, i] * k1**2 + 2.0 * c[i] * k1 * by_k1)
+            third, by_third = c[i] + 2.0 * q[i] ** 2, by_c[:, i] + 4.0 * q[i] * by_q[:, i]
+            state(f"{channel}_K3", third * k1**2, by_third * k1**2 + 2.0 * third * k1 * by_k1)
         state(f"{channel}_delta_o", m[i, p] / k1, by_m[:, i, p] / k1 - m[i, p] / k1**2 * by_k1)
         state(f"{channel}_delta_p", -m[i, o] / k1, m[i, o] / k1**2 * by_k1 - by_m[:, i, o] / k1)
     return Quantities(tuple(names), np.array(values), np.array(rows)).without(chip.undetermined)

@@ -64,11 +64,26 @@ def _calibrate(
     ] = None,
     turn_on_std: Annotated[
         float | None,
-        typer.Option("--turn-on-std", help="With --update: turn-on repeatability of a bias, m/s²; 0.03 by default."),
+        typer.Option(
+            "--turn-on-std",
+            help="With --update, --calibration: turn-on repeatability of a bias, m/s²; 0.03 by default.",
+        ),
     ] = None,
     bias_walk: Annotated[
         float | None,
         typer.Option("--bias-walk", help="With --update: random walk of a bias between poses, m/s²/√s; 0 by default."),
+    ] = None,
+    calibration: Annotated[
+        Path | None,
+        typer.Option("--calibration", help="spin: static calibration to start from, or that of another spin."),
+    ] = None,
+    radius_std: Annotated[
+        float | None,
+        typer.Option("--radius-std", help="spin: standard deviation of a chip's place, m; 5e-4 by default."),
+    ] = None,
+    stretch_std: Annotated[
+        float | None,
+        typer.Option("--stretch-std", help="spin: standard deviation of the arm stretch, s²/rad²; 1e-7 by default."),
     ] = None,
     check: Annotated[
         Path | None, typer.Option("--check", help="Other poses at rest, which the fit does not see: |a| − g on them.")
@@ -82,6 +97,8 @@ def _calibrate(
     """Calibrate the accelerometers of a recording, each parameter with its standard deviation.
 
     Example: gfimu calibrate multi-position poses.csv --latitude 52.3 --height 80 --out calibration.json
+
+    Non-linearity on a turntable: gfimu calibrate spin run.parquet --calibration static.json --out spin.json
 
     Checked on other poses: gfimu calibrate multi-position poses.csv --out calibration.json --check others.csv
     """
@@ -108,6 +125,9 @@ def _calibrate(
             update=update,
             turn_on_std=turn_on_std,
             bias_walk=bias_walk,
+            calibration=calibration,
+            radius_std=radius_std,
+            stretch_std=stretch_std,
             check=check,
             picture=picture,
             force=force,

@@ -35,6 +35,16 @@ def _certificate(
             "--stage", help="Errors of stage and gravity, for the budget (.toml); gfimu new stage writes one to edit."
         ),
     ] = None,
+    array: Annotated[
+        str | None,
+        typer.Option("--array", help="Array, a name or .toml file: adds its sheet as an angular sensor (IEEE 671)."),
+    ] = None,
+    rest: Annotated[
+        Path | None,
+        typer.Option(
+            "--rest", help="Recording at rest: noise and bias of that sheet; else the data sheets of the parts."
+        ),
+    ] = None,
     item: Annotated[str, typer.Option("--item", help="What was calibrated: part, serial number.")] = "",
     date: Annotated[str, typer.Option("--date", help="When it was calibrated.")] = "",
     json: JsonOption = False,
@@ -45,12 +55,16 @@ def _certificate(
 
     With the stage: gfimu certificate calibration.json --stage plate.toml --out certificate
 
+    The array as an angular sensor: gfimu certificate calibration.json --array cube12 --rest rest.parquet
+
     Two laboratories: gfimu certificate calibration.json --compare theirs.json
     """
     from gfimu.certification.page import FILES
     from gfimu.commands.certificate import certificate
 
-    found = certificate(calibration, out=out, compare=compare, stage=stage, item=item, date=date)
+    found = certificate(
+        calibration, out=out, compare=compare, stage=stage, array=array, rest=rest, item=item, date=date
+    )
     files = {} if out is None else {meaning: out / name for name, meaning in FILES.items()}
     if json:
         print_json(found.to_dict() | {"files": files})
@@ -67,6 +81,10 @@ def _print(found: Certificate) -> None:
         missing = [term.name for term in (*chip.terms, *chip.intrinsic) if term.value is None]
         if missing:
             print_text(f"not determined: {', '.join(missing)}")
+    if found.angular_sensor is not None:
+        print_table(found.angular_sensor.title, header, [_row(term) for term in found.angular_sensor.terms])
+        for name, text in found.angular_sensor.conditions.items():
+            print_text(f"{name}: {text}")
     if found.comparison is not None:
         rows = [
             (
@@ -89,6 +107,8 @@ def _print(found: Certificate) -> None:
 
 
 def _row(term: Term) -> tuple[str, str, str, str, str]:
+    if term.value is None:
+        return (term.name, term.note, "", "", term.unit)
     value = f"{term.value:.7g}"
     if term.expanded is None:
         return (term.name, value, term.note, "", term.unit)

@@ -24,6 +24,9 @@ __all__ = ["calibrate"]
 _OPTION_NAMES = {
     "motion": "--motion is the motion of a whole array",
     "update": "--update carries the calibration of a whole array over",
+    "start": "--calibration is what a spin starts from",
+    "radius_std_m": "--radius-std is of the arms on a turntable",
+    "stretch_std_s2_rad2": "--stretch-std is of the arms on a turntable",
     "levelling_std_rad": "--levelling-std is the tilt of levelled faces",
     "n_parameters": "--parameters chooses the model of single chips",
     "input_kind": "--input chooses the rows for single chips",
@@ -31,7 +34,11 @@ _OPTION_NAMES = {
 """What the options are that some methods do not use, by the field of the task."""
 
 
-@writes(reads=("recording", "array", "motion", "update", "check", "column_map"), out=CALIBRATION, picture=PICTURE)
+@writes(
+    reads=("recording", "array", "motion", "update", "calibration", "check", "column_map"),
+    out=CALIBRATION,
+    picture=PICTURE,
+)
 def calibrate(
     method: str,
     recording: Recording | str | Path | MappedFile,
@@ -52,6 +59,9 @@ def calibrate(
     update: Calibration | str | Path | None = None,
     turn_on_std: float | None = None,
     bias_walk: float | None = None,
+    calibration: Calibration | str | Path | None = None,
+    radius_std: float | None = None,
+    stretch_std: float | None = None,
     check: Recording | str | Path | MappedFile | None = None,
     picture: str | Path | None = None,
     force: bool = False,
@@ -97,7 +107,12 @@ def calibrate(
         For ``array``: calibration of an earlier run to carry over.
     turn_on_std, bias_walk : float, optional
         With ``update``: change of a bias between power-ons, m/s², 0.03 by default; random walk between poses, m/s²/√s,
-        0 by default.
+        0 by default. The first also with ``calibration``.
+    calibration : Calibration, str or Path, optional
+        For ``spin``: static calibration to start from, or the result of another spin; else the data sheets.
+    radius_std, stretch_std : float, optional
+        For ``spin``: standard deviations of each coordinate of a chip, m, and of the arm stretch, s²/rad²
+        (`gfimu.calibration.spin.policy`).
     check : Recording, str or Path, optional
         Other poses at rest, which the fit does not see: |a| − g on them goes into the statistics
         (`gfimu.calibration.check_poses`).
@@ -130,8 +145,11 @@ def calibrate(
         levelling_std_rad=levelling,
         n_parameters=count,
         input_kind=None if input_kind == "averaged" else input_kind,
+        start=calibration,
+        radius_std_m=radius_std,
+        stretch_std_s2_rad2=stretch_std,
     )
-    if update is None and (turn_on_std is not None or bias_walk is not None):
+    if update is None and (bias_walk is not None or (turn_on_std is not None and calibration is None)):
         raise InputError("--turn-on-std and --bias-walk are of --update; give the calibration to carry over")
     drawing = None if array is None else as_array(array)
     local_gravity = _gravity(gravity, latitude, height)
@@ -156,6 +174,9 @@ def calibrate(
         array=_own_array(source) if drawing is None and "array" in chosen.options else drawing,
         motion=turned,
         update=None if update is None else as_calibration(update),
+        start=None if calibration is None else as_calibration(calibration),
+        radius_std_m=radius_std,
+        stretch_std_s2_rad2=stretch_std,
         turn_on_std_m_s2=0.03 if turn_on_std is None else turn_on_std,
         bias_walk_m_s2_rt_s=bias_walk or 0.0,
         progress=progress,

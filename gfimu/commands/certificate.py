@@ -13,6 +13,8 @@ from gfimu.files.outputs import OutputFolder, writes
 if TYPE_CHECKING:
     from gfimu.calibration.result import Calibration
     from gfimu.certification.certificate import Certificate, Component, Sheet
+    from gfimu.geometry.array import AccelerometerArray
+    from gfimu.recording import Recording
     from gfimu.uncertainty.stage import Stage
 
 __all__ = ["FOLDER", "certificate"]
@@ -24,13 +26,15 @@ FOLDER = OutputFolder(("certificate.json", "certificate.html"))
 """What a certificate writes."""
 
 
-@writes(reads=("calibration", "compare", "stage"), out=FOLDER)
+@writes(reads=("calibration", "compare", "stage", "array", "rest"), out=FOLDER)
 def certificate(
     calibration: Calibration | str | Path,
     *,
     out: str | Path | None = None,
     compare: Calibration | Certificate | str | Path | None = None,
     stage: Stage | str | Path | None = None,
+    array: AccelerometerArray | str | Path | None = None,
+    rest: Recording | str | Path | None = None,
     item: str = "",
     date: str = "",
     components: Iterable[Component] = (),
@@ -49,6 +53,11 @@ def certificate(
     stage : Stage, str or Path, optional
         What the laboratory states of the errors of its stage and of gravity, or its file (``gfimu new stage``):
         components of type B, by simulated calibrations.
+    array : AccelerometerArray, str or Path, optional
+        The array, its name or file: adds the sheet of the whole array as an angular sensor (IEEE 671).
+    rest : Recording, str or Path, optional
+        Recording at rest: noise, bias and bias instability of that sheet; else the data sheets of the parts. The array
+        is the recording's own where none is given.
     item : str
         What was calibrated, such as part and serial number.
     date : str
@@ -75,11 +84,12 @@ def certificate(
     from gfimu.uncertainty.stage import Stage
 
     source = str(calibration) if isinstance(calibration, str | Path) else "calibration"
+    fitted = as_calibration(calibration)
     found = _certified(
-        as_calibration(calibration),
+        fitted,
         Stage.load(stage) if isinstance(stage, str | Path) else stage,
         components=components,
-        angular_sensor=angular_sensor,
+        angular_sensor=_sheet(fitted, array, rest) or angular_sensor,
         item=item,
         date=date,
         source=source,
@@ -90,6 +100,21 @@ def certificate(
     if out is not None:
         write_certificate(out, found)
     return found
+
+
+def _sheet(
+    calibration: Calibration,
+    array: AccelerometerArray | str | Path | None,
+    rest: Recording | str | Path | None,
+) -> Sheet | None:
+    """Return the sheet of the array as an angular sensor; None where neither array nor recording is given."""
+    from gfimu.certification.angular import angular_sensor_sheet
+    from gfimu.commands.opened import as_array, as_calibrated_run, as_run
+
+    if rest is None:
+        return None if array is None else angular_sensor_sheet(calibration, as_array(array))
+    corrected, _ = as_calibrated_run(rest, array, calibration)
+    return angular_sensor_sheet(calibration, as_run(rest, array)[1], rest=corrected)
 
 
 def _certified(

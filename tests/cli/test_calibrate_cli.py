@@ -218,6 +218,68 @@ def test_a_calibration_with_nan_covariance_is_one_line(gfimu_command, poses, run
         assert refused.stderr.count("\n") == 1
 
 
+@pytest.fixture(scope="module")
+def turned(tmp_path_factory):
+    """A table that holds four speeds, the cube upright, chips without other errors than a bend of a11."""
+    t = np.arange(4000) / 100
+    rate = np.interp(t, [0, 4, 5, 13, 14, 22, 23, 31, 32, 40], [0, 0, 10, 10, 18, 18, 24, 24, 30, 30])
+    alpha = np.gradient(rate, t)
+    turns = np.outer(rate, [0.0, 0.0, 1.0]), np.outer(alpha, [0.0, 0.0, 1.0])
+    ideal = specific_force(CUBE, np.tile([0.0, 0.0, 9.80665], (len(t), 1)), turns[1], turns[0])
+    ideal[:, 0] += 1e-4 * ideal[:, 0] ** 2
+    readings = ideal + np.random.default_rng(6).normal(0, 0.02, ideal.shape)
+    path = tmp_path_factory.mktemp("table") / "turned.parquet"
+    Recording.from_arrays(t, readings, CUBE, reference={"tacho_rad_s": rate}).write(path)
+    return path
+
+
+def test_spin(gfimu_command, turned):
+    out = turned.with_name("spin.json")
+    result = gfimu_command("calibrate", "spin", turned, "--out", out, "--radius-std", 2e-4)
+    assert (result.code, result.stderr) == (0, "")
+    assert "spin, not determined: a1_q_z" in " ".join(result.stdout.split())
+    assert "radius of a chip 0.2 mm per coordinate" in " ".join(result.stdout.split())
+    found = load_calibration(out)
+    assert found.method == "spin"
+    assert abs(found.value("a1_q_x") - 1e-4) < 4 * found.std_of("a1_q_x")
+    assert found.value("a1_q_x") > 3 * found.std_of("a1_q_x")
+    again = gfimu_command(
+        *(
+            "calibrate",
+            "spin",
+            turned,
+            "--calibration",
+            out,
+            "--turn-on-std",
+            0.01,
+            "--out",
+            turned.with_name("again.json"),
+        )
+    )
+    assert again.code == 0
+    assert "K0, K1 and alignment start from the spin calibration" in " ".join(again.stdout.split())
+
+
+def test_spin_bad_input(gfimu_command, turned, poses):
+    out = turned.with_name("none.json")
+    slow = turned.with_name("slow.parquet")
+    Recording.read(turned).between(0.0, 13.0).write(slow)
+    for arguments, message in (
+        (("spin", poses), "the recording has no tacho_rad_s column"),
+        (("spin", slow), "one speed only (10 rad/s)"),
+        (("spin", turned, "--min-rest", 20), "no plateau of constant rate"),
+        (("spin", turned, "--motion", turned), "--motion is the motion of a whole array; use it with array, not spin"),
+        (("array", poses, "--calibration", turned), "--calibration is what a spin starts from; use it with spin"),
+        (("spin", turned, "--stretch-std", -1), "stretch_std_s2_rad2 = -1: a standard deviation is positive"),
+        (("spin", turned, "--array", "corners8"), "array"),
+    ):
+        result = gfimu_command("calibrate", *arguments, "--out", out)
+        assert result.code == 2, arguments
+        assert message in result.stderr
+        assert result.stderr.count("\n") == 1
+        assert not out.exists()
+
+
 def test_the_help_lists_every_method(gfimu_command):
     shown = " ".join(gfimu_command("calibrate", "--help").stdout.replace("│", " ").split())
     assert ", ".join(METHODS) in shown
