@@ -16,13 +16,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from gfimu.errors import InputError, unknown_name
 from gfimu.recording import Recording
-from gfimu.recording.rest import Rest
+from gfimu.recording.rest import Rest, mean_variance_factor
 
 __all__ = ["INPUTS", "Observations", "averaged_poses", "denoised_samples", "every_sample", "observations_from"]
 
 Floats = NDArray[np.float64]
 
-_BLOCKS = 10
 _COUNT_VARIANCE = 1.0 / 12.0
 
 
@@ -228,7 +227,7 @@ def _build(recording: Recording, rest: Rest, kind: str) -> Observations:
         poses.append(samples)
         covariances.append(np.cov(samples, rowvar=False).reshape(c, c))
         starts.append(recording.t_s[start])
-    factor = _correlation_factor(poses)
+    factor = mean_variance_factor(poses)
     covariance = _regular(np.array(covariances), recording.unit) * factor
     lengths = np.array([len(samples) for samples in poses])
     if kind == "averaged":
@@ -239,24 +238,6 @@ def _build(recording: Recording, rest: Rest, kind: str) -> Observations:
         rows = np.concatenate(poses)
         number = np.repeat(np.arange(len(poses)), lengths)
     return Observations(rows, number, covariance, recording.channels, recording.unit, np.array(starts), kind, factor)
-
-
-def _correlation_factor(poses: list[Floats]) -> float:
-    """Variance of block means over that expected of white noise, at least 1."""
-    ratios = []
-    for samples in poses:
-        size = len(samples) // _BLOCKS
-        if size < 2:
-            continue
-        blocks = samples[: size * _BLOCKS].reshape(_BLOCKS, size, -1).mean(axis=1)
-        white = samples.var(axis=0, ddof=1) / size
-        good = white > 0.0
-        ratios.extend((blocks.var(axis=0, ddof=1)[good] / white[good]).tolist())
-    if not ratios:
-        return 1.0
-    factor = float(np.mean(ratios))
-    spread = np.sqrt(2.0 / (_BLOCKS - 1) / len(ratios))
-    return factor if factor > 1.0 + 3.0 * spread else 1.0
 
 
 def _regular(covariance: Floats, unit: str) -> Floats:
