@@ -273,7 +273,14 @@ ROOMS = {
         "gfimu.recording",
     },
     "gfimu.own_rig": {"gfimu.files", "gfimu.geometry.array", "gfimu.generic_basis", "gfimu.world_model"},
-    "gfimu.position_drift": {"gfimu.geometry", "gfimu.motion", "gfimu.rate.integration"},
+    "gfimu.position_drift": {
+        "gfimu.geometry",
+        "gfimu.motion",
+        "gfimu.rate.integration",
+        "gfimu.recording",
+        "gfimu.sensor_noise",
+        "gfimu.visual.colours",
+    },
     "firmware_bridge.adxl345": set(),
     "firmware_bridge.frames": {"gfimu.files", "gfimu.geometry.array"},
     "firmware_bridge.host": {

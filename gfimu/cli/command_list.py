@@ -105,7 +105,7 @@ JOBS: dict[str, tuple[Entry, ...]] = {
         Entry("optimize", "Search the geometry of least GDOP for a number of chips in a box.", "score"),
         Entry(
             "drift",
-            "Position-drift budget of an array: closed forms, their validity limit, Monte Carlo beside.",
+            "Position-drift budget of an array in closed form, with a Monte Carlo; the drift of a recording at rest.",
             "drift",
         ),
         Entry(
