@@ -18,9 +18,10 @@ from gfimu.calibration.faults import (
 from gfimu.calibration.fit_quality import mean_factor
 from gfimu.calibration.nonlinearity import quadratic_std
 from gfimu.calibration.observations import observations_from
+from gfimu.calibration.rate_table import body_axis, find_plateaus
 from gfimu.calibration.registry import METHODS, CalibrationMethod, calibration_method
 from gfimu.calibration.result import Calibration, combine
-from gfimu.errors import InputError
+from gfimu.errors import InputError, naming
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.parts.part import Part
 from gfimu.recording import Recording
@@ -30,13 +31,35 @@ from gfimu.units import STANDARD_GRAVITY
 __all__ = [
     "METHODS",
     "CalibrationTask",
+    "RateTable",
     "calibrate",
     "calibrate_gyro",
+    "calibrate_on_rate_table",
     "calibrate_reference_gyro",
     "calibrate_triads",
     "calibrate_whole_array",
     "run_calibration",
 ]
+
+
+@dataclass(frozen=True)
+class RateTable:
+    """Recordings of a gyro on a rate table besides the first one.
+
+    Parameters
+    ----------
+    also : tuple of Recording
+        Recordings of the gyro mounted otherwise.
+    axes : tuple of str
+        Axis of the gyro along the table's, up, of the first recording and each of those: x, -y …; by default those of
+        their mountings.
+    names : tuple of str
+        Names of these recordings, for messages.
+    """
+
+    also: tuple[Recording, ...] = ()
+    axes: tuple[str, ...] = ()
+    names: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -67,6 +90,10 @@ class CalibrationTask:
         Calibration of an earlier run to carry over.
     turn_on_std_m_s2, bias_walk_m_s2_rt_s : float
         With ``update``: change of a bias between power-ons, m/s², and random walk between poses, m/s²/√s.
+    latitude_deg : float, optional
+        Latitude, degrees, for the Earth's rate.
+    rate_table : RateTable, optional
+        What a gyro on a rate table needs besides.
     progress : callable, optional
         Called with the share done of a fit that takes long, 0 to 1.
     """
@@ -83,6 +110,8 @@ class CalibrationTask:
     update: Calibration | None = None
     turn_on_std_m_s2: float = 0.03
     bias_walk_m_s2_rt_s: float = 0.0
+    latitude_deg: float | None = None
+    rate_table: RateTable | None = None
     progress: Callable[[float], object] | None = None
 
 
@@ -240,6 +269,31 @@ def calibrate_reference_gyro(method: CalibrationMethod, task: CalibrationTask) -
         unit="rad_s",
     )
     result: Calibration = method.fit(observations_from(rates, rest, "averaged"))
+    return result
+
+
+def calibrate_on_rate_table(method: CalibrationMethod, task: CalibrationTask) -> Calibration:
+    """Calibrate a gyro from one or more recordings on a rate table; runner of ``gyro-rate-table``.
+
+    Raises
+    ------
+    InputError
+        If the number of axes is not that of the recordings, or as `gfimu.calibration.rate_table.find_plateaus`.
+    """
+    table = task.rate_table or RateTable()
+    runs = (task.recording, *table.also)
+    if table.axes and len(table.axes) != len(runs):
+        raise InputError(f"{len(table.axes)} axes along the table's for {len(runs)} recordings; give one for each")
+    axes = [body_axis(name) for name in table.axes] or [None] * len(runs)
+    mountings = []
+    for run, axis, name in zip(runs, axes, table.names or [""] * len(runs), strict=True):
+        with naming(name):
+            mountings.append(
+                find_plateaus(run, axis=axis, threshold=task.rest_threshold, min_duration_s=_min_rest(method, task))
+            )
+    result: Calibration = method.fit(
+        mountings, latitude_deg=task.latitude_deg, levelling_std_rad=task.levelling_std_rad or 0.0
+    )
     return result
 
 

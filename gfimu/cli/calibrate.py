@@ -73,17 +73,31 @@ def _calibrate(
     check: Annotated[
         Path | None, typer.Option("--check", help="Other poses at rest, which the fit does not see: |a| − g on them.")
     ] = None,
+    rate_table: Annotated[
+        bool, typer.Option("--rate-table", help="gyro: RUN is of a rate table, whose tachometer is the reference.")
+    ] = False,
+    also: Annotated[
+        list[Path] | None,
+        typer.Option("--also", help="With --rate-table: a recording of the gyro mounted otherwise; repeat it."),
+    ] = None,
+    table_axes: Annotated[
+        str,
+        typer.Option(
+            "--table-axes", help="Gyro's axis along the table's, of RUN and each --also: x,y,-z; else by file."
+        ),
+    ] = "",
     picture: Annotated[Path | None, typer.Option("--picture", help="Picture to write (.png, .svg, .pdf).")] = None,
     force: ForceOption = False,
     column_map: MapOption = None,
     map_set: MapSetOption = None,
     json: JsonOption = False,
 ) -> None:
-    """Calibrate the accelerometers of a recording, each parameter with its standard deviation.
+    """Calibrate the accelerometers or the gyro of a recording, each parameter with its standard deviation.
 
     Example: gfimu calibrate multi-position poses.csv --latitude 52.3 --height 80 --out calibration.json
 
     Checked on other poses: gfimu calibrate multi-position poses.csv --out calibration.json --check others.csv
+    A gyro: gfimu calibrate gyro x.csv --rate-table --also y.csv --also z.csv --table-axes x,y,z --out gyro.json
     """
     from gfimu.commands.calibrate import calibrate
 
@@ -109,6 +123,9 @@ def _calibrate(
             turn_on_std=turn_on_std,
             bias_walk=bias_walk,
             check=check,
+            rate_table=rate_table,
+            also=also or [],
+            table_axes=table_axes,
             picture=picture,
             force=force,
         )

@@ -57,7 +57,7 @@ JOBS: dict[str, tuple[Entry, ...]] = {
     "Calibrate and estimate": (
         Entry(
             "calibrate",
-            "Calibrate the accelerometers of a recording, each parameter with its standard deviation.",
+            "Calibrate the accelerometers or the gyro of a recording, each parameter with its standard deviation.",
             "calibrate",
         ),
         Entry(

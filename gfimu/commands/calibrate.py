@@ -27,11 +27,14 @@ _OPTION_NAMES = {
     "levelling_std_rad": "--levelling-std is the tilt of levelled faces",
     "n_parameters": "--parameters chooses the model of single chips",
     "input_kind": "--input chooses the rows for single chips",
+    "rate_table": "--rate-table, --also and --table-axes are of a gyro on a rate table",
 }
 """What the options are that some methods do not use, by the field of the task."""
 
 
-@writes(reads=("recording", "array", "motion", "update", "check", "column_map"), out=CALIBRATION, picture=PICTURE)
+@writes(
+    reads=("recording", "array", "motion", "update", "check", "also", "column_map"), out=CALIBRATION, picture=PICTURE
+)
 def calibrate(
     method: str,
     recording: Recording | str | Path | MappedFile,
@@ -53,6 +56,9 @@ def calibrate(
     turn_on_std: float | None = None,
     bias_walk: float | None = None,
     check: Recording | str | Path | MappedFile | None = None,
+    rate_table: bool = False,
+    also: Sequence[Recording | str | Path | MappedFile] = (),
+    table_axes: Sequence[str] | str = (),
     picture: str | Path | None = None,
     force: bool = False,
     progress: Callable[[float], object] | None = None,
@@ -101,6 +107,14 @@ def calibrate(
     check : Recording, str or Path, optional
         Other poses at rest, which the fit does not see: |a| − g on them goes into the statistics
         (`gfimu.calibration.check_poses`).
+    rate_table : bool
+        For ``gyro``: the recording is of a rate table, whose rate (``tacho_rad_s``) is the reference
+        (`gfimu.calibration.rate_table`); the same as the method ``gyro-rate-table``. It may hold references alone.
+    also : sequence of Recording, str or Path
+        With ``rate_table``: recordings of the gyro mounted otherwise.
+    table_axes : sequence of str or str
+        With ``rate_table``: the gyro's axis along the table's, up, of the recording and each of ``also``, such as
+        ``["x", "y", "-z"]`` or ``"x,y,-z"``; by default those of the recordings' mountings.
     picture : str or Path, optional
         Picture to write, ``.png``, ``.svg`` or ``.pdf``; its magnitudes are those of ``check``, where that is given.
     force : bool
@@ -115,12 +129,13 @@ def calibrate(
         faulty, the poses don't suffice, or an output can't be written where it is asked for.
     """
     from gfimu.calibration.check_poses import check_on_poses
-    from gfimu.calibration.methods import CalibrationTask, run_calibration
+    from gfimu.calibration.methods import CalibrationTask, RateTable, run_calibration
     from gfimu.calibration.registry import calibration_method
     from gfimu.commands.opened import as_array, as_calibration, by_map, name_of
     from gfimu.recording.checks import examine
 
-    chosen = calibration_method(method)
+    on_table = rate_table or bool(also) or bool(table_axes)
+    chosen = calibration_method("gyro-rate-table" if on_table and method == "gyro" else method)
     levelling = levelling_std_rad if levelling_std is None else levelling_std
     count = n_parameters if parameters is None else parameters
     _refuse_unused(
@@ -130,12 +145,34 @@ def calibrate(
         levelling_std_rad=levelling,
         n_parameters=count,
         input_kind=None if input_kind == "averaged" else input_kind,
+        rate_table=on_table or None,
     )
     if update is None and (turn_on_std is not None or bias_walk is not None):
         raise InputError("--turn-on-std and --bias-walk are of --update; give the calibration to carry over")
     drawing = None if array is None else as_array(array)
     local_gravity = _gravity(gravity, latitude, height)
     source = by_map(recording, column_map, map_set)
+    if on_table or "rate_table" in chosen.options:
+        if check is not None or picture is not None or drawing is not None or gravity is not None:
+            raise InputError(
+                "--array, --gravity, --check and --picture are of accelerometers; leave them out for a gyro"
+            )
+        task = CalibrationTask(
+            _references(source),
+            rest_threshold=rest_threshold,
+            min_rest_s=min_rest_s if min_rest is None else min_rest,
+            levelling_std_rad=levelling,
+            latitude_deg=latitude,
+            rate_table=RateTable(
+                tuple(_references(by_map(one, column_map, map_set)) for one in also),
+                tuple(filter(None, table_axes.split(","))) if isinstance(table_axes, str) else tuple(table_axes),
+                tuple(name_of(one) for one in (recording, *also)),
+            ),
+        )
+        result = run_calibration(chosen, task)
+        if out is not None:
+            result.save(out)
+        return result
     run = _uncalibrated(source, drawing)
     examine(run, drawing, source=name_of(recording), force=force)
     turned = None if motion is None else _uncalibrated(by_map(motion, column_map, map_set), drawing)
@@ -197,6 +234,13 @@ def _uncalibrated(recording: Recording | str | Path | MappedFile, array: Acceler
     from gfimu.recording import Recording
 
     return recording if isinstance(recording, Recording) else open_uncalibrated(recording, array=array)
+
+
+def _references(recording: Recording | str | Path | MappedFile) -> Recording:
+    from gfimu.calibration.run_file import open_references
+    from gfimu.recording import Recording
+
+    return recording if isinstance(recording, Recording) else open_references(recording)
 
 
 def _own_array(recording: Recording | str | Path | MappedFile) -> AccelerometerArray:

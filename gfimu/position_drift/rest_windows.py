@@ -191,7 +191,7 @@ def rest_drift(
     starts = _windows(recording, readings, before + after + 1)
     noise = recording_noise(recording, gyros=False)
     squares = np.array([[noise.models[name][symbol].value ** 2 for name in array.channels] for symbol in TERMS])
-    t = np.arange(after + 1) * recording.sample_period
+    t = np.arange(after + 1, dtype=np.float64) * recording.sample_period
     times = np.linspace(0.0, t[-1], _TIMES + 1)[1:]
     response = NoiseResponse.of(times, before, recording.sample_rate, gravity)
     errors, means, stds, tilts = [], [], [], []
@@ -214,7 +214,7 @@ def rest_drift(
         array.name,
         float(t[-1]),
         lead,
-        recording.t_s[np.array(starts) + before],
+        np.asarray(recording.t_s[np.array(starts) + before]),
         t,
         np.array(errors),
         times,

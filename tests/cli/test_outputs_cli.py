@@ -38,6 +38,7 @@ NAMES_A_FILE = {
     "calibration",
     "update",
     "motion",
+    "also",
     "recording",
     "column_map",
 }
