@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -94,6 +95,8 @@ class CalibrationTask:
         Latitude, degrees, for the Earth's rate.
     rate_table : RateTable, optional
         What a gyro on a rate table needs besides.
+    wavelet : mapping
+        Options of `gfimu.calibration.observations.denoised_samples`, for the wavelet input.
     progress : callable, optional
         Called with the share done of a fit that takes long, 0 to 1.
     """
@@ -112,6 +115,7 @@ class CalibrationTask:
     bias_walk_m_s2_rt_s: float = 0.0
     latitude_deg: float | None = None
     rate_table: RateTable | None = None
+    wavelet: Mapping[str, Any] = field(default_factory=dict)
     progress: Callable[[float], object] | None = None
 
 
@@ -182,7 +186,8 @@ def calibrate_triads(method: CalibrationMethod, task: CalibrationTask) -> Calibr
     rest, moved = without_moved_poses(recording, rest)
     warnings += moved
     observations = replace(
-        observations_from(recording, rest, task.input_kind), quadratic_std=quadratic_std(recording, task.array)
+        observations_from(recording, rest, task.input_kind, **task.wavelet),
+        quadratic_std=quadratic_std(recording, task.array),
     )
     options: dict[str, float] = {}
     if task.levelling_std_rad is not None and "levelling_std_rad" in method.options:
@@ -284,7 +289,7 @@ def calibrate_on_rate_table(method: CalibrationMethod, task: CalibrationTask) ->
     runs = (task.recording, *table.also)
     if table.axes and len(table.axes) != len(runs):
         raise InputError(f"{len(table.axes)} axes along the table's for {len(runs)} recordings; give one for each")
-    axes = [body_axis(name) for name in table.axes] or [None] * len(runs)
+    axes = [body_axis(name) for name in table.axes] if table.axes else [None] * len(runs)
     mountings = []
     for run, axis, name in zip(runs, axes, table.names or [""] * len(runs), strict=True):
         with naming(name):

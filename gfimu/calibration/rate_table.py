@@ -108,7 +108,7 @@ def find_plateaus(
     readings = np.column_stack([run.reference[name] for name in (*GYRO_COLUMNS, table)])  # (n, 4)
     seen = replace(run, readings=readings, channels=("gyro1", "gyro2", "gyro3", "table"), reference={}, unit="rad_s")
     rest = detect_rest(seen, threshold=threshold, min_duration_s=min_duration_s)
-    complete = np.isfinite(readings).all(axis=1)
+    complete = np.asarray(np.isfinite(readings).all(axis=1))
     rows = [np.arange(start, stop)[complete[start:stop]] for start, stop in zip(rest.start, rest.stop, strict=True)]
     rows = [one for one in rows if len(one) > 1]
     if not rows:

@@ -44,6 +44,17 @@ def _calibrate(
     input_kind: Annotated[
         str, typer.Option("--input", help="Rows that the fit uses: averaged, raw or wavelet.")
     ] = "averaged",
+    wavelet_level: Annotated[
+        int | None, typer.Option("--wavelet-level", help="With --input wavelet: level of the transform; 4 by default.")
+    ] = None,
+    wavelet_threshold: Annotated[
+        str | None,
+        typer.Option(
+            "--wavelet-threshold",
+            help="With --input wavelet: leave out all details (none, the default), or those below the universal "
+            "threshold (soft or hard).",
+        ),
+    ] = None,
     rest_threshold: Annotated[
         float | None,
         typer.Option("--rest-threshold", help="Threshold of rest, reading unit squared; else from the data."),
@@ -113,6 +124,8 @@ def _calibrate(
             height=height,
             parameters=parameters,
             input_kind=input_kind,
+            wavelet_level=wavelet_level,
+            wavelet_threshold=wavelet_threshold,
             rest_threshold=rest_threshold,
             min_rest=min_rest,
             levelling_std=levelling_std,

@@ -48,6 +48,8 @@ def calibrate(
     height: float = 0.0,
     parameters: int | None = None,
     input_kind: str = "averaged",
+    wavelet_level: int | None = None,
+    wavelet_threshold: str | None = None,
     rest_threshold: float | None = None,
     min_rest: float | None = None,
     levelling_std: float | None = None,
@@ -90,6 +92,9 @@ def calibrate(
         Parameters per triad; two names of one argument.
     input_kind : {"averaged", "raw", "wavelet"}
         Rows that the fit uses (``--input``).
+    wavelet_level, wavelet_threshold : int and {"none", "soft", "hard"}, optional
+        With the wavelet input: level of the transform, 4 by default, and what becomes of its details: all are left out,
+        or those below the universal threshold (`gfimu.calibration.observations.denoised_samples`).
     rest_threshold : float, optional
         Threshold of rest, reading unit squared; chosen by the data if not given.
     min_rest, min_rest_s : float, optional
@@ -136,6 +141,8 @@ def calibrate(
 
     on_table = rate_table or bool(also) or bool(table_axes)
     chosen = calibration_method("gyro-rate-table" if on_table and method == "gyro" else method)
+    given = {"level": wavelet_level, "threshold": wavelet_threshold}
+    wavelet = {key: value for key, value in given.items() if value is not None}
     levelling = levelling_std_rad if levelling_std is None else levelling_std
     count = n_parameters if parameters is None else parameters
     _refuse_unused(
@@ -144,7 +151,7 @@ def calibrate(
         update=update,
         levelling_std_rad=levelling,
         n_parameters=count,
-        input_kind=None if input_kind == "averaged" else input_kind,
+        input_kind=None if input_kind == "averaged" and not wavelet else input_kind,
         rate_table=on_table or None,
     )
     if update is None and (turn_on_std is not None or bias_walk is not None):
@@ -195,6 +202,7 @@ def calibrate(
         update=None if update is None else as_calibration(update),
         turn_on_std_m_s2=0.03 if turn_on_std is None else turn_on_std,
         bias_walk_m_s2_rt_s=bias_walk or 0.0,
+        wavelet=wavelet,
         progress=progress,
     )
     result = run_calibration(chosen, task)
