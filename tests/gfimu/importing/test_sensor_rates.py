@@ -1,4 +1,4 @@
-"""Logs in which every sensor has a rate of its own: slower ones keep their times, and others are said to be interpolated."""
+"""Logs with a rate per sensor: slower ones keep their times, others are interpolated with a note."""
 
 import warnings
 
