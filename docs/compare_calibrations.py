@@ -85,7 +85,9 @@ def compare(trials: int, *, seed: int = 1, levelling: tuple[float, ...] = LEVELL
     return Comparison({key: np.array(values) for key, values in residuals.items()})
 
 
-def compare_wavelets(trials: int, *, seed: int = 1) -> dict[tuple[str, int, str], float]:
+def compare_wavelets(
+    trials: int, *, seed: int = 1, levels: tuple[int, ...] = WAVELET_LEVELS
+) -> dict[tuple[str, int, str], float]:
     """Compare the wavelet input, by level and threshold, with averages, for level faces.
 
     Returns
@@ -96,7 +98,7 @@ def compare_wavelets(trials: int, *, seed: int = 1) -> dict[tuple[str, int, str]
     """
     rng = np.random.default_rng(seed)
     squares: dict[tuple[str, int, str], float] = {}
-    inputs = [(level, threshold) for level in WAVELET_LEVELS for threshold in THRESHOLDS]
+    inputs = [(level, threshold) for level in levels for threshold in THRESHOLDS]
     for _ in range(trials):
         truth = ErrorModel(np.tril(np.eye(3) + rng.normal(0, 0.01, (3, 3))), rng.normal(0, 0.3, 3))
         check = rng.normal(size=(CHECK_POSES, 3))
@@ -114,14 +116,12 @@ def compare_wavelets(trials: int, *, seed: int = 1) -> dict[tuple[str, int, str]
 
 
 def wavelet_table(ratios: dict[tuple[str, int, str], float]) -> str:
-    """Return the ratios of `compare_wavelets` as a Markdown table, a row per level."""
-    lines = ["| input | details | " + " | ".join(METHODS) + " |", "|---|---|" + "---|" * len(METHODS)]
-    rows = dict.fromkeys((level, threshold) for _, level, threshold in ratios)
-    words = {"none": "left out", "soft": "soft threshold", "hard": "hard threshold"}
-    for level, threshold in rows:
-        cells = [f"{ratios[name, level, threshold]:.3f}" for name in METHODS]
-        kind = f"level {level} | {words[threshold]}" if level else "raw | –"
-        lines.append(f"| {kind} | " + " | ".join(cells) + " |")
+    """Return the ratios of `compare_wavelets` as a Markdown table: a row per level, thresholds none, soft, hard."""
+    lines = ["| level | " + " | ".join(METHODS) + " |", "|---|" + "---|" * len(METHODS)]
+    for level in dict.fromkeys(level for _, level, _ in ratios):
+        kinds = [kind for kind in THRESHOLDS if (next(iter(METHODS)), level, kind) in ratios]
+        cells = [" / ".join(f"{ratios[name, level, kind]:.3f}" for kind in kinds) for name in METHODS]
+        lines.append(f"| {level or 'raw'} | " + " | ".join(cells) + " |")
     return "\n".join(lines)
 
 

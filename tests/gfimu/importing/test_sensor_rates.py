@@ -171,3 +171,15 @@ def test_a_column_of_times_that_is_missing_is_named(tmp_path):
     keys = map_of('reference.tacho_rad_s={column="w", unit="rad/s", time="t_tacho"}')
     with pytest.raises(InputError, match="column 't_tacho' of the time is missing"):
         gfimu.convert(file, tmp_path / "run.csv", map_set=keys)
+
+
+def test_noise_of_a_slower_gyro_is_that_at_its_own_rate():
+    rng = np.random.default_rng(9)
+    t = np.arange(20000) / 100.0
+    gyro = np.full(len(t), np.nan)
+    gyro[::2] = 0.01 * rng.standard_normal(10000)
+    reference = {"gyro_x_rad_s": gyro, "gyro_t_s": np.where(np.isfinite(gyro), t + 0.003, np.nan)}
+    recording = gfimu.Recording(t, rng.standard_normal((len(t), 3)), ("a11", "a12", "a13"), reference)
+    found = gfimu.noise(recording, stretch="all").models["gyro_x"]
+    assert found.allan.rate == pytest.approx(50.0)
+    assert found["N"].value == pytest.approx(0.01 / np.sqrt(50.0), rel=0.05)
