@@ -10,6 +10,7 @@ import gfimu
 from gfimu import InputError
 from gfimu.errors import RecordingWarning
 from gfimu.importing import load_map
+from gfimu.importing.piece import nearest_rows
 from gfimu.recording.reference_times import reference_on_rows, reference_series
 
 ACCEL = np.arange(0.0, 10.0, 0.01)
@@ -158,6 +159,14 @@ def test_a_sensor_that_is_not_there_is_said(long_log, tmp_path):
     )
     with pytest.warns(RecordingWarning, match="no table 'sensor=wh', so no tacho_rad_s"):
         gfimu.convert(long_log, tmp_path / "run.csv", map_set=keys)
+
+
+def test_a_row_has_the_mean_of_what_was_read_in_it():
+    values, read = nearest_rows(
+        np.array([0.0, 1.0, 2.0]), np.array([0.8, 1.3, 1.9, 4.0]), np.array([1.0, 3.0, np.nan, 9.0])
+    )
+    assert_allclose(values, [np.nan, 2.0, np.nan])
+    assert_allclose(read, [np.nan, 1.05, np.nan])
 
 
 def test_a_column_has_a_time_or_a_rate():

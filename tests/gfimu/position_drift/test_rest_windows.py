@@ -22,14 +22,19 @@ def squares(covariance, **coefficients):
     return np.array([coefficients.get(symbol, 0.0) ** 2 * covariance for symbol in TERMS])
 
 
-@pytest.mark.parametrize("lead", [LEAD, 40.0])
-def test_white_noise_follows_the_laws_of_drift(lead):
+def off_centre():
+    """A cube whose origin is far from its chips: errors of α and p are correlated."""
+    return CUBE.with_geometry([chip.position + [0.1, 0.2, 0.3] for chip in CUBE.chips], [c.axes for c in CUBE.chips])
+
+
+@pytest.mark.parametrize(("lead", "array"), [(LEAD, CUBE), (40.0, CUBE), (LEAD, off_centre())])
+def test_white_noise_follows_the_laws_of_drift(lead, array):
     """The mean over the lead leaves a constant bias of variance N²/lead; the rest is the budget's."""
     density = 3e-3  # two-sided root, m/s²/√Hz
     response = NoiseResponse.of(TIMES, round(lead * 1000.0), 1000.0, G)
-    _, found, tilt = response.prediction(squares(motion_covariance(CUBE), N=density))
+    _, found, tilt = response.prediction(squares(motion_covariance(array), N=density))
     sources = ErrorSources(bias=density / np.sqrt(lead), noise_density=density * np.sqrt(2.0))
-    budget = drift_budget(CUBE, TIME, sources, gravity=G)
+    budget = drift_budget(array, TIME, sources, gravity=G)
     horizontal = (slice(0, 2), slice(0, 2))
     assert_allclose(found[-1][horizontal], budget.covariance[horizontal], rtol=0.01, atol=1e-9)
     assert np.sqrt(tilt[-1, 0]) == pytest.approx(budget.tilt_std, rel=0.01)
