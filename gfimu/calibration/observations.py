@@ -27,6 +27,7 @@ __all__ = [
     "denoised_samples",
     "every_sample",
     "observations_from",
+    "regular_covariance",
 ]
 
 Floats = NDArray[np.float64]
@@ -283,7 +284,7 @@ def _build(recording: Recording, rest: Rest, kind: str) -> Observations:
         covariances.append(np.cov(samples, rowvar=False).reshape(c, c))
         starts.append(recording.t_s[start])
     factor = mean_variance_factor(poses)
-    covariance = _regular(np.array(covariances), recording.unit) * factor
+    covariance = regular_covariance(np.array(covariances), recording.unit) * factor
     lengths = np.array([len(samples) for samples in poses])
     if kind == "averaged":
         rows = np.array([samples.mean(axis=0) for samples in poses])
@@ -295,8 +296,8 @@ def _build(recording: Recording, rest: Rest, kind: str) -> Observations:
     return Observations(rows, number, covariance, recording.channels, recording.unit, np.array(starts), kind, factor)
 
 
-def _regular(covariance: Floats, unit: str) -> Floats:
-    """Give readings that never change within a pose the variance of rounding, or of the other poses."""
+def regular_covariance(covariance: Floats, unit: str) -> Floats:
+    """Give readings that never change within a pose the variance of rounding, or of the other poses; (p, c, c)."""
     diagonal = np.einsum("pcc->pc", covariance)
     floor = _COUNT_VARIANCE if unit == "lsb" else 0.0
     typical = np.median(diagonal, axis=0)

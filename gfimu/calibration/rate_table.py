@@ -21,6 +21,7 @@ from scipy.spatial.transform import Rotation
 from gfimu.calibration.error_model import free_elements
 from gfimu.calibration.fit_quality import covariance_scale
 from gfimu.calibration.known_poses import forward_design
+from gfimu.calibration.observations import regular_covariance
 from gfimu.calibration.result import Calibration, parameter_names
 from gfimu.errors import InputError
 from gfimu.geometry.gravity import EARTH_RATE
@@ -39,6 +40,7 @@ _TABLE_RATES = ("tacho_rad_s", "command_rad_s")
 
 _GAUGE = "poses"
 _RANK = 1e-9  # numerical: of the largest singular value of the true inputs, rad/s
+_JITTER = 1e-13  # numerical: of the largest variance, by which a covariance stays positive definite
 _PASSES = 3  # numerical: the covariance needs M, which is one to a few per cent
 
 
@@ -119,13 +121,12 @@ def find_plateaus(
     stretches = [readings[one] for one in rows]
     counts = np.array([len(one) for one in stretches])
     means = np.array([one.mean(axis=0) for one in stretches])
-    noise = np.array([np.cov(one, rowvar=False) for one in stretches]) / counts[:, None, None]
-    noise *= mean_variance_factor(stretches)
+    noise = regular_covariance(np.array([np.cov(one, rowvar=False) for one in stretches]), seen.unit)
+    noise *= mean_variance_factor(stretches) / counts[:, None, None]  # of the means
     known = np.isfinite(readings[:, 3])
     rate = np.interp(run.t_s, run.t_s[known], readings[known, 3])
     angle = integrate_samples(run.t_s, rate[:, None], np.zeros(1), method="trapezoid")[:, 0]
     up = Rotation.from_rotvec(run.mounting_rotvec).inv().apply([0.0, 0.0, 1.0]) if axis is None else axis
-    floor = np.finfo(float).tiny * np.eye(3)  # of readings that never change
     return Plateaus(
         np.asarray(up, dtype=np.float64),
         means[:, 3],
@@ -133,7 +134,7 @@ def find_plateaus(
         np.array([angle[one[-1]] - angle[one[0]] for one in rows]),
         np.array([0.5 * (angle[one[-1]] + angle[one[0]]) for one in rows]),
         means[:, :3],
-        noise[:, :3, :3] + floor,
+        noise[:, :3, :3],
     )
 
 
@@ -288,4 +289,5 @@ def _covariance(
         first += len(one.rate)
     sources.append(spin_up)
     shift = (np.array(sources) @ sensitivity.T).reshape(len(sources), -1)  # (s, 3p)
-    return np.asarray(matrix.reshape(3 * count, 3 * count) + shift.T @ shift)
+    whole = matrix.reshape(3 * count, 3 * count) + shift.T @ shift
+    return np.asarray(whole + _JITTER * whole.diagonal().max() * np.eye(len(whole)))

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+import gfimu
 from gfimu import AccelerometerArray, ErrorSources, InputError, Recording, drift_budget, specific_force
 from gfimu.position_drift.budget import motion_covariance
 from gfimu.position_drift.rest_windows import NoiseResponse, rest_drift
@@ -31,12 +32,12 @@ def off_centre():
 def test_white_noise_follows_the_laws_of_drift(lead, array):
     """The mean over the lead leaves a constant bias of variance N²/lead; the rest is the budget's."""
     density = 3e-3  # two-sided root, m/s²/√Hz
-    response = NoiseResponse.of(TIMES, round(lead * 1000.0), 1000.0, G)
+    response = NoiseResponse.of(TIMES, round(lead * 250.0), 250.0, G)
     _, found, tilt = response.prediction(squares(motion_covariance(array), N=density))
     sources = ErrorSources(bias=density / np.sqrt(lead), noise_density=density * np.sqrt(2.0))
     budget = drift_budget(array, TIME, sources, gravity=G)
     horizontal = (slice(0, 2), slice(0, 2))
-    assert_allclose(found[-1][horizontal], budget.covariance[horizontal], rtol=0.01, atol=1e-9)
+    assert_allclose(found[-1][horizontal], budget.covariance[horizontal], rtol=0.02, atol=1e-9)
     assert np.sqrt(tilt[-1, 0]) == pytest.approx(budget.tilt_std, rel=0.01)
 
 
@@ -129,3 +130,13 @@ def test_a_rest_with_missing_samples_gives_no_window():
 def test_what_cannot_be_done_is_refused(options, words):
     with pytest.raises(InputError, match=words):
         rest_drift(at_rest(4, N=2e-3), CUBE, **options)
+
+
+def test_eight_chips_in_the_hand_drift_as_their_noise_says(shared_data):
+    """MIMU4444, some twenty poses; after 1 s the tilt is still small. The first window is just after power-on."""
+    file = shared_data / "mimu4444" / "exp_1.bin.gz"
+    found = gfimu.drift_of_rest(file, "mimu4444", time=1.0, lead=5.0)
+    low, high = found.ratio_interval
+    assert found.valid
+    assert len(found.start_s) > 50
+    assert low < found.ratio < high
