@@ -162,10 +162,12 @@ def rate_table_gyro(
     Raises
     ------
     InputError
-        If the latitude is out of range.
+        If the latitude or the standard deviation is out of range.
     """
     if latitude_deg is not None and not -90.0 <= latitude_deg <= 90.0:
         raise InputError(f"latitude {latitude_deg:g}° is outside −90…90; give it in degrees")
+    if not 0.0 <= levelling_std_rad < math.inf:
+        raise InputError(f"--levelling-std is {levelling_std_rad:g} rad; it must be zero or above")
     vertical = 0.0 if latitude_deg is None else EARTH_RATE * math.sin(math.radians(latitude_deg))
     axes = np.concatenate([np.tile(one.axis, (len(one.rate), 1)) for one in mountings])  # (p, 3)
     true = (np.concatenate([one.rate for one in mountings]) + vertical)[:, None] * axes

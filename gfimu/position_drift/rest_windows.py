@@ -183,8 +183,10 @@ def rest_drift(
         If the array can't see all six motions.
     """
     for name, value in (("--time", time), ("--lead", lead)):
-        if not (math.isfinite(value) and value * recording.sample_rate >= 2.0):
+        if not 2.0 <= value * recording.sample_rate < math.inf:
             raise InputError(f"{name} is {value:g} s; it must be two samples or more ({2 / recording.sample_rate:g} s)")
+    if not 0.0 < gravity < math.inf:
+        raise InputError(f"gravity is {gravity:g} m/s²; it must be a number above zero")
     inverse = pseudo_inverse(array)  # (6, c)
     readings = recording.for_array(array)
     before, after = round(lead * recording.sample_rate), round(time * recording.sample_rate)

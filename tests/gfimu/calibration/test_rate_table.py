@@ -180,6 +180,7 @@ def test_axes_given_stand_for_the_mountings():
         ({"min_rest": 60.0}, "no stretch of constant rate of 60 s"),
         ({"latitude": 95.0}, "latitude 95° is outside"),
         ({"gravity": 9.8}, "are of accelerometers"),
+        ({"levelling_std": float("nan")}, "--levelling-std is nan rad"),
     ],
 )
 def test_what_does_not_fit_is_refused(options, words):

@@ -125,6 +125,8 @@ def test_a_rest_with_missing_samples_gives_no_window():
         ({"time": 0.0}, "--time is 0 s"),
         ({"lead": -1.0}, "--lead is -1 s"),
         ({"time": float("nan")}, "--time is nan s"),
+        ({"time": 1e308}, "--time is 1e"),
+        ({"gravity": float("inf")}, "gravity is inf"),
     ],
 )
 def test_what_cannot_be_done_is_refused(options, words):
