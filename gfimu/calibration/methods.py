@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -18,10 +19,11 @@ from gfimu.calibration.faults import (
 from gfimu.calibration.fit_quality import mean_factor
 from gfimu.calibration.nonlinearity import quadratic_std
 from gfimu.calibration.observations import Observations, observations_from
+from gfimu.calibration.rate_table import body_axis, find_plateaus
 from gfimu.calibration.registry import METHODS, CalibrationMethod, calibration_method
 from gfimu.calibration.result import Calibration, combine
 from gfimu.calibration.spin.policy import SpinPolicy
-from gfimu.errors import InputError
+from gfimu.errors import InputError, naming
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.parts.part import Part
 from gfimu.recording import Recording
@@ -31,14 +33,36 @@ from gfimu.units import STANDARD_GRAVITY
 __all__ = [
     "METHODS",
     "CalibrationTask",
+    "RateTable",
     "calibrate",
     "calibrate_by_spin",
     "calibrate_gyro",
+    "calibrate_on_rate_table",
     "calibrate_reference_gyro",
     "calibrate_triads",
     "calibrate_whole_array",
     "run_calibration",
 ]
+
+
+@dataclass(frozen=True)
+class RateTable:
+    """Recordings of a gyro on a rate table besides the first one.
+
+    Parameters
+    ----------
+    also : tuple of Recording
+        Recordings of the gyro mounted otherwise.
+    axes : tuple of str
+        Axis of the gyro along the table's, up, of the first recording and each of those: x, -y …; by default those of
+        their mountings.
+    names : tuple of str
+        Names of these recordings, for messages.
+    """
+
+    also: tuple[Recording, ...] = ()
+    axes: tuple[str, ...] = ()
+    names: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -74,6 +98,12 @@ class CalibrationTask:
     turn_on_std_m_s2, bias_walk_m_s2_rt_s : float
         With ``update`` or ``start``: change of a bias between power-ons, m/s²; with ``update`` random walk between
         poses, m/s²/√s.
+    latitude_deg : float, optional
+        Latitude, degrees, for the Earth's rate.
+    rate_table : RateTable, optional
+        What a gyro on a rate table needs besides.
+    wavelet : mapping
+        Options of `gfimu.calibration.observations.denoised_samples`, for the wavelet input.
     progress : callable, optional
         Called with the share done of a fit that takes long, 0 to 1.
     """
@@ -93,6 +123,9 @@ class CalibrationTask:
     stretch_std_s2_rad2: float | None = None
     turn_on_std_m_s2: float = 0.03
     bias_walk_m_s2_rt_s: float = 0.0
+    latitude_deg: float | None = None
+    rate_table: RateTable | None = None
+    wavelet: Mapping[str, Any] = field(default_factory=dict)
     progress: Callable[[float], object] | None = None
 
 
@@ -163,7 +196,8 @@ def calibrate_triads(method: CalibrationMethod, task: CalibrationTask) -> Calibr
     rest, moved = without_moved_poses(recording, rest)
     warnings += moved
     observations = replace(
-        observations_from(recording, rest, task.input_kind), quadratic_std=quadratic_std(recording, task.array)
+        observations_from(recording, rest, task.input_kind, **task.wavelet),
+        quadratic_std=quadratic_std(recording, task.array),
     )
     options: dict[str, float] = {}
     if task.levelling_std_rad is not None and "levelling_std_rad" in method.options:
@@ -290,6 +324,31 @@ def calibrate_reference_gyro(method: CalibrationMethod, task: CalibrationTask) -
         unit="rad_s",
     )
     result: Calibration = method.fit(observations_from(rates, rest, "averaged"))
+    return result
+
+
+def calibrate_on_rate_table(method: CalibrationMethod, task: CalibrationTask) -> Calibration:
+    """Calibrate a gyro from one or more recordings on a rate table; runner of ``gyro-rate-table``.
+
+    Raises
+    ------
+    InputError
+        If the number of axes is not that of the recordings, or as `gfimu.calibration.rate_table.find_plateaus`.
+    """
+    table = task.rate_table or RateTable()
+    runs = (task.recording, *table.also)
+    if table.axes and len(table.axes) != len(runs):
+        raise InputError(f"{len(table.axes)} axes along the table's for {len(runs)} recordings; give one for each")
+    axes = [body_axis(name) for name in table.axes] if table.axes else [None] * len(runs)
+    mountings = []
+    for run, axis, name in zip(runs, axes, table.names or [""] * len(runs), strict=True):
+        with naming(name):
+            mountings.append(
+                find_plateaus(run, axis=axis, threshold=task.rest_threshold, min_duration_s=_min_rest(method, task))
+            )
+    result: Calibration = method.fit(
+        mountings, latitude_deg=task.latitude_deg, levelling_std_rad=task.levelling_std_rad or 0.0
+    )
     return result
 
 

@@ -136,6 +136,15 @@ _RECORDS = (
         estimates="bias of the reference gyro; M where the noise leaves it visible",
         source="|omega| = Earth's rate, in the form of the Persian calibration paper, section 2.3.2",
     ),
+    CalibrationMethod(
+        "gyro-rate-table",
+        "gfimu.calibration.rate_table:rate_table_gyro",
+        "gfimu.calibration.methods:calibrate_on_rate_table",
+        needs="stretches of constant rate on a rate table, three mountings or more",
+        estimates="M and b of the gyro",
+        source="the Persian calibration paper's eqs 5-8, with rates of the table for gravity",
+        options=frozenset({"rate_table", "levelling_std_rad"}),
+    ),
 )
 
 METHODS: Mapping[str, CalibrationMethod] = MappingProxyType({method.name: method for method in _RECORDS})

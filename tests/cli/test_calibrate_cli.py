@@ -168,7 +168,7 @@ def test_raw_counts(gfimu_command, tmp_path, poses, run):
     [
         (
             ("seven-position", "POSES"),
-            "unknown calibration method 'seven-position'; valid: array, gyro, multi-position",
+            "unknown calibration method 'seven-position'; valid: array, gyro, gyro-rate-table, multi-position",
         ),
         (("multi-position", "RUN"), "no rest found"),
         (("multi-position", "POSES", "--gravity", 9.81, "--latitude", 50), "give --gravity or --latitude"),
@@ -181,7 +181,7 @@ def test_raw_counts(gfimu_command, tmp_path, poses, run):
         (("six-position", "POSES", "--motion", "RUN"), "use it with array, not six-position"),
         (
             ("recursive", "POSES", "--levelling-std", 0.001),
-            "use it with six-position or twelve-position, not recursive",
+            "use it with six-position or twelve-position or gyro-rate-table, not recursive",
         ),
         (("array", "POSES", "--parameters", 9), "twelve-position, not array"),
         (("array", "POSES", "--input", "raw"), "twelve-position, not array"),
@@ -331,3 +331,52 @@ def test_noise_bad_input(gfimu_command, still, tmp_path):
         assert result.code == 2
         assert message in result.stderr
         assert result.stderr.count("\n") == 1
+
+
+@pytest.fixture
+def on_table(tmp_path):
+    """Files of a gyro alone on a rate table, with its x-, y- and z-axis along the table's; no accelerometers."""
+    rng = np.random.default_rng(2)
+    rates = np.repeat([0.0, 2.0, -2.0, 5.0, -5.0], 2)
+    t = np.arange(5000) / 100.0
+    table = np.interp(t, np.concatenate([[10.0 * number, 10.0 * number + 7.0] for number in range(5)]), rates)
+    files = []
+    for axis, name in enumerate("xyz"):
+        gyro = np.array([0.01, -0.02, 0.0]) + np.outer(table, np.diag([1.02, 0.99, 1.0])[:, axis])
+        gyro += 1e-3 * rng.standard_normal(gyro.shape)
+        head = "t_s,gyro_x_rad_s,gyro_y_rad_s,gyro_z_rad_s,tacho_rpm"
+        files.append(tmp_path / f"{name}.csv")
+        rows = np.column_stack([t, gyro, table * 30.0 / np.pi])
+        np.savetxt(files[-1], rows, delimiter=",", header=head, comments="", fmt="%.8f")
+    return files
+
+
+def test_a_gyro_on_a_rate_table(gfimu_command, on_table, tmp_path):
+    x, y, z = on_table
+    how = ("calibrate", "gyro", x, "--rate-table", "--out", tmp_path / "gyro.json")
+    result = gfimu_command(*how, "--also", y, "--also", z, "--table-axes", "x,y,z")
+    assert (result.code, result.stderr) == (0, "")
+    found = load_calibration(tmp_path / "gyro.json")
+    expected = np.concatenate([np.diag([1.02, 0.99, 1.0]).ravel(), [0.01, -0.02, 0.0]])
+    assert np.all(np.abs(found.values - expected) < 5.0 * found.std)
+    assert "against the table's rate" in " ".join(result.stdout.split())
+    alone = gfimu_command(*how)
+    assert "rates about x, y is not determined" in " ".join(alone.stdout.split())
+
+
+def test_what_a_rate_table_refuses(gfimu_command, on_table, tmp_path):
+    x, y, _ = on_table
+    (tmp_path / "no_tacho.csv").write_text("t_s,gyro_x_rad_s,gyro_y_rad_s,gyro_z_rad_s\n0,1,2,3\n0.01,1,2,3\n")
+    out = ("--out", tmp_path / "gyro.json")
+    for arguments, words in (
+        (("gyro", tmp_path / "no_tacho.csv", "--rate-table"), "no_tacho.csv: the recording lacks tacho_rad_s"),
+        (("gyro", x, "--rate-table", "--also", y, "--table-axes", "x"), "1 axes along the table's for 2 recordings"),
+        (("gyro", x, "--rate-table", "--table-axes", "w"), "give x, y, z, -x, -y or -z"),
+        (("gyro", x, "--rate-table", "--picture", tmp_path / "p.png"), "are of accelerometers"),
+        (("six-position", x, "--rate-table"), "are of a gyro on a rate table"),
+        (("gyro", x, "--rate-table", "--also", tmp_path / "gone.csv"), "gone.csv: no such file"),
+    ):
+        result = gfimu_command("calibrate", *arguments, *out)
+        assert (result.code, result.stderr.count("\n")) == (2, 1), result.stderr
+        assert words in result.stderr
+        assert not (tmp_path / "gyro.json").exists()
