@@ -118,7 +118,10 @@ def _with_costs(ways: Sequence[Otherwise], before: Costs, evidence: Evidence) ->
 
 def _explaining(tried: Sequence[tuple[Otherwise, Costs]], before: Costs, evidence: Evidence) -> list[Explanation]:
     """Return the ways that explain a contradiction."""
-    usable = any(one.motion < _FITS for one in [before, *(costs for _, costs in tried)])
+    # A motion that no way fits, of those that the rests allow, can't be compared: it was too long or too fast.
+    usable = before.motion < _FITS or any(
+        costs.motion < _FITS and max(costs.worst_rest, costs.level, costs.parity) < _FITS for _, costs in tried
+    )
     found = []
     for way, after in tried:
         compared = usable and bool(np.isfinite(after.motion))
