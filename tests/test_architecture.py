@@ -275,7 +275,7 @@ ROOMS = {
     "gfimu.own_rig": {"gfimu.files", "gfimu.geometry.array", "gfimu.generic_basis", "gfimu.world_model"},
     "gfimu.position_drift": {"gfimu.geometry", "gfimu.motion", "gfimu.rate.integration"},
     "firmware_bridge.adxl345": set(),
-    "firmware_bridge.frames": {"gfimu.files", "gfimu.geometry.array"},
+    "firmware_bridge.frames": {"gfimu.files", "gfimu.geometry.array", "gfimu.parts"},
     "firmware_bridge.host": {
         "firmware_bridge.frames",
         "firmware_bridge.sources",

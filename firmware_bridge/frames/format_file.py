@@ -144,7 +144,7 @@ def load_format(path: str | Path) -> FrameFormat:
 
 
 def _temperature(spec: FormatFile, array: AccelerometerArray, source: str) -> TemperatureField:
-    """Return what the number of the temperature means: by the file, by the part, or °C as the readings are in a unit."""
+    """Return what the number of the temperature means: by the file, the part, or °C beside readings in a unit."""
     lsb, zero = spec.temperature_lsb_K, spec.temperature_zero_degC
     if spec.unit != "lsb":
         lsb, zero = 1.0 if lsb is None else lsb, 0.0 if zero is None else zero
@@ -167,6 +167,8 @@ def _packet(spec: Packet, source: str) -> tuple[StreamLayout, Collection[str], i
     for name in ("time", "counts"):
         if names.count(name) != 1:
             raise InputError(f"{source}: [stream]: fields {', '.join(names)}: give one with name = {name!r}")
+    if any(one.name == "temperature" and one.count != 1 for one in spec.fields):
+        raise InputError(f"{source}: [stream]: field 'temperature': one number for the board; leave its count out")
     if len(set(names)) != len(names):
         raise InputError(f"{source}: [stream]: fields {', '.join(names)}: two have the same name")
     if spec.checksum not in CHECKSUMS:

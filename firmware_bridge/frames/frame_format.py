@@ -23,7 +23,16 @@ from firmware_bridge.frames.packets import PacketLayout, StreamLayout
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
 
-__all__ = ["FORMATS", "LPC1768_DTYPE", "MIMU4444_DTYPE", "FrameFormat", "Status", "TemperatureField", "encode_message", "encode_samples"]
+__all__ = [
+    "FORMATS",
+    "LPC1768_DTYPE",
+    "MIMU4444_DTYPE",
+    "FrameFormat",
+    "Status",
+    "TemperatureField",
+    "encode_message",
+    "encode_samples",
+]
 
 FRAME_VERSION = 1
 

@@ -29,6 +29,7 @@ __all__ = [
     "check_image",
     "compiler_version",
     "image_path",
+    "named_image",
     "source_hash",
 ]
 
@@ -137,6 +138,13 @@ def array_definition(array: str) -> dict[str, str]:
             "give the array a shorter one, or name it with gfimu record --array"
         )
     return {"GFIMU_ARRAY": f'"{array}"'}
+
+
+def named_image(image: ElfImage, array: str) -> ElfImage:
+    """Return a finished image that states another array; as it is if it has no place for a name."""
+    array_definition(array)  # whether it is a name
+    address = image.symbols.get(ARRAY_SYMBOL)
+    return image if address is None else image.with_bytes(address, array.encode().ljust(_LONGEST_NAME, b"\0"))
 
 
 def build(

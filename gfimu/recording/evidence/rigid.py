@@ -331,9 +331,7 @@ class Evidence:
         prior = noise / len(matrices.null) / np.maximum(bias_std, 1e-9) ** 2
         seen = np.linalg.pinv(matrices.sensitivity, rcond=0.05)
         fastest = int(np.argmax(np.sum(z**2, axis=1)))  # where biases matter least
-        rates = _rates_of(seen @ z[:5].mean(axis=0)) + [
-            rate - turned[fastest] for rate in _rates_of(seen @ z[fastest])
-        ]
+        rates = _rates_of(seen @ z[:5].mean(axis=0)) + [rate - turned[fastest] for rate in _rates_of(seen @ z[fastest])]
         energy, fitted = np.inf, np.zeros(6)
         starts = [np.concatenate([rate, np.zeros(3)]) for rate in [np.zeros(3), *rates]]
         for start in starts if further is None else [*starts, further]:
