@@ -228,6 +228,10 @@ class _LateView:
         self._form, self._say, self._rrd, self._live = form, say, rrd, live
         self._view: LiveView | None = None
         self._opened = False
+        if live:
+            from gfimu.files.rerun_stream import check_display
+
+            check_display()
 
     def open(self, array: AccelerometerArray | None) -> None:
         """Open the view of an array; raises `InputError` if a picture is asked for and the array is not known."""
