@@ -63,6 +63,9 @@ class Text(Table, frozen=True, tag="text", tag_field="kind"):
         tuple[str, ...],
         about("what stands between separators: `time`, `sequence`, `temperature`, channels; an empty name is skipped."),
     ] = ()
+    optional: Annotated[
+        tuple[str, ...], about("columns, the last ones, that a line may lack, such as `temperature`.")
+    ] = ()
     separator: Annotated[str, about("between the columns; blanks beside it do not count.", min_length=1)] = ","
     pattern: Annotated[
         str,
@@ -217,6 +220,10 @@ def _text(
         pattern = re.compile(text.pattern.encode() if text.pattern else _pattern_of(text))
     except re.error as error:
         raise InputError(f"{source}: [stream]: pattern: no regular expression ({error})") from None
+    if text.optional and text.columns[-len(text.optional) :] != text.optional:
+        raise InputError(
+            f"{source}: [stream]: optional {', '.join(text.optional)}: name the last of the columns, in order"
+        )
     missing = [name for name in ("time", *channels) if name not in pattern.groupindex]
     if missing:
         raise InputError(f"{source}: [stream]: a line has no {', '.join(missing)}; name the array's channels and time")
@@ -227,8 +234,8 @@ def _text(
 
 def _pattern_of(text: Text) -> bytes:
     """Return the regular expression of columns between separators."""
-    groups = [
-        b"(?P<%b>%b)" % (name.encode(), _NUMBER) if name else b"[^%b]*" % re.escape(text.separator.encode())
-        for name in text.columns
-    ]
-    return (rb"[ \t]*" + re.escape(text.separator.encode()) + rb"[ \t]*").join(groups)
+    separator = re.escape(text.separator.encode())
+    groups = [b"(?P<%b>%b)" % (name.encode(), _NUMBER) if name else b"[^%b]*" % separator for name in text.columns]
+    between = rb"[ \t]*" + separator + rb"[ \t]*"
+    needed = len(groups) - len(text.optional)
+    return between.join(groups[:needed]) + b"".join(b"(?:%b%b)?" % (between, group) for group in groups[needed:])

@@ -224,13 +224,27 @@ def check_image(name: str = "gfimu") -> dict[str, str | bool]:
     }
 
 
-def build_host_library(out: str | Path) -> Path:
-    """Compile the firmware's core for this computer, as a shared library for tests; return its path."""
+def build_host_library(out: str | Path, *, array: str = "") -> Path:
+    """Compile the firmware's core for this computer, as a shared library for tests; return its path.
+
+    It states ``array``, if that is given.
+    """
     compiler_version()
     suffix = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
     library = Path(out) / f"firmware_host{suffix}"
-    flags = ("-std=c11", "-O1", "-g0", "-shared", "-fPIC", "-Wall", "-Wextra", "-Werror", "-fsanitize=undefined")
+    flags: tuple[str, ...] = (
+        "-std=c11",
+        "-O1",
+        "-g0",
+        "-shared",
+        "-fPIC",
+        "-Wall",
+        "-Wextra",
+        "-Werror",
+        "-fsanitize=undefined",
+    )
     files = ("host/hal_host.c", "src/core.c", "src/adxl345.c")
+    flags += tuple(f"-D{key}={value}" for key, value in array_definition(array).items())
     _zig("cc", *flags, "-fsanitize-trap=undefined", *files, "-o", str(library), cwd=FOLDER)
     return library
 

@@ -6,6 +6,7 @@ import threading
 import time
 import warnings
 from dataclasses import replace
+from typing import Self
 
 import numpy as np
 import pytest
@@ -55,7 +56,7 @@ class SmallBoard:
                     self.frames = b""
             time.sleep(0.01)
 
-    def __enter__(self) -> SmallBoard:
+    def __enter__(self) -> Self:
         self._thread.start()
         return self
 
@@ -117,7 +118,7 @@ def test_the_answer_of_a_person_is_taken(tmp_path) -> None:
 
 
 def test_an_array_that_this_computer_does_not_have_is_refused_before_anything_is_written(tmp_path) -> None:
-    with SmallBoard("cube12", "lab7") as board, pytest.raises(InputError, match="states array 'lab7'.*--array"):
+    with SmallBoard("cube12", "lab7") as board, pytest.raises(InputError, match=r"states array 'lab7'.*--array"):
         record_port(board.name, tmp_path / "run.csv", duration_s=1.0)
     assert not list(tmp_path.iterdir())
 
