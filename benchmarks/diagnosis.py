@@ -1,7 +1,7 @@
 """How long a diagnosis takes, and how much memory, against the limits of 15 s a minute and 120 s and 2 GB half an hour.
 
-python benchmarks/diagnosis.py           60 s: nothing hidden, one effect, wandering biases, and what is in no library
-python benchmarks/diagnosis.py --long    30 min: nothing hidden, one effect, wandering biases, and what is in no library
+python benchmarks/diagnosis.py           60 s: nothing hidden, one effect, walking biases, and what no library has
+python benchmarks/diagnosis.py --long    30 min: nothing hidden, one effect, walking biases, and what no library has
 """
 
 from __future__ import annotations

@@ -14,8 +14,8 @@ J, Q
     Regression matrix (c × 6) and centripetal matrix (c × 6): reading = J [α; p] + Q s, s the six products of ω.
 GDOP
     √tr((JᵀJ)⁻¹) with lengths in the array's length unit (half the cube's edge).
-bias, scale factor, misalignment, cross-axis
-    Constant offset, gain error, wrong direction of a sensing axis, pick-up of a neighbouring axis.
+bias, scale factor, input-axis misalignment, cross-axis sensitivity
+    Constant offset, gain error, wrong direction of a sensing axis, pick-up of a neighbouring axis (IEEE 528, 1293).
 velocity random walk N, bias instability B, acceleration random walk K
     Coefficients of the Allan deviation of an accelerometer.
 

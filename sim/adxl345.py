@@ -1,9 +1,9 @@
 """The ADXL345 as a sensing chain: from specific force along the axes to the counts the chip puts out.
 
-Two things that are kept apart: `draw_errors` throws the dice once for a set of chips (offsets, gains, cross-axis
-pick-up, misalignment, non-linearity, temperature coefficients, all from the data sheet), and `Sensor` is the chain that
-they then go through (errors, noise, bias instability, range, resolution). The scenarios and the register-level chip of
-`firmware_bridge` use the same chain. Any part of ``models/parts`` fits it.
+Two things that are kept apart: `draw_errors` throws the dice once for a set of chips (biases, gains, cross-axis
+sensitivity, misalignment, non-linearity, temperature coefficients, all from the data sheet), and `Sensor` is the chain
+that they then go through (errors, noise, bias instability, range, resolution). The scenarios and the register-level
+chip of `firmware_bridge` use the same chain. Any part of ``models/parts`` fits it.
 
 Per the data sheet, typical deviations are one standard deviation of the population. Noise is given as counts rms of
 the output codes, so the analogue noise is what remains of it after the variance of the quantisation.

@@ -37,7 +37,7 @@ class DataSheet:
     sensitivity_std, sensitivity_limit, sensitivity_tempco : float
         Typical and largest relative gain error, and its typical change per K.
     cross_axis_std : float
-        Typical pick-up of a neighbouring axis.
+        Typical cross-axis sensitivity.
     misalignment_std : float
         Typical misalignment of a sensing axis, rad.
     nonlinearity : float

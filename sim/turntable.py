@@ -332,7 +332,7 @@ def _free_state(body: BodyState) -> tuple[NDArray[np.float64], NDArray[np.float6
 
 
 def _gravity(world: World, motion: SpinMotion | BodyMotion, t: NDArray[np.float64]) -> NDArray[np.float64] | None:
-    """Return gravity as a rig feels it that is shaken in the room, (n, 3), m/s²; None where nothing shakes it."""
+    """Return gravity as a rig is under it that is shaken in the room, (n, 3), m/s²; None where nothing shakes it."""
     if not world.shakes:
         return None
     spin = cast("SpinMotion", motion).at(t)

@@ -56,7 +56,7 @@ class Board:
     sensors : sequence of Adxl345
         Chips on SSP1, selected by P2.0, P2.1 and so on; the same chips hang on I2C0 for images that use it.
     tracer : Tracer, optional
-        Is told every register access and every exception (slow).
+        Receives every register access and every exception (slow).
 
     Attributes
     ----------

@@ -205,7 +205,7 @@ class FrameFormat:
         return replace(self, channels=self.channels[:channels], status_mask=self.status_mask & ~others)
 
     def is_sample(self, packets: NDArray[Any]) -> NDArray[np.bool_]:
-        """Tell which packets, shape (n,), carry a sample."""
+        """Return which packets, shape (n,), carry a sample."""
         if self.sample_type is None:
             return np.ones(len(packets), dtype=bool)
         field, value = self.sample_type

@@ -79,12 +79,12 @@ class PacketLayout:
         return PacketScanner(self)
 
     def has_signature(self, packets: NDArray[Any]) -> NDArray[np.bool_]:
-        """Tell which packets, shape (n,), have the bytes that every packet has."""
+        """Return which packets, shape (n,), have the bytes that every packet has."""
         rows = packets.view(np.uint8).reshape(len(packets), self.size)
         return np.all([rows[:, offset] == value for offset, value in self.signature], axis=0) & np.ones(len(rows), bool)
 
     def is_valid(self, packets: NDArray[Any]) -> NDArray[np.bool_]:
-        """Tell which packets, shape (n,), carry the right checksum."""
+        """Return which packets, shape (n,), carry the right checksum."""
         if self.checksum is None:
             return np.ones(len(packets), dtype=bool)
         name = (self.dtype.names or ())[-1]
@@ -167,7 +167,7 @@ def _without_overlaps(starts: NDArray[np.intp], size: int) -> NDArray[np.intp]:
 
 
 def _covered(candidates: NDArray[np.intp], chosen: NDArray[np.intp], size: int) -> NDArray[np.bool_]:
-    """Tell which candidates are or lie inside a chosen packet."""
+    """Return which candidates are or lie inside a chosen packet."""
     if not len(chosen):
         return np.zeros(len(candidates), dtype=bool)
     before = np.searchsorted(chosen, candidates, side="right") - 1

@@ -43,7 +43,7 @@ class Chunk:
     Parameters
     ----------
     data : bytes
-        The bytes; empty when only the break is to be told.
+        The bytes; empty when only the break is to be reported.
     host_s : float
         Host time (`time.monotonic`) at which they were read, s.
     after_break : bool
@@ -229,7 +229,7 @@ class Link:
 
     def _read_some(self) -> bytes:
         """Bytes that are there, or an empty string after a short wait."""
-        if self._is_socket or self.source is not None:  # does not tell how many bytes wait
+        if self._is_socket or self.source is not None:  # does not report how many bytes wait
             return bytes(self._serial.read(_READ_BYTES))
         data = bytes(self._serial.read(1))
         return data + bytes(self._serial.read(min(self._serial.in_waiting, _READ_BYTES))) if data else data

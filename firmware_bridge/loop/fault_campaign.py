@@ -242,7 +242,7 @@ def run_campaign(
 
 
 def _keys(sequence: NDArray[np.uint16], counts: NDArray[np.int16]) -> NDArray[np.int32]:
-    """One row per frame that tells frames apart: sequence number and counts."""
+    """One row per frame that distinguishes frames: sequence number and counts."""
     return np.column_stack([sequence.astype(np.int32), counts.astype(np.int32)])
 
 

@@ -278,7 +278,7 @@ def serve(
     stop : callable, optional
         Asked often; True ends the run.
     on_progress : callable, optional
-        Is told the virtual time done, s.
+        Receives the virtual time done, s.
     """
     began = time.monotonic()
     first = now = board.now

@@ -101,7 +101,7 @@ def record_virtual(
     lose_every : int
         Fault: every so many sample interrupts one is lost.
     progress : callable, optional
-        Is told the share done, 0 to 1.
+        Receives the share done, 0 to 1.
     """
     setup = set_range(range_g, full_resolution=full_resolution) + sample_at(rate_hz, rate_code)
     options = typical_chips(scene.seed) if chips is None else tuple(chips)

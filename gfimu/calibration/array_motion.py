@@ -231,7 +231,7 @@ def _linearise(
         own = np.concatenate([by_force, alpha_z, by_rate[:, :, 2:]], axis=2) / sigma
         extra = np.zeros((n, 2, 5))
         extra[:, 0, 4], extra[:, 1, 3] = 1.0 / reference.omega_std, 1.0 / reference.alpha_std
-        told = np.column_stack(
+        referred = np.column_stack(
             [
                 (reference.omega[:, 2] - omega[:, 2]) / reference.omega_std,
                 (reference.alpha - alpha[:, 2]) / reference.alpha_std,
@@ -241,9 +241,9 @@ def _linearise(
         own = np.concatenate([by_force, np.broadcast_to(by_alpha, (n, c, 3)), by_rate], axis=2) / sigma
         extra = np.zeros((n, 3, 9))
         extra[:, range(3), range(6, 9)] = 1.0 / reference.omega_std
-        told = (reference.omega - omega) / reference.omega_std
+        referred = (reference.omega - omega) / reference.omega_std
     unknown = np.concatenate([design / sigma, np.zeros((n, extra.shape[1], 3 * k + c))], axis=1)
-    return unknown, np.concatenate([own, extra], axis=1), np.concatenate([residual, told], axis=1)
+    return unknown, np.concatenate([own, extra], axis=1), np.concatenate([residual, referred], axis=1)
 
 
 def _eliminate(design: Floats, nuisance: Floats, residual: Floats) -> tuple[Floats, Floats, Callable[[Floats], Floats]]:

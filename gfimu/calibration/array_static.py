@@ -1,6 +1,6 @@
 """Static calibration of a whole array: every chip in one body frame, from poses of unknown direction.
 
-At rest all chips of a rigid array feel the same specific force a, so that l_i = M_i A_i a + b_i with A_i the chip's
+At rest all chips of a rigid array see the same specific force a, so that l_i = M_i A_i a + b_i with A_i the chip's
 axes on the drawing. The conditions of a pose are |a_1| = g and a_i = a_1 for every other chip; they are adjusted
 together (combined adjustment). What M_i holds beyond scale and non-orthogonality is the rotation of the chip against
 the drawing. A common rotation of all chips changes nothing at rest: the body frame is defined as the one in which the

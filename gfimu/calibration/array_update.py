@@ -1,7 +1,7 @@
 """Carry the calibration of an array over to a later run: what it was, and biases that moved, from a few poses.
 
-Sensitivities and alignment last; biases change from one power-on to the next and wander afterwards. The earlier
-calibration, with the variance of its biases raised by that of a power-on, is the prior of a Kalman filter whose
+Sensitivities and alignment last; biases change from one power-on to the next and follow a random walk afterwards. The
+earlier calibration, with the variance of its biases raised by that of a power-on, is the prior of a Kalman filter whose
 measurements are the conditions of each pose, |a_1| = g and a_i = a_1 (`gfimu.calibration.array_static`). Nothing need
 be level, and one pose is enough to see what counts at rest: how the chips disagree.
 """
@@ -133,7 +133,7 @@ def _check(calibration: Calibration, observations: Observations, array: Accelero
 
 
 def _statement(observations: Observations, turn_on_std: float, walk: float) -> str:
-    wander = f" and wander by {walk:.3g} m/s²/√s" if walk else ""
+    wander = f" and follow a random walk of {walk:.3g} m/s²/√s" if walk else ""
     return (
         f"carried over from an earlier run and updated with {observations.n_poses} poses: biases taken to change by "
         f"{turn_on_std:.3g} m/s² between the runs{wander}"
@@ -153,7 +153,7 @@ def _warnings(factor: float, conditions: int) -> tuple[str, ...]:
 def _statistics(
     before: Calibration, after: Calibration, array: AccelerometerArray, means: Floats, factor: float
 ) -> dict[str, float | str]:
-    """Tell what the poses show before and after the update."""
+    """State what the poses show before and after the update."""
     statistics: dict[str, float | str] = {"poses": float(len(means)), "innovation_variance_factor": factor}
     for when, calibration in (("before", before), ("after", after)):
         body = body_specific_force(calibration, array, means)

@@ -68,7 +68,7 @@ def fit_sphere(means: Floats) -> tuple[Floats, float]:
     size = float(np.linalg.norm(points, axis=1).max()) if len(points) else 0.0
     advice = "turn the sensor so that each axis points up once and down once"
     if len(means) < 4 or size == 0.0:
-        raise InputError(f"{len(means)} poses are too few to tell bias from scale; {advice}")
+        raise InputError(f"{len(means)} poses are too few to separate bias from scale; {advice}")
     points = points / size
     spread = np.linalg.svd(points, compute_uv=False)
     if spread[2] < 0.05 * np.sqrt(len(points)):

@@ -17,7 +17,7 @@ from gfimu.errors import InputError, unknown_name
 __all__ = ["GAUGES", "ErrorModel", "free_elements"]
 
 GAUGES = {
-    "poses": "the axes of the poses the calibration was told",
+    "poses": "the axes of the poses given to the calibration",
     "x_axis": "sensing axis x along frame x, sensing axis y in the frame's x-y plane (M lower triangular)",
     "z_axis": "sensing axis z along frame z, sensing axis y in the frame's y-z plane (M upper triangular)",
     "coarse": "the frame nearest to that of the coarse solution (minimum norm)",
@@ -152,7 +152,7 @@ class ErrorModel:
     def in_gauge(self, gauge: str) -> ErrorModel:
         """Express the same triad in the frame of another gauge, ``x_axis`` or ``z_axis``.
 
-        A rotation R of the frame turns M into M Rᵀ and leaves |a| as it was, so that magnitudes cannot tell the two
+        A rotation R of the frame turns M into M Rᵀ and leaves |a| as it was, so that magnitudes cannot separate the two
         apart; the rotation that makes M triangular with a positive diagonal is unique.
         """
         if gauge == "x_axis":

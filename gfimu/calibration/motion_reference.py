@@ -1,4 +1,4 @@
-"""What a tachometer or a gyro tells about the rotation of an array, for the calibration from motion."""
+"""What a tachometer or a gyro shows of the rotation of an array, for the calibration from motion."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _SMOOTHING_S = 0.3
 
 @dataclass(frozen=True)
 class MotionReference:
-    """What a reference tells about the rotation at the samples used.
+    """What a reference shows of the rotation at the samples used.
 
     Parameters
     ----------

@@ -176,7 +176,7 @@ def multi_position_gyro(observations: Observations, *, earth_rate: float = EARTH
     per_row = np.bincount(observations.pose)
     spread = observations.covariance / per_row[:, None, None]  # covariance of the means, (p, 3, 3)
     noise = float(np.sqrt(np.einsum("pcc->p", spread).mean() / 3.0))
-    # A pose tells the scale to noise / Ω; p poses to about √(3 / p) of it.
+    # A pose shows the scale to noise / Ω; p poses to about √(3 / p) of it.
     scale_std = noise / earth_rate * np.sqrt(3.0 / observations.n_poses)
     if scale_std < _SEEN:
         check_magnitude_coverage(pose_directions(means))

@@ -64,7 +64,7 @@ def _calibrate(
     ] = None,
     turn_on_std: Annotated[
         float | None,
-        typer.Option("--turn-on-std", help="With --update: change of a bias between power-ons, m/s²; 0.03 by default."),
+        typer.Option("--turn-on-std", help="With --update: turn-on repeatability of a bias, m/s²; 0.03 by default."),
     ] = None,
     bias_walk: Annotated[
         float | None,

@@ -24,7 +24,7 @@ def register(app: typer.Typer) -> None:
 def _design(
     twin: Annotated[str, typer.Option("--twin", help="Twin: a name or a file (.toml).")],
     effects: Annotated[
-        list[str] | None, typer.Argument(metavar="[EFFECT]...", help="Effects to tell apart; or use --verdict.")
+        list[str] | None, typer.Argument(metavar="[EFFECT]...", help="Effects to distinguish; or use --verdict.")
     ] = None,
     verdict: Annotated[
         Path | None, typer.Option("--verdict", help="Take the effects of an ambiguous verdict (verdict.json).")

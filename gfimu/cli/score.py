@@ -221,7 +221,7 @@ def _print_scores(scores: list[Score], condition: str) -> None:
             for entry in scores
         ],
         note="σ_α (per length unit) and σ_p for channels of standard deviation 1. σ_ω: least one sample can reach "
-        f"(Cramér–Rao) at {condition}; —: one sample can't tell.",
+        f"(Cramér–Rao) at {condition}; —: one sample doesn't determine it.",
     )
     remark = ranking_remark(scores)
     if remark:

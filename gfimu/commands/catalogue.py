@@ -41,9 +41,9 @@ def catalogue(kind: str) -> dict[str, str]:
     if kind not in KINDS:
         raise unknown_name("kind", kind, KINDS)
     if kind == "effects":
-        from sim.effects import CARRIAGE_EFFECTS, EFFECTS, FURTHER_EFFECTS, added_effects
+        from sim.effects import CARRIAGE_EFFECTS, EFFECTS, FURTHER_EFFECTS, SIMULATED_EFFECTS, added_effects
 
-        every = EFFECTS | FURTHER_EFFECTS | (CARRIAGE_EFFECTS | EFFECTS) | added_effects()
+        every = EFFECTS | FURTHER_EFFECTS | CARRIAGE_EFFECTS | SIMULATED_EFFECTS | added_effects()
         return {name: family.summary for name, family in every.items()}
     if kind == "formats":
         from gfimu.importing.readers import readers

@@ -54,7 +54,7 @@ def design(
     twin : WorldModel, str or Path
         The simulation: a twin, its name or file, or one of one's own (``rig.py:function``).
     effects : sequence of str or Effect
-        Effects to tell apart; or give ``verdict``.
+        Effects to distinguish; or give ``verdict``.
     verdict : str or Path, optional
         Take the effects of an ambiguous verdict (``verdict.json``, or the folder that holds it).
     run : Recording, path, or sequence of these
@@ -106,7 +106,7 @@ def design(
     from gfimu.recording.formats import open_recording
 
     if (verdict is None) == (not effects):
-        raise InputError("name effects to tell apart, or give --verdict: one of the two")
+        raise InputError("name effects to distinguish, or give --verdict: one of the two")
     model = as_twin(twin)
     asked = list(effects) if verdict is None else open_effects(verdict, model)
     at_hand = [

@@ -224,7 +224,7 @@ def _opened(recording: Recording | str | Path | MappedFile, model: WorldModel, u
 
 
 def _names(runs: Sequence[Recording | str | Path | MappedFile]) -> list[str]:
-    """Return names for people: file names where they tell the runs apart."""
+    """Return names for people: file names where they distinguish the runs."""
     paths = [Path(run) if isinstance(run, str | os.PathLike) else None for run in runs]
     short = [path.name if path is not None else f"run {number}" for number, path in enumerate(paths, start=1)]
     if len(set(short)) == len(short):

@@ -197,7 +197,7 @@ class LibraryDiagnosis:
         return found[0] if found else None
 
     def _impossible(self, explanation: Explanation) -> str:
-        """Return the signature where every set that the data can't tell apart holds a size beyond physics."""
+        """Return the signature where every set that the data can't distinguish holds a size beyond physics."""
         families, array = self._model.families(), self._model.array
         found = [
             impossible_sizes(named_causes(explanation, one, self._policy), families, array)

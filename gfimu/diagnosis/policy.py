@@ -175,7 +175,7 @@ class Policy:
 
     @property
     def ambiguous(self) -> float:
-        """Log odds within which two statements can't be told apart, nats: those of ``stds`` standard deviations."""
+        """Log odds within which two statements can't be distinguished, nats: those of ``stds`` standard deviations."""
         return 0.5 * self.stds**2
 
     @property

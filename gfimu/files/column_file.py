@@ -68,7 +68,7 @@ class ColumnFile(Protocol):
 
 
 def open_columns(source: str | Path | ArrowStream | ColumnFile) -> ColumnFile:
-    """Open a CSV or Parquet file (told apart by content), or a table object.
+    """Open a CSV or Parquet file (recognised by content), or a table object.
 
     Raises
     ------

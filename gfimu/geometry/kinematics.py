@@ -275,14 +275,14 @@ def joint_form(array: AccelerometerArray, readings: ArrayLike) -> JointEstimate:
     Raises
     ------
     GeometryError
-        If α or p can't be told from the products of ω.
+        If α or p can't be separated from the products of ω.
     """
     rows = _reading_matrix(array, readings)
     inverse, seen = _joint_inverse(array)
     if not seen[:6].all():
         mixed = [name for name, known in zip(MOTION_NAMES, seen[:6], strict=True) if not known]
         raise GeometryError(
-            f"array {array.name!r} can't tell {', '.join(mixed)} from the products of the angular rate; "
+            f"array {array.name!r} can't separate {', '.join(mixed)} from the products of the angular rate; "
             "use motion_from_readings with a given omega, or add sensing axes"
         )
     solution = _product_by_blocks(rows, inverse)  # (n, 12)

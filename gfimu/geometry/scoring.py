@@ -71,7 +71,7 @@ class Score:
     noise_m_s2 : float
         Channel standard deviation at which it holds.
     rate_bound_rad_s : ndarray, shape (3,)
-        Cramér–Rao bound of one sample on the components of ω; infinite where one sample can't tell.
+        Cramér–Rao bound of one sample on the components of ω; infinite where one sample doesn't determine it.
     protection : Protection, optional
         Least faults of its channels that are found.
     """

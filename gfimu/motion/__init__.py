@@ -1,1 +1,1 @@
-"""Motion of the body: estimation, attitude, navigation, what a rest at the start tells of the biases."""
+"""Motion of the body: estimation, attitude, navigation, what a rest at the start shows of the biases."""

@@ -57,7 +57,7 @@ def level(p_at_rest: ArrayLike, *, heading: float = 0.0) -> NDArray[np.float64]:
     p_at_rest : array_like, shape (n, 3) or (3,)
         Specific force in body axes while at rest, m/s²; averaged over the rows without NaN.
     heading : float
-        Angle of the body's x-axis about the world's z, rad; gravity can't tell it.
+        Angle of the body's x-axis about the world's z, rad; gravity doesn't show it.
 
     Returns
     -------

@@ -188,7 +188,7 @@ def bias_cause(array: AccelerometerArray, *, prior_std: float = _BIAS) -> Cause:
     parameters = tuple(Parameter(f"{name}_m_s2", "m/s²", prior_std, bound=STANDARD_GRAVITY) for name in array.channels)
     return Cause(
         "bias",
-        "a constant offset per channel",
+        "a bias: a constant offset per channel",
         parameters,
         "static poses on several sides",
         "sensing",
@@ -202,7 +202,7 @@ def gain_cause(array: AccelerometerArray, *, prior_std: float = _GAIN) -> Cause:
     parameters = tuple(Parameter(name, RATIO, prior_std, bound=_LARGEST_GAIN) for name in array.channels)
     return Cause(
         "scale_factor",
-        "a gain error per channel",
+        "a scale-factor error per channel",
         parameters,
         "static poses on several sides",
         "sensing",

@@ -94,7 +94,7 @@ class PartFile(Table, frozen=True, forbid_unknown_fields=False):
     sensitivity_tempco_K: Annotated[
         NotNegative, about("Typical relative change of the gain with temperature.", "1/K")
     ] = 0.0
-    cross_axis_std: Annotated[NotNegative, about("Typical pick-up of a neighbouring axis, a ratio.")] = 0.0
+    cross_axis_std: Annotated[NotNegative, about("Typical cross-axis sensitivity, a ratio.")] = 0.0
     misalignment_std_rad: Annotated[NotNegative, about("Typical tilt of a sensing axis.", "rad")] = 0.0
     nonlinearity_full_scale: Annotated[
         NotNegative, about("Typical deviation from a straight line at full scale, relative to full scale.")

@@ -11,7 +11,7 @@ __all__ = ["backward"]
 
 
 @njit(**COMPILE)
-def backward(record, count, ringing, adjoint, curvature, omega, covariance, first):  # type: ignore[no-untyped-def]
+def backward(record, count, overshoot, adjoint, curvature, omega, covariance, first):  # type: ignore[no-untyped-def]
     """Run the smoother back over a recorded block of ``count`` samples (Bryson–Frazier form of Rauch–Tung–Striebel).
 
     For each scalar measurement, from the last to the first, with gain k = P h/S:
@@ -60,9 +60,9 @@ def backward(record, count, ringing, adjoint, curvature, omega, covariance, firs
             covariance[first + row, place] = total
         # λ ← Fᵀλ, Λ ← FᵀΛF with F the identity but for the rows of ω, and −g for ε.
         transition = record.transition[row]
-        adjoint[n - 3 :] *= -ringing
-        curvature[n - 3 :] *= -ringing
-        curvature[:, n - 3 :] *= -ringing
+        adjoint[n - 3 :] *= -overshoot
+        curvature[n - 3 :] *= -overshoot
+        curvature[:, n - 3 :] *= -overshoot
         for r in range(n):
             total = adjoint[r] if r >= 3 else 0.0
             for a in range(3):

@@ -51,7 +51,7 @@ def filter_rate(
     Returns
     -------
     RateEstimate
-        With an unknown start the whole run of the hypothesis that won; ``sign`` tells from when on that was certain.
+        With an unknown start the whole run of the hypothesis that won; ``sign`` states from when on that was certain.
         Before the rate first stands clear of the biases it is zero give or take all that they allow.
 
     Raises

@@ -335,7 +335,7 @@ class KalmanRateFilter:
                 self._buffer, first, last, n, self._compiled_tables, self._tuning, self._kept[number].copy(), ignored,
                 -first, record,
             )  # fmt: skip
-            backward(record, last - first, self._tuning.ringing, adjoint, curvature, omega, covariance, first)
+            backward(record, last - first, self._tuning.overshoot, adjoint, curvature, omega, covariance, first)
         return omega, full_covariance(covariance)
 
     def _check_times(self, times: NDArray[np.float64]) -> None:

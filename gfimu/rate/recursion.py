@@ -6,7 +6,7 @@ State x = [ω (3); b_α (3); b_z (d); b_gyro (0 or 3); ε (3)], biases constant.
 
 with w the weights of the interval's quadrature and (K, L) zero for sets of channels that see α cleanly. ε is what the
 noise n of α does to it: half enters before the sample is measured and half after, the same noise twice, and the
-quadrature rings, because its outer weights are negative,
+quadrature overshoots, because its outer weights are negative,
 
     ε_k = −g ε_{k−1} − (1 + g) n_k,    g = 2 Σ w²/Δt² − 1.                                              (1b)
 
@@ -38,7 +38,7 @@ from gfimu.rate.second_order import second_order
 
 __all__ = ["forward"]
 
-_WALK_MEMORY = 1.0  # s, over which the wandering of α is averaged
+_WALK_MEMORY = 1.0  # s, over which the change of α is averaged
 _HIDDEN = 0.1  # (⅓)²: share of the change of α by which its integral may be off, squared
 _SLOW = 1e-3  # tr P above this share of |ω|² switches the second-order terms on
 
@@ -70,8 +70,8 @@ def forward(  # type: ignore[no-untyped-def]
     product = np.zeros((3, n))
     settles = state.settles[0]
     noise_row = n - 3
-    ringing = tuning.ringing
-    renewed = (1.0 + ringing) * (1.0 + ringing)
+    overshoot = tuning.overshoot
+    renewed = (1.0 + overshoot) * (1.0 + overshoot)
     slopes = np.zeros((max(d, 1), 3))
     innovations = np.zeros(d)
     variances = np.zeros(d)
@@ -100,7 +100,7 @@ def forward(  # type: ignore[no-untyped-def]
             # Prediction, (1).
             step = data.t[k] - state.scalars[TIME]
             half = 0.5 * step
-            carried = half * (1.0 - ringing)  # of the last ε, with its share in the new one
+            carried = half * (1.0 - overshoot)  # of the last ε, with its share in the new one
             start = min(max(k - 1 - tuning.position, 0), closing - points)
             regular = start >= 0 and data.uniform_run[start + points - 1] >= points - 1
             even = plain_set and regular
@@ -212,9 +212,9 @@ def forward(  # type: ignore[no-untyped-def]
             x[0] += s0 - step * x[3] + carried * x[noise_row]
             x[1] += s1 - step * x[4] + carried * x[noise_row + 1]
             x[2] += s2 - step * x[5] + carried * x[noise_row + 2]
-            _renew_noise(x, covariance, tables.alpha_noise[noise_set], (1.0 + inflation) * renewed, ringing, half)
+            _renew_noise(x, covariance, tables.alpha_noise[noise_set], (1.0 + inflation) * renewed, overshoot, half)
             extra = 0.0
-            if not sensed:  # α is held: its wandering adds up
+            if not sensed:  # α is held: its changes add up
                 age = data.t[k] - state.scalars[LAST_GOOD]
                 extra = state.scalars[WALK] * age * age * step
             elif data.whole_run[k] == 0:
@@ -238,7 +238,7 @@ def forward(  # type: ignore[no-untyped-def]
                 for a in range(3):
                     _copy(rows[a], record.transition[row, a])
         else:
-            settled = (1.0 + inflation) * renewed / (1.0 - ringing * ringing)
+            settled = (1.0 + inflation) * renewed / (1.0 - overshoot * overshoot)
             _renew_noise(x, covariance, tables.alpha_noise[noise_set], settled, 0.0, 0.0)
             if keep:
                 record.transition[row] = 0.0
@@ -440,15 +440,15 @@ def _correct(alpha, tables, place, x, omega0, omega1, omega2, out):  # type: ign
 
 
 @njit(**INNER)
-def _renew_noise(x, covariance, noise, factor, ringing, half):  # type: ignore[no-untyped-def]
+def _renew_noise(x, covariance, noise, factor, overshoot, half):  # type: ignore[no-untyped-def]
     """Take the ε of a new sample into the state, (1b), and half of what is new in it into ω."""
     noise_row = len(x) - 3
     for a in range(3):
-        x[noise_row + a] *= -ringing
+        x[noise_row + a] *= -overshoot
         for r in range(len(x)):
-            covariance[noise_row + a, r] *= -ringing
+            covariance[noise_row + a, r] *= -overshoot
         for r in range(len(x)):
-            covariance[r, noise_row + a] *= -ringing
+            covariance[r, noise_row + a] *= -overshoot
     for a in range(3):
         for b in range(3):
             value = factor * noise[a, b]

@@ -41,7 +41,7 @@ class Tuning(NamedTuple):
     period: float  # nominal sample period, s
     weights: NDArray[np.float64]  # (m − 1, m): quadrature of each interval of the stencil, in periods
     position: int  # interval of the stencil that is integrated
-    ringing: float  # g of (1b) in `gfimu.rate.recursion`
+    overshoot: float  # g of (1b) in `gfimu.rate.recursion`
     inverse_noise: NDArray[np.float64]  # (c,) 1/σ, s²/m
     scale_variance: float  # of the scale factors
     placement_variance: float  # over σ² of a channel, 1/(m/s²)² m²

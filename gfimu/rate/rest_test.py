@@ -25,7 +25,7 @@ Until a slow departure shows it has been taken for rest. Therefore where a rest 
 before, and the two, four … before when it was their mean that showed it: it goes back to its state before them and
 filters those samples again without ω = 0.
 
-Turning steadily about the vertical changes no reading; it is told from rest by the null space (down to about
+Turning steadily about the vertical changes no reading; it is distinguished from rest by the null space (down to about
 √(3 σ_b/h), σ_b the uncertainty of the null-space bias) and by the rate that the filter remembers, which is why a block
 only counts if ω was known to ``largest_rate_std`` when it began. A start in the dark, with ω unknown, is never taken
 for rest. And a rate that passes slowly through zero looks like rest for a while: after a motion, rest begins only when

@@ -1,4 +1,4 @@
-"""What the rate estimators know about the sensors: their errors, and what each set of working channels can tell.
+"""What the rate estimators know about the sensors: their errors, and what each set of working channels determines.
 
 For any set of working channels the readings y split into two parts that share no unknown motion:
 

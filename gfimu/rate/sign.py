@@ -1,7 +1,7 @@
 """Starting while already spinning: which of ω and −ω it is.
 
 Centripetal readings are the same for ω and −ω, so a start in the dark is followed by two filters that begin at
-opposite rates. What tells them apart is α: if ω grows while α points along it, the sign was right. The ratio of the
+opposite rates. What distinguishes them is α: if ω grows while α points along it, the sign was right. The ratio of the
 filters' likelihoods says which; but at constant ω both explain the readings equally well, and the logarithm of the
 ratio is a random walk that sooner or later crosses any threshold. So it is accumulated only during a manoeuvre: while
 α, averaged over the filters' memory 1/|ω|, is six standard deviations from zero in both filters, their uncertain

@@ -1,6 +1,6 @@
 """Checks of a recording against its array alone: units, time, order and sign of the channels, dead channels.
 
-The array's redundant directions and gravity at rest tell whether the channels fit one rigid body
+The array's redundant directions and gravity at rest show whether the channels fit one rigid body
 (`gfimu.recording.evidence.rigid`). A recording is refused only where errors within the data sheets' limits can't be the
 reason and one other way to read the file explains nearly all of it; where that other way explains nearly all of a
 smaller contradiction, there is a warning; otherwise nothing is said.
@@ -173,7 +173,7 @@ def dead_channels(recording: Recording, array: AccelerometerArray) -> tuple[Find
 
 
 def noisy_channels(recording: Recording, array: AccelerometerArray) -> NDArray[np.bool_]:
-    """Tell which channels surely have noise of their own, (c,); none where their data sheets are not known."""
+    """Return which channels surely have noise of their own, (c,); none where their data sheets are not known."""
     limits = _limits(recording, array)
     if limits is None:
         return np.zeros(array.n_channels, dtype=bool)
@@ -244,7 +244,7 @@ def _limits(recording: Recording, array: AccelerometerArray) -> PartLimits | Non
 
 
 def _constant(readings: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Tell which channels (c,) hold one value in all their samples."""
+    """Return which channels (c,) hold one value in all their samples."""
     top = np.where(np.isfinite(readings), readings, -np.inf).max(axis=0, initial=-np.inf)
     low = np.where(np.isfinite(readings), readings, np.inf).min(axis=0, initial=np.inf)
     return np.asarray(top == low)

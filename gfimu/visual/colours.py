@@ -105,7 +105,7 @@ SEPARATED: Mapping[str, Mapping[str, Colour]] = {
     "comparison": {"measured": MEASURED, "before": BEFORE, "after": AFTER},
     "report": {"noise": NOISE_ON_PAPER, "before": BEFORE_ON_PAPER, "after": AFTER_ON_PAPER, "ink": INK},
 }
-"""Colours of one picture that a reader has to tell from each other, by picture."""
+"""Colours of one picture that a reader has to distinguish, by picture."""
 
 _GOLDEN_TURN = (np.sqrt(5.0) - 1.0) / 2.0
 _FIRST_HUE = 80.0  # degrees; of those tried in steps of 10, the colour-blind see the first eight chips best apart

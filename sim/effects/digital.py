@@ -60,10 +60,10 @@ class Noise(_Discrete):
 
 
 class BiasRandomWalk(_Discrete):
-    """Offsets that wander."""
+    """Biases that follow a random walk."""
 
     name = "bias_random_walk"
-    summary = "offsets wander as a random walk"
+    summary = "biases follow a random walk (acceleration random walk)"
     place = "noise"
     other_units: ClassVar = {"strength_m_s2_rts": "m/s²/√s"}
     separated_by = "a long rest at constant temperature"

@@ -42,7 +42,7 @@ class Misalignment(Effect):
     """A chip's sensing axes turned against the body."""
 
     name = "misalignment"
-    summary = "a chip's sensing axes are turned against the body"
+    summary = "input-axis misalignment: a chip's sensing axes are turned against the body"
     tolerance = float(np.deg2rad(0.02))
     place = "geometry"
     contained_in = frozenset({"cross_axis"})
@@ -279,7 +279,7 @@ class CentrifugalFlex(Effect):
     """
 
     name = "centrifugal_flex"
-    summary = "arms stretch with the rate squared"
+    summary = "arm stretch: radii grow with the rate squared"
     place = "geometry"
     separated_by = "the array remounted on its side, and several high speeds"
     other_units: ClassVar = {"moving_arms": NUMBER}
@@ -368,7 +368,7 @@ class Resonance(Effect):
     name = "resonance"
     summary = "a mode between the drive and the array, excited by acceleration"
     place = "motion"
-    separated_by = "fast ramps followed by rest, in which the mode rings down alone"
+    separated_by = "fast ramps followed by rest, in which the mode decays alone"
     other_units: ClassVar = {"frequency_hz": "Hz", "damping_ratio": RATIO}
     shape_limits: ClassVar = {"damping_ratio": (1e-3, 0.3)}
 

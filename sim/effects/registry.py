@@ -24,6 +24,7 @@ __all__ = [
     "NOT_OF_AN_ENCODER",
     "NOT_OF_A_BODY",
     "NOT_OF_A_CARRIAGE",
+    "SIMULATED_EFFECTS",
     "TABLE_EFFECTS",
     "added_effects",
     "apply_effects",
@@ -93,8 +94,8 @@ NOT_OF_A_BODY: dict[str, str] = {
     "sensor_lag": "against a motion that is itself unknown a lag of all channels is a delay: gyro_latency",
     "tacho_scale": "a gyro has three gains: gyro_scale",
     "interference_tone": "what all channels share looks like the body's own specific force",
-    "hysteresis": "what depends on the past of a motion that is itself unknown can't be told from it",
-    "bias_random_walk": "slow wander is part of the noise that is fitted",
+    "hysteresis": "what depends on the past of a motion that is itself unknown can't be separated from it",
+    "bias_random_walk": "a slow random walk is part of the noise that is fitted",
 }
 """Effects that a diagnosis of a free body does not look for, and why."""
 
@@ -138,6 +139,9 @@ CARRIAGE_EFFECTS: dict[str, type[Effect]] = {
 TABLE_EFFECTS: dict[str, type[Effect]] = EFFECTS | FURTHER_EFFECTS
 """Every effect of a rig on its table whose reference is a rate."""
 
+SIMULATED_EFFECTS: dict[str, type[Effect]] = {sensing.ProofMass.name: sensing.ProofMass}
+"""What scenarios and twins may have and no diagnosis looks for, as the usual effects hold its limit."""
+
 ENCODER_EFFECTS: dict[str, type[Effect]] = {
     name: effect for name, effect in TABLE_EFFECTS.items() if name not in NOT_OF_AN_ENCODER
 }
@@ -169,7 +173,8 @@ def make_effect(
     name: str, parameters: Mapping[str, Any] | None = None, array: AccelerometerArray | None = None
 ) -> Effect:
     """Build an effect by name; raises `InputError` for an unknown name or, given the array, an unknown key."""
-    known = CARRIAGE_EFFECTS | TABLE_EFFECTS | BODY_EFFECTS | INCLINED_EFFECTS | {Unknown.name: Unknown}
+    known = CARRIAGE_EFFECTS | TABLE_EFFECTS | BODY_EFFECTS | INCLINED_EFFECTS | SIMULATED_EFFECTS
+    known = known | {Unknown.name: Unknown}
     if name not in known:
         known = known | added_effects()
     if name not in known:
@@ -192,7 +197,7 @@ _CHAIN = (
         "axis_wobble",
     ),
     *("cross_axis", "scale_factor", "gain_drift", "quadratic", "vibration_rectification", "hysteresis"),
-    *("bias", "bias_temperature", "warm_up", "cold_start", "interference_tone", "sensor_lag", "unknown"),
+    *("bias", "bias_temperature", "warm_up", "cold_start", "interference_tone", "sensor_lag", "proof_mass", "unknown"),
 )
 
 
@@ -205,7 +210,7 @@ def apply_effects(world: World, effects: Sequence[Effect]) -> World:
     """Apply effects in the order of the chain, whatever the order they are given in.
 
     From the chip in the array to the table in the world; from the proof mass (axes, gain, curvature) to the offset of
-    the circuit and its filter. Those that neither place nor chain tell apart keep their order.
+    the circuit and its filter. Those that neither place nor chain order keep their order.
     """
     for effect in sorted(effects, key=_place_in_chain):
         world = effect.apply(world)

@@ -146,7 +146,7 @@ class BearingShake(Effect):
 def shake_orders(left: Sequence[Whitened], count: int) -> tuple[list[dict[str, float]], float]:
     """Return the strongest orders of a vertical acceleration of the whole array in proportion to the rate."""
     turned = max(float(np.ptp(one.state.angle)) for one in left)
-    step = np.pi / max(turned, 2 * np.pi)  # half of what a run of so many turns tells apart
+    step = np.pi / max(turned, 2 * np.pi)  # half of what a run of so many turns resolves
     orders = np.arange(_LEAST_RATIO, _MOST_RATIO, step)
     power, energy = np.zeros(len(orders)), 1e-30
     for one in left:

@@ -75,7 +75,7 @@ def per_rate(one: Whitened) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 
 def mode_shapes(left: Sequence[Whitened], count: int) -> tuple[list[dict[str, float]], float]:
-    """Return the modes of every frequency and damping that, rung by the drive, follow the residual best."""
+    """Return the modes of every frequency and damping that, excited by the drive, follow the residual best."""
     period = float(left[0].t[1] - left[0].t[0])
     top = 0.45 / period
     modes = []

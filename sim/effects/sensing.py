@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.units import RATIO, STANDARD_GRAVITY
 from sim.effects.base import LARGEST_TURN, Effect, Pattern, Size, channel_patterns
-from sim.effects.low_pass import low_pass
+from sim.effects.low_pass import low_pass, mass_on_spring
 from sim.effects.scans import tone_shapes
 from sim.world import SensingStep, World
 
@@ -23,6 +23,7 @@ __all__ = [
     "GainDrift",
     "Hysteresis",
     "InterferenceTone",
+    "ProofMass",
     "Quadratic",
     "ScaleFactor",
     "SensorLag",
@@ -69,7 +70,7 @@ class Bias(_PerChannel):
     """Constant offset per channel."""
 
     name = "bias"
-    summary = "a constant offset per channel"
+    summary = "a bias: a constant offset per channel"
     suffix = "_m_s2"
     unit = "m/s²"
     tolerance = 0.3 * _MG
@@ -88,7 +89,7 @@ class ScaleFactor(_PerChannel):
     """Gain error per channel."""
 
     name = "scale_factor"
-    summary = "a gain error per channel (another supply voltage, say)"
+    summary = "a scale-factor error per channel (another supply voltage, say)"
     tolerance = 5e-4
     of_pose = True
     prior_std = 0.02
@@ -128,7 +129,7 @@ class BiasTemperature(_PerChannel):
     """Offsets that follow the board's temperature."""
 
     name = "bias_temperature"
-    summary = "offsets follow the board's temperature"
+    summary = "biases follow the board's temperature"
     suffix = "_m_s2_K"
     unit = "m/s²/K"
     needs_temperature = True
@@ -149,7 +150,7 @@ class WarmUp(_PerChannel):
     """Offsets that settle exponentially after power-on."""
 
     name = "warm_up"
-    summary = "offsets settle exponentially after power-on"
+    summary = "biases settle exponentially after turn-on (warm-up)"
     suffix = "_m_s2"
     unit = "m/s²"
     prior_std = 10 * _MG
@@ -177,7 +178,7 @@ class ColdStart(WarmUp):
     """Offsets that decay from power-on: a unit that was calibrated warm and starts cold."""
 
     name = "cold_start"
-    summary = "offsets decay exponentially after power-on (calibrated warm, started cold)"
+    summary = "biases decay exponentially after turn-on (calibrated warm, started cold)"
     rarity = 30.0  # times rarer than offsets that settle, by choice
 
     @classmethod
@@ -225,7 +226,7 @@ class CrossAxis(Effect):
     """A channel that picks up its neighbour on the same chip."""
 
     name = "cross_axis"
-    summary = "a channel picks up its neighbour on the same chip"
+    summary = "cross-axis sensitivity: a channel picks up its neighbour on the same chip"
     place = "sensing"
     of_pose = True
     separated_by = "static poses on several sides and several speeds"
@@ -303,6 +304,33 @@ class SensorLag(Effect):
         return _with_step(world, lambda readings, context: low_pass(readings, context.t, tau)) if tau else world
 
 
+class ProofMass(Effect):
+    """A sensing chain of second order: the chip's mass on its spring, with its damper (GF-IMU paper, eq. 2).
+
+    Far below the resonance it is `SensorLag` with the time constant damping_ratio / (π resonance_hz). So it is a part
+    of simulations only: a diagnosis names the lag.
+    """
+
+    name = "proof_mass"
+    summary = "a mass on a spring: the sensing chain resonates (its limit far below is sensor_lag)"
+    place = "sensing"
+    separated_by = "motion near the resonance, sampled at more than twice its frequency"
+    other_units: ClassVar = {"damping_ratio": RATIO}
+
+    @classmethod
+    def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
+        """Resonance frequency; zero is none."""
+        return (Size("resonance_hz", "Hz", 1e3, positive=True),)
+
+    def apply(self, world: World) -> World:
+        """Pass the readings through the second-order low pass."""
+        natural = 2.0 * np.pi * abs(self.value("resonance_hz"))
+        damping = abs(self.value("damping_ratio", 0.7))
+        if not natural:
+            return world
+        return _with_step(world, lambda readings, context: mass_on_spring(readings, context.t, natural, damping))
+
+
 @njit(cache=True)
 def _play(readings: NDArray[np.float64], width: float) -> NDArray[np.float64]:
     """Play operator of half-width ``width`` on every column."""
@@ -319,7 +347,7 @@ class Hysteresis(Effect):
     """Play in the reading: it follows the specific force only after the play is taken up."""
 
     name = "hysteresis"
-    summary = "play in the reading: it depends on the direction from which it came"
+    summary = "hysteresis: a reading depends on the direction from which it came"
     place = "sensing"
     separated_by = "slow reversals of the rate"
     shape_limits: ClassVar = {"width_m_s2": (1e-3, 20.0)}

@@ -85,7 +85,7 @@ def _servo_error(torque, turns, order, a, b):  # type: ignore[no-untyped-def]  #
 
 @dataclass(frozen=True)
 class Mode:
-    """A mode between table and array that the table's angular acceleration α rings: φ'' + 2ζω₀φ' + ω₀²φ = −α.
+    """A mode between table and array that the table's angular acceleration α excites: φ'' + 2ζω₀φ' + ω₀²φ = −α.
 
     Parameters
     ----------

@@ -21,7 +21,7 @@ from gfimu.geometry.array import AccelerometerArray
 from sim import forward
 from sim.campaign import random_profile
 from sim.effects import EFFECTS, Effect, apply_effects, make_effect
-from sim.effects.low_pass import low_pass
+from sim.effects.low_pass import low_pass, mass_on_spring
 from sim.motion import SpinState, SplineSpin
 from sim.profiles import Chirp, Hold, Ramp, spin_profile
 from sim.turntable import prescribed_readings, turntable_model
@@ -433,6 +433,41 @@ def test_a_mass_on_a_spring_is_a_lag_while_it_is_fast(damping):
     limit = (hertz / resonance) ** 2
     assert np.abs(reading - lag)[settled].max() == pytest.approx(limit, rel=0.1)
     assert np.abs(reading - wave)[settled].max() > 5 * limit  # so the lag is not to be left out
+
+
+@pytest.mark.parametrize("damping", [0.05, 0.7, 2.0])
+@pytest.mark.parametrize(("hertz", "rate"), [(5.0, 1000.0), (90.0, 1000.0), (5.0, 200.0)])
+def test_a_proof_mass_passes_a_sine_as_its_transfer_function_says(hertz, rate, damping):
+    """GF-IMU paper, eq. 2, at, below and far below a resonance of 100 Hz that the samples do or do not resolve."""
+    natural, t = 2 * np.pi * 100.0, np.arange(0.0, 2.0, 1.0 / rate)
+    s = 2j * np.pi * hertz / natural
+    passed = 1.0 / (1.0 + 2.0 * damping * s + s**2)
+    reading = mass_on_spring(np.sin(2 * np.pi * hertz * t)[:, None], t, natural, damping)[:, 0]
+    settled = slice(len(t) // 2, -20)  # the mode has decayed to exp(-30), the spline's free end is far
+    expected = np.imag(passed * np.exp(2j * np.pi * hertz * t))
+    assert np.abs(reading - expected)[settled].max() < 2e-3 * np.abs(passed)
+
+
+def test_a_stiff_proof_mass_is_a_first_order_lag():
+    t = np.arange(0.0, 4.0, 0.01)
+    wave = np.sin(2 * np.pi * 3.0 * t)[:, None]
+    natural = 2 * np.pi * 1e6
+    lag = mass_on_spring(wave, t, natural, 0.5 * natural * 3e-3)  # D/k = 2 ζ / ω = 3 ms
+    assert np.abs(lag - low_pass(wave, t, 3e-3)).max() < 1e-6
+
+
+def test_a_world_with_a_proof_mass_reads_later(cube12):
+    twin = Twin(array=cube12, array_name="cube12")
+    motion, t = random_profile(np.random.default_rng(3), 10.0), np.arange(0.0, 10.0, 0.01)
+
+    def readings(*effects):
+        return twin.predict(motion, t, effects=effects)[0]
+
+    mass = readings(make_effect("proof_mass", {"resonance_hz": 1500.0, "damping_ratio": 0.7}, cube12))
+    lag = readings(make_effect("sensor_lag", {"time_constant_s": 0.7 / (np.pi * 1500.0)}, cube12))
+    ideal = readings()
+    assert np.abs(mass - lag).max() < 0.1 * np.abs(mass - ideal).max()
+    assert np.abs(readings(make_effect("proof_mass", {}, cube12)) - ideal).max() == 0.0
 
 
 def test_apply_effects_leaves_the_given_world_alone(cube12, twin):

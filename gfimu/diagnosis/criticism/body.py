@@ -95,7 +95,7 @@ def tone(at: HandPosterior, policy: Policy) -> LackOfFit:
                 tops = frequency[high][np.argmax(ratio[:, :, channel], axis=1)]
                 sure = odds[:, :, channel].max(axis=1) > policy.lack_odds
                 low, top = tops[sure].min(initial=one), tops[sure].max(initial=one)
-                text += f", wandering from {low:.3g} to {top:.3g} Hz" if top - low > 4 * frequency[1] else ""
+                text += f", varying from {low:.3g} to {top:.3g} Hz" if top - low > 4 * frequency[1] else ""
             found = LackOfFit(
                 float(odds[window, place, channel]), text, {f"{channels[channel]}: tone at {one:.4f} Hz": amplitude}
             )

@@ -277,7 +277,7 @@ def _expected(trained: Fit, array: AccelerometerArray) -> tuple[Cause, ...]:
     """Return causes with the sizes to expect after a fit: the posterior mean under a prior of the likeliest scale.
 
     A size that one part of a recording does not determine would be extrapolated to the other part at any value. The
-    prior of the fit is wide enough for a gross error; how large a cause's sizes usually are follows from those of them
+    prior of the fit is wide enough for a large error; how large a cause's sizes usually are follows from those of them
     that are determined.
     """
     if not trained.causes:

@@ -55,7 +55,7 @@ class CosineBasis:
     period : float
         Sample period, s.
     elapsed : float
-        Time since the run began, for which biases have wandered already, s.
+        Time since the run began, for which the random walk of biases has lasted already, s.
     stretches : int
         How many such stretches the run is cut into. Their means are taken for independent though a bias is much the
         same in neighbouring ones; so each is as uncertain as makes the mean of all as uncertain as it is.

@@ -354,9 +354,9 @@ def _exchanged_channels(
         if before > 2 * SIGNIFICANT_RMS**2 and after < (1 - _REMOVED) * before:
             order = np.arange(len(names))
             order[[one, two]] = order[[two, one]]
-            told = f"{names[one]} and {names[two]} read what the other should"
+            words = f"{names[one]} and {names[two]} read what the other should"
             swapped: dict[str, object] = {"channels": [names[one], names[two]]}
-            options.append((float(before - after), "axis_swap", swapped, told, prediction[:, order]))
+            options.append((float(before - after), "axis_swap", swapped, words, prediction[:, order]))
     return options
 
 
@@ -375,8 +375,8 @@ def _inverted_channels(
         if _clears(flipped[one], own[one]) or _reads_negative(run, prediction[:, one], white[one], one):
             sign = np.ones(len(names))
             sign[one] = -1
-            told = f"{name} reads the negative of what it should"
-            options.append((own[one] - flipped[one], "sign_flip", {"channel": name}, told, prediction * sign))
+            words = f"{name} reads the negative of what it should"
+            options.append((own[one] - flipped[one], "sign_flip", {"channel": name}, words, prediction * sign))
     return options
 
 
@@ -399,8 +399,8 @@ def _other_ranges(
             limit = min((1 - _REMOVED) * before, _FITTING * float(power[mine].sum()))
             if before > 2 * SIGNIFICANT_RMS**2 and after < limit:
                 found: dict[str, object] = {"chip": chip.name, "factor": factor}
-                told = f"chip {chip.name} reads {factor:g} times what it should"
-                options.append((before - after, "wrong_range", found, told, prediction * np.where(mine, factor, 1.0)))
+                words = f"chip {chip.name} reads {factor:g} times what it should"
+                options.append((before - after, "wrong_range", found, words, prediction * np.where(mine, factor, 1.0)))
     return options
 
 
@@ -420,9 +420,9 @@ def _exchanged_chips(
         if before - after > by_two + 2 * SIGNIFICANT_RMS**2 and after < (1 - _REMOVED) * before:
             order = np.arange(len(names))
             order[pairs] = pairs[:, ::-1]
-            told = f"chips {chips[one].name} and {chips[two].name} read what the other should"
+            words = f"chips {chips[one].name} and {chips[two].name} read what the other should"
             swapped = [names[channel] for channel in pairs.ravel()]
-            options.append((before - after, "axis_swap", {"channels": swapped}, told, prediction[:, order]))
+            options.append((before - after, "axis_swap", {"channels": swapped}, words, prediction[:, order]))
     return options
 
 

@@ -1,6 +1,6 @@
 """Plausibility: recordings that fit the twin only in another unit, turned over, with another drive, or not at all.
 
-No effect of the library is that: such a file is wrong about itself, and what is wrong is told instead of a diagnosis.
+No effect of the library is that: such a file is wrong about itself; what is wrong is reported, no diagnosis made.
 """
 
 from __future__ import annotations
@@ -91,7 +91,7 @@ def refuse_implausible(
     if misfit.whole < SIGNIFICANT_RMS**2:
         scales = {words: scale for words, scale in scales.items() if scale < 0.0}
     references = [
-        _Reading(f"column {column} {words}, by what the channels feel; mend it", other, predict(other), steady=False)
+        _Reading(f"column {column} {words}, by what the channels read; mend it", other, predict(other), steady=False)
         for words, scale in scales.items()
         for other in [replace(run, reference=run.reference / scale)]
     ]
@@ -128,7 +128,7 @@ def _scales(model: WorldModel) -> Mapping[str, float]:
 class _Reading:
     """A run read otherwise, what the twin predicts for that, and what to say if it fits.
 
-    ``steady`` tells whether the means of the channels change too.
+    ``steady``: whether the means of the channels change too.
     """
 
     text: str
@@ -161,11 +161,11 @@ def _signed_in_parts(
     turned = 0
     for number in range(1, count + 1):
         rows = parts == number
-        as_told, other = (
-            float(np.sum(np.where(run.valid[rows], (run.readings[rows] - told[rows]) / white, 0.0) ** 2))
-            for told in (prediction, reverse.prediction)
+        as_stated, other = (
+            float(np.sum(np.where(run.valid[rows], (run.readings[rows] - expected[rows]) / white, 0.0) ** 2))
+            for expected in (prediction, reverse.prediction)
         )
-        if other < (1.0 - REMOVED) * as_told:
+        if other < (1.0 - REMOVED) * as_stated:
             reference[rows] *= -1.0
             turned += 1
     if turned == 0:
@@ -178,11 +178,11 @@ def _signed_in_parts(
 def _refuse_unrelated(run: Run, prediction: NDArray[np.float64], white: NDArray[np.float64], column: str) -> None:
     """Refuse a run in which much should vary and no channel goes with what it should read."""
     related, spreads = [], []
-    for mine, told, valid, sigma in zip(run.readings.T, prediction.T, run.valid.T, white, strict=True):
-        if valid.sum() < _FEWEST or np.std(told[valid]) < SIGNIFICANT_RMS * sigma:
+    for mine, expected, valid, sigma in zip(run.readings.T, prediction.T, run.valid.T, white, strict=True):
+        if valid.sum() < _FEWEST or np.std(expected[valid]) < SIGNIFICANT_RMS * sigma:
             continue
         spreads.append(float(np.ptp(mine[valid])))
-        related.append(abs(float(np.corrcoef(mine[valid], told[valid])[0, 1])) if spreads[-1] > 0.0 else 0.0)
+        related.append(abs(float(np.corrcoef(mine[valid], expected[valid])[0, 1])) if spreads[-1] > 0.0 else 0.0)
     if len(related) <= prediction.shape[1] // 3 or max(related) > _UNRELATED:
         return
     if not any(spreads):
@@ -190,7 +190,7 @@ def _refuse_unrelated(run: Run, prediction: NDArray[np.float64], white: NDArray[
             f"{run.name}: the channels hold one value while the table turns; check that the board was read"
         )
     raise InputError(
-        f"{run.name}: no channel follows the motion that column {column} tells; "
+        f"{run.name}: no channel follows the motion that column {column} states; "
         "are they of the same run, and was the board on the table?"
     )
 

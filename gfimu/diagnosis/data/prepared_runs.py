@@ -87,7 +87,7 @@ class PreparedRuns:
             checked = _check(model, run, predict, force=force)
             runs.append(checked.run)
             effects.append(list(checked.effects))
-            why = {**checked.why, **why}  # of the run whose numbers are told, the first
+            why = {**checked.why, **why}  # of the run whose numbers are stated, the first
             spikes += checked.spikes + int(wrong.sum())
         rounded = any(effect.name in _ROUNDING for known in (model.effects, *effects) for effect in known)
         return cls(runs, effects, why, spikes, rounded)

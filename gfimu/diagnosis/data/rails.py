@@ -1,7 +1,7 @@
 """Rails: levels of a channel, above or below, that its readings reach again and again and hardly exceed.
 
 The two sides of a channel, and the channels, may differ. A rail is a few counts wide: now and then a reading lies
-beyond it, or its readings carry some noise. Readings on a rail tell nothing but that the truth is beyond.
+beyond it, or its readings carry some noise. Readings on a rail show nothing but that the truth is beyond.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Coarse rounding: what a reading tells when one count is larger than the noise.
+"""Coarse rounding: what a reading determines when one count is larger than the noise.
 
 A reading y in steps of q says only that the value before rounding lay within y ± q/2. Its likelihood
 
@@ -36,7 +36,7 @@ _LEAST_STEP = 1e-9
 _OFF_GRID = 0.05
 _NEAR = 30.0  # standard deviations, within which probabilities don't underflow
 _FAR = 1e4  # standard deviations
-_LEAST_NOISE = 0.03  # of a reference's step: finer edges would tell more than the steps of real parts keep to
+_LEAST_NOISE = 0.03  # of a reference's step: finer edges would be more exact than the steps of real parts keep to
 _NOISE_FACTORS = np.geomspace(0.5, 6.0, 26)
 _MOST_CHANGES = 0.1  # to and fro, of the samples; where there are more the noise shows between the steps
 _ONE_CHANGE = 0.5  # of the usual time from one value to the next, within which there and back is one change

@@ -314,7 +314,7 @@ def _unreferenced(valid: NDArray[np.bool_], period: float) -> NDArray[np.bool_]:
 def _without_repeats(reference: NDArray[np.float64]) -> NDArray[np.float64]:
     """Leave out values that a slower reference repeats until its next reading comes.
 
-    Repeats are told from a table at rest by their being the rule, and from a coarse reference by how many different
+    Repeats differ from a table at rest by their being the rule, and from a coarse reference by how many different
     values there are and by their differing by more than one step.
     """
     known = np.flatnonzero(np.isfinite(reference))
@@ -337,7 +337,7 @@ def _without_repeats(reference: NDArray[np.float64]) -> NDArray[np.float64]:
 def _without_holds(reference: NDArray[np.float64]) -> NDArray[np.float64]:
     """Leave out stretches in which a noisy reference holds one value: it has stopped, or lost its pulses.
 
-    A table at rest may be told as zero to the last digit; zero that the reference jumps to is no rest.
+    A table at rest may be reported as zero to the last digit; zero that the reference jumps to is no rest.
     """
     known = np.flatnonzero(np.isfinite(reference))
     values = reference[known]

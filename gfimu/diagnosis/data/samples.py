@@ -15,7 +15,7 @@ from gfimu.diagnosis.policy import Policy
 __all__ = ["channel_spikes", "frozen_stretches", "reference_spikes", "told_frozen"]
 
 _LONGEST_EQUAL = 40
-_LEAST_NOISE = 0.1  # of a step: with less no run is long enough to tell
+_LEAST_NOISE = 0.1  # of a step: with less no run is long enough to show it
 _SPIKE = 8.0  # noise
 _ROUGH = 6.0  # how much neighbours usually differ there
 _NEIGHBOURS, _AROUND = 5, 9

@@ -78,7 +78,7 @@ def time_grid(t_s: NDArray[np.float64]) -> TimeGrid:
     place = np.concatenate([[0], np.cumsum(apart)])
     step, start = (float(one) for one in np.polyfit(place, t_s - t_s[0], 1))
     late = t_s - t_s[0] - start - step * place
-    jitter = float(np.std(late - uniform_filter1d(late, _MEMORY)))  # a clock that wanders slowly makes no jitter
+    jitter = float(np.std(late - uniform_filter1d(late, _MEMORY)))  # a clock that varies slowly makes no jitter
     if steps.min() >= _EARLY * period:
         # The median step carries the rounding of the time stamps; the ends do not.
         ends = float(t_s[-1] - t_s[0]) / float(place[-1])
@@ -141,10 +141,10 @@ def _apart(steps: NDArray[np.float64]) -> NDArray[np.intp]:
                 if total in wanted and wanted[total].cost <= cost:
                     continue
                 # An outlier moves the grid no further than the spread would.
-                heard = min(max(error, -3.0 * spread), 3.0 * spread)
-                rate = min(max(path.rate + drift * heard, -_MOST_RATE), _MOST_RATE)
+                limited = min(max(error, -3.0 * spread), 3.0 * spread)
+                rate = min(max(path.rate + drift * limited, -_MOST_RATE), _MOST_RATE)
                 losses = _Loss(number, more, path.losses) if more else path.losses
-                wanted[total] = _Path(error - gain * heard, rate, cost, losses)
+                wanted[total] = _Path(error - gain * limited, rate, cost, losses)
         best = min(path.cost for path in wanted.values())
         near = sorted((one for one in wanted.items() if one[1].cost < best + _FAR), key=lambda one: one[1].cost)
         paths = dict(near[:_KEPT])

@@ -1,4 +1,4 @@
-"""What an ambiguous verdict leaves open: the effects that the data couldn't tell apart."""
+"""What an ambiguous verdict leaves open: the effects that the data couldn't distinguish."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["open_effects"]
 
 
 def open_effects(path: str | Path, model: WorldModel) -> list[str | Effect]:
-    """Read the effects that a verdict could not tell apart.
+    """Read the effects that a verdict could not distinguish.
 
     The effect with the fewest sizes comes at its fitted size. A wide family, fitted to the same data, has taken the
     very form of its rival, which no experiment could part from it; it is taken in its usual size instead.
@@ -46,7 +46,7 @@ def open_effects(path: str | Path, model: WorldModel) -> list[str | Effect]:
     names = list(dict.fromkeys([*named, *rivals]))
     if len(names) < 2:
         raise InputError(
-            f"{file}: the verdict is {verdict.get('verdict')!r} and leaves no effects to tell apart; "
+            f"{file}: the verdict is {verdict.get('verdict')!r} and leaves no effects to distinguish; "
             "name them instead, such as tacho_scale sensor_position"
         )
     families = model.families()

@@ -1,4 +1,4 @@
-"""Design of the next experiment: the turntable profile, within limits, that best tells named effects apart.
+"""Design of the next experiment: the turntable profile, within limits, that best distinguishes named effects.
 
 The profile that maximises the smallest D_ij (`gfimu.diagnosis.design.distinguishability`) over all ordered pairs of
 effects is searched by random starts and local search. Where no motion of an upright array can part two effects, the
@@ -56,7 +56,7 @@ def design(
     evaluations: int = 150,
     report: Report | None = None,
 ) -> Proposal:
-    """Propose the experiment that best tells effects apart.
+    """Propose the experiment that best distinguishes effects.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def design(
         limits leave no motion.
     """
     if len(effects) < 2:
-        raise InputError("name at least two effects to tell apart, such as tacho_scale sensor_position")
+        raise InputError("name at least two effects to distinguish, such as tacho_scale sensor_position")
     if model.drive_source == "gyro":
         raise InputError("the twin is a free body (drive source 'gyro'); a turntable profile needs source = \"tacho\"")
     if is_linear(model):
@@ -197,7 +197,7 @@ class _Plan:
 
 
 def _score(table: Distinguishability) -> float:
-    """Logarithm of the smallest D_ij, and a little of all, so that equal ones are told apart."""
+    """Logarithm of the smallest D_ij, and a little of all, so that equal ones are distinguished."""
     logs = np.log(table.nats[~np.eye(len(table.effects), dtype=bool)] + 1e-9)
     return float(logs.min() + 0.02 * logs.mean())
 

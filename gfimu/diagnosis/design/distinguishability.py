@@ -1,4 +1,4 @@
-"""Distinguishability: how surely data of a given motion could tell one effect from another.
+"""Distinguishability: how surely data of a given motion could separate one effect from another.
 
 With the normal equations G of the effects' signatures (noise whitened, drive marginalised;
 `gfimu.diagnosis.fit.posterior`), an effect of sizes z leaves, after the best explanation by a rival with sizes y, the
@@ -90,7 +90,7 @@ class Contender:
 
 @dataclass(frozen=True)
 class Distinguishability:
-    """How surely each of k effects is told from each other one.
+    """How surely each of k effects is separated from each other one.
 
     Parameters
     ----------
@@ -300,7 +300,7 @@ def normal_equations(
 def predict_distinguishability(
     model: WorldModel, effects: Sequence[str | Effect], runs: Sequence[PlannedRun]
 ) -> Distinguishability:
-    """Predict how surely planned runs, taken together, would tell effects apart; no data needed.
+    """Predict how surely planned runs, taken together, would distinguish effects; no data needed.
 
     Parameters
     ----------

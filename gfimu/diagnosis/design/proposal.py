@@ -18,7 +18,7 @@ from gfimu.world_model import WorldModel
 __all__ = ["SEPARATED", "Proposal", "in_words", "scenario_of"]
 
 SEPARATED = 12.0
-"""D_ij from which on two effects are told apart with confidence, nats: odds of 10⁵, less what the prior costs."""
+"""D_ij from which on two effects are distinguished with confidence, nats: odds of 10⁵, less what the prior costs."""
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Proposal:
     Parameters
     ----------
     effects : tuple of str
-        The effects to tell apart.
+        The effects to distinguish.
     profile : TableProfile
         Motion of the table.
     mounting : tuple of float
@@ -61,7 +61,7 @@ class Proposal:
 
     @property
     def separates(self) -> bool:
-        """Whether every effect is expected to be told from every other."""
+        """Whether every effect is expected to be separated from every other."""
         return self.after.least_nats >= SEPARATED
 
     def to_toml(self) -> str:

@@ -18,7 +18,7 @@ from scipy.special import log_ndtr
 __all__ = ["SCALES", "inverse", "likeliest_scale", "log_evidence", "log_evidence_each", "posterior"]
 
 SCALES = (0.01, 0.03, 0.08, 0.2, 0.45, 1.0, 2.2, 5.0, 12.0, 30.0)
-"""Scales k of the prior: a fraction of the usual size up to a gross error.
+"""Scales k of the prior: a fraction of the usual size up to a large error.
 
 Numerical: nodes of a sum over it. Close to each other: with twelve coordinates a prior three times too wide costs
 eight nats, and a rival that happens to have a narrower one would win.

@@ -94,7 +94,7 @@ def _by_reference(stretch: Stretch, spacing: float) -> Drive:
 def _missed_intervals(
     drive: Drive, t: NDArray[np.float64], values: NDArray[np.float64], std: NDArray[np.float64], order: int
 ) -> NDArray[np.bool_]:
-    """Tell in which knot intervals (k,) a drive misses its own reference by more than noise; in none if it rarely does.
+    """Return the knot intervals (k,) in which a drive misses its reference by more than noise; none if it rarely does.
 
     A reference that is faster than the knots, as the command of a printer's axis, needs closer ones before any channel
     is looked at.
@@ -175,7 +175,7 @@ def _log_evidence(posterior: Posterior) -> float:
 
 
 def _is_blurred(drive: Drive, stretch: Stretch, levels: NoiseLevels, acuity: float) -> NDArray[np.bool_]:
-    """Tell in which intervals (k,) of a drive the observations show what its spline misses."""
+    """Return in which intervals (k,) of a drive the observations show what its spline misses."""
     missed, widths = drive.missed, drive.spline.widths
     # It goes to and fro once per interval.
     misread = missed * (widths / (2.0 * np.pi)) ** (2 if stretch.is_angle else 1)

@@ -136,7 +136,7 @@ def story(diagnosis: Diagnosis) -> str:
     level = float(diagnosis.noise.get("bias_instability_largest_m_s2", 0.0))
     if level > 0.0:
         name = diagnosis.noise["bias_instability_largest_channel"]
-        parts.append(f"The largest slow noise is that of {name}, {level / STANDARD_GRAVITY * 1e3:.2g} mg. ")
+        parts.append(f"The largest bias instability is that of {name}, {level / STANDARD_GRAVITY * 1e3:.2g} mg. ")
     return (text + "".join(parts)).strip()
 
 
@@ -261,7 +261,7 @@ def _calibrate_first(diagnosis: Diagnosis) -> list[str]:
         return []
     step = (
         f"If the unit is not calibrated, do that first: {_joined(every)} on all channels is what such a unit looks "
-        "like, and one run can't tell many wrong numbers from each other. Record static poses; then "
+        "like, and one run can't separate many wrong numbers. Record static poses; then "
         "gfimu calibrate twelve-position POSES --array ARRAY --out cal.json and "
         "gfimu diagnose RUN --calibration cal.json."
     )

@@ -455,8 +455,8 @@ def _remembers(cause: Cause, stretch: Stretch) -> bool:
 def _widened(cause: Cause, other: Cause) -> Cause:
     """Return a cause whose uncertainty holds how far it is from another fit of it.
 
-    Whether the drive or a mode rings, only the prior of the drive decides, which is learnt beside it: the covariance
-    alone is too small.
+    Whether the drive or a mode oscillates, only the prior of the drive decides, which is learnt beside it: the
+    covariance alone is too small.
     """
     apart = cause.coordinates - other.coordinates
     shape_std = {key: float(np.hypot(std, cause.shape[key] - other.shape[key])) for key, std in cause.shape_std.items()}

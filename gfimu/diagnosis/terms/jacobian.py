@@ -202,7 +202,7 @@ def measured_reach(
 ) -> Reach:
     """Measure over how many intervals before and after its support a coefficient acts, by a few moved at once.
 
-    Readings belong to other times than those they are told at, ``times`` (n, c), as far as clocks and delays say: a
+    Readings belong to other times than those of their stamps, ``times`` (n, c), as far as clocks and delays say: a
     slow clock shows at its end a motion that is many intervals ahead. What is measured is the memory beyond that. One
     longer than the distance of the moved coefficients has to be declared by what has it.
     """

@@ -4,7 +4,7 @@ The noise of observation c is white but for a few modes, orthonormal columns Q_c
 
     W_c = (I − Q_c diag(s_c) Q_cᵀ) / σ_c².
 
-Where every sample counts alike the modes are cosines, the same for all observations. A coarse reading tells more at the
+Where all samples count alike the modes are cosines, the same for all observations. A coarse reading counts more at the
 edge of a step than in its middle (`gfimu.diagnosis.data.rounding`), so slow noise comes through with the weight w of
 each sample: with B = diag(w) C and the variances S of the cosines C,
 
@@ -114,8 +114,8 @@ class WeighedModes(SlowModes):
         for gram, root in zip(self._gram, self._root.T, strict=True):
             power, vectors = np.linalg.eigh(gram)
             power, vectors = np.maximum(power[::-1], 0.0), vectors[:, ::-1]
-            told = power > WEAKEST_CORRECTION * (1.0 + power)
-            found.append((power[told], root[:, None] * vectors[:, told] / np.sqrt(power[told])))
+            resolved = power > WEAKEST_CORRECTION * (1.0 + power)
+            found.append((power[resolved], root[:, None] * vectors[:, resolved] / np.sqrt(power[resolved])))
         return found
 
     @cached_property

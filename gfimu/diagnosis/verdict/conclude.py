@@ -82,7 +82,7 @@ def stands_out(explanation: Explanation, left: LackOfFit, policy: Policy) -> boo
 
 
 def _depends(explanation: Explanation, left: LackOfFit, policy: Policy) -> bool:
-    """Tell the same of all but noise that grows with the motion, which speaks against no cause."""
+    """Return the same of all but noise that grows with the motion, which speaks against no cause."""
     if left.instead or _is_full(explanation, policy):
         return left.log_odds > policy.lack_odds
     return left.log_odds > max(policy.lack_odds, policy.inexactness * removed(explanation))
@@ -318,8 +318,8 @@ def _loud(loudest: LoudestChannel, policy: Policy) -> str:
     if not loudest.stands_out(policy):
         return ""
     return (
-        f"the slow noise of channel {loudest.name} is {loudest.ratio:.1f} times the median of the other channels: "
-        "something else is in it"
+        f"the bias instability of channel {loudest.name} is {loudest.ratio:.1f} times the median of the other "
+        "channels: something else is in it"
     )
 
 
@@ -338,7 +338,7 @@ def _noise_causes(walk: Walk | None, understanding: Understanding, policy: Polic
                 log_odds=walk.log_odds,
             )
         )
-    body = isinstance(stretches[0], BodyStretch)  # whose channels' noise can't be told apart well
+    body = isinstance(stretches[0], BodyStretch)  # whose channels' noise can't be distinguished well
     excess = None if body else white_factor(stretches, understanding.explanation.best.point.levels)
     if excess is not None and "noise" in families:
         factor, std = excess

@@ -1,8 +1,8 @@
 """Whether the library holds the truth: how far a named cause is to be believed when reality may be outside of it.
 
 The probability of a cause by evidence is one among the effects of the library. Free numbers fit much that is not
-in it. What gives an imitation away can be seen in the fit: numbers bound by a pattern that nothing should bind, sizes
-that hardly stand out from their uncertainty, and something that stays unexplained beside the causes.
+in it. What gives a confounded cause away can be seen in the fit: numbers bound by a pattern that nothing should bind,
+sizes that hardly stand out from their uncertainty, and something that stays unexplained beside the causes.
 """
 
 from __future__ import annotations
@@ -91,7 +91,7 @@ def standing_out(cause: NamedCause, shape: Collection[str]) -> float:
 
 
 def library_probability(evidence: LibraryEvidence, stds: float, rule: LibraryRule, policy: Policy) -> float:
-    """Return the probability that a cause is the truth and no imitation of something outside the library.
+    """Return the probability that a cause is the truth and not confounded with something outside the library.
 
     Parameters
     ----------

@@ -98,7 +98,7 @@ def mimics(explanation: Explanation, cause: Cause, policy: Policy) -> list[str]:
 
 
 def conflicting(explanation: Explanation, policy: Policy) -> list[Fit]:
-    """Return rival sets that the data can't tell from the best one."""
+    """Return rival sets that the data can't separate from the best one."""
     best = explanation.best
     return [
         rival
@@ -208,14 +208,14 @@ def _at_most(explanation: Explanation, fit: Fit, cause: Cause) -> str:
     spin = fit.point.drives[0].spin.at(stretch.run.t)
     values = dependence.of(spin)
     at = int(np.abs(values).argmax())
-    told = f"; it goes with {dependence.words}"
+    text = f"; it goes with {dependence.words}"
     if dependence.name == "1" or not values[at]:
-        return told
+        return text
     sizes = cause.sizes(stretch.model.array, stretch.index)
     number = int(np.abs(sizes).argmax())
     unit = cause.family.sizes(stretch.model.array)[number].unit.split("/(")[0]
     amount = f"{100 * sizes[number] * values[at]:.2g} %" if unit == "1" else f"{sizes[number] * values[at]:.3g} {unit}"
-    return f"{told}: {amount} at {spin.rate[at]:.3g} rad/s and {spin.acceleration[at]:.3g} rad/s²"
+    return f"{text}: {amount} at {spin.rate[at]:.3g} rad/s and {spin.acceleration[at]:.3g} rad/s²"
 
 
 def _or_other_nuisances(explanation: Explanation, cause: Cause, policy: Policy) -> str:
@@ -246,7 +246,7 @@ def capped(cause: NamedCause, policy: Policy, shape: Container[str] = ()) -> Nam
 def contested(
     named: Sequence[NamedCause], fits: Sequence[Fit], families: Mapping[str, EffectFamily]
 ) -> tuple[NamedCause, ...]:
-    """Let each cause that may be another list the others; ``fits`` are the sets that the data can't tell apart."""
+    """Let each cause that may be another list the others; ``fits`` are the sets that the data can't distinguish."""
     shared = frozenset.intersection(*(fit.names for fit in fits))
     open_names = list(dict.fromkeys(cause.effect for cause in named if cause.effect not in shared))
     out = []

@@ -179,7 +179,7 @@ class Diagnosis:
     verdict : {"nothing_found", "explained", "ambiguous", "unknown"}
         The verdict.
     causes : tuple of NamedCause
-        By contribution; of an ambiguous verdict, the effects that can't be told apart.
+        By contribution; of an ambiguous verdict, the effects that can't be distinguished.
     residual, gain, unexplained
         See their classes.
     rivals : tuple of Rival

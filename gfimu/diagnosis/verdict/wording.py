@@ -30,7 +30,7 @@ class Notes:
     terms : int, optional
         Number of terms that describe an unknown, where it was tried.
     loudest : tuple of (str, float, float), optional
-        Channel with the largest slow noise, its level, m/s², and that over the median of the others.
+        Channel with the largest bias instability, its level, m/s², and that over the median of the others.
     rest : str
         What the strongest of the lack of fit looks like.
     """
@@ -98,16 +98,16 @@ def _held_out(residual: Residual, gain: Gain) -> list[str]:
 def _left_over(verdict: str, residual: Residual, unexplained: Unexplained, rest: str) -> list[str]:
     """Say what the causes leave; an unknown verdict says it at first."""
     if unexplained.significant:
-        told = f"Something is left that nothing in the library explains: {unexplained.signature}."
-        return [] if verdict == "unknown" else [told]
+        sentence = f"Something is left that nothing in the library explains: {unexplained.signature}."
+        return [] if verdict == "unknown" else [sentence]
     over = residual.rms_after / max(residual.noise_floor, 1e-12)
     if verdict != "explained" or over <= 1.0 + Policy.small:
         return []
-    told = (
+    sentence = (
         f"What is left is {over:.2f} times the noise{f' ({rest})' if rest else ''}: "
         "little against what is explained, and ± holds it."
     )
-    return [told]
+    return [sentence]
 
 
 def _noted(notes: Notes) -> list[str]:
@@ -116,7 +116,7 @@ def _noted(notes: Notes) -> list[str]:
     if notes.loudest is not None and notes.loudest[1] > 0.0:
         name, level, ratio = notes.loudest
         words.append(
-            f"The largest slow noise is that of channel {name}: {level / STANDARD_GRAVITY * 1e3:.2f} mg, "
+            f"The largest bias instability is that of channel {name}: {level / STANDARD_GRAVITY * 1e3:.2f} mg, "
             f"{ratio:.1f} times the median of the other channels."
         )
     if notes.residue > 0.0:
@@ -143,11 +143,11 @@ def _far_below(residual: Residual, gain: Gain) -> list[str]:
     share = gain.share_of_excess_removed
     if share + 2.0 * float(np.nan_to_num(gain.share_std)) > fitted - Policy.sizeable:
         return []
-    told = (
+    sentence = (
         f"On the fitted data {fitted:.0%} of it is gone: so much more than on unseen data that the sizes may belong to "
         "this recording alone; confirm them on another one."
     )
-    return [told]
+    return [sentence]
 
 
 def _headline(verdict: str, causes: Sequence[NamedCause], unexplained: Unexplained, residue: float, gain: Gain) -> str:

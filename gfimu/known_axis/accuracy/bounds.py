@@ -38,7 +38,7 @@ class AxisBounds:
     rate_rad_s : float
         Rate at which they hold, rad/s.
     acceleration_std, square_std : float
-        σ_α, rad/s², and σ_s, rad²/s², of one sample; infinite where the array can't tell.
+        σ_α, rad/s², and σ_s, rad²/s², of one sample; infinite where the array doesn't determine it.
     sample_std, filter_std : float
         Standard deviation of the rate from one sample, and of a filter that has settled, rad/s.
     predicted : PredictedEstimate, optional

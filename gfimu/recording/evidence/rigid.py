@@ -134,7 +134,7 @@ class Window:
 class _Matrices:
     """What an array makes of its readings: α = A y, N y = M s(ω), and P y = 0 for any motion.
 
-    ``clean`` tells whether no products of ω are left in A y; without that the motion is not judged.
+    ``clean``: whether no products of ω are left in A y; without that the motion is not judged.
     """
 
     alpha: NDArray[np.float64]  # (3, c)
@@ -160,7 +160,7 @@ class _Matrices:
 
 @dataclass(frozen=True)
 class Evidence:
-    """A recording reduced to what tells whether its channels fit one rigid body.
+    """A recording reduced to what shows whether its channels fit one rigid body.
 
     Parameters
     ----------
@@ -417,7 +417,7 @@ def _least_largest(axes: NDArray[np.float64], mean: NDArray[np.float64], limit: 
 
 
 def gather(recording: Recording, array: AccelerometerArray, limits: PartLimits, alive: NDArray[np.bool_]) -> Evidence:
-    """Reduce a recording to what tells whether its channels fit one rigid body.
+    """Reduce a recording to what shows whether its channels fit one rigid body.
 
     Raises
     ------

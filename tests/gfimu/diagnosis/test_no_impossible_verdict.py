@@ -100,8 +100,8 @@ def test_one_channel_with_far_more_slow_noise_is_told(twin):
     assert loud.noise["bias_instability_largest_channel"] == "a22"
     assert loud.noise["bias_instability_largest_m_s2"] > 4 * loud.noise["bias_instability_m_s2"]
     assert loud.verdict == "unknown"
-    assert "the slow noise of channel a22 is" in loud.unexplained.signature
-    assert any("The largest slow noise is that of channel a22" in sentence for sentence in loud.sentences)
+    assert "the bias instability of channel a22 is" in loud.unexplained.signature
+    assert any("The largest bias instability is that of channel a22" in sentence for sentence in loud.sentences)
     assert "bias instability largest channel a22" in report_html(loud)
     quiet = diagnose([run], twin)
     assert quiet.verdict == "nothing_found"

@@ -164,7 +164,7 @@ def test_geometry_that_needs_the_rate_says_so():
     array = AccelerometerArray.load("p2_face_centres")
     with pytest.raises(GeometryError, match=r"p2_face_centres.*alpha_x, alpha_y, alpha_z; give omega"):
         motion_from_readings(array, np.zeros((1, 6)))
-    with pytest.raises(GeometryError, match="can't tell alpha_x"):
+    with pytest.raises(GeometryError, match="can't separate alpha_x"):
         joint_form(array, np.zeros((1, 6)))
 
 

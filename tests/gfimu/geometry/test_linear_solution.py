@@ -89,7 +89,7 @@ def test_forms_can_be_chosen_where_the_geometry_allows():
     readings = specific_force(uniaxial, p, alpha, omega)
     with pytest.raises(GeometryError, match="leaves products of the angular rate"):
         solve(uniaxial, readings, form="linear")
-    with pytest.raises(GeometryError, match="can't tell alpha_x"):
+    with pytest.raises(GeometryError, match="can't separate alpha_x"):
         solve(uniaxial, readings, form="joint")
     with pytest.raises(InputError, match="unknown form 'magic'; valid: auto, joint, linear, recursive"):
         solve(uniaxial, readings, form="magic")

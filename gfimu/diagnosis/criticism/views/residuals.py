@@ -96,10 +96,12 @@ class ResidualViews:
         """The sentences of all views that matter."""
         angle = self.strongest_order
         views = (self.size, self.whiteness, *self.dependences, self.spectrum, self.orders)
-        told = [view for view in views if view is not None and view.sentence]
+        worded = [view for view in views if view is not None and view.sentence]
         # Twelve orders of the angle are one view: its strongest speaks.
         return tuple(
-            view.sentence for view in told if not isinstance(view, Dependence) or view.view != "angle" or view is angle
+            view.sentence
+            for view in worded
+            if not isinstance(view, Dependence) or view.view != "angle" or view is angle
         )
 
     @property
@@ -126,7 +128,7 @@ def residual_views(run: RunView, channels: Sequence[str], *, bias_instability: f
     channels : sequence of str
         Names of the c channels.
     bias_instability : float
-        Rms of the sensors' bias instability, m/s²: slow wander that is noise and no discrepancy.
+        Rms of the sensors' bias instability, m/s²: slow change that is noise and no discrepancy.
     """
     names = tuple(channels)
     before = np.where(run.valid, run.measured - run.before, 0.0)

@@ -22,7 +22,7 @@ __all__ = ["LEAST_POWER", "BodyNoise", "Projection", "learn_motion_noise", "whit
 _AGITATION_GRID = np.concatenate([[0.0], np.geomspace(2e-5, 2e-2, 31)])  # numerical: s
 _SLOPE_GRID = np.concatenate([[0.0], np.geomspace(1e-3, 3.0, 22)])  # numerical: rad/s² per m/s³
 _FLOOR_GRID = np.concatenate([[0.0], np.geomspace(1e-2, 3e2, 19)])  # numerical: rad/s²
-_RATIO_SPREAD = 0.5  # numerical: holds ratios of channels that few combinations hardly tell apart
+_RATIO_SPREAD = 0.5  # numerical: holds ratios of channels that few combinations hardly separate
 _QUIET, _FEWEST_QUIET = 0.34, 200  # numerical: share of the samples that change least, and how many they have to be
 LEAST_POWER = 1e-9
 """Numerical: of the loudest row, or the strongest direction, below which there are rounding errors."""
@@ -93,7 +93,7 @@ class Projection:
     is what the channels read per specific force, where gains and cross-axis effects make that other than the axes.
 
     About a known axis ``rate_row`` (c,) is what senses an error of the squared rate, with ``rate_strength`` (per
-    rad²/s²), of the combinations that don't feel the angular acceleration. On chips of three axes with noise alike
+    rad²/s²), of the combinations that the angular acceleration does not enter. On chips of three axes with noise alike
     nothing of it is lost: tangential and radial differences are orthogonal.
     """
 
@@ -119,7 +119,7 @@ class Projection:
         self.rate_row = (by_rate / max(self.rate_strength, 1e-300)) @ self.rows  # (c,)
         self.force_rows = basis[:, :3].T * self.inverse  # (3, c): what the specific force takes
         self.strength = strength  # (3,)
-        self.turn = turn  # (3, 3): rows i feels strength_i · turn_i · α
+        self.turn = turn  # (3, 3): row i reads strength_i · turn_i · α
         self.to_force = np.linalg.pinv(axes) * self.inverse  # (3, c)
         # Gains near −1 leave no specific force to be sensed.
         self.force_covariance = np.linalg.pinv(axes.T @ axes, hermitian=True)
@@ -136,7 +136,7 @@ def white_from_rows(
     """White noise of each channel from residuals r = P e of the quiet samples, shape (c,), m/s².
 
     With independent channels E r_i² = Σ_j P_ij² σ_j²; second differences in time leave white noise alone. Where few
-    combinations are left the channels can't be told apart well: their ratios are held near those of the data sheet.
+    combinations are left the channels can't be distinguished well: their ratios are held near those of the data sheet.
     """
     both = use[2:] & use[1:-1] & use[:-2]
     quiet = both & (change[1:-1] <= np.quantile(change[1:-1][both], _QUIET)) if both.any() else both

@@ -107,7 +107,7 @@ class HandPosterior:
 
     @cached_property
     def _mix(self) -> NDArray[np.float64]:
-        """The combinations that feel the drive, shape (7, c)."""
+        """The combinations that the drive enters, shape (7, c)."""
         return np.vstack([self.jacobian.force_rows, self.jacobian.rows[:3], self.jacobian.rate_row])
 
     @cached_property
@@ -477,7 +477,7 @@ def _settled(
         left = np.where(stretch.run.valid, stretch.run.readings - stretch.channels(effects, drive.spin), 0.0)
         step = left @ projection.to_force.T
         size = float(np.sqrt(np.mean(step[stretch.use] ** 2)))
-        if not size <= last:  # effects this large leave no specific force that fits: the misfit will tell
+        if not size <= last:  # effects this large leave no specific force that fits: the misfit will show it
             break
         drive, last = replace(drive, spin=drive.spin.with_force(drive.spin.force + step)), size
         if size < _FORCE_DONE * levels.typical:

@@ -90,7 +90,7 @@ def test_notes_come_last_in_order():
         "nothing_found", loudest=("a12", 9.80665e-3, 1.5), unreferenced=2.0, residue=1.0, withdrawn=["resonance"]
     )
     assert words[1:] == (
-        "The largest slow noise is that of channel a12: 1.00 mg, 1.5 times the median of the other channels.",
+        "The largest bias instability is that of channel a12: 1.00 mg, 1.5 times the median of the other channels.",
         words[2],
         "2.0 s are left out, as the reference is missing there.",
         "resonance was withdrawn: it did not predict held-out data.",
