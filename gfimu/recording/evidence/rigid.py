@@ -504,12 +504,11 @@ def _still(t: NDArray[np.float64], values: NDArray[np.float64], rests: NDArray[n
     """Return what channels (m, c) read while α is zero, interpolated between the rests (k, 2) of a window.
 
     A gain that is off by a tenth makes an α of gravity, another one in each pose, that would integrate to a rate. At
-    rest, and in a steady spin, α is zero; so what is read there is taken off. Zero where a window has one rest only: an
-    error of α that stays is fitted.
+    rest, and in a steady spin, α is zero; so what is read there is taken off, and what is wrong with it is fitted.
     """
     inside = np.clip(rests, 0, len(t))
     inside = inside[inside[:, 1] - inside[:, 0] >= _FEWEST_STILL]
-    if len(inside) < 2:
+    if not len(inside):
         return np.zeros_like(values)
     middles = [float(t[start:stop].mean()) for start, stop in inside]
     means = np.array([values[start:stop].mean(axis=0) for start, stop in inside])
