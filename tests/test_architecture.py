@@ -290,7 +290,7 @@ ROOMS = {
     },
     "gfimu.uncertainty": {"gfimu.calibration", "gfimu.certification", "gfimu.files"},
     "firmware_bridge.adxl345": set(),
-    "firmware_bridge.frames": {"gfimu.files", "gfimu.geometry.array"},
+    "firmware_bridge.frames": {"gfimu.files", "gfimu.geometry.array", "gfimu.parts"},
     "firmware_bridge.host": {
         "firmware_bridge.frames",
         "firmware_bridge.sources",

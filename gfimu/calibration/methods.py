@@ -42,6 +42,7 @@ __all__ = [
     "calibrate_triads",
     "calibrate_whole_array",
     "run_calibration",
+    "temperature_statistics",
 ]
 
 
@@ -184,7 +185,19 @@ def calibrate(
 def run_calibration(method: CalibrationMethod, task: CalibrationTask) -> Calibration:
     """Calibrate by the record of a method; raises as `calibrate`."""
     result: Calibration = method.run(method, task)
-    return result
+    return replace(result, statistics={**result.statistics, **temperature_statistics(task.recording)})
+
+
+def temperature_statistics(recording: Recording) -> dict[str, float]:
+    """Return mean and span of the temperature at which a recording was made; empty if it has none.
+
+    Sensitivity and bias hold at that temperature: a condition of the calibration.
+    """
+    temperature = recording.reference.get("temperature_degC")
+    seen = np.empty(0) if temperature is None else temperature[np.isfinite(temperature)]
+    if not len(seen):
+        return {}
+    return {"temperature_mean_degC": float(seen.mean()), "temperature_span_K": float(np.ptp(seen))}
 
 
 def calibrate_triads(method: CalibrationMethod, task: CalibrationTask) -> Calibration:

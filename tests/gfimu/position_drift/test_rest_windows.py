@@ -25,7 +25,8 @@ def squares(covariance, **coefficients):
 
 def off_centre():
     """A cube whose origin is far from its chips: errors of α and p are correlated."""
-    return CUBE.with_geometry([np.add(chip.position, [0.1, 0.2, 0.3]) for chip in CUBE.chips], [c.axes for c in CUBE.chips])
+    places = [np.add(chip.position, [0.1, 0.2, 0.3]) for chip in CUBE.chips]
+    return CUBE.with_geometry(places, [chip.axes for chip in CUBE.chips])
 
 
 @pytest.mark.parametrize(("lead", "array"), [(LEAD, CUBE), (40.0, CUBE), (LEAD, off_centre())])
