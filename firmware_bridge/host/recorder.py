@@ -21,7 +21,14 @@ from firmware_bridge.host.finder import SPEEDS, has_speed
 from firmware_bridge.host.journal import JournalError
 from firmware_bridge.host.line_up import line_up, needed_baud
 from firmware_bridge.host.link import Chunk, Link
-from firmware_bridge.host.mounting.on_board import ArrayOnBoard, ask_board, candidate_arrays, load_stated, take_waiting
+from firmware_bridge.host.mounting.on_board import (
+    ArrayOnBoard,
+    BoardAnswer,
+    ask_board,
+    candidate_arrays,
+    load_stated,
+    take_waiting,
+)
 from firmware_bridge.host.record_session import Batch, RecordSession, SampleClock
 from firmware_bridge.sources.ports import port_format
 from gfimu.errors import GfimuError, InputError
@@ -154,14 +161,16 @@ def record(
     layout = layout.for_array(given)
     with Link(port, baud=baud or SPEEDS[0], reconnect_s=reconnect_s, form=layout) as link:
         began = time.monotonic()
-        on_board, agreed, chunks = ArrayOnBoard(given, "host" if array else "format"), None, deque[Chunk]()
+        on_board, answer = ArrayOnBoard(given, "host" if array else "format"), None
         if layout.array_is_assumed and not array:
-            on_board, agreed, chunks = _settle_array(link, layout, baud, setup, choose_array, stop)
+            on_board, answer = _settle_array(link, layout, baud, setup, choose_array, stop)
             layout = layout.for_array(on_board.array)
         if on_array is not None:
             on_array(on_board.known)
         session = RecordSession(layout, on_board, target, _metadata(port, layout, on_board), has_setup=bool(setup))
-        session.baud = agreed
+        if answer is not None:
+            session.baud = answer.baud
+            session.waiting_for_board &= answer.answers or bool(setup)  # it was given its time
         with _ask_to_stop() as asked:
             trouble = _run(
                 link,
@@ -171,7 +180,7 @@ def record(
                 on_batch,
                 lambda: asked() or (stop is not None and stop()),
                 baud,
-                (began, chunks),
+                (began, deque(() if answer is None else answer.chunks)),
             )
         breaks = link.breaks
     try:
@@ -247,18 +256,18 @@ def _settle_array(
     setup: tuple[bytes, ...],
     choose: Callable[[tuple[AccelerometerArray, ...]], str] | None,
     stop: Callable[[], bool] | None,
-) -> tuple[ArrayOnBoard, int | None, deque[Chunk]]:
-    """Return the array that the board states, or that is chosen; the speed agreed on, and what came meanwhile."""
+) -> tuple[ArrayOnBoard, BoardAnswer]:
+    """Return the array that the board states, or that is chosen, and what else became of the question."""
     least = needed_baud(layout, asked_rate(setup))
     answer = ask_board(link, layout, baud, least, stop or (lambda: False), has_setup=bool(setup))
     if answer.array:
-        return ArrayOnBoard(load_stated(answer.array, link.port), "board"), answer.baud, deque(answer.chunks)
+        return ArrayOnBoard(load_stated(answer.array, link.port), "board"), answer
     name = "" if choose is None else choose(candidate_arrays(layout))
     if choose is not None:
         take_waiting(link)  # the recording begins with the answer
         answer.chunks.clear()
     array = AccelerometerArray.load(name or layout.array)
-    return ArrayOnBoard(array, "answer" if name else ""), answer.baud, deque(answer.chunks)
+    return ArrayOnBoard(array, "answer" if name else ""), answer
 
 
 @contextmanager

@@ -56,11 +56,12 @@ class ArrayOnBoard:
 
 @dataclass(frozen=True)
 class BoardAnswer:
-    """What a board was asked for: the array that it states, the speed if one was agreed on, and what came meanwhile."""
+    """What became of the question to a board: the array that it states, the speed agreed on, what came meanwhile."""
 
     array: str
     baud: int | None
     chunks: list[Chunk]
+    answers: bool
 
 
 def ask_board(
@@ -73,13 +74,14 @@ def ask_board(
     if has_speed(link.port):
         result = line_up(link, form, baud, least_baud=least_baud, stop=stop)
         if result is None:
-            return BoardAnswer("", None, [])
+            return BoardAnswer("", None, [], answers=False)
         found, chunks = result
-        return BoardAnswer(found.array, found.baud, [] if has_setup else chunks)
+        return BoardAnswer(found.array, found.baud, [] if has_setup else chunks, answers=found.identity is not None)
     early = take_waiting(link)
     listener = Listener([form])
-    listener.listen(link)
-    return BoardAnswer(listener.array, None, early + listener.chunks)
+    understood = listener.listen(link)
+    answers = understood is not None and understood[1] is not None
+    return BoardAnswer(listener.array, None, early + listener.chunks, answers=answers)
 
 
 def take_waiting(link: Link) -> list[Chunk]:
