@@ -177,7 +177,7 @@ def _behind_port(
         line.close()
 
 
-@writes(reads=("image",), out=IMAGES)
+@writes(reads=("image", "array"), out=IMAGES)
 def build(
     image: str = "gfimu",
     *,
