@@ -276,7 +276,23 @@ class _Problem:
         fitted = places >= len(self.at["sensors"])
         values[fitted] += start.values[fitted]
         covariance = solution.covariance[np.ix_(places, places)]
-        return replace(start, method="spin", values=values, covariance=(covariance + covariance.T) / 2.0, statistics={})
+        fresh = replace(
+            start, method="spin", values=values, covariance=(covariance + covariance.T) / 2.0, statistics={}
+        )
+        return replace(fresh, null_space=_carried_directions(start, fresh))
+
+
+def _carried_directions(start: Calibration, fresh: Calibration) -> Floats:
+    """Return the directions that the start left undetermined, rotations dM = M X of the frame, at the fitted M."""
+    directions = start.null_space.copy()
+    for chip in start.chips:
+        rows = [
+            start.names.index(f"{chip}_M_{i}{j}") for i in "xyz" for j in "xyz" if f"{chip}_M_{i}{j}" in start.names
+        ]
+        if len(rows) == 9:  # a triangular M has its frame
+            turned = fresh.models[chip].sensitivity @ start.models[chip].inverse
+            directions[rows] = np.einsum("ij,jkn->ikn", turned, directions[rows].reshape(3, 3, -1)).reshape(9, -1)
+    return np.asarray(np.linalg.qr(directions)[0], dtype=np.float64)
 
 
 def _axis(

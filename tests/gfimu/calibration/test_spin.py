@@ -13,6 +13,7 @@ from gfimu.calibration.result import Calibration, load_calibration
 from gfimu.calibration.spin import SpinPolicy, spin
 from gfimu.calibration.spin.model import Geometry, SpinGeometry, read_plateaus
 from gfimu.calibration.spin.plateaus import find_plateaus
+from gfimu.certification.certify import certify
 from gfimu.errors import InputError, UnitError
 from gfimu.recording import Recording
 from sim.adxl345 import SensorErrors, SensorSettings
@@ -269,6 +270,20 @@ def test_a_run_on_the_side_determines_what_the_upright_one_left_open():
     up = ~np.isin(np.arange(12), ACROSS)
     assert np.all(spread(both, "q")[up] < 0.75 * spread(upright, "q")[up])
     assert np.all(spread(both, "c") <= spread(upright, "c") * 1.02)
+
+
+def test_a_certificate_of_a_spin_states_what_that_of_the_poses_does():
+    """The frame's rotation stays undetermined, at the fitted gains: K1 and the angles are stated all the same."""
+    rng = np.random.default_rng(14)
+    unit = Unit.draw(rng)
+    static = unit.static(rng)
+    stated = [
+        {term.name for term in certify(one).terms if term.value is not None}
+        for one in (static, spin(unit.turn(rng), CUBE, start=static))
+    ]
+    assert {"a11_K1", "a1_angle_xy"} <= stated[0]
+    assert stated[1] - stated[0] == {f"{channel}_K3" for channel in CUBE.channels}
+    assert stated[0] <= stated[1]
 
 
 def test_raw_counts_give_the_same_in_their_unit():
