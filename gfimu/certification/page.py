@@ -77,9 +77,8 @@ def certificate_html(certificate: Certificate) -> str:
 
 def _symbol(text: str) -> Markup:
     """Symbol or equation with its indices below the line: ``K_ip``, ``K0``."""
-    lowered = re.sub(
-        r"_([A-Za-zα-ω]+)|(?<=K)(\d)", lambda found: f"<sub>{found[1] or found[2]}</sub>", str(escape(text))
-    )
+    index = r"_([A-Za-zα-ω]+)|(?<=K)(\d)"
+    lowered = re.sub(index, lambda found: f"<sub>{found[1] or found[2]}</sub>", str(escape(text)))
     return Markup(lowered)  # noqa: S704  the text was escaped
 
 
