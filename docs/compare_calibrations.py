@@ -24,7 +24,14 @@ import numpy as np
 
 from gfimu.calibration.error_model import ErrorModel
 from gfimu.calibration.multi_position import multi_position
-from gfimu.calibration.observations import INPUTS, observations_from
+from gfimu.calibration.observations import (
+    INPUTS,
+    THRESHOLDS,
+    averaged_poses,
+    denoised_samples,
+    every_sample,
+    observations_from,
+)
 from gfimu.calibration.recursive import recursive
 from gfimu.calibration.result import Calibration
 from gfimu.calibration.six_position import six_position
@@ -37,6 +44,8 @@ RATE, SECONDS = 100.0, 8.0
 NOISE = {"N": 0.003, "B": 0.0005}
 LEVELLING_DEG = (0.0, 0.1, 0.5)
 CHECK_POSES = 40
+WAVELET_LEVELS = (1, 2, 3, 4, 5, 6)
+WAVELET_TRIALS = 16
 FACES = np.concatenate([np.eye(3), -np.eye(3)])
 DIRECTIONS = np.array([v for v in itertools.product((-1, 0, 1), repeat=3) if 0 < np.abs(v).sum() < 3], dtype=float)
 DIRECTIONS /= np.linalg.norm(DIRECTIONS, axis=1, keepdims=True)
@@ -76,6 +85,46 @@ def compare(trials: int, *, seed: int = 1, levelling: tuple[float, ...] = LEVELL
     return Comparison({key: np.array(values) for key, values in residuals.items()})
 
 
+def compare_wavelets(
+    trials: int, *, seed: int = 1, levels: tuple[int, ...] = WAVELET_LEVELS
+) -> dict[tuple[str, int, str], float]:
+    """Compare the wavelet input, by level and threshold, with averages, for level faces.
+
+    Returns
+    -------
+    dict
+        By method, level and threshold: RMS of |a| − g on poses that the fit has not seen over that of the averaged
+        input, pooled over the triads. Level 0 are the raw samples.
+    """
+    rng = np.random.default_rng(seed)
+    squares: dict[tuple[str, int, str], float] = {}
+    inputs = [(level, threshold) for level in levels for threshold in THRESHOLDS]
+    for _ in range(trials):
+        truth = ErrorModel(np.tril(np.eye(3) + rng.normal(0, 0.01, (3, 3))), rng.normal(0, 0.3, 3))
+        check = rng.normal(size=(CHECK_POSES, 3))
+        check *= GRAVITY / np.linalg.norm(check, axis=1, keepdims=True)
+        for name, (method, poses) in METHODS.items():
+            recording, rest = _record(truth, poses, 0.0, rng)
+            rows = {(-1, ""): averaged_poses(recording, rest), (0, "none"): every_sample(recording, rest)}
+            rows |= {one: denoised_samples(recording, rest, level=one[0], threshold=one[1]) for one in inputs}
+            for (level, threshold), observations in rows.items():
+                model = method(observations, gravity=GRAVITY, gauge="x_axis").models["a1"]
+                miss = np.linalg.norm(model.correct(truth.read(check)), axis=1) - GRAVITY
+                key = (name, level, threshold)
+                squares[key] = squares.get(key, 0.0) + float(np.mean(miss**2))
+    return {key: float(np.sqrt(value / squares[key[0], -1, ""])) for key, value in squares.items() if key[1] >= 0}
+
+
+def wavelet_table(ratios: dict[tuple[str, int, str], float]) -> str:
+    """Return the ratios of `compare_wavelets` as a Markdown table: a row per level, thresholds none, soft, hard."""
+    lines = ["| level | " + " | ".join(METHODS) + " |", "|---|" + "---|" * len(METHODS)]
+    for level in dict.fromkeys(level for _, level, _ in ratios):
+        kinds = [kind for kind in THRESHOLDS if (next(iter(METHODS)), level, kind) in ratios]
+        cells = [" / ".join(f"{ratios[name, level, kind]:.3f}" for kind in kinds) for name in METHODS]
+        lines.append(f"| {level or 'raw'} | " + " | ".join(cells) + " |")
+    return "\n".join(lines)
+
+
 def table(comparison: Comparison) -> str:
     """Return the medians over the trials as a Markdown table, mm/s²."""
     lines = ["| levelling error | method | " + " | ".join(INPUTS) + " |", "|---|---|" + "---|" * len(INPUTS)]
@@ -106,6 +155,8 @@ def main(folder: Path, trials: int = 60) -> Comparison:
     comparison = compare(trials)
     print(f"RMS of |a| − g on {CHECK_POSES} check poses, median of {trials} triads, mm/s²:\n")
     print(table(comparison))
+    print(f"\nWavelet input, the same over that of averages, {WAVELET_TRIALS} triads:\n")
+    print(wavelet_table(compare_wavelets(WAVELET_TRIALS)))
     folder.mkdir(parents=True, exist_ok=True)
     draw(comparison, folder / "calibration_comparison.png")
     return comparison

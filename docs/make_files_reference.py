@@ -1,5 +1,7 @@
 """Write docs/files.md, the reference of the files that a user writes by hand, from their schemas.
 
+The JSON schema of a certificate, which `gfimu certificate` writes, is published with it.
+
 Run ``python docs/make_files_reference.py``.
 """
 
@@ -7,6 +9,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from gfimu.certification.schema import SCHEMA_FILE, certificate_schema
 from gfimu.commands.file_kinds import FILE_KINDS, file_schema
 from gfimu.files.schema_keys import TableRows, table_rows
 
@@ -15,9 +18,10 @@ PAGE = Path(__file__).parent / "files.md"
 INTRODUCTION = """\
 # Files key by key
 <!-- made by make_files_reference.py; edit the schemas that are named below -->
-Arrays, parts, column maps, twins and scenarios are TOML files. `gfimu list arrays` lists those that come with gfimu,
-`gfimu show cube12` prints one, and `gfimu new array --out my_array.toml` writes a commented one to edit. A key that is
-not on this page is refused, with the nearest one that is; part files may hold further keys for people.
+Arrays, parts, column maps, twins, scenarios, frames and stages are TOML files. `gfimu list arrays` lists those that
+come with gfimu, `gfimu show cube12` prints one, and `gfimu new array --out my_array.toml` writes a commented one to
+edit. A key that is not on this page is refused, with the nearest one that is; part files may hold further keys for
+people.
 
 Editors with [taplo](https://taplo.tamasfe.dev) (Even Better TOML in VS Code) complete and check these files by a JSON
 schema. `gfimu new array --out my_array.toml --schema array.schema.json` writes the file, the schema, and the line
@@ -76,3 +80,4 @@ def _cell(text: str) -> str:
 
 if __name__ == "__main__":
     PAGE.write_text(files_page(), encoding="utf-8")
+    SCHEMA_FILE.write_text(certificate_schema(), encoding="utf-8")

@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from gfimu.commands.catalogue import catalogue as catalogue
     from gfimu.commands.catalogue import new as new
     from gfimu.commands.catalogue import show as show
+    from gfimu.commands.certificate import certificate as certificate
     from gfimu.commands.check import check as check
     from gfimu.commands.convert import convert as convert
     from gfimu.commands.demo import demo as demo
@@ -50,6 +51,7 @@ if TYPE_CHECKING:
     from gfimu.commands.drift import axis_drift as axis_drift
     from gfimu.commands.drift import drift as drift
     from gfimu.commands.drift import drift_from_position as drift_from_position
+    from gfimu.commands.drift_of_rest import drift_of_rest as drift_of_rest
     from gfimu.commands.estimate import estimate as estimate
     from gfimu.commands.impact import impact as impact
     from gfimu.commands.inspect import inspect as inspect
@@ -120,6 +122,7 @@ _PUBLIC = {
     "calibrate_array": "gfimu.calibration.array_calibration",
     "centripetal_agreement": "gfimu.motion.estimate_summary",
     "catalogue": "gfimu.commands.catalogue",
+    "certificate": "gfimu.commands.certificate",
     "check": "gfimu.commands.check",
     "closed_form": "gfimu.geometry.kinematics",
     "convert": "gfimu.commands.convert",
@@ -131,6 +134,7 @@ _PUBLIC = {
     "axis_drift": "gfimu.commands.drift",
     "drift": "gfimu.commands.drift",
     "drift_from_position": "gfimu.commands.drift",
+    "drift_of_rest": "gfimu.commands.drift_of_rest",
     "drift_budget": "gfimu.position_drift",
     "equivalent_p_bias": "gfimu.motion.equivalent_errors",
     "equivalent_rate_drift": "gfimu.motion.equivalent_errors",

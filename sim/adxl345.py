@@ -109,6 +109,8 @@ class SensorErrors:
         Change of the offset with temperature, m/s² per K.
     scale_temperature : ndarray, shape (c,)
         Relative change of the gain per K.
+    cubic : ndarray, shape (c,), or float
+        Third-order non-linearity, s⁴/m²: reading + cubic · reading³. No data sheet states one, so none is drawn.
     """
 
     bias: NDArray[np.float64]
@@ -118,6 +120,7 @@ class SensorErrors:
     quadratic: NDArray[np.float64]
     bias_temperature: NDArray[np.float64]
     scale_temperature: NDArray[np.float64]
+    cubic: NDArray[np.float64] | float = 0.0
 
     __repr__ = short_repr
 
@@ -132,7 +135,7 @@ class SensorErrors:
         """Apply the errors to specific force (n, c), m/s², at board temperatures (n,), °C."""
         warm = (temperature - _REFERENCE_TEMPERATURE)[:, None]
         picked = force + force @ (self.cross_axis + self.misalignment).T  # (n, c)
-        bent = picked + self.quadratic * picked**2
+        bent = picked + self.quadratic * picked**2 + self.cubic * picked**3
         gain = 1.0 + self.scale + self.scale_temperature * warm
         return bent * gain + self.bias + self.bias_temperature * warm
 

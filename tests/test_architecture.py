@@ -255,6 +255,13 @@ ROOMS = {
         "gfimu.recording",
         "gfimu.visual.colours",
     },
+    "gfimu.certification": {
+        "gfimu.calibration",
+        "gfimu.geometry.array",
+        "gfimu.parts",
+        "gfimu.recording",
+        "gfimu.sensor_noise",
+    },
     "gfimu.exporting": {
         "gfimu.calibration",
         "gfimu.geometry",
@@ -273,9 +280,17 @@ ROOMS = {
         "gfimu.recording",
     },
     "gfimu.own_rig": {"gfimu.files", "gfimu.geometry.array", "gfimu.generic_basis", "gfimu.world_model"},
-    "gfimu.position_drift": {"gfimu.geometry", "gfimu.motion", "gfimu.rate.integration"},
+    "gfimu.position_drift": {
+        "gfimu.geometry",
+        "gfimu.motion",
+        "gfimu.rate.integration",
+        "gfimu.recording",
+        "gfimu.sensor_noise",
+        "gfimu.visual.colours",
+    },
+    "gfimu.uncertainty": {"gfimu.calibration", "gfimu.certification", "gfimu.files"},
     "firmware_bridge.adxl345": set(),
-    "firmware_bridge.frames": {"gfimu.files", "gfimu.geometry.array"},
+    "firmware_bridge.frames": {"gfimu.files", "gfimu.geometry.array", "gfimu.parts"},
     "firmware_bridge.host": {
         "firmware_bridge.frames",
         "firmware_bridge.sources",

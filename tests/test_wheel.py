@@ -46,6 +46,7 @@ def _run(site: Path, *arguments: str, cwd: Path) -> subprocess.CompletedProcess[
 def test_models_lie_inside_the_wheel(installed: Path) -> None:
     assert (installed / "sim" / "models" / "arrays" / "cube12.toml").is_file()
     assert (installed / "sim" / "models" / "mjcf" / "turntable.xml").is_file()
+    assert (installed / "gfimu" / "certification" / "certificate.schema.json").is_file()
     assert not (installed / "tests").exists()
 
 

@@ -13,6 +13,7 @@ from firmware_bridge.board.board import Board
 from firmware_bridge.board.fast_board import FastBoard
 from firmware_bridge.board.nvic import FIRST_IRQ
 from firmware_bridge.board.trace import Event, EventList
+from firmware_bridge.lpc1768.build import named_image
 from firmware_bridge.lpc1768.elf import ElfImage
 
 __all__ = ["Worker"]
@@ -24,8 +25,12 @@ _TIMER_COUNTER = 0x08
 class Worker:
     """One board and the requests it answers; each method is one request."""
 
-    def __init__(self, path: Path, sensors: Sequence[Adxl345], *, fast: bool, trace: bool, lose_every: int) -> None:
+    def __init__(
+        self, path: Path, sensors: Sequence[Adxl345], *, fast: bool, trace: bool, lose_every: int, array: str = ""
+    ) -> None:
         image = ElfImage.load(path)
+        if array:
+            image = named_image(image, array)
         self._events = EventList() if trace else None
         self._board: Board = FastBoard(image, sensors) if fast else Board(image, sensors, tracer=self._events)
         gc.freeze()

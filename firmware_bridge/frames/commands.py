@@ -18,6 +18,8 @@ __all__ = [
     "LPC1768_DIALOGUE",
     "RATES_HZ",
     "RATE_CODE_AUTO",
+    "TEMPERATURE_LSB_K",
+    "ArrayName",
     "Command",
     "Dialogue",
     "FrameType",
@@ -42,6 +44,9 @@ RATES_HZ = (10, 3200)
 NO_TEMPERATURE = -(1 << 15)
 """Value of the temperature field while no sensor fills it."""
 
+TEMPERATURE_LSB_K = 0.01
+"""Size of a count of that field."""
+
 _LARGEST_RATE_CODE = 15
 _FASTEST_OUTPUT_HZ = 3200.0  # of the chips, at that code
 _SEVERAL_BITS = (4, 5, 6, 7)  # status bits of the sensors that converted more than once since the sample before
@@ -62,6 +67,7 @@ class FrameType(enum.IntEnum):
     SAMPLE = 1
     IDENTITY = 2
     REPLY = 3
+    ARRAY = 4
 
 
 class Command(enum.IntEnum):
@@ -92,6 +98,13 @@ class Reply:
 
     command: int
     result: Result
+
+
+@dataclass(frozen=True)
+class ArrayName:
+    """The array that a board states to be on it; sent before each identity by boards that state one."""
+
+    name: str
 
 
 @dataclass(frozen=True)
@@ -180,13 +193,13 @@ class Dialogue:
     start : bytes
         Command that starts the stream of samples.
     parse : callable
-        Packet that is no sample to `Reply` or `Identity`, or None.
+        Packet that is no sample to `Reply`, `ArrayName` or `Identity`, or None.
     """
 
     identify: bytes
     identify_code: int
     start: bytes
-    parse: Callable[[Any], Reply | Identity | None]
+    parse: Callable[[Any], Reply | ArrayName | Identity | None]
 
 
 def encode_command(command: int, *values: int) -> bytes:
@@ -237,10 +250,11 @@ def set_range(range_g: int, *, full_resolution: bool = True) -> bytes:
     return encode_command(Command.SET_RANGE, range_g.bit_length() - 2, int(full_resolution))
 
 
-def parse_message(packet: Any) -> Reply | Identity | None:
-    """Read an identity or reply frame; None for other types, and for what the firmware does not send.
+def parse_message(packet: Any) -> Reply | ArrayName | Identity | None:
+    """Read a frame that is no sample; None for other types, and for what the firmware does not send.
 
-    Status and temperature of both are empty, and a reply ends in zeros: junk that passes the checksum has other bytes.
+    Status and temperature of all are empty, a reply and a name end in zeros: junk that passes the checksum has other
+    bytes.
     """
     payload = np.asarray(packet["counts"], dtype="<i2").tobytes()
     if packet["status"] != 0 or packet["temperature"] != NO_TEMPERATURE:
@@ -250,6 +264,9 @@ def parse_message(packet: Any) -> Reply | Identity | None:
             return None
         result = payload[1] if payload[1] <= max(Result) else Result.UNKNOWN_COMMAND
         return Reply(payload[0], Result(result))
+    if packet["type"] == FrameType.ARRAY:
+        name = payload.rstrip(b"\0")
+        return ArrayName(name.decode("ascii")) if name and all(0x20 < byte < 0x7F for byte in name) else None
     if packet["type"] != FrameType.IDENTITY:
         return None
     fields: tuple[Any, ...] = struct.unpack("<4BHBBIBBBBIHH", payload)

@@ -79,6 +79,8 @@ class Samples:
         Samples lost between the sample before and this one; 0 where the board began to sample anew.
     segment : ndarray, shape (n,)
         Number that grows by one whenever the board started anew: its clock begins again there.
+    temperature_degC : ndarray, shape (n,)
+        Temperature of the board; NaN where the sample has none.
     """
 
     ticks: NDArray[np.int64]
@@ -87,6 +89,7 @@ class Samples:
     status: NDArray[np.uint16]
     lost_before: NDArray[np.int64]
     segment: NDArray[np.int64]
+    temperature_degC: NDArray[np.float64]
 
     __repr__ = short_repr
 
@@ -235,7 +238,8 @@ class SampleDecoder:
         self._lost += int(lost.sum())
         numbers = self._sequence(packets)
         self._received += n
-        return Samples(ticks, numbers, self.format.counts(packets), status, lost, segment)
+        counts, warm = self.format.counts(packets), self.format.temperatures(packets)
+        return Samples(ticks, numbers, counts, status, lost, segment, warm)
 
     def _sequence(self, packets: NDArray[Any]) -> NDArray[Any]:
         """Sequence numbers of the packets in the byte order of this machine; where there are none, a count of them."""

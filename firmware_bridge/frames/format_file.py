@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Collection
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -10,13 +11,14 @@ import numpy as np
 
 from firmware_bridge.frames.checksum import CHECKSUMS
 from firmware_bridge.frames.delimited import DelimitedLayout
-from firmware_bridge.frames.frame_format import FrameFormat
+from firmware_bridge.frames.frame_format import FrameFormat, TemperatureField
 from firmware_bridge.frames.packets import PacketLayout, StreamLayout
 from firmware_bridge.frames.text_lines import TextLayout
 from gfimu.errors import InputError, unknown_name
 from gfimu.files.model_files import find_model, read_toml
 from gfimu.files.schema import Positive, Table, about, read
 from gfimu.geometry.array import AccelerometerArray
+from gfimu.parts.part_file import PartFile
 
 __all__ = ["FormatFile", "load_format"]
 
@@ -33,7 +35,9 @@ Unit = Literal["lsb", "m_s2", "g", "mg"]
 class Field(Table, frozen=True):
     """A field of a packet, in the order of the bytes."""
 
-    name: Annotated[str, about("`counts` (readings), `time`, `sequence`; any other name is not looked at.")]
+    name: Annotated[
+        str, about("`counts` (readings), `time`, `sequence`, `temperature`; any other name is not looked at.")
+    ]
     type: Annotated[Type, about("unsigned or signed integer and its bits.")]
     count: Annotated[int, about("how many of them follow each other.", ge=1, le=4096)] = 1
     value: Annotated[list[int] | None, about("values that the field has in every packet, such as sync bytes.")] = None
@@ -57,11 +61,18 @@ class Text(Table, frozen=True, tag="text", tag_field="kind"):
 
     columns: Annotated[
         tuple[str, ...],
-        about("what stands between separators: `time`, `sequence`, channels; an empty name is skipped."),
+        about("what stands between separators: `time`, `sequence`, `temperature`, channels; an empty name is skipped."),
+    ] = ()
+    optional: Annotated[
+        tuple[str, ...], about("columns, the last ones, that a line may lack, such as `temperature`.")
     ] = ()
     separator: Annotated[str, about("between the columns; blanks beside it do not count.", min_length=1)] = ","
     pattern: Annotated[
-        str, about("instead of columns: regular expression of a line, with groups `time`, `sequence` and the channels.")
+        str,
+        about(
+            "instead of columns: regular expression of a line, with groups `time`, `sequence`, `temperature` and the "
+            "channels."
+        ),
     ] = ""
     wraps_at: Annotated[
         Positive | None, about("where the time starts over, such as 4294967296 of Arduino's micros().", default="never")
@@ -83,6 +94,15 @@ class FormatFile(Table, frozen=True):
     ] = None
     no_reading: Annotated[int | None, about("count that stands for a missing reading.")] = None
     slowest_hz: Annotated[Positive, about("lowest sample rate of the board.", "Hz")] = 1.0
+    temperature_lsb_K: Annotated[
+        float | None,
+        about("size of a count of the temperature.", "K", default="the part's; 1 where `unit` is not `lsb`"),
+    ] = None
+    temperature_zero_degC: Annotated[
+        float | None,
+        about("temperature of the count zero.", "°C", default="the part's; 0 where `unit` is not `lsb`"),
+    ] = None
+    no_temperature: Annotated[int | None, about("count that stands for no temperature.", default="none")] = None
 
 
 def load_format(path: str | Path) -> FrameFormat:
@@ -98,7 +118,7 @@ def load_format(path: str | Path) -> FrameFormat:
     spec = read(read_toml(file), FormatFile, source)
     array = AccelerometerArray.load(spec.array, beside=file.parent)
     beside = file.parent / spec.array
-    layout, has_sequence, number = (
+    layout, extra, number = (
         _text(spec, spec.stream, array.channels, source)
         if isinstance(spec.stream, Text)
         else _packet(spec.stream, source)
@@ -118,20 +138,40 @@ def load_format(path: str | Path) -> FrameFormat:
         clock_hz=_TEXT_CLOCK_HZ if is_text else spec.clock_hz,
         array=str(beside) if beside.is_file() else spec.array,
         channels=channels,
-        sequence_field="sequence" if has_sequence else "",
+        sequence_field="sequence" if "sequence" in extra else "",
         no_reading=spec.no_reading,
         count_m_s2=spec.lsb_m_s2 if size is None else _FINE_M_S2 if is_text else size,
         slowest_hz=spec.slowest_hz,
+        temperature=_temperature(spec, array, source) if "temperature" in extra else None,
     )
 
 
-def _packet(spec: Packet, source: str) -> tuple[StreamLayout, bool, int]:
-    """Return the layout of a packet, whether it has a sequence number, and its number of counts."""
+def _temperature(spec: FormatFile, array: AccelerometerArray, source: str) -> TemperatureField:
+    """Return what the number of the temperature means: by the file, the part, or °C beside readings in a unit."""
+    lsb, zero = spec.temperature_lsb_K, spec.temperature_zero_degC
+    if spec.unit != "lsb":
+        lsb, zero = 1.0 if lsb is None else lsb, 0.0 if zero is None else zero
+    part = array.chips[0].part
+    sheet = PartFile.load(part, array.part_files)
+    lsb = sheet.temperature_lsb_K if lsb is None else lsb
+    zero = sheet.temperature_zero_degC if zero is None else zero
+    if not lsb or zero is None:
+        raise InputError(
+            f"{source}: temperature_lsb_K and temperature_zero_degC: part {part!r} states none; give the size of a "
+            "count and the temperature of the count zero (1.0 and 0.0 for degrees)"
+        )
+    return TemperatureField("temperature", lsb, zero, spec.no_temperature)
+
+
+def _packet(spec: Packet, source: str) -> tuple[StreamLayout, Collection[str], int]:
+    """Return the layout of a packet, the names of its fields, and its number of counts."""
     order = "<" if spec.byte_order == "little" else ">"
     names = [one.name for one in spec.fields]
     for name in ("time", "counts"):
         if names.count(name) != 1:
             raise InputError(f"{source}: [stream]: fields {', '.join(names)}: give one with name = {name!r}")
+    if any(one.name == "temperature" and one.count != 1 for one in spec.fields):
+        raise InputError(f"{source}: [stream]: field 'temperature': one number for the board; leave its count out")
     if len(set(names)) != len(names):
         raise InputError(f"{source}: [stream]: fields {', '.join(names)}: two have the same name")
     if spec.checksum not in CHECKSUMS:
@@ -163,33 +203,39 @@ def _packet(spec: Packet, source: str) -> tuple[StreamLayout, bool, int]:
         )
     packet = PacketLayout(dtype, tuple(signature), rule.of_rows)
     number = next(one.count for one in spec.fields if one.name == "counts")
-    return (packet if spec.framing == "none" else DelimitedLayout(packet, spec.framing)), "sequence" in names, number
+    return (packet if spec.framing == "none" else DelimitedLayout(packet, spec.framing)), names, number
 
 
 def _numpy_type(name: Type, order: str) -> str:
     return f"{order}{name[0]}{int(name[1:]) // 8}"
 
 
-def _text(spec: FormatFile, text: Text, channels: tuple[str, ...], source: str) -> tuple[StreamLayout, bool, int]:
-    """Return the layout of a line, whether it has a sequence number, and its number of counts."""
+def _text(
+    spec: FormatFile, text: Text, channels: tuple[str, ...], source: str
+) -> tuple[StreamLayout, Collection[str], int]:
+    """Return the layout of a line, the names of its groups, and its number of counts."""
     if bool(text.columns) == bool(text.pattern):
         raise InputError(f"{source}: [stream]: give either columns or pattern")
     try:
         pattern = re.compile(text.pattern.encode() if text.pattern else _pattern_of(text))
     except re.error as error:
         raise InputError(f"{source}: [stream]: pattern: no regular expression ({error})") from None
+    if text.optional and text.columns[-len(text.optional) :] != text.optional:
+        raise InputError(
+            f"{source}: [stream]: optional {', '.join(text.optional)}: name the last of the columns, in order"
+        )
     missing = [name for name in ("time", *channels) if name not in pattern.groupindex]
     if missing:
         raise InputError(f"{source}: [stream]: a line has no {', '.join(missing)}; name the array's channels and time")
     per_unit = 1.0 if spec.unit == "lsb" else _UNITS_M_S2[spec.unit] / _FINE_M_S2
     layout = TextLayout(pattern, channels, _TEXT_CLOCK_HZ / spec.clock_hz, per_unit, text.wraps_at)
-    return layout, "sequence" in pattern.groupindex, len(channels)
+    return layout, pattern.groupindex, len(channels)
 
 
 def _pattern_of(text: Text) -> bytes:
     """Return the regular expression of columns between separators."""
-    groups = [
-        b"(?P<%b>%b)" % (name.encode(), _NUMBER) if name else b"[^%b]*" % re.escape(text.separator.encode())
-        for name in text.columns
-    ]
-    return (rb"[ \t]*" + re.escape(text.separator.encode()) + rb"[ \t]*").join(groups)
+    separator = re.escape(text.separator.encode())
+    groups = [b"(?P<%b>%b)" % (name.encode(), _NUMBER) if name else b"[^%b]*" % separator for name in text.columns]
+    between = rb"[ \t]*" + separator + rb"[ \t]*"
+    needed = len(groups) - len(text.optional)
+    return between.join(groups[:needed]) + b"".join(b"(?:%b%b)?" % (between, group) for group in groups[needed:])

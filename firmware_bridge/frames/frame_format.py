@@ -11,12 +11,28 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from firmware_bridge.frames.checksum import crc16, crc16_rows, sum16_rows
-from firmware_bridge.frames.commands import LPC1768_DIALOGUE, NO_TEMPERATURE, RATES_HZ, Dialogue, FrameType
+from firmware_bridge.frames.commands import (
+    LPC1768_DIALOGUE,
+    NO_TEMPERATURE,
+    RATES_HZ,
+    TEMPERATURE_LSB_K,
+    Dialogue,
+    FrameType,
+)
 from firmware_bridge.frames.packets import PacketLayout, StreamLayout
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
 
-__all__ = ["FORMATS", "LPC1768_DTYPE", "MIMU4444_DTYPE", "FrameFormat", "Status", "encode_message", "encode_samples"]
+__all__ = [
+    "FORMATS",
+    "LPC1768_DTYPE",
+    "MIMU4444_DTYPE",
+    "FrameFormat",
+    "Status",
+    "TemperatureField",
+    "encode_message",
+    "encode_samples",
+]
 
 FRAME_VERSION = 1
 
@@ -78,6 +94,34 @@ MIMU4444_DTYPE = np.dtype(
 
 
 @dataclass(frozen=True)
+class TemperatureField:
+    """Where a sample has a temperature, and what its number means.
+
+    Parameters
+    ----------
+    name : str
+        The field.
+    lsb_K : float
+        Size of a count, K; negative where the count falls as it gets warmer.
+    zero_degC : float
+        Temperature of the count zero, °C.
+    no_reading : int, optional
+        Count that stands for no temperature.
+    """
+
+    name: str
+    lsb_K: float
+    zero_degC: float = 0.0
+    no_reading: int | None = None
+
+    def of(self, packets: NDArray[Any]) -> NDArray[np.float64]:
+        """Temperatures of the packets, shape (n,), °C; NaN where there is none."""
+        counts = packets[self.name]
+        temperature = self.zero_degC + self.lsb_K * counts.astype(float)
+        return temperature if self.no_reading is None else np.where(counts == self.no_reading, np.nan, temperature)
+
+
+@dataclass(frozen=True)
 class FrameFormat:
     """One frame format: all that decoding and recording need to know of a board's stream.
 
@@ -114,6 +158,11 @@ class FrameFormat:
         Lowest sample rate of the board, Hz: two samples can't be farther apart.
     dialogue : Dialogue, optional
         Commands and answers of the board; None if it only sends.
+    temperature : TemperatureField, optional
+        Temperature of the board; None if a sample has none.
+    array_is_assumed : bool
+        Whether the format says nothing of how the chips are mounted: then ``array`` gives names and number of the
+        channels, and which array it is has to be stated by the board or at the host.
     """
 
     name: str
@@ -131,6 +180,8 @@ class FrameFormat:
     count_m_s2: float | None = None
     slowest_hz: float = 1.0
     dialogue: Dialogue | None = None
+    temperature: TemperatureField | None = None
+    array_is_assumed: bool = False
 
     def for_array(self, array: AccelerometerArray) -> FrameFormat:
         """Return this format for an array of its own number of channels, or of fewer chips where one may be missing.
@@ -171,6 +222,10 @@ class FrameFormat:
         counts = packets[self.counts_field][:, list(self.channels)]
         return np.asarray(counts, dtype=counts.dtype.newbyteorder("="))
 
+    def temperatures(self, packets: NDArray[Any]) -> NDArray[np.float64]:
+        """Temperatures of the packets, shape (n,), °C; NaN where there is none."""
+        return np.full(len(packets), np.nan) if self.temperature is None else self.temperature.of(packets)
+
     def mask_of(self, field: str) -> int:
         """Largest value of an unsigned field, at which it wraps; of 8 bytes, only 63 bits are used."""
         return 0 if not field else (1 << min(8 * self.layout.dtype[field].itemsize, 63)) - 1
@@ -191,6 +246,8 @@ FORMATS: dict[str, FrameFormat] = {
             no_reading=-(1 << 15),
             slowest_hz=RATES_HZ[0],
             dialogue=LPC1768_DIALOGUE,
+            temperature=TemperatureField("temperature", TEMPERATURE_LSB_K, no_reading=NO_TEMPERATURE),
+            array_is_assumed=True,
         ),
         FrameFormat(
             "mimu4444",

@@ -21,7 +21,8 @@ class TextLayout:
     Parameters
     ----------
     pattern : re.Pattern
-        Matches a whole line; group ``time``, groups of the channels, and where there is one ``sequence``.
+        Matches a whole line; group ``time``, groups of the channels, and where there are such ``sequence`` and
+        ``temperature``.
     channels : tuple of str
         Groups of the channels, in the order of the counts.
     ticks_per_unit : float
@@ -41,7 +42,9 @@ class TextLayout:
     @property
     def dtype(self) -> np.dtype[Any]:
         """Fields of a sample."""
-        return np.dtype([("sequence", "<u4"), ("time", "<u8"), ("counts", "<i4", len(self.channels))])
+        return np.dtype(
+            [("sequence", "<u4"), ("time", "<u8"), ("counts", "<i4", len(self.channels)), ("temperature", "<f8")]
+        )
 
     @property
     def size(self) -> int:
@@ -83,7 +86,7 @@ class TextScanner:
         self.accepted += len(rows)
         return np.array(rows, dtype=self.layout.dtype) if rows else np.empty(0, self.layout.dtype)
 
-    def _row(self, line: bytes) -> tuple[int, int, tuple[int, ...]] | None:
+    def _row(self, line: bytes) -> tuple[int, int, tuple[int, ...], float] | None:
         """Return a sample; None for a line that is none."""
         layout = self.layout
         found = layout.pattern.fullmatch(line)
@@ -94,10 +97,11 @@ class TextScanner:
             time = round(self._unwrapped(float(groups["time"])) * layout.ticks_per_unit)
             counts = tuple(round(float(groups[name]) * layout.counts_per_unit) for name in layout.channels)
             sequence = int(groups.get("sequence") or 0)
+            temperature = float(groups.get("temperature") or "nan")
         except (ValueError, OverflowError):  # of NaN, infinity, or an empty group
             return None
         inside = all(abs(count) < 1 << 31 for count in counts) and 0 <= time < 1 << 63 and 0 <= sequence < 1 << 32
-        return (sequence, time, counts) if inside else None
+        return (sequence, time, counts, temperature) if inside else None
 
     def _unwrapped(self, time: float) -> float:
         """Go on where the time starts over."""

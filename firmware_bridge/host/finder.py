@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from firmware_bridge.frames.commands import Identity
+from firmware_bridge.frames.commands import ArrayName, Identity
 from firmware_bridge.frames.decoder import FORMATS, FrameFormat, SampleDecoder, frame_format
 from firmware_bridge.host.link import Chunk, Link
 from gfimu.errors import InputError
@@ -34,12 +34,15 @@ class Found:
         Frame format.
     identity : Identity or None
         What it says about itself; None if it only sends.
+    array : str
+        The array that it states; empty if it states none.
     """
 
     port: str
     baud: int
     form: str
     identity: Identity | None
+    array: str = ""
 
 
 class Listener:
@@ -48,6 +51,7 @@ class Listener:
     def __init__(self, forms: Sequence[FrameFormat]) -> None:
         self._decoders = [SampleDecoder(form) for form in forms]
         self.chunks: list[Chunk] = []
+        self.array = ""  # that the board states
 
     def listen(self, link: Link, seconds: float = _LISTEN_S) -> tuple[FrameFormat, Identity | None] | None:
         """Ask, and return the format that is understood with the identity if one came; None if there is none."""
@@ -64,7 +68,7 @@ class Listener:
             self.chunks.append(chunk)
             for decoder in self._decoders:
                 decoder.feed(chunk.data)
-                identity = _identity(decoder)
+                identity, self.array = _statements(decoder)
                 if identity is not None:
                     return decoder.format, identity
                 if decoder.counts.samples >= _SAMPLES:
@@ -74,11 +78,12 @@ class Listener:
         return None if best is None else (best, None)
 
 
-def _identity(decoder: SampleDecoder) -> Identity | None:
-    """Return the newest identity among the messages."""
+def _statements(decoder: SampleDecoder) -> tuple[Identity | None, str]:
+    """Return the newest identity among the messages, and the name of the array; empty if none was stated."""
     dialogue = decoder.format.dialogue
-    found = [] if dialogue is None else [dialogue.parse(packet) for packet in decoder.messages]
-    return next((message for message in reversed(found) if isinstance(message, Identity)), None)
+    found = [] if dialogue is None else [dialogue.parse(packet) for packet in reversed(decoder.messages)]
+    identity = next((message for message in found if isinstance(message, Identity)), None)
+    return identity, next((message.name for message in found if isinstance(message, ArrayName)), "")
 
 
 def search_speed(
@@ -93,7 +98,7 @@ def search_speed(
         understood = listener.listen(link)
         if understood is not None:
             form, identity = understood
-            return Found(link.port, baud, form.name, identity), listener.chunks
+            return Found(link.port, baud, form.name, identity, listener.array), listener.chunks
     return None
 
 

@@ -27,6 +27,7 @@ __all__ = ["Journal", "JournalError"]
 
 _PAGE = 4096
 _BLOCK_BYTES = 1 << 22
+_TEMPERATURE = "temperature_degC"
 
 
 class JournalError(GfimuError):
@@ -44,6 +45,8 @@ class Journal:
         Names of the channels; their columns are raw counts, ``…_lsb``.
     metadata : mapping
         Metadata known at the start.
+    has_temperature : bool
+        Whether the samples have a temperature: then there is a column for it.
 
     Raises
     ------
@@ -53,12 +56,16 @@ class Journal:
         If the disk is full.
     """
 
-    def __init__(self, path: str | Path, channels: tuple[str, ...], metadata: Mapping[str, Any]) -> None:
+    def __init__(
+        self, path: str | Path, channels: tuple[str, ...], metadata: Mapping[str, Any], *, has_temperature: bool = False
+    ) -> None:
         self.path = Path(path)
         if self.path.suffix not in {".csv", ".parquet"}:
             raise InputError(f"{path}: unknown recording format {self.path.suffix!r}; use .csv or .parquet")
         self.samples = 0
+        self._has_temperature = has_temperature
         self.columns = ["t_s", *(f"{channel}_lsb" for channel in channels), "status"]
+        self.columns += [_TEMPERATURE] if has_temperature else []
         lines = [f"# {key}: {json.dumps(value)}\n" for key, value in metadata.items()]
         try:
             flags = os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_APPEND | getattr(os, "O_BINARY", 0)
@@ -78,8 +85,14 @@ class Journal:
             raise
         self.samples = 0  # the lines so far are the header
 
-    def append(self, t_s: NDArray[np.float64], counts: NDArray[np.float64], status: NDArray[np.uint16]) -> None:
-        """Append samples: times (n,), s, counts (n, c) with NaN where missing, status bits (n,)."""
+    def append(
+        self,
+        t_s: NDArray[np.float64],
+        counts: NDArray[np.float64],
+        status: NDArray[np.uint16],
+        temperature_degC: NDArray[np.float64] | None = None,
+    ) -> None:
+        """Append samples: times (n,), s, counts (n, c), status bits, temperatures, °C; NaN where one is missing."""
         if not len(t_s):
             return
         columns: list[Any] = [pa.array(np.round(t_s, 7))]
@@ -90,6 +103,9 @@ class Journal:
             mask = missing[:, place]
             columns.append(pa.array(whole[:, place], mask=mask if mask.any() else None))
         columns.append(pa.array(status))
+        if self._has_temperature:
+            warm = np.full(len(t_s), np.nan) if temperature_degC is None else temperature_degC
+            columns.append(pa.array(np.round(warm, 4), mask=np.isnan(warm)))
         sink = io.BytesIO()
         options = pa_csv.WriteOptions(include_header=False, quoting_style="none")
         pa_csv.write_csv(pa.table(columns, names=self.columns), sink, options)
@@ -157,7 +173,7 @@ class Journal:
 
     def _finish_parquet(self, target: Path, metadata: Mapping[str, Any]) -> None:
         count = pa.int16() if self._is_narrow else pa.int32()
-        types = {name: pa.float64() if name == "t_s" else count for name in self.columns}
+        types = {name: pa.float64() if name in {"t_s", _TEMPERATURE} else count for name in self.columns}
         types["status"] = pa.uint16()
         described = {key.encode(): json.dumps(value).encode() for key, value in metadata.items()}
         schema = pa.schema(list(types.items()), metadata=described)

@@ -11,13 +11,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from firmware_bridge.frames.commands import Dialogue, Identity, Reply
+from firmware_bridge.frames.commands import ArrayName, Dialogue, Identity, Reply
 from firmware_bridge.frames.decoder import FrameFormat, SampleDecoder, Samples, Status
 from firmware_bridge.host.clock import HostClock, SampleRate
 from firmware_bridge.host.journal import Journal
 from firmware_bridge.host.link import Chunk, Link
+from firmware_bridge.host.mounting.on_board import ArrayOnBoard
 from gfimu.errors import InputError
+from gfimu.files.model_files import list_models
 from gfimu.geometry.array import AccelerometerArray
+from gfimu.recording.carried_array import array_metadata
 
 __all__ = ["Batch", "RecordSession", "SampleClock"]
 
@@ -42,11 +45,19 @@ class Batch:
         Full-resolution counts; NaN where a chip did not answer.
     status : ndarray, shape (n,)
         Status bits.
+    temperature_degC : ndarray, shape (n,), optional
+        Temperature of the board; NaN where a sample has none.
     """
 
     t_s: NDArray[np.float64]
     counts: NDArray[np.float64]
     status: NDArray[np.uint16]
+    temperature_degC: NDArray[np.float64] | None = None
+
+    @property
+    def temperatures(self) -> NDArray[np.float64]:
+        """Temperatures (n,), °C; NaN where there is none."""
+        return np.full(len(self.t_s), np.nan) if self.temperature_degC is None else self.temperature_degC
 
 
 class SampleClock:
@@ -93,7 +104,7 @@ class RecordSession:
     """State of one recording."""
 
     def __init__(
-        self, form: FrameFormat, array: AccelerometerArray, out: Path, metadata: dict[str, Any], *, has_setup: bool
+        self, form: FrameFormat, on_board: ArrayOnBoard, out: Path, metadata: dict[str, Any], *, has_setup: bool
     ) -> None:
         self.decoder = SampleDecoder(form)
         self.clock = HostClock()
@@ -110,7 +121,10 @@ class RecordSession:
         self.waiting_for_board = form.dialogue is not None  # for its answer to the setup, which gives the scale
         self.baud: int | None = None
         self.expect_answers()
-        self._form, self._array, self._out, self._metadata = form, array, out, metadata
+        self.on_board = on_board
+        self.board_array = on_board.array.name if on_board.stated_by == "board" else ""
+        self.warmth: tuple[float, float] | None = None  # lowest and highest temperature, °C
+        self._form, self._array, self._out, self._metadata = form, on_board.array, out, metadata
         self._asked_s = -math.inf
         self._unanswered_s: list[float] = []
         self._held: list[tuple[Samples, float]] = []
@@ -159,11 +173,23 @@ class RecordSession:
         message = dialogue.parse(packet)
         if isinstance(message, Identity) and self.answers:
             self.identity = message
+        elif isinstance(message, ArrayName):
+            self.board_array = message.name
         elif isinstance(message, Reply):
             if message.command == dialogue.identify_code:
                 self._take_answer(packet)
             if message.result:
                 self.refused.append(message)
+
+    def late_array(self) -> dict[str, Any]:
+        """Return the metadata of an array that the board stated only after the recording had begun, if it fits."""
+        if self.on_board.stated_by or self.board_array not in list_models("arrays"):
+            return {}
+        stated = AccelerometerArray.load(self.board_array)
+        if stated.channels != self._array.channels:
+            return {}
+        self.on_board = ArrayOnBoard(stated, "board")
+        return array_metadata(stated)
 
     def _refuse_more_chips(self, identity: Identity) -> None:
         """Nothing that answers is left out of a recording."""
@@ -213,7 +239,8 @@ class RecordSession:
             counts[samples.counts == self._form.no_reading] = np.nan
         if self.identity is not None:
             counts *= self.identity.count_size
-        batch = Batch(self.times.place(samples, arrivals[-1][1]), counts, samples.status)
+        times = self.times.place(samples, arrivals[-1][1])
+        batch = Batch(times, counts, samples.status, samples.temperature_degC)
         ends = np.cumsum([number for number, _ in arrivals])
         for place, (_, host_s) in zip(ends - ends[-1] + len(samples) - 1, arrivals, strict=True):
             if place >= 0:  # those before were left out
@@ -227,6 +254,10 @@ class RecordSession:
         if self.first_s is None:
             self.first_s = float(batch.t_s[0])
         self.last_s = float(batch.t_s[-1])
+        warm = batch.temperatures[np.isfinite(batch.temperatures)]
+        if len(warm):
+            seen = (*(self.warmth or ()), float(warm.min()), float(warm.max()))
+            self.warmth = (min(seen), max(seen))
         self._waiting.append(batch)
         return batch
 
@@ -241,7 +272,8 @@ class RecordSession:
                 self._metadata["range_g"] = self.identity.range_g
                 self._metadata["firmware"] = self.identity.firmware
                 self._metadata.update(self.identity.conversions)
-            self.journal = Journal(self._out, self._array.channels, self._metadata)
+            warm = any(np.isfinite(part.temperatures).any() for part in self._waiting)
+            self.journal = Journal(self._out, self._array.channels, self._metadata, has_temperature=warm)
         parts = self._waiting
         self._waiting = []
         self._flushed_at = now_s
@@ -249,4 +281,5 @@ class RecordSession:
             np.concatenate([part.t_s for part in parts]),
             np.concatenate([part.counts for part in parts]),
             np.concatenate([part.status for part in parts]),
+            np.concatenate([part.temperatures for part in parts]),
         )

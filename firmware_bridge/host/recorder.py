@@ -21,6 +21,14 @@ from firmware_bridge.host.finder import SPEEDS, has_speed
 from firmware_bridge.host.journal import JournalError
 from firmware_bridge.host.line_up import line_up, needed_baud
 from firmware_bridge.host.link import Chunk, Link
+from firmware_bridge.host.mounting.on_board import (
+    ArrayOnBoard,
+    BoardAnswer,
+    ask_board,
+    candidate_arrays,
+    load_stated,
+    take_waiting,
+)
 from firmware_bridge.host.record_session import Batch, RecordSession, SampleClock
 from firmware_bridge.sources.ports import port_format
 from gfimu.errors import GfimuError, InputError
@@ -61,6 +69,14 @@ class RecordReport:
         Speed of the line at the end, bits per second.
     source : dict
         What a source says of itself (`firmware_bridge.sources`); also in the recording's metadata.
+    array : str
+        Name of the array that the recording carries; empty if nobody stated one.
+    array_stated_by : str
+        ``host``, ``format``, ``board`` or ``answer``; empty if nobody did.
+    board_array : str
+        The array that the board states; empty if it states none.
+    temperature_degC : tuple of float, optional
+        Lowest and highest temperature of the board, °C.
     """
 
     path: Path
@@ -73,6 +89,10 @@ class RecordReport:
     faults: tuple[dict[str, Any], ...] = ()
     baud: int | None = None
     source: dict[str, Any] = field(default_factory=dict)
+    array: str = ""
+    array_stated_by: str = ""
+    board_array: str = ""
+    temperature_degC: tuple[float, float] | None = None
 
 
 def record(
@@ -86,6 +106,8 @@ def record(
     setup: tuple[bytes, ...] = (),
     reconnect_s: float | None = None,
     on_batch: Callable[[Batch, StreamCounts], None] | None = None,
+    on_array: Callable[[AccelerometerArray | None], None] | None = None,
+    choose_array: Callable[[tuple[AccelerometerArray, ...]], str] | None = None,
     stop: Callable[[], bool] | None = None,
 ) -> RecordReport:
     """Record from a port until the time is up, ``stop`` says so, or Ctrl-C.
@@ -103,7 +125,8 @@ def record(
         Frame format, or its name in `firmware_bridge.frames.decoder.FORMATS`; by default that of this project's board,
         and of a source that delivers samples its own.
     array : str
-        Array file; by default the format's. With fewer chips than the format has, they are the first ones.
+        Array file; by default the one that the board states, or the format's. With fewer chips than the format has,
+        they are the first ones.
     baud : int, optional
         Bits per second. By default the speed at which the board answers or sends, raised if the sample rate needs more.
     setup : tuple of bytes
@@ -113,6 +136,11 @@ def record(
         there at once, and a lost connection is waited for a minute.
     on_batch : callable, optional
         Is given each batch and the totals so far.
+    on_array : callable, optional
+        Is given the array before the first batch; None if nobody stated it. Then the recording carries none.
+    choose_array : callable, optional
+        Is asked for the name or file of the array, from the shipped ones that have these channels, if neither
+        ``array`` nor the board states it; an empty answer leaves it open.
     stop : callable, optional
         Asked often; True ends the recording.
 
@@ -129,34 +157,31 @@ def record(
     layout = port_format(port, form, array)
     if setup and layout.dialogue is None:
         raise InputError(f"format {layout.name} has no commands: rate and range can't be set; leave them out")
-    carried = AccelerometerArray.load(array or layout.array)
-    layout = layout.for_array(carried)
-    part = carried.chips[0].part
-    metadata: dict[str, Any] = {
-        **array_metadata(carried),
-        "part": part,
-        "lsb_m_s2": layout.count_m_s2 or Part.load(part, carried.part_files).lsb,
-        "port": port,
-        "format": layout.name,
-        "started_utc": datetime.now(UTC).isoformat(timespec="milliseconds"),
-        "software_version": gfimu.__version__,
-        "time_stamp_clock": "board",
-        "time_stamp_tick_hz": layout.clock_hz,
-    }
-    session = RecordSession(layout, carried, target, metadata, has_setup=bool(setup))
-    with (
-        Link(port, baud=baud or SPEEDS[0], reconnect_s=reconnect_s, form=layout) as link,
-        _ask_to_stop() as asked,
-    ):
-        trouble = _run(
-            link,
-            session,
-            duration_s,
-            setup,
-            on_batch,
-            lambda: asked() or (stop is not None and stop()),
-            baud,
-        )
+    given = AccelerometerArray.load(array or layout.array)
+    layout = layout.for_array(given)
+    with Link(port, baud=baud or SPEEDS[0], reconnect_s=reconnect_s, form=layout) as link:
+        began = time.monotonic()
+        on_board, answer = ArrayOnBoard(given, "host" if array else "format"), None
+        if layout.array_is_assumed and not array:
+            on_board, answer = _settle_array(link, layout, baud, setup, choose_array, stop)
+            layout = layout.for_array(on_board.array)
+        if on_array is not None:
+            on_array(on_board.known)
+        session = RecordSession(layout, on_board, target, _metadata(port, layout, on_board), has_setup=bool(setup))
+        if answer is not None:
+            session.baud = answer.baud
+            session.waiting_for_board &= answer.answers or bool(setup)  # it was given its time
+        with _ask_to_stop() as asked:
+            trouble = _run(
+                link,
+                session,
+                duration_s,
+                setup,
+                on_batch,
+                lambda: asked() or (stop is not None and stop()),
+                baud,
+                (began, deque(() if answer is None else answer.chunks)),
+            )
         breaks = link.breaks
     try:
         session.release()
@@ -187,6 +212,7 @@ def record(
         "board_restarts": counts.restarts,
         "connection_breaks": breaks,
         "status_counts": session.status_counts,
+        **session.late_array(),
         **session.rate.metadata(fit),
         **of_source,
         **({} if fit is None else {"host_clock": fit.__dict__}),
@@ -201,8 +227,47 @@ def record(
     duration = session.last_s - (session.first_s or 0.0)
     return RecordReport(
         target, duration, counts, breaks, fit, session.identity, session.status_counts,
-        baud=session.baud, source=of_source,
+        baud=session.baud, source=of_source, array=session.on_board.name, array_stated_by=session.on_board.stated_by,
+        board_array=session.board_array, temperature_degC=session.warmth,
     )  # fmt: skip
+
+
+def _metadata(port: str, layout: FrameFormat, on_board: ArrayOnBoard) -> dict[str, Any]:
+    """Return what a recording says of its board from the start."""
+    array = on_board.array
+    part = array.chips[0].part
+    return {
+        **({} if on_board.known is None else array_metadata(array)),
+        "part": part,
+        "lsb_m_s2": layout.count_m_s2 or Part.load(part, array.part_files).lsb,
+        "port": port,
+        "format": layout.name,
+        "started_utc": datetime.now(UTC).isoformat(timespec="milliseconds"),
+        "software_version": gfimu.__version__,
+        "time_stamp_clock": "board",
+        "time_stamp_tick_hz": layout.clock_hz,
+    }
+
+
+def _settle_array(
+    link: Link,
+    layout: FrameFormat,
+    baud: int | None,
+    setup: tuple[bytes, ...],
+    choose: Callable[[tuple[AccelerometerArray, ...]], str] | None,
+    stop: Callable[[], bool] | None,
+) -> tuple[ArrayOnBoard, BoardAnswer]:
+    """Return the array that the board states, or that is chosen, and what else became of the question."""
+    least = needed_baud(layout, asked_rate(setup))
+    answer = ask_board(link, layout, baud, least, stop or (lambda: False), has_setup=bool(setup))
+    if answer.array:
+        return ArrayOnBoard(load_stated(answer.array, link.port), "board"), answer
+    name = "" if choose is None else choose(candidate_arrays(layout))
+    if choose is not None:
+        take_waiting(link)  # the recording begins with the answer
+        answer.chunks.clear()
+    array = AccelerometerArray.load(name or layout.array)
+    return ArrayOnBoard(array, "answer" if name else ""), answer
 
 
 @contextmanager
@@ -229,13 +294,16 @@ def _run(
     on_batch: Callable[[Batch, StreamCounts], None] | None,
     stop: Callable[[], bool],
     baud: int | None,
+    so_far: tuple[float, deque[Chunk]],
 ) -> GfimuError | None:
-    """Read until the end; return what ended the recording early, if anything did."""
-    began = time.monotonic()
+    """Read until the end; return what ended the recording early, if anything did.
+
+    ``so_far``: when the port was opened, and what came since.
+    """
+    began, chunks = so_far
     form = session.decoder.format
     dialogue = form.dialogue
     least = needed_baud(form, asked_rate(setup))
-    chunks: deque[Chunk] = deque()
 
     def find_speed() -> None:
         found = line_up(link, form, baud, least_baud=least, stop=stop)

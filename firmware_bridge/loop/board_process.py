@@ -57,6 +57,8 @@ class BoardProcess:
         Keep a list of register accesses and exceptions (slow; not with the fast path).
     lose_every : int
         Fault: every so many sample interrupts one is lost (0: none).
+    array : str
+        Name of the array that the board states, as if its image had been built so; by default that of the image.
 
     Raises
     ------
@@ -73,6 +75,7 @@ class BoardProcess:
         fast: bool | None = None,
         trace: bool = False,
         lose_every: int = 0,
+        array: str = "",
     ) -> None:
         require_emulator()
         path = image_path(str(image)) if str(image) in IMAGES else Path(image)
@@ -85,7 +88,7 @@ class BoardProcess:
         context = multiprocessing.get_context("spawn")
         self._pipe, theirs = context.Pipe()
         self._process = context.Process(
-            target=_work, args=(theirs, path, tuple(chips), self.fast, trace, lose_every), daemon=True
+            target=_work, args=(theirs, path, tuple(chips), self.fast, trace, lose_every, array), daemon=True
         )
         with _without_main():
             self._process.start()
@@ -208,7 +211,13 @@ def _without_main() -> Iterator[None]:
 
 
 def _work(
-    pipe: Connection, path: Path, chips: tuple[Adxl345Options, ...], fast: bool, trace: bool, lose_every: int
+    pipe: Connection,
+    path: Path,
+    chips: tuple[Adxl345Options, ...],
+    fast: bool,
+    trace: bool,
+    lose_every: int,
+    array: str,
 ) -> None:
     """Serve one board until the pipe closes."""
     import numpy as np
@@ -233,7 +242,7 @@ def _work(
             return
         try:
             if worker is None:
-                worker = Worker(path, sensors, fast=fast, trace=trace, lose_every=lose_every)
+                worker = Worker(path, sensors, fast=fast, trace=trace, lose_every=lose_every, array=array)
             answer = getattr(worker, name)(*arguments)
         except GfimuError as error:
             pipe.send(("error", error))

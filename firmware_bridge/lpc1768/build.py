@@ -20,13 +20,16 @@ from gfimu.errors import GfimuError, InputError
 from gfimu.files.atomic_file import atomic_path, write_text
 
 __all__ = [
+    "ARRAY_SYMBOL",
     "IMAGES",
     "BuildReport",
+    "array_definition",
     "build",
     "build_host_library",
     "check_image",
     "compiler_version",
     "image_path",
+    "named_image",
     "source_hash",
 ]
 
@@ -46,6 +49,10 @@ _FLAGS = (
     "-Wall", "-Wextra", "-Wconversion", "-Werror", "-nostdlib",
     "-Wl,-T,lpc1768.ld", "-Wl,--gc-sections", "-Wl,-e,Reset_Handler",
 )  # fmt: skip
+ARRAY_SYMBOL = "gfimu_array"
+"""Where the name of the array stands in an image (core.c)."""
+
+_LONGEST_NAME = 24  # bytes of a frame's payload
 _VECTORS_SUMMED = 7
 _CODE_READ_PROTECTION = 0x2FC  # UM10360 32.6
 _UNPROTECTED = b"\xff\xff\xff\xff"
@@ -115,8 +122,37 @@ def source_hash(name: str, defines: Mapping[str, str] | None = None) -> str:
     return digest.hexdigest()
 
 
+def array_definition(array: str) -> dict[str, str]:
+    """Return the preprocessor definition by which a board states its array; none without a name.
+
+    Raises
+    ------
+    InputError
+        If a frame has no room for the name, or it holds other characters than printable ASCII.
+    """
+    if not array:
+        return {}
+    if len(array) > _LONGEST_NAME or not (array.isascii() and array.isprintable()) or set(array) & set(' "\\'):
+        raise InputError(
+            f"array {array!r}: a board can state a name of at most {_LONGEST_NAME} plain characters; "
+            "give the array a shorter one, or name it with gfimu record --array"
+        )
+    return {"GFIMU_ARRAY": f'"{array}"'}
+
+
+def named_image(image: ElfImage, array: str) -> ElfImage:
+    """Return a finished image that states another array; as it is if it has no place for a name."""
+    array_definition(array)  # whether it is a name
+    address = image.symbols.get(ARRAY_SYMBOL)
+    return image if address is None else image.with_bytes(address, array.encode().ljust(_LONGEST_NAME, b"\0"))
+
+
 def build(
-    name: str = "gfimu", out: str | Path | None = None, *, defines: Mapping[str, str] | None = None
+    name: str = "gfimu",
+    out: str | Path | None = None,
+    *,
+    array: str = "",
+    defines: Mapping[str, str] | None = None,
 ) -> BuildReport:
     """Compile and link one image; write ``NAME.elf``, ``NAME.bin`` and ``NAME.toml``.
 
@@ -126,21 +162,24 @@ def build(
         Image in `IMAGES`.
     out : str or Path, optional
         Folder for the results, made if it isn't there; by default the package's own ``image`` folder.
+    array : str
+        Name of the array on the board, which the board then states (`array_definition`).
     defines : mapping of str to str, optional
         Preprocessor definitions, such as ``{"GFIMU_SPI_HZ": "100000U"}``.
 
     Raises
     ------
     InputError
-        If the compiler is not installed or the image is unknown.
+        If the compiler is not installed, the image is unknown or the board can't state that name.
     GfimuError
         If the sources do not compile (the message holds the compiler's), or code lies in the code-protection word.
     """
     image_path(name)
     compiler = compiler_version()
+    defines = {**array_definition(array), **(defines or {})}
     folder = Path(out) if out is not None else FOLDER / "image"
     identity = source_hash(name, defines)
-    options = [f"-D{key}={value}" for key, value in sorted((defines or {}).items())]
+    options = [f"-D{key}={value}" for key, value in sorted(defines.items())]
     options.append(f"-DGFIMU_BUILD_ID=0x{identity[:8]}U")
     with tempfile.TemporaryDirectory() as scratch:
         linked = Path(scratch) / f"{name}.elf"
@@ -159,7 +198,7 @@ def build(
             temporary.write_bytes(data)
     text, data_bytes, bss = image.section_sizes()
     report = BuildReport(
-        name, elf, binary, hashlib.sha256(content).hexdigest(), identity, compiler, text, data_bytes, bss, defines or {}
+        name, elf, binary, hashlib.sha256(content).hexdigest(), identity, compiler, text, data_bytes, bss, defines
     )
     facts = {
         "compiler": compiler,
@@ -185,13 +224,27 @@ def check_image(name: str = "gfimu") -> dict[str, str | bool]:
     }
 
 
-def build_host_library(out: str | Path) -> Path:
-    """Compile the firmware's core for this computer, as a shared library for tests; return its path."""
+def build_host_library(out: str | Path, *, array: str = "") -> Path:
+    """Compile the firmware's core for this computer, as a shared library for tests; return its path.
+
+    It states ``array``, if that is given.
+    """
     compiler_version()
     suffix = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
     library = Path(out) / f"firmware_host{suffix}"
-    flags = ("-std=c11", "-O1", "-g0", "-shared", "-fPIC", "-Wall", "-Wextra", "-Werror", "-fsanitize=undefined")
+    flags: tuple[str, ...] = (
+        "-std=c11",
+        "-O1",
+        "-g0",
+        "-shared",
+        "-fPIC",
+        "-Wall",
+        "-Wextra",
+        "-Werror",
+        "-fsanitize=undefined",
+    )
     files = ("host/hal_host.c", "src/core.c", "src/adxl345.c")
+    flags += tuple(f"-D{key}={value}" for key, value in array_definition(array).items())
     _zig("cc", *flags, "-fsanitize-trap=undefined", *files, "-o", str(library), cwd=FOLDER)
     return library
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bisect
 import struct
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from gfimu.errors import InputError
@@ -112,6 +112,17 @@ class ElfImage:
             if begin < end:
                 content[begin - address : end - address] = segment.data[begin - segment.address : end - segment.address]
         return bytes(content)
+
+    def with_bytes(self, address: int, data: bytes) -> ElfImage:
+        """Return the image with other bytes at an address that is loaded."""
+        segments = []
+        for segment in self.segments:
+            at = address - segment.address
+            if 0 <= at <= len(segment.data) - len(data):
+                segments.append(replace(segment, data=segment.data[:at] + data + segment.data[at + len(data) :]))
+            else:
+                segments.append(segment)
+        return replace(self, segments=tuple(segments))
 
     def in_memory(self, address: int) -> bool:
         """Whether a loaded segment or a writable section holds an address."""

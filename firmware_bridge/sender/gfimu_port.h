@@ -38,6 +38,12 @@ void gfimu_port_exchange(uint8_t chip, uint8_t *bytes, uint8_t count);
 /* SPI clock, kHz; for the identity. */
 uint32_t gfimu_port_spi_khz(void);
 
+/* Only where GFIMU_TEMPERATURE is defined, here or with -D: temperature of the board or of a chip on it, 0.01 °C, as last
+ * read; INT16_MIN while there is none. Called once per sample. */
+#ifdef GFIMU_TEMPERATURE
+int16_t gfimu_port_temperature(void);
+#endif
+
 /* Time in µs from a crystal, all 32 bits, from any start: it wraps after 71.6 min. It stamps the samples. */
 uint32_t gfimu_port_time_us(void);
 

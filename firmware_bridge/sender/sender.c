@@ -50,6 +50,15 @@ uint32_t hal_spi_khz(void)
     return gfimu_port_spi_khz();
 }
 
+int16_t hal_temperature(void)
+{
+#ifdef GFIMU_TEMPERATURE
+    return gfimu_port_temperature();
+#else
+    return HAL_NO_TEMPERATURE;
+#endif
+}
+
 uint32_t hal_time_us(void)
 {
     return gfimu_port_time_us();

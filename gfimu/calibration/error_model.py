@@ -1,4 +1,4 @@
-"""Error model of a sensor triad: l = M a + b, and its other ways of writing; where the axes bend, l = b + y + q y².
+"""Error model of a sensor triad: l = M a + b, and other ways of writing it; axes that bend: l = b + y + q y² + c y³.
 
 l is what the triad reads (counts, or m/s²), a the true input (specific force, m/s²), M the sensitivity matrix, b the
 bias. With a full M there are 12 parameters; with a triangular one there are 9, and the zeros of M fix the frame in
@@ -7,7 +7,7 @@ which a is expressed (Persian calibration paper, its two models).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,6 +24,9 @@ GAUGES = {
     "array": "the body frame in which the chips' mean rotation from their drawing is zero",
 }
 """Ways to fix the frame of a calibrated triad, and what each means."""
+
+_CUBIC_STEPS = 5  # numerical: Newton's, from the quadratic solution; the last one changes nothing below 20 % of bending
+_LEAST_SLOPE = 0.1  # numerical: of the reading against the input, beyond which no axis bends
 
 _FULL = tuple((i, j) for i in range(3) for j in range(3))
 _LOWER = tuple((i, j) for i, j in _FULL if i >= j)
@@ -55,11 +58,15 @@ class ErrorModel:
         b, reading unit.
     quadratic : ndarray, shape (3,), optional
         q of each sensing axis, 1 per reading unit: l = b + y + q y² with y = M a; zero by default.
+    cubic : ndarray, shape (3,), optional
+        c of each sensing axis, 1 per reading unit squared; zero by default. Exactly, q and c are the coefficients of
+        the correction M a = u − q u² − c u³ with u = l − b; `series` gives those of the reading.
     """
 
     sensitivity: NDArray[np.float64]
     bias: NDArray[np.float64]
     quadratic: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
+    cubic: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
 
     def __post_init__(self) -> None:
         sensitivity = np.asarray(self.sensitivity, dtype=float)
@@ -81,13 +88,28 @@ class ErrorModel:
     def read(self, a: ArrayLike) -> NDArray[np.float64]:
         """Return the readings l of true inputs ``a``, shape (..., 3): what `correct` turns back into ``a``."""
         straight = np.asarray(a, dtype=float) @ self.sensitivity.T
-        root = np.sqrt(np.maximum(1.0 - 4.0 * self.quadratic * straight, 0.0))  # of y − q y² = M a
-        return np.asarray(2.0 * straight / (1.0 + root) + self.bias, dtype=np.float64)
+        root = np.sqrt(np.maximum(1.0 - 4.0 * self.quadratic * straight, 0.0))  # of u − q u² = M a
+        bent = 2.0 * straight / (1.0 + root)
+        if self.cubic.any():
+            for _ in range(_CUBIC_STEPS):
+                slope = 1.0 - bent * (2.0 * self.quadratic + 3.0 * self.cubic * bent)
+                bent = bent + (straight - self._straight(bent)) / np.maximum(slope, _LEAST_SLOPE)
+        return np.asarray(bent + self.bias, dtype=np.float64)
 
     def correct(self, readings: ArrayLike) -> NDArray[np.float64]:
-        """Return the true inputs a = M⁻¹ (y − q y²) with y = l − b of readings, shape (..., 3)."""
-        y = np.asarray(readings, dtype=float) - self.bias
-        return np.asarray((y - self.quadratic * y**2 if self.quadratic.any() else y) @ self.inverse.T)
+        """Return the true inputs a = M⁻¹ (u − q u² − c u³) with u = l − b of readings, shape (..., 3)."""
+        return np.asarray(self._straight(np.asarray(readings, dtype=float) - self.bias) @ self.inverse.T)
+
+    def _straight(self, bent: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return M a of readings without bias, u − q u² − c u³."""
+        if self.cubic.any():
+            return np.asarray(bent - bent**2 * (self.quadratic + self.cubic * bent), dtype=np.float64)
+        return bent - self.quadratic * bent**2 if self.quadratic.any() else bent
+
+    @property
+    def series(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Coefficients of y² and y³ in l = b + y + q y² + (c + 2 q²) y³ + …, y = M a, each (3,)."""
+        return self.quadratic, self.cubic + 2.0 * self.quadratic**2
 
     @classmethod
     def nominal(cls, scale: float = 1.0, bias: float = 0.0) -> ErrorModel:
@@ -165,7 +187,7 @@ class ErrorModel:
         else:
             raise unknown_name("triangular gauge", gauge, ("x_axis", "z_axis"))
         signs = np.sign(np.diag(triangular))
-        return ErrorModel(triangular * signs, self.bias, self.quadratic)
+        return replace(self, sensitivity=triangular * signs)
 
     def parameters(self, gauge: str) -> NDArray[np.float64]:
         """Parameter vector: the free elements of M row by row, then b; shape (12,) or (9,)."""

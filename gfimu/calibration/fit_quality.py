@@ -55,12 +55,17 @@ def covariance_scale(
     return factor, (text,)
 
 
-def mean_factor(variance_factor: float, redundancy: int) -> float:
-    """Mean of 1 + κ after a misfit of vᵀPv = ``variance_factor`` · ``redundancy``, as in `covariance_scale`."""
+def mean_factor(variance_factor: float, redundancy: int, explained: float = 0.0) -> float:
+    """Mean of 1 + κ after a misfit of vᵀPv = ``variance_factor`` · ``redundancy``, as in `covariance_scale`.
+
+    Where known errors leave a misfit of ``explained`` · ``redundancy`` by themselves, on average, the misfit is
+    (1 + κ + explained) times χ².
+    """
     highest = math.log10(max(variance_factor, 1.0)) + 1.0
     kappa = np.concatenate([[0.0], np.logspace(_LOWEST_ORDER, highest, 41)])
     prior = np.concatenate([[_CLEAN], np.full(41, (1.0 - _CLEAN) / 41)])
-    likelihood = -0.5 * redundancy * (np.log1p(kappa) + variance_factor / (1.0 + kappa))
+    expected = 1.0 + kappa + explained
+    likelihood = -0.5 * redundancy * (np.log(expected) + variance_factor / expected)
     weight = prior * np.exp(likelihood - likelihood.max())
     return float(weight @ (1.0 + kappa) / weight.sum())
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -17,10 +18,12 @@ from gfimu.calibration.faults import (
 )
 from gfimu.calibration.fit_quality import mean_factor
 from gfimu.calibration.nonlinearity import quadratic_std
-from gfimu.calibration.observations import observations_from
+from gfimu.calibration.observations import Observations, observations_from
+from gfimu.calibration.rate_table import body_axis, find_plateaus
 from gfimu.calibration.registry import METHODS, CalibrationMethod, calibration_method
 from gfimu.calibration.result import Calibration, combine
-from gfimu.errors import InputError
+from gfimu.calibration.spin.policy import SpinPolicy
+from gfimu.errors import InputError, naming
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.parts.part import Part
 from gfimu.recording import Recording
@@ -30,13 +33,37 @@ from gfimu.units import STANDARD_GRAVITY
 __all__ = [
     "METHODS",
     "CalibrationTask",
+    "RateTable",
     "calibrate",
+    "calibrate_by_spin",
     "calibrate_gyro",
+    "calibrate_on_rate_table",
     "calibrate_reference_gyro",
     "calibrate_triads",
     "calibrate_whole_array",
     "run_calibration",
+    "temperature_statistics",
 ]
+
+
+@dataclass(frozen=True)
+class RateTable:
+    """Recordings of a gyro on a rate table besides the first one.
+
+    Parameters
+    ----------
+    also : tuple of Recording
+        Recordings of the gyro mounted otherwise.
+    axes : tuple of str
+        Axis of the gyro along the table's, up, of the first recording and each of those: x, -y …; by default those of
+        their mountings.
+    names : tuple of str
+        Names of these recordings, for messages.
+    """
+
+    also: tuple[Recording, ...] = ()
+    axes: tuple[str, ...] = ()
+    names: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -65,8 +92,19 @@ class CalibrationTask:
         Recording with the motion, if it is another one.
     update : Calibration, optional
         Calibration of an earlier run to carry over.
+    start : Calibration, optional
+        Calibration that a spin starts from.
+    radius_std_m, stretch_std_s2_rad2 : float, optional
+        Of a spin: standard deviations of a chip's radius and of the arm stretch; those of its policy if not given.
     turn_on_std_m_s2, bias_walk_m_s2_rt_s : float
-        With ``update``: change of a bias between power-ons, m/s², and random walk between poses, m/s²/√s.
+        With ``update`` or ``start``: change of a bias between power-ons, m/s²; with ``update`` random walk between
+        poses, m/s²/√s.
+    latitude_deg : float, optional
+        Latitude, degrees, for the Earth's rate.
+    rate_table : RateTable, optional
+        What a gyro on a rate table needs besides.
+    wavelet : mapping
+        Options of `gfimu.calibration.observations.denoised_samples`, for the wavelet input.
     progress : callable, optional
         Called with the share done of a fit that takes long, 0 to 1.
     """
@@ -81,8 +119,14 @@ class CalibrationTask:
     array: AccelerometerArray | None = None
     motion: Recording | None = None
     update: Calibration | None = None
+    start: Calibration | None = None
+    radius_std_m: float | None = None
+    stretch_std_s2_rad2: float | None = None
     turn_on_std_m_s2: float = 0.03
     bias_walk_m_s2_rt_s: float = 0.0
+    latitude_deg: float | None = None
+    rate_table: RateTable | None = None
+    wavelet: Mapping[str, Any] = field(default_factory=dict)
     progress: Callable[[float], object] | None = None
 
 
@@ -141,7 +185,19 @@ def calibrate(
 def run_calibration(method: CalibrationMethod, task: CalibrationTask) -> Calibration:
     """Calibrate by the record of a method; raises as `calibrate`."""
     result: Calibration = method.run(method, task)
-    return result
+    return replace(result, statistics={**result.statistics, **temperature_statistics(task.recording)})
+
+
+def temperature_statistics(recording: Recording) -> dict[str, float]:
+    """Return mean and span of the temperature at which a recording was made; empty if it has none.
+
+    Sensitivity and bias hold at that temperature: a condition of the calibration.
+    """
+    temperature = recording.reference.get("temperature_degC")
+    seen = np.empty(0) if temperature is None else temperature[np.isfinite(temperature)]
+    if not len(seen):
+        return {}
+    return {"temperature_mean_degC": float(seen.mean()), "temperature_span_K": float(np.ptp(seen))}
 
 
 def calibrate_triads(method: CalibrationMethod, task: CalibrationTask) -> Calibration:
@@ -153,7 +209,8 @@ def calibrate_triads(method: CalibrationMethod, task: CalibrationTask) -> Calibr
     rest, moved = without_moved_poses(recording, rest)
     warnings += moved
     observations = replace(
-        observations_from(recording, rest, task.input_kind), quadratic_std=quadratic_std(recording, task.array)
+        observations_from(recording, rest, task.input_kind, **task.wavelet),
+        quadratic_std=quadratic_std(recording, task.array),
     )
     options: dict[str, float] = {}
     if task.levelling_std_rad is not None and "levelling_std_rad" in method.options:
@@ -180,8 +237,21 @@ def calibrate_triads(method: CalibrationMethod, task: CalibrationTask) -> Calibr
             "rest_threshold_chosen_by": "data" if rest.chosen_by_data else "user",
             "poses_found": float(len(rest)),
             "noise_correlation_factor": observations.correlation_factor,
+            **_weights(observations),
         },
     )
+
+
+def _weights(observations: Observations) -> dict[str, float]:
+    """Return what the weights of each chip were made from, by name: its mean noise and the prior of its bends."""
+    found: dict[str, float] = {}
+    for chip in observations.chips:
+        one = observations.of_chip(chip)
+        variance = np.einsum("pcc->pc", one.mean_covariance).mean()
+        found[f"{chip}_mean_noise_{one.unit}"] = float(np.sqrt(variance))
+        if one.bends:
+            found[f"{chip}_quadratic_prior_std_per_{one.unit}"] = float(one.quadratic_prior.max())
+    return found
 
 
 def _common_factor(results: list[Calibration]) -> float | None:
@@ -219,6 +289,33 @@ def calibrate_whole_array(method: CalibrationMethod, task: CalibrationTask) -> C
     return result
 
 
+def calibrate_by_spin(method: CalibrationMethod, task: CalibrationTask) -> Calibration:
+    """Find the non-linearity of an array on a turntable; runner of ``spin``.
+
+    Raises
+    ------
+    InputError
+        As `gfimu.calibration.spin.spin`; also without the array, or of a standard deviation that is not positive.
+    """
+    if task.array is None:
+        raise InputError(f"calibration method {method.name!r} needs the array; give its name or file")
+    given = {"radius_std_m": task.radius_std_m, "stretch_std_s2_rad2": task.stretch_std_s2_rad2}
+    changes = {name: value for name, value in given.items() if value is not None}
+    for name, value in changes.items():
+        if not 0.0 < value < np.inf:
+            raise InputError(f"{name} = {value:g}: a standard deviation is positive")
+    result: Calibration = method.fit(
+        task.recording,
+        task.array,
+        start=task.start,
+        gravity=task.gravity,
+        min_plateau_s=_min_rest(method, task),
+        turn_on_std_m_s2=task.turn_on_std_m_s2,
+        policy=replace(SpinPolicy(), **changes),
+    )
+    return replace(result, warnings=(*check_gravity(task.gravity), *result.warnings))
+
+
 def calibrate_reference_gyro(method: CalibrationMethod, task: CalibrationTask) -> Calibration:
     """Calibrate the reference gyro of a recording at rest against the Earth's rate; runner of ``gyro``.
 
@@ -240,6 +337,31 @@ def calibrate_reference_gyro(method: CalibrationMethod, task: CalibrationTask) -
         unit="rad_s",
     )
     result: Calibration = method.fit(observations_from(rates, rest, "averaged"))
+    return result
+
+
+def calibrate_on_rate_table(method: CalibrationMethod, task: CalibrationTask) -> Calibration:
+    """Calibrate a gyro from one or more recordings on a rate table; runner of ``gyro-rate-table``.
+
+    Raises
+    ------
+    InputError
+        If the number of axes is not that of the recordings, or as `gfimu.calibration.rate_table.find_plateaus`.
+    """
+    table = task.rate_table or RateTable()
+    runs = (task.recording, *table.also)
+    if table.axes and len(table.axes) != len(runs):
+        raise InputError(f"{len(table.axes)} axes along the table's for {len(runs)} recordings; give one for each")
+    axes = [body_axis(name) for name in table.axes] if table.axes else [None] * len(runs)
+    mountings = []
+    for run, axis, name in zip(runs, axes, table.names or [""] * len(runs), strict=True):
+        with naming(name):
+            mountings.append(
+                find_plateaus(run, axis=axis, threshold=task.rest_threshold, min_duration_s=_min_rest(method, task))
+            )
+    result: Calibration = method.fit(
+        mountings, latitude_deg=task.latitude_deg, levelling_std_rad=task.levelling_std_rad or 0.0
+    )
     return result
 
 

@@ -4,7 +4,8 @@ A data sheet states the deviation from a straight line at full scale; of an ADXL
 3 mm/s² at 1 g: more than the noise of a mean over a rest, and the same whenever a pose is repeated, so that no
 averaging removes it and no scatter of the poses shows all of it. The coefficient q of every axis is therefore estimated
 with the other parameters, under the prior of the data sheet. What the poses do not show of it (in poses about the
-six faces, much) enters the standard deviations of bias and sensitivity.
+six faces, much) enters the standard deviations of bias and sensitivity. Poses show nothing of a cubic coefficient c; a
+turntable does (`gfimu.calibration.spin`).
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from gfimu.geometry.array import AccelerometerArray
 from gfimu.parts.part_file import PartFile
 from gfimu.recording import Recording
 
-__all__ = ["quadratic_statement", "quadratic_std", "with_quadratic", "without_quadratic"]
+__all__ = ["cubic_std", "quadratic_statement", "quadratic_std", "with_quadratic", "without_quadratic"]
 
 Floats = NDArray[np.float64]
 
@@ -39,6 +40,30 @@ def quadratic_std(recording: Recording, array: AccelerometerArray | None = None)
     ndarray, shape (c,)
         Deviation at full scale over the full range, 1 per reading unit; zero where no data sheet states it.
     """
+    return _of_data_sheets(recording, array, 1)
+
+
+def cubic_std(recording: Recording, array: AccelerometerArray | None = None) -> Floats:
+    """Take the standard deviation of each channel's cubic coefficient from the data sheet of its part.
+
+    Parameters
+    ----------
+    recording : Recording
+        Readings in m/s² or raw counts.
+    array : AccelerometerArray, optional
+        The array, whose chips have parts; by default that of the recording, or the part that its metadata name.
+
+    Returns
+    -------
+    ndarray, shape (c,)
+        Deviation at full scale over the full range squared, 1 per reading unit squared; zero where no data sheet states
+        it. The data sheet does not say which power it is of: each may be all of it.
+    """
+    return _of_data_sheets(recording, array, 2)
+
+
+def _of_data_sheets(recording: Recording, array: AccelerometerArray | None, power: int) -> Floats:
+    """Return the deviation at full scale over the full range to a power, in reading units, (c,)."""
     if recording.unit not in {"m_s2", "lsb"}:
         return np.zeros(len(recording.channels))
     if array is None:
@@ -49,18 +74,20 @@ def quadratic_std(recording: Recording, array: AccelerometerArray | None = None)
     parts = {} if array is None else {chip.name: chip.part for chip in array.chips}
     files = recording.metadata.get("parts_toml") if array is None else array.part_files
     default = str(recording.metadata.get("part", ""))
-    values = []
+    values, known = [], {}
     for channel in recording.channels:
         name = parts.get(channel[:-1], default)
-        try:
-            part = PartFile.load(name, files) if name else None
-        except InputError:
-            part = None
+        if name not in known:
+            try:
+                known[name] = PartFile.load(name, files) if name else None
+            except InputError:
+                known[name] = None
+        part = known[name]
         if part is None or part.full_range_m_s2 is None:
             values.append(0.0)
             continue
         unit = float(recording.metadata.get("lsb_m_s2", part.lsb_m_s2)) if recording.unit == "lsb" else 1.0
-        values.append(part.nonlinearity_full_scale / part.full_range_m_s2 * unit)
+        values.append(part.nonlinearity_full_scale / (part.full_range_m_s2 / unit) ** power)
     return np.array(values)
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 import pywt
@@ -16,14 +17,27 @@ from numpy.typing import ArrayLike, NDArray
 
 from gfimu.errors import InputError, unknown_name
 from gfimu.recording import Recording
-from gfimu.recording.rest import Rest
+from gfimu.recording.rest import Rest, mean_variance_factor
 
-__all__ = ["INPUTS", "Observations", "averaged_poses", "denoised_samples", "every_sample", "observations_from"]
+__all__ = [
+    "INPUTS",
+    "THRESHOLDS",
+    "Observations",
+    "averaged_poses",
+    "denoised_samples",
+    "every_sample",
+    "observations_from",
+    "regular_covariance",
+]
 
 Floats = NDArray[np.float64]
 
-_BLOCKS = 10
 _COUNT_VARIANCE = 1.0 / 12.0
+_MEDIAN_OF_NORMAL = 0.6745  # numerical: median of the size of a standard normal number
+_DEEPEST = 12
+
+THRESHOLDS = ("none", "soft", "hard")
+"""What becomes of the details of the wavelet input."""
 
 
 @dataclass(frozen=True)
@@ -166,19 +180,40 @@ def every_sample(recording: Recording, rest: Rest) -> Observations:
     return _build(recording, rest, "raw")
 
 
-def denoised_samples(recording: Recording, rest: Rest, *, wavelet: str = "db4", level: int = 4) -> Observations:
-    """Take every sample at rest after wavelet denoising: the approximation at ``level``, its details left out.
+def denoised_samples(
+    recording: Recording, rest: Rest, *, wavelet: str = "db4", level: int = 4, threshold: str = "none"
+) -> Observations:
+    """Take every sample at rest after wavelet denoising.
 
     Denoised neighbours are no longer independent. Each row keeps the covariance of the raw samples, so that n rows
     carry the information that n raw samples carry and no more.
 
+    Parameters
+    ----------
+    recording : Recording
+        Readings.
+    rest : Rest
+        Its stretches of rest.
+    wavelet : str
+        Name of a discrete wavelet of PyWavelets.
+    level : int
+        Level of the transform, 1 to 12; a short pose is transformed to the level that its length allows.
+    threshold : {"none", "soft", "hard"}
+        What becomes of the details: all are left out, or those below the universal threshold σ √(2 ln n), with σ from
+        the median of the finest ones over 0.6745; ``soft`` shrinks the others by the threshold. Source: Donoho &
+        Johnstone, Biometrika 81(3), 1994.
+
     Raises
     ------
     InputError
-        If the wavelet is unknown.
+        If the wavelet or threshold is unknown, or the level out of range.
     """
     if wavelet not in pywt.wavelist(kind="discrete"):
         raise unknown_name("wavelet", wavelet, pywt.wavelist(kind="discrete"))
+    if threshold not in THRESHOLDS:
+        raise unknown_name("threshold", threshold, THRESHOLDS)
+    if not 1 <= level <= _DEEPEST:
+        raise InputError(f"wavelet level {level}: give 1 to {_DEEPEST}")
     observations = _build(recording, rest, "wavelet")
     smooth = observations.readings.copy()
     for pose in range(observations.n_poses):
@@ -187,19 +222,39 @@ def denoised_samples(recording: Recording, rest: Rest, *, wavelet: str = "db4", 
         if depth < 1:
             continue
         levels = pywt.wavedec(smooth[rows], wavelet, mode="symmetric", level=depth, axis=0)
-        levels[1:] = [np.zeros_like(detail) for detail in levels[1:]]
+        levels[1:] = _details(levels[1:], threshold, len(rows))
         smooth[rows] = pywt.waverec(levels, wavelet, mode="symmetric", axis=0)[: len(rows)]
     return replace(observations, readings=smooth)
 
 
-def observations_from(recording: Recording, rest: Rest, kind: str) -> Observations:
-    """Build the observations of a named input; raises `InputError` that lists the inputs."""
+def _details(details: list[Floats], threshold: str, samples: int) -> list[Floats]:
+    """Return the details (k_i, c) of a pose after thresholding, the finest last."""
+    if threshold == "none":
+        return [np.zeros_like(one) for one in details]
+    noise = np.median(np.abs(details[-1]), axis=0) / _MEDIAN_OF_NORMAL  # (c,)
+    limit = noise * np.sqrt(2.0 * np.log(samples))
+    size = [np.maximum(np.abs(one), np.finfo(float).tiny) for one in details]
+    if threshold == "hard":
+        return [np.where(large > limit, one, 0.0) for one, large in zip(details, size, strict=True)]
+    return [one * np.maximum(1.0 - limit / large, 0.0) for one, large in zip(details, size, strict=True)]
+
+
+def observations_from(recording: Recording, rest: Rest, kind: str, **options: Any) -> Observations:
+    """Build the observations of a named input, with options of `denoised_samples` for ``wavelet``.
+
+    Raises
+    ------
+    InputError
+        If there is no such input (the message lists the inputs), or it has no such option.
+    """
     if kind not in INPUTS:
         raise unknown_name("input", kind, INPUTS)
-    return INPUTS[kind](recording, rest)
+    if options and kind != "wavelet":
+        raise InputError("--wavelet-level and --wavelet-threshold are of the wavelet input; add --input wavelet")
+    return INPUTS[kind](recording, rest, **options)
 
 
-INPUTS: Mapping[str, Callable[[Recording, Rest], Observations]] = MappingProxyType(
+INPUTS: Mapping[str, Callable[..., Observations]] = MappingProxyType(
     {"averaged": averaged_poses, "raw": every_sample, "wavelet": denoised_samples}
 )
 """What makes the observations of each input, by name."""
@@ -228,8 +283,8 @@ def _build(recording: Recording, rest: Rest, kind: str) -> Observations:
         poses.append(samples)
         covariances.append(np.cov(samples, rowvar=False).reshape(c, c))
         starts.append(recording.t_s[start])
-    factor = _correlation_factor(poses)
-    covariance = _regular(np.array(covariances), recording.unit) * factor
+    factor = mean_variance_factor(poses)
+    covariance = regular_covariance(np.array(covariances), recording.unit) * factor
     lengths = np.array([len(samples) for samples in poses])
     if kind == "averaged":
         rows = np.array([samples.mean(axis=0) for samples in poses])
@@ -241,26 +296,8 @@ def _build(recording: Recording, rest: Rest, kind: str) -> Observations:
     return Observations(rows, number, covariance, recording.channels, recording.unit, np.array(starts), kind, factor)
 
 
-def _correlation_factor(poses: list[Floats]) -> float:
-    """Variance of block means over that expected of white noise, at least 1."""
-    ratios = []
-    for samples in poses:
-        size = len(samples) // _BLOCKS
-        if size < 2:
-            continue
-        blocks = samples[: size * _BLOCKS].reshape(_BLOCKS, size, -1).mean(axis=1)
-        white = samples.var(axis=0, ddof=1) / size
-        good = white > 0.0
-        ratios.extend((blocks.var(axis=0, ddof=1)[good] / white[good]).tolist())
-    if not ratios:
-        return 1.0
-    factor = float(np.mean(ratios))
-    spread = np.sqrt(2.0 / (_BLOCKS - 1) / len(ratios))
-    return factor if factor > 1.0 + 3.0 * spread else 1.0
-
-
-def _regular(covariance: Floats, unit: str) -> Floats:
-    """Give readings that never change within a pose the variance of rounding, or of the other poses."""
+def regular_covariance(covariance: Floats, unit: str) -> Floats:
+    """Give readings that never change within a pose the variance of rounding, or of the other poses; (p, c, c)."""
     diagonal = np.einsum("pcc->pc", covariance)
     floor = _COUNT_VARIANCE if unit == "lsb" else 0.0
     typical = np.median(diagonal, axis=0)

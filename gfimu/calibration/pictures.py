@@ -32,11 +32,13 @@ _MOST_NAMED = 128  # parameters with a name each; of more, the blocks of the chi
 _PER_LABEL_IN = 0.125  # room for one name, inches: type of 7 points needs 0.1
 _LINEAR = 0.005  # m/s²: below it the scale of magnitudes is linear
 _NEAR_AXIS = np.cos(np.deg2rad(10.0))
-_UNITS = {"lsb": "count", "m_s2": "m/s²", "rad_s": "rad/s", "1": "ratio", "m": "m", "s²/m": "s²/m", "s": "s"}
+_UNITS = {"lsb": "count", "lsb²": "count²", "m_s2": "m/s²", "rad_s": "rad/s", "1": "ratio", "m": "m", "s": "s"}
+_UNITS |= {unit: unit for unit in ("s²/m", "s⁴/m²")}
 _KINDS = {
     "M": "M_ij: sensitivity of axis i to input j",
     "b": "b_i: bias",
     "q": "q_i: quadratic coefficient",
+    "c": "c_i: cubic coefficient",
     "r": "r_i: position",
     "d": "d: delay",
 }

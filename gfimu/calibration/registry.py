@@ -120,12 +120,30 @@ _RECORDS = (
         min_rest_s=2.0,
     ),
     CalibrationMethod(
+        "spin",
+        "gfimu.calibration.spin.fit:spin",
+        "gfimu.calibration.methods:calibrate_by_spin",
+        needs="a turntable with a tachometer, three or more speeds held",
+        estimates="q and c (K2, K3) of every axis across the table's axis, with M and b",
+        source="spin reduction of IEEE Std 836",
+        options=frozenset({"array", "start", "radius_std_m", "stretch_std_s2_rad2"}),
+    ),
+    CalibrationMethod(
         "gyro",
         "gfimu.calibration.multi_position:multi_position_gyro",
         "gfimu.calibration.methods:calibrate_reference_gyro",
         needs="rest in any poses, with the columns of a gyro",
         estimates="bias of the reference gyro; M where the noise leaves it visible",
         source="|omega| = Earth's rate, in the form of the Persian calibration paper, section 2.3.2",
+    ),
+    CalibrationMethod(
+        "gyro-rate-table",
+        "gfimu.calibration.rate_table:rate_table_gyro",
+        "gfimu.calibration.methods:calibrate_on_rate_table",
+        needs="stretches of constant rate on a rate table, three mountings or more",
+        estimates="M and b of the gyro",
+        source="the Persian calibration paper's eqs 5-8, with rates of the table for gravity",
+        options=frozenset({"rate_table", "levelling_std_rad"}),
     ),
 )
 

@@ -26,7 +26,15 @@ from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
 from gfimu.short_repr import joined
 
-__all__ = ["FORMAT_VERSION", "Calibration", "combine", "load_calibration", "parameter_names", "quadratic_names"]
+__all__ = [
+    "FORMAT_VERSION",
+    "Calibration",
+    "combine",
+    "cubic_names",
+    "load_calibration",
+    "parameter_names",
+    "quadratic_names",
+]
 
 FORMAT = "gfimu-calibration"
 FORMAT_VERSION = 1
@@ -47,7 +55,12 @@ def parameter_names(chip: str, gauge: str) -> tuple[str, ...]:
 
 def quadratic_names(chips: tuple[str, ...]) -> tuple[str, ...]:
     """Names of the quadratic coefficients of chips: ``a1_q_x`` …, three per chip."""
-    return tuple(f"{chip}_q_{axis}" for chip in chips for axis in "xyz")
+    return tuple(f"{chip}_q_{axis}" for chip in chips for axis in _AXES)
+
+
+def cubic_names(chips: tuple[str, ...]) -> tuple[str, ...]:
+    """Names of the cubic coefficients of chips: ``a1_c_x`` …, three per chip."""
+    return tuple(f"{chip}_c_{axis}" for chip in chips for axis in _AXES)
 
 
 @dataclass(frozen=True)
@@ -68,7 +81,8 @@ class Calibration:
         Magnitude of the true input used, m/s² (rad/s for a gyro).
     names : tuple of str
         Parameter names: ``a1_M_xy`` (sensitivity, reading unit per m/s²), ``a1_b_x`` (bias, reading unit),
-        ``a1_q_x`` (quadratic coefficient, 1 per reading unit), ``a1_r_x`` (position, m),
+        ``a1_q_x`` (quadratic coefficient, 1 per reading unit), ``a1_c_x`` (cubic coefficient, 1 per reading unit
+        squared), ``a1_r_x`` (position, m),
         ``a1_d`` (delay of the chip against the mean of all, s; not applied).
     values : ndarray, shape (p,)
         Parameter values.
@@ -145,10 +159,9 @@ class Calibration:
         """Unit of each parameter."""
         reading, true = _READING_UNITS[self.unit]
         ratio = "1" if reading == true else f"{reading} per {true}"
-        inverse = "s²/m" if reading == "m_s2" else f"1 per {reading}"
-        return tuple(
-            {"M": ratio, "b": reading, "r": "m", "q": inverse, "d": "s"}[name.split("_")[1]] for name in self.names
-        )
+        inverse, square = {"m_s2": ("s²/m", "s⁴/m²")}.get(reading, (f"1 per {reading}", f"1 per {reading}²"))
+        units = {"M": ratio, "b": reading, "r": "m", "q": inverse, "c": square, "d": "s"}
+        return tuple(units[name.split("_")[1]] for name in self.names)
 
     @property
     def chips(self) -> tuple[str, ...]:
@@ -158,14 +171,17 @@ class Calibration:
     @cached_property
     def models(self) -> dict[str, ErrorModel]:
         """Error model of each chip, by name."""
+
+        def bends(names: tuple[str, ...]) -> NDArray[np.float64]:
+            return np.array([self.value(name) if name in self.names else 0.0 for name in names])
+
         return {
             chip: replace(
                 ErrorModel.from_parameters(
                     [self.value(name) for name in parameter_names(chip, self.gauge)], self.gauge
                 ),
-                quadratic=np.array(
-                    [self.value(name) if name in self.names else 0.0 for name in quadratic_names((chip,))]
-                ),
+                quadratic=bends(quadratic_names((chip,))),
+                cubic=bends(cubic_names((chip,))),
             )
             for chip in self.chips
         }
@@ -197,7 +213,7 @@ class Calibration:
         return self.names.index(name)
 
     def apply(self, recording: Recording) -> Recording:
-        """Correct a recording: a = M⁻¹ (y − q y²), y = l − b, for every chip.
+        """Correct a recording: a = M⁻¹ (u − q u² − c u³), u = l − b, for every chip.
 
         For an array, the result is what ideal sensors along the drawing's axes would read.
 
@@ -267,7 +283,7 @@ class Calibration:
     def rows(self) -> list[tuple[str, str, str, str]]:
         """Rows of a table for people: name, value, standard deviation, unit."""
         return [
-            (name, f"{value:.3g}" if "_q_" in name else f"{value:.6f}", f"{std:.2g}", unit)
+            (name, f"{value:.3g}" if name.split("_")[1] in "qc" else f"{value:.6f}", f"{std:.2g}", unit)
             for name, value, std, unit in zip(self.names, self.values, self.std, self.units, strict=True)
         ]
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+
 from gfimu.calibration.imu_tk import read_text_triad
 from gfimu.calibration.result import Calibration
 from gfimu.errors import InputError
@@ -13,9 +15,9 @@ from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
 from gfimu.recording.carried_array import array_difference
 from gfimu.recording.formats import format_of_recording, open_run
-from gfimu.recording.mapped import MappedFile
+from gfimu.recording.mapped import MappedFile, mapped_reference
 
-__all__ = ["open_calibrated", "open_calibrated_run", "open_uncalibrated"]
+__all__ = ["open_calibrated", "open_calibrated_run", "open_references", "open_uncalibrated"]
 
 _TEXT = (".txt", ".txt.gz")
 
@@ -32,6 +34,23 @@ def open_uncalibrated(path: str | Path | MappedFile, *, array: AccelerometerArra
         As `gfimu.Recording.read` and the importers.
     """
     return _open(path, array, None)
+
+
+def open_references(path: str | Path | MappedFile) -> Recording:
+    """Read a recording that may hold references alone, such as a gyro on a rate table.
+
+    Raises
+    ------
+    InputError
+        As `gfimu.Recording.read`, `gfimu.recording.mapped.mapped_reference` and the importers.
+    """
+    if isinstance(path, MappedFile) and path.column_map.reference and not path.column_map.channels:
+        t, columns, _ = mapped_reference(path.path, path.column_map)
+        return Recording(t, np.empty((len(t), 0)), (), columns)
+    if isinstance(path, MappedFile):
+        return path.read(None)
+    whole = format_of_recording(path)
+    return Recording.read(path, needs_channels=False) if whole is None else whole.read(path)
 
 
 def open_calibrated(

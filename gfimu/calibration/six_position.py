@@ -98,6 +98,7 @@ def six_position(
             "redundancy": float(redundancy),
             "variance_factor": factor,
             "covariance_factor": scale,
+            "levelling_std_rad": levelling_std_rad,
             "magnitude_residual_rms_m_s2": float(np.sqrt(np.mean(miss**2))),
             "input": observations.kind,
         },

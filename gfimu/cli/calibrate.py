@@ -44,6 +44,17 @@ def _calibrate(
     input_kind: Annotated[
         str, typer.Option("--input", help="Rows that the fit uses: averaged, raw or wavelet.")
     ] = "averaged",
+    wavelet_level: Annotated[
+        int | None, typer.Option("--wavelet-level", help="With --input wavelet: level of the transform; 4 by default.")
+    ] = None,
+    wavelet_threshold: Annotated[
+        str | None,
+        typer.Option(
+            "--wavelet-threshold",
+            help="With --input wavelet: leave out all details (none, the default), or those below the universal "
+            "threshold (soft or hard).",
+        ),
+    ] = None,
     rest_threshold: Annotated[
         float | None,
         typer.Option("--rest-threshold", help="Threshold of rest, reading unit squared; else from the data."),
@@ -64,26 +75,57 @@ def _calibrate(
     ] = None,
     turn_on_std: Annotated[
         float | None,
-        typer.Option("--turn-on-std", help="With --update: turn-on repeatability of a bias, m/s²; 0.03 by default."),
+        typer.Option(
+            "--turn-on-std",
+            help="With --update, --calibration: turn-on repeatability of a bias, m/s²; 0.03 by default.",
+        ),
     ] = None,
     bias_walk: Annotated[
         float | None,
         typer.Option("--bias-walk", help="With --update: random walk of a bias between poses, m/s²/√s; 0 by default."),
     ] = None,
+    calibration: Annotated[
+        Path | None,
+        typer.Option("--calibration", help="spin: static calibration to start from, or that of another spin."),
+    ] = None,
+    radius_std: Annotated[
+        float | None,
+        typer.Option("--radius-std", help="spin: standard deviation of a chip's place, m; 5e-4 by default."),
+    ] = None,
+    stretch_std: Annotated[
+        float | None,
+        typer.Option("--stretch-std", help="spin: standard deviation of the arm stretch, s²/rad²; 1e-7 by default."),
+    ] = None,
     check: Annotated[
         Path | None, typer.Option("--check", help="Other poses at rest, which the fit does not see: |a| − g on them.")
     ] = None,
+    rate_table: Annotated[
+        bool, typer.Option("--rate-table", help="gyro: RUN is of a rate table, whose tachometer is the reference.")
+    ] = False,
+    also: Annotated[
+        list[Path] | None,
+        typer.Option("--also", help="With --rate-table: a recording of the gyro mounted otherwise; repeat it."),
+    ] = None,
+    table_axes: Annotated[
+        str,
+        typer.Option(
+            "--table-axes", help="Gyro's axis along the table's, of RUN and each --also: x,y,-z; else by file."
+        ),
+    ] = "",
     picture: Annotated[Path | None, typer.Option("--picture", help="Picture to write (.png, .svg, .pdf).")] = None,
     force: ForceOption = False,
     column_map: MapOption = None,
     map_set: MapSetOption = None,
     json: JsonOption = False,
 ) -> None:
-    """Calibrate the accelerometers of a recording, each parameter with its standard deviation.
+    """Calibrate the accelerometers or the gyro of a recording, each parameter with its standard deviation.
 
     Example: gfimu calibrate multi-position poses.csv --latitude 52.3 --height 80 --out calibration.json
 
+    Non-linearity on a turntable: gfimu calibrate spin run.parquet --calibration static.json --out spin.json
+
     Checked on other poses: gfimu calibrate multi-position poses.csv --out calibration.json --check others.csv
+    A gyro: gfimu calibrate gyro x.csv --rate-table --also y.csv --also z.csv --table-axes x,y,z --out gyro.json
     """
     from gfimu.commands.calibrate import calibrate
 
@@ -99,6 +141,8 @@ def _calibrate(
             height=height,
             parameters=parameters,
             input_kind=input_kind,
+            wavelet_level=wavelet_level,
+            wavelet_threshold=wavelet_threshold,
             rest_threshold=rest_threshold,
             min_rest=min_rest,
             levelling_std=levelling_std,
@@ -108,7 +152,13 @@ def _calibrate(
             update=update,
             turn_on_std=turn_on_std,
             bias_walk=bias_walk,
+            calibration=calibration,
+            radius_std=radius_std,
+            stretch_std=stretch_std,
             check=check,
+            rate_table=rate_table,
+            also=also or [],
+            table_axes=table_axes,
             picture=picture,
             force=force,
         )

@@ -80,6 +80,9 @@ def print_check(found: RunCheck) -> None:
         ("run", "length", "rate", "fastest", "acceleration", "turns", "forwards / backwards / rest"),
         rows,
     )
+    for one in found.runs:
+        if "lowest_degC" in one:
+            print_text(f"Temperature of {one['name']}: {one['lowest_degC']:.4g} to {one['highest_degC']:.4g} °C.")
     print_text("Data: " + ("; ".join(found.findings) if found.findings else "nothing odd."))
     if found.effects:
         print_table(

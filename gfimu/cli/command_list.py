@@ -57,8 +57,13 @@ JOBS: dict[str, tuple[Entry, ...]] = {
     "Calibrate and estimate": (
         Entry(
             "calibrate",
-            "Calibrate the accelerometers of a recording, each parameter with its standard deviation.",
+            "Calibrate the accelerometers or the gyro of a recording, each parameter with its standard deviation.",
             "calibrate",
+        ),
+        Entry(
+            "certificate",
+            "State a calibration in the terms of IEEE 1293 and NIST, with expanded uncertainties and their budget.",
+            "certificate",
         ),
         Entry(
             "noise",
@@ -105,7 +110,7 @@ JOBS: dict[str, tuple[Entry, ...]] = {
         Entry("optimize", "Search the geometry of least GDOP for a number of chips in a box.", "score"),
         Entry(
             "drift",
-            "Position-drift budget of an array: closed forms, their validity limit, Monte Carlo beside.",
+            "Position-drift budget of an array in closed form, with a Monte Carlo; the drift of a recording at rest.",
             "drift",
         ),
         Entry(

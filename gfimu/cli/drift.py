@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from gfimu.cli.axis_options import AxisOption, AxisPointOption, HubOption, InclinationOption
-from gfimu.cli.output import JsonOption, print_json, print_table, print_text, progress
+from gfimu.cli.mapped import ForceOption, MapOption, MapSetOption
+from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, print_text, progress
 from gfimu.errors import InputError
 
 if TYPE_CHECKING:
@@ -16,6 +18,7 @@ if TYPE_CHECKING:
     from gfimu.known_axis.accuracy.drift import AxisDrift
     from gfimu.position_drift import DriftBudget
     from gfimu.position_drift.monte_carlo import DriftSample
+    from gfimu.position_drift.rest_windows import RestDrift
 
 __all__ = ["register"]
 
@@ -26,7 +29,14 @@ def register(app: typer.Typer) -> None:
 
 
 def _drift(
-    array: Annotated[str, typer.Option(help="Array: a name in models/arrays or a TOML file.")] = "cube12",
+    run: Annotated[
+        Path | None,
+        typer.Argument(help="Recording with long rests: the drift that it has, beside what its noise predicts."),
+    ] = None,
+    array: Annotated[
+        str | None,
+        typer.Option(help="Array: a name or a TOML file; else the recording's own, or cube12 without a recording."),
+    ] = None,
     time: Annotated[float, typer.Option(help="Time since the start of navigation, s.")] = 30.0,
     bias_mg: Annotated[float, typer.Option(help="Standard deviation of each channel's constant bias, mg.")] = 0.0,
     noise_ug: Annotated[float, typer.Option(help="White noise of each channel, one-sided density, µg/√Hz.")] = 0.0,
@@ -58,22 +68,63 @@ def _drift(
     latitude: Annotated[
         float | None, typer.Option(help="With --from-position: latitude, degrees, for the Earth's share.")
     ] = None,
+    lead: Annotated[
+        float | None,
+        typer.Option(help="With RUN: rest before each window, from which tilt and biases are read off, s; else 10."),
+    ] = None,
+    calibration: Annotated[Path | None, typer.Option(help="With RUN: calibration to apply first (JSON).")] = None,
+    picture: Annotated[Path | None, typer.Option(help="With RUN: picture to write (.png, .svg, .pdf).")] = None,
+    force: ForceOption = False,
+    column_map: MapOption = None,
+    map_set: MapSetOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Position-drift budget of an array: closed forms, their validity limit, Monte Carlo beside.
+    """Position-drift budget of an array in closed form, with a Monte Carlo; the drift of a recording at rest.
 
     Example: `gfimu drift --array cube12 --time 0.3 --bias-mg 35 --noise-ug 290 --monte-carlo 400`
 
     The paper's inversion: `gfimu drift --from-position 6.42 0 0 --known-bias-mg 1 0 0 --latitude 35.7`
 
+    Of a recording at rest: `gfimu drift run.parquet --time 30 --picture drift.png`
+
     One chip on a table: `gfimu drift --array arm.toml --axis z --rate 6 --time 60 --bias-mg 5 --noise-ug 290`
     """
     from gfimu.commands.drift import axis_drift, drift, drift_from_position
+    from gfimu.commands.drift_of_rest import drift_of_rest
     from gfimu.commands.known_axis import known_axis, turning_axis
     from gfimu.commands.opened import as_array
 
+    budgeted = bias_mg or noise_ug or walk_ug or rate_drift_deg_h or rate or monte_carlo or any(offset)
+    if run is not None:
+        if budgeted or axis is not None or from_position is not None or any(known_bias_mg) or latitude is not None:
+            raise InputError(
+                f"{run}: the drift of a recording goes with --array, --calibration, --time, --lead, --gravity, "
+                "--picture, --map and --force; its noise is measured"
+            )
+        seen = drift_of_rest(
+            run,
+            array,
+            time=time,
+            lead=10.0 if lead is None else lead,
+            gravity=gravity,
+            calibration=calibration,
+            picture=picture,
+            column_map=column_map,
+            map_set=map_set or [],
+            force=force,
+        )
+        files = {} if picture is None else {"picture": picture}
+        if as_json:
+            print_json(seen.to_dict() | {"files": files})
+        else:
+            _print_of_rest(seen)
+            print_paths(files.items())
+        return
+    if lead is not None or calibration or picture or column_map or map_set or force:
+        raise InputError("--lead, --calibration, --picture, --map and --force are of a recording; name it first")
+    array = array or "cube12"
     if from_position is not None:
-        if bias_mg or noise_ug or walk_ug or rate_drift_deg_h or rate or monte_carlo or any(offset) or axis is not None:
+        if budgeted or axis is not None:
             raise InputError(
                 "--from-position works errors out; give it with --time, --known-bias-mg, --latitude, --gravity"
             )
@@ -157,6 +208,40 @@ def _print_equivalent(found: EquivalentErrors) -> None:
             f"The Earth's rate has {found.earth_rate_deg_h:.3g} °/h in the horizontal: {found.earth_share_m:.3g} m in "
             "a unit that takes the Earth for still, in a direction that its heading decides."
         )
+
+
+def _print_of_rest(found: RestDrift) -> None:
+    """Print the errors of a recording at rest beside their prediction."""
+    from gfimu.position_drift import TILT_LIMIT
+
+    rows = [("first window", *found.final_m[0])]
+    if len(found.start_s) > 1:
+        rows.append((f"rms of {len(found.start_s)} windows", *found.rms_m))
+    rows.append(("rms predicted from the noise", *found.predicted_m))
+    print_table(
+        f"Position error after {found.time_s:g} s at rest, {found.array}, biases read off over {found.lead_s:g} s, m",
+        ("", "x", "y", "z"),
+        [(name, *(f"{value:.4g}" for value in values)) for name, *values in rows],
+    )
+    low, high = found.ratio_interval
+    good = found.valid and low <= found.ratio <= high
+    verdict = "as predicted" if good else "NOT AS PREDICTED" if found.valid else "beyond first order"
+    print_text(
+        f"Error over prediction, horizontal, rms over the windows: {found.ratio:.2f}, {verdict} (95 % of right "
+        f"predictions: {low:.2f} to {high:.2f}). Terms of the noise found: {', '.join(found.found_terms)}.",
+        style="" if good else "yellow",
+    )
+    if not found.valid:
+        print_text(
+            f"The prediction is of first order in the tilt, which reaches {found.tilt_std_rad:.2g} rad (1 σ); it holds "
+            f"to {TILT_LIMIT} rad: give a shorter --time.",
+            style="yellow",
+        )
+    where = " ".join(f"{value:.4g}" for value in found.final_m[0])
+    print_text(
+        f"The first window's error is that of a rate drift of {found.rate_drift_deg_h:.4g} °/h: gfimu drift "
+        f"--from-position {where} --time {found.time_s:g}"
+    )
 
 
 def _print_about_axis(found: AxisDrift) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     import numpy as np
 
     from gfimu.motion.estimate_summary import EstimateSummary, PositionSummary
+    from gfimu.motion.rest_bias import ForceAtRest
 
 __all__ = ["register"]
 
@@ -197,10 +199,27 @@ def _print_summary(summary: EstimateSummary) -> None:
     if summary.channels_left_out:
         rows.append(("channels left out", ", ".join(summary.channels_left_out), ""))
     print_table(f"{summary.array}, method {summary.method}, {summary.form} form", ("quantity", "value", "unit"), rows)
+    if summary.at_rest is not None:
+        _print_at_rest(summary.at_rest)
     if summary.position is not None:
         _print_position(summary.position)
     if summary.mounting is not None:
         _print_mounting(summary.mounting)
+
+
+def _print_at_rest(found: ForceAtRest) -> None:
+    """Print what p reads beyond gravity at rest, and the lean that would read the same."""
+    rows = [
+        ("bias of p", *(f"{value:+.2f}" for value in found.bias_mg), f"{found.magnitude_mg:+.2f}"),
+        ("standard uncertainty", *(f"{value:.2g}" for value in found.std_mg), f"{found.magnitude_std_mg:.2g}"),
+    ]
+    print_table(
+        f"Equivalent biases of p at rest, {found.start_s:.4g} to {found.stop_s:.4g} s, mg",
+        ("mean less gravity", "x", "y", "z", "magnitude"),
+        rows,
+        note=f"At rest a bias and a lean are one: a lean of {math.degrees(found.lean_rad):.2g}° reads the same across "
+        "the vertical. No lean makes the magnitude.",
+    )
 
 
 def _print_position(position: PositionSummary) -> None:

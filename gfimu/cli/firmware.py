@@ -146,6 +146,9 @@ def _run_behind_port(
 def _build(
     image: Annotated[str, typer.Argument(help="Image: gfimu or selfcheck.")] = "gfimu",
     out: Annotated[Path | None, typer.Option("--out", help="Folder for the image; else the package's own.")] = None,
+    array: Annotated[
+        str, typer.Option("--array", help="Name of the array on the board, which the board then states to the host.")
+    ] = "",
     baud: Annotated[
         int | None, typer.Option("--baud", help="Speed of the line after power-on, bits per second; else 115200.")
     ] = None,
@@ -156,6 +159,8 @@ def _build(
     json: JsonOption = False,
 ) -> None:
     """Compile the firmware from its C sources with the compiler of the ziglang package.
+
+    Example: gfimu firmware build --out build --array cube12_as_built
 
     Example: gfimu firmware build --out build --baud 460800 --define GFIMU_SPI_HZ=1000000U
     """
@@ -168,7 +173,7 @@ def _build(
         if not equals or not name.isidentifier():
             raise InputError(f"--define {item!r}: write NAME=VALUE")
         defines[name] = value
-    report = build(image, out=out, baud=baud, define=defines)
+    report = build(image, out=out, array=array, baud=baud, define=defines)
     if json:
         print_json(asdict(report))
         return

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from gfimu.cli.output import JsonOption, console, print_json, print_paths, print_table
+from gfimu.cli.output import JsonOption, console, print_json, print_paths, print_table, print_text
 
 if TYPE_CHECKING:
     from firmware_bridge.host.chip_selftest import AxisSelfTest
     from firmware_bridge.host.finder import Found
+    from gfimu.geometry.array import AccelerometerArray
 
 __all__ = ["register"]
+
+_STATED = {"host": "given", "board": "stated by the board", "format": "the format's", "answer": "as answered"}
 
 
 def register(app: typer.Typer) -> None:
@@ -52,7 +56,9 @@ def _record(
             help="Frame format: lpc1768 or mimu4444. Or a TOML file (gfimu new frame). Else lpc1768, or what is found.",
         ),
     ] = "",
-    array: Annotated[str, typer.Option("--array", help="Array on the board; else the format's.")] = "",
+    array: Annotated[
+        str, typer.Option("--array", help="Array on the board; else the one that the board states, or the format's.")
+    ] = "",
     baud: Annotated[
         int | None, typer.Option("--baud", help="Bits per second; else as the board is, raised if the rate needs it.")
     ] = None,
@@ -106,6 +112,7 @@ def _record(
         if not json:
             _print_self_test(tested)
 
+    can_ask = interactive and sys.stdin.isatty()
     report = record(
         port,
         out,
@@ -125,6 +132,7 @@ def _record(
         on_note=say,
         on_find=name_board,
         on_self_test=show_axes,
+        choose_array=_ask_for_array if can_ask else None,
         on_try=(lambda name: screen.print(f"looking at {name} …", end="\r")) if interactive else None,
     )
     outcome = {"boards": [asdict(board) for board in boards], "self_test": [asdict(axis) for axis in axes]}
@@ -161,12 +169,36 @@ def _record(
         if faulty:
             rows.append(("chips that do not hold their settings", faulty))
         rows.append(("firmware", f"{identity.firmware}, {identity.rate_hz} Hz, ±{identity.range_g} g"))
+    rows.append(("array", f"{report.array} ({_STATED[report.array_stated_by]})" if report.array else "not known"))
+    if report.temperature_degC is not None:
+        rows.append(("temperature", "{:.2f} to {:.2f} °C".format(*report.temperature_degC)))
     if report.baud is not None:
         rows.append(("speed of the line", f"{report.baud} baud"))
     rows += [(f"status {name}", number) for name, number in report.status_counts.items()]
     rows += [(name.replace("_", " "), _short(value)) for name, value in report.source.items()]
     print_table(f"recorded from {port}", ("quantity", "value"), rows)
     print_paths(written.items())
+
+
+def _ask_for_array(candidates: tuple[AccelerometerArray, ...]) -> str:
+    """Ask for the array on the board until the answer is one, or empty."""
+    from firmware_bridge.host.mounting.on_board import mounting_words
+    from gfimu.errors import InputError
+    from gfimu.geometry.array import AccelerometerArray
+
+    print_text("The board does not state how its chips are mounted (docs/bench.md, Which array):")
+    for array in candidates:
+        print_text(f"  {array.name}: {mounting_words(array)}")
+    while True:
+        name = str(typer.prompt("array (a name, a file, or Enter to leave it open)", default="", show_default=False))
+        if not name.strip():
+            return ""
+        try:
+            AccelerometerArray.load(name)
+        except InputError as error:
+            print_text(str(error))
+        else:
+            return name
 
 
 def _short(value: Any) -> str:
@@ -180,7 +212,7 @@ def _short(value: Any) -> str:
 
 def _description(board: Found) -> str:
     """Return a line on a board: speed, format, and what it says about itself."""
-    line = f"{board.form} at {board.baud} baud"
+    line = f"{board.form} at {board.baud} baud" + (f", array {board.array}" if board.array else "")
     if (identity := board.identity) is None:
         return f"{line}, sends without answering"
     chips = [

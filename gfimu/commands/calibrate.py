@@ -24,14 +24,22 @@ __all__ = ["calibrate"]
 _OPTION_NAMES = {
     "motion": "--motion is the motion of a whole array",
     "update": "--update carries the calibration of a whole array over",
+    "start": "--calibration is what a spin starts from",
+    "radius_std_m": "--radius-std is of the arms on a turntable",
+    "stretch_std_s2_rad2": "--stretch-std is of the arms on a turntable",
     "levelling_std_rad": "--levelling-std is the tilt of levelled faces",
     "n_parameters": "--parameters chooses the model of single chips",
     "input_kind": "--input chooses the rows for single chips",
+    "rate_table": "--rate-table, --also and --table-axes are of a gyro on a rate table",
 }
 """What the options are that some methods do not use, by the field of the task."""
 
 
-@writes(reads=("recording", "array", "motion", "update", "check", "column_map"), out=CALIBRATION, picture=PICTURE)
+@writes(
+    reads=("recording", "array", "motion", "update", "calibration", "check", "also", "column_map"),
+    out=CALIBRATION,
+    picture=PICTURE,
+)
 def calibrate(
     method: str,
     recording: Recording | str | Path | MappedFile,
@@ -45,6 +53,8 @@ def calibrate(
     height: float = 0.0,
     parameters: int | None = None,
     input_kind: str = "averaged",
+    wavelet_level: int | None = None,
+    wavelet_threshold: str | None = None,
     rest_threshold: float | None = None,
     min_rest: float | None = None,
     levelling_std: float | None = None,
@@ -52,7 +62,13 @@ def calibrate(
     update: Calibration | str | Path | None = None,
     turn_on_std: float | None = None,
     bias_walk: float | None = None,
+    calibration: Calibration | str | Path | None = None,
+    radius_std: float | None = None,
+    stretch_std: float | None = None,
     check: Recording | str | Path | MappedFile | None = None,
+    rate_table: bool = False,
+    also: Sequence[Recording | str | Path | MappedFile] = (),
+    table_axes: Sequence[str] | str = (),
     picture: str | Path | None = None,
     force: bool = False,
     progress: Callable[[float], object] | None = None,
@@ -84,6 +100,9 @@ def calibrate(
         Parameters per triad; two names of one argument.
     input_kind : {"averaged", "raw", "wavelet"}
         Rows that the fit uses (``--input``).
+    wavelet_level, wavelet_threshold : int and {"none", "soft", "hard"}, optional
+        With the wavelet input: level of the transform, 4 by default, and what becomes of its details: all are left out,
+        or those below the universal threshold (`gfimu.calibration.observations.denoised_samples`).
     rest_threshold : float, optional
         Threshold of rest, reading unit squared; chosen by the data if not given.
     min_rest, min_rest_s : float, optional
@@ -97,10 +116,23 @@ def calibrate(
         For ``array``: calibration of an earlier run to carry over.
     turn_on_std, bias_walk : float, optional
         With ``update``: change of a bias between power-ons, m/s², 0.03 by default; random walk between poses, m/s²/√s,
-        0 by default.
+        0 by default. The first also with ``calibration``.
+    calibration : Calibration, str or Path, optional
+        For ``spin``: static calibration to start from, or the result of another spin; else the data sheets.
+    radius_std, stretch_std : float, optional
+        For ``spin``: standard deviations of each coordinate of a chip, m, and of the arm stretch, s²/rad²
+        (`gfimu.calibration.spin.policy`).
     check : Recording, str or Path, optional
         Other poses at rest, which the fit does not see: |a| − g on them goes into the statistics
         (`gfimu.calibration.check_poses`).
+    rate_table : bool
+        For ``gyro``: the recording is of a rate table, whose rate (``tacho_rad_s``) is the reference
+        (`gfimu.calibration.rate_table`); the same as the method ``gyro-rate-table``. It may hold references alone.
+    also : sequence of Recording, str or Path
+        With ``rate_table``: recordings of the gyro mounted otherwise.
+    table_axes : sequence of str or str
+        With ``rate_table``: the gyro's axis along the table's, up, of the recording and each of ``also``, such as
+        ``["x", "y", "-z"]`` or ``"x,y,-z"``; by default those of the recordings' mountings.
     picture : str or Path, optional
         Picture to write, ``.png``, ``.svg`` or ``.pdf``; its magnitudes are those of ``check``, where that is given.
     force : bool
@@ -115,12 +147,15 @@ def calibrate(
         faulty, the poses don't suffice, or an output can't be written where it is asked for.
     """
     from gfimu.calibration.check_poses import check_on_poses
-    from gfimu.calibration.methods import CalibrationTask, run_calibration
+    from gfimu.calibration.methods import CalibrationTask, RateTable, run_calibration
     from gfimu.calibration.registry import calibration_method
     from gfimu.commands.opened import as_array, as_calibration, by_map, name_of
     from gfimu.recording.checks import examine
 
-    chosen = calibration_method(method)
+    on_table = rate_table or bool(also) or bool(table_axes)
+    chosen = calibration_method("gyro-rate-table" if on_table and method == "gyro" else method)
+    given = {"level": wavelet_level, "threshold": wavelet_threshold}
+    wavelet = {key: value for key, value in given.items() if value is not None}
     levelling = levelling_std_rad if levelling_std is None else levelling_std
     count = n_parameters if parameters is None else parameters
     _refuse_unused(
@@ -129,13 +164,38 @@ def calibrate(
         update=update,
         levelling_std_rad=levelling,
         n_parameters=count,
-        input_kind=None if input_kind == "averaged" else input_kind,
+        input_kind=None if input_kind == "averaged" and not wavelet else input_kind,
+        start=calibration,
+        radius_std_m=radius_std,
+        stretch_std_s2_rad2=stretch_std,
+        rate_table=on_table or None,
     )
-    if update is None and (turn_on_std is not None or bias_walk is not None):
+    if update is None and (bias_walk is not None or (turn_on_std is not None and calibration is None)):
         raise InputError("--turn-on-std and --bias-walk are of --update; give the calibration to carry over")
     drawing = None if array is None else as_array(array)
     local_gravity = _gravity(gravity, latitude, height)
     source = by_map(recording, column_map, map_set)
+    if on_table or "rate_table" in chosen.options:
+        if check is not None or picture is not None or drawing is not None or gravity is not None:
+            raise InputError(
+                "--array, --gravity, --check and --picture are of accelerometers; leave them out for a gyro"
+            )
+        task = CalibrationTask(
+            _references(source),
+            rest_threshold=rest_threshold,
+            min_rest_s=min_rest_s if min_rest is None else min_rest,
+            levelling_std_rad=levelling,
+            latitude_deg=latitude,
+            rate_table=RateTable(
+                tuple(_references(by_map(one, column_map, map_set)) for one in also),
+                tuple(filter(None, table_axes.split(","))) if isinstance(table_axes, str) else tuple(table_axes),
+                tuple(name_of(one) for one in (recording, *also)),
+            ),
+        )
+        result = run_calibration(chosen, task)
+        if out is not None:
+            result.save(out)
+        return result
     run = _uncalibrated(source, drawing)
     examine(run, drawing, source=name_of(recording), force=force)
     turned = None if motion is None else _uncalibrated(by_map(motion, column_map, map_set), drawing)
@@ -156,8 +216,12 @@ def calibrate(
         array=_own_array(source) if drawing is None and "array" in chosen.options else drawing,
         motion=turned,
         update=None if update is None else as_calibration(update),
+        start=None if calibration is None else as_calibration(calibration),
+        radius_std_m=radius_std,
+        stretch_std_s2_rad2=stretch_std,
         turn_on_std_m_s2=0.03 if turn_on_std is None else turn_on_std,
         bias_walk_m_s2_rt_s=bias_walk or 0.0,
+        wavelet=wavelet,
         progress=progress,
     )
     result = run_calibration(chosen, task)
@@ -197,6 +261,13 @@ def _uncalibrated(recording: Recording | str | Path | MappedFile, array: Acceler
     from gfimu.recording import Recording
 
     return recording if isinstance(recording, Recording) else open_uncalibrated(recording, array=array)
+
+
+def _references(recording: Recording | str | Path | MappedFile) -> Recording:
+    from gfimu.calibration.run_file import open_references
+    from gfimu.recording import Recording
+
+    return recording if isinstance(recording, Recording) else open_references(recording)
 
 
 def _own_array(recording: Recording | str | Path | MappedFile) -> AccelerometerArray:

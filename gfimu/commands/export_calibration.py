@@ -67,4 +67,7 @@ def _notes(calibration: Calibration) -> list[str]:
 
     made = f"gfimu calibration, method {calibration.method}, g = {calibration.gravity:.9g} m/s^2"
     frame = f"frame of the calibrated values: {GAUGES[calibration.gauge]}"
-    return [made, frame, *calibration.statements, *(f"warning: {text}" for text in calibration.warnings)]
+    bends = "".join(kind for kind in "qc" if any(name.split("_")[1] == kind for name in calibration.names))
+    lost = {"q": "quadratic coefficients q are", "c": "cubic coefficients c are", "qc": "coefficients q and c are"}
+    left_out = [f"non-linearity: the {lost[bends]} left out; M and b are those at zero input"] if bends else []
+    return [made, frame, *left_out, *calibration.statements, *(f"warning: {text}" for text in calibration.warnings)]

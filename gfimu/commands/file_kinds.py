@@ -20,6 +20,7 @@ FILE_KINDS = {
     "twin": "sim.twin_file.TwinFile",
     "scenario": "sim.scenario_file.ScenarioFile",
     "frame": "firmware_bridge.frames.format_file.FormatFile",
+    "stage": "gfimu.uncertainty.stage.Stage",
 }
 """Kinds of files by name, and the struct that is the schema of each."""
 
@@ -39,6 +40,7 @@ _MARKS = {
     "frame": "stream",
     "map": "channels",
     "scenario": "motion",
+    "stage": "stage",
     "twin": "array",
 }
 """A key by which each kind of file is known, the first kind that has it."""

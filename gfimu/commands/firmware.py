@@ -177,11 +177,12 @@ def _behind_port(
         line.close()
 
 
-@writes(reads=("image",), out=IMAGES)
+@writes(reads=("image", "array"), out=IMAGES)
 def build(
     image: str = "gfimu",
     *,
     out: str | Path | None = None,
+    array: str = "",
     baud: int | None = None,
     define: Mapping[str, str] | None = None,
 ) -> BuildReport:
@@ -193,6 +194,8 @@ def build(
         Image: gfimu or selfcheck.
     out : str or Path, optional
         Folder for the image, made if it isn't there; the package's own by default.
+    array : str
+        Name of the array on the board, which the board then states to the host (``GFIMU_ARRAY``); none by default.
     baud : int, optional
         Speed of the line after power-on, bits per second (``GFIMU_BOOT_BAUD``); 115,200 by default.
     define : mapping of str to str, optional
@@ -208,7 +211,7 @@ def build(
     from firmware_bridge.lpc1768.build import build as build_image
 
     speed = {} if baud is None else {"GFIMU_BOOT_BAUD": f"{baud}U"}
-    return build_image(image, out, defines={**speed, **(define or {})})
+    return build_image(image, out, array=array, defines={**speed, **(define or {})})
 
 
 def selftest() -> list[SelfTestRow]:
@@ -316,6 +319,8 @@ def _board(ride: Ride, image: str | Path, seed: int, *, pure_python: bool, trace
     from firmware_bridge.loop.board_process import BoardProcess
     from firmware_bridge.loop.physics import RidePhysics
     from firmware_bridge.loop.virtual_run import typical_chips
+    from gfimu.files.model_files import list_models
 
     fast = False if pure_python else None
-    return BoardProcess(RidePhysics(ride), image=image, chips=typical_chips(seed), fast=fast, trace=trace)
+    name = ride.array.name if ride.array.name in list_models("arrays") else ""  # a host knows no other by its name
+    return BoardProcess(RidePhysics(ride), image=image, chips=typical_chips(seed), fast=fast, trace=trace, array=name)

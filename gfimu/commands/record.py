@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gfimu.errors import InputError
+from gfimu.errors import InputError, RecordingWarning
 from gfimu.files.outputs import RECORDING, RERUN, writes
 
 if TYPE_CHECKING:
+    from firmware_bridge.frames.decoder import StreamCounts
     from firmware_bridge.frames.frame_format import FrameFormat
     from firmware_bridge.host.chip_selftest import AxisSelfTest
     from firmware_bridge.host.finder import Found
     from firmware_bridge.host.live import LiveView
-    from firmware_bridge.host.recorder import RecordReport
+    from firmware_bridge.host.mounting.fit import FirstSamples
+    from firmware_bridge.host.recorder import Batch, RecordReport
+    from gfimu.geometry.array import AccelerometerArray
+    from gfimu.integrity.fault import ChannelFault
 
 __all__ = ["record"]
 
@@ -42,6 +47,7 @@ def record(
     on_find: Callable[[Found], None] | None = None,
     on_try: Callable[[str], None] | None = None,
     on_self_test: Callable[[list[AxisSelfTest]], None] | None = None,
+    choose_array: Callable[[tuple[AccelerometerArray, ...]], str] | None = None,
     stop: Callable[[], bool] | None = None,
 ) -> RecordReport | None:
     """Record from a board, real or virtual, until the time is up, ``stop`` says so, or Ctrl-C.
@@ -68,8 +74,9 @@ def record(
         Frame format (``--format``): a key of `firmware_bridge.frames.frame_format.FORMATS`; else ``lpc1768``, or
         what is found. Klipper and phyphox send samples and have none.
     array : str
-        Array on the board; the format's by default. A board of the format ``lpc1768`` may have fewer chips than four:
-        then the array's chips are the first ones.
+        Array on the board (``--array``); by default the one that the board states, or the format's. A board of the
+        format ``lpc1768`` that states none is recorded without an array, with a `gfimu.errors.RecordingWarning` that
+        names the arrays that it may be. It may have fewer chips than four: then the array's chips are the first ones.
     baud : int, optional
         Bits per second. By default the speed at which the board is, raised if the sample rate needs more.
     reconnect : float, optional
@@ -91,13 +98,15 @@ def record(
         Are given each board that is found, and each port before it is tried.
     on_self_test : callable, optional
         Is given the results of the self-test, channel by channel.
+    choose_array : callable, optional
+        Is asked for the array, of those that may be on the board, if neither ``array`` nor the board states it.
     stop : callable, optional
         Asked often; True ends the recording.
 
     Returns
     -------
     RecordReport or None
-        None if nothing was to be recorded.
+        None if nothing was to be recorded. What the samples show against the array is a warning, too.
 
     Raises
     ------
@@ -106,8 +115,10 @@ def record(
         where it is asked for.
     """
     from firmware_bridge.frames.commands import set_range, set_rate
+    from firmware_bridge.host.mounting.fit import FirstSamples
     from firmware_bridge.host.recorder import record as record_port
     from firmware_bridge.sources.ports import has_own_samples, port_format
+    from gfimu.geometry.array import AccelerometerArray
 
     if (find or self_test) and has_own_samples(port):
         raise InputError(f"{port}: --find and --self-test are for boards that answer; leave them out")
@@ -129,22 +140,53 @@ def record(
     port = _needed(port)
     setup = [set_range(range_g)] if range_g is not None else []
     setup += [set_rate(rate)] if rate is not None else []
-    view = None
-    if on_text is not None or on_fault is not None or rrd is not None or live:
-        view = _live_view(port_format(port, form, array), array, (on_text, on_fault, on_note), rrd, live=live)
+    form_read = port_format(port, form, array)
+    samples = FirstSamples()
+    view = _LateView(form_read, (on_text, on_fault, on_note), rrd, live=live)
+    if array or not form_read.array_is_assumed:
+        view.open(AccelerometerArray.load(array or form_read.array))
+
+    def take(batch: Batch, counts: StreamCounts) -> None:
+        samples(batch, counts)
+        view(batch, counts)
+
     try:
         report = record_port(
             port, out, duration_s=duration, form=form, array=array, baud=baud, setup=tuple(setup),
-            reconnect_s=reconnect, on_batch=view, stop=stop,
+            reconnect_s=reconnect, on_batch=take, on_array=view.open, choose_array=choose_array, stop=stop,
         )  # fmt: skip
     except BaseException:
-        if view is not None:
-            view.close(keep=False)
+        view.close(keep=False)
         raise
-    if view is None:
-        return report
     view.close()
+    _warn_of_array(report, samples, form_read, array)
     return replace(report, faults=tuple(entry for fault in view.faults for entry in fault.entries()))
+
+
+def _warn_of_array(report: RecordReport, samples: FirstSamples, form: FrameFormat, array: str) -> None:
+    """Warn where the array of a recording is open, or contradicted by the board or by what it sent."""
+    from firmware_bridge.host.mounting.fit import open_array_text, other_array_text
+    from firmware_bridge.host.mounting.on_board import candidate_arrays
+    from gfimu.geometry.array import AccelerometerArray
+
+    if not report.array:
+        texts = [open_array_text(candidate_arrays(form), samples, _count_size(form, None), str(report.path))]
+    else:
+        carried = AccelerometerArray.load(array or report.array)
+        texts = [other_array_text(report.board_array, carried)]
+        texts += [one.text for one in samples.findings(carried, _count_size(form, carried))]
+    for text in texts:
+        if text:
+            warnings.warn(f"{report.path}: {text}", RecordingWarning, stacklevel=3)
+
+
+def _count_size(form: FrameFormat, array: AccelerometerArray | None) -> float:
+    """Size of a count, m/s²."""
+    from gfimu.geometry.array import AccelerometerArray
+    from gfimu.parts.part import Part
+
+    carried = AccelerometerArray.load(form.array) if array is None else array
+    return form.count_m_s2 or Part.load(carried.chips[0].part, carried.part_files).lsb
 
 
 def _needed(port: str) -> str:
@@ -172,30 +214,63 @@ def _found(
     return boards[0]
 
 
-def _live_view(
-    form: FrameFormat,
-    array: str,
-    say: tuple[Callable[[str], None] | None, Callable[[str], None] | None, Callable[[str], None] | None],
-    rrd: str | Path | None,
-    *,
-    live: bool,
-) -> LiveView:
-    from firmware_bridge.host.live import LiveView
-    from gfimu.geometry.array import AccelerometerArray
-    from gfimu.parts.part import Part
+class _LateView:
+    """The live view of a recording, opened when its array is settled; without one no rate is shown."""
 
-    carried = AccelerometerArray.load(array or form.array)
-    lsb = form.count_m_s2 or Part.load(carried.chips[0].part, carried.part_files).lsb
-    picture = None
-    if rrd is not None or live:
-        from gfimu.files.rerun_stream import quiet_sdk
+    def __init__(
+        self,
+        form: FrameFormat,
+        say: tuple[Callable[[str], None] | None, Callable[[str], None] | None, Callable[[str], None] | None],
+        rrd: str | Path | None,
+        *,
+        live: bool,
+    ) -> None:
+        self._form, self._say, self._rrd, self._live = form, say, rrd, live
+        self._view: LiveView | None = None
+        self._opened = False
+        if live:
+            from gfimu.files.rerun_stream import check_display
 
-        quiet_sdk()
-        from gfimu.visual.live import LivePicture
+            check_display()
 
-        picture = LivePicture(carried)
-    on_text, on_fault, on_note = say
-    return LiveView(
-        carried, lsb, on_text=on_text, on_fault=on_fault, on_note=on_note, rrd=None if rrd is None else Path(rrd),
-        viewer=live, picture=picture,
-    )  # fmt: skip
+    def open(self, array: AccelerometerArray | None) -> None:
+        """Open the view of an array; raises `InputError` if a picture is asked for and the array is not known."""
+        on_text, on_fault, on_note = self._say
+        has_picture = self._live or self._rrd is not None
+        if self._opened or not (has_picture or on_text is not None or on_fault is not None):
+            return
+        self._opened = True
+        if array is None:
+            if has_picture:
+                raise InputError(
+                    "--live and --rrd draw the array, which the board does not state; give it with --array"
+                )
+            return
+        picture = None
+        if has_picture:
+            from gfimu.files.rerun_stream import quiet_sdk
+
+            quiet_sdk()
+            from gfimu.visual.live import LivePicture
+
+            picture = LivePicture(array)
+        from firmware_bridge.host.live import LiveView
+
+        self._view = LiveView(
+            array, _count_size(self._form, array), on_text=on_text, on_fault=on_fault, on_note=on_note,
+            rrd=None if self._rrd is None else Path(self._rrd), viewer=self._live, picture=picture,
+        )  # fmt: skip
+
+    def __call__(self, batch: Batch, counts: StreamCounts) -> None:
+        if self._view is not None:
+            self._view(batch, counts)
+
+    def close(self, *, keep: bool = True) -> None:
+        """Close the view."""
+        if self._view is not None:
+            self._view.close(keep=keep)
+
+    @property
+    def faults(self) -> tuple[ChannelFault, ...]:
+        """Faults of channels that were seen."""
+        return () if self._view is None else self._view.faults

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray, Chip
 from gfimu.recording import Recording
+from gfimu.recording.reference_times import reference_on_rows
 from gfimu.units import GYRO_COLUMNS
 
 __all__ = ["ChipStream", "chips_of", "stamps_ns"]
@@ -46,6 +47,7 @@ def chips_of(recording: Recording) -> Iterator[ChipStream]:
     array = recording.array
     chips = array.chips if array is not None else _guessed(recording)
     gyro = None
+    recording = reference_on_rows(recording)  # a message has one time
     if all(name in recording.reference for name in GYRO_COLUMNS):
         gyro = np.column_stack([recording.reference[name] for name in GYRO_COLUMNS])
     for chip in chips:

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 __all__ = [
     "LOOPBACK",
     "WEB_VIEWER",
+    "check_display",
     "has_display",
     "quiet_sdk",
     "rrd_stream",
@@ -98,6 +99,15 @@ def viewer_command(*arguments: str | Path) -> list[str]:
     return [sys.executable, "-m", "rerun", "--bind", LOOPBACK, *map(str, arguments)]
 
 
+def check_display() -> None:
+    """Raise `GfimuError` where a viewer neither runs nor could show anything; the message says what to do instead."""
+    if not (viewer_listens() or has_display()):
+        raise GfimuError(
+            f"no display here for the rerun viewer; run `{WEB_VIEWER}` first and open the address it prints in a "
+            "browser, or write a file with --rrd and look at it later"
+        )
+
+
 def viewer_stream(application: str) -> Any:
     """Return a stream to a viewer on this machine; one is started unless one listens already.
 
@@ -108,12 +118,8 @@ def viewer_stream(application: str) -> Any:
     """
     import rerun as rr
 
+    check_display()
     if not viewer_listens():
-        if not has_display():
-            raise GfimuError(
-                f"no display here for the rerun viewer; run `{WEB_VIEWER}` first and open the address it prints in a "
-                "browser, or write a file with --rrd and look at it later"
-            )
         viewer = subprocess.Popen(
             viewer_command("--port", str(_PORT), "--expect-data-soon"),
             stdout=subprocess.DEVNULL,

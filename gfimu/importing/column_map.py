@@ -53,6 +53,18 @@ class ColumnSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     ] = 1.0
     offset: Annotated[float, _Meta(description="Number at zero.")] = 0.0
     table: Annotated[str, _Meta(description="Table of the file; by default that of the channels.")] = ""
+    time: Annotated[
+        _Column | None, _Meta(description="Column of its own times, in the unit of the map's, where it has such.")
+    ] = None
+    rate_hz: Annotated[
+        Annotated[float, _Meta(gt=0)] | None,
+        _Meta(description="Its own sample rate, Hz, from the first row on, where it has no times."),
+    ] = None
+
+    @property
+    def has_own_times(self) -> bool:
+        """Whether it has a column of times or a sample rate of its own."""
+        return self.time is not None or self.rate_hz is not None
 
 
 class TimeSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -145,6 +157,9 @@ class ColumnMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             factor_of(spec.unit, "acceleration", where=f"{source}: channel {name}")
             if not name[-1:].isdigit():
                 raise InputError(f"{source}: channel {name!r} does not end in the number of its axis; name it as a11")
+        for name, spec in {**self.channels, **self.reference}.items():
+            if spec.time is not None and spec.rate_hz is not None:
+                raise InputError(f"{source}: {name} has both a time and rate_hz of its own; keep one")
         for name, spec in self.reference.items():
             if name not in REFERENCE_KINDS:
                 raise InputError(f"{source}: unknown reference {name!r}; valid: {', '.join(REFERENCE_KINDS)}")
@@ -178,7 +193,7 @@ class ColumnMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
                 short[group][key] = {
                     item: value
                     for item, value in spec.items()
-                    if item in {"column", "unit"} or value not in (1.0, 0.0, "")
+                    if item in {"column", "unit"} or value not in (1.0, 0.0, "", None)
                 }
         for group in ("time", "text"):
             if group in short:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,15 +12,18 @@ from numpy.typing import NDArray
 
 from gfimu.errors import InputError
 from gfimu.importing.clock import Times, times_of
-from gfimu.importing.column_map import REFERENCE_KINDS, ColumnMap, ColumnSpec
+from gfimu.importing.column_map import REFERENCE_KINDS, ColumnMap, ColumnSpec, TimeSpec
 from gfimu.importing.notation import factor_of
 from gfimu.importing.raw_table import RawFile, RawTable
 from gfimu.importing.recognise import fitting_maps
 from gfimu.importing.splitting import split_file
+from gfimu.units import TIME_COLUMNS
 
-__all__ = ["Piece", "at_times", "merged_piece", "piece_of"]
+__all__ = ["Piece", "at_times", "combined_file", "merged_piece", "nearest_rows", "piece_of"]
 
 _GAP = 1.5  # sample periods, from which values are not interpolated
+_SLOWER = 1.5  # sample periods of the channels, between the values of a reference that keeps its own times
+_NEAR = 0.75  # sample periods, up to which a value belongs to a row
 
 
 @dataclass(frozen=True)
@@ -34,21 +38,31 @@ class Piece:
 
 
 def piece_of(raw: RawFile, chosen: ColumnMap) -> Piece:
-    """Return the columns of one file in SI units, those of other tables of it at the times of the first."""
+    """Return the columns of one file in SI units on the times of its channels.
+
+    A reference that comes less often than the channels keeps its own times (see `nearest_rows`). Other columns of
+    another table or with times of their own are interpolated, with a note.
+    """
     if chosen.split_by:
-        raw = split_file(raw, chosen.split_by, raw.source)
-    table = _without_first(_table(raw, chosen), chosen.skip_rows, raw.source)
+        raw = split_file(raw, chosen.split_by, raw.source, wanted=_tables_named(chosen))
+    whole = table = _without_first(_table(raw, chosen), chosen.skip_rows, raw.source)
+    specs = {**chosen.channels, **chosen.reference}
+    if any(spec.has_own_times for spec in specs.values()):
+        table = _filled(table, chosen.time.column, [spec.column for spec in chosen.channels.values()])
     times = times_of(table, chosen.time, raw.source, drop=chosen.drop)
     if not len(times.t_s):
         raise InputError(f"{raw.source}: no samples; record again or give another file")
     notes = [*table.notes, *times.notes]
-    others: dict[str, Times] = {}
+    others: dict[tuple[str, object, float | None], tuple[RawTable, Times]] = {}
     columns: dict[str, NDArray[np.float64]] = {}
     used = {table.find(chosen.time.column)} if chosen.time.column is not None else set()
-    for name, spec in {**chosen.channels, **chosen.reference}.items():
+    used |= {table.find(spec.time) for spec in specs.values() if spec.time is not None}
+    interpolated: dict[str, list[str]] = {}
+    for name, spec in specs.items():
         kind = "acceleration" if name in chosen.channels else REFERENCE_KINDS[name]
         required = name in chosen.channels and chosen.is_required(name)
         if spec.table and not raw.has(spec.table) and not required:
+            notes += [f"{raw.source}: no table {spec.table!r}, so no {name}"] if chosen.is_required(name) else []
             continue
         other = raw.table(spec.table) if spec.table else table
         column = other.find(spec.column)
@@ -56,19 +70,25 @@ def piece_of(raw: RawFile, chosen: ColumnMap) -> Piece:
             raise InputError(f"{raw.source}: table {spec.table!r} has no column {_shown(spec.column)} for {name}")
         if column is None:
             continue
-        values = _values(other, column, spec, kind, chosen)
         if other.name == table.name:
             used.add(column)
-            columns[name] = values[times.rows]
+        if other.name == table.name and not spec.has_own_times:
+            columns[name] = _values(table, column, spec, kind, chosen)[times.rows]
             continue
-        if other.name not in others:
-            others[other.name] = times_of(other, chosen.time, raw.source, drop=chosen.drop)
-            notes += [note for note in others[other.name].notes if note not in notes]
-        theirs = others[other.name]
-        columns[name] = at_times(times.t_s + (times.origin_s - theirs.origin_s), theirs.t_s, values[theirs.rows])
+        key = (other.name, spec.time, spec.rate_hz)
+        if key not in others:
+            others[key] = _own_times(whole if other is table else other, column, spec, chosen, raw.source)
+            notes += [note for note in others[key][1].notes if note not in notes]
+        rows, theirs = others[key]
+        values = _values(rows, column, spec, kind, chosen)[theirs.rows]
+        t = theirs.t_s + (theirs.origin_s - times.origin_s)
+        if name in TIME_COLUMNS and name in chosen.reference and _is_slower(t, times.t_s):
+            columns[name], columns[TIME_COLUMNS[name]] = nearest_rows(times.t_s, t, values)
+        else:
+            columns[name] = at_times(times.t_s, t, values)
+            interpolated.setdefault(other.name if other.name != table.name else "", []).append(name)
     channels = {name: columns[name] for name in chosen.channels if name in columns}
-    if any(spec.table and spec.table != table.name for spec in chosen.channels.values()):
-        notes.append(f"{raw.source}: chips of other tables are interpolated to the sample times of {table.name!r}")
+    notes += _interpolation_notes(raw.source, table.name, interpolated)
     silent = _before_the_first(channels)
     if silent:
         notes.append(f"{raw.source}: every channel reads zero up to row {silent}, which counts as missing")
@@ -79,9 +99,106 @@ def piece_of(raw: RawFile, chosen: ColumnMap) -> Piece:
         raw.source,
         replace(times, notes=tuple(notes)),
         channels,
-        {name: columns[name] for name in chosen.reference if name in columns},
+        {name: values for name, values in columns.items() if name not in chosen.channels},
         {name: values[times.rows] for name, values in rest.items()},
     )
+
+
+def combined_file(files: Sequence[RawFile], chosen: ColumnMap) -> RawFile | None:
+    """Return one file with the tables of several, named by file, where the map names all but the first; None else."""
+    named = _tables_named(chosen)
+    names = [Path(one.source).name for one in files]
+    if len(files) < 2 or not all(any(name.endswith(one) for one in named) for name in names[1:]):
+        return None
+    tables = {
+        name if len(one.tables) == 1 else f"{key} of {name}": replace(table, name=name)
+        for name, one in zip(names, files, strict=True)
+        for key, table in one.tables.items()
+    }
+    return RawFile(files[0].source, files[0].format, {key: replace(table, name=key) for key, table in tables.items()})
+
+
+def _tables_named(chosen: ColumnMap) -> set[str]:
+    """Return the tables that the map names."""
+    specs = (*chosen.channels.values(), *chosen.reference.values())
+    return {one for one in (chosen.table, *(spec.table for spec in specs)) if one}
+
+
+def _own_times(
+    table: RawTable, column: str, spec: ColumnSpec, chosen: ColumnMap, source: str
+) -> tuple[RawTable, Times]:
+    """Return the rows of a table that a column with its own times, or of another table, has, and their times."""
+    if not spec.has_own_times:
+        return table, times_of(table, chosen.time, source, drop=chosen.drop)
+    table = _filled(table, spec.time, [column])
+    own = TimeSpec(
+        column=spec.time, unit=chosen.time.unit, scale=chosen.time.scale, rate_hz=spec.rate_hz, wrap=chosen.time.wrap
+    )
+    return table, times_of(table, own, source, drop=chosen.drop)
+
+
+def _filled(
+    table: RawTable,
+    time: str | int | tuple[str | int, ...] | None,
+    columns: Sequence[str | int | tuple[str | int, ...]],
+) -> RawTable:
+    """Return the rows of a table that have a time, or, without times, those up to the last one with a value."""
+    if time is not None:
+        name = table.find(time)
+        if name is None:
+            return table
+        values = table.columns[name]
+        kept = np.array([one not in (None, "") for one in values]) if values.dtype == object else ~np.isnan(values)
+    else:
+        names = [name for one in columns if (name := table.find(one)) is not None]
+        known = np.any([np.isfinite(table.numbers(name)) for name in names], axis=0)
+        kept = np.arange(len(table)) <= np.max(np.flatnonzero(known), initial=-1)
+    return replace(table, columns={name: values[kept] for name, values in table.columns.items()})
+
+
+def _is_slower(t: NDArray[np.float64], channels: NDArray[np.float64]) -> bool:
+    """Whether values at times (k,) come less often than the channels, at times (n,)."""
+    if len(t) < 2 or len(channels) < 2:
+        return True
+    return float(np.median(np.diff(t))) > _SLOWER * float(np.median(np.diff(channels)))
+
+
+def _interpolation_notes(source: str, table: str, interpolated: Mapping[str, Sequence[str]]) -> list[str]:
+    """Say which columns were interpolated, by the table that they come from; empty for the channels' own."""
+    where = f" of {table!r}" if table else ""
+    return [
+        f"{source}: {', '.join(names)}{f' of table {name!r}' if name else ''} interpolated to the sample times{where}"
+        for name, names in interpolated.items()
+    ]
+
+
+def nearest_rows(
+    t: NDArray[np.float64], times: NDArray[np.float64], values: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Put values at times of their own into the nearest rows of a recording.
+
+    Parameters
+    ----------
+    t : ndarray, shape (n,)
+        Times of the rows, s.
+    times, values : ndarray, shape (m,)
+        Times, s, and values; NaN where there is none.
+
+    Returns
+    -------
+    values, times : ndarray, shape (n,)
+        Value of each row, and when it was read, s: of several to a row their means, NaN in rows without one and for
+        values more than three quarters of a sample period from every row.
+    """
+    nearest = np.clip(np.searchsorted(t, times), 1, len(t) - 1)
+    nearest = nearest - (times - t[nearest - 1] < t[nearest] - times)
+    known = (np.abs(t[nearest] - times) <= _NEAR * float(np.median(np.diff(t)))) & np.isfinite(values)
+    rows, place = np.unique(nearest[known], return_inverse=True)
+    count = np.bincount(place, minlength=len(rows))
+    found, read = np.full(len(t), np.nan), np.full(len(t), np.nan)
+    found[rows] = np.bincount(place, values[known], minlength=len(rows)) / count
+    read[rows] = np.bincount(place, times[known], minlength=len(rows)) / count
+    return found, read
 
 
 def _without_first(table: RawTable, rows: int, source: str) -> RawTable:

@@ -1,8 +1,9 @@
-"""Tables in which a column names the chip of each row (long format), as one table per chip."""
+"""Tables in which a column names the chip or sensor of each row (long format), as one table for each."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Collection
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +21,10 @@ _NAMES = re.compile(
 )
 
 
-def split_file(raw: RawFile, column: str | int, source: str) -> RawFile:
+def split_file(raw: RawFile, column: str | int, source: str, *, wanted: Collection[str] = ()) -> RawFile:
     """Return a file with a table for each value of a column, named ``sensor=1``.
+
+    Values in few rows are taken for mistakes, but those of the tables ``wanted``.
 
     Raises
     ------
@@ -33,7 +36,7 @@ def split_file(raw: RawFile, column: str | int, source: str) -> RawFile:
         name = table.find(column)
         if name is None:
             continue
-        values, places = _values(table, name)
+        values, places = _values(table, name, wanted)
         if len(values) > _MOST_CHIPS:
             raise InputError(
                 f"{source}: split_by = {column!r} would make {len(values)} tables; give the column that names the chip"
@@ -76,11 +79,15 @@ def find_split(table: RawTable, times: str | None) -> str | None:
     return None
 
 
-def _values(table: RawTable, name: str) -> tuple[list[str], NDArray[np.int64]]:
-    """Return the values of a column in their order, and which one each row has; -1 for rare and empty ones."""
+def _values(table: RawTable, name: str, wanted: Collection[str] = ()) -> tuple[list[str], NDArray[np.int64]]:
+    """Return the values of a column in their order, and which one each row has; -1 for rare and empty ones.
+
+    Rare ones of tables that are ``wanted`` stay.
+    """
     texts = np.array(["" if value is None else str(value).strip()[:80] for value in table.columns[name].tolist()])
     values, places, counts = np.unique(texts, return_inverse=True, return_counts=True)
-    usual = (counts >= _LEAST_SHARE * counts.max()) & (values != "")
+    named = np.array([any(f"{name}={value}".lower().endswith(one.lower()) for one in wanted) for value in values])
+    usual = ((counts >= _LEAST_SHARE * counts.max()) | named) & (values != "")
     order = [place for place in range(len(values)) if usual[place]]
     if all(re.fullmatch(r"-?\d+", values[place]) for place in order):
         order.sort(key=lambda place: int(values[place]))

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from gfimu.errors import InputError
+from gfimu.importing.piece import nearest_rows
 from gfimu.joining.alignment import align
 from gfimu.joining.reference_file import ReferenceSeries
 from gfimu.joining.signals import Alignment, Signals, functions_of, uniform
@@ -258,20 +259,11 @@ def _joined(
     recording: Recording, reference: ReferenceSeries, found: Alignment, theirs: NDArray[np.float64]
 ) -> Recording:
     """Return the recording with the reference, read at ``theirs`` (m,), s, in the nearest rows, and its times."""
-    t = recording.t_s
-    nearest = np.clip(np.searchsorted(t, theirs), 1, len(t) - 1)
-    nearest = nearest - (theirs - t[nearest - 1] < t[nearest] - theirs)
-    near = np.abs(t[nearest] - theirs) <= 0.75 * recording.sample_period
     columns = dict(recording.reference)
     for name, values in reference.columns.items():
-        known = near & np.isfinite(values)
-        rows, place = np.unique(nearest[known], return_inverse=True)
-        count = np.bincount(place)
-        # Of a reference that is faster than the channels a row has the mean, at the mean time.
-        for column, series in ((name, values), (TIME_COLUMNS.get(name), theirs)):
-            if column is not None:
-                columns[column] = np.full(len(t), np.nan)
-                columns[column][rows] = np.bincount(place, series[known]) / count
+        columns[name], read = nearest_rows(recording.t_s, theirs, values)
+        if name in TIME_COLUMNS:
+            columns[TIME_COLUMNS[name]] = read
     facts = {
         "reference_offset_s": found.offset,
         "reference_offset_std_s": found.offset_std,

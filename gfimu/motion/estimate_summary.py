@@ -17,8 +17,10 @@ from gfimu.geometry.observability import unseen_motions
 from gfimu.motion.earth import EarthRotation
 from gfimu.motion.equivalent_errors import equivalent_p_bias, equivalent_rate_drift
 from gfimu.motion.estimation import Estimate
+from gfimu.motion.rest_bias import ForceAtRest, force_at_rest
 from gfimu.recording import Recording
 from gfimu.short_repr import short_repr
+from gfimu.units import STANDARD_GRAVITY
 
 __all__ = ["Agreement", "EstimateSummary", "PositionSummary", "centripetal_agreement", "summarise"]
 
@@ -103,6 +105,8 @@ class EstimateSummary:
         About a known axis: constants of the mounting that were estimated (`gfimu.known_axis.mounting_fit`).
     position : PositionSummary or None
         Where navigation ends, where the position was asked for.
+    at_rest : ForceAtRest or None
+        Mean of p at the first rest less gravity, from the readings as recorded (calibrated where that was asked for).
     health : mapping or None
         Faults of channels that were found and left out (`gfimu.integrity.fault.ChannelHealth`), where it was looked.
     faults : tuple of mapping
@@ -134,6 +138,7 @@ class EstimateSummary:
     consistency: Mapping[str, Any] | None = None
     mounting: Mapping[str, Any] | None = None
     position: PositionSummary | None = None
+    at_rest: ForceAtRest | None = None
     health: Mapping[str, Any] | None = None
     faults: tuple[Mapping[str, Any], ...] = ()
     channels_left_out: tuple[str, ...] = ()
@@ -188,6 +193,12 @@ def summarise(estimate: Estimate, recording: Recording, array: AccelerometerArra
         consistency=consistency,
         mounting=estimate.metadata.get("mounting"),
         position=_position(estimate),
+        at_rest=force_at_rest(
+            recording,
+            array,
+            gravity=float(estimate.metadata.get("gravity_m_s2", STANDARD_GRAVITY)),
+            without=estimate.metadata.get("channels_left_out", ()),
+        ),
         health=estimate.metadata.get("health"),
         faults=tuple(estimate.metadata.get("faults", ())),
         channels_left_out=tuple(estimate.metadata.get("channels_left_out", ())),

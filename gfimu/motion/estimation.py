@@ -343,6 +343,7 @@ def estimate(
             "faults": [entry for fault in used.faults(array) for entry in fault.entries()],
             "channels_left_out": dead,
             **({} if earth is None else earth.to_dict()),
+            "gravity_m_s2": gravity,
             "mounting_rotvec_rad": recording.mounting_rotvec.tolist(),
             "format_version": FORMAT_VERSION,
             "software_version": __version__,

@@ -3,6 +3,8 @@
 While nothing moves, each channel should read its share of gravity; what it reads beyond that is taken as its bias.
 Levelling is assumed: a tilt of the table goes into the biases. What is left afterwards is the noise of the average,
 and it grows into the rate with time; `RestBias.rate_std` says how much.
+
+`force_at_rest` is the paper's Table 1 itself: what p of the whole array reads beyond gravity.
 """
 
 from __future__ import annotations
@@ -23,11 +25,11 @@ from gfimu.parts.limits import PartLimits
 from gfimu.rate.registry import rate_method
 from gfimu.recording import Recording
 from gfimu.recording.checks import Finding, check_recording, refuse_or_warn, without_dead_channels
-from gfimu.recording.rest import detect_rest
+from gfimu.recording.rest import Rest, detect_rest, mean_variance_factor
 from gfimu.short_repr import short_repr
 from gfimu.units import STANDARD_GRAVITY
 
-__all__ = ["RestBias", "estimate_from_rest", "rest_bias"]
+__all__ = ["ForceAtRest", "RestBias", "estimate_from_rest", "force_at_rest", "rest_bias"]
 
 _MILLI_G = STANDARD_GRAVITY / 1000.0
 
@@ -94,6 +96,96 @@ class RestBias:
         return (Finding("rest_bias", text, True, (self.array.channels[worst],)),)
 
 
+@dataclass(frozen=True)
+class ForceAtRest:
+    """Specific force p of the body origin at rest, less gravity: Table 1 of the GF-IMU paper.
+
+    Parameters
+    ----------
+    start_s, stop_s : float
+        The stretch of rest, s.
+    bias_mg : ndarray, shape (3,)
+        Mean of p less gravity, body axes, mg: the equivalent biases of p, if the unit stands level.
+    std_mg : ndarray, shape (3,)
+        Standard uncertainty of that mean by the noise of the stretch, mg.
+    lean_rad : float
+        Angle between p and the upright of the recording's mounting, rad: the lean that would make the part of
+        ``bias_mg`` across the upright.
+    magnitude_mg, magnitude_std_mg : float
+        |p| less gravity, which no lean makes, and its standard uncertainty, mg.
+    """
+
+    start_s: float
+    stop_s: float
+    bias_mg: NDArray[np.float64]
+    std_mg: NDArray[np.float64]
+    lean_rad: float
+    magnitude_mg: float
+    magnitude_std_mg: float
+
+    __repr__ = short_repr
+
+
+def force_at_rest(
+    recording: Recording,
+    array: AccelerometerArray,
+    *,
+    gravity: float = STANDARD_GRAVITY,
+    without: Collection[str] = (),
+) -> ForceAtRest | None:
+    """Average p over the first rest of a recording and take gravity off (GF-IMU paper, Table 1).
+
+    Parameters
+    ----------
+    recording : Recording
+        Readings in m/s², with their biases; the recording's mounting says how the unit lay.
+    array : AccelerometerArray
+        Geometry of the channels.
+    gravity : float
+        Local gravity, m/s².
+    without : collection of str
+        Channels to leave out.
+
+    Returns
+    -------
+    ForceAtRest or None
+        None where nothing rests for a second, or the channels don't see p.
+
+    Notes
+    -----
+    p = S a with S the left inverse of the regression matrix (paper, eq. 22). Noise that is correlated over the stretch
+    raises the uncertainty (`gfimu.recording.rest.mean_variance_factor`); errors that last longer than it do not show.
+    """
+    used = np.array([name not in without for name in array.channels])
+    regression = array.regression_matrix[used]  # (c, 6)
+    if np.linalg.matrix_rank(regression) < 6:
+        return None
+    try:
+        rest = _first_rest(recording, array, used)
+    except InputError:
+        return None
+    rows = slice(int(rest.start[0]), int(rest.stop[0]))
+    readings = recording.for_array(array)[rows][:, used]  # (n, c)
+    readings = readings[np.isfinite(readings).all(axis=1)]
+    if len(readings) < 2:
+        return None
+    p = readings @ np.linalg.pinv(regression)[3:].T  # (n, 3)
+    covariance = np.cov(p, rowvar=False) * (mean_variance_factor([p]) / len(p))  # of the mean
+    mean = p.mean(axis=0)
+    up = _upright(recording)
+    direction = mean / np.linalg.norm(mean)
+    t = recording.t_s[rows]
+    return ForceAtRest(
+        float(t[0]),
+        float(t[-1]),
+        (mean - gravity * up) / _MILLI_G,
+        np.sqrt(np.diag(covariance)) / _MILLI_G,
+        float(np.arctan2(np.linalg.norm(np.cross(up, mean)), up @ mean)),
+        float(np.linalg.norm(mean) - gravity) / _MILLI_G,
+        float(np.sqrt(direction @ covariance @ direction)) / _MILLI_G,
+    )
+
+
 def rest_bias(
     recording: Recording,
     array: AccelerometerArray,
@@ -127,18 +219,11 @@ def rest_bias(
     silent = used & ~np.isfinite(readings).any(axis=0)
     if silent.any():
         raise InputError(f"channel {array.channels[int(np.argmax(silent))]} has no readings; check its wiring")
-    names = tuple(name for name, kept in zip(array.channels, used, strict=True) if kept)
-    seen = recording if used.all() else replace(recording, readings=readings[:, used], channels=names)
-    rest = detect_rest(seen, min_duration_s=min_duration_s)
-    if len(rest) == 0:
-        raise InputError(
-            f"no rest of {min_duration_s:g} s in the recording to read biases off; record one, or calibrate first"
-        )
+    rest = _first_rest(recording, array, used, min_duration_s)
     rows = slice(int(rest.start[0]), int(rest.stop[0]))
     readings = np.where(used, readings[rows], 0.0)
     count = np.isfinite(readings).sum(axis=0)  # the rest was found with at least half of every window there
-    up = Rotation.from_rotvec(recording.mounting_rotvec).inv().apply([0.0, 0.0, gravity])
-    expected = specific_force(array, up, np.zeros(3), np.zeros(3))[0]  # (c,)
+    expected = specific_force(array, gravity * _upright(recording), np.zeros(3), np.zeros(3))[0]  # (c,)
     t = recording.t_s[rows]
     return RestBias(
         array,
@@ -147,6 +232,26 @@ def rest_bias(
         float(t[0]),
         float(t[-1]),
     )
+
+
+def _first_rest(
+    recording: Recording, array: AccelerometerArray, used: NDArray[np.bool_], min_duration_s: float = 1.0
+) -> Rest:
+    """Return the stretches of rest by the channels used, shape (c,); raises `InputError` if there is none."""
+    names = tuple(name for name, kept in zip(array.channels, used, strict=True) if kept)
+    readings = recording.for_array(array)
+    seen = recording if used.all() else replace(recording, readings=readings[:, used], channels=names)
+    rest = detect_rest(seen, min_duration_s=min_duration_s)
+    if len(rest) == 0:
+        raise InputError(
+            f"no rest of {min_duration_s:g} s in the recording to read biases off; record one, or calibrate first"
+        )
+    return rest
+
+
+def _upright(recording: Recording) -> NDArray[np.float64]:
+    """Return the world's up in the body axes of the recording's mounting, shape (3,)."""
+    return np.asarray(Rotation.from_rotvec(recording.mounting_rotvec).inv().apply([0.0, 0.0, 1.0]))
 
 
 def estimate_from_rest(

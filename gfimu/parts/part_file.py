@@ -99,6 +99,17 @@ class PartFile(Table, frozen=True, forbid_unknown_fields=False):
     nonlinearity_full_scale: Annotated[
         NotNegative, about("Typical deviation from a straight line at full scale, relative to full scale.")
     ] = 0.0
+    temperature_lsb_K: Annotated[
+        float | None,
+        about(
+            "Size of a count of the chip's own temperature reading; negative where it falls as the chip warms up.",
+            "K",
+            default="no such reading",
+        ),
+    ] = None
+    temperature_zero_degC: Annotated[
+        float | None, about("Temperature at which that reading is zero.", "°C", default="no such reading")
+    ] = None
     output_data_rate_max_hz: Annotated[Positive, about("Highest output data rate.", "Hz")] = 3200.0
     output_data_rate_min_hz: Annotated[
         NotNegative,

@@ -54,7 +54,11 @@ class _Column:
 
 
 def read_recording_file(
-    path: str | Path | ArrowStream | ColumnFile, array: AccelerometerArray | None, unit: str
+    path: str | Path | ArrowStream | ColumnFile,
+    array: AccelerometerArray | None,
+    unit: str,
+    *,
+    needs_channels: bool = True,
 ) -> RecordingContent:
     """Read a CSV or Parquet file block by block, or a table object, into arrays of its final size.
 
@@ -66,6 +70,8 @@ def read_recording_file(
         The array whose channels must be there; None takes every channel found.
     unit : {"m_s2", "lsb"}
         Unit of the readings in memory.
+    needs_channels : bool
+        Refuse a file of references alone.
 
     Raises
     ------
@@ -79,7 +85,7 @@ def read_recording_file(
         _refuse_other_time_unit(table)
         raise InputError(f"{table.file}: column t_s is missing; every recording needs the sample time in seconds")
     references = _reference_columns(table)
-    channels = _channel_columns(table, array, _own_array(table), unit)
+    channels = _channel_columns(table, array, _own_array(table), unit, needs_channels=needs_channels)
     known = {"t_s", *(column.source for column in (*channels, *references))}
 
     time = np.empty(table.max_rows)
@@ -168,7 +174,12 @@ def _own_array(table: ColumnFile) -> AccelerometerArray | None:
 
 
 def _channel_columns(
-    table: ColumnFile, array: AccelerometerArray | None, own: AccelerometerArray | None, unit: str
+    table: ColumnFile,
+    array: AccelerometerArray | None,
+    own: AccelerometerArray | None,
+    unit: str,
+    *,
+    needs_channels: bool,
 ) -> list[_Column]:
     """Find the columns of the channels; an unknown unit, two units of one channel or a missing one is an error."""
     found: dict[str, tuple[str, str]] = {}
@@ -188,6 +199,8 @@ def _channel_columns(
         found[channel] = (name, suffix)
     wanted = tuple(found) if array is None else array.channels
     missing = [f"{channel}_m_s2" for channel in wanted if channel not in found]
+    if not wanted and not needs_channels:
+        return []
     if not wanted:
         raise InputError(f"{table.file}: no column holds a reading; name them a11_m_s2 … (or _g, _mg, _lsb)")
     if missing:

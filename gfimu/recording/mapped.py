@@ -18,7 +18,7 @@ from gfimu.files.table import ArrowStream, schema_metadata
 from gfimu.files.table_columns import TableColumns
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.importing.column_map import ColumnMap, load_map
-from gfimu.importing.piece import Piece, merged_piece, piece_of
+from gfimu.importing.piece import Piece, combined_file, merged_piece, piece_of
 from gfimu.importing.raw_table import RawFile, RawTable
 from gfimu.importing.readers import read_foreign
 from gfimu.importing.readers.tables import arrow_table
@@ -77,7 +77,8 @@ def mapped_recording(
     ----------
     source : str, Path, table, or sequence of paths
         A file of any format of `gfimu.importing.readers`, a table of pandas, polars or pyarrow, or one file per chip
-        on a common clock: the later ones are interpolated to the times of the first.
+        on a common clock: the later ones are interpolated to the times of the first. Or one file per sensor, where the
+        map names the later ones as tables.
     column_map : ColumnMap, str or Path
         The map, its name, or its TOML file.
     array : AccelerometerArray, optional
@@ -94,18 +95,18 @@ def mapped_recording(
         return filtered_recording(source, chosen, array=array)  # type: ignore[arg-type]
     if not chosen.channels:
         raise InputError(f"map {chosen.name!r} has references only; a recording needs [channels]")
-    if isinstance(source, str | Path):
-        pieces = [piece_of(read_foreign(source, chosen.format, chosen.text), chosen)]
-    elif isinstance(source, list | tuple):
-        pieces = [piece_of(read_foreign(one, chosen.format, chosen.text), chosen) for one in source]
+    if isinstance(source, str | Path | list | tuple):
+        paths = [source] if isinstance(source, str | Path) else source
+        files = [read_foreign(one, chosen.format, chosen.text) for one in paths]
     else:
-        table = TableColumns(source)
-        pieces = [piece_of(RawFile(table.file, "table", {"": _as_raw(source)}), chosen)]
+        files = [RawFile(TableColumns(source).file, "table", {"": _as_raw(source)})]
+    whole = combined_file(files, chosen)
+    pieces = [piece_of(one, chosen) for one in (files if whole is None else [whole])]
     geometry = array or (AccelerometerArray.load(chosen.array) if chosen.array and len(pieces) == 1 else None)
     merged = _between(merged_piece(pieces), chosen)
     for note in merged.times.notes:
         warnings.warn(note, RecordingWarning, stacklevel=2)
-    return _recording(merged, chosen, geometry, [one.source for one in pieces])
+    return _recording(merged, chosen, geometry, [one.source for one in files])
 
 
 def mapped_reference(

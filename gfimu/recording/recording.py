@@ -185,7 +185,12 @@ class Recording(Tabular):
 
     @classmethod
     def read(
-        cls, path: str | Path | ArrowStream, *, array: AccelerometerArray | None = None, unit: str = "m_s2"
+        cls,
+        path: str | Path | ArrowStream,
+        *,
+        array: AccelerometerArray | None = None,
+        unit: str = "m_s2",
+        needs_channels: bool = True,
     ) -> Recording:
         """Read a recording from a CSV or Parquet file, or from a table of pandas, polars or pyarrow.
 
@@ -202,6 +207,8 @@ class Recording(Tabular):
             The array whose channels must be there; by default every channel found is read.
         unit : {"m_s2", "lsb"}
             Unit of the readings in memory; ``lsb`` keeps raw counts and refuses files without them.
+        needs_channels : bool
+            Refuse a file of references alone, such as that of a gyro on a rate table.
 
         Raises
         ------
@@ -209,7 +216,7 @@ class Recording(Tabular):
             If the file is missing, empty, malformed, lacks a column, or its time does not increase; the message
             names the file, the line or column and the remedy.
         """
-        content = read_recording_file(path, array, unit)
+        content = read_recording_file(path, array, unit, needs_channels=needs_channels)
         return cls(**{item.name: getattr(content, item.name) for item in fields(content)}, unit=unit)
 
     def write(self, path: str | Path) -> None:

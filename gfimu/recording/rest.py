@@ -8,6 +8,7 @@ unless given.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,7 +18,7 @@ from gfimu.errors import InputError
 from gfimu.recording.recording import Recording
 from gfimu.short_repr import short_repr
 
-__all__ = ["Rest", "detect_rest", "motion_statistic", "rest_threshold"]
+__all__ = ["Rest", "detect_rest", "mean_variance_factor", "motion_statistic", "rest_threshold"]
 
 _BINS_PER_DECADE = 20
 _CLUSTER_SHARE = 0.05
@@ -25,6 +26,7 @@ _VALLEY_SHARE = 0.01
 _STANDING_RATE = 0.05
 _ROUNDING = 1e-13
 _LONGEST = 1e9  # numerical: s
+_BLOCKS = 10
 
 
 @dataclass(frozen=True)
@@ -189,6 +191,35 @@ def detect_rest(
     start, stop = edges[::2], edges[1::2]
     long = stop - start >= max(round(min_duration_s * recording.sample_rate), 2)
     return Rest(start[long], stop[long], float(limit), threshold is None, window, recording.unit)
+
+
+def mean_variance_factor(stretches: Sequence[NDArray[np.float64]]) -> float:
+    """Factor by which the variance of the means of stretches of rest exceeds that of white noise, at least 1.
+
+    Parameters
+    ----------
+    stretches : sequence of ndarray, each of shape (n_i, c)
+        Samples at rest of c channels.
+
+    Returns
+    -------
+    float
+        Variance of block means over that expected of white noise, pooled; 1 where it is not significantly more.
+    """
+    ratios = []
+    for samples in stretches:
+        size = len(samples) // _BLOCKS
+        if size < 2:
+            continue
+        blocks = samples[: size * _BLOCKS].reshape(_BLOCKS, size, -1).mean(axis=1)
+        white = samples.var(axis=0, ddof=1) / size
+        good = white > 0.0
+        ratios.extend((blocks.var(axis=0, ddof=1)[good] / white[good]).tolist())
+    if not ratios:
+        return 1.0
+    factor = float(np.mean(ratios))
+    spread = np.sqrt(2.0 / (_BLOCKS - 1) / len(ratios))
+    return factor if factor > 1.0 + 3.0 * spread else 1.0
 
 
 def _window_sum(values: NDArray[np.float64], window: int) -> NDArray[np.float64]:

@@ -24,7 +24,7 @@ from gfimu.errors import InputError
 from gfimu.sensor_noise.allan import AllanDeviation, allan_deviation
 from gfimu.short_repr import short_repr
 
-__all__ = ["TERMS", "NoiseModel", "NoiseTerm", "identify_noise", "model_variance"]
+__all__ = ["TERMS", "NoiseModel", "NoiseTerm", "identify_noise", "model_variance", "term_spectra"]
 
 Floats = NDArray[np.float64]
 
@@ -122,6 +122,23 @@ def model_variance(factors: ArrayLike, rate: float) -> Floats:
     return np.column_stack([3.0 / tau**2, 1.0 / tau, _flicker_variance(m), random_walk, tau**2 / 2.0])
 
 
+def term_spectra(f: ArrayLike, rate: float) -> Floats:
+    """Two-sided spectral density of each term with coefficient one, rows in the order of `TERMS`, shape (5, k).
+
+    Parameters
+    ----------
+    f : array_like, shape (k,)
+        Frequencies above zero, Hz.
+    rate : float
+        Sample rate, Hz. The ramp is no noise: its density is zero.
+    """
+    step = 2.0 * np.sin(np.pi * np.asarray(f, dtype=float) / rate)
+    # Quantisation is the difference of white noise: S = Q² (2πf)²/rate at low f, here in its sampled form.
+    return np.array(
+        [rate * step**2, np.ones_like(step), 1.0 / (rate * step), 1.0 / (rate * step) ** 2, np.zeros_like(step)]
+    )
+
+
 def identify_noise(values: ArrayLike, rate: float, *, candidates: Sequence[str] = tuple(TERMS)) -> NoiseModel:
     """Identify the noise terms of a series at rest.
 
@@ -199,11 +216,7 @@ class _Fit:
         self.df = np.gradient(self.f)
         x = np.pi * self.f / rate
         self.filters = 2.0 * np.sin(self.m[:, None] * x) ** 4 / (self.m[:, None] * np.sin(x)) ** 2  # (k, F)
-        step = 2.0 * np.sin(x)
-        self.spectra = np.array(
-            # Quantisation is the difference of white noise: S = Q² (2πf)²/rate at low f, here in its sampled form.
-            [rate * step**2, np.ones_like(x), 1.0 / (rate * step), 1.0 / (rate * step) ** 2, np.zeros_like(x)]
-        )
+        self.spectra = term_spectra(self.f, rate)
 
     def covariance(self, squares: Floats, symbols: Sequence[str]) -> Floats:
         """Covariance of the Allan variances when the terms have these squared coefficients, (k, k)."""

@@ -12,9 +12,11 @@ from numpy.typing import NDArray
 
 from gfimu.errors import InputError, unknown_name
 from gfimu.recording import Recording
+from gfimu.recording.reference_times import reference_series
 from gfimu.recording.rest import detect_rest
 from gfimu.sensor_noise.identification import TERMS, NoiseModel, identify_noise
 from gfimu.short_repr import short_repr
+from gfimu.units import TIME_COLUMNS
 
 if TYPE_CHECKING:
     from gfimu.known_axis.accuracy.noise import AxisNoise
@@ -36,7 +38,7 @@ class RecordingNoise:
     unit : str
         Unit of the readings: ``m_s2`` or ``lsb``; coefficients are in its terms.
     rate : float
-        Sample rate, Hz.
+        Sample rate of the channels, Hz; a gyro with times of its own has its own (``models["gyro_x"].allan.rate``).
     start_s, duration_s : float
         Stretch used, s.
     about_axis : AxisNoise, optional
@@ -161,17 +163,27 @@ def recording_noise(
         longest = int(np.argmax(rest.lengths))
         start, stop = int(rest.start[longest]), int(rest.stop[longest])
     part = recording.slice(start, stop)
-    series: dict[str, NDArray[np.float64]] = dict(zip(part.channels, part.readings.T, strict=True))
+    rate = recording.sample_rate
+    series = {name: (values, rate) for name, values in zip(part.channels, part.readings.T, strict=True)}
     if gyros:
         names = [f"gyro_{axis}" for axis in "xyz" if f"gyro_{axis}_rad_s" in part.reference]
-        series |= {name: part.reference[f"{name}_rad_s"] for name in names}
-    rate = recording.sample_rate
+        series |= {name: _gyro_series(part, f"{name}_rad_s") for name in names}
     models = {}
-    for name, values in series.items():
+    for name, (values, own_rate) in series.items():
         if not np.isfinite(values).all():
             raise InputError(f"channel {name} has missing samples in the stretch used; choose another run")
         try:
-            models[name] = identify_noise(values, rate)
+            models[name] = identify_noise(values, own_rate)
         except InputError as error:
             raise InputError(f"channel {name}: {error}") from None
     return RecordingNoise(models, recording.unit, rate, float(part.t_s[0]), part.duration)
+
+
+def _gyro_series(recording: Recording, column: str) -> tuple[NDArray[np.float64], float]:
+    """Return the values of a gyro's axis and their rate, Hz: those of the rows, or its own where it has own times."""
+    if TIME_COLUMNS[column] not in recording.reference:
+        return recording.reference[column], recording.sample_rate
+    t, values = reference_series(recording, column)
+    if len(t) < 2:
+        raise InputError(f"{column} has {len(t)} values in the stretch used; choose another run")
+    return values, 1.0 / float(np.median(np.diff(t)))

@@ -168,7 +168,7 @@ def test_raw_counts(gfimu_command, tmp_path, poses, run):
     [
         (
             ("seven-position", "POSES"),
-            "unknown calibration method 'seven-position'; valid: array, gyro, multi-position",
+            "unknown calibration method 'seven-position'; valid: array, gyro, gyro-rate-table, multi-position",
         ),
         (("multi-position", "RUN"), "no rest found"),
         (("multi-position", "POSES", "--gravity", 9.81, "--latitude", 50), "give --gravity or --latitude"),
@@ -181,7 +181,7 @@ def test_raw_counts(gfimu_command, tmp_path, poses, run):
         (("six-position", "POSES", "--motion", "RUN"), "use it with array, not six-position"),
         (
             ("recursive", "POSES", "--levelling-std", 0.001),
-            "use it with six-position or twelve-position, not recursive",
+            "use it with six-position or twelve-position or gyro-rate-table, not recursive",
         ),
         (("array", "POSES", "--parameters", 9), "twelve-position, not array"),
         (("array", "POSES", "--input", "raw"), "twelve-position, not array"),
@@ -216,6 +216,68 @@ def test_a_calibration_with_nan_covariance_is_one_line(gfimu_command, poses, run
         assert refused.code == 2
         assert "nan.json: damaged calibration file (the covariance of a1_M_yx and a1_M_yx is nan" in refused.stderr
         assert refused.stderr.count("\n") == 1
+
+
+@pytest.fixture(scope="module")
+def turned(tmp_path_factory):
+    """A table that holds four speeds, the cube upright, chips without other errors than a bend of a11."""
+    t = np.arange(4000) / 100
+    rate = np.interp(t, [0, 4, 5, 13, 14, 22, 23, 31, 32, 40], [0, 0, 10, 10, 18, 18, 24, 24, 30, 30])
+    alpha = np.gradient(rate, t)
+    turns = np.outer(rate, [0.0, 0.0, 1.0]), np.outer(alpha, [0.0, 0.0, 1.0])
+    ideal = specific_force(CUBE, np.tile([0.0, 0.0, 9.80665], (len(t), 1)), turns[1], turns[0])
+    ideal[:, 0] += 1e-4 * ideal[:, 0] ** 2
+    readings = ideal + np.random.default_rng(6).normal(0, 0.02, ideal.shape)
+    path = tmp_path_factory.mktemp("table") / "turned.parquet"
+    Recording.from_arrays(t, readings, CUBE, reference={"tacho_rad_s": rate}).write(path)
+    return path
+
+
+def test_spin(gfimu_command, turned):
+    out = turned.with_name("spin.json")
+    result = gfimu_command("calibrate", "spin", turned, "--out", out, "--radius-std", 2e-4)
+    assert (result.code, result.stderr) == (0, "")
+    assert "spin, not determined: a1_q_z" in " ".join(result.stdout.split())
+    assert "radius of a chip 0.2 mm per coordinate" in " ".join(result.stdout.split())
+    found = load_calibration(out)
+    assert found.method == "spin"
+    assert abs(found.value("a1_q_x") - 1e-4) < 4 * found.std_of("a1_q_x")
+    assert found.value("a1_q_x") > 3 * found.std_of("a1_q_x")
+    again = gfimu_command(
+        *(
+            "calibrate",
+            "spin",
+            turned,
+            "--calibration",
+            out,
+            "--turn-on-std",
+            0.01,
+            "--out",
+            turned.with_name("again.json"),
+        )
+    )
+    assert again.code == 0
+    assert "K0, K1 and alignment start from the spin calibration" in " ".join(again.stdout.split())
+
+
+def test_spin_bad_input(gfimu_command, turned, poses):
+    out = turned.with_name("none.json")
+    slow = turned.with_name("slow.parquet")
+    Recording.read(turned).between(0.0, 13.0).write(slow)
+    for arguments, message in (
+        (("spin", poses), "the recording has no tacho_rad_s column"),
+        (("spin", slow), "one speed only (10 rad/s)"),
+        (("spin", turned, "--min-rest", 20), "no plateau of constant rate"),
+        (("spin", turned, "--motion", turned), "--motion is the motion of a whole array; use it with array, not spin"),
+        (("array", poses, "--calibration", turned), "--calibration is what a spin starts from; use it with spin"),
+        (("spin", turned, "--stretch-std", -1), "stretch_std_s2_rad2 = -1: a standard deviation is positive"),
+        (("spin", turned, "--array", "corners8"), "array"),
+    ):
+        result = gfimu_command("calibrate", *arguments, "--out", out)
+        assert result.code == 2, arguments
+        assert message in result.stderr
+        assert result.stderr.count("\n") == 1
+        assert not out.exists()
 
 
 def test_the_help_lists_every_method(gfimu_command):
@@ -269,3 +331,52 @@ def test_noise_bad_input(gfimu_command, still, tmp_path):
         assert result.code == 2
         assert message in result.stderr
         assert result.stderr.count("\n") == 1
+
+
+@pytest.fixture
+def on_table(tmp_path):
+    """Files of a gyro alone on a rate table, with its x-, y- and z-axis along the table's; no accelerometers."""
+    rng = np.random.default_rng(2)
+    rates = np.repeat([0.0, 2.0, -2.0, 5.0, -5.0], 2)
+    t = np.arange(5000) / 100.0
+    table = np.interp(t, np.concatenate([[10.0 * number, 10.0 * number + 7.0] for number in range(5)]), rates)
+    files = []
+    for axis, name in enumerate("xyz"):
+        gyro = np.array([0.01, -0.02, 0.0]) + np.outer(table, np.diag([1.02, 0.99, 1.0])[:, axis])
+        gyro += 1e-3 * rng.standard_normal(gyro.shape)
+        head = "t_s,gyro_x_rad_s,gyro_y_rad_s,gyro_z_rad_s,tacho_rpm"
+        files.append(tmp_path / f"{name}.csv")
+        rows = np.column_stack([t, gyro, table * 30.0 / np.pi])
+        np.savetxt(files[-1], rows, delimiter=",", header=head, comments="", fmt="%.8f")
+    return files
+
+
+def test_a_gyro_on_a_rate_table(gfimu_command, on_table, tmp_path):
+    x, y, z = on_table
+    how = ("calibrate", "gyro", x, "--rate-table", "--out", tmp_path / "gyro.json")
+    result = gfimu_command(*how, "--also", y, "--also", z, "--table-axes", "x,y,z")
+    assert (result.code, result.stderr) == (0, "")
+    found = load_calibration(tmp_path / "gyro.json")
+    expected = np.concatenate([np.diag([1.02, 0.99, 1.0]).ravel(), [0.01, -0.02, 0.0]])
+    assert np.all(np.abs(found.values - expected) < 5.0 * found.std)
+    assert "against the table's rate" in " ".join(result.stdout.split())
+    alone = gfimu_command(*how)
+    assert "rates about x, y is not determined" in " ".join(alone.stdout.split())
+
+
+def test_what_a_rate_table_refuses(gfimu_command, on_table, tmp_path):
+    x, y, _ = on_table
+    (tmp_path / "no_tacho.csv").write_text("t_s,gyro_x_rad_s,gyro_y_rad_s,gyro_z_rad_s\n0,1,2,3\n0.01,1,2,3\n")
+    out = ("--out", tmp_path / "gyro.json")
+    for arguments, words in (
+        (("gyro", tmp_path / "no_tacho.csv", "--rate-table"), "no_tacho.csv: the recording lacks tacho_rad_s"),
+        (("gyro", x, "--rate-table", "--also", y, "--table-axes", "x"), "1 axes along the table's for 2 recordings"),
+        (("gyro", x, "--rate-table", "--table-axes", "w"), "give x, y, z, -x, -y or -z"),
+        (("gyro", x, "--rate-table", "--picture", tmp_path / "p.png"), "are of accelerometers"),
+        (("six-position", x, "--rate-table"), "are of a gyro on a rate table"),
+        (("gyro", x, "--rate-table", "--also", tmp_path / "gone.csv"), "gone.csv: no such file"),
+    ):
+        result = gfimu_command("calibrate", *arguments, *out)
+        assert (result.code, result.stderr.count("\n")) == (2, 1), result.stderr
+        assert words in result.stderr
+        assert not (tmp_path / "gyro.json").exists()

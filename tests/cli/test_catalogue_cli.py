@@ -10,6 +10,7 @@ from gfimu.files.model_files import find_model, list_models
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.importing import load_map
 from gfimu.parts.part import Part
+from gfimu.uncertainty.stage import Stage
 from sim.data_sheet import DataSheet
 from sim.scenarios import Scenario
 from sim.twin import Twin
@@ -21,6 +22,7 @@ LOADERS = {
     "twin": Twin.load,
     "scenario": Scenario.load,
     "frame": load_format,
+    "stage": Stage.load,
 }
 
 

@@ -107,3 +107,51 @@ def test_the_inversion_undoes_the_drift_model():
 )  # fmt: skip
 def test_the_inversion_refuses_what_has_no_use(gfimu_command, words):
     assert gfimu_command("drift", *words.split()).code == 2
+
+
+@pytest.fixture(scope="module")
+def rest(tmp_path_factory):
+    """Two minutes of cube12 at rest, 50 Hz, with offsets and white noise."""
+    rng = np.random.default_rng(8)
+    cube = gfimu.AccelerometerArray.load("cube12")
+    still = gfimu.specific_force(cube, [0.0, 0.0, 1e3 * MG], [0.0] * 3, [0.0] * 3)
+    readings = still + 0.2 * rng.standard_normal(12) + 0.02 * rng.standard_normal((6000, 12))
+    file = tmp_path_factory.mktemp("rest") / "rest.parquet"
+    gfimu.Recording.from_arrays(np.arange(6000) / 50.0, readings, cube).write(file)
+    return file
+
+
+def test_drift_of_a_recording_at_rest(gfimu_command, rest, tmp_path):
+    picture = tmp_path / "drift.png"
+    how = ("drift", rest, "--time", 2, "--lead", 5)
+    shown = gfimu_command(*how, "--picture", picture)
+    assert (shown.code, shown.stderr) == (0, "")
+    for words in ("rms of 16 windows", "rms predicted from the noise", "as predicted", "--from-position"):
+        assert words in " ".join(shown.stdout.split())
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    data = json.loads(gfimu_command(*how, "--json").stdout)
+    found = gfimu.drift_of_rest(rest, time=2.0, lead=5.0)
+    np.testing.assert_allclose([one["position_m"] for one in data["windows"]], found.final_m)
+    assert data["ratio_interval_95"][0] < data["ratio"] < data["ratio_interval_95"][1]
+    back = gfimu.drift_from_position(tuple(found.final_m[0]), time=found.time_s)
+    assert np.hypot(*back.rate_drift_deg_h[:2]) == pytest.approx(data["equivalent_rate_drift_deg_h"], rel=1e-6)
+
+
+def test_beyond_first_order_is_said(gfimu_command, rest):
+    shown = gfimu_command("drift", rest, "--time", 10, "--lead", 5)
+    assert shown.code == 0
+    assert "beyond first order" in " ".join(shown.stdout.split())
+
+
+def test_what_a_recording_at_rest_does_not_go_with(gfimu_command, rest, tmp_path):
+    for arguments, words in (
+        ((rest, "--bias-mg", 3), "its noise is measured"),
+        ((rest, "--from-position", 1, 0, 0), "its noise is measured"),
+        ((rest, "--time", 500), "the longest is 119"),
+        ((tmp_path / "none.parquet",), "no such file"),
+        (("--picture", tmp_path / "x.png"), "name it first"),
+        ((rest, "--picture", tmp_path / "x.txt"), ".png"),
+    ):
+        result = gfimu_command("drift", *arguments)
+        assert (result.code, result.stderr.count("\n")) == (2, 1), result.stderr
+        assert words in result.stderr

@@ -51,6 +51,23 @@ def test_estimate(gfimu_command, run, suffix):
     np.testing.assert_allclose(found.omega[:, 2], np.sin(found.t_s), atol=1e-5)
 
 
+def test_equivalent_biases_of_p_at_rest(gfimu_command, tmp_path):
+    """Table 1 of the GF-IMU paper, with and without taking the channels' biases off."""
+    t = np.arange(500) / 100.0
+    bias = np.linspace(-0.03, 0.05, 12)
+    noise = 0.01 * np.random.default_rng(1).standard_normal((500, 12))
+    readings = specific_force(CUBE, [0.0, 0.0, STANDARD_GRAVITY], [0.0] * 3, [0.0] * 3) + bias + noise
+    Recording.from_arrays(t, readings, CUBE).write(tmp_path / "rest.csv")
+    expected = bias.reshape(4, 3).mean(axis=0) / STANDARD_GRAVITY * 1e3
+    for options in ((), ("--rest-bias",)):
+        how = ("estimate", tmp_path / "rest.csv", *options, "--out", tmp_path / "e.csv")
+        found = json.loads(gfimu_command(*how, "--json").stdout)["at_rest"]
+        assert np.all(np.abs(np.array(found["bias_mg"]) - expected) < 4.0 * np.array(found["std_mg"]))
+        shown = gfimu_command(*how).stdout
+        for words in ("Equivalent biases of p at rest", f"{found['bias_mg'][0]:+.2f}", "a bias and a lean are one"):
+            assert words in " ".join(shown.split())
+
+
 def test_table_for_people(gfimu_command, run):
     out = run.with_name("estimate.parquet")
     result = gfimu_command("estimate", run, "--array", "cube12", "--out", out)

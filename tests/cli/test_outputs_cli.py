@@ -38,6 +38,7 @@ NAMES_A_FILE = {
     "calibration",
     "update",
     "motion",
+    "also",
     "recording",
     "column_map",
 }
@@ -48,9 +49,11 @@ CALLS = {
     "inspect": {"file": "in.csv"},
     "join": {"channels": "in.csv", "reference": "other.csv", "out": "made.csv"},
     "convert": {"source": "in.csv", "target": "made.csv"},
+    "drift": {"recording": "in.csv"},
     "diagnose": {"recordings": "in.csv", "twin": "cube12_turntable", "out": "made"},
     "design": {"effects": "bias", "twin": "cube12_turntable"},
     "calibrate": {"method": "array", "recording": "in.csv", "out": "made.json"},
+    "certificate": {"calibration": "in.json", "out": "made"},
     "noise": {"recording": "in.csv"},
     "impact": {"recording": "in.csv", "array": "cube12", "out": "made.csv"},
     "record": {"port": "socket://127.0.0.1:1", "out": "made.csv"},
@@ -87,13 +90,25 @@ def argument_of(parameter) -> str:
     return OTHER_WORDS.get(flag, flag.removeprefix("--").replace("-", "_"))
 
 
+BESIDE = {"drift": (gfimu.axis_drift, gfimu.drift_from_position, gfimu.drift_of_rest)}
+"""Functions under a command besides the one of its name."""
+
+FILES_OF = {"drift": gfimu.drift_of_rest}
+"""Of these the one that reads and writes files."""
+
+
+def filer(name):
+    """The function under a command that reads and writes its files."""
+    return FILES_OF.get(name, COMMANDS[name][1])
+
+
 def parameters_of(name):
     return [p for p in COMMANDS[name][0].params if not NO_ARGUMENT & set(p.opts)]
 
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_every_option_is_an_argument_of_the_function(name):
-    functions = [COMMANDS[name][1], *([gfimu.axis_drift, gfimu.drift_from_position] if name == "drift" else [])]
+    functions = [COMMANDS[name][1], *BESIDE.get(name, ())]
     arguments = {argument for function in functions for argument in inspect.signature(function).parameters}
     assert {argument_of(parameter) for parameter in parameters_of(name)} <= arguments
 
@@ -101,7 +116,7 @@ def test_every_option_is_an_argument_of_the_function(name):
 @pytest.mark.parametrize("name", COMMANDS)
 def test_every_path_is_declared_as_read_or_written(name):
     """A new option that writes but is not declared fails here, and so does one that reads a file."""
-    command, function = COMMANDS[name]
+    command, function = COMMANDS[name][0], filer(name)
     hints = get_type_hints(inspect.unwrap(command.callback))
     written, read = getattr(function, "__outputs__", {}), getattr(function, "__reads__", ())
     for parameter in parameters_of(name):
@@ -122,7 +137,7 @@ def test_the_docs_list_every_command_with_its_function(project_root):
     assert rows == {name: PYTHON_NAME.get(name, name.replace(" ", ".")) for name in COMMANDS}
     for flag, argument in OTHER_WORDS.items():
         assert f"`{flag}` is `{argument}`" in page
-    written = {suffix for _, function in COMMANDS.values() for output in getattr(function, "__outputs__", {}).values()
+    written = {suffix for name in COMMANDS for output in getattr(filer(name), "__outputs__", {}).values()
                if isinstance(output, OutputFile) for suffix in output.suffixes}  # fmt: skip
     assert all(f"`{suffix}`" in page for suffix in written)
 
@@ -139,12 +154,10 @@ def call(name, values):
 
 
 def argument_is_file(name, argument):
-    return isinstance(COMMANDS[name][1].__outputs__[argument], OutputFile)
+    return isinstance(filer(name).__outputs__[argument], OutputFile)
 
 
-OUTPUTS = [
-    (name, argument) for name, (_, function) in COMMANDS.items() for argument in getattr(function, "__outputs__", {})
-]
+OUTPUTS = [(name, argument) for name in COMMANDS for argument in getattr(filer(name), "__outputs__", {})]
 
 
 FILES = [(name, argument) for name, argument in OUTPUTS if argument_is_file(name, argument)]
@@ -176,7 +189,7 @@ def output_name(output, folder="."):
 
 @pytest.mark.parametrize(("name", "argument"), OUTPUTS)
 def test_a_folder_that_is_not_there_is_not_made(gfimu_command, here, name, argument):
-    output = COMMANDS[name][1].__outputs__[argument]
+    output = filer(name).__outputs__[argument]
     before = contents(here)
     values = CALLS[name] | {argument: output_name(output, "typo")}
     refused(gfimu_command(*call(name, values)), before, here, "there is no folder typo", "choose a folder")
@@ -184,7 +197,7 @@ def test_a_folder_that_is_not_there_is_not_made(gfimu_command, here, name, argum
 
 @pytest.mark.parametrize(("name", "argument"), FILES)
 def test_a_wrong_extension_is_refused(gfimu_command, here, name, argument):
-    output = COMMANDS[name][1].__outputs__[argument]
+    output = filer(name).__outputs__[argument]
     before = contents(here)
     result = gfimu_command(*call(name, CALLS[name] | {argument: "made.xls"}))
     refused(result, before, here, "made.xls", output.suffixes[0])
@@ -192,7 +205,7 @@ def test_a_wrong_extension_is_refused(gfimu_command, here, name, argument):
 
 @pytest.mark.parametrize(("name", "argument"), OUTPUTS)
 def test_an_output_that_is_an_input_is_refused(gfimu_command, here, name, argument):
-    function = COMMANDS[name][1]
+    function = filer(name)
     output = function.__outputs__[argument]
     options = {argument_of(parameter) for parameter in parameters_of(name)}
     for read in (reads for reads in function.__reads__ if reads in options):

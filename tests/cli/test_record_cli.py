@@ -56,6 +56,7 @@ def test_run_behind_a_port_and_record_from_it(tmp_path) -> None:
     found = json.loads(done.stdout)
     assert found["stream"]["lost"] == found["stream"]["corrupt"] == 0
     assert found["identity"]["rate_hz"] == 800
+    assert (found["array"], found["array_stated_by"]) == ("cube12", "board")
     assert len(Recording.read(out)) >= 1600 * 0.98  # the pace of the chips
     assert (tmp_path / "live.rrd").read_bytes()[:3] == b"RRF"
 
@@ -153,7 +154,8 @@ def test_live_follows_what_record_is_writing(tmp_path, name) -> None:
     from firmware_bridge.loop.virtual_port import TcpPort
 
     chance, port, out, shown = np.random.default_rng(0), TcpPort(0), tmp_path / name, tmp_path / "shown"
-    record = subprocess.Popen([GFIMU, "record", "--port", port.name, "--out", out, "--json"], stdout=subprocess.PIPE)
+    command = [GFIMU, "record", "--port", port.name, "--array", "cube12", "--out", out, "--json"]
+    record = subprocess.Popen(command, stdout=subprocess.PIPE)
     live, number, last = None, 0, None
     end = time.monotonic() + 120.0
     try:

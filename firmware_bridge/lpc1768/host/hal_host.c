@@ -20,9 +20,11 @@ static uint32_t timer_hz;
 static uint32_t delayed_us;
 static uint32_t baud;
 static int32_t lock_depth;
+static int16_t temperature = HAL_NO_TEMPERATURE;
 
 PUBLIC void host_set_exchange(exchange_function function) { exchange = function; }
 PUBLIC void host_set_time_us(uint32_t value) { time_us = value; }
+PUBLIC void host_set_temperature(int32_t value) { temperature = (int16_t)value; }
 PUBLIC uint32_t host_time_us(void) { return time_us; }
 PUBLIC uint32_t host_timer_hz(void) { return timer_hz; }
 PUBLIC uint32_t host_delayed_us(void) { return delayed_us; }
@@ -43,6 +45,7 @@ PUBLIC uint32_t host_rate_code(uint32_t rate_hz) { return adxl345_rate_code(rate
 void hal_spi_exchange(uint32_t sensor, uint16_t *words, uint32_t count) { exchange(sensor, words, count); }
 void hal_spi_burst(uint32_t sensor, uint16_t words[HAL_BURST_WORDS]) { exchange(sensor, words, HAL_BURST_WORDS); }
 uint32_t hal_spi_khz(void) { return 5000U; }
+int16_t hal_temperature(void) { return temperature; }
 uint32_t hal_time_us(void) { return time_us; }
 void hal_wait_us(uint32_t microseconds) { time_us += microseconds; }
 void hal_timer_start(uint32_t rate_hz) { timer_hz = rate_hz; }

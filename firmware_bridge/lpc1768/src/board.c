@@ -240,6 +240,11 @@ static void time_init(void)
     T1TCR = TIMER_ENABLE;
 }
 
+int16_t hal_temperature(void)
+{
+    return HAL_NO_TEMPERATURE; /* neither the LPC1768 nor the ADXL345 has a sensor for it */
+}
+
 uint32_t hal_time_us(void)
 {
     return T1TC;

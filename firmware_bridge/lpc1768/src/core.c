@@ -22,7 +22,6 @@
 #define PAYLOAD_BYTES 24U
 #define CRC_OFFSET (FRAME_BYTES - 2U)
 #define NO_READING INT16_MIN
-#define NO_TEMPERATURE INT16_MIN
 
 #define COMMAND_SYNC_1 0xC3U
 #define COMMAND_SYNC_2 0x3CU
@@ -49,6 +48,10 @@
 _Static_assert((RECEIVE_RING & (RECEIVE_RING - 1U)) == 0U, "the receive ring is indexed with a mask");
 _Static_assert(HEADER_BYTES + PAYLOAD_BYTES + 6U == FRAME_BYTES, "frame layout");
 _Static_assert(SENSOR_COUNT * 6U == PAYLOAD_BYTES, "a sample fills the payload");
+_Static_assert(sizeof(GFIMU_ARRAY) <= PAYLOAD_BYTES + 1U, "GFIMU_ARRAY: at most 24 characters");
+
+/* Not static, and read at run time: a finished image can be given another name. */
+const volatile char gfimu_array[PAYLOAD_BYTES + 1U] __attribute__((used)) = GFIMU_ARRAY;
 
 static struct {
     /* configuration */
@@ -76,6 +79,7 @@ static struct {
     uint32_t faulty;  /* bit mask of sensors that identify themselves but do not hold it */
     uint16_t sticky;  /* status bits to report in the next frame */
     volatile bool announce;
+    bool array_sent; /* of the announcement under way */
     volatile uint32_t new_baud;      /* 0, or the rate to switch to once the reply has left */
     volatile uint32_t fallback_baud; /* 0, or the rate to go back to while no command has come at the new one */
     uint32_t unreadable;             /* pieces of garbage since the last change of rate */
@@ -173,11 +177,11 @@ static uint8_t *frame_open(uint32_t type, uint32_t sequence, uint32_t time_us)
     return frame;
 }
 
-static void frame_close(uint8_t *frame, uint32_t status)
+static void frame_close(uint8_t *frame, uint32_t status, int16_t temperature)
 {
     uint32_t next = transmit_head + FRAME_BYTES;
     put16(&frame[34], status);
-    put16(&frame[36], (uint16_t)NO_TEMPERATURE);
+    put16(&frame[36], (uint16_t)temperature);
     put16(&frame[CRC_OFFSET], core_crc16(frame, CRC_OFFSET));
     transmit_head = (next == TRANSMIT_RING) ? 0U : next;
     hal_transmit_kick();
@@ -205,10 +209,19 @@ static void send_message(uint32_t type, const uint8_t *payload, uint32_t count)
         for (uint32_t i = 0U; i < PAYLOAD_BYTES; i++) {
             frame[HEADER_BYTES + i] = (i < count) ? payload[i] : 0U;
         }
-        frame_close(frame, 0U);
+        frame_close(frame, 0U, HAL_NO_TEMPERATURE);
         core.message_sequence++;
     }
     hal_unlock();
+}
+
+static void send_array(void)
+{
+    uint8_t payload[PAYLOAD_BYTES];
+    for (uint32_t i = 0U; i < PAYLOAD_BYTES; i++) {
+        payload[i] = (uint8_t)gfimu_array[i];
+    }
+    send_message(FRAME_ARRAY, payload, PAYLOAD_BYTES);
 }
 
 static void send_identity(void)
@@ -471,7 +484,7 @@ void core_sample(void)
         status |= STATUS_CHIP_FAULT;
     }
     core.sticky = 0U;
-    frame_close(frame, status);
+    frame_close(frame, status, hal_temperature());
     retry_missing(now_us);
 }
 
@@ -736,8 +749,13 @@ void core_poll(void)
     }
     while (change_baud() && frame_fits(0U) && (parse_command() || take_byte())) {
     }
+    if (core.announce && !core.array_sent && (gfimu_array[0] != '\0') && (core.new_baud == 0U) && frame_fits(0U)) {
+        core.array_sent = true;
+        send_array();
+    }
     if (core.announce && (core.new_baud == 0U) && frame_fits(0U)) {
         core.announce = false;
+        core.array_sent = false;
         send_identity();
     }
 }
@@ -761,6 +779,7 @@ void core_init(uint32_t reset_cause, uint32_t baud)
     core.last_retried = 0U;
     core.sticky = ((reset_cause & RESET_WATCHDOG) != 0U) ? STATUS_WATCHDOG_RESET : 0U;
     core.announce = true;
+    core.array_sent = false;
     core.new_baud = 0U;
     core.fallback_baud = 0U;
     core.unreadable = 0U;

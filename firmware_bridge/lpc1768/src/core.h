@@ -13,15 +13,21 @@
 #define SENSOR_COUNT 4U
 #define FRAME_SLOTS 32U
 
+/* Name of the array of chips (gfimu list arrays), at most 24 characters. It is sent before each identity, so that the host
+ * does not have to be asked how the chips are mounted; empty: the board does not state it. */
+#ifndef GFIMU_ARRAY
+#define GFIMU_ARRAY ""
+#endif
+
 #define FIRMWARE_MAJOR 1U
-#define FIRMWARE_MINOR 2U
+#define FIRMWARE_MINOR 3U
 #define FIRMWARE_PATCH 0U
 
 #define RATE_MIN_HZ 10U
 #define RATE_MAX_HZ 3200U
 #define RATE_CODE_AUTO 0xFFU
 
-enum frame_type { FRAME_SAMPLE = 1, FRAME_IDENTITY = 2, FRAME_REPLY = 3 };
+enum frame_type { FRAME_SAMPLE = 1, FRAME_IDENTITY = 2, FRAME_REPLY = 3, FRAME_ARRAY = 4 };
 
 enum command {
     COMMAND_START = 1,

@@ -19,6 +19,10 @@ void hal_spi_burst(uint32_t sensor, uint16_t words[HAL_BURST_WORDS]);
 /* SPI clock, kHz. */
 uint32_t hal_spi_khz(void);
 
+/* Temperature of the board, 0.01 °C; HAL_NO_TEMPERATURE where nothing measures it. */
+#define HAL_NO_TEMPERATURE INT16_MIN
+int16_t hal_temperature(void);
+
 /* Free-running time, microseconds since reset. */
 uint32_t hal_time_us(void);
 

@@ -135,6 +135,16 @@ void gfimu_port_exchange(uint8_t number, uint8_t *bytes, uint8_t count)
     }
 }
 
+#ifdef GFIMU_TEMPERATURE
+/* Warms up from 25 °C by 0.01 °C per 100 ms. */
+int16_t gfimu_port_temperature(void)
+{
+    static uint32_t began_us;
+    began_us = (began_us == 0U) ? gfimu_port_time_us() : began_us;
+    return (int16_t)(2500U + (((gfimu_port_time_us() - began_us) / 100000U) % 2000U));
+}
+#endif
+
 uint32_t gfimu_port_spi_khz(void)
 {
     return 5000U;

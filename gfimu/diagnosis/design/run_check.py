@@ -141,10 +141,16 @@ def check_runs(
         if len(recording.gaps):
             findings.append(f"{name}: {len(recording.gaps)} gaps in its times")
     if model.drive_source == "gyro":
-        facts = tuple({"name": name, "duration_s": one.duration} for name, one in zip(names, recordings, strict=True))
+        facts = tuple(
+            {"name": name, "duration_s": one.duration, **_temperature(one)}
+            for name, one in zip(names, recordings, strict=True)
+        )
         return RunCheck(facts, tuple(findings), (), ())
     runs = [prepare_run(one, model, name=name) for one, name in zip(recordings, names, strict=True)]
-    facts = tuple(_facts(run, name, model, useful) for run, name in zip(runs, names, strict=True))
+    facts = tuple(
+        _facts(run, name, model, useful) | _temperature(one)
+        for run, name, one in zip(runs, names, recordings, strict=True)
+    )
     effects = _effects(runs, model)
     return RunCheck(facts, tuple(findings), effects, tuple(_advice(facts, effects, useful)))
 
@@ -168,6 +174,14 @@ def _facts(run: Run, name: str, model: WorldModel, useful: UsefulRun) -> dict[st
         "share_backwards": float(np.mean(rate < -slow)),
         "share_at_rest": float(np.mean(np.abs(rate) < 0.1 * slow)),
     }
+
+
+def _temperature(recording: Recording) -> dict[str, float]:
+    """Return the lowest and the highest temperature of the board; empty if the recording has none."""
+    temperature = recording.reference.get("temperature_degC")
+    if temperature is None or not np.isfinite(temperature).any():
+        return {}
+    return {"lowest_degC": float(np.nanmin(temperature)), "highest_degC": float(np.nanmax(temperature))}
 
 
 def _effects(runs: Sequence[Run], model: WorldModel) -> tuple[EffectView, ...]:

@@ -151,7 +151,7 @@ def _known_reference(name: str) -> tuple[str, str] | None:
         return None
     words = {"tacho_rad_s": _TACHO, "angle_rad": _ANGLE, "temperature_degC": _TEMPERATURE}
     for key, marks in words.items():
-        if any(mark in name.lower() for mark in marks):
+        if any(mark in name.lower() for mark in marks) or (key == "temperature_degC" and plain == "temp"):
             if unit:
                 return (key, unit) if kind_of(unit) == REFERENCE_KINDS[key] else None
             if key == "temperature_degC":

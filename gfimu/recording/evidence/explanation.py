@@ -118,7 +118,10 @@ def _with_costs(ways: Sequence[Otherwise], before: Costs, evidence: Evidence) ->
 
 def _explaining(tried: Sequence[tuple[Otherwise, Costs]], before: Costs, evidence: Evidence) -> list[Explanation]:
     """Return the ways that explain a contradiction."""
-    usable = any(one.motion < _FITS for one in [before, *(costs for _, costs in tried)])
+    # A motion that no way fits, of those that the rests allow, can't be compared: it was too long or too fast.
+    usable = before.motion < _FITS or any(
+        costs.motion < _FITS and max(costs.worst_rest, costs.level, costs.parity) < _FITS for _, costs in tried
+    )
     found = []
     for way, after in tried:
         compared = usable and bool(np.isfinite(after.motion))
@@ -132,7 +135,7 @@ def _explaining(tried: Sequence[tuple[Otherwise, Costs]], before: Costs, evidenc
             before = again if again.motion < before.motion else before
         impossible = _impossible(before, motion=compared)
         left = _left(before, after, impossible, scaled=way.is_one_of(_SCALED))
-        if impossible and left < 1.0 - _REMOVED:
+        if impossible and left < 1.0 - _REMOVED and _removes_enough(before, after, impossible):
             found.append(Explanation(left, way, after, refused=True))
         elif not impossible and _explains_noise(before, after, motion=compared):
             left = after.total(motion=compared) / before.total(motion=compared)
@@ -149,6 +152,14 @@ def _impossible(costs: Costs, *, motion: bool) -> tuple[str, ...]:
         "motion": motion and costs.motion > _FITS,
     }
     return tuple(name for name, is_beyond in beyond.items() if is_beyond)
+
+
+def _removes_enough(before: Costs, after: Costs, impossible: Sequence[str]) -> bool:
+    """Whether what a way removes is by itself beyond the limits, where motion alone contradicts the file.
+
+    The cost of a motion is no strict bound: errors of α add up in the rate of a long fast spin.
+    """
+    return tuple(impossible) != ("motion",) or before.motion - after.motion > _FITS
 
 
 def _left(before: Costs, after: Costs, impossible: Sequence[str], *, scaled: bool) -> float:

@@ -219,7 +219,7 @@ class Evidence:
         """
         array = way.array or self.array
         matrices = self._matrices(array)
-        rest, level, worst = self._rest(way, array, exact=way.kind == "")
+        rest, level, worst = self._rest(way, array, exact=way.kind in {"", "array"})
         columns = way.columns[np.ix_(self.alive, self.alive)]
         sigma = self.limits.noise[self.alive]
         parity = parity_noise = 0.0
@@ -267,8 +267,9 @@ class Evidence:
             largest = float(np.abs(ratio).max())
             if exact and largest > 0.5:
                 largest = _least_largest(axes, mean, limit)
-                if largest > 1.0:
-                    largest = min(largest, self._spinning(array, mean, limit))
+                spinning = self._spinning(array, mean, limit) if largest > 1.0 else ratio
+                if largest > 1.0 and float(np.abs(spinning).max()) < largest:
+                    ratio, largest = spinning, float(np.abs(spinning).max())
             costs.append(float(ratio @ ratio))
             worst.append(largest)
             size = float(np.linalg.norm(force))
@@ -285,12 +286,14 @@ class Evidence:
         axes = (way.array or self.array).axes[self.alive]
         return np.linalg.norm((self.rests @ way.columns.T)[:, self.alive] @ np.linalg.pinv(axes).T, axis=1)
 
-    def _spinning(self, array: AccelerometerArray, mean: NDArray[np.float64], limit: NDArray[np.float64]) -> float:
-        """Return the largest residual over its limit if the body spins steadily while its readings rest."""
+    def _spinning(
+        self, array: AccelerometerArray, mean: NDArray[np.float64], limit: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Return the residuals (c,) over their limits if the body spins steadily while its readings rest."""
         axes, centripetal = array.axes[self.alive], array.centripetal_matrix[self.alive]
         both = np.hstack([axes, centripetal]) / limit[:, None]
         products = np.linalg.lstsq(both, mean / limit, rcond=1e-9)[0][3:]
-        best = np.inf
+        best = np.full(len(mean), np.inf)
         for start in _rates_of(products):
             omega = start
             for _ in range(_ITERATIONS):
@@ -300,7 +303,8 @@ class Evidence:
                 omega = omega + step[3:]
             residual = (mean - centripetal @ omega_products(omega)) / limit
             force = np.linalg.lstsq(axes / limit[:, None], residual, rcond=None)[0]
-            best = min(best, float(np.abs(residual - axes @ force / limit).max()))
+            left = residual - axes @ force / limit
+            best = min(best, left, key=lambda ratio: float(np.abs(ratio).max()))
         return best
 
     def _motion(
@@ -325,9 +329,11 @@ class Evidence:
         allowed = self._allowed(np.std(readings, axis=0))
         bias_std = np.abs(matrices.alpha) @ self.limits.bias[self.alive]  # (3,) of α
         prior = noise / len(matrices.null) / np.maximum(bias_std, 1e-9) ** 2
-        products = np.linalg.pinv(matrices.sensitivity, rcond=0.05) @ z[:5].mean(axis=0)
+        seen = np.linalg.pinv(matrices.sensitivity, rcond=0.05)
+        fastest = int(np.argmax(np.sum(z**2, axis=1)))  # where biases matter least
+        rates = _rates_of(seen @ z[:5].mean(axis=0)) + [rate - turned[fastest] for rate in _rates_of(seen @ z[fastest])]
         energy, fitted = np.inf, np.zeros(6)
-        starts = [np.concatenate([rate, np.zeros(3)]) for rate in [np.zeros(3), *_rates_of(products)]]
+        starts = [np.concatenate([rate, np.zeros(3)]) for rate in [np.zeros(3), *rates]]
         for start in starts if further is None else [*starts, further]:
             left, point = _unexplained(z, turned, t, matrices, start, prior)
             if left < energy:
@@ -498,12 +504,11 @@ def _still(t: NDArray[np.float64], values: NDArray[np.float64], rests: NDArray[n
     """Return what channels (m, c) read while α is zero, interpolated between the rests (k, 2) of a window.
 
     A gain that is off by a tenth makes an α of gravity, another one in each pose, that would integrate to a rate. At
-    rest, and in a steady spin, α is zero; so what is read there is taken off. Zero where a window has one rest only: an
-    error of α that stays is fitted.
+    rest, and in a steady spin, α is zero; so what is read there is taken off, and what is wrong with it is fitted.
     """
     inside = np.clip(rests, 0, len(t))
     inside = inside[inside[:, 1] - inside[:, 0] >= _FEWEST_STILL]
-    if len(inside) < 2:
+    if not len(inside):
         return np.zeros_like(values)
     middles = [float(t[start:stop].mean()) for start, stop in inside]
     means = np.array([values[start:stop].mean(axis=0) for start, stop in inside])

@@ -194,3 +194,98 @@ def test_a_board_that_a_file_describes_is_recorded(tmp_path) -> None:
     assert recording.sample_rate == pytest.approx(1000)
     place = np.flatnonzero((recording.readings[0] == COUNTS).all(axis=1))[0]
     assert np.array_equal(recording.readings[:20], np.roll(COUNTS, -place, axis=0)[:20])
+
+
+MPU_PART = """name = "warm_chip"
+lsb_m_s2 = 0.0048
+noise_lsb_rms_100_hz = [1.0, 1.0, 1.0]
+temperature_lsb_K = -0.5
+temperature_zero_degC = 100.0
+"""
+ONE_WARM_CHIP = """name = "one_warm_chip"
+[[chip]]
+name = "a1"
+part = "warm_chip.toml"
+position_m = [0.0, 0.0, 0.0]
+axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+"""
+WARM_PACKET = """name = "warm"
+array = "one_warm_chip.toml"
+clock_hz = 1e6
+no_temperature = -999
+[stream]
+kind = "packet"
+checksum = "sum8"
+[[stream.fields]]
+name = "sync"
+type = "u8"
+value = [170]
+[[stream.fields]]
+name = "time"
+type = "u32"
+[[stream.fields]]
+name = "counts"
+type = "i16"
+count = 3
+[[stream.fields]]
+name = "temperature"
+type = "i16"
+"""
+
+
+@pytest.fixture
+def warm_files(tmp_path):
+    (tmp_path / "warm_chip.toml").write_text(MPU_PART)
+    (tmp_path / "one_warm_chip.toml").write_text(ONE_WARM_CHIP)
+    return tmp_path
+
+
+def test_a_packet_s_temperature_is_scaled_by_the_part(warm_files) -> None:
+    (warm_files / "warm.toml").write_text(WARM_PACKET)
+    raw = [150, -999, 148]
+    stream = b""
+    for k, count in enumerate(raw):
+        body = struct.pack("<BI3hh", 170, 1000 * k, 1, 2, 3, count)
+        stream += body + bytes([sum(body) & 0xFF])
+    samples, _ = decoded(warm_files / "warm.toml", stream, step=5)
+    np.testing.assert_allclose(samples.temperature_degC, [25.0, np.nan, 26.0])  # 100 - 0.5 per count
+
+
+def test_a_temperature_in_degrees_or_in_counts_of_the_part_on_a_line(warm_files) -> None:
+    head = 'name = "l"\narray = "one_warm_chip.toml"\nclock_hz = 1e6\n'
+    stream = (
+        '[stream]\nkind = "text"\ncolumns = ["time", "a11", "a12", "a13", "temperature"]\noptional = ["temperature"]\n'
+    )
+    lines = b"1000,1,2,3,150\n2000,1,2,3\n3000,1,2,3,148\n"
+    (warm_files / "raw.toml").write_text(head + stream)
+    (warm_files / "si.toml").write_text(head + 'unit = "m_s2"\n' + stream)
+    np.testing.assert_allclose(decoded(warm_files / "raw.toml", lines)[0].temperature_degC, [25.0, np.nan, 26.0])
+    np.testing.assert_allclose(decoded(warm_files / "si.toml", lines)[0].temperature_degC, [150.0, np.nan, 148.0])
+
+
+def test_a_part_without_a_temperature_needs_its_figures_in_the_format(tmp_path) -> None:
+    text = WARM_PACKET.replace("one_warm_chip.toml", "one_adxl345")
+    (tmp_path / "warm.toml").write_text(text)
+    with pytest.raises(InputError, match="temperature_lsb_K and temperature_zero_degC: part 'adxl345' states none"):
+        load_format(tmp_path / "warm.toml")
+    (tmp_path / "warm.toml").write_text(
+        text.replace("no_temp", "temperature_lsb_K = 1.0\ntemperature_zero_degC = 0.0\nno_temp")
+    )
+    assert load_format(tmp_path / "warm.toml").temperature is not None
+
+
+def test_a_sketch_of_twelve_counts_may_add_the_temperature() -> None:
+    counts = ",".join(map(str, range(12)))
+    stream = f"1000,{counts}\r\n2250,{counts},24.81\r\n".encode()
+    samples, decoder = decoded("arduino_csv", stream)
+    assert decoder.counts.samples == 2
+    np.testing.assert_allclose(samples.temperature_degC, [np.nan, 24.81])
+
+
+def test_optional_columns_are_the_last_ones(tmp_path) -> None:
+    (tmp_path / "f.toml").write_text(
+        'name = "f"\narray = "one_adxl345"\nclock_hz = 1e6\n[stream]\nkind = "text"\n'
+        'columns = ["time", "temperature", "a11", "a12", "a13"]\noptional = ["temperature"]\n'
+    )
+    with pytest.raises(InputError, match="optional temperature: name the last of the columns"):
+        load_format(tmp_path / "f.toml")

@@ -128,6 +128,7 @@ def samples_at(ticks, *, status=None, lost=None, segment=None) -> Samples:
         np.asarray(none if status is None else status, dtype=np.uint16),
         none if lost is None else np.asarray(lost),
         none if segment is None else np.asarray(segment),
+        np.full(n, np.nan),
     )
 
 

@@ -94,7 +94,7 @@ def test_virtual_board_to_file(tmp_path, port: str, name: str) -> None:
         pytest.skip("no pseudo-terminals on Windows")
     out = tmp_path / name
     with served_board(port, realtime=False) as device:
-        report = record(device, out, duration_s=2.0, setup=(set_range(8), set_rate(800)))
+        report = record(device, out, duration_s=2.0, array="cube12", setup=(set_range(8), set_rate(800)))
     recording = Recording.read(out)
     assert report.stream.lost == report.stream.corrupt == 0
     assert report.identity is not None

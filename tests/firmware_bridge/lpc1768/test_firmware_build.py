@@ -9,7 +9,15 @@ import tomllib
 import pytest
 
 from firmware_bridge.lpc1768 import build as firmware
-from firmware_bridge.lpc1768.build import IMAGES, build, check_image, compiler_version, image_path, source_hash
+from firmware_bridge.lpc1768.build import (
+    IMAGES,
+    build,
+    check_image,
+    compiler_version,
+    image_path,
+    named_image,
+    source_hash,
+)
 from firmware_bridge.lpc1768.elf import ElfImage
 from gfimu.errors import GfimuError, InputError
 
@@ -90,4 +98,23 @@ def test_compiler_errors_are_shown(tmp_path) -> None:
     pytest.importorskip("ziglang", reason="the C compiler is in the extra 'firmware'")
     with pytest.raises(GfimuError, match="out of the SSP's reach"):
         build("gfimu", tmp_path, defines={"GFIMU_SPI_HZ": "1000U"})
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_array_is_built_in_or_written_into_a_finished_image(tmp_path) -> None:
+    pytest.importorskip("ziglang", reason="the C compiler is in the extra 'firmware'")
+    built = ElfImage.load(build("gfimu", tmp_path, array="cube12_as_built").elf)
+    written = named_image(ElfImage.load(image_path()), "cube12_as_built")
+    place = built.symbols["gfimu_array"]
+    for image in (built, written):
+        assert image.read(image.symbols["gfimu_array"], 25) == b"cube12_as_built".ljust(25, b"\0")
+    assert ElfImage.load(image_path()).read(place, 25) == b"\0" * 25
+    selfcheck = ElfImage.load(image_path("selfcheck"))
+    assert named_image(selfcheck, "cube12") is selfcheck  # it states none
+
+
+@pytest.mark.parametrize("name", ["x" * 25, 'a"b', "two words", "würfel"])
+def test_a_name_that_no_frame_can_hold_is_refused(name: str, tmp_path) -> None:
+    with pytest.raises(InputError, match="at most 24 plain characters"):
+        build("gfimu", tmp_path, array=name)
     assert not list(tmp_path.iterdir())

@@ -13,6 +13,7 @@ from firmware_bridge.adxl345.device import Adxl345
 from firmware_bridge.adxl345.registers import RAW_PER_COUNT, TICKS_PER_SECOND, Adxl345Options, LineFault
 from firmware_bridge.frames.checksum import crc16
 from firmware_bridge.frames.commands import (
+    ArrayName,
     Command,
     Identity,
     Reply,
@@ -112,6 +113,45 @@ def test_crc_agrees_with_the_hosts(library) -> None:
 def test_rate_codes(library) -> None:
     codes = {10: 10, 100: 10, 101: 11, 200: 11, 400: 12, 800: 13, 1000: 14, 1600: 14, 1601: 15, 3200: 15}
     assert {rate: library.host_rate_code(rate) for rate in codes} == codes
+
+
+@pytest.fixture(scope="module")
+def named_library(tmp_path_factory):
+    return ctypes.CDLL(str(build_host_library(tmp_path_factory.mktemp("named"), array="cube12_as_built")))
+
+
+def test_it_states_its_array_before_each_identity(named_library) -> None:
+    host = Host(named_library)
+    host.library.host_poll()
+    name, identity = host.messages()
+    assert name == ArrayName("cube12_as_built")
+    assert isinstance(identity, Identity)
+    host.send(encode_command(Command.IDENTIFY))
+    assert [type(message) for message in host.messages()] == [Reply, ArrayName, Identity]
+
+
+def test_a_line_that_is_full_delays_the_statement_and_loses_none(named_library) -> None:
+    host = Host(named_library)
+    host.library.host_poll()
+    host.messages()
+    host.library.host_start()
+    host.sample(60, drain=False)  # more than the queue holds: one place is left to messages
+    host.send(encode_command(Command.IDENTIFY))
+    for _ in range(3):
+        host.drain()
+        host.library.host_poll()
+    assert [type(message) for message in host.messages()] == [Reply, ArrayName, Identity]
+
+
+def test_the_temperature_goes_with_every_sample(host: Host) -> None:
+    host.library.host_poll()
+    host.library.host_start()
+    assert np.isnan(host.sample(5).temperature_degC).all()
+    host.library.host_set_temperature(-1234)
+    np.testing.assert_allclose(host.sample(3).temperature_degC, -12.34)
+    host.library.host_set_temperature(-(1 << 15))
+    host.send(encode_command(Command.IDENTIFY))
+    assert host.messages()
 
 
 def test_it_announces_itself_and_configures_the_chips(host: Host) -> None:

@@ -66,6 +66,19 @@ def test_one_chip(compile_sender, tmp_path) -> None:
     assert (report.identity.present, report.identity.faulty) == ((True, False, False, False), (False,) * 4)
 
 
+def test_a_sender_states_its_array_and_its_temperature(compile_sender, tmp_path) -> None:
+    named = compile_sender(*STRICT, '-DGFIMU_ARRAY="cube12_as_built"', "-DGFIMU_TEMPERATURE", "ports/host.c", *CORE)
+    with running(named) as port:
+        report = gfimu.record(port, tmp_path / "run.parquet", duration=1.0)
+    assert (report.array, report.array_stated_by) == ("cube12_as_built", "board")
+    recording = gfimu.Recording.read(tmp_path / "run.parquet")
+    assert recording.array is not None
+    assert recording.array.name == "cube12_as_built"
+    warm = recording.reference["temperature_degC"]
+    assert 25.0 <= warm[0] <= 26.0
+    assert warm[-1] - warm[0] == pytest.approx(0.1, abs=0.021)  # 0.01 °C per 100 ms
+
+
 def test_two_of_four_chips_that_answer(program, tmp_path) -> None:
     with running(program, "--chips", "2") as port:
         report = gfimu.record(port, tmp_path / "all.csv", duration=0.5)

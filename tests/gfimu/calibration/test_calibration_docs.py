@@ -40,6 +40,17 @@ def test_what_holds_of_the_persian_papers_ranking(project_root, tmp_path):
     assert (tmp_path / "histograms.png").stat().st_size > 5000
 
 
+def test_the_wavelet_input_is_compared_with_averages(project_root, page):
+    script = load(project_root, "compare_calibrations")
+    ratios = script.compare_wavelets(1, levels=(2,))
+    for name in ("six-position (SPS)", "multi-position (MP)"):
+        found = [ratios[name, 2, threshold] for threshold in script.THRESHOLDS]
+        assert found == pytest.approx([1.0] * 3, abs=0.05)
+    rows = script.wavelet_table(ratios).splitlines()
+    assert len(rows) == 4
+    assert rows[0] in page
+
+
 def test_figures_and_the_numbers_quoted(project_root, page, tmp_path):
     script = load(project_root, "make_calibration_figures")
     found = script.main(tmp_path)

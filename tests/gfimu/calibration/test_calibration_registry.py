@@ -40,7 +40,8 @@ def test_an_unknown_method_is_one_line_with_the_list(ask):
         ask("seven-position")
     assert str(refused.value) == (
         "unknown calibration method 'seven-position'; "
-        "valid: array, gyro, multi-position, recursive, six-position, twelve-position; did you mean 'twelve-position'?"
+        "valid: array, gyro, gyro-rate-table, multi-position, recursive, six-position, spin, twelve-position; "
+        "did you mean 'twelve-position'?"
     )
 
 

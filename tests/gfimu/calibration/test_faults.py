@@ -1,5 +1,7 @@
 """From a recording to a calibration, and every fault of calibration data named."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from calibration_cases import FACES, GRAVITY, MULTI
@@ -31,6 +33,15 @@ def test_two_chips_from_a_recording(triad, mti, method, kind):
     still = detect_rest(corrected)
     means = averaged_poses(corrected, still).means
     np.testing.assert_allclose(np.linalg.norm(means[:, :3], axis=1), GRAVITY, atol=0.002)
+
+
+def test_the_statistics_state_what_the_weights_were_made_from(triad):
+    recording = pose_recording([triad], MULTI, np.random.default_rng(1), still_s=4.0, sigma=0.01)
+    recording = replace(recording, metadata={"part": "adxl345"})
+    found = calibrate("six-position", recording, gravity=GRAVITY, levelling_std_rad=2e-3).statistics
+    assert found["levelling_std_rad"] == 2e-3
+    assert found["a1_mean_noise_m_s2"] == pytest.approx(0.01 / np.sqrt(400), rel=0.2)  # rests are cut a little short
+    assert found["a1_quadratic_prior_std_per_m_s2"] == pytest.approx(0.005 / 156.9064)
 
 
 def test_raw_counts(mti):

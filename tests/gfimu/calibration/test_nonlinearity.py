@@ -117,6 +117,15 @@ def test_the_factor_makes_errors_of_unit_variance(dof, kappa):
     assert 0.9 < np.sqrt(np.mean((1 + kappa) / factors)) < 1.1
 
 
+def test_a_misfit_that_known_errors_explain_leaves_the_noise_as_it_is():
+    """Of a misfit of 70 that is expected, the factor leaves little; of one that is not, most."""
+    rng = np.random.default_rng(5)
+    misfits = 70.0 * rng.chisquare(30, 200) / 30
+    assert np.median([mean_factor(misfit, 30, 69.0) for misfit in misfits]) < 4.0
+    assert 60.0 < np.median([mean_factor(misfit, 30) for misfit in misfits]) < 80.0
+    assert abs(mean_factor(70.0, 30, 10.0) / (mean_factor(70.0, 30) - 10.0) - 1.0) < 0.05
+
+
 def test_a_factor_learned_elsewhere_is_used():
     assert covariance_scale(1.0, 9, 2.5)[0] == 2.5
     assert covariance_scale(float("nan"), 0)[0] == 1.0

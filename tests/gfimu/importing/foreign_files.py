@@ -114,6 +114,31 @@ def ulog(path):
     return path
 
 
+WARM = 30.0 + np.round(2.0 * np.sin(0.7 * T), 2)  # (n,), °C
+
+
+def ulog_accel(path, *, warm=True):
+    """A log of PX4 with the topic of one chip, with its temperature or, as some had it, without."""
+
+    def message(kind, body):
+        return struct.pack("<HB", len(body), ord(kind)) + body
+
+    form = b"sensor_accel:uint64_t timestamp;float x;float y;float z;" + (b"float temperature;" if warm else b"")
+    content = b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 0)
+    content += message("F", form) + message("A", struct.pack("<BH", 0, 7) + b"sensor_accel")
+    for t, force, degrees in zip(T, FORCE, WARM, strict=True):
+        values = (*force, degrees) if warm else force
+        content += message("D", struct.pack(f"<HQ{len(values)}f", 7, round(5e6 + t * 1e6), *values))
+    path.write_bytes(content)
+    return path
+
+
+def mpu6050(path):
+    """What a usual sketch prints of an MPU-6050: g, °/s and °C."""
+    header = ["time_ms,ax_g,ay_g,az_g,gx_deg_s,gy_deg_s,gz_deg_s,Temp"]
+    return rows(path, header, [1e3 * T, *(FORCE / 9.80665).T, *np.degrees(GYRO).T, WARM])
+
+
 def _messages(store):
     imu, header, stamp, vector, turn = (
         store.types[name]

@@ -69,6 +69,25 @@ def test_a_suggested_map_reads_the_file(case, tmp_path):
         assert np.column_stack([recording.reference[axis] for axis in GYRO]) == pytest.approx(files.GYRO, abs=gyro)
 
 
+@pytest.mark.parametrize("warm", [True, False])
+def test_the_temperature_of_a_chip_is_kept_where_a_log_has_it(tmp_path, warm):
+    recording = mapped_recording(files.ulog_accel(tmp_path / "log.ulg", warm=warm), "ulog_accel")
+    assert recording.readings == pytest.approx(files.FORCE, abs=1e-6)
+    if warm:
+        assert recording.reference["temperature_degC"] == pytest.approx(files.WARM, abs=1e-4)
+    else:
+        assert "temperature_degC" not in recording.reference
+
+
+def test_the_temperature_of_a_sketch_is_recognised(tmp_path):
+    path = files.mpu6050(tmp_path / "mpu.csv")
+    file = tmp_path / "suggested.toml"
+    file.write_text(inspect_file(path).map_text())
+    recording = mapped_recording(path, load_map(file))
+    assert recording.reference["temperature_degC"] == pytest.approx(files.WARM)
+    assert recording.readings == pytest.approx(files.FORCE, abs=1e-6)
+
+
 def test_a_written_recording_reads_back_with_what_else_the_file_held(tmp_path):
     recording = mapped_recording(files.xsens_dot(tmp_path / "dot.csv"), "xsens_dot")
     recording.write(tmp_path / "run.csv")

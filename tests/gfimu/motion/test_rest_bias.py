@@ -9,10 +9,11 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.spatial.transform import Rotation
 
 from gfimu import AccelerometerArray, InputError, Recording, specific_force
-from gfimu.motion.rest_bias import RestBias, estimate_from_rest, rest_bias
+from gfimu.motion.rest_bias import RestBias, estimate_from_rest, force_at_rest, rest_bias
 
 ARRAY = AccelerometerArray.load("cube12")
 BIAS = np.linspace(-0.5, 0.4, 12)
+MILLI_G = 9.80665e-3
 
 
 def recording(noise: float, *, mounting=(0.0, 0.0, 0.0), seed: int = 0, still: bool = True) -> Recording:
@@ -82,3 +83,56 @@ def test_the_rate_stays_within_the_band_it_gives():
     # The mean square of 40 standard normal scores is within 4 standard deviations, 4 √(2/40), of 1.
     assert np.mean(np.square(scores)) == pytest.approx(1.0, abs=4 * np.sqrt(2 / 40))
     assert found.metadata["rest_bias_m_s2"]["a11"] == pytest.approx(BIAS[0], abs=0.02)
+
+
+def of_p(bias):
+    """Equivalent biases of p by the closed form of the cube: a quarter of the sum of four channels, mg."""
+    return np.asarray(bias).reshape(4, 3).mean(axis=0) / MILLI_G
+
+
+@pytest.mark.parametrize("mounting", [(0.0, 0.0, 0.0), (np.pi / 2, 0.0, 0.0)])
+def test_equivalent_biases_of_p_are_the_mean_over_the_chips(mounting):
+    found = force_at_rest(recording(1e-9, mounting=mounting), ARRAY)
+    assert_allclose(found.bias_mg, of_p(BIAS), atol=1e-5)
+    up = Rotation.from_rotvec(mounting).inv().apply([0.0, 0.0, 1000.0])  # mg
+    assert found.magnitude_mg == pytest.approx(np.linalg.norm(up + of_p(BIAS)) - 1000.0, abs=1e-5)
+
+
+def test_equivalent_biases_of_p_are_as_sure_as_they_say():
+    found = [force_at_rest(recording(0.03, seed=seed), ARRAY) for seed in range(40)]
+    scores = [(one.bias_mg - of_p(BIAS)) / one.std_mg for one in found]
+    # 120 standard normal scores: their variance is within 4 standard deviations, 4 √(2/120), of 1.
+    assert np.var(scores) == pytest.approx(1.0, abs=4 * np.sqrt(2 / 120))
+    # Noise of 0.03 m/s² in four channels, over the 351 samples of the rest.
+    samples = round((found[0].stop_s - found[0].start_s) / 0.01) + 1
+    assert_allclose(found[0].std_mg, 0.03 / 2.0 / np.sqrt(samples) / MILLI_G, rtol=4 / np.sqrt(2 * samples))
+
+
+def test_a_lean_reads_as_a_bias_and_is_stated_as_one():
+    lean = 0.005
+    run = recording(1e-9, mounting=(lean, 0.0, 0.0))
+    level = Recording(run.t_s, run.readings - BIAS, run.channels, run.reference)
+    found = force_at_rest(level, ARRAY)
+    assert_allclose(found.bias_mg[:2], [0.0, 1000.0 * np.sin(lean)], atol=1e-4)
+    assert found.lean_rad == pytest.approx(lean, rel=1e-5)
+    assert abs(found.magnitude_mg) < 1e-5
+
+
+def test_local_gravity_is_taken_off():
+    found = force_at_rest(recording(1e-9), ARRAY, gravity=9.80665 + 0.01)
+    assert found.bias_mg[2] == pytest.approx(of_p(BIAS)[2] - 0.01 / MILLI_G, abs=1e-5)
+
+
+def test_without_rest_or_sight_there_are_no_equivalent_biases():
+    assert force_at_rest(recording(0.03, still=False), ARRAY) is None
+    assert force_at_rest(recording(0.03), ARRAY, without=ARRAY.channels[:7]) is None
+
+
+def test_a_channel_left_out_has_no_part_in_p():
+    run = recording(1e-9)
+    hurt = run.readings.copy()
+    hurt[:, 4] = np.nan
+    found = force_at_rest(Recording(run.t_s, hurt, run.channels, run.reference), ARRAY, without=["a22"])
+    kept = np.arange(12) != 4
+    left_inverse = np.linalg.pinv(ARRAY.regression_matrix[kept])
+    assert_allclose(found.bias_mg, left_inverse[3:] @ BIAS[kept] / MILLI_G, atol=1e-5)

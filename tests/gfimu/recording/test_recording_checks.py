@@ -145,6 +145,13 @@ def table_run():
     return Recording.from_arrays(t, readings, CUBE, metadata={"mounting_rotvec_rad": [0, 0, 0]})
 
 
+@pytest.mark.parametrize("seed", [3005, 3008, 3009])
+def test_a_short_run_of_uncalibrated_chips_is_accepted(seed):
+    """One rest, then a spin: the α that biases read there adds up to many times the rate, unless it is taken off."""
+    run = simulate(Scenario.load("paper_run", changes=["duration_s=10"]), seed=seed)
+    assert not check_recording(run, CUBE)
+
+
 @pytest.mark.parametrize("name", WRONG)
 def test_a_wrong_file_is_refused_with_its_cause(table_run, name):
     spoil, kind, words = WRONG[name]

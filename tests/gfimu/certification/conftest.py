@@ -1,0 +1,9 @@
+"""Random numbers of the tests of certificates."""
+
+import numpy as np
+import pytest
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(36)

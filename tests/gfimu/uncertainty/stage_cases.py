@@ -1,0 +1,42 @@
+"""A triad, its calibrations by every method, and the intrinsic parameters, shared by the tests of type B."""
+
+import numpy as np
+
+from gfimu.calibration.error_model import ErrorModel
+from gfimu.calibration.multi_position import multi_position
+from gfimu.calibration.observations import Observations
+from gfimu.calibration.recursive import recursive
+from gfimu.calibration.six_position import six_position
+from gfimu.calibration.twelve_position import twelve_position
+from tests.gfimu.calibration.calibration_cases import FACES, GRAVITY, MULTI, TWELVE
+
+PERFECT = ErrorModel(np.eye(3), np.zeros(3))
+SKEW = ErrorModel(
+    np.array([[1.01, 0.01, -0.005], [0.008, 0.99, 0.01], [-0.01, 0.006, 1.02]]), np.array([0.1, -0.2, 0.05])
+)
+METHODS = {
+    "six-position": (six_position, FACES),
+    "recursive": (recursive, FACES),
+    "twelve-position": (twelve_position, TWELVE),
+    "multi-position": (multi_position, MULTI),
+}
+
+
+def calibration_of(name, model=SKEW, **options):
+    """Calibration of a triad from readings without error."""
+    method, poses = METHODS[name]
+    observations = Observations.from_means(model.read(GRAVITY * poses), 1e-6 * np.eye(3))
+    return method(observations, gravity=GRAVITY, **options)
+
+
+def values(calibration):
+    return calibration.values
+
+
+def intrinsic(calibration):
+    """Three sensitivities, three angles (xy, xz, yz; rad) and three offsets of the first chip, written out here."""
+    model = calibration.models[calibration.chips[0]]
+    size = np.linalg.norm(model.sensitivity, axis=1)
+    rows = model.sensitivity / size[:, None]
+    angles = [np.arccos(rows[i] @ rows[j]) for i, j in ((0, 1), (0, 2), (1, 2))]
+    return np.concatenate([size, angles, model.bias])
