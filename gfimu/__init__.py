@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from gfimu.calibration.result import load_calibration as load_calibration
     from gfimu.commands import firmware as firmware
     from gfimu.commands.calibrate import calibrate as calibrate
+    from gfimu.commands.campaign import campaign as campaign
     from gfimu.commands.catalogue import catalogue as catalogue
     from gfimu.commands.catalogue import new as new
     from gfimu.commands.catalogue import show as show
@@ -121,6 +122,7 @@ _PUBLIC = {
     "calibrate": "gfimu.commands.calibrate",
     "calibrate_array": "gfimu.calibration.array_calibration",
     "centripetal_agreement": "gfimu.motion.estimate_summary",
+    "campaign": "gfimu.commands.campaign",
     "catalogue": "gfimu.commands.catalogue",
     "certificate": "gfimu.commands.certificate",
     "check": "gfimu.commands.check",

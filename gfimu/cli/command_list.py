@@ -118,6 +118,12 @@ JOBS: dict[str, tuple[Entry, ...]] = {
             "Simulate a scenario on the MuJoCo turntable and write what the board would have recorded.",
             "simulate",
         ),
+        Entry(
+            "campaign",
+            "Run many simulated cases by a plan into one dataset, and summarise it; a second call goes on where one "
+            "ended.",
+            "campaign",
+        ),
         Entry("firmware", "The LPC1768 image in the emulator: run, build, selftest, trace, faults, check.", "firmware"),
     ),
 }

@@ -50,7 +50,7 @@ class CampaignResult:
         }
 
 
-@writes(reads=("plan",), out=OutputFolder(()))
+@writes(reads=("plan",), out=OutputFolder(("plan.toml",)))
 def campaign(
     plan: str | Path,
     *,
@@ -87,14 +87,12 @@ def campaign(
     InputError
         If the plan is wrong, a folder is needed or holds another campaign, or Dask is not installed.
     """
-    import os
-
     from gfimu.commands.campaign_cases import KINDS, check_factors
     from gfimu.errors import InputError
     from sim.sweep.dataset import Dataset
     from sim.sweep.design import Design
     from sim.sweep.engine import run_campaign
-    from sim.sweep.executors import open_executor
+    from sim.sweep.executors import open_executor, processors
     from sim.sweep.plan import load_plan
     from sim.sweep.summary import failures, grouped
 
@@ -110,7 +108,7 @@ def campaign(
         if out is None:
             raise InputError(f"{plan}: give the folder of the campaign with --out")
         dataset = Dataset.create(out, plan)
-        count = workers or len(os.sched_getaffinity(0))
+        count = workers or processors()
         run_campaign(
             dataset,
             KINDS[found.kind],

@@ -41,8 +41,8 @@ _OF_STUDY = {
 def estimate_case(case: Case) -> Mapping[str, float]:
     """Simulate a scenario, calibrate the unit if asked for, estimate its motion, and compare that with the truth.
 
-    Factors: ``scenario``, ``method`` (of the angular rate), ``calibration`` (``none``; ``rest``: biases read at the first
-    rest; ``poses``: a calibration from poses of the same chips), ``array``, ``part``, ``duration_s``,
+    Factors: ``scenario``, ``method`` (of the angular rate), ``calibration`` (``none``; ``rest``: biases read at the
+    first rest; ``poses``: a calibration from poses of the same chips), ``array``, ``part``, ``duration_s``,
     ``sample_rate_hz``, and any key of the scenario file.
 
     Returns

@@ -21,6 +21,7 @@ FILE_KINDS = {
     "scenario": "sim.scenario_file.ScenarioFile",
     "frame": "firmware_bridge.frames.format_file.FormatFile",
     "stage": "gfimu.uncertainty.stage.Stage",
+    "plan": "sim.sweep.plan.PlanFile",
 }
 """Kinds of files by name, and the struct that is the schema of each."""
 
@@ -37,6 +38,7 @@ def file_schema(kind: str) -> type[msgspec.Struct]:
 _MARKS = {
     "array": "chip",
     "part": "noise_lsb_rms_100_hz",
+    "plan": "factors",
     "frame": "stream",
     "map": "channels",
     "scenario": "motion",

@@ -50,7 +50,7 @@ class Dataset:
         found, path = load_plan(plan), Path(folder)
         kept = path / _PLAN
         if kept.exists() and load_plan(kept) != found:
-            raise InputError(f"{path}: holds another plan; give another --out, or run its own {kept}")
+            raise InputError(f"{path}: holds another plan; give another --out")
         if path.exists() and not kept.exists() and any(path.iterdir()):
             raise InputError(f"{path}: is not empty and no campaign; give another --out")
         path.mkdir(parents=True, exist_ok=True)

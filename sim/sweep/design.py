@@ -70,7 +70,9 @@ class Design:
         plan, factors = self.plan, self.plan.factors.values()
         if plan.design == "grid":
             axes = [
-                np.linspace(0.0, 1.0, one.levels or 2) if isinstance(one, RangeTable) else np.arange(len(one), dtype=float)
+                np.linspace(0.0, 1.0, one.levels or 2)
+                if isinstance(one, RangeTable)
+                else np.arange(len(one), dtype=float)
                 for one in factors
             ]
             count = int(np.prod([len(axis) for axis in axes], dtype=float))
@@ -87,7 +89,7 @@ class Design:
         values: dict[str, Value] = {}
         for (name, factor), place in zip(self.plan.factors.items(), point, strict=True):
             if isinstance(factor, RangeTable):
-                low, high = (np.log([factor.low, factor.high]) if factor.scale == "log" else (factor.low, factor.high))
+                low, high = np.log([factor.low, factor.high]) if factor.scale == "log" else (factor.low, factor.high)
                 value = float(low + place * (high - low))
                 values[name] = float(np.exp(value)) if factor.scale == "log" else value
             else:
@@ -107,4 +109,6 @@ def _unit_cube(design: str, dimensions: int, count: int, seed: int) -> NDArray[n
 
 def _check_count(count: int) -> None:
     if count > _MOST_POINTS:
-        raise InputError(f"the plan has {count} combinations, at most {_MOST_POINTS}; use fewer points and more repeats")
+        raise InputError(
+            f"the plan has {count} combinations, at most {_MOST_POINTS}; use fewer points and more repeats"
+        )

@@ -13,10 +13,15 @@ from multiprocessing.queues import SimpleQueue
 
 from gfimu.errors import InputError
 
-__all__ = ["open_executor"]
+__all__ = ["open_executor", "processors"]
 
 _WATCH_PERIOD = 2.0  # s
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+def processors() -> int:
+    """Return how many processors this process has."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @contextmanager
@@ -45,10 +50,10 @@ def _shares(workers: int) -> list[set[int]]:
     """Deal the processors out to the workers, so that what one does on several of them takes none from another."""
     if not hasattr(os, "sched_getaffinity"):
         return [set() for _ in range(workers)]
-    processors = sorted(os.sched_getaffinity(0))
-    if workers >= len(processors):
-        return [{processors[worker % len(processors)]} for worker in range(workers)]
-    return [set(processors[worker::workers]) for worker in range(workers)]
+    mine = sorted(os.sched_getaffinity(0))
+    if workers >= len(mine):
+        return [{mine[worker % len(mine)]} for worker in range(workers)]
+    return [set(mine[worker::workers]) for worker in range(workers)]
 
 
 def _begin(parent: int, shares: SimpleQueue[set[int]]) -> None:

@@ -22,10 +22,12 @@ class RangeTable(Table, frozen=True):
 
     low: Annotated[float, about("Lower limit.")]
     high: Annotated[float, about("Upper limit.")]
-    scale: Annotated[Literal["linear", "log"], about("Whether values or their logarithms are spread evenly.")] = "linear"
-    levels: Annotated[
-        Annotated[int, msgspec.Meta(ge=2)] | None, about("Values of a grid, both limits included.")
-    ] = None
+    scale: Annotated[Literal["linear", "log"], about("Whether values or their logarithms are spread evenly.")] = (
+        "linear"
+    )
+    levels: Annotated[Annotated[int, msgspec.Meta(ge=2)] | None, about("Values of a grid, both limits included.")] = (
+        None
+    )
 
 
 class PlanFile(Table, frozen=True):

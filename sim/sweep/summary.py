@@ -86,7 +86,9 @@ def grouped(rows: Sequence[Row], plan: PlanFile, by: Sequence[str] = ()) -> list
     for values, members in groups.items():
         failed = sum(bool(row["failure"]) for row in members)
         for result in results:
-            numbers = [row[result] for row in members if isinstance(row.get(result), float | int)]
+            numbers = [
+                row[result] for row in members if isinstance(row.get(result), float | int) and np.isfinite(row[result])
+            ]
             if numbers:
                 low, median, high = _share(numbers) if isinstance(numbers[0], bool) else _quantiles(numbers)
                 named = dict(zip(names, values, strict=True))

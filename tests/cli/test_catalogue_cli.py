@@ -13,6 +13,7 @@ from gfimu.parts.part import Part
 from gfimu.uncertainty.stage import Stage
 from sim.data_sheet import DataSheet
 from sim.scenarios import Scenario
+from sim.sweep.plan import load_plan
 from sim.twin import Twin
 
 LOADERS = {
@@ -23,6 +24,7 @@ LOADERS = {
     "scenario": Scenario.load,
     "frame": load_format,
     "stage": Stage.load,
+    "plan": load_plan,
 }
 
 

@@ -41,6 +41,7 @@ NAMES_A_FILE = {
     "also",
     "recording",
     "column_map",
+    "plan",
 }
 
 CALLS = {
@@ -61,6 +62,7 @@ CALLS = {
     "optimize": {"chips": "4", "restarts": "1"},
     "demo": {},
     "new": {"kind": "array", "out": "made.toml"},
+    "campaign": {"plan": "in.toml", "out": "made"},
     "firmware run": {},
     "firmware build": {},
     "firmware trace": {"out": "made.vcd"},

@@ -1,0 +1,59 @@
+"""`gfimu campaign`: a plan is run, gone on with, and summarised; what is wrong with it is one line."""
+
+import json
+
+import pytest
+
+PLAN = """
+repeats = 1
+batch = 1
+[factors]
+scenario = ["paper_run"]
+method = ["integrate", "filter"]
+duration_s = [6.0]
+"sensor.range_g" = [16, 3]
+"""
+
+
+def test_a_plan_is_run_and_gone_on_with(gfimu_command, tmp_path):
+    plan, out = tmp_path / "plan.toml", tmp_path / "out"
+    plan.write_text(PLAN)
+    first = gfimu_command("campaign", plan, "--out", out, "--workers", 1, "--json")
+    assert first.code == 0, first.stderr
+    found = json.loads(first.stdout)
+    assert (found["cases"], found["done"]) == (4, 4)
+    assert found["failures"] == {"adxl345: unknown range_g 3; valid: 2, 4, 8, 16": 2}
+    omega = {
+        (group["values"]["method"], group["values"]["sensor.range_g"]): group["median"]
+        for group in found["groups"]
+        if group["result"] == "omega_rms_rad_s"
+    }
+    assert 0.0 < omega["filter", 16] < omega["integrate", 16]
+    before = {file.name: file.stat().st_mtime_ns for file in out.iterdir()}
+    again = gfimu_command("campaign", plan, "--out", out)
+    assert again.code == 0
+    assert {file.name: file.stat().st_mtime_ns for file in out.iterdir()} == before
+    shown = gfimu_command("campaign", out, "--by", "method")
+    assert shown.code == 0
+    assert "4 of 4 cases" in " ".join(shown.stdout.split())
+    assert "omega_rms_rad_s" in shown.stdout
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (PLAN.replace("integrate", "guess"), "unknown method 'guess'"),
+        (PLAN.replace("sensor.range_g", "sensor.rnge_g"), "rnge_g"),
+        ('kind = "dream"\n' + PLAN, "unknown kind 'dream'"),
+        ('kind = "diagnose"\n[factors]\ncolour = ["red"]\n', "colour"),
+    ],
+)
+def test_a_wrong_plan_is_one_line_and_writes_nothing(gfimu_command, tmp_path, text, message):
+    plan = tmp_path / "plan.toml"
+    plan.write_text(text)
+    result = gfimu_command("campaign", plan, "--out", tmp_path / "out")
+    assert result.code == 2
+    assert message in result.stderr
+    assert result.stderr.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+    assert gfimu_command("campaign", plan).code == 2

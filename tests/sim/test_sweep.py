@@ -1,0 +1,171 @@
+"""Campaigns: the cases of a plan, and that nothing is lost or run twice, whatever dies."""
+
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from sweep_cases import always_dies, dies_once, quick
+
+from gfimu.errors import InputError
+from sim.sweep.dataset import Dataset
+from sim.sweep.design import Design
+from sim.sweep.engine import run_campaign
+from sim.sweep.executors import open_executor
+from sim.sweep.plan import load_plan
+from sim.sweep.summary import failures, grouped
+
+GRID = """
+repeats = 3
+seed = 7
+batch = 4
+[factors]
+size = [1, 2, 5]
+name = ["x", "y"]
+"""
+SPREAD = """
+design = "{design}"
+points = 64
+[factors]
+size = [1, 2]
+[factors.noise]
+low = 1e-3
+high = 1e-1
+scale = "log"
+[factors.angle]
+low = -1.0
+high = 3.0
+"""
+
+
+def plan_file(folder, text):
+    path = folder / "plan.toml"
+    path.write_text(text)
+    return path
+
+
+@contextmanager
+def threads(count):
+    with ThreadPoolExecutor(count) as pool:
+        yield pool
+
+
+def run(folder, plan, work=quick, opened=threads, workers=2):
+    dataset = Dataset.create(folder, plan)
+    return dataset, run_campaign(dataset, work, opened, workers)
+
+
+def content(folder):
+    return {file.name: file.read_bytes() for file in sorted(folder.iterdir())}
+
+
+def test_a_grid_has_every_combination_with_every_seed(tmp_path):
+    design = Design(load_plan(plan_file(tmp_path, GRID)))
+    cases = [design[number] for number in range(len(design))]
+    assert len(cases) == 3 * 2 * 3
+    assert len({(case.values["size"], case.values["name"], case.seed) for case in cases}) == 18
+    assert len({case.seed for case in cases}) == 3  # combinations are compared on the same chips
+
+
+@pytest.mark.parametrize("design", ["random", "latin_hypercube", "sobol"])
+def test_ranges_are_filled_evenly(tmp_path, design):
+    drawn = Design(load_plan(plan_file(tmp_path, SPREAD.format(design=design))))
+    values = [drawn[number].values for number in range(len(drawn))]
+    noise, angle = np.array([v["noise"] for v in values]), np.array([v["angle"] for v in values])
+    assert noise.min() >= 1e-3
+    assert noise.max() <= 1e-1
+    assert angle.min() >= -1.0
+    assert angle.max() <= 3.0
+    deciles = np.histogram(np.log10(noise), np.linspace(-3, -1, 9))[0]
+    assert deciles.max() - deciles.min() <= (15 if design == "random" else 1)  # 8 of 64 each
+    assert {v["size"] for v in values} == {1, 2}
+
+
+def test_a_campaign_that_goes_on_gives_the_same_bytes(tmp_path):
+    plan = plan_file(tmp_path, GRID)
+    _, ran = run(tmp_path / "whole", plan)
+    assert ran == 18
+    part, _ = run(tmp_path / "part", plan, workers=1)
+    shards = sorted((tmp_path / "part").glob("*.parquet"))
+    for shard in shards[1:4]:
+        shard.unlink()
+    ran_again = run_campaign(part, quick, threads, 2)
+    assert ran_again == sum(min(4, 18 - 4 * number) for number in (1, 2, 3))
+    assert content(tmp_path / "whole") == content(tmp_path / "part")
+    assert run_campaign(part, quick, threads, 2) == 0
+
+
+def test_a_failed_case_is_a_row(tmp_path):
+    dataset, _ = run(tmp_path / "out", plan_file(tmp_path, "[factors]\nsize = [1, 3, 4]\n"))
+    rows = dataset.read(list(Design(dataset.plan).batches()))
+    assert [row["failure"] for row in rows] == ["", "size 3 is not made", "ZeroDivisionError: by nothing"]
+    assert failures(rows) == {"size 3 is not made": 1, "ZeroDivisionError: by nothing": 1}
+
+
+def test_a_worker_that_dies_costs_nothing(tmp_path, monkeypatch):
+    monkeypatch.setenv("GFIMU_TEST_MARKER", str(tmp_path / "marker"))
+    plan = plan_file(tmp_path, GRID)
+    run(tmp_path / "undisturbed", plan)
+    run(tmp_path / "disturbed", plan, dies_once, open_executor)
+    assert (tmp_path / "marker").exists()
+    assert content(tmp_path / "undisturbed") == content(tmp_path / "disturbed")
+
+
+def test_a_batch_that_kills_its_worker_each_time_is_reported(tmp_path):
+    dataset, ran = run(tmp_path / "out", plan_file(tmp_path, GRID), always_dies, open_executor)
+    assert ran == 18
+    rows = dataset.read(list(Design(dataset.plan).batches()))
+    assert [row["case"] for row in rows if row["failure"]] == [4, 5, 6, 7]
+    assert "died 3 times" in rows[5]["failure"]
+
+
+def test_results_are_grouped_by_factors(tmp_path):
+    dataset, _ = run(tmp_path / "out", plan_file(tmp_path, GRID))
+    rows = pq.ParquetDataset(sorted((tmp_path / "out").glob("*.parquet"))).read().to_pylist()
+    groups = grouped(rows, dataset.plan, ["size"])
+    assert [(group.values, group.result, group.cases) for group in groups[:2]] == [
+        ({"size": 1}, "result_m", 6),
+        ({"size": 1}, "good", 6),
+    ]
+    ones = [row["result_m"] for row in rows if row["size"] == 1]
+    assert groups[0].median == np.median(ones)
+    share = np.mean([row["good"] for row in rows if row["size"] == 1])
+    assert groups[1].median == pytest.approx(share)
+    assert groups[1].low <= share <= groups[1].high
+    with pytest.raises(InputError, match="unknown factor 'sise'"):
+        grouped(rows, dataset.plan, ["sise"])
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[factors]\n", r"\[factors\] is empty"),
+        ("points = 3\n[factors]\na = [1]\n", "leave points out"),
+        ('design = "random"\n[factors]\na = [1]\n', "needs points"),
+        ('design = "sobol"\npoints = 6\n[factors]\na = [1]\n', "powers of two"),
+        ("[factors.a]\nlow = 1.0\nhigh = 2.0\n", "levels"),
+        ("[factors.a]\nlow = 2.0\nhigh = 1.0\nlevels = 2\n", "not below"),
+        ('[factors.a]\nlow = -1.0\nhigh = 1.0\nlevels = 2\nscale = "log"\n', "no logarithm"),
+        ("[factors]\na = []\n", "a"),
+        ("factor = 3\n", "factor"),
+    ],
+)
+def test_a_wrong_plan_is_one_line(tmp_path, text, message):
+    with pytest.raises(InputError, match=message) as refused:
+        load_plan(plan_file(tmp_path, text))
+    assert "\n" not in str(refused.value)
+
+
+def test_folders_of_others_are_left_alone(tmp_path):
+    plan = plan_file(tmp_path, GRID)
+    run(tmp_path / "out", plan)
+    other = plan_file(tmp_path, GRID.replace("seed = 7", "seed = 8"))
+    with pytest.raises(InputError, match="another plan"):
+        Dataset.create(tmp_path / "out", other)
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "letter.txt").touch()
+    with pytest.raises(InputError, match="not empty and no campaign"):
+        Dataset.create(tmp_path / "full", plan)
+    with pytest.raises(InputError, match="no campaign"):
+        Dataset.open(tmp_path / "full")
