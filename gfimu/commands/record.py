@@ -159,11 +159,13 @@ def record(
         view.close(keep=False)
         raise
     view.close()
-    _warn_of_array(report, samples, form_read, array)
+    _warn_of_array(report, samples, form_read, view.array)
     return replace(report, faults=tuple(entry for fault in view.faults for entry in fault.entries()))
 
 
-def _warn_of_array(report: RecordReport, samples: FirstSamples, form: FrameFormat, array: str) -> None:
+def _warn_of_array(
+    report: RecordReport, samples: FirstSamples, form: FrameFormat, array: AccelerometerArray | None
+) -> None:
     """Warn where the array of a recording is open, or contradicted by the board or by what it sent."""
     from firmware_bridge.host.mounting.fit import open_array_text, other_array_text
     from firmware_bridge.host.mounting.on_board import candidate_arrays
@@ -172,7 +174,7 @@ def _warn_of_array(report: RecordReport, samples: FirstSamples, form: FrameForma
     if not report.array:
         texts = [open_array_text(candidate_arrays(form), samples, _count_size(form, None), str(report.path))]
     else:
-        carried = AccelerometerArray.load(array or report.array)
+        carried = array or AccelerometerArray.load(report.array)  # one that was stated late is a shipped one
         texts = [other_array_text(report.board_array, carried)]
         texts += [one.text for one in samples.findings(carried, _count_size(form, carried))]
     for text in texts:
@@ -226,6 +228,7 @@ class _LateView:
         live: bool,
     ) -> None:
         self._form, self._say, self._rrd, self._live = form, say, rrd, live
+        self.array: AccelerometerArray | None = None
         self._view: LiveView | None = None
         self._opened = False
         if live:
@@ -235,6 +238,7 @@ class _LateView:
 
     def open(self, array: AccelerometerArray | None) -> None:
         """Open the view of an array; raises `InputError` if a picture is asked for and the array is not known."""
+        self.array = array
         on_text, on_fault, on_note = self._say
         has_picture = self._live or self._rrd is not None
         if self._opened or not (has_picture or on_text is not None or on_fault is not None):

@@ -289,3 +289,29 @@ def test_optional_columns_are_the_last_ones(tmp_path) -> None:
     )
     with pytest.raises(InputError, match="optional temperature: name the last of the columns"):
         load_format(tmp_path / "f.toml")
+
+
+def test_a_format_with_an_array_file_of_its_own_is_recorded_with_it(warm_files) -> None:
+    from gfimu.commands.record import record as record_command
+
+    (warm_files / "warm.toml").write_text(WARM_PACKET)
+    port = TcpPort(0)
+    stream = b""
+    for k in range(100):
+        body = struct.pack("<BI3hh", 170, 10_000 * k, 1, 2, 2048 + k % 3, 150)
+        stream += body + bytes([sum(body) & 0xFF])
+
+    def send() -> None:
+        while port._host is None:
+            port.read()
+            time.sleep(0.01)
+        time.sleep(0.3)  # pyserial empties its input when it opens a port
+        port.write(stream, 5.0)
+
+    thread = threading.Thread(target=send)
+    thread.start()
+    report = record_command(port.name, warm_files / "run.csv", form=str(warm_files / "warm.toml"), duration=0.9)
+    thread.join()
+    port.close()
+    assert (report.array, report.array_stated_by) == ("one_warm_chip", "format")
+    assert report.temperature_degC == (25.0, 25.0)
