@@ -45,7 +45,9 @@ def test_a_chip_that_goes_wrong_is_named_while_recording(tmp_path) -> None:
         thread = threading.Thread(target=serve, args=(board, port), kwargs={"stop": done.is_set, "realtime": False})
         thread.start()
         try:
-            report = record(port.name, tmp_path / "run.csv", duration=14.0, rate=100, on_fault=sentences.append)
+            report = record(
+                port.name, tmp_path / "run.csv", duration=14.0, rate=100, array="cube12", on_fault=sentences.append
+            )
         finally:
             done.set()
             thread.join()

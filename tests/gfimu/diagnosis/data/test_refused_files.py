@@ -58,7 +58,7 @@ def test_a_sound_run_is_not_refused(stretch, predict):
         (lambda run: replace(run, readings=np.full_like(run.readings, 3.0)), "the channels hold one value"),
         (
             lambda run: replace(run, readings=np.random.default_rng(1).standard_normal(run.readings.shape)),
-            "no channel follows the motion that column tacho_rad_s tells",
+            "no channel follows the motion that column tacho_rad_s states",
         ),
     ],
 )
