@@ -5,15 +5,20 @@ python benchmarks/factory.py [COUNT]
 
 from __future__ import annotations
 
-import sys
-import time
-from collections.abc import Callable
+import os
 
-import numpy as np
+for _variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(_variable, "1")  # threads that wait would count as processor time
 
-from sim.campaign import measure
-from sim.factory import WorldFactory
-from sim.twin import Twin
+import sys  # noqa: E402
+import time  # noqa: E402
+from collections.abc import Callable  # noqa: E402
+
+import numpy as np  # noqa: E402
+
+from sim.campaign import measure  # noqa: E402
+from sim.factory import WorldFactory  # noqa: E402
+from sim.twin import Twin  # noqa: E402
 
 
 def main(count: int) -> None:
