@@ -128,8 +128,10 @@ def _submit(
     held: dict[Future[list[dict[str, Any]]], range],
 ) -> None:
     if queue:
-        batch = queue.pop(0)
+        batch = queue[0]
+        # A pool that broke meanwhile refuses it: then the batch stays in the queue.
         held[executor.submit(run_batch, plan, work, batch.start, batch.stop)] = batch
+        queue.pop(0)
 
 
 def run_lost(plan: PlanFile, batch: range) -> list[dict[str, Any]]:

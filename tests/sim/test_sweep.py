@@ -1,6 +1,7 @@
 """Campaigns: the cases of a plan, and that nothing is lost or run twice, whatever dies."""
 
 from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 
 import numpy as np
@@ -109,6 +110,32 @@ def test_a_worker_that_dies_costs_nothing(tmp_path, monkeypatch):
     run(tmp_path / "undisturbed", plan)
     run(tmp_path / "disturbed", plan, dies_once, open_executor)
     assert (tmp_path / "marker").exists()
+    assert content(tmp_path / "undisturbed") == content(tmp_path / "disturbed")
+
+
+def test_a_batch_that_a_broken_pool_refuses_is_not_lost(tmp_path):
+    """A worker may die while another batch ends: the pool then raises where the next one is submitted."""
+    pools = []
+
+    class Refusing(ThreadPoolExecutor):
+        taken = 0
+
+        def submit(self, *task):
+            if self is pools[0] and self.taken == 2:
+                raise BrokenProcessPool("a worker died")
+            self.taken += 1
+            return super().submit(*task)
+
+    @contextmanager
+    def opened(count):
+        pools.append(Refusing(count))
+        with pools[-1] as pool:
+            yield pool
+
+    plan = plan_file(tmp_path, GRID)
+    run(tmp_path / "undisturbed", plan)
+    run(tmp_path / "disturbed", plan, opened=opened)
+    assert len(pools) > 1
     assert content(tmp_path / "undisturbed") == content(tmp_path / "disturbed")
 
 
