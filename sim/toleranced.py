@@ -58,9 +58,7 @@ class ToleranceUnit:
 
     __repr__ = short_repr
 
-    def record(
-        self, scenario: Scenario, rng: np.random.Generator, *, temperature: float = CALIBRATED_AT
-    ) -> Recording:
+    def record(self, scenario: Scenario, rng: np.random.Generator, *, temperature: float = CALIBRATED_AT) -> Recording:
         """Record the motion of a scenario; its sensors and effects are not looked at.
 
         Parameters

@@ -141,9 +141,7 @@ def unit_rows(task: UnitTask, numbers: Sequence[int]) -> list[_Row]:
 def _row(task: UnitTask, number: int, motion: KnownMotion, reference: Estimate) -> _Row:
     from sim.toleranced import CALIBRATED_AT, draw_unit
 
-    drawing, of_run, of_poses = (
-        np.random.default_rng([task.seed, number, stream]) for stream in range(3)
-    )
+    drawing, of_run, of_poses = (np.random.default_rng([task.seed, number, stream]) for stream in range(3))
     unit = draw_unit(task.scenario.array, task.tolerances, drawing)
     warm = CALIBRATED_AT + task.tolerances.temperature_K
     run = unit.record(task.scenario, of_run, temperature=warm)

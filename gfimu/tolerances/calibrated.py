@@ -171,9 +171,7 @@ def _after_poses(
         left["angles"] = np.tile(turned * tolerances.angle_std, (1, 1, len(array.chips)))
     if "cross-axis" in before:
         # x θ_i θ_jᵀ turns the chip by x/2 θ_i × θ_j; the rest of it is fitted.
-        turns = [
-            0.5 * tolerances.cross_axis[i] * np.cross(array.axes[i], array.axes[j]) for i, j in axis_pairs(array)
-        ]
+        turns = [0.5 * tolerances.cross_axis[i] * np.cross(array.axes[i], array.axes[j]) for i, j in axis_pairs(array)]
         left["cross-axis"] = np.einsum("nci,mi->ncm", turned, np.array(turns))
     posterior = poses.posterior(array, np.maximum(tolerances.noise, _least_noise(tolerances)), motion.gravity)
     if tolerances.noise.any():

@@ -84,12 +84,14 @@ class Tolerances:
         Standard deviations of the bias, m/s², the relative gain error, and the white noise of a sample, m/s².
     cross_axis : ndarray, shape (c,)
         Standard deviation of the pick-up of each other axis of the chip, a ratio.
-    quadratic : ndarray, shape (c,)
-        Standard deviation of the quadratic coefficient of a channel's reading, s²/m.
+    nonlinearity, full_range : ndarray, shape (c,)
+        Standard deviation of the deviation from a straight line at full scale, a ratio to the full range, m/s².
     bias_tempco, gain_tempco : ndarray, shape (c,)
         Standard deviations of the change of bias, m/s²/K, and gain, 1/K, with temperature.
     temperature_K : float
         Temperature of the run less that of the calibration (25 °C), K.
+    from_data_sheet : tuple of str
+        Fields of `ChipErrors` that are the data sheets'.
     """
 
     placement_m: float
@@ -99,7 +101,8 @@ class Tolerances:
     gain: Floats
     noise: Floats
     cross_axis: Floats
-    quadratic: Floats
+    nonlinearity: Floats
+    full_range: Floats
     bias_tempco: Floats
     gain_tempco: Floats
     temperature_K: float
@@ -137,12 +140,10 @@ class Tolerances:
             for one in array.chips
         }
         of_channel = [(parts[one.part], axis) for one in array.chips for axis in range(len(one.axes))]
-        full_range = np.array([part.full_range_m_s2 or np.inf for part, _ in of_channel])
 
         def figure(given: float | None, sheet: list[float]) -> Floats:
             return np.array(sheet, dtype=float) if given is None else np.full(array.n_channels, given)
 
-        nonlinearity = figure(stated.nonlinearity, [part.nonlinearity_full_scale for part, _ in of_channel])
         density = stated.noise_m_s2_rthz
         noise = white_noise_std(array, sample_rate)
         if density is not None:  # white up to half the output data rate
@@ -155,9 +156,11 @@ class Tolerances:
             gain=figure(stated.gain, [part.sensitivity_std for part, _ in of_channel]),
             noise=noise,
             cross_axis=figure(
-                stated.cross_axis, [math.hypot(part.cross_axis_std, part.misalignment_std_rad) for part, _ in of_channel]
+                stated.cross_axis,
+                [math.hypot(part.cross_axis_std, part.misalignment_std_rad) for part, _ in of_channel],
             ),
-            quadratic=nonlinearity / full_range,
+            nonlinearity=figure(stated.nonlinearity, [part.nonlinearity_full_scale for part, _ in of_channel]),
+            full_range=np.array([part.full_range_m_s2 or np.inf for part, _ in of_channel]),
             bias_tempco=np.array([part.offset_tempco_m_s2_K[axis] for part, axis in of_channel]),
             gain_tempco=np.array([part.sensitivity_tempco_K for part, _ in of_channel]),
             temperature_K=temperature_K,
@@ -173,3 +176,8 @@ class Tolerances:
     def angle_std(self) -> float:
         """Standard deviation of the rotation of a chip about one axis, rad."""
         return self.angle_rad / SHAPES[self.shape]
+
+    @property
+    def quadratic(self) -> Floats:
+        """Standard deviation of the quadratic coefficient of each channel's reading, shape (c,), s²/m."""
+        return self.nonlinearity / self.full_range
