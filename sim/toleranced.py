@@ -21,7 +21,7 @@ from gfimu.tolerances.known_motion import KnownMotion
 from gfimu.tolerances.tolerances import Tolerances
 from sim.adxl345 import SensorErrors
 from sim.motion import BodyState
-from sim.profiles import Hold, Ramp, spin_profile
+from sim.profiles import Hold, Ramp, Segment, spin_profile
 from sim.scenarios import Scenario
 from sim.truth import cube_state
 from sim.turntable import prescribed_readings
@@ -132,7 +132,7 @@ def reference_motion(array: AccelerometerArray, *, time: float, rate: float, sam
     sample_rate : float
         Sample rate, Hz.
     """
-    pieces = [Hold(_REST_S), Ramp(rate, _RAMP_S), Hold(time - LEAST_TIME_S)]
+    pieces: list[Segment] = [Hold(_REST_S), Ramp(rate, _RAMP_S), Hold(time - LEAST_TIME_S)]
     return Scenario("reference motion", array, spin_profile(pieces), time, sample_rate, cube_offset=(0.0, 0.0, 0.0))
 
 

@@ -174,8 +174,8 @@ def _print_calibration(result: ToleranceResult, calibration: str) -> None:
         )
     if budget.attitude_rad > TILT_LIMIT:
         print_text(
-            f"  The attitude error reaches {budget.attitude_rad:.2g} rad (1 σ per axis), beyond the {TILT_LIMIT} rad up to "
-            "which position is of first order: calibrate, or give a shorter --time.",
+            f"  The attitude error reaches {budget.attitude_rad:.2g} rad (1 σ per axis); position is of first order up "
+            f"to {TILT_LIMIT} rad: calibrate, or give a shorter --time.",
             style="yellow",
         )
     for reason, count in result.units[calibration].failures.items() if result.units else ():

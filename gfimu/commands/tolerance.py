@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from gfimu.tolerances.budget import ToleranceBudget
     from gfimu.tolerances.calibrated import Poses
     from gfimu.tolerances.comparison import Comparison
-    from gfimu.tolerances.known_motion import KnownMotion
     from gfimu.tolerances.tolerances import Tolerances
     from sim.scenarios import Scenario
 
@@ -142,7 +141,7 @@ def tolerance(
     angle_deg : float
         Limit of the rotation of each chip about each axis, °.
     normal : bool
-        Take both limits for three standard deviations of a normal distribution; by default errors are even between them.
+        Take both limits for three standard deviations of a normal distribution; else errors are even between them.
     part : str, optional
         Part of every chip, in place of those of the array.
     bias_mg, gain_percent, cross_axis_percent, nonlinearity_percent : float, optional
@@ -272,7 +271,7 @@ def _run(
         words = f"scenario {given.name}, {length:g} s"
     if not 10 <= round(run.duration * run.sample_rate) <= _MOST_SAMPLES:
         raise InputError(
-            f"the run has {run.duration * run.sample_rate:.0f} samples; 10 to {_MOST_SAMPLES} are budgeted: change --time"
+            f"the run has {run.duration * run.sample_rate:.0f} samples; give a --time with 10 to {_MOST_SAMPLES}"
         )
     return run, words
 

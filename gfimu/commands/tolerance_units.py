@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import re
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -101,7 +102,7 @@ def simulate_units(
     return {calibration: _gather([row[calibration] for row in rows]) for calibration in task.calibrations}
 
 
-def _batches(task: UnitTask, batches: Sequence[range], workers: int):  # type: ignore[no-untyped-def]
+def _batches(task: UnitTask, batches: Sequence[range], workers: int) -> Iterator[list[_Row]]:
     """Yield the rows of each batch in order."""
     if workers <= 1:
         for batch in batches:
@@ -127,8 +128,8 @@ def _gather(found: Sequence[dict[str, float] | str]) -> UnitErrors:
 
 def unit_rows(task: UnitTask, numbers: Sequence[int]) -> list[_Row]:
     """Simulate some units, given their numbers, and return the errors of each."""
-    from sim.toleranced import ToleranceUnit, known_motion_of
     from sim.adxl345 import SensorErrors
+    from sim.toleranced import ToleranceUnit, known_motion_of
 
     array = task.scenario.array
     motion = known_motion_of(task.scenario)
@@ -141,25 +142,29 @@ def unit_rows(task: UnitTask, numbers: Sequence[int]) -> list[_Row]:
 def _row(task: UnitTask, number: int, motion: KnownMotion, reference: Estimate) -> _Row:
     from sim.toleranced import CALIBRATED_AT, draw_unit
 
+    # Streams of their own: which calibrations are asked for changes no unit.
     drawing, of_run, of_poses = (np.random.default_rng([task.seed, number, stream]) for stream in range(3))
     unit = draw_unit(task.scenario.array, task.tolerances, drawing)
-    warm = CALIBRATED_AT + task.tolerances.temperature_K
-    run = unit.record(task.scenario, of_run, temperature=warm)
+    run = unit.record(task.scenario, of_run, temperature=CALIBRATED_AT + task.tolerances.temperature_K)
+    runs: dict[bool, Recording | str] = {False: run}
+    if any("poses" in calibration for calibration in task.calibrations):
+        runs[True] = _corrected(task, unit, run, of_poses)
     found: _Row = {}
-    posed: Recording | str | None = None
     for calibration in task.calibrations:
+        readings = runs["poses" in calibration]
+        if isinstance(readings, str):
+            found[calibration] = readings
+            continue
         try:
-            if "poses" in calibration and posed is None:
-                posed = _corrected(task, unit, run, of_poses)
-            if "poses" in calibration and isinstance(posed, str):
-                found[calibration] = posed
-                continue
-            readings = posed if "poses" in calibration else run
-            assert not isinstance(readings, str) and readings is not None
             found[calibration] = _errors(task, calibration, readings, motion, reference)
         except GfimuError as error:
-            found[calibration] = str(error).splitlines()[0]
+            found[calibration] = _reason(error)
     return found
+
+
+def _reason(error: GfimuError) -> str:
+    """Return why a unit failed, without the figures, so that equal reasons count together."""
+    return re.sub(r"-?\d+(\.\d+)?(e[-+]?\d+)?", "…", str(error).splitlines()[0])
 
 
 def _corrected(task: UnitTask, unit: ToleranceUnit, run: Recording, rng: np.random.Generator) -> Recording | str:
@@ -167,12 +172,10 @@ def _corrected(task: UnitTask, unit: ToleranceUnit, run: Recording, rng: np.rand
     from gfimu.calibration.array_calibration import calibrate_array
 
     try:
-        calibration = calibrate_array(
-            unit.record(task.poses, rng), task.scenario.array, gravity=task.poses.gravity, fit_positions=False
-        )
-        return calibration.apply(run)
+        posed = unit.record(task.poses, rng)
+        return calibrate_array(posed, task.scenario.array, gravity=task.poses.gravity, fit_positions=False).apply(run)
     except GfimuError as error:
-        return str(error).splitlines()[0]
+        return _reason(error)
 
 
 def _errors(
@@ -191,7 +194,8 @@ def _errors(
     }
     if task.rates:
         errors["omega_null_space"] = _rms(_null_space_rate(run, array, motion) - motion.omega[motion.turning])
-    assert found.position is not None and reference.position is not None
+    assert found.position is not None
+    assert reference.position is not None
     errors["position"] = float(np.linalg.norm(found.position[-1] - reference.position[-1]))
     return errors
 

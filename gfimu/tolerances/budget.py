@@ -214,7 +214,7 @@ def _alpha_gram(maps: ErrorMaps, motion: KnownMotion, signature: Floats) -> Floa
 
 
 def _mean_products(errors: Floats) -> Floats:
-    rows = errors.reshape(-1, errors.shape[2])  # (3 n, m)
+    rows = errors.reshape(3 * len(errors), errors.shape[2])  # (3 n, m)
     return rows.T @ rows / len(errors)
 
 

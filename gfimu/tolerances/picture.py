@@ -77,7 +77,7 @@ def tolerance_picture(
         _shares(right, quantities)
     lines = "dashed: first order, full: simulated units" if errors else "first order"
     grid[0, 0].set_title(f"share of units whose error is below ({lines})", fontsize=10)
-    grid[0, 1].set_title("share of each cause in the variance; total, rms over units", fontsize=10)
+    grid[0, 1].set_title("share of each cause in the variance, and total, rms over units (first order)", fontsize=10)
     every = [budget.quantities[name].shares for budget in budgets.values() for name in names]
     present = [cause for cause in CAUSES if any(shares.get(cause, 0.0) >= _IN_KEY for shares in every)]
     handles = [Patch(color=_colour(cause), label=cause) for cause in present]

@@ -1,7 +1,8 @@
 """How small errors of the readings run through the estimate: linear maps from channel errors to α, ω and position.
 
-The estimate is that of ``gfimu estimate --method integrate``: [α; p] = G a − Λ s(ω), ω by integration of α, attitude by
-integration of ω from a levelled start, position by two integrations of R p less gravity. With u = G δa, small errors obey
+The estimate is that of ``gfimu estimate --method integrate``: [α; p] = G a − Λ s(ω), ω by integration of α, attitude
+by integration of ω from a levelled start, position by two integrations of R p less gravity. With u = G δa, small
+errors obey
 
   δω̇ = u_α − Λ_α S δω,  φ̇ = R δω,  δv̇ = R (u_p − Λ_p S δω) + φ × R p,  δṙ = δv,
 
@@ -84,9 +85,9 @@ def error_maps(array: AccelerometerArray, motion: KnownMotion) -> ErrorMaps:
     if count:
         per_mean = weights[0][:, 3:6] @ _levelling(motion, count)  # (9, 3)
         by_motion[:count, :, 3:] += per_mean / count
-        # The estimate turns each p back by what it takes for turning meanwhile: the mean over T of ∬ u_α.
-        end = motion.t[0] + count * motion.step
-        turned = quadrature[:count] * (end - motion.t[:count]) ** 2 / (2.0 * count * motion.step)
+        # The estimate turns each p back by what it takes for turning meanwhile: the mean over these samples of ∬ u_α.
+        later = np.arange(count)[::-1]  # samples after this one
+        turned = quadrature[:count] * later * (later + 1) * motion.step / (2.0 * count)
         by_motion[:count, :, :3] -= turned[:, None, None] * (per_mean @ cross_matrix(motion.p[0]))
     return ErrorMaps(by_motion @ inverse, inverse[:3], feedback, null_space_maps(array, motion))
 

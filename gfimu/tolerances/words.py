@@ -67,13 +67,12 @@ def tolerance_figures(tolerances: Tolerances) -> dict[str, Any]:
 
 
 def pay_for(budget: QuantityBudget) -> str:
-    """Say which tolerance of a quantity to pay for, and which next."""
+    """Say which tolerance of a quantity to pay for and which next, and by how much halving it lowers the error."""
     order = sorted(budget.halving.items(), key=lambda item: -item[1])
     gains = [(cause, gain) for cause, gain in order if gain >= _WORTH]
     if not gains:
-        return "no tolerance matters"
-    first, *others = [f"{cause}: half of it takes {gain:.0%} off" for cause, gain in gains[:2]]
-    return "; then ".join([first, *others])
+        return "no tolerance gains 2 % if halved"
+    return "halve " + ", then ".join(f"{cause} (−{gain:.0%})" for cause, gain in gains[:2])
 
 
 def _span(values: NDArray[np.float64]) -> str:
