@@ -61,8 +61,6 @@ def rest_removed(readings, motion):
 def test_each_cause_against_the_whole_chain(name, cause, calibration):
     run, motion = run_of(name), motion_of(name)
     array = run.array
-    if cause == "cross-axis" and len(array.chips[0].axes) == 1:
-        pytest.skip("chips with one axis pick nothing up")
     tolerances, unit, parameters = draw_with_parameters(array, cause, 3)
     ideal = readings_of(perfect(array), run, tolerances)
     error = readings_of(unit, run, tolerances) - ideal
@@ -72,7 +70,8 @@ def test_each_cause_against_the_whole_chain(name, cause, calibration):
 
     maps = error_maps(array, motion)
     found = remaining(calibration, array, motion, tolerances, poses()).signatures
-    if cause == "bias" and calibration == "rest":
+    nothing_to_pick_up = cause == "cross-axis" and len(array.chips[0].axes) == 1
+    if nothing_to_pick_up or (cause == "bias" and calibration == "rest"):
         assert cause not in found
         np.testing.assert_allclose(after.omega, before.omega, atol=1e-12)
         return

@@ -10,7 +10,7 @@ import pytest
 from tolerance_cases import ONLY, motion_of, only, poses, run_of
 
 from gfimu.commands.tolerance import _poses
-from gfimu.commands.tolerance_units import UnitTask, simulate_units
+from gfimu.commands.tolerance_units import UnitTask, simulate_units, unit_rows
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.tolerances.budget import tolerance_budget
@@ -165,6 +165,14 @@ def test_units_do_not_depend_on_workers_or_on_other_calibrations():
     spread = simulated("p1_face_diagonals", ("none", "rest"), tolerances, 12, workers=2)["rest"].errors
     for quantity, errors in alone.items():
         np.testing.assert_array_equal(errors, spread[quantity])
+
+
+def test_a_unit_is_the_same_in_any_batch():
+    run = run_of("cube12")
+    task = UnitTask(run, _poses(run)[0], usual(run.array), ("none",), True, 4)
+    assert unit_rows(task, [2]) == unit_rows(task, range(3))[2:]
+    other = UnitTask(run, task.poses, task.tolerances, ("none",), True, 5)
+    assert unit_rows(other, [2]) != unit_rows(task, [2])
 
 
 def test_chips_with_one_axis_have_no_poses():
