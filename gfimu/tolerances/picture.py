@@ -68,7 +68,7 @@ def tolerance_picture(
         What is shown.
     """
     names = [name for name in QUANTITIES if all(name in budget.quantities for budget in budgets.values())]
-    figure = Figure(figsize=(13, 2.6 * len(names) + 1.2), layout="constrained")
+    figure = Figure(figsize=(12, 2.3 * len(names) + 1.2), layout="constrained")
     grid = np.atleast_2d(figure.subplots(len(names), 2, width_ratios=(1.0, 1.25)))
     for (left, right), name in zip(grid, names, strict=True):
         quantities = {calibration: budget.quantities[name] for calibration, budget in budgets.items()}
@@ -85,7 +85,7 @@ def tolerance_picture(
         figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), fontsize=9, frameon=False)
     figure.suptitle(title, fontsize=11)
     with atomic_path(path) as temporary:
-        figure.savefig(temporary, dpi=110, format=Path(path).suffix.lstrip("."))
+        figure.savefig(temporary, dpi=100, format=Path(path).suffix.lstrip("."))
 
 
 def _distributions(
