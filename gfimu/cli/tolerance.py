@@ -144,7 +144,7 @@ def _print_calibration(result: ToleranceResult, calibration: str) -> None:
     from gfimu.position_drift import TILT_LIMIT
     from gfimu.tolerances.calibrated import CALIBRATIONS
     from gfimu.tolerances.tolerances import CAUSES
-    from gfimu.tolerances.words import pay_for
+    from gfimu.tolerances.words import pay_for, room_for
 
     budget, simulated = result.budgets[calibration], result.comparisons.get(calibration, {})
     quantities = list(budget.quantities.values())
@@ -165,7 +165,8 @@ def _print_calibration(result: ToleranceResult, calibration: str) -> None:
         rows,
     )
     for one in quantities:
-        print_text(f"  {_SHORT[one.name]}: {pay_for(one)}")
+        room = room_for(one, result.tolerances)
+        print_text(f"  {_SHORT[one.name]}: {pay_for(one)}" + (f"; {room}" if room else ""))
     failing = [_SHORT[one.name] for one in quantities if one.name in simulated and not simulated[one.name].agrees]
     if failing:
         print_text(

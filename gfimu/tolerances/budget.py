@@ -35,6 +35,7 @@ QUANTITIES: Mapping[str, tuple[str, str]] = {
 
 _END = {"omega": slice(0, 3), "attitude": slice(3, 6), "position": slice(6, 9)}
 _HALVED = 0.75  # of a variance goes with half a tolerance
+_A_TENTH_MORE = 1.1  # of an error: what a designer may give away for a cheaper tolerance
 
 
 @dataclass(frozen=True)
@@ -50,9 +51,9 @@ class QuantityBudget:
     factors : mapping of str to ndarray, shape (r, m)
         By cause, a matrix F whose |F x| is the error for parameters x of unit variance; noise is not among them.
     noise_covariance : ndarray, shape (3, 3)
-        What white noise adds: covariance of the components, or where the error is a mean over many samples its mean.
-    averaged : bool
-        Whether the error is the root of a mean square over many samples.
+        What white noise adds: covariance of the components, its mean where the error is one over many samples.
+    samples : int
+        Number of samples over whose mean square the error is the root; 0 of an error at the end.
     """
 
     name: str
@@ -61,7 +62,7 @@ class QuantityBudget:
     by_cause: Mapping[str, float]
     factors: Mapping[str, Floats]
     noise_covariance: Floats
-    averaged: bool
+    samples: int
 
     __repr__ = short_repr
 
@@ -80,6 +81,14 @@ class QuantityBudget:
     def halving(self) -> dict[str, float]:
         """By how much the error shrinks, relatively, if the tolerance of one cause is halved."""
         return {cause: 1.0 - math.sqrt(1.0 - _HALVED * share) for cause, share in self.shares.items()}
+
+    @property
+    def allowance(self) -> dict[str, float]:
+        """By which factor the tolerance of one cause may grow before the error grows by a tenth; at least 1."""
+        return {
+            cause: math.sqrt(1.0 + (_A_TENTH_MORE**2 - 1.0) / share) if share else math.inf
+            for cause, share in self.shares.items()
+        }
 
     def draw(self, count: int, shape: str, rng: np.random.Generator) -> Floats:
         """Draw the norm of the error of ``count`` units by the first-order map, shape (count,).
@@ -100,10 +109,16 @@ class QuantityBudget:
             edge = math.sqrt(3.0)
             size = (count, factor.shape[1])
             total += (rng.uniform(-edge, edge, size) if even else rng.standard_normal(size)) @ factor.T
-        if self.averaged:
-            return np.sqrt(np.sum(total**2, axis=1) + np.trace(self.noise_covariance))
+        if self.samples:
+            return np.asarray(np.sqrt(self._with_mean_noise(np.sum(total**2, axis=1), rng)))
         total[:, :3] += rng.multivariate_normal(np.zeros(3), self.noise_covariance, count, check_valid="ignore")
         return np.asarray(np.linalg.norm(total, axis=1))
+
+    def _with_mean_noise(self, squares: Floats, rng: np.random.Generator) -> Floats:
+        """Add the mean square of noise over the samples, and its product with the error that is there, both normal."""
+        size = float(np.trace(self.noise_covariance))
+        variance = 2.0 * np.sum(self.noise_covariance**2) + 4.0 * squares * size / 3.0
+        return np.maximum(squares + size + np.sqrt(variance / self.samples) * rng.standard_normal(len(squares)), 0.0)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures by name for JSON."""
@@ -114,6 +129,7 @@ class QuantityBudget:
             "rms_by_cause": dict(self.by_cause),
             "share": self.shares,
             "reduction_by_halving": self.halving,
+            "factor_for_a_tenth_more": self.allowance,
         }
 
 
@@ -176,7 +192,7 @@ def tolerance_budget(
     noise = _NoiseParts(linear, motion, tolerances.noise, left.rest)
     every = np.concatenate([np.zeros((len(motion), array.n_channels, 0)), *left.signatures.values()], axis=2)
     end, noise_end = np.einsum("nrc,ncm->rm", linear.end, every), noise.at_end()  # (9, m), (9, 9)
-    quantities = {}
+    quantities, samples = {}, {"alpha": len(motion), "omega_null_space": int(motion.turning.sum())}
     for name in QUANTITIES:
         if name == "alpha":
             whole, spread = _root(_alpha_gram(linear, motion, every)), noise.of_alpha()
@@ -186,7 +202,7 @@ def tolerance_budget(
             whole, spread = _root(_mean_products(linear.rate @ every[motion.turning])), noise.of_rate()
         else:
             whole, spread = end[_END[name]], noise_end[_END[name], _END[name]]
-        quantities[name] = _quantity(name, _by_cause(whole, left), spread, averaged=name not in _END)
+        quantities[name] = _quantity(name, _by_cause(whole, left), spread, samples.get(name, 0))
     turned = np.sum(end[_END["attitude"]] ** 2) + np.trace(noise_end[_END["attitude"], _END["attitude"]])
     return ToleranceBudget(calibration, quantities, math.sqrt(float(turned) / 3.0))
 
@@ -197,12 +213,12 @@ def _by_cause(whole: Floats, left: Remaining) -> dict[str, Floats]:
     return dict(zip(left.signatures, np.split(whole, ends[:-1], axis=1), strict=True)) if len(ends) else {}
 
 
-def _quantity(name: str, factors: Mapping[str, Floats], noise: Floats, *, averaged: bool) -> QuantityBudget:
+def _quantity(name: str, factors: Mapping[str, Floats], noise: Floats, samples: int) -> QuantityBudget:
     unit, meaning = QUANTITIES[name]
     sizes = {cause: math.sqrt(float(np.sum(factor**2))) for cause, factor in factors.items()}
     sizes["noise"] = math.sqrt(float(np.trace(noise)))
     ordered = {cause: sizes[cause] for cause in CAUSES if sizes.get(cause, 0.0) > 0.0}
-    return QuantityBudget(name, unit, meaning, ordered, factors, noise, averaged)
+    return QuantityBudget(name, unit, meaning, ordered, factors, noise, samples)
 
 
 def _alpha_gram(maps: ErrorMaps, motion: KnownMotion, signature: Floats) -> Floats:

@@ -13,7 +13,7 @@ from gfimu.tolerances.budget import QuantityBudget
 from gfimu.tolerances.tolerances import Tolerances
 from gfimu.units import STANDARD_GRAVITY
 
-__all__ = ["pay_for", "stated_tolerances", "tolerance_figures"]
+__all__ = ["pay_for", "room_for", "stated_tolerances", "tolerance_figures"]
 
 _WORTH = 0.02  # of the error: a tolerance whose half gains less is not worth a word
 
@@ -64,6 +64,20 @@ def tolerance_figures(tolerances: Tolerances) -> dict[str, Any]:
         "temperature_K": tolerances.temperature_K,
         "from_data_sheet": list(tolerances.from_data_sheet),
     }
+
+
+def room_for(budget: QuantityBudget, tolerances: Tolerances) -> str:
+    """Say how large placement and angles may be, each alone, before an error grows by a tenth; empty without them."""
+    sizes = {
+        "placement": (1e3 * tolerances.placement_m, " mm"),
+        "angles": (math.degrees(tolerances.angle_rad), "°"),
+    }
+    found = [
+        f"{cause} ±{size * budget.allowance[cause]:.2g}{unit}"
+        for cause, (size, unit) in sizes.items()
+        if cause in budget.by_cause
+    ]
+    return "a tenth more at " + " or ".join(found) if found else ""
 
 
 def pay_for(budget: QuantityBudget) -> str:

@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 import pytest
+import scipy.stats
 from tolerance_cases import ONLY, motion_of, only, poses, run_of
 
 from gfimu.commands.tolerance import _poses
@@ -18,7 +19,7 @@ from gfimu.tolerances.calibrated import CALIBRATIONS, calibrations_of, check_cal
 from gfimu.tolerances.comparison import compare
 from gfimu.tolerances.propagation import error_maps
 from gfimu.tolerances.tolerances import CAUSES, ChipErrors, Tolerances
-from gfimu.tolerances.words import pay_for
+from gfimu.tolerances.words import pay_for, room_for
 
 
 def usual(array, **changes):
@@ -68,6 +69,15 @@ def test_shares_sum_to_one_and_halving_is_what_half_a_tolerance_does(calibration
     assert array.n_channels == 12
 
 
+def test_the_allowance_makes_a_tenth_more():
+    tolerances = usual(run_of("cube12").array)
+    before = budget_of("cube12", "rest", tolerances).quantities["omega"]
+    for cause, field in (("placement", "placement_m"), ("angles", "angle_rad")):
+        larger = dataclasses.replace(tolerances, **{field: getattr(tolerances, field) * before.allowance[cause]})
+        assert budget_of("cube12", "rest", larger).quantities["omega"].rms == pytest.approx(1.1 * before.rms)
+    assert room_for(before, tolerances).startswith("a tenth more at placement ±")
+
+
 @pytest.mark.parametrize("calibration", CALIBRATIONS)
 def test_no_tolerance_no_error(calibration):
     nothing = only(run_of("cube12").array, "none of them")
@@ -97,6 +107,15 @@ def test_the_first_order_map_draws_what_the_budget_states():
             drawn = one.draw(4000, "uniform", np.random.default_rng(1))
             sampling = 0.5 * np.std(drawn**2) / np.mean(drawn**2) / math.sqrt(4000)
             assert np.sqrt(np.mean(drawn**2)) == pytest.approx(one.rms, rel=4.0 * sampling)
+
+
+def test_quantiles_of_the_first_order_map_are_those_of_units():
+    """Also of an error that is almost all noise, whose mean square over the run scatters little."""
+    tolerances = usual(run_of("cube12").array)
+    errors = simulated("cube12", ("rest",), tolerances, 60)["rest"].errors
+    for name, one in budget_of("cube12", "rest", tolerances).quantities.items():
+        drawn = one.draw(5000, "uniform", np.random.default_rng(1))
+        assert scipy.stats.ks_2samp(drawn, errors[name]).pvalue > 1e-3, name
 
 
 def simulated(name, calibrations, tolerances, units, workers=1):
