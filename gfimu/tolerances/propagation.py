@@ -72,14 +72,14 @@ def error_maps(array: AccelerometerArray, motion: KnownMotion) -> ErrorMaps:
     GeometryError
         If the array can't see all six motions.
     """
-    c, n = array.n_channels, len(motion)
+    c = array.n_channels
     solution = linear_solution(array, np.eye(c), np.ones(c))
     inverse, leakage = solution.motion.T, solution.leakage[0]  # (6, c), (6, 6)
     slope = product_slope(motion.omega)  # (n, 6, 3)
     feedback, of_p = leakage[:3] @ slope, leakage[3:] @ slope  # (n, 3, 3)
     flow, inputs = _dynamics(motion, feedback, of_p)
     weights = _adjoint(flow, motion.step)  # (n, 9, 12)
-    quadrature = np.full(n, motion.step) if feedback.any() else _quadrature(motion.t)
+    quadrature = _quadrature(motion.t, "trapezoid" if feedback.any() else "runge_kutta")
     by_motion = quadrature[:, None, None] * (weights @ inputs)  # (n, 9, 6)
     count = motion.levelled
     if count:
@@ -148,16 +148,16 @@ def _adjoint(flow: Floats, step: float) -> Floats:
     return weights
 
 
-def _quadrature(t: Floats) -> Floats:
+def _quadrature(t: Floats, method: str) -> Floats:
     """Return the weight of each sample in the integral from the first to the last, s, shape (n,).
 
-    Probed through the integration that the estimate uses, whose weights alternate: even ones would give the integral of
-    white noise a tenth less variance.
+    Probed through the integration that the estimate uses. Those of ``runge_kutta`` alternate: even ones would give the
+    integral of white noise a tenth less variance. Where ω feeds back on α they are even (`gfimu.rate.feedback`).
     """
     n = len(t)
     samples = np.arange(n)
     probes = (samples[:, None] % _COMB == np.arange(_COMB)).astype(float)
-    parts = np.diff(integrate_samples(t, probes), axis=0)  # (n − 1, comb)
+    parts = np.diff(integrate_samples(t, probes, method=method), axis=0)  # (n − 1, comb)
     weights = np.zeros(n)
     for comb in range(_COMB):
         nearest = np.rint((samples[:-1] + 0.5 - comb) / _COMB).astype(int) * _COMB + comb

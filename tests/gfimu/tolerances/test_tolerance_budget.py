@@ -125,7 +125,7 @@ def simulated(name, calibrations, tolerances, units, workers=1):
     return simulate_units(UnitTask(run, posed, tolerances, calibrations, rates, 4), units, workers)
 
 
-@pytest.mark.parametrize("name", ["cube12", "corners8", "p1_face_diagonals"])
+@pytest.mark.parametrize("name", ["cube12", "corners8", "p1_face_diagonals", "p2_face_centres"])
 def test_simulated_units_agree_with_first_order_after_a_rest(name):
     tolerances = usual(run_of(name).array)
     found = simulated(name, ("rest",), tolerances, 30)["rest"]
