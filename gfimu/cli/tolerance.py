@@ -125,10 +125,14 @@ def _print_totals(result: ToleranceResult) -> None:
     for calibration, budget in result.budgets.items():
         found = result.comparisons.get(calibration, {})
         # Where first order fails, what was simulated stands in its place.
-        cells = [
-            f"{found[name].rms:.3g} (simulated)" if name in found and not found[name].agrees else f"{one.rms:.3g}"
-            for name, one in budget.quantities.items()
-        ]
+        cells = []
+        for name, one in budget.quantities.items():
+            if result.units and name not in found:
+                cells.append("no unit estimated")
+            elif name in found and not found[name].agrees:
+                cells.append(f"{found[name].rms:.3g} (simulated)")
+            else:
+                cells.append(f"{one.rms:.3g}")
         rows.append([calibration, *cells])
     meanings = "; ".join(f"{_SHORT[name]}: {one.meaning}" for name, one in first.quantities.items())
     print_table(

@@ -44,7 +44,7 @@ class Comparison:
     ratio : float
         ``rms`` over that of first order; NaN where that is zero.
     ratio_std : float
-        Its standard error by the number of units.
+        Standard deviation that this ratio has by the number of units, if first order is right.
     """
 
     units: int
@@ -89,18 +89,17 @@ def compare(budget: QuantityBudget, errors: Floats, shape: str) -> Comparison:
         Distribution of the machining errors.
     """
     found = errors[np.isfinite(errors)]
-    squares = found**2
-    mean = float(squares.mean()) if len(found) else float("nan")
-    rms = float(np.sqrt(mean))
+    rms = float(np.sqrt(np.mean(found**2))) if len(found) else float("nan")
     first = budget.rms
     ratio = rms / first if first > 0.0 else float("nan")
-    relative = 0.5 * float(squares.std(ddof=1)) / mean / np.sqrt(len(found)) if len(found) > 1 and mean > 0 else 0.0
     drawn = budget.draw(_DRAWS, shape, np.random.default_rng(0))
+    expected = drawn**2
+    spread = 0.5 * float(expected.std()) / float(expected.mean()) if first > 0.0 else 0.0
     return Comparison(
         len(found),
         rms,
         {p: float(np.quantile(found, p)) if len(found) else float("nan") for p in QUANTILES},
         {p: float(np.quantile(drawn, p)) for p in QUANTILES},
         ratio,
-        ratio * relative,
+        spread / np.sqrt(len(found)) if len(found) else float("nan"),
     )

@@ -75,6 +75,15 @@ def test_a_body_in_free_motion(gfimu_command):
     assert "scenario tumble" in result.stdout
 
 
+def test_an_array_of_which_no_unit_can_be_estimated(gfimu_command, tmp_path):
+    result = gfimu_command(
+        "tolerance", "p2_face_centres", *FEW, "--calibrated", "none", "--out", tmp_path / "diverged.png"
+    )
+    assert result.code == 0
+    assert "10 units could not be estimated: the rate diverges" in result.stdout
+    assert "no unit" in result.stdout
+
+
 @pytest.mark.parametrize("suffix", ["png", "svg"])
 def test_picture(gfimu_command, tmp_path, suffix):
     file = tmp_path / f"tolerance.{suffix}"

@@ -20,6 +20,7 @@ from gfimu.tolerances.comparison import compare
 from gfimu.tolerances.propagation import error_maps
 from gfimu.tolerances.tolerances import CAUSES, ChipErrors, Tolerances
 from gfimu.tolerances.words import pay_for, room_for
+from sim.toleranced import known_motion_of, reference_motion
 
 
 def usual(array, **changes):
@@ -148,6 +149,22 @@ def test_simulated_units_agree_with_first_order_after_poses():
         for quantity in ("alpha", "omega", "omega_null_space"):
             one = compare(budget.quantities[quantity], units.errors[quantity], "uniform")
             assert one.ratio == pytest.approx(1.0, abs=0.03 + 4.0 * one.ratio_std), (calibration, quantity)
+
+
+def test_an_array_whose_rate_diverges():
+    """Units that could not be estimated are counted by their reason, and what is left is not called first order."""
+    tolerances = usual(run_of("p2_face_centres").array)
+    run = reference_motion(run_of("p2_face_centres").array, time=3.0, rate=5.0)
+    found = simulate_units(UnitTask(run, _poses(run)[0], tolerances, ("none", "rest"), False, 0), 20, 1)
+    (reason,) = found["none"].failures
+    assert found["none"].failures[reason] == 20
+    assert reason.startswith("the rate diverges … s after the start")
+    assert not found["none"].errors
+    motion = known_motion_of(run)
+    budget = tolerance_budget(run.array, motion, tolerances, calibration="rest", poses=poses())
+    one = compare(budget.quantities["alpha"], found["rest"].errors["alpha"], "uniform")
+    assert one.units == 20 - sum(found["rest"].failures.values())
+    assert not one.agrees
 
 
 def test_where_first_order_fails_it_says_so():
