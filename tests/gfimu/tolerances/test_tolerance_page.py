@@ -8,6 +8,7 @@ import pytest
 
 import gfimu
 from gfimu.tolerances.budget import QUANTITIES
+from gfimu.tolerances.words import pay_for, room_for
 
 
 @pytest.fixture(scope="module")
@@ -39,6 +40,12 @@ def test_tables(page, cube, part):
 def test_the_simulated_position_without_calibration():
     found = gfimu.tolerance("cube12", calibrated=["none"], units=40, workers=1).comparisons["none"]["position"]
     assert found.rms == pytest.approx(22.0, abs=1.0 + 4.0 * found.ratio_std / found.ratio * found.rms)
+
+
+def test_what_to_pay_for_as_printed(page, cube):
+    omega = cube["ADXL345"]["poses+rest"].quantities["omega"]
+    tolerances = gfimu.tolerance("cube12", closed_form=True, calibrated=["none"]).tolerances
+    assert f"ω integrated: {pay_for(omega)}; {room_for(omega, tolerances)}\n" in page
 
 
 def test_sentences(cube):
