@@ -17,7 +17,7 @@ from gfimu.recording import Recording
 from gfimu.tolerances.budget import tolerance_budget
 from gfimu.tolerances.calibrated import remaining
 from gfimu.tolerances.propagation import error_maps, null_space_of, product_slope
-from sim.toleranced import draw_unit
+from sim.toleranced import draw_unit, known_motion_of, reference_motion
 
 ARRAYS = ("cube12", "p1_face_diagonals", "p2_face_centres", "p3_three_plus_one")
 """One of each form of the solution: linear; recursive, with ω² in p alone and in α; joint."""
@@ -169,24 +169,53 @@ def test_slope_of_the_products():
     np.testing.assert_allclose(product_slope(omega)[0], numeric, atol=1e-8)
 
 
-def test_noise_at_the_end_against_many_runs():
+def noisy_runs(run, motion, tolerances, *, rest, count):
+    """Return the errors of α, (count, n, 3), and of ω and position at the end, each (count, 3), of runs with noise."""
+    ideal, rng = motion.readings(run.array), np.random.default_rng(2)
+    before = estimated(run, ideal)
+    alpha, omega, position = [], [], []
+    for _ in range(count):
+        noise = tolerances.noise * rng.standard_normal(ideal.shape)
+        found = estimated(run, ideal + (rest_removed(noise, motion) if rest else noise))
+        alpha.append(found.alpha - before.alpha)
+        omega.append(found.omega[-1] - before.omega[-1])
+        position.append(found.position[-1] - before.position[-1])
+    return np.array(alpha), np.array(omega), np.array(position)
+
+
+def as_budgeted(squares, rms):
+    """Whether squared norms, (count,), have the mean square that a budget states."""
+    sampling = squares.std() / squares.mean() / np.sqrt(len(squares))
+    return squares.mean() / rms**2 == pytest.approx(1.0, abs=4.0 * sampling)
+
+
+def test_noise_against_many_runs():
     """Simpson's weights, the levelled start and the mean over the rest that is taken off, all at once."""
     run, motion = run_of("cube12"), motion_of("cube12")
-    array = run.array
-    tolerances = only(array, "noise", share=0.1)
-    budget = tolerance_budget(array, motion, tolerances, calibration="rest", poses=poses())
-    ideal = motion.readings(array)
-    before, rng = estimated(run, ideal), np.random.default_rng(2)
-    errors = []
-    for _ in range(80):
-        noise = rest_removed(tolerances.noise * rng.standard_normal(ideal.shape), motion)
-        found = estimated(run, ideal + noise)
-        errors.append(np.concatenate([found.omega[-1] - before.omega[-1], found.position[-1] - before.position[-1]]))
-    squares = np.array(errors) ** 2
-    for name, part in (("omega", slice(0, 3)), ("position", slice(3, 6))):
-        norms = squares[:, part].sum(axis=1)
-        sampling = norms.std() / norms.mean() / np.sqrt(len(norms))
-        assert norms.mean() / budget.quantities[name].rms ** 2 == pytest.approx(1.0, abs=4.0 * sampling)
+    tolerances = only(run.array, "noise", share=0.1)
+    budget = tolerance_budget(run.array, motion, tolerances, calibration="rest", poses=poses()).quantities
+    alpha, omega, position = noisy_runs(run, motion, tolerances, rest=True, count=80)
+    assert as_budgeted(np.sum(omega**2, axis=1), budget["omega"].rms)
+    assert as_budgeted(np.sum(position**2, axis=1), budget["position"].rms)
+    over_run = np.sum(alpha**2, axis=2).mean(axis=1)
+    assert as_budgeted(over_run, budget["alpha"].rms)
+    drawn = budget["alpha"].draw(2000, "normal", np.random.default_rng(0))
+    assert drawn.std() == pytest.approx(np.sqrt(over_run).std(), rel=4.0 / np.sqrt(2 * 80))
+
+
+@pytest.mark.parametrize("calibration", ["none", "rest"])
+def test_noise_that_feeds_itself(calibration):
+    """An array whose α depends on ω²: the noise of ω comes back in α, where it is larger than the noise of a sample."""
+    run = reference_motion(AccelerometerArray.load("p2_face_centres"), time=2.7, rate=5.0)
+    motion = known_motion_of(run)
+    tolerances = only(run.array, "noise", share=1e-2)
+    maps = error_maps(run.array, motion)
+    budget = tolerance_budget(
+        run.array, motion, tolerances, calibration=calibration, poses=poses(), maps=maps
+    ).quantities["alpha"]
+    assert budget.rms > 1.2 * np.sqrt(np.sum((maps.alpha * tolerances.noise) ** 2))
+    alpha, _, _ = noisy_runs(run, motion, tolerances, rest=calibration == "rest", count=80)
+    assert as_budgeted(np.sum(alpha**2, axis=2).mean(axis=1), budget.rms)
 
 
 def test_an_array_without_null_space_has_no_such_rate():
