@@ -24,7 +24,7 @@ def register(app: typer.Typer) -> None:
 
 
 def _tolerance(
-    array: Annotated[str, typer.Argument(help="Array as drawn: a name or a TOML file.")],
+    array: Annotated[str, typer.Argument(help="Array as drawn: a name, a TOML file, or an MJCF file with sites.")],
     scenario: Annotated[
         str | None,
         typer.Option(help="Motion: a scenario by name or file; by default rest, then a spin about the vertical."),
@@ -67,7 +67,7 @@ def _tolerance(
 
     Example: `gfimu tolerance cube12 --placement-mm 0.2 --angle-deg 0.5 --out tolerance.png`
 
-    One line of a trade: `gfimu tolerance cube12 --closed-form --part adxl355 --calibrated poses+rest`
+    Another part, without simulated units: `gfimu tolerance cube12 --closed-form --part adxl355 --calibrated poses+rest`
     """
     from gfimu.commands.tolerance import tolerance
 
