@@ -63,6 +63,7 @@ if TYPE_CHECKING:
     from gfimu.commands.record import record as record
     from gfimu.commands.score import score as score
     from gfimu.commands.simulate import simulate as simulate
+    from gfimu.commands.tolerance import tolerance as tolerance
     from gfimu.commands.view import view as view
     from gfimu.errors import GeometryError as GeometryError
     from gfimu.errors import GfimuError as GfimuError
@@ -173,6 +174,7 @@ _PUBLIC = {
     "simulate": "gfimu.commands.simulate",
     "specific_force": "gfimu.geometry.kinematics",
     "summarise": "gfimu.motion.estimate_summary",
+    "tolerance": "gfimu.commands.tolerance",
     "update_array_calibration": "gfimu.calibration.array_calibration",
     "view": "gfimu.commands.view",
 }

@@ -62,6 +62,7 @@ CALLS = {
     "optimize": {"chips": "4", "restarts": "1"},
     "demo": {},
     "new": {"kind": "array", "out": "made.toml"},
+    "tolerance": {"array": "cube12", "units": "10", "workers": "1"},
     "campaign": {"plan": "in.toml", "out": "made"},
     "firmware run": {},
     "firmware build": {},
