@@ -15,8 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from gfimu.errors import InputError
-from sim.study.cases import STUDIES, Case
+from sim.study.cases import STUDIES, Case, find_case
 from sim.study.report import LEAST_VISIBLE
 
 __all__ = ["GATE", "STRATA", "Stratum", "choose_gate", "gate_cases"]
@@ -91,16 +90,8 @@ def gate_cases(first: int | None = None) -> list[tuple[Case, str]]:
     InputError
         If a line of the list is no case of a study.
     """
-    by_key: dict[str, Case] = {}
-    chosen = []
-    for line in _LIST.read_text(encoding="utf-8").splitlines():
-        key, _, source = line.partition(" ")
-        study = key.partition("/")[0]
-        if key not in by_key and study in STUDIES:
-            by_key |= {case.key: case for case in STUDIES[study]()}
-        if key not in by_key:
-            raise InputError(f"{_LIST}: no case {key!r}; choose the gate again")
-        chosen.append((by_key[key], source))
+    lines = [line.partition(" ") for line in _LIST.read_text(encoding="utf-8").splitlines()]
+    chosen = [(find_case(key), source) for key, _, source in lines]
     order = np.random.default_rng(len(chosen)).permutation(len(chosen))
     return [chosen[place] for place in order[:first]]
 
