@@ -38,6 +38,8 @@ def read_outcomes(path: str | Path) -> list[dict[str, Any]]:
     file = Path(path)
     if file.is_dir():
         dataset = Dataset.open(file)
+        if dataset.plan.kind != "study":
+            raise InputError(f"{file}: is another campaign; give a folder that `python -m sim.study run` wrote")
         return [outcome_of_row(row) for row in dataset.read(list(Design(dataset.plan).batches()))]
     if not file.exists():
         return []

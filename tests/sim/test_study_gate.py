@@ -20,6 +20,8 @@ from sim.study.compare import load_outcomes
 from sim.study.gate import LONGEST, STRATA, choose_gate, gate_cases
 from sim.study.outcome import draw_world
 from sim.study.outcome_file import generator_name, read_outcomes
+from sim.sweep.dataset import Dataset
+from sim.sweep.plan import PlanFile
 
 
 @pytest.fixture(scope="module")
@@ -200,6 +202,12 @@ def test_a_generator_that_is_not_there_is_one_line_before_anything_runs(tmp_path
     assert words in told
     assert told.count("\n") == 1
     assert not (tmp_path / "run").exists()
+
+
+def test_another_campaign_has_no_outcomes_of_the_study(tmp_path, capsys):
+    Dataset.create(tmp_path / "other", PlanFile({"scenario": ["paper_run"]}))
+    assert main(["compare", str(tmp_path / "other")]) == 2
+    assert "is another campaign" in capsys.readouterr().err
 
 
 def test_a_file_of_outcomes_is_no_folder_to_run_into(tmp_path, capsys):
