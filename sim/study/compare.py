@@ -129,7 +129,7 @@ class Comparison:
 
 
 def load_outcomes(path: str | Path) -> dict[tuple[str, str], Outcome]:
-    """Read outcomes of the diagnosis by key and generator; a later one replaces an earlier, a torn line is left out.
+    """Read outcomes of the diagnosis by key and generator; a later one replaces an earlier.
 
     Raises
     ------

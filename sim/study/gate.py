@@ -6,7 +6,6 @@ and stays as it is, so that comparisons of different days are of the same cases.
 
 from __future__ import annotations
 
-import itertools
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -134,7 +133,7 @@ def _groups(cases: Sequence[Case], by: Sequence[str]) -> list[list[Case]]:
     groups: dict[tuple[Any, ...], list[Case]] = defaultdict(list)
     for case in cases:
         groups[tuple(_property(case, name) for name in by)].append(case)
-    return list(itertools.chain(groups.values()))
+    return list(groups.values())
 
 
 def _property(case: Case, name: str) -> Any:

@@ -26,9 +26,7 @@ def generator_name(source: str) -> str:
 
 
 def read_outcomes(path: str | Path) -> list[dict[str, Any]]:
-    """Read outcomes from the folder of a run, or from lines of JSON, packed (``.xz``) or not.
-
-    A last line cut off by an interruption is left out.
+    """Read outcomes from the folder of a run, or from lines of JSON, packed (``.xz``) or not; none where nothing is.
 
     Raises
     ------
@@ -39,24 +37,16 @@ def read_outcomes(path: str | Path) -> list[dict[str, Any]]:
     if file.is_dir():
         dataset = Dataset.open(file)
         if dataset.plan.kind != "study":
-            raise InputError(f"{file}: is another campaign; give a folder that `python -m sim.study run` wrote")
+            raise InputError(f"{file}: is another campaign; give a folder of `python -m sim.study run`")
         return [outcome_of_row(row) for row in dataset.read(list(Design(dataset.plan).batches()))]
     if not file.exists():
         return []
     try:
-        packed = file.suffix == _PACKED
-        text = lzma.decompress(file.read_bytes()).decode() if packed else file.read_text(encoding="utf-8")
-    except (lzma.LZMAError, UnicodeDecodeError):
-        raise InputError(
-            f"{file}: not a file of outcomes; give a folder that `python -m sim.study run` wrote"
-        ) from None
-    outcomes = []
-    for line in text.splitlines():
-        try:
-            outcomes.append(json.loads(line))
-        except json.JSONDecodeError:
-            continue
-    return outcomes
+        content = file.read_bytes()
+        lines = (lzma.decompress(content) if file.suffix == _PACKED else content).splitlines()
+        return [json.loads(line) for line in lines]
+    except (lzma.LZMAError, ValueError):
+        raise InputError(f"{file}: no file of outcomes; give a folder of `python -m sim.study run`") from None
 
 
 def outcome_of_row(row: Mapping[str, Any]) -> dict[str, Any]:
