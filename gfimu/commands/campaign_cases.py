@@ -88,19 +88,13 @@ def diagnose_case(case: Case) -> Mapping[str, Any]:
     """
     from sim.study.cases import Case as StudyCase
     from sim.study.outcome import run_case
+    from sim.study.report import brief
 
     values = {_OF_STUDY[name]: value for name, value in case.values.items()}
     hidden = values.pop("effects", "none")
     effects = () if hidden == "none" else (str(hidden),)
     outcome = run_case(StudyCase("campaign", case.seed, effects, **values))  # type: ignore[arg-type]
-    names = sorted(cause["effect"] for cause in outcome["causes"])
-    return {
-        "verdict": outcome["verdict"],
-        "causes": ", ".join(names),
-        "exact": outcome["verdict"] == ("explained" if effects else "nothing_found") and names == sorted(effects),
-        "wrong": outcome["verdict"] == "explained" and not set(names) <= set(effects),
-        "share_of_excess_removed": outcome["share_of_excess_removed"],
-    }
+    return {**brief(outcome), "share_of_excess_removed": outcome["share_of_excess_removed"]}
 
 
 KINDS: dict[str, Callable[[Case], Mapping[str, Any]]] = {"estimate": estimate_case, "diagnose": diagnose_case}

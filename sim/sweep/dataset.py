@@ -7,11 +7,12 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import msgspec
 import pyarrow as pa
 import pyarrow.parquet as pq
+import tomli_w
 
 from gfimu.errors import InputError
 from gfimu.files.atomic_file import atomic_path
@@ -39,28 +40,34 @@ class Dataset:
     plan: PlanFile
 
     @classmethod
-    def create(cls, folder: str | Path, plan: str | Path) -> Dataset:
-        """Open the folder of a plan, or begin it.
+    def create(cls, folder: str | Path, plan: str | Path | PlanFile) -> Self:
+        """Open the folder of a plan, or begin it; the plan is a file (.toml) or its content.
 
         Raises
         ------
         InputError
-            If the folder holds another plan.
+            If the folder holds another plan, or is a file.
         """
-        found, path = load_plan(plan), Path(folder)
+        found, path = plan if isinstance(plan, PlanFile) else load_plan(plan), Path(folder)
         kept = path / _PLAN
         if kept.exists() and load_plan(kept) != found:
             raise InputError(f"{path}: holds another plan; give another --out")
+        if path.is_file():
+            raise InputError(f"{path}: is a file; name a folder with --out")
         if path.exists() and not kept.exists() and any(path.iterdir()):
             raise InputError(f"{path}: is not empty and no campaign; give another --out")
         path.mkdir(parents=True, exist_ok=True)
         if not kept.exists():
             with atomic_path(kept) as part:
-                Path(part).write_bytes(Path(plan).read_bytes())
+                if isinstance(plan, PlanFile):
+                    table = {key: value for key, value in msgspec.to_builtins(plan).items() if value is not None}
+                    part.write_text(tomli_w.dumps(table), encoding="utf-8")
+                else:
+                    part.write_bytes(Path(plan).read_bytes())
         return cls(path, found)
 
     @classmethod
-    def open(cls, folder: str | Path) -> Dataset:
+    def open(cls, folder: str | Path) -> Self:
         """Open the folder of a campaign; raises `InputError` if it is none."""
         path = Path(folder)
         if not (path / _PLAN).is_file():
