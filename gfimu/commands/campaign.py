@@ -92,7 +92,7 @@ def campaign(
     from sim.sweep.dataset import Dataset
     from sim.sweep.design import Design
     from sim.sweep.engine import run_campaign
-    from sim.sweep.executors import open_executor, processors
+    from sim.sweep.executors import open_workers, processors
     from sim.sweep.plan import load_plan
     from sim.sweep.summary import failures, grouped
 
@@ -107,15 +107,10 @@ def campaign(
         check_factors(found, Design(found)[0], str(plan))
         if out is None:
             raise InputError(f"{plan}: give the folder of the campaign with --out")
-        dataset = Dataset.create(out, plan)
-        count = workers or processors()
-        run_campaign(
-            dataset,
-            KINDS[found.kind],
-            lambda number: open_executor(number, cluster),
-            count,
-            progress=progress,
-        )
+        opened = partial(open_workers, workers or processors(), cluster)
+        with opened():  # a cluster that is not there is said before anything is written
+            dataset = Dataset.create(out, plan)
+        run_campaign(dataset, KINDS[found.kind], opened, progress=progress)
     design = Design(dataset.plan)
     rows = dataset.read(list(design.batches()))
     return CampaignResult(

@@ -39,12 +39,15 @@ class PlanFile(Table, frozen=True):
     ]
     kind: Annotated[str, about("What a case does: estimate or diagnose.")] = "estimate"
     design: Annotated[
-        Literal["grid", "random", "latin_hypercube", "sobol"],
-        about("All combinations, or points of the unit cube drawn or spread evenly (scipy.stats.qmc)."),
+        Literal["grid", "random", "latin_hypercube", "sobol", "saltelli"],
+        about(
+            "All combinations, or points of the unit cube drawn or spread evenly (scipy.stats.qmc); saltelli: for each "
+            "of the points as many combinations as factors and two more, for Sobol indices."
+        ),
     ] = "grid"
     points: Annotated[
         Annotated[int, msgspec.Meta(ge=1)] | None,
-        about("Combinations of a design that is no grid; a power of two for sobol."),
+        about("Combinations of a design that is no grid; a power of two for sobol and saltelli."),
     ] = None
     repeats: Annotated[int, about("Seeds per combination.", ge=1)] = 1
     seed: Annotated[int, about("Seed of everything left to chance.", ge=0)] = 0
@@ -69,8 +72,11 @@ def load_plan(path: str | Path) -> PlanFile:
         raise InputError(f"{path}: a grid has as many points as combinations; leave points out")
     if plan.design != "grid" and plan.points is None:
         raise InputError(f"{path}: design {plan.design!r} needs points = N")
-    if plan.design == "sobol" and plan.points is not None and plan.points & (plan.points - 1):
-        raise InputError(f"{path}: points = {plan.points}: a Sobol design is balanced for powers of two; use one")
+    if plan.design in {"sobol", "saltelli"} and plan.points is not None and plan.points & (plan.points - 1):
+        below = 1 << (plan.points.bit_length() - 1)
+        raise InputError(
+            f"{path}: points = {plan.points}: a Sobol sequence is balanced for powers of two; use {below} or {2 * below}"
+        )
     return plan
 
 

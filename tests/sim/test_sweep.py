@@ -1,8 +1,9 @@
 """Campaigns: the cases of a plan, and that nothing is lost or run twice, whatever dies."""
 
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import BrokenExecutor, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
+from functools import partial
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -13,9 +14,10 @@ from gfimu.errors import InputError
 from sim.sweep.dataset import Dataset
 from sim.sweep.design import Design
 from sim.sweep.engine import run_campaign
-from sim.sweep.executors import open_executor
 from sim.sweep.plan import load_plan
+from sim.sweep.pool import open_pool
 from sim.sweep.summary import failures, grouped
+from sim.sweep.workers import Workers
 
 GRID = """
 repeats = 3
@@ -46,15 +48,23 @@ def plan_file(folder, text):
     return path
 
 
+def died(error):
+    return 1 if isinstance(error, BrokenExecutor) else None
+
+
 @contextmanager
-def threads(count):
+def threads(count=2):
     with ThreadPoolExecutor(count) as pool:
-        yield pool
+        yield Workers(pool, lambda: count, died)
 
 
-def run(folder, plan, work=quick, opened=threads, workers=2):
+def pool():
+    return open_pool(2)
+
+
+def run(folder, plan, work=quick, opened=threads):
     dataset = Dataset.create(folder, plan)
-    return dataset, run_campaign(dataset, work, opened, workers)
+    return dataset, run_campaign(dataset, work, opened)
 
 
 def content(folder):
@@ -87,14 +97,14 @@ def test_a_campaign_that_goes_on_gives_the_same_bytes(tmp_path):
     plan = plan_file(tmp_path, GRID)
     _, ran = run(tmp_path / "whole", plan)
     assert ran == 18
-    part, _ = run(tmp_path / "part", plan, workers=1)
+    part, _ = run(tmp_path / "part", plan, opened=partial(threads, 1))
     shards = sorted((tmp_path / "part").glob("*.parquet"))
     for shard in shards[1:4]:
         shard.unlink()
-    ran_again = run_campaign(part, quick, threads, 2)
+    ran_again = run_campaign(part, quick, threads)
     assert ran_again == sum(min(4, 18 - 4 * number) for number in (1, 2, 3))
     assert content(tmp_path / "whole") == content(tmp_path / "part")
-    assert run_campaign(part, quick, threads, 2) == 0
+    assert run_campaign(part, quick, threads) == 0
 
 
 def test_a_failed_case_is_a_row(tmp_path):
@@ -108,7 +118,7 @@ def test_a_worker_that_dies_costs_nothing(tmp_path, monkeypatch):
     monkeypatch.setenv("GFIMU_TEST_MARKER", str(tmp_path / "marker"))
     plan = plan_file(tmp_path, GRID)
     run(tmp_path / "undisturbed", plan)
-    run(tmp_path / "disturbed", plan, dies_once, open_executor)
+    run(tmp_path / "disturbed", plan, dies_once, pool)
     assert (tmp_path / "marker").exists()
     assert content(tmp_path / "undisturbed") == content(tmp_path / "disturbed")
 
@@ -127,10 +137,10 @@ def test_a_batch_that_a_broken_pool_refuses_is_not_lost(tmp_path):
             return super().submit(*task)
 
     @contextmanager
-    def opened(count):
-        pools.append(Refusing(count))
-        with pools[-1] as pool:
-            yield pool
+    def opened():
+        pools.append(Refusing(2))
+        with pools[-1] as executor:
+            yield Workers(executor, lambda: 2, died)
 
     plan = plan_file(tmp_path, GRID)
     run(tmp_path / "undisturbed", plan)
@@ -140,7 +150,7 @@ def test_a_batch_that_a_broken_pool_refuses_is_not_lost(tmp_path):
 
 
 def test_a_batch_that_kills_its_worker_each_time_is_reported(tmp_path):
-    dataset, ran = run(tmp_path / "out", plan_file(tmp_path, GRID), always_dies, open_executor)
+    dataset, ran = run(tmp_path / "out", plan_file(tmp_path, GRID), always_dies, pool)
     assert ran == 18
     rows = dataset.read(list(Design(dataset.plan).batches()))
     assert [row["case"] for row in rows if row["failure"]] == [4, 5, 6, 7]
