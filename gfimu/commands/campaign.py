@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -85,7 +86,7 @@ def campaign(
     Raises
     ------
     InputError
-        If the plan is wrong, a folder is needed or holds another campaign, or Dask is not installed.
+        If the plan is wrong, a folder is needed or holds another campaign, Dask is not installed or no scheduler answers.
     """
     from gfimu.commands.campaign_cases import KINDS, check_factors
     from gfimu.errors import InputError
@@ -108,11 +109,11 @@ def campaign(
         if out is None:
             raise InputError(f"{plan}: give the folder of the campaign with --out")
         opened = partial(open_workers, workers or processors(), cluster)
-        with opened():  # a cluster that is not there is said before anything is written
-            dataset = Dataset.create(out, plan)
+        if cluster:
+            with opened():  # one that is not there is said before anything is written
+                pass
+        dataset = Dataset.create(out, plan)
         run_campaign(dataset, KINDS[found.kind], opened, progress=progress)
-    design = Design(dataset.plan)
-    rows = dataset.read(list(design.batches()))
-    return CampaignResult(
-        dataset.folder, len(design), len(rows), failures(rows), tuple(grouped(rows, dataset.plan, list(by)))
-    )
+    table = dataset.table()
+    groups = tuple(grouped(table, dataset.plan, list(by)))
+    return CampaignResult(dataset.folder, len(Design(dataset.plan)), len(table), failures(table), groups)

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import asyncio
+import pickle  # noqa: S403 - between processes of one cluster, as Dask itself does
 import time
 from collections.abc import Iterator
-from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
+from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from gfimu.errors import InputError
@@ -16,7 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = ["open_cluster"]
 
-_CONNECT = "10s"  # numerical: longest wait for a scheduler; it answers within milliseconds
+_CONNECT = 5.0  # numerical: s, longest wait for a scheduler; it answers within milliseconds
 _ASK = 1.0  # numerical: s between questions for the number of workers
 
 
@@ -49,7 +52,8 @@ class _ClusterExecutor(Executor):
 
     def submit(self, function: Any, /, *values: Any, **named: Any) -> Future[Any]:
         self._check()
-        found: Future[Any] = self._executor.submit(function, *values, **named)
+        call = pickle.dumps(_Call(partial(function, **named), values))
+        found: Future[Any] = self._executor.submit(pickle.loads, call)
         return found
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
@@ -71,18 +75,42 @@ class _ClusterExecutor(Executor):
             raise BrokenExecutor("the scheduler is gone")
 
 
+class _Call:
+    """A call that is made when it is unpickled.
+
+    A worker of Dask that can't import what a task names closes its connection, and the task waits for ever. Unpickled
+    inside a task, the same failure is that task's error.
+    """
+
+    def __init__(self, function: Any, values: tuple[Any, ...]) -> None:
+        self._reduced = function, values
+
+    def __reduce__(self) -> tuple[Any, tuple[Any, ...]]:
+        return self._reduced
+
+
 def _client(address: str) -> Client:
     try:
-        from distributed import Client
+        from distributed import Client, rpc
     except ImportError:
         raise InputError('a cluster needs Dask: pip install "gfimu[cluster]"') from None
+
+    async def ask() -> str:
+        async with rpc(address) as scheduler:
+            return str((await scheduler.identity())["type"])
+
+    # Asked first, since a client that finds no scheduler takes long to close; in a thread, as a notebook has a loop.
     try:
-        return Client(address, timeout=_CONNECT, set_as_default=False)
-    except (OSError, ValueError) as error:  # a time-out and a broken connection are of the former
-        reason = str(error).partition("\n")[0]
+        with ThreadPoolExecutor(1) as thread:
+            kind = thread.submit(lambda: asyncio.run(asyncio.wait_for(ask(), _CONNECT))).result()
+    except Exception as error:  # noqa: BLE001 - whatever answers at that port may send anything
+        reason = str(error).partition("\n")[0] or f"nothing within {_CONNECT:g} s"
         raise InputError(
             f"--cluster {address}: no Dask scheduler answers ({reason}); start one with: dask scheduler"
         ) from None
+    if kind != "Scheduler":
+        raise InputError(f"--cluster {address}: is a Dask {kind.lower()}; give the address of the scheduler")
+    return Client(address, timeout=_CONNECT, set_as_default=False)
 
 
 def _deaths(error: BaseException) -> int | None:

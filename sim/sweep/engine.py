@@ -17,6 +17,7 @@ from gfimu.errors import GfimuError
 from sim.sweep.dataset import Dataset
 from sim.sweep.design import Case, Design
 from sim.sweep.workers import Workers
+from sim.sweep.pace import running
 from sim.sweep.plan import PlanFile
 
 __all__ = ["Work", "run_campaign"]
@@ -61,15 +62,17 @@ def run_campaign(
     """
     design = Design(dataset.plan)
     tell = progress or (lambda done, total: None)
-    missing = [batch for batch in design.batches() if not dataset.shard(batch).exists()]
+    present = set(dataset.present())
+    missing = [batch for batch in design.batches() if batch not in present]
     done = len(design) - sum(map(len, missing))
     tell(done, len(design))
     ran = 0
     # Closed here whatever happens, so that an error or Ctrl-C ends the workers before it is reported.
-    with closing(_Batches(dataset.plan, work, missing).results(open_workers)) as results:
+    with closing(_Batches(dataset.plan, work, missing).results(open_workers)) as results, running(dataset) as note:
         for batch, rows in results:
             dataset.write(batch, rows)
             ran += len(batch)
+            note(ran)
             tell(done + ran, len(design))
     return ran
 

@@ -68,6 +68,8 @@ def load_plan(path: str | Path) -> PlanFile:
     for name, factor in plan.factors.items():
         if isinstance(factor, RangeTable):
             _check_range(f"{path}: [factors] {name}", factor, grid=plan.design == "grid")
+        else:
+            _check_list(f"{path}: [factors] {name}", factor)
     if plan.design == "grid" and plan.points is not None:
         raise InputError(f"{path}: a grid has as many points as combinations; leave points out")
     if plan.design != "grid" and plan.points is None:
@@ -78,6 +80,15 @@ def load_plan(path: str | Path) -> PlanFile:
             f"{path}: points = {plan.points}: a Sobol sequence is balanced for powers of two; use {below} or {2 * below}"
         )
     return plan
+
+
+def _check_list(where: str, factor: list[Value]) -> None:
+    # A column of the dataset holds values of one type.
+    if len({float if type(one) is int else type(one) for one in factor}) > 1:
+        raise InputError(f"{where}: {factor} mixes numbers, texts or booleans; give values of one type")
+    twice = [one for one in factor if factor.count(one) > 1]
+    if twice:
+        raise InputError(f"{where}: {twice[0]!r} is given twice; give each value once")
 
 
 def _check_range(where: str, factor: RangeTable, *, grid: bool) -> None:

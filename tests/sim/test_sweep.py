@@ -109,9 +109,9 @@ def test_a_campaign_that_goes_on_gives_the_same_bytes(tmp_path):
 
 def test_a_failed_case_is_a_row(tmp_path):
     dataset, _ = run(tmp_path / "out", plan_file(tmp_path, "[factors]\nsize = [1, 3, 4]\n"))
-    rows = dataset.read(list(Design(dataset.plan).batches()))
-    assert [row["failure"] for row in rows] == ["", "size 3 is not made", "ZeroDivisionError: by nothing"]
-    assert failures(rows) == {"size 3 is not made": 1, "ZeroDivisionError: by nothing": 1}
+    table = dataset.table()
+    assert table["failure"].to_pylist() == ["", "size 3 is not made", "ZeroDivisionError: by nothing"]
+    assert failures(table) == {"size 3 is not made": 1, "ZeroDivisionError: by nothing": 1}
 
 
 def test_a_worker_that_dies_costs_nothing(tmp_path, monkeypatch):
@@ -152,15 +152,16 @@ def test_a_batch_that_a_broken_pool_refuses_is_not_lost(tmp_path):
 def test_a_batch_that_kills_its_worker_each_time_is_reported(tmp_path):
     dataset, ran = run(tmp_path / "out", plan_file(tmp_path, GRID), always_dies, pool)
     assert ran == 18
-    rows = dataset.read(list(Design(dataset.plan).batches()))
+    rows = dataset.table().to_pylist()
     assert [row["case"] for row in rows if row["failure"]] == [4, 5, 6, 7]
     assert "died 3 times" in rows[5]["failure"]
 
 
 def test_results_are_grouped_by_factors(tmp_path):
     dataset, _ = run(tmp_path / "out", plan_file(tmp_path, GRID))
-    rows = pq.ParquetDataset(sorted((tmp_path / "out").glob("*.parquet"))).read().to_pylist()
-    groups = grouped(rows, dataset.plan, ["size"])
+    table = pq.ParquetDataset(sorted((tmp_path / "out").glob("*.parquet"))).read()
+    rows = table.to_pylist()
+    groups = grouped(table, dataset.plan, ["size"])
     assert [(group.values, group.result, group.cases) for group in groups[:2]] == [
         ({"size": 1}, "result_m", 6),
         ({"size": 1}, "good", 6),
@@ -171,7 +172,7 @@ def test_results_are_grouped_by_factors(tmp_path):
     assert groups[1].median == pytest.approx(share)
     assert groups[1].low <= share <= groups[1].high
     with pytest.raises(InputError, match="unknown factor 'sise'"):
-        grouped(rows, dataset.plan, ["sise"])
+        grouped(table, dataset.plan, ["sise"])
 
 
 @pytest.mark.parametrize(

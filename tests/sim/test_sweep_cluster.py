@@ -15,7 +15,6 @@ from sweep_cases import always_dies, counted, waits
 from gfimu.errors import GfimuError, InputError
 from sim.sweep.cluster import open_cluster
 from sim.sweep.dataset import Dataset
-from sim.sweep.design import Design
 from sim.sweep.engine import run_campaign
 from sim.sweep.pool import open_pool
 
@@ -104,7 +103,7 @@ def test_a_cluster_gives_the_bytes_of_the_pool_whoever_dies_or_leaves(ran):
 def test_a_batch_that_kills_each_worker_of_a_cluster_is_reported_and_no_other_runs_again(ran):
     with dask.config.set({"distributed.scheduler.allowed-failures": 0}), cluster() as found:
         _, _, dataset = ran("out", partial(open_cluster, found.scheduler_address), always_dies)
-    rows = dataset.read(list(Design(dataset.plan).batches()))
+    rows = dataset.table().to_pylist()
     assert [row["case"] for row in rows] == list(range(36))
     assert [row["case"] for row in rows if row["failure"]] == [4, 5]
     assert "died 3 times" in rows[5]["failure"]
@@ -117,7 +116,7 @@ def test_a_lost_connection_ends_in_one_line_and_another_call_goes_on(ran):
             ran("out", partial(open_cluster, address), waits, after(6, found.close))
     _, times, dataset = ran("out", partial(open_pool, 1))
     assert set(times) == {0, 1}
-    assert len(dataset.read(list(Design(dataset.plan).batches()))) == 36
+    assert len(dataset.table()) == 36
 
 
 def test_work_that_no_worker_finds_is_one_line(ran, monkeypatch):
