@@ -17,6 +17,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from sim.sweep.design import Design
+from sim.sweep.plan import RangeTable
 from sim.sweep.summary import numbers, result_names, varying
 
 __all__ = ["METHODS", "Sensitivity", "seed_shares", "sensitivities"]
@@ -155,7 +156,8 @@ def _of_given_data(result: str, values: Floats, table: pa.Table, design: Design)
             value, half = _of_grid(values, which)
             found.append(Sensitivity(result, name, "grid", len(values), value, value - half, value + half))
         else:
-            value, half = _of_classes(values.mean(axis=1), which)
+            even = design.plan.design == "sobol" and isinstance(design.plan.factors[name], RangeTable)
+            value, half = _of_classes(values.mean(axis=1), which, even=even)
             found.append(Sensitivity(result, name, "given data", len(values), value, value - half, value + half))
     return found
 
@@ -170,10 +172,12 @@ def _classes(column: pa.ChunkedArray) -> NDArray[np.intp]:
     return ranks * bins // len(ranks)
 
 
-def _of_classes(y: Floats, which: NDArray[np.intp]) -> tuple[float, float]:
-    """Return the correlation ratio of y (n,) over classes (n,), its bias removed (Kelley's ε²), and half its interval.
+def _of_classes(y: Floats, which: NDArray[np.intp], *, even: bool) -> tuple[float, float]:
+    """Return the correlation ratio of y (n,) over classes (n,), its bias removed, and half its interval.
 
-    With the variance within classes s², that between them is too large by s² for each degree of freedom.
+    The mean of a class has a variance of its own, by which the ratio is too large. Of independent points it is the
+    variance within classes over their count (Kelley's ε²). The points of a Sobol sequence (``even``) are spread evenly
+    inside a bin too: there it is less, and the second differences of the means of neighbouring bins show how much.
     """
     y = y - y.mean()
     count = int(which.max()) + 1
@@ -181,11 +185,15 @@ def _of_classes(y: Floats, which: NDArray[np.intp]) -> tuple[float, float]:
     moments = np.column_stack([np.ones(len(y)), y, y**2, inside, inside * y[:, None]])
 
     def index(sums: Floats) -> Floats:
-        n, total = sums[..., :1], sums[..., 2:3] - sums[..., 1:2] ** 2 / sums[..., :1]
-        members, parts = sums[..., 3 : 3 + count], sums[..., 3 + count :]
-        between = np.sum(parts**2 / np.maximum(members, 1.0), axis=-1, keepdims=True) - sums[..., 1:2] ** 2 / n
-        used = np.sum(members > 0.0, axis=-1, keepdims=True)
-        return 1.0 - (n - 1.0) / np.maximum(n - used, 1.0) * (1.0 - between / total)
+        n, whole = sums[..., 0], sums[..., 1] ** 2 / sums[..., 0]
+        total = sums[..., 2] - whole
+        members, parts = np.maximum(sums[..., 3 : 3 + count], 1e-12), sums[..., 3 + count :]
+        between = np.sum(parts**2 / members, axis=-1) - whole
+        bias = (count - 1.0) * (total - between) / np.maximum(n - count, 1.0)
+        if even and count > 2:
+            rough = np.mean(np.diff(parts / members, 2, axis=-1) ** 2, axis=-1) / 6.0  # variance of a mean
+            bias = np.minimum(bias, rough * n)
+        return np.asarray(((between - bias) / total)[..., None])
 
     value, half = _bootstrapped(moments, index)
     return float(value[0]), float(half[0])
