@@ -107,7 +107,8 @@ class WorldFactory:
         world = self.twin.world(effects) if effects else self._world
         temperature = temperature_course(rng, t)
         readings = forward.channels(world, spin, t, temperature, None if effects else self._geometry)
-        motion = spin.at(t)
+        asked = spin.at(t)
+        motion = SpinState(asked.angle, asked.rate, asked.acceleration)
         ideal = forward.channels(self._world, spin, t, temperature, self._geometry) if effects else readings.copy()
         white = self._white * world.noise_factor
         level = setting.bias_instability * level_factors(rng, readings.shape[1])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -114,7 +115,7 @@ def duration_text(seconds: float) -> str:
     """Return a time as people say it, to two places: ``3 h 20 min``."""
     units = (("d", 86400), ("h", 3600), ("min", 60), ("s", 1))
     whole = round(seconds)
-    for (name, size), (smaller, part) in zip(units, units[1:], strict=False):
+    for (name, size), (smaller, part) in pairwise(units):
         if whole >= size:
             return f"{whole // size} {name} {whole % size // part} {smaller}"
     return f"{whole} s"
@@ -137,9 +138,9 @@ def _print_sensitivities(found: CampaignTable) -> None:
         for one in found.sensitivities
     ]
     rows += [(result, "(seeds)", f"{share:.3f}", "", "") for result, share in found.seed_shares.items()]
-    print_table(
-        "Share of the variance", ("result", "factor", "first order", "total", "points"), sorted(rows), left=2
-    )
+    order = list(dict.fromkeys(row[0] for row in rows))
+    rows.sort(key=lambda row: order.index(row[0]))
+    print_table("Share of the variance", ("result", "factor", "first order", "total", "points"), rows, left=2)
     for method in dict.fromkeys(one.method for one in found.sensitivities):
         print_text(METHODS[method])
     print_text("Factors: of the variance of the mean over seeds, with 95 % interval (bootstrap). ", style="dim")

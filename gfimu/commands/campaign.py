@@ -86,7 +86,8 @@ def campaign(
     Raises
     ------
     InputError
-        If the plan is wrong, a folder is needed or holds another campaign, Dask is not installed or no scheduler answers.
+        If the plan is wrong, a folder is needed or holds another campaign, Dask is not installed, or no scheduler
+        answers.
     """
     from gfimu.commands.campaign_cases import KINDS, check_factors
     from gfimu.errors import InputError

@@ -104,7 +104,7 @@ def diagnose_case(case: Case) -> Mapping[str, Any]:
 
 
 def measure_case(case: Case) -> Mapping[str, float]:
-    """Measure a world of the factory, and compare a linear solution with the truth (`gfimu.commands.campaign_worlds`)."""
+    """Measure a world and compare a linear solution with the truth (`gfimu.commands.campaign_worlds`)."""
     from gfimu.commands import campaign_worlds
 
     return campaign_worlds.measure_case(case)

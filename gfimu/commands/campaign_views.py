@@ -178,6 +178,4 @@ def _write_csv(path: str | Path, groups: Sequence[Group]) -> None:
         lines = writer(file, lineterminator="\n")
         lines.writerow([*factors, "result", "cases", "failed", "q05", "median_or_share", "q95"])
         for one in groups:
-            lines.writerow(
-                [*one.values.values(), one.result, one.cases, one.failed, one.low, one.median, one.high]
-            )
+            lines.writerow([*one.values.values(), one.result, one.cases, one.failed, one.low, one.median, one.high])

@@ -104,7 +104,10 @@ def _world(case: Case) -> tuple[_Solution, list[Effect]]:
     """Return the solution of a case with the noise of its worlds, and the effects that are hidden in it."""
     values = case.values
     setting = Measurement()
-    duration, rate = _number(values, "duration_s", setting.duration), _number(values, "sample_rate_hz", setting.sample_rate)
+    duration, rate = (
+        _number(values, "duration_s", setting.duration),
+        _number(values, "sample_rate_hz", setting.sample_rate),
+    )
     if not (duration * rate >= 2.0 and rate > 0.0):
         raise InputError(f"duration_s = {duration:g} at sample_rate_hz = {rate:g} has less than two samples")
     found = _solution(str(values.get("twin", _TWIN)), duration, rate)
@@ -164,7 +167,9 @@ def _drawn(
         if key.startswith(_STD):
             valid = {f"{_STD}_{KEY_ENDINGS.get(size.unit, size.unit)}" for size in sizes}
             if valid != {key}:
-                raise InputError(f"{effect}.{key}: sizes of {effect} are drawn by {' or '.join(sorted(valid)) or 'none'}")
+                raise InputError(
+                    f"{effect}.{key}: sizes of {effect} are drawn by {' or '.join(sorted(valid)) or 'none'}"
+                )
             draws = float(value) * rng.standard_normal(len(sizes))
             found |= {size.key: float(one) for size, one in zip(sizes, draws, strict=True)}
     return found

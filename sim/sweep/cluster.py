@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-import pickle  # noqa: S403 - between processes of one cluster, as Dask itself does
+import pickle
 import time
 from collections.abc import Iterator
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ThreadPoolExecutor

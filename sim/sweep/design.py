@@ -79,9 +79,7 @@ class Design:
     @cached_property
     def _sizes(self) -> tuple[int, ...]:
         """Values of each factor; of a range its levels, 0 without."""
-        return tuple(
-            one.levels or 0 if isinstance(one, RangeTable) else len(one) for one in self.plan.factors.values()
-        )
+        return tuple(one.levels or 0 if isinstance(one, RangeTable) else len(one) for one in self.plan.factors.values())
 
     @cached_property
     def _cube(self) -> NDArray[np.float64]:
@@ -132,4 +130,3 @@ def _unit_cube(design: str, dimensions: int, count: int, seed: int) -> NDArray[n
     if design == "latin_hypercube":
         return np.asarray(qmc.LatinHypercube(dimensions, rng=rng).random(count))
     return rng.random((count, dimensions))
-

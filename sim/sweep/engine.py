@@ -6,8 +6,8 @@ A batch is always in exactly one place: waiting, held by the executor, put aside
 from __future__ import annotations
 
 from collections import Counter, deque
-from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
+from collections.abc import Callable, Generator, Iterator, Mapping
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Future, wait
 from contextlib import AbstractContextManager, closing
 from typing import Any
 
@@ -16,9 +16,9 @@ from threadpoolctl import threadpool_limits
 from gfimu.errors import GfimuError
 from sim.sweep.dataset import Dataset
 from sim.sweep.design import Case, Design
-from sim.sweep.workers import Workers
 from sim.sweep.pace import running
 from sim.sweep.plan import PlanFile
+from sim.sweep.workers import Workers
 
 __all__ = ["Work", "run_campaign"]
 
@@ -111,7 +111,7 @@ class _Batches:
         self._suspects: deque[range] = deque()
         self._deaths: Counter[range] = Counter()
 
-    def results(self, open_workers: OpenWorkers) -> Iterator[tuple[range, Rows]]:
+    def results(self, open_workers: OpenWorkers) -> Generator[tuple[range, Rows], None, None]:
         """Yield batches with their rows as they come."""
         while self._waiting or self._suspects:
             with open_workers() as workers:
@@ -120,9 +120,7 @@ class _Batches:
                     broken = broken or not self._submitted(workers)
                     finished, _ = wait(self._held, _LOOK, FIRST_COMPLETED)
                     for future in finished:
-                        error = None if future.cancelled() else future.exception()
-                        if future.cancelled() or error is not None:
-                            broken = broken or isinstance(error, BrokenExecutor)
+                        if future.cancelled() or future.exception() is not None:
                             yield from self._lost(future, workers)
                         else:
                             yield self._held.pop(future), future.result()
@@ -147,15 +145,13 @@ class _Batches:
 
     def _lost(self, future: Future[Rows], workers: Workers) -> Iterator[tuple[range, Rows]]:
         """Put a batch back whose rows did not come, or report it."""
-        try:
-            future.result()
-        except Exception as error:
-            deaths = workers.deaths(error)
-            if deaths is None:
-                raise GfimuError(
-                    f"a worker can't run a batch ({type(error).__name__}: {_first_line(str(error))}); "
-                    "it needs the same gfimu as this process"
-                ) from error
+        error = CancelledError() if future.cancelled() else future.exception()
+        deaths = None if error is None else workers.deaths(error)
+        if deaths is None:
+            raise GfimuError(
+                f"a worker can't run a batch ({type(error).__name__}: {_first_line(str(error))}); "
+                "it needs the same gfimu as this process"
+            ) from error
         batch = self._held.pop(future)
         alone = self._deaths[batch] > 0
         self._deaths[batch] += deaths

@@ -93,6 +93,9 @@ def running(dataset: Dataset) -> Iterator[Callable[[int], None]]:
             with suppress(OSError), atomic_path(path) as part:  # the rows matter, this does not
                 Path(part).write_text(json.dumps(asdict(Run(host, pid, ran, rate, time.time()))), encoding="utf-8")
 
+    for kept, run in _notes(dataset):
+        if run.ended:
+            kept.unlink(missing_ok=True)
     note(0)
     try:
         yield note
@@ -103,8 +106,12 @@ def running(dataset: Dataset) -> Iterator[Callable[[int], None]]:
 
 def runs(dataset: Dataset) -> list[Run]:
     """Return the processes that run a campaign now, as far as their notes say."""
+    return [run for _, run in _notes(dataset) if not run.ended]
+
+
+def _notes(dataset: Dataset) -> list[tuple[Path, Run]]:
     found = []
     for path in sorted(dataset.folder.glob(f"{_PREFIX}*{_SUFFIX}")):
         with suppress(OSError, ValueError, TypeError):  # one that ends at this moment
-            found.append(Run(**json.loads(path.read_text(encoding="utf-8"))))
-    return [run for run in found if not run.ended]
+            found.append((path, Run(**json.loads(path.read_text(encoding="utf-8")))))
+    return found

@@ -25,21 +25,26 @@ mpl.use("Agg")
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 __all__ = ["campaign_picture", "label"]
 
 Floats = NDArray[np.float64]
 
 _MOST_RESULTS, _MOST_FACTORS = 4, 6  # panels that a page shows legibly
-_PANEL = (2.9, 2.5)  # inches
+_PANEL = (2.7, 2.4)  # inches
 _BINS = 12  # of equal count, along a range
 _DOTS = 1500  # cases: of more, dots hide each other
 _DECADE = 15.0  # ratio of quantiles 95 and 5 % from which a logarithmic axis shows more
 _LONGEST = 12  # characters of a value that stands upright
+_CAPTION = (
+    "Line: median. Dark band, box: half of the cases. Light band, whiskers: 90 %. Bars: share of the variance that a "
+    "factor causes, with 95 % interval."
+)
 _STYLE = {"font.size": 9, "axes.titlesize": 9, "axes.spines.top": False, "axes.spines.right": False,
           "svg.hashsalt": "gfimu", "text.color": css(INK)}  # fmt: skip
 _UNITS = {ending: unit for unit, ending in KEY_ENDINGS.items()} | {
-    "mg": "mg", "g": "g", "degC": "°C", "rad2_s2": "rad²/s²", "ms": "ms", "mm": "mm", "deg": "°"
+    "mg": "mg", "g": "g", "degC": "°C", "rad2_s2": "rad²/s²", "ratio": "ratio", "ms": "ms", "mm": "mm", "deg": "°"
 }  # fmt: skip
 
 
@@ -90,8 +95,12 @@ def label(name: str) -> str:
     """Return a column's name as people read it: ``alpha_rms_rad_s2`` is ``alpha rms (rad/s²)``."""
     for ending in sorted(_UNITS, key=len, reverse=True):
         if name.endswith(f"_{ending}"):
-            return f"{name.removesuffix(f'_{ending}').replace('_', ' ')} ({_UNITS[ending]})"
-    return name.replace("_", " ")
+            return f"{_words(name.removesuffix(f'_{ending}'))} ({_UNITS[ending]})"
+    return _words(name)
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ").replace(".", " ")
 
 
 def _metadata(path: str | Path) -> dict[str, None]:
@@ -120,12 +129,16 @@ def _figure(title: str, table: pa.Table, design: Design, results: list[str], all
             row[0].set_xlabel(label(result))
             row[0].set_ylabel("cases")
         else:
-            row[0].set_ylabel(f"share with {label(result)}" if truth else label(result))
+            row[0].set_ylabel(f"share of cases: {label(result)}" if truth else label(result))
         for axes in row[1 : len(factors)]:
             axes.sharey(row[0])
             axes.tick_params(labelleft=False)
         if found:
             _draw_bars(row[-1], [one for one in found if one.result == result], shares.get(result))
+    if any(np.isfinite(one.total) for one in found):
+        grid[0][-1].legend(fontsize=7, frameon=False, loc="lower right")
+    if factors:
+        figure.supxlabel(_CAPTION, fontsize=8, x=0.01, ha="left")
     return figure
 
 
@@ -151,6 +164,9 @@ def _draw(axes: Axes, table: pa.Table, design: Design, name: str, values: Floats
     if isinstance(factor, RangeTable):
         if factor.scale == "log":
             axes.set_xscale("log")
+        else:
+            axes.xaxis.set_major_locator(MaxNLocator(4))
+            axes.ticklabel_format(axis="x", scilimits=(-2, 4), useMathText=True)
         _draw_bands(axes, numbers(table, name)[finite], values, truth=truth)
         return
     column = np.array(table[name].to_pylist(), dtype=object)[finite]
@@ -211,12 +227,12 @@ def _draw_bars(axes: Axes, found: Sequence[Sensitivity], seeds: float | None) ->
     for place, one in enumerate(found, start=len(names)):
         shift = height / 2 if has_total else 0.0
         axes.barh(
-            place + shift, max(one.first, 0.0), height, color=css(AFTER_ON_PAPER), label=None if place > len(names) else "first order",
+            place + shift, max(one.first, 0.0), height, color=css(AFTER_ON_PAPER), label="first order" if one is found[0] else None,
             xerr=one.first_high - one.first if np.isfinite(one.first_high) else None, error_kw={"lw": 0.9},
         )  # fmt: skip
         if np.isfinite(one.total):
             axes.barh(
-                place - shift, one.total, height, color=css(BEFORE_ON_PAPER), label=None if place > len(names) else "total",
+                place - shift, one.total, height, color=css(BEFORE_ON_PAPER), label="total" if one is found[0] else None,
                 xerr=one.total_high - one.total, error_kw={"lw": 0.9},
             )  # fmt: skip
     names += [label(one.factor).partition(" (")[0] for one in found]
@@ -224,8 +240,6 @@ def _draw_bars(axes: Axes, found: Sequence[Sensitivity], seeds: float | None) ->
     axes.set_xlim(0.0, 1.05)
     axes.grid(axis="x", lw=0.3)
     axes.set_xlabel("share of the variance")
-    if has_total:
-        axes.legend(fontsize=7, frameon=False, loc="lower right")
 
 
 def _page(figure: Figure, folder: Path, table: pa.Table, design: Design) -> str:
@@ -238,8 +252,7 @@ def _page(figure: Figure, folder: Path, table: pa.Table, design: Design) -> str:
     return (
         f'<!DOCTYPE html><html lang="en"><meta charset="utf-8"><title>Campaign {name}</title>'
         "<style>body{font-family:sans-serif;margin:2em} svg{max-width:100%;height:auto}</style>"
-        f"<h1>Campaign {name}</h1><p>{len(table)} of {len(design)} cases. Of a range: median, bands of 50 and 90 % of "
-        "the cases. Of a list: quartiles, whiskers to 5 and 95 %. Right: share of the variance that a factor causes.</p>"
+        f"<h1>Campaign {name}</h1><p>{len(table)} of {len(design)} cases.</p>"
         + svg[svg.index("<svg") :]
         + (f"<h2>Failures</h2><ul>{reasons}</ul>" if reasons else "")
         + "</html>"

@@ -77,7 +77,7 @@ def load_plan(path: str | Path) -> PlanFile:
     if plan.design in {"sobol", "saltelli"} and plan.points is not None and plan.points & (plan.points - 1):
         below = 1 << (plan.points.bit_length() - 1)
         raise InputError(
-            f"{path}: points = {plan.points}: a Sobol sequence is balanced for powers of two; use {below} or {2 * below}"
+            f"{path}: points = {plan.points}: a Sobol sequence is even for powers of two; use {below} or {2 * below}"
         )
     return plan
 

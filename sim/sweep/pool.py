@@ -57,7 +57,7 @@ def open_pool(count: int) -> Iterator[Workers]:
 
 @contextmanager
 def _one_thread() -> Iterator[None]:
-    """Give processes that start one thread of linear algebra each: many threads in every worker get in each other's way.
+    """Give processes that start one thread of linear algebra each, as many in every worker would wait for each other.
 
     NumPy reads these variables when it is first imported.
     """

@@ -2,8 +2,8 @@
 
 The first-order index of a factor is the variance of the result's mean given that factor, over the variance of the
 result; the total index is what would remain of the variance if all other factors were known (Saltelli et al., Global
-Sensitivity Analysis, 2008, ch. 4). Both are of the mean over the seeds of a combination; what the seeds cause themselves
-is given beside them.
+Sensitivity Analysis, 2008, ch. 4). Both are of the mean over the seeds of a combination; what the seeds cause is given
+beside them.
 """
 
 from __future__ import annotations

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -124,29 +125,31 @@ def _groups(
     """Return the rows of each group, and its values by factor."""
     codes, labels = np.zeros((len(table), 0), dtype=int), []
     for name in names:
-        one, label = _binned(numbers(table, name)) if isinstance(plan.factors[name], RangeTable) else _coded(table[name])
+        factor = plan.factors[name]
+        one, label = (
+            _binned(numbers(table, name)) if isinstance(factor, RangeTable) else _coded(table[name], list(factor))
+        )
         codes = np.column_stack([codes, one])
         labels.append(label)
-    _, first, which = np.unique(codes, axis=0, return_index=True, return_inverse=True)
-    order = np.argsort(first, kind="stable")
+    found, which = np.unique(codes, axis=0, return_inverse=True)
     members = np.split(np.argsort(which.ravel(), kind="stable"), np.cumsum(np.bincount(which.ravel()))[:-1])
-    values = [
-        {name: label[code] for name, label, code in zip(names, labels, codes[first[k]], strict=True)} for k in order
-    ]
-    return [members[k] for k in order], values
+    values = [{name: label[code] for name, label, code in zip(names, labels, one, strict=True)} for one in found]
+    return members, values
 
 
-def _coded(column: pa.ChunkedArray) -> tuple[NDArray[np.intp], list[Value]]:
-    """Return the number of each row's value, (n,), and the values."""
+def _coded(column: pa.ChunkedArray, factor: list[Value]) -> tuple[NDArray[np.intp], list[Value]]:
+    """Return the place of each row's value in the plan, (n,), and the values."""
     encoded = column.combine_chunks().dictionary_encode()
-    return np.asarray(encoded.indices), encoded.dictionary.to_pylist()
+    places = np.array([factor.index(value) for value in encoded.dictionary.to_pylist()])
+    return places[np.asarray(encoded.indices)], factor
 
 
 def _binned(column: NDArray[np.float64]) -> tuple[NDArray[np.intp], list[Value]]:
     """Return the number of each row's bin of equal count, (n,), and the limits of the bins as text."""
     edges = np.unique(np.quantile(column, np.linspace(0.0, 1.0, _BINS + 1)))
     which = np.clip(np.searchsorted(edges, column, side="right") - 1, 0, max(len(edges) - 2, 0))
-    return which, [f"{low:.3g} … {high:.3g}" for low, high in zip(edges[:-1], edges[1:], strict=True)] or [str(edges[0])]
+    limits = [f"{low:.3g} … {high:.3g}" for low, high in pairwise(edges)]
+    return which, [*limits] or [f"{edges[0]:.3g}"]
 
 
 def _quantiles(column: NDArray[np.float64]) -> tuple[float, float, float]:

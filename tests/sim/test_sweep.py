@@ -181,7 +181,7 @@ def test_results_are_grouped_by_factors(tmp_path):
         ("[factors]\n", r"\[factors\] is empty"),
         ("points = 3\n[factors]\na = [1]\n", "leave points out"),
         ('design = "random"\n[factors]\na = [1]\n', "needs points"),
-        ('design = "sobol"\npoints = 6\n[factors]\na = [1]\n', "powers of two"),
+        ('design = "sobol"\npoints = 6\n[factors]\na = [1]\n', "powers of two; use 4 or 8"),
         ("[factors.a]\nlow = 1.0\nhigh = 2.0\n", "levels"),
         ("[factors.a]\nlow = 2.0\nhigh = 1.0\nlevels = 2\n", "not below"),
         ('[factors.a]\nlow = -1.0\nhigh = 1.0\nlevels = 2\nscale = "log"\n', "no logarithm"),

@@ -123,6 +123,6 @@ def test_work_that_no_worker_finds_is_one_line(ran, monkeypatch):
     module = ModuleType("only_here")
     exec("def work(case):\n    return {}", module.__dict__)
     monkeypatch.setitem(sys.modules, "only_here", module)
-    with cluster(1) as found, pytest.raises(GfimuError, match="No module named 'only_here'.*same gfimu") as refused:
+    with cluster(1) as found, pytest.raises(GfimuError, match=r"No module named 'only_here'.*same gfimu") as refused:
         ran("out", partial(open_cluster, found.scheduler_address), module.work)
     assert "\n" not in str(refused.value)

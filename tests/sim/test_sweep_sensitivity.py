@@ -12,7 +12,7 @@ from sim.sweep.sensitivity import seed_shares, sensitivities
 ISHIGAMI_FIRST, ISHIGAMI_TOTAL = (0.3139, 0.4424, 0.0), (0.5576, 0.4424, 0.2437)
 """Of sin x1 + 7 sin² x2 + 0.1 x3⁴ sin x1, x in ±π (Ishigami & Homma, 1990)."""
 
-RANGE = '[factors.x{0}]\nlow = -3.141592653589793\nhigh = 3.141592653589793\n'
+RANGE = "[factors.x{0}]\nlow = -3.141592653589793\nhigh = 3.141592653589793\n"
 THREE = "".join(RANGE.format(k) for k in (1, 2, 3))
 LISTS = '[factors]\na = [0, 1, 2]\nb = ["no", "yes"]\nc = [1.5, 2.5]\n'
 
@@ -97,7 +97,7 @@ def test_any_design_gives_first_order_indices(tmp_path, kind):
 
 
 def test_the_bias_of_many_bins_is_removed(tmp_path):
-    """Of pure noise every index is zero in the mean; the plain correlation ratio is the share of bins to points, 1/8."""
+    """Of pure noise every index is zero in the mean; the plain correlation ratio is bins over points, 1/8."""
     plan = f'design = "random"\npoints = 256\nseed = {{}}\n{THREE}'
     found = [
         one.first
@@ -121,7 +121,11 @@ def test_intervals_cover(tmp_path):
 
 @pytest.mark.parametrize(
     ("head", "total"),
-    [("", None), ('design = "saltelli"\npoints = 512\n', CATEGORICAL_TOTAL), ('design = "sobol"\npoints = 512\n', None)],
+    [
+        ("", None),
+        ('design = "saltelli"\npoints = 512\n', CATEGORICAL_TOTAL),
+        ('design = "sobol"\npoints = 512\n', None),
+    ],
 )
 def test_lists_have_indices_too(tmp_path, head, total):
     found = sensitivities(*campaign(tmp_path, head + LISTS, categorical))
