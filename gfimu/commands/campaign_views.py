@@ -90,6 +90,7 @@ class CampaignTable:
         }
 
 
+@writes(reads=("folder",))
 def campaign_status(folder: str | Path) -> CampaignStatus:
     """Say how far a campaign is, also while another process runs it.
 

@@ -220,21 +220,21 @@ def _draw_bars(axes: Axes, found: Sequence[Sensitivity], seeds: float | None) ->
     """Draw the indices of the factors, the largest on top, and the share of the seeds below."""
     found = sorted(found, key=lambda one: np.nanmax([one.first, one.total]))[-8:]
     has_total = any(np.isfinite(one.total) for one in found)
-    height, names = 0.36 if has_total else 0.6, []
+    kinds = [("first order", [one.first for one in found], [one.first_high for one in found], AFTER_ON_PAPER)]
+    if has_total:
+        kinds.append(("total", [one.total for one in found], [one.total_high for one in found], BEFORE_ON_PAPER))
+    height, names = 0.72 / len(kinds), []
     if seeds is not None:
         axes.barh(0, seeds, 0.6, color=css(NOISE_ON_PAPER))
         names.append("seeds")
-    for place, one in enumerate(found, start=len(names)):
-        shift = height / 2 if has_total else 0.0
+    places = np.arange(len(names), len(names) + len(found))
+    for number, (name, values, highs, colour) in enumerate(kinds):
+        shift = height * (0.5 * (len(kinds) - 1) - number)
+        error = np.nan_to_num(np.subtract(highs, values))
         axes.barh(
-            place + shift, max(one.first, 0.0), height, color=css(AFTER_ON_PAPER), label="first order" if one is found[0] else None,
-            xerr=one.first_high - one.first if np.isfinite(one.first_high) else None, error_kw={"lw": 0.9},
+            places + shift, np.maximum(values, 0.0), height, color=css(colour), label=name, xerr=error,
+            error_kw={"lw": 0.9},
         )  # fmt: skip
-        if np.isfinite(one.total):
-            axes.barh(
-                place - shift, one.total, height, color=css(BEFORE_ON_PAPER), label="total" if one is found[0] else None,
-                xerr=one.total_high - one.total, error_kw={"lw": 0.9},
-            )  # fmt: skip
     names += [label(one.factor).partition(" (")[0] for one in found]
     axes.set_yticks(range(len(names)), names)
     axes.set_xlim(0.0, 1.05)
