@@ -43,7 +43,7 @@ def status(folder: FolderArgument, json: JsonOption = False) -> None:
         left = "time left not known yet" if math.isnan(found.left_s) else f"{duration_text(found.left_s)} left"
         print_text(f"runs: {places}; {found.rate_per_s:.3g} cases/s, {left}")
     elif found.done < found.cases:
-        print_text(f"does not run; gfimu campaign {found.folder / 'plan.toml'} --out {found.folder} goes on with it")
+        print_text(f"does not run; gfimu campaign PLAN.toml --out {found.folder} with its plan goes on with it")
     print_failures(found.failures)
 
 
