@@ -136,7 +136,7 @@ def _figure(title: str, table: pa.Table, design: Design, results: list[str], all
         if found:
             _draw_bars(row[-1], [one for one in found if one.result == result], shares.get(result))
     if any(np.isfinite(one.total) for one in found):
-        grid[0][-1].legend(fontsize=7, frameon=False, loc="lower right")
+        grid[0][-1].legend(fontsize=7, frameon=False, loc="center right")
     if factors:
         figure.supxlabel(_CAPTION, fontsize=8, x=0.01, ha="left")
     return figure

@@ -93,9 +93,7 @@ def test_table_has_quantiles_and_sensitivities(gfimu_command, campaign, tmp_path
     rows = list(csv.DictReader(out.open()))
     assert [row["sample_rate_hz"] for row in rows] == ["20"] * 6 + ["40"] * 6
     assert float(rows[0]["median_or_share"]) == content["groups"][0]["median"]
-    first = {
-        one["factor"]: one["first"] for one in content["sensitivities"] if one["result"] == "deviation_over_noise"
-    }
+    first = {one["factor"]: one["first"] for one in content["sensitivities"] if one["result"] == "deviation_over_noise"}
     assert first["bias_instability_mg"] > 0.5
     assert abs(first["sample_rate_hz"]) < 0.2
     assert 0.0 < content["seed_shares"]["alpha_rms_rad_s2"] < 1.0
@@ -137,7 +135,7 @@ def test_a_damaged_shard_is_one_line_and_is_made_again(gfimu_command, part, tmp_
 @pytest.mark.parametrize(
     ("factors", "message"),
     [
-        ('sample_rate = [20]\n', "unknown factor of kind 'measure' 'sample_rate'"),
+        ("sample_rate = [20]\n", "unknown factor of kind 'measure' 'sample_rate'"),
         ('"table_tild.x_rad" = [0.1]\n', "unknown effect 'table_tild'"),
         ('"table_tilt.x_m" = [0.1]\n', "x_m"),
         ('"misalignment.std_m" = [0.1]\n', "drawn by std_rad"),

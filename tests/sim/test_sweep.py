@@ -1,6 +1,6 @@
 """Campaigns: the cases of a plan, and that nothing is lost or run twice, whatever dies."""
 
-from concurrent.futures import BrokenExecutor, ThreadPoolExecutor
+from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from functools import partial
@@ -147,6 +147,74 @@ def test_a_batch_that_a_broken_pool_refuses_is_not_lost(tmp_path):
     run(tmp_path / "disturbed", plan, opened=opened)
     assert len(pools) > 1
     assert content(tmp_path / "undisturbed") == content(tmp_path / "disturbed")
+
+
+class Unreliable(Executor):
+    """Holds batches for a while, and at random breaks, loses or cancels them, or loses a worker under one of them."""
+
+    def __init__(self, rng, log):
+        self.rng, self.log, self.pending, self.broken = rng, log, [], False
+
+    def count(self):
+        for future, task in self.pending[: 1 + self.rng.integers(3)]:
+            self.finish(future, task)
+        return int(self.rng.integers(1, 4))
+
+    def submit(self, function, *values):
+        if self.broken or self.rng.random() < 0.05:
+            self.give_up()
+            raise BrokenExecutor("refused")
+        future = Future()
+        self.pending.append((future, (function, values)))
+        return future
+
+    def finish(self, future, task):
+        self.pending.remove((future, task))
+        chance, (function, values) = self.rng.random(), task
+        if chance < 0.08:
+            future.cancel()
+            future.set_running_or_notify_cancel()
+        elif chance < 0.15:
+            future.set_exception(WorkerDied())
+        elif chance < 0.2:
+            future.set_exception(BrokenExecutor("broke"))
+            self.give_up()
+        else:
+            self.log.append(values[2])  # first case of a batch whose rows are returned
+            future.set_result(function(*values))
+
+    def give_up(self):
+        self.broken = True
+        for future, _ in self.pending:
+            future.set_exception(BrokenExecutor("broke"))
+        self.pending.clear()
+
+
+class WorkerDied(Exception):
+    """As Dask reports it: of one batch alone."""
+
+
+def test_whatever_an_executor_does_each_batch_is_written_once(tmp_path, monkeypatch):
+    """Random losses at every place where an executor can lose a batch; rows that were returned are never made again."""
+    monkeypatch.setattr("sim.sweep.engine._LOOK", 1e-3)
+    monkeypatch.setattr("sim.sweep.engine._TRIES", 99)
+    plan = plan_file(tmp_path, GRID.replace("batch = 4", "batch = 1"))
+    undisturbed = content(run(tmp_path / "undisturbed", plan)[0].folder)
+    for seed in range(20):
+        rng, log, pools = np.random.default_rng(seed), [], []
+
+        @contextmanager
+        def opened(rng=rng, log=log, pools=pools):
+            pools.append(Unreliable(rng, log))
+            lost = (CancelledError, BrokenExecutor)
+            yield Workers(
+                pools[-1], pools[-1].count, lambda e: 1 if isinstance(e, WorkerDied) else 0 * isinstance(e, lost)
+            )
+
+        dataset, ran = run(tmp_path / str(seed), plan, opened=opened)
+        assert ran == 18
+        assert sorted(log) == list(range(18))
+        assert content(dataset.folder) == undisturbed
 
 
 def test_a_batch_that_kills_its_worker_each_time_is_reported(tmp_path):
