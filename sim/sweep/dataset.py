@@ -21,7 +21,7 @@ from sim.sweep.plan import PlanFile, load_plan
 __all__ = ["Dataset"]
 
 _PLAN = "plan.toml"
-_FORMAT = 1  # of rows; another one makes other names
+_FORMAT = 2  # of rows; another one makes other names
 
 
 @dataclass(frozen=True)

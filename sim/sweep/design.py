@@ -16,6 +16,7 @@ from sim.sweep.plan import PlanFile, RangeTable, Value
 
 __all__ = ["Case", "Design"]
 
+_UNUSED_BITS = 11  # numerical: of 64; a seed of 53 bits is exact in every file, and millions of them differ
 _MOST_POINTS = 2_000_000  # numerical: of a design that is no grid, which are kept in memory
 
 
@@ -60,8 +61,8 @@ class Design:
     def __getitem__(self, number: int) -> Case:
         point, repeat = divmod(number, self.plan.repeats)
         # Repeats of all points share their seeds, so that factors are compared on the same chips and noise.
-        (seed,) = np.random.SeedSequence([self.plan.seed, repeat]).generate_state(1)
-        return Case(number, self._values(self._point(point)), int(seed))
+        (seed,) = np.random.SeedSequence([self.plan.seed, repeat]).generate_state(1, np.uint64)
+        return Case(number, self._values(self._point(point)), int(seed) >> _UNUSED_BITS)
 
     def batches(self) -> Iterator[range]:
         """Yield the numbers of the cases that run together."""
