@@ -7,7 +7,8 @@ state; the acceleration of a Runge-Kutta step is that of its last stage.)
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import mujoco
@@ -187,7 +188,6 @@ def drive(
     return run
 
 
-@mujoco_warnings()
 def drive_all(
     drives: Iterable[Drive],
     *,
@@ -218,7 +218,8 @@ def drive_all(
     groups: dict[tuple[int, ...], list[tuple[int, mujoco.MjModel]]] = {}
     for place, run in enumerate(runs):
         try:
-            model = run.model()
+            with mujoco_warnings():
+                model = run.model()
         except InputError as error:
             results[place] = error
             continue
@@ -231,12 +232,23 @@ def drive_all(
             if progress is not None:
                 progress((before + share * steps) / total)
 
-        for (place, _), result in zip(
-            group, _step_together(together, [model for _, model in group], threads, every, tell), strict=True
-        ):
+        with _unsaid_warnings():
+            found = _step_together(together, [model for _, model in group], threads, every, tell)
+        for (place, _), result in zip(group, found, strict=True):
             results[place] = result
         done += len(group) * len(together[0].times)
     return results
+
+
+@contextmanager
+def _unsaid_warnings() -> Iterator[None]:
+    """Keep MuJoCo from writing its warnings to a file: their counters say which run failed."""
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda text: None)
+    try:
+        yield
+    finally:
+        mujoco.set_mju_user_warning(before)
 
 
 def _layout(model: mujoco.MjModel) -> tuple[int, ...]:

@@ -58,7 +58,7 @@ class Ride:
         self.array = run.array
         self._command = run.motion
         if run.driven and not run.free:
-            driven = drive(self.world, _spin(run.motion), run.duration + 1.0, step=run.physics_step)
+            driven = drive(self.world, _spin(run.motion), run.duration + 1.0, step=run.physics_step, motor=run.motor)
             run = replace(run, motion=driven.motion)
         self.scenario = run
         self._motion = run.motion
