@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gfimu.commands.campaign_drive import DriveWork
 from gfimu.errors import InputError, unknown_name
 
 if TYPE_CHECKING:
@@ -103,7 +104,11 @@ def diagnose_case(case: Case) -> Mapping[str, Any]:
     }
 
 
-KINDS: dict[str, Callable[[Case], Mapping[str, Any]]] = {"estimate": estimate_case, "diagnose": diagnose_case}
+KINDS: dict[str, Callable[[Case], Mapping[str, Any]]] = {
+    "estimate": estimate_case,
+    "diagnose": diagnose_case,
+    "drive": DriveWork(),
+}
 """What a case does, by the plan's ``kind``."""
 
 
@@ -117,7 +122,10 @@ def check_factors(plan: PlanFile, first: Case, source: str) -> None:
                 raise unknown_name("factor of kind 'diagnose'", name, _OF_STUDY)
         return
     try:
-        _setting(first.values)
+        if plan.kind == "drive":
+            DriveWork().check(first)
+        else:
+            _setting(first.values)
     except InputError as error:
         raise InputError(f"{source}: [factors]: {error}") from None
 

@@ -11,6 +11,7 @@ from gfimu.errors import GfimuError
 from sim.sweep.dataset import Dataset
 from sim.sweep.design import Case, Design
 from sim.sweep.plan import PlanFile
+from sim.sweep.together import prepared
 
 __all__ = ["Work", "run_campaign"]
 
@@ -63,6 +64,7 @@ def run_campaign(
 def run_batch(plan: PlanFile, work: Work, first: int, stop: int) -> list[dict[str, Any]]:
     """Run the cases of a batch in this process and return a row each."""
     design = Design(plan)
+    work = prepared(work, [design[number] for number in range(first, stop)])
     return [_row(design[number], work) for number in range(first, stop)]
 
 
