@@ -5,6 +5,8 @@ from __future__ import annotations
 from xml.etree import ElementTree as ET
 
 import mujoco
+import numpy as np
+from numpy.typing import NDArray
 
 from gfimu.errors import InputError, unknown_name
 from gfimu.geometry.array import AccelerometerArray
@@ -65,5 +67,5 @@ def _write_all_digits(root: ET.Element, spec: mujoco.MjSpec, array: Acceleromete
             site.set("quat", _digits(spec.site(site.get("name")).quat))
 
 
-def _digits(values: object) -> str:
-    return " ".join(repr(float(value)) for value in values)  # type: ignore[attr-defined]
+def _digits(values: NDArray[np.float64]) -> str:
+    return " ".join(repr(value) for value in values.tolist())

@@ -14,7 +14,7 @@ from sim.effects import make_effect
 from sim.scenarios import Scenario, simulate
 from sim.turntable import prescribed_readings
 
-SHIPPED = ["driven_run", "eccentric_mount", "paper_run", "rest", "speed_sweep", "tumble"]
+SHIPPED = ["driven_run", "eccentric_mount", "motor_run", "paper_run", "rest", "speed_sweep", "tumble"]
 PERFECT = "sensor.perfect=true"
 
 
