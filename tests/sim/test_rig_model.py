@@ -5,14 +5,23 @@ import re
 import mujoco
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from gfimu.files.model_files import models_directory
-from gfimu.geometry.array import AccelerometerArray
+from gfimu.geometry.array import AccelerometerArray, Chip
 from gfimu.geometry.kinematics import specific_force
 from sim.mjcf_array import array_from_mjcf
 from sim.mjcf_export import RIGS, array_as_mjcf
 
 ROUNDING = 1e-11  # m/s², of readings of some 10 m/s² through MuJoCo's tree
+
+ODD = AccelerometerArray(
+    "odd",
+    (
+        Chip("a1", np.array([1 / 30, -1 / 70, 1 / 110]), Rotation.from_rotvec([0.1, 0.2, 0.3]).as_matrix()),
+        Chip("a2", np.array([-1 / 30, 1 / 60, 0.0]), Rotation.from_rotvec([0.4, 0.2, 0.3]).as_matrix()[:2]),
+    ),
+)  # places and axes that six digits don't hold; a chip of three axes and one of two
 
 
 def opened(name):
@@ -75,10 +84,12 @@ def test_a_reader_of_the_free_cube_alone_sees_twelve_streams():
 
 
 @pytest.mark.parametrize("rig", RIGS)
-@pytest.mark.parametrize("name", ["cube12", "cube12_as_built", "nap_3_2_2_2", "mimu4444"])
-def test_an_array_of_ones_own_becomes_a_model(tmp_path, name, rig):
+@pytest.mark.parametrize(
+    "array", [ODD, *map(AccelerometerArray.load, ["cube12", "nap_3_2_2_2", "mimu4444"])], ids=lambda one: one.name
+)
+def test_an_array_of_ones_own_becomes_a_model(tmp_path, array, rig):
     """Its text says where the channels are; MuJoCo alone finds gravity there, and the array in the sites."""
-    array, file = AccelerometerArray.load(name), tmp_path / "rig.xml"
+    file = tmp_path / "rig.xml"
     file.write_text(array_as_mjcf(array, rig))
     model = mujoco.MjModel.from_xml_path(str(file))
     data = mujoco.MjData(model)
