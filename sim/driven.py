@@ -57,7 +57,7 @@ class Drive:
     Raises
     ------
     InputError
-        If the step is not positive or longer than the duration.
+        If the step is not positive or longer than the duration, or the world is a linear axis.
     """
 
     world: World
@@ -71,6 +71,8 @@ class Drive:
     def __post_init__(self) -> None:
         if not 0 < self.step <= self.duration:
             raise InputError(f"physics step {self.step} s: must be positive and at most the duration {self.duration} s")
+        if self.world.slide is not None:
+            raise InputError("a linear axis has no motor here: it moves as commanded")
 
     @property
     def times(self) -> NDArray[np.float64]:
@@ -212,7 +214,14 @@ def drive_all(
     -------
     list of DrivenRun or InputError
         A result per run, in order; an error where a model is refused or a run does not stay finite.
+
+    Raises
+    ------
+    InputError
+        If there is not at least one thread, or not every so many steps a state.
     """
+    if threads < 1 or every < 1:
+        raise InputError(f"threads {threads}, every {every}: give at least 1 of each")
     runs = list(drives)
     results: list[DrivenRun | InputError] = [InputError("not run")] * len(runs)
     groups: dict[tuple[int, ...], list[tuple[int, mujoco.MjModel]]] = {}

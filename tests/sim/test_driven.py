@@ -74,8 +74,9 @@ def test_runs_of_several_kinds_and_lengths_come_back_in_order():
     assert shares[-1] == pytest.approx(1.0)
 
 
-def test_every_nth_state_is_one_of_all(monkeypatch):
-    (run,) = varied(1, True)
+@pytest.mark.parametrize("motor", [False, True], ids=["speed controller", "dcmotor"])
+def test_every_nth_state_is_one_of_all(monkeypatch, motor):
+    (run,) = varied(1, motor)
     whole = drive(run.world, run.command, run.duration, motor=run.motor)
     monkeypatch.setattr("sim.driven._CHUNK", 18 * 64)  # the log is put together of several pieces
     (every,) = drive_all([run], every=10)
@@ -97,3 +98,12 @@ def test_a_run_that_fails_leaves_the_others_alone(tmp_path, monkeypatch):
     assert isinstance(third, InputError)
     assert "\n" not in str(third)
     assert not list(tmp_path.iterdir())
+
+
+def test_what_cannot_be_driven_is_one_line():
+    (run,) = varied(1, True)
+    with pytest.raises(InputError, match="linear axis has no motor"):
+        replace(run, world=run.world.changed(slide=np.array([1.0, 0.0, 0.0])))
+    with pytest.raises(InputError, match="threads 0, every 1: give at least 1"):
+        drive_all([run], threads=0)
+    assert drive_all([]) == []
