@@ -31,6 +31,7 @@ __all__ = ["LONGEST_STEP", "Drive", "DrivenRun", "drive", "drive_all"]
 LONGEST_STEP = 1e-3
 """Usual physics step of a driven run, s."""
 
+_MOST_STEPS = 20_000_000  # of a run, 3 GB of logs
 _CHUNK = 4_000_000  # numbers of sensor data that are held at once, besides the logs
 _ACCELERATION = "angular_acceleration"
 _TORQUE = "torque"
@@ -57,7 +58,7 @@ class Drive:
     Raises
     ------
     InputError
-        If the step is not positive or longer than the duration, or the world is a linear axis.
+        If the step is not positive, longer than the duration or too short for it, or the world is a linear axis.
     """
 
     world: World
@@ -71,6 +72,10 @@ class Drive:
     def __post_init__(self) -> None:
         if not 0 < self.step <= self.duration:
             raise InputError(f"physics step {self.step} s: must be positive and at most the duration {self.duration} s")
+        if self.duration / self.step > _MOST_STEPS:
+            raise InputError(
+                f"physics step {self.step:g} s: {self.duration:g} s take more than {_MOST_STEPS:g}; give a longer step"
+            )
         if self.world.slide is not None:
             raise InputError("a linear axis has no motor here: it moves as commanded")
 

@@ -104,6 +104,8 @@ def test_what_cannot_be_driven_is_one_line():
     (run,) = varied(1, True)
     with pytest.raises(InputError, match="linear axis has no motor"):
         replace(run, world=run.world.changed(slide=np.array([1.0, 0.0, 0.0])))
+    with pytest.raises(InputError, match=r"physics step 1e-09 s: 1 s take more than 2e\+07; give a longer step"):
+        replace(run, step=1e-9)
     with pytest.raises(InputError, match="threads 0, every 1: give at least 1"):
         drive_all([run], threads=0)
     assert drive_all([]) == []
