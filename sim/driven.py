@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from mujoco.batch import Batch
+from mujoco.batch import Batch, SimulationError
 from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline, PPoly
 
@@ -292,14 +292,19 @@ def _step_together(
     controls = [run.controls(state) for run, state in zip(drives, wanted, strict=True)]
     logs = np.empty((len(drives), -(-steps // every), models[0].nsensordata))
     rows = max(every, _CHUNK // (len(drives) * models[0].nsensordata) // every * every)
-    before = batch.warning[:, :, 1].copy()
+    warned, stopped = batch.warning[:, :, 1].copy(), np.zeros(len(drives), dtype=bool)
     for first in range(0, steps, rows):
         count = min(rows, steps - first)
         control = np.stack([one[first : first + count] for one in controls])
-        sensors = batch.rollout(count, control, record=("sensordata",))["sensordata"][:, ::every]
-        logs[:, first // every : first // every + sensors.shape[1]] = sensors
+        sensors = np.empty((len(drives), count, models[0].nsensordata))
+        try:
+            batch.rollout(count, control, record=("sensordata",), out={"sensordata": sensors})
+        except SimulationError as error:
+            stopped[error.ids] = True  # the others ran to the end
+        kept = sensors[:, ::every]
+        logs[:, first // every : first // every + kept.shape[1]] = kept
         tell((first + count) / steps)
-    failed = (batch.warning[:, :, 1] != before).any(axis=1)
+    failed = stopped | (batch.warning[:, :, 1] != warned).any(axis=1)
     return [
         InputError(
             f"the driven table did not stay finite with a physics step of {run.step:g} s; "

@@ -5,6 +5,7 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 import pytest
+from mujoco.batch import Batch, SimulationError
 
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
@@ -98,6 +99,21 @@ def test_a_run_that_fails_leaves_the_others_alone(tmp_path, monkeypatch):
     assert isinstance(third, InputError)
     assert "\n" not in str(third)
     assert not list(tmp_path.iterdir())
+
+
+def test_an_error_of_mujoco_in_one_run_leaves_the_others_alone(monkeypatch):
+    whole = drive_all(varied(3, True))
+    rollout = Batch.rollout
+
+    def failing(self, *arguments, **options):
+        rollout(self, *arguments, **options)
+        raise SimulationError(np.array([1]), "stack overflow")
+
+    monkeypatch.setattr(Batch, "rollout", failing)
+    first, second, third = drive_all(varied(3, True))
+    same(first, whole[0])
+    same(third, whole[2])
+    assert isinstance(second, InputError)
 
 
 def test_what_cannot_be_driven_is_one_line():
