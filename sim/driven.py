@@ -238,19 +238,22 @@ def drive_all(
             results[place] = error
             continue
         groups.setdefault((len(run.times), *_layout(model)), []).append((place, model))
-    total, done = sum(len(run.times) for run in runs), 0
-    for group in groups.values():
-        together = [runs[place] for place, _ in group]
-
-        def tell(share: float, before: int = done, steps: int = len(group) * len(together[0].times)) -> None:
-            if progress is not None:
-                progress((before + share * steps) / total)
-
+    total, done = sum(len(run.times) for run in runs), 0.0
+    tell = progress or (lambda share: None)
+    for (steps, *_), group in groups.items():
+        places, models = [place for place, _ in group], [model for _, model in group]
+        part = len(group) * steps / total
         with _unsaid_warnings():
-            found = _step_together(together, [model for _, model in group], threads, every, tell)
-        for (place, _), result in zip(group, found, strict=True):
+            found = _step_together(
+                [runs[place] for place in places],
+                models,
+                threads,
+                every,
+                lambda share, part=part, done=done: tell(done + part * share),  # type: ignore[misc]
+            )
+        for place, result in zip(places, found, strict=True):
             results[place] = result
-        done += len(group) * len(together[0].times)
+        done += part
     return results
 
 
@@ -266,9 +269,9 @@ def _unsaid_warnings() -> Iterator[None]:
 
 
 def _layout(model: mujoco.MjModel) -> tuple[int, ...]:
-    """Return the sizes that models of one batch share."""
-    names = ("nq", "nv", "na", "nu", "nbody", "njnt", "ngeom", "nsite", "nactuator", "nsensor", "nsensordata", "nM")
-    return tuple(int(getattr(model, name)) for name in names if hasattr(model, name))
+    """Return the sizes that models of one batch share: all that MuJoCo has."""
+    sizes = (getattr(model, name) for name in sorted(dir(model)) if name.startswith("n"))
+    return tuple(size for size in sizes if isinstance(size, int))
 
 
 def _step_together(
