@@ -40,6 +40,9 @@ if TYPE_CHECKING:
     from gfimu.commands import firmware as firmware
     from gfimu.commands.calibrate import calibrate as calibrate
     from gfimu.commands.campaign import campaign as campaign
+    from gfimu.commands.campaign_views import campaign_plot as campaign_plot
+    from gfimu.commands.campaign_views import campaign_status as campaign_status
+    from gfimu.commands.campaign_views import campaign_table as campaign_table
     from gfimu.commands.catalogue import catalogue as catalogue
     from gfimu.commands.catalogue import new as new
     from gfimu.commands.catalogue import show as show
@@ -63,6 +66,7 @@ if TYPE_CHECKING:
     from gfimu.commands.record import record as record
     from gfimu.commands.score import score as score
     from gfimu.commands.simulate import simulate as simulate
+    from gfimu.commands.tolerance import tolerance as tolerance
     from gfimu.commands.view import view as view
     from gfimu.errors import GeometryError as GeometryError
     from gfimu.errors import GfimuError as GfimuError
@@ -123,6 +127,9 @@ _PUBLIC = {
     "calibrate_array": "gfimu.calibration.array_calibration",
     "centripetal_agreement": "gfimu.motion.estimate_summary",
     "campaign": "gfimu.commands.campaign",
+    "campaign_plot": "gfimu.commands.campaign_views",
+    "campaign_status": "gfimu.commands.campaign_views",
+    "campaign_table": "gfimu.commands.campaign_views",
     "catalogue": "gfimu.commands.catalogue",
     "certificate": "gfimu.commands.certificate",
     "check": "gfimu.commands.check",
@@ -173,6 +180,7 @@ _PUBLIC = {
     "simulate": "gfimu.commands.simulate",
     "specific_force": "gfimu.geometry.kinematics",
     "summarise": "gfimu.motion.estimate_summary",
+    "tolerance": "gfimu.commands.tolerance",
     "update_array_calibration": "gfimu.calibration.array_calibration",
     "view": "gfimu.commands.view",
 }

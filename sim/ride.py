@@ -97,11 +97,7 @@ class Ride:
             "scenario": self.scenario.name,
             "seed": self.seed,
             "mounting_rotvec_rad": list(self.scenario.mounting_rotvec),
-            **(
-                {}
-                if self.scenario.earth is None
-                else {**self.scenario.earth.to_dict(), "gravity_m_s2": self.scenario.gravity}
-            ),
+            **self.scenario.place,
         }
 
     def force(self, t: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -118,6 +118,13 @@ class Scenario:
         return isinstance(self.motion.at(np.zeros(1)), BodyState)
 
     @property
+    def place(self) -> dict[str, float]:
+        """Metadata of a recording that say where it was made: gravity where it isn't standard, latitude and north."""
+        if self.earth is None:
+            return {} if self.gravity == STANDARD_GRAVITY else {"gravity_m_s2": self.gravity}
+        return {**self.earth.to_dict(), "gravity_m_s2": self.gravity}
+
+    @property
     def world(self) -> World:
         """The world of the run, with its effects."""
         nominal = World(
@@ -364,7 +371,7 @@ def _metadata(run: Scenario, sensor: Sensor, seed: int) -> dict[str, Any]:
         "seed": seed,
         "software_version": gfimu.__version__,
         "mounting_rotvec_rad": list(run.mounting_rotvec),
-        **({} if run.earth is None else {**run.earth.to_dict(), "gravity_m_s2": run.gravity}),
+        **run.place,
         "lsb_m_s2": float(sensor.lsb[0]),
         "effects": [{"name": effect.name, "parameters": effect.parameters} for effect in run.effects],
         "truth_bias_m_s2": errors,

@@ -1,6 +1,6 @@
 """How the diagnosis does in worlds that it has never met: runs the foreign list and prints its table.
 
-    python tests/foreign_study.py --out foreign.jsonl --workers 2        (every third case; --all for the whole list)
+    python tests/foreign_study.py --out foreign --workers 2        (every third case; --all for the whole list)
 
 Of each case a second recording of the same world, on another profile, is predicted from its reference alone by the
 given and by the extended simulation. A run that was cut off is resumed.
@@ -11,11 +11,10 @@ import json
 import random
 from collections import Counter, defaultdict
 from dataclasses import replace
-from functools import partial
-from multiprocessing import Pool
 from pathlib import Path
 
 import foreign_world
+import msgspec
 import numpy as np
 from foreign_effects import FOREIGN
 
@@ -26,6 +25,12 @@ from gfimu.errors import GfimuError
 from gfimu.recording import Recording
 from gfimu.units import STANDARD_GRAVITY
 from sim.study.outcome import draw_world, outcome_of, processor_time
+from sim.sweep.dataset import Dataset
+from sim.sweep.design import Design
+from sim.sweep.engine import run_campaign
+from sim.sweep.executors import open_executor
+from sim.sweep.plan import PlanFile
+from sim.sweep.summary import failures
 
 WORSE = 1.02  # of the prediction error of a new recording, from which a twin predicts worse
 
@@ -92,6 +97,14 @@ def recorded_again(generator, case, array):
     return Recording.from_arrays(columns.pop("t_s"), readings, array, reference=columns)
 
 
+def run_world(case):
+    """Run a case of the campaign: ``world`` is its generator and key."""
+    generator, key = case.values["world"].split()
+    job = next(job for job in jobs(every=True) if job[0] == generator and job[1].key == key)
+    outcome = run_case(job, at_once=case.values["grammar"])
+    return {"judged": judged(outcome), "outcome": msgspec.json.encode(outcome, enc_hook=np.generic.item).decode()}
+
+
 def run_case(job, *, at_once=False):
     """Draw, diagnose and predict one case; a refusal is an outcome, too."""
     generator, case = job
@@ -147,22 +160,21 @@ def _said(outcome):
 
 def main():
     parser = argparse.ArgumentParser(description="Diagnose worlds with foreign effects and print the table.")
-    parser.add_argument("--out", type=Path, required=True, help="file of outcomes (JSON lines)")
+    parser.add_argument("--out", type=Path, required=True, help="folder of the run")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--all", action="store_true", help="all three profiles of each effect")
     parser.add_argument("--grammar", action="store_true", help="search the wider library at once")
     options = parser.parse_args()
-    lines = options.out.read_text().splitlines() if options.out.exists() else []
-    outcomes = [json.loads(line) for line in lines]
-    done = {(one["generator"], one["key"]) for one in outcomes}
-    todo = [job for job in jobs(every=options.all) if (job[0], job[1].key) not in done]
-    with Pool(options.workers, maxtasksperchild=10) as pool, options.out.open("a") as file:
-        for outcome in pool.imap_unordered(partial(run_case, at_once=options.grammar), todo):
-            file.write(json.dumps(outcome) + "\n")
-            file.flush()
-            outcomes.append(outcome)
-            print(outcome["generator"], outcome["effects"][0], _said(outcome), flush=True)
-    print(table(outcomes))
+    worlds = [f"{generator} {case.key}" for generator, case in jobs(every=options.all)]
+    plan = PlanFile({"world": worlds, "grammar": [options.grammar]}, kind="foreign", batch=1)
+    dataset = Dataset.create(options.out, plan)
+    run_campaign(
+        dataset, run_world, open_executor, options.workers, progress=lambda *counts: print(*counts, flush=True)
+    )
+    rows = dataset.read(list(Design(plan).batches()))
+    print(table([json.loads(row["outcome"]) for row in rows if not row["failure"]]))
+    for reason, count in failures(rows).items():
+        print(f"{count} failed: {reason}")
 
 
 if __name__ == "__main__":

@@ -114,6 +114,12 @@ JOBS: dict[str, tuple[Entry, ...]] = {
             "drift",
         ),
         Entry(
+            "tolerance",
+            "Budget what machining and chip tolerances do to α, ω and position: shares, simulated units, what to pay "
+            "for.",
+            "tolerance",
+        ),
+        Entry(
             "simulate",
             "Simulate a scenario on the MuJoCo turntable and write what the board would have recorded.",
             "simulate",

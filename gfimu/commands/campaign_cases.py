@@ -1,4 +1,4 @@
-"""What a case of a campaign does: simulate and estimate, or hide an effect and diagnose."""
+"""What a case of a campaign does: simulate and estimate, hide an effect and diagnose, or measure a world."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from sim.sweep.design import Case
     from sim.sweep.plan import PlanFile, Value
 
-__all__ = ["KINDS", "check_factors", "diagnose_case", "estimate_case"]
+__all__ = ["KINDS", "check_factors", "diagnose_case", "estimate_case", "measure_case"]
 
 _SCENARIO = "paper_run"
 _CALIBRATIONS = ("none", "rest", "poses")
@@ -89,24 +89,26 @@ def diagnose_case(case: Case) -> Mapping[str, Any]:
     """
     from sim.study.cases import Case as StudyCase
     from sim.study.outcome import run_case
+    from sim.study.report import brief
 
     values = {_OF_STUDY[name]: value for name, value in case.values.items()}
     hidden = values.pop("effects", "none")
     effects = () if hidden == "none" else (str(hidden),)
     outcome = run_case(StudyCase("campaign", case.seed, effects, **values))  # type: ignore[arg-type]
-    names = sorted(cause["effect"] for cause in outcome["causes"])
-    return {
-        "verdict": outcome["verdict"],
-        "causes": ", ".join(names),
-        "exact": outcome["verdict"] == ("explained" if effects else "nothing_found") and names == sorted(effects),
-        "wrong": outcome["verdict"] == "explained" and not set(names) <= set(effects),
-        "share_of_excess_removed": outcome["share_of_excess_removed"],
-    }
+    return {**brief(outcome), "share_of_excess_removed": outcome["share_of_excess_removed"]}
+
+
+def measure_case(case: Case) -> Mapping[str, float]:
+    """Measure a world and compare a linear solution with the truth (`gfimu.commands.campaign_worlds`)."""
+    from gfimu.commands import campaign_worlds
+
+    return campaign_worlds.measure_case(case)
 
 
 KINDS: dict[str, Callable[[Case], Mapping[str, Any]]] = {
     "estimate": estimate_case,
     "diagnose": diagnose_case,
+    "measure": measure_case,
     "drive": DriveWork(),
 }
 """What a case does, by the plan's ``kind``."""
@@ -122,7 +124,11 @@ def check_factors(plan: PlanFile, first: Case, source: str) -> None:
                 raise unknown_name("factor of kind 'diagnose'", name, _OF_STUDY)
         return
     try:
-        if plan.kind == "drive":
+        if plan.kind == "measure":
+            from gfimu.commands.campaign_worlds import check_world_factors
+
+            check_world_factors(plan, first)
+        elif plan.kind == "drive":
             DriveWork().check(first)
         else:
             _setting(first.values)

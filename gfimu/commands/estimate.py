@@ -237,12 +237,12 @@ def _place(recording: Recording, latitude: float | None, north_rad: float | None
     from gfimu.motion.earth import EarthRotation
 
     place = recording.metadata.get("latitude_deg") if latitude is None else latitude
+    gravity = recording.metadata.get("gravity_m_s2") if latitude is None else None
     if place is None:
         if north_rad is not None:
             raise InputError("the direction of north has no use without a latitude; give that too (--latitude)")
-        return {}
+        return {} if gravity is None else {"gravity": float(gravity)}
     north = float(recording.metadata.get("north_rad", 0.0)) if north_rad is None else north_rad
-    gravity = recording.metadata.get("gravity_m_s2") if latitude is None else None
     return {
         "earth": EarthRotation(float(place), north),
         "gravity": local_gravity(float(place)) if gravity is None else float(gravity),

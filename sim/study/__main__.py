@@ -1,63 +1,65 @@
-"""Run ``python -m sim.study run STUDY --out FILE.jsonl``, then ``report FILE.jsonl --out DIR`` or ``compare FILE``.
+"""Run ``python -m sim.study run STUDY --out RUN``, then ``report RUN --out DIR`` or ``compare RUN``.
 
-``run gate --out FILE.jsonl`` and ``compare FILE.jsonl`` compare an engine with the one of the study page, list by list.
+``run gate --out RUN`` and ``compare RUN`` compare an engine with the one of the study page, list by list.
 """
 
 from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from gfimu.errors import GfimuError, InputError
 from sim.study.baselines import METHODS
-from sim.study.cases import STUDIES, Case, study_cases
+from sim.study.cases import STUDIES
 from sim.study.compare import compare, load_outcomes
-from sim.study.gate import GATE, choose_gate, gate_cases
-from sim.study.outcome_file import read_outcomes
+from sim.study.gate import GATE, choose_gate
+from sim.study.outcome_file import outcome_of_row, read_outcomes
+from sim.study.plan import study_plan, study_work
 from sim.study.report import summarise, write_report
-from sim.study.runner import run_study
+from sim.sweep.dataset import Dataset
+from sim.sweep.engine import run_campaign
 from sim.sweep.executors import open_executor
 
 STORED = "docs/diagnosis-study.jsonl.xz"
 """Outcomes of the study page, seen from the project's root."""
 
 
-def _print_outcome(outcome: dict[str, Any]) -> None:
-    causes = " + ".join(cause["effect"] for cause in outcome["causes"])
-    hidden = " + ".join(outcome["effects"]) or "nothing"
-    sys.stdout.write(
-        f"{outcome['key']:24s} {hidden:32s} d'={outcome['size']:<6.0f} "
-        f"{outcome['verdict']:14s} {causes or outcome.get('error', '')} ({outcome['processor_s']:.1f} s)\n"
-    )
-    sys.stdout.flush()
+class _PrintedDataset(Dataset):
+    """A dataset whose outcomes are printed as they come."""
+
+    def write(self, batch: range, rows: Sequence[Mapping[str, Any]]) -> None:
+        """Write the rows of a batch and print them."""
+        super().write(batch, rows)
+        for outcome in map(outcome_of_row, rows):
+            causes = " + ".join(cause["effect"] for cause in outcome["causes"])
+            hidden = " + ".join(outcome["effects"]) or "nothing"
+            sys.stdout.write(
+                f"{outcome['key']:24s} {hidden:32s} d'={outcome['size']:<6.0f} "
+                f"{outcome['verdict']:14s} {causes or outcome.get('error', '')} ({outcome['processor_s']:.1f} s)\n"
+            )
+        sys.stdout.flush()
 
 
 def _run(options: argparse.Namespace) -> int:
-    if GATE in options.studies and options.world:
-        raise InputError(f"{GATE} has generators of its own; leave out --world")
-    lists: list[tuple[list[Case], str]] = []
-    for study in options.studies:
-        if study == GATE:
-            by_source: dict[str, list[Case]] = {}
-            for case, source in gate_cases(options.first):
-                by_source.setdefault(source, []).append(case)
-            lists += [(cases, source) for source, cases in by_source.items()]
-        else:
-            lists.append((study_cases(study, options.first), options.world))
-    with open_executor(options.workers, options.cluster) as executor:
-        for cases, source in lists:
-            run_study(
-                cases,
-                options.out,
-                executor,
-                source=source,
-                method=options.method,
-                blame=options.blame,
-                tell=_print_outcome,
-            )
+    plan = study_plan(
+        options.studies, first=options.first, source=options.world, method=options.method, blame=options.blame
+    )
+    run_campaign(
+        _PrintedDataset.create(options.out, plan),
+        study_work,
+        lambda workers: open_executor(workers, options.cluster),
+        options.workers,
+    )
     return 0
+
+
+def _count(text: str) -> int:
+    count = int(text)
+    if count < 1:
+        raise ValueError
+    return count
 
 
 def _compare(options: argparse.Namespace) -> int:
@@ -77,7 +79,7 @@ def _report(options: argparse.Namespace) -> int:
     for file in options.outcomes:
         found = read_outcomes(file)
         if not found:
-            raise InputError(f"{file}: no outcomes; give a file that `python -m sim.study run` wrote")
+            raise InputError(f"{file}: no outcomes; give a folder that `python -m sim.study run` wrote")
         for outcome in found:
             latest[outcome["key"], outcome["source"], outcome.get("method", "")] = outcome
     outcomes = list(latest.values())
@@ -95,26 +97,28 @@ def main(arguments: Sequence[str] | None = None) -> int:
     commands = parser.add_subparsers(required=True)
     run = commands.add_parser("run", help="diagnose the hidden worlds of studies")
     run.add_argument("studies", nargs="+", metavar="STUDY", choices=[*STUDIES, GATE], help=", ".join([*STUDIES, GATE]))
-    run.add_argument("--out", required=True, help="file of outcomes (JSON lines); a run that was cut off is resumed")
-    run.add_argument("--first", type=int, help="only so many cases of each study")
-    run.add_argument("--workers", type=int, default=2)
+    run.add_argument("--out", required=True, help="folder of the run; one that was cut off is resumed")
+    run.add_argument("--first", type=_count, help="only so many cases of each study")
+    run.add_argument("--workers", type=_count, default=2)
     run.add_argument("--cluster", default="", help="address of a Dask scheduler")
     run.add_argument("--world", default="", help="FILE.py:FUNCTION of another generator of worlds")
     run.add_argument("--method", default="", choices=["", *METHODS], help="a simpler method instead of the diagnosis")
     run.add_argument("--blame", action="store_true", help="fit each miss from the truth: search or evidence")
     run.set_defaults(work=_run)
     comparison = commands.add_parser(
-        "compare", help="two files of outcomes, list by list; exit code 1 where a list leaves its interval"
+        "compare", help="two runs, list by list; exit code 1 where a list leaves its interval"
     )
     comparison.add_argument(
-        "files", nargs="+", metavar="[OLD] NEW", help=f"files of outcomes; OLD is {STORED} by default"
+        "files", nargs="+", metavar="[OLD] NEW", help=f"folders of runs, or files; OLD is {STORED} by default"
     )
     comparison.set_defaults(work=_compare)
     choice = commands.add_parser("choose-gate", help="print the list of the gate, chosen by the time that cases took")
-    choice.add_argument("outcomes", nargs="?", default=STORED, help=f"file of outcomes; {STORED} by default")
+    choice.add_argument("outcomes", nargs="?", default=STORED, help=f"folder of a run, or file; {STORED} by default")
     choice.set_defaults(work=_choose_gate)
     report = commands.add_parser("report", help="tables and figures from outcomes")
-    report.add_argument("outcomes", nargs="+", help="files of outcomes; what a later one has again replaces an earlier")
+    report.add_argument(
+        "outcomes", nargs="+", help="folders of runs, or files; what a later one has again replaces an earlier"
+    )
     report.add_argument(
         "--out",
         help="folder for diagnosis-study.md, figures/ and the outcomes (diagnosis-study.jsonl.xz); "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
@@ -9,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from gfimu.errors import unknown_name
+from gfimu.errors import InputError, unknown_name
 from sim.effects import BODY_EFFECTS, EFFECTS, NOT_OF_AN_ENCODER
 
-__all__ = ["BODY_PARTS", "EXOTICS", "STUDIES", "Case", "study_cases"]
+__all__ = ["BODY_PARTS", "EXOTICS", "STUDIES", "Case", "find_case", "study_cases"]
 
 SIZES = (15.0, 60.0, 300.0, 1500.0, 6000.0)
 """Sizes as d′: from just detectable to gross."""
@@ -372,3 +373,23 @@ def study_cases(name: str, first: int | None = None) -> list[Case]:
     cases = STUDIES[name]()
     order = np.random.default_rng(len(cases)).permutation(len(cases))
     return [cases[place] for place in order[:first]]
+
+
+def find_case(key: str) -> Case:
+    """Return the case of a key ``STUDY/SEED``.
+
+    Raises
+    ------
+    InputError
+        If no study has it.
+    """
+    study = key.partition("/")[0]
+    found = _by_key(study).get(key) if study in STUDIES else None
+    if found is None:
+        raise InputError(f"no study has the case {key!r}")
+    return found
+
+
+@functools.cache
+def _by_key(study: str) -> Mapping[str, Case]:
+    return {case.key: case for case in STUDIES[study]()}

@@ -23,7 +23,7 @@ _DEFINED = (
     *("effects", "size", "duration", "sample_rate", "bias_instability_mg", "tacho_noise", "array", "residue"),
     *("without", "encoder_counts"),
 )
-_KEPT_DIGITS = 1e-5  # of a number that is kept (`sim.study.runner.keep_outcomes`)
+_KEPT_DIGITS = 1e-5  # of a number that is kept (`sim.study.outcome_file.keep_outcomes`)
 _MOST_NAMED = 10  # cases of a list that only one file has
 
 
@@ -129,7 +129,7 @@ class Comparison:
 
 
 def load_outcomes(path: str | Path) -> dict[tuple[str, str], Outcome]:
-    """Read outcomes of the diagnosis by key and generator; a later one replaces an earlier, a torn line is left out.
+    """Read outcomes of the diagnosis by key and generator; a later one replaces an earlier.
 
     Raises
     ------
@@ -140,13 +140,11 @@ def load_outcomes(path: str | Path) -> dict[tuple[str, str], Outcome]:
     for number, outcome in enumerate(read_outcomes(path), start=1):
         missing = [key for key in _NEEDED if not isinstance(outcome, dict) or key not in outcome]
         if missing:
-            raise InputError(
-                f"{path}: outcome {number} has no {missing[0]!r}; give a file of `python -m sim.study run`"
-            )
+            raise InputError(f"{path}: outcome {number} has no {missing[0]!r}; give a run of `python -m sim.study run`")
         if not outcome.get("method"):
             found[outcome["key"], generator_name(outcome["source"])] = outcome
     if not found:
-        raise InputError(f"{path}: no outcomes; give a file that `python -m sim.study run` wrote")
+        raise InputError(f"{path}: no outcomes; give a folder that `python -m sim.study run` wrote")
     return found
 
 

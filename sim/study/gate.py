@@ -6,7 +6,6 @@ and stays as it is, so that comparisons of different days are of the same cases.
 
 from __future__ import annotations
 
-import itertools
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -15,8 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from gfimu.errors import InputError
-from sim.study.cases import STUDIES, Case
+from sim.study.cases import STUDIES, Case, find_case
 from sim.study.report import LEAST_VISIBLE
 
 __all__ = ["GATE", "STRATA", "Stratum", "choose_gate", "gate_cases"]
@@ -91,16 +89,8 @@ def gate_cases(first: int | None = None) -> list[tuple[Case, str]]:
     InputError
         If a line of the list is no case of a study.
     """
-    by_key: dict[str, Case] = {}
-    chosen = []
-    for line in _LIST.read_text(encoding="utf-8").splitlines():
-        key, _, source = line.partition(" ")
-        study = key.partition("/")[0]
-        if key not in by_key and study in STUDIES:
-            by_key |= {case.key: case for case in STUDIES[study]()}
-        if key not in by_key:
-            raise InputError(f"{_LIST}: no case {key!r}; choose the gate again")
-        chosen.append((by_key[key], source))
+    lines = [line.partition(" ") for line in _LIST.read_text(encoding="utf-8").splitlines()]
+    chosen = [(find_case(key), source) for key, _, source in lines]
     order = np.random.default_rng(len(chosen)).permutation(len(chosen))
     return [chosen[place] for place in order[:first]]
 
@@ -143,7 +133,7 @@ def _groups(cases: Sequence[Case], by: Sequence[str]) -> list[list[Case]]:
     groups: dict[tuple[Any, ...], list[Case]] = defaultdict(list)
     for case in cases:
         groups[tuple(_property(case, name) for name in by)].append(case)
-    return list(itertools.chain(groups.values()))
+    return list(groups.values())
 
 
 def _property(case: Case, name: str) -> Any:

@@ -29,7 +29,7 @@ from sim.study.bodies import body_twin, draw_body
 from sim.study.cases import Case
 from sim.twin import Twin
 
-__all__ = ["HiddenWorld", "SmallerLibrary", "draw_world", "outcome_of", "run_case"]
+__all__ = ["HiddenWorld", "SmallerLibrary", "draw_world", "load_generator", "outcome_of", "run_case"]
 
 _MG = STANDARD_GRAVITY / 1000.0
 _TURN = 2 * np.pi
@@ -182,7 +182,7 @@ def _reaches(twin: Twin, motion: SpinMotion, setting: Measurement, level: float)
 
 
 def _foreign_world(case: Case, twin: Twin, source: str) -> HiddenWorld:
-    run = _load_function(source)(
+    run = load_generator(source)(
         case.seed,
         case.effects,
         case.size,
@@ -197,7 +197,8 @@ def _foreign_world(case: Case, twin: Twin, source: str) -> HiddenWorld:
     return HiddenWorld(recording, twin, tuple(run.truth), run.detectability)
 
 
-def _load_function(source: str) -> Callable[..., Any]:
+def load_generator(source: str) -> Callable[..., Any]:
+    """Return a generator of worlds, given as ``FILE.py:FUNCTION``; raises `InputError` if there is none."""
     file, _, function = source.rpartition(":")
     path = Path(file)
     if not path.is_file():
@@ -205,7 +206,10 @@ def _load_function(source: str) -> Callable[..., Any]:
     folder = str(path.resolve().parent)
     if folder not in sys.path:
         sys.path.insert(0, folder)
-    return getattr(importlib.import_module(path.stem), function)
+    found: Callable[..., Any] | None = getattr(importlib.import_module(path.stem), function, None)
+    if found is None:
+        raise InputError(f"{source}: {file} has no function {function!r}")
+    return found
 
 
 def run_case(case: Case, source: str = "") -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Files of outcomes: lines of JSON, packed where they are kept beside the tables made of them."""
+"""Outcomes from the dataset of a run, and files of them: lines of JSON, packed, beside the tables made of them."""
 
 from __future__ import annotations
 
@@ -10,8 +10,11 @@ from typing import Any
 
 from gfimu.errors import InputError
 from gfimu.files.atomic_file import atomic_path
+from sim.study.cases import find_case
+from sim.sweep.dataset import Dataset
+from sim.sweep.design import Design
 
-__all__ = ["generator_name", "keep_outcomes", "read_outcomes"]
+__all__ = ["generator_name", "keep_outcomes", "outcome_of_row", "read_outcomes"]
 
 _PACKED = ".xz"
 
@@ -23,22 +26,38 @@ def generator_name(source: str) -> str:
 
 
 def read_outcomes(path: str | Path) -> list[dict[str, Any]]:
-    """Read the outcomes of a study, packed (``.xz``) or not; a last line cut off by an interruption is left out."""
+    """Read outcomes from the folder of a run, or from lines of JSON, packed (``.xz``) or not; none where nothing is.
+
+    Raises
+    ------
+    InputError
+        If it is another folder or file.
+    """
     file = Path(path)
+    if file.is_dir():
+        dataset = Dataset.open(file)
+        if dataset.plan.kind != "study":
+            raise InputError(f"{file}: is another campaign; give a folder of `python -m sim.study run`")
+        return [outcome_of_row(row) for row in dataset.read(list(Design(dataset.plan).batches()))]
     if not file.exists():
         return []
     try:
-        packed = file.suffix == _PACKED
-        text = lzma.decompress(file.read_bytes()).decode() if packed else file.read_text(encoding="utf-8")
-    except (lzma.LZMAError, UnicodeDecodeError):
-        raise InputError(f"{file}: not a file of outcomes; give one that `python -m sim.study run` wrote") from None
-    outcomes = []
-    for line in text.splitlines():
-        try:
-            outcomes.append(json.loads(line))
-        except json.JSONDecodeError:
-            continue
-    return outcomes
+        content = file.read_bytes()
+        lines = (lzma.decompress(content) if file.suffix == _PACKED else content).splitlines()
+        return [json.loads(line) for line in lines]
+    except (lzma.LZMAError, ValueError):
+        raise InputError(f"{file}: no file of outcomes; give a folder of `python -m sim.study run`") from None
+
+
+def outcome_of_row(row: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the outcome that a row of the dataset holds; a case that failed is one with the verdict ``error``."""
+    if not row["failure"]:
+        return dict(json.loads(row["outcome"]))
+    key, _, source = row["world"].partition(" ")
+    method = {"method": row["method"]} if row["method"] else {}
+    nothing: dict[str, Any] = {"causes": [], "share_of_excess_removed": None, "unexplained": False, "noise": {}}
+    what = {"verdict": "error", "error": row["failure"], "signature": "", "wall_s": 0.0, "processor_s": 0.0}
+    return {"key": key, "source": source or "sim.campaign", **method, **find_case(key).to_dict(), **nothing, **what}
 
 
 def keep_outcomes(outcomes: Sequence[Mapping[str, Any]], path: str | Path) -> Path:

@@ -17,7 +17,7 @@ from gfimu.files.atomic_file import write_text
 from sim.study.figures import draw_confusion, draw_detection, draw_reliability
 from sim.study.outcome_file import keep_outcomes
 
-__all__ = ["Tally", "rate_with_interval", "score", "summarise", "visible", "write_report"]
+__all__ = ["Tally", "brief", "rate_with_interval", "score", "summarise", "visible", "write_report"]
 
 Outcome = Mapping[str, Any]
 
@@ -79,6 +79,17 @@ def score(outcome: Outcome) -> dict[str, bool]:
         "nothing": verdict == "nothing_found",
         "unknown": verdict == "unknown",
         "error": verdict == "error",
+    }
+
+
+def brief(outcome: Outcome) -> dict[str, Any]:
+    """Return what was said, the names as one text, and whether it was exactly right or wrong (`score`)."""
+    judged, names = score(outcome), sorted(cause["effect"] for cause in outcome["causes"])
+    return {
+        "verdict": outcome["verdict"],
+        "causes": ", ".join(names),
+        "exact": judged["exact"],
+        "wrong": judged["wrong"],
     }
 
 
@@ -423,8 +434,8 @@ def write_report(outcomes: Sequence[Outcome], folder: str | Path) -> list[Path]:
         "# Study of the diagnosis\n\n"
         "Hidden worlds are drawn from fixed seeds; noise levels are not told to the tool. A size is "
         "d′ = √Σ(Δ/σ)² over all channels and the tachometer with the drive known. Made by\n\n"
-        "```\npython -m sim.study run STUDY ... --out outcomes.jsonl\n"
-        "python -m sim.study report docs/diagnosis-study.jsonl.xz outcomes.jsonl --out docs\n```\n\n"
+        "```\npython -m sim.study run STUDY ... --out outcomes\n"
+        "python -m sim.study report docs/diagnosis-study.jsonl.xz outcomes --out docs\n```\n\n"
         "Every outcome is in `diagnosis-study.jsonl.xz`; what is run again replaces what was there.\n\n"
         f"{_REMARKS}\n{remarks}\n{_END_OF_REMARKS}\n\n"
         + summarise(outcomes)

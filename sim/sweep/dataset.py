@@ -7,20 +7,22 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import msgspec
 import pyarrow as pa
 import pyarrow.parquet as pq
+import tomli_w
 
 from gfimu.errors import InputError
 from gfimu.files.atomic_file import atomic_path
+from sim.sweep.design import Design
 from sim.sweep.plan import PlanFile, load_plan
 
 __all__ = ["Dataset"]
 
 _PLAN = "plan.toml"
-_FORMAT = 1  # of rows; another one makes other names
+_FORMAT = 2  # of rows; another one makes other names
 
 
 @dataclass(frozen=True)
@@ -39,28 +41,34 @@ class Dataset:
     plan: PlanFile
 
     @classmethod
-    def create(cls, folder: str | Path, plan: str | Path) -> Dataset:
-        """Open the folder of a plan, or begin it.
+    def create(cls, folder: str | Path, plan: str | Path | PlanFile) -> Self:
+        """Open the folder of a plan, or begin it; the plan is a file (.toml) or its content.
 
         Raises
         ------
         InputError
-            If the folder holds another plan.
+            If the folder holds another plan, or is a file.
         """
-        found, path = load_plan(plan), Path(folder)
+        found, path = plan if isinstance(plan, PlanFile) else load_plan(plan), Path(folder)
         kept = path / _PLAN
         if kept.exists() and load_plan(kept) != found:
             raise InputError(f"{path}: holds another plan; give another --out")
+        if path.is_file():
+            raise InputError(f"{path}: is a file; name a folder with --out")
         if path.exists() and not kept.exists() and any(path.iterdir()):
             raise InputError(f"{path}: is not empty and no campaign; give another --out")
         path.mkdir(parents=True, exist_ok=True)
         if not kept.exists():
             with atomic_path(kept) as part:
-                Path(part).write_bytes(Path(plan).read_bytes())
+                if isinstance(plan, PlanFile):
+                    table = {key: value for key, value in msgspec.to_builtins(plan).items() if value is not None}
+                    part.write_text(tomli_w.dumps(table), encoding="utf-8")
+                else:
+                    part.write_bytes(Path(plan).read_bytes())
         return cls(path, found)
 
     @classmethod
-    def open(cls, folder: str | Path) -> Dataset:
+    def open(cls, folder: str | Path) -> Self:
         """Open the folder of a campaign; raises `InputError` if it is none."""
         path = Path(folder)
         if not (path / _PLAN).is_file():
@@ -85,10 +93,33 @@ class Dataset:
         with atomic_path(self.shard(batch)) as part:
             pq.write_table(pa.table(columns), part)
 
-    def read(self, batches: Sequence[range]) -> list[dict[str, Any]]:
-        """Return the rows of all batches that are there, by number."""
-        rows: list[dict[str, Any]] = []
-        for batch in batches:
-            if self.shard(batch).exists():
-                rows += pq.read_table(self.shard(batch)).to_pylist()
-        return rows
+    def present(self) -> list[range]:
+        """Return the batches whose rows are there, in order; a file that is being written is not there yet."""
+        names = {entry.name for entry in self.folder.iterdir()}
+        return [batch for batch in Design(self.plan).batches() if self.shard(batch).name in names]
+
+    def table(self, columns: Sequence[str] | None = None) -> pa.Table:
+        """Return the rows that are there, in order, or some of their columns.
+
+        Raises
+        ------
+        InputError
+            If a file is damaged.
+        """
+        return pa.concat_tables(
+            [pa.table({"case": pa.array([], pa.int64())}), *(self._shard(batch, columns) for batch in self.present())],
+            promote_options="permissive",
+        )
+
+    def _shard(self, batch: range, columns: Sequence[str] | None) -> pa.Table:
+        path = self.shard(batch)
+        try:
+            found = pq.ParquetFile(path)
+            wanted = None if columns is None else [name for name in columns if name in found.schema_arrow.names]
+            table = found.read(wanted)
+        except (pa.ArrowInvalid, OSError) as error:
+            reason = str(error).partition("\n")[0]
+            raise InputError(f"{path}: damaged ({reason}); delete it and run the campaign again") from None
+        if len(table) != len(batch):
+            raise InputError(f"{path}: has {len(table)} rows, not {len(batch)}; delete it and run the campaign again")
+        return table

@@ -134,7 +134,9 @@ def recorded(tmp_path_factory):
     """A short recording."""
     file = tmp_path_factory.mktemp("recorded") / "in.csv"
     gfimu.simulate("rest", changes=["duration_s=3"], out=file)
-    gfimu.estimate(file)  # compiles what the tests below must not compile under a limit
+    # Both compile what the tests below must not compile under a limit.
+    gfimu.estimate(file)
+    gfimu.noise(file, stretch="all")
     return file
 
 

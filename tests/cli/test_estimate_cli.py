@@ -109,6 +109,15 @@ def test_a_position_is_summed_up_by_the_errors_that_would_explain_it(gfimu_comma
     assert "equivalent bias of p" in gfimu_command("estimate", run, "--out", out, "--position").stdout
 
 
+def test_gravity_of_the_place_is_taken_from_the_recording(gfimu_command, tmp_path):
+    run, out = tmp_path / "run.parquet", tmp_path / "estimate.parquet"
+    changes = ("gravity_m_s2=9.7", "duration_s=8")
+    gfimu_command("simulate", "rest", *(f"--set={change}" for change in changes), "--out", run)
+    assert Recording.read(run).metadata["gravity_m_s2"] == 9.7
+    assert gfimu_command("estimate", run, "--out", out, "--position", "--rest-bias").code == 0
+    assert Estimate.read(out).metadata["gravity_m_s2"] == 9.7
+
+
 @pytest.mark.parametrize(
     ("options", "words"),
     [

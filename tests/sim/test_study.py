@@ -122,6 +122,11 @@ def test_the_tables_can_be_made_again_from_what_is_kept_beside_them(tmp_path):
     assert [one["verdict"] for one in read_outcomes(tmp_path / "third" / kept.name)] == ["explained", "explained"]
 
 
+def test_the_page_of_the_study_is_that_of_the_outcomes_beside_it(project_root):
+    page = (project_root / "docs" / "diagnosis-study.md").read_text(encoding="utf-8")
+    assert summarise(read_outcomes(project_root / "docs" / "diagnosis-study.jsonl.xz")) in page
+
+
 @pytest.mark.parametrize(
     ("name", "content"),
     [

@@ -1,10 +1,9 @@
-"""The gate's list: what is in it, how it was chosen, free bodies, blame, and a worker that is killed."""
+"""The gate's list: what is in it, how it was chosen, free bodies, blame, and runs of a study as campaigns."""
 
 from __future__ import annotations
 
 from collections import Counter
-from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor
-from contextlib import nullcontext
+from concurrent.futures import BrokenExecutor, Future, ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -12,15 +11,17 @@ import pytest
 
 from gfimu.errors import InputError
 from sim.effects import EFFECTS
-from sim.study import blame, runner
+from sim.study import __main__ as study
+from sim.study import blame, plan
 from sim.study.__main__ import main
 from sim.study.blame import blame_of, is_miss
-from sim.study.cases import EXOTICS, STUDIES, Case
+from sim.study.cases import EXOTICS, STUDIES, Case, study_cases
 from sim.study.compare import load_outcomes
 from sim.study.gate import LONGEST, STRATA, choose_gate, gate_cases
 from sim.study.outcome import draw_world
 from sim.study.outcome_file import generator_name, read_outcomes
-from sim.study.runner import run_study
+from sim.sweep.dataset import Dataset
+from sim.sweep.plan import PlanFile
 
 
 @pytest.fixture(scope="module")
@@ -61,7 +62,7 @@ def test_the_gate_is_chosen_by_time_and_seed_and_not_by_what_was_reported(stored
 
 
 def test_the_gate_has_its_own_generators(tmp_path, capsys):
-    assert main(["run", "gate", "--out", str(tmp_path / "out.jsonl"), "--world", "some.py:hide"]) == 2
+    assert main(["run", "gate", "--out", str(tmp_path / "run"), "--world", "some.py:hide"]) == 2
     assert "leave out --world" in capsys.readouterr().err
 
 
@@ -110,50 +111,106 @@ def test_an_effect_without_a_size_and_a_crash_have_no_fit_to_blame():
     assert blame_of(case, "", {"verdict": "error"})["blame"] == "crash"
 
 
-class _Pool(Executor):
-    """A pool that breaks, as a process pool does, with the case whose worker is killed, and with all after it."""
+def run(folder, monkeypatch, *options, executor=ThreadPoolExecutor):
+    """Run the first two cases of a study, in threads of this process."""
+    monkeypatch.setattr(study, "open_executor", lambda workers, cluster: executor(workers))
+    code = main(["run", *(options or ["nulls"]), "--first", "2", "--out", str(folder)])
+    return code, read_outcomes(folder) if code == 0 else []
 
-    def __init__(self):
-        self._broken = False
 
-    def submit(self, work, case, source):
+@pytest.fixture
+def said(monkeypatch):
+    """What each case is made to report, by its key, without drawing and diagnosing it; calls are counted."""
+    found, calls = {}, Counter()
+
+    def reported(case, source=""):
+        calls[case.key] += 1
+        outcome = {"key": case.key, "source": source or "sim.campaign", **case.to_dict(), "verdict": "nothing_found"}
+        return {**outcome, "causes": [], "reached": np.inf, "processor_s": np.float64(0.1), **found.get(case.key, {})}
+
+    monkeypatch.setattr(plan, "run_case", reported)
+    return found, calls
+
+
+class _Deadly(ThreadPoolExecutor):
+    """A pool that breaks, as a process pool does, with the case whose worker is killed."""
+
+    def submit(self, work, content, *task):
         future = Future()
-        self._broken |= case.seed == 2
-        if self._broken:
+        if content.factors["world"][task[1]] == study_cases("nulls")[1].key:
             future.set_exception(BrokenExecutor("a process in the process pool was terminated abruptly"))
-        else:
-            found = {"key": case.key, "source": source or "sim.campaign", **case.to_dict(), "verdict": "nothing_found"}
-            future.set_result(found)
-        return future
+            return future
+        return super().submit(work, content, *task)
 
 
-@pytest.mark.parametrize("suspects", [1, 8])
-def test_a_killed_worker_is_a_row_that_says_so_and_the_others_go_on(tmp_path, monkeypatch, suspects):
-    monkeypatch.setattr(runner, "open_executor", lambda workers: nullcontext(_Pool()))
-    monkeypatch.setattr(runner, "_SUSPECTS", suspects)
-    cases = [Case("nulls", seed) for seed in (1, 2, 3)]
-    assert run_study(cases, tmp_path / "out.jsonl", _Pool()) == 3
-    rows = {row["seed"]: row for row in read_outcomes(tmp_path / "out.jsonl")}
-    assert {seed: row["verdict"] for seed, row in rows.items()} == {1: "nothing_found", 2: "error", 3: "nothing_found"}
-    assert "killed" in rows[2]["error"]
+def test_a_killed_worker_is_an_outcome_that_says_so_and_the_others_go_on(tmp_path, monkeypatch, said, capsys):
+    code, (alive, killed) = run(tmp_path / "run", monkeypatch, executor=_Deadly)
+    assert code == 0
+    assert (alive["verdict"], killed["verdict"]) == ("nothing_found", "error")
+    assert "died" in killed["error"]
+    assert set(killed) >= {"key", "source", "effects", "size", "without", "causes"}
+    assert main(["report", str(tmp_path / "run")]) == 0
+    assert killed["error"] in capsys.readouterr().out
 
 
-@pytest.mark.parametrize(("verdict", "asked"), [("nothing_found", ["nulls/1"]), ("explained", [])])
-def test_only_a_miss_is_fitted_from_the_truth(tmp_path, monkeypatch, verdict, asked):
-    told = [] if verdict == "nothing_found" else [{"effect": "bias", "rivals": []}]
-    monkeypatch.setattr(
-        runner,
-        "run_case",
-        lambda case, source: {**_row(case), "effects": ["bias"], "verdict": verdict, "causes": told, "reached": 60.0},
-    )
-    seen = []
-    monkeypatch.setattr(runner, "blame_of", lambda case, *_: seen.append(case.key) or {"blame": "search"})
-    with ThreadPoolExecutor(1) as executor:
-        run_study([Case("nulls", 1)], tmp_path / "out.jsonl", executor, blame=True)
-    (row,) = read_outcomes(tmp_path / "out.jsonl")
-    assert seen == asked
-    assert row.get("blame") == ("search" if asked else None)
+def test_a_run_that_was_cut_off_is_resumed(tmp_path, monkeypatch, said, capsys):
+    _, calls = said
+    run(tmp_path / "run", monkeypatch)
+    whole = sorted((tmp_path / "run").glob("*.parquet"))
+    before = [file.read_bytes() for file in whole]
+    whole[1].unlink()
+    code, outcomes = run(tmp_path / "run", monkeypatch)
+    assert code == 0
+    first, second = study_cases("nulls", 2)
+    assert calls == {first.key: 1, second.key: 2}
+    assert [file.read_bytes() for file in whole] == before
+    assert [one["key"] for one in outcomes] == [first.key, second.key]
+    assert outcomes[0]["reached"] is None  # not finite
+    assert run(tmp_path / "run", monkeypatch, "pairs")[0] == 2
+    assert "another plan" in capsys.readouterr().err
 
 
-def _row(case):
-    return {"key": case.key, "source": "sim.campaign", **case.to_dict()}
+def test_what_was_run_by_a_simpler_method_says_so(tmp_path, monkeypatch):
+    def simpler(method, case, source):
+        return {"key": case.key, "source": "sim.campaign", "method": method, **case.to_dict(), **SIMPLER}
+
+    SIMPLER = {"verdict": "nothing_found", "causes": [], "reached": None, "processor_s": 0.1}
+    monkeypatch.setattr(plan, "run_baseline", simpler)
+    _, outcomes = run(tmp_path / "run", monkeypatch, "nulls", "--method", "greedy BIC")
+    assert [one["method"] for one in outcomes] == ["greedy BIC", "greedy BIC"]
+
+
+@pytest.mark.parametrize("verdict", ["nothing_found", "explained"])
+def test_only_a_miss_is_fitted_from_the_truth(tmp_path, monkeypatch, said, verdict):
+    missed, other = study_cases("pairs", 2)
+    told = [{"effect": name, "rivals": []} for name in missed.effects]
+    said[0][missed.key] = {"verdict": verdict, "causes": told if verdict == "explained" else []}
+    told = [{"effect": name, "rivals": []} for name in other.effects]
+    said[0][other.key] = {"verdict": "explained", "causes": told}
+    monkeypatch.setattr(plan, "blame_of", lambda case, *_: {"blame": f"search of {case.key}"})
+    _, outcomes = run(tmp_path / "run", monkeypatch, "pairs", "--blame")
+    asked = f"search of {missed.key}" if verdict == "nothing_found" else None
+    assert [one.get("blame") for one in outcomes] == [asked, None]
+
+
+@pytest.mark.parametrize(
+    ("source", "words"), [("none.py:hide", "existing file"), ("tests/independent_world.py:nobody", "no function")]
+)
+def test_a_generator_that_is_not_there_is_one_line_before_anything_runs(tmp_path, source, words, capsys):
+    assert main(["run", "singles", "--world", source, "--out", str(tmp_path / "run")]) == 2
+    told = capsys.readouterr().err
+    assert words in told
+    assert told.count("\n") == 1
+    assert not (tmp_path / "run").exists()
+
+
+def test_another_campaign_has_no_outcomes_of_the_study(tmp_path, capsys):
+    Dataset.create(tmp_path / "other", PlanFile({"scenario": ["paper_run"]}))
+    assert main(["compare", str(tmp_path / "other")]) == 2
+    assert "is another campaign" in capsys.readouterr().err
+
+
+def test_a_file_of_outcomes_is_no_folder_to_run_into(tmp_path, capsys):
+    (tmp_path / "run.jsonl").touch()
+    assert main(["run", "nulls", "--first", "1", "--out", str(tmp_path / "run.jsonl")]) == 2
+    assert "is a file" in capsys.readouterr().err

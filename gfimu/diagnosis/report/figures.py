@@ -9,6 +9,7 @@ import zlib
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import SymLogNorm
 from matplotlib.figure import Figure
@@ -51,6 +52,7 @@ _NOISE, _INK, _PALE = css(NOISE_ON_PAPER), css(INK), css(PALE)
 _STRONGEST = 4  # channels drawn in colour
 _MOST_POINTS = 4000
 _MOST_FREQUENCIES = 1200
+_SVG_DPI = 72  # points per inch, in which SVG is laid out
 _DPI = 110
 _SMOOTH_S = 0.15
 _STYLE = {
@@ -291,6 +293,11 @@ def _legend_above(axis: Axes) -> None:
 
 def _svg(figure: Figure) -> str:
     buffer = io.StringIO()
+    if layout := figure.get_layout_engine():  # laid out here, as a figure that is saved with a layout is drawn twice
+        FigureCanvasSVG(figure)
+        figure.set_dpi(_SVG_DPI)
+        layout.execute(figure)
+        figure.set_layout_engine(None)
     figure.savefig(buffer, format="svg", dpi=_DPI, metadata={"Date": None})
     text = buffer.getvalue()
     text = text[text.index("<svg") :]

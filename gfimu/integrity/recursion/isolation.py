@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from gfimu.rate.recursion_data import COMPILE
+from gfimu.rate.recursion_data import COMPILE, INNER
 
 __all__ = ["Explanation", "deflate", "explanations", "strongest"]
 
@@ -42,11 +42,47 @@ def deflate(information, score, std):  # type: ignore[no-untyped-def]
             left[i, j] += std[i] * information[i, j] * std[j]
             right[i, j] = std[i] * information[i, j]
         right[i, c] = std[i] * score[i]
-    solved = np.linalg.solve(left, right)
+    _solve(left, right)
+    cleaned = np.empty((c, c))
+    explained = np.empty(c)
     for i in range(c):
-        for j in range(c + 1):
-            solved[i, j] /= std[i]
-    return solved[:, :c].copy(), solved[:, c].copy()
+        for j in range(c):
+            cleaned[i, j] = right[i, j] / std[i]
+        explained[i] = right[i, c] / std[i]
+    return cleaned, explained
+
+
+@njit(**INNER)
+def _solve(matrix, columns):  # type: ignore[no-untyped-def]
+    """Put P⁻¹ B in the place of ``columns`` B, P = L Lᵀ positive definite, whose lower triangle becomes L.
+
+    As with NumPy's, a matrix that has no such L is a `LinAlgError`.
+
+    Loops, as the compiler takes far longer over calls of a linear algebra library.
+    """
+    n, width = columns.shape
+    for i in range(n):
+        for j in range(i + 1):
+            entry = matrix[i, j]
+            for q in range(j):
+                entry -= matrix[i, q] * matrix[j, q]
+            if i > j:
+                matrix[i, j] = entry / matrix[j, j]
+            elif 0.0 < entry < np.inf:
+                matrix[i, i] = np.sqrt(entry)
+            else:  # not a number
+                raise np.linalg.LinAlgError("not positive definite")
+        for q in range(i):
+            for m in range(width):
+                columns[i, m] -= matrix[i, q] * columns[q, m]
+        for m in range(width):
+            columns[i, m] /= matrix[i, i]
+    for i in range(n - 1, -1, -1):
+        for q in range(i + 1, n):
+            for m in range(width):
+                columns[i, m] -= matrix[q, i] * columns[q, m]
+        for m in range(width):
+            columns[i, m] /= matrix[i, i]
 
 
 @njit(**COMPILE)
@@ -68,7 +104,7 @@ def strongest(information, score, watched):  # type: ignore[no-untyped-def]
     return best, first, second
 
 
-@njit(**COMPILE)
+@njit(**INNER)
 def _explained(information, score, members):  # type: ignore[no-untyped-def]
     """Return T_S of a set; 0 where its channels can't be separated."""
     size = len(members)

@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 
 from gfimu.integrity.recursion.isolation import deflate, strongest
-from gfimu.rate.recursion_data import COMPILE
+from gfimu.rate.recursion_data import COMPILE, INNER
 
 __all__ = ["carry_signatures", "forget_onsets", "new_slot", "strongest_slot"]
 
@@ -48,21 +48,26 @@ def new_slot(state, oldest):  # type: ignore[no-untyped-def]
         else:
             _drop_slot(state, drop)
             used -= 1
-    state.signature[used] = 0.0
-    state.information[used] = 0.0
-    state.score[used] = 0.0
+    rows, c = state.signature.shape[1], state.signature.shape[2]
+    for i in range(c):  # number by number, as in `_move_slot`
+        for r in range(rows):
+            state.signature[used, r, i] = 0.0
+        for j in range(c):
+            state.information[used, i, j] = 0.0
+        state.score[used, i] = 0.0
     ages[used] = 0.5  # half of the step before lies behind the onset; set to 1 after this block
 
 
-@njit(**COMPILE)
+@njit(**INNER)
 def forget_onsets(state):  # type: ignore[no-untyped-def]
     """Follow no onset for now."""
-    state.ages[:] = 0.0
+    for s in range(len(state.ages)):
+        state.ages[s] = 0.0
     state.leading[0] = -1
     state.held[0] = -1
 
 
-@njit(**COMPILE)
+@njit(**INNER)
 def _count_used(ages):  # type: ignore[no-untyped-def]
     """Return how many slots are in use; they stand at the front."""
     used = 0
@@ -72,7 +77,7 @@ def _count_used(ages):  # type: ignore[no-untyped-def]
     return used
 
 
-@njit(**COMPILE)
+@njit(**INNER)
 def _drop_slot(state, drop):  # type: ignore[no-untyped-def]
     """Forget an onset; the younger ones move up."""
     used = _count_used(state.ages)
@@ -87,7 +92,7 @@ def _drop_slot(state, drop):  # type: ignore[no-untyped-def]
             mark[0] -= 1
 
 
-@njit(**COMPILE)
+@njit(**INNER)
 def _move_slot(state, source, target):  # type: ignore[no-untyped-def]
     """Copy a slot, number by number: slices take longer to compile than all of this module."""
     rows, c = state.signature.shape[1], state.signature.shape[2]
@@ -99,7 +104,7 @@ def _move_slot(state, source, target):  # type: ignore[no-untyped-def]
         state.score[target, i] = state.score[source, i]
 
 
-@njit(**COMPILE)
+@njit(**INNER)
 def carry_signatures(tables, state, transition, step, place):  # type: ignore[no-untyped-def]
     """Carry the effect of every fault on the state over to this block, (3)."""
     alpha_rows = tables.alpha[place]
@@ -135,7 +140,7 @@ def carry_signatures(tables, state, transition, step, place):  # type: ignore[no
         state.ages[s] = age + 1.0
 
 
-@njit(**COMPILE)
+@njit(**INNER)
 def strongest_slot(state, tuning, model_std, watched):  # type: ignore[no-untyped-def]
     """Return the slot in which a channel exceeds the threshold most, beyond what model errors explain; −1 if none."""
     found = -1

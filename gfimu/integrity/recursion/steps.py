@@ -28,7 +28,7 @@ import numpy as np
 from numba import njit
 
 from gfimu.integrity.recursion.signatures import carry_signatures, forget_onsets, new_slot, strongest_slot
-from gfimu.rate.recursion_data import COMPILE
+from gfimu.rate.recursion_data import COMPILE, INNER
 
 __all__ = ["advance", "model_errors"]
 
@@ -61,8 +61,9 @@ def advance(tables, tuning, state, means, turning, steps, sets, levels, watched,
         step = steps[k] + pending
         if tables.null_count[place] < 0:  # too few channels: a gap
             pending = step
-            omega[k] = state.omega
-            std[k] = np.inf
+            for a in range(3):
+                omega[k, a] = state.omega[a]
+                std[k, a] = np.inf
             forget_onsets(state)
             k += 1
             continue
@@ -78,8 +79,8 @@ def advance(tables, tuning, state, means, turning, steps, sets, levels, watched,
             new_slot(state, tuning.oldest)
             carry_signatures(tables, state, transition, step, place)
         nis[k] = _update(tables, tuning, state, means[k], turning[k], place, level)
-        omega[k] = state.omega
         for a in range(3):
+            omega[k, a] = state.omega[a]
             std[k, a] = np.sqrt(max(state.covariance[a, a], 0.0))
         for i in range(len(state.last)):
             state.last[i] = means[k, i]
@@ -104,7 +105,7 @@ def model_errors(state, tuning, std):  # type: ignore[no-untyped-def]
         std[i] = np.sqrt(gain * gain + place * place + tuning.floor * tuning.floor)
 
 
-@njit(**COMPILE)
+@njit(**INNER)
 def _keep(state, block):  # type: ignore[no-untyped-def]
     """Keep the state before a block: number by number, as slices take ten times as long to compile."""
     place = block % len(state.past_rate)
@@ -120,7 +121,7 @@ def _keep(state, block):  # type: ignore[no-untyped-def]
             state.past_covariance[place, r, q] = state.covariance[r, q]
 
 
-@njit(**COMPILE)
+@njit(**INNER)
 def _follow_range(state, mean, forget):  # type: ignore[no-untyped-def]
     """Follow the range of each channel's readings, with a memory."""
     for i in range(len(mean)):
@@ -131,12 +132,12 @@ def _follow_range(state, mean, forget):  # type: ignore[no-untyped-def]
         state.high[i] = max(mean[i], state.high[i] + forget * (mean[i] - state.high[i]))
 
 
-@njit(**COMPILE)
+@njit(**INNER)
 def _products(w):  # type: ignore[no-untyped-def]
     return np.array([w[0] * w[0], w[1] * w[1], w[2] * w[2], w[0] * w[1], w[0] * w[2], w[1] * w[2]])
 
 
-@njit(**COMPILE)
+@njit(**INNER)
 def _slope(row, w, out):  # type: ignore[no-untyped-def]
     """Fill in the derivative of ``row`` s(ω) by ω."""
     out[0] = 2.0 * w[0] * row[0] + w[1] * row[3] + w[2] * row[4]
@@ -144,7 +145,7 @@ def _slope(row, w, out):  # type: ignore[no-untyped-def]
     out[2] = 2.0 * w[2] * row[2] + w[0] * row[4] + w[1] * row[5]
 
 
-@njit(**COMPILE)
+@njit(**INNER)
 def _predict(tables, tuning, state, mean, turning, step, place, level, transition):  # type: ignore[no-untyped-def]
     """Carry state and covariance over to the next block, (1); ``transition`` becomes Φ_ω − 1."""
     alpha_rows = tables.alpha[place]
@@ -210,7 +211,7 @@ def _predict(tables, tuning, state, mean, turning, step, place, level, transitio
         p[3 + i, 3 + i] += tuning.walk * step + 0.5 * tuning.scale_std * tuning.scale_std * change
 
 
-@njit(**COMPILE)
+@njit(**INNER)
 def _spread_within(products, turning, leak, tuning):  # type: ignore[no-untyped-def]
     """Add ⟨δδ⟩ − s(⟨δ⟩) to s(ω), without what products of ω that remain in α add to δ: L τ with L = leak s(ω)."""
     length = tuning.period / tuning.samples
@@ -229,7 +230,7 @@ def _spread_within(products, turning, leak, tuning):  # type: ignore[no-untyped-
         )
 
 
-@njit(**COMPILE)
+@njit(**INNER)
 def _update(tables, tuning, state, mean, turning, place, level):  # type: ignore[no-untyped-def]
     """Measure the null space row by row, (2), with all signatures, (3); returns the normalised innovation squared."""
     c = len(mean)
