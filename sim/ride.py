@@ -19,9 +19,10 @@ from gfimu.errors import InputError
 from sim import forward
 from sim.adxl345 import Sensor, conversion_offsets
 from sim.data_sheet import DataSheet
+from sim.driven import drive
 from sim.motion import SpinMotion, SpinState
 from sim.scenarios import Scenario
-from sim.turntable import drive, prescribed_readings
+from sim.turntable import prescribed_readings
 from sim.world import SampleContext
 
 __all__ = ["Ride"]
@@ -57,7 +58,7 @@ class Ride:
         self.array = run.array
         self._command = run.motion
         if run.driven and not run.free:
-            driven = drive(self.world, _spin(run.motion), run.duration + 1.0, step=run.physics_step)
+            driven = drive(self.world, _spin(run.motion), run.duration + 1.0, step=run.physics_step, motor=run.motor)
             run = replace(run, motion=driven.motion)
         self.scenario = run
         self._motion = run.motion

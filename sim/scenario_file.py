@@ -19,8 +19,10 @@ from gfimu.motion.earth import EarthRotation
 from gfimu.units import STANDARD_GRAVITY
 from sim.adxl345 import SensorSettings
 from sim.data_sheet import DataSheet
+from sim.dc_motor import DcMotor
 from sim.effect_table import EffectTable
 from sim.motion_file import MotionTable, ProfileTable
+from sim.motor_file import MotorTable
 from sim.twin_file import Inclination
 
 __all__ = ["ReferenceSettings", "ScenarioFile", "scenario_fields"]
@@ -120,10 +122,16 @@ class DriveTable(Table, frozen=True):
     """How the table follows its command."""
 
     mode: Annotated[
-        Literal["prescribed", "driven"],
-        about("Whether the table moves as commanded, or a motor drives it against inertia and friction."),
+        Literal["prescribed", "driven", "dcmotor"],
+        about(
+            "The table moves as commanded; or a drive with limited torque turns it against inertia and friction; or a "
+            "motor with winding, cogging and LuGre friction does."
+        ),
     ] = "prescribed"
     step_s: Annotated[Positive, about("Step of the driven simulation.", "s")] = 1e-3
+    motor: Annotated[
+        MotorTable | None, about("Figures of the motor of mode dcmotor.", default="those of the table")
+    ] = None
     source: Annotated[str, about("Of a twin file: not used here, as a simulation drives itself.", default="none")] = ""
 
 
@@ -256,12 +264,25 @@ def scenario_fields(data: Mapping[str, Any], source: str, beside: Path | None) -
         "cube_offset": file.cube_offset_m,
         "mounting_rotvec": file.mounting_rotvec_rad,
         "axis_inclination": file.axis_inclination_rad,
-        "driven": file.drive.mode == "driven",
+        "driven": file.drive.mode != "prescribed",
+        "motor": _motor(file.drive, source),
         "physics_step": file.drive.step_s,
         "reference": file.reference.settings(),
         "effects": tuple(table.effect(array, source) for table in file.effect),
         "temperature": file.temperature.course(),
     }
+
+
+def _motor(drive: DriveTable, source: str) -> DcMotor | None:
+    """Return the motor of a drive; None where it has none."""
+    if drive.mode == "dcmotor":
+        try:
+            return DcMotor() if drive.motor is None else drive.motor.motor()
+        except InputError as error:
+            raise InputError(f"{source}: {error}") from None
+    if drive.motor is not None:
+        raise InputError(f"{source}: [drive.motor] belongs to drive.mode = 'dcmotor'; set that, or leave the motor out")
+    return None
 
 
 def _gravity(file: ScenarioFile) -> float:

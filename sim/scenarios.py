@@ -25,13 +25,15 @@ from sim import forward
 from sim.adxl345 import Sensor, SensorSettings
 from sim.carried import Carriage, Wheel
 from sim.conversions import conversion_groups
+from sim.dc_motor import DcMotor
+from sim.driven import drive
 from sim.earth import earth_in_body
 from sim.effects import NOT_OF_A_CARRIAGE, Effect, apply_effects
 from sim.effects.unlisted import Unlisted
 from sim.motion import BodyMotion, BodyState, SpinMotion, SpinState
 from sim.scenario_file import ReferenceSettings, scenario_fields
 from sim.truth import cube_state, truth_columns
-from sim.turntable import drive, prescribed_readings
+from sim.turntable import prescribed_readings
 from sim.world import SampleContext, World
 
 __all__ = ["ReferenceSettings", "Scenario", "simulate", "summarise"]
@@ -73,6 +75,8 @@ class Scenario:
         Angle between the table's axis and the vertical, rad, about the world's x axis: π/2 of a wheel or a pendulum.
     driven : bool
         Whether the motor drives the table after the command; otherwise the motion is prescribed.
+    motor : DcMotor, optional
+        The motor of a driven table; by default a speed controller with limited torque.
     physics_step : float
         Step of the driven simulation, s.
     reference : ReferenceSettings
@@ -99,6 +103,7 @@ class Scenario:
     mounting_rotvec: tuple[float, float, float] = (0.0, 0.0, 0.0)
     axis_inclination: float = 0.0
     driven: bool = False
+    motor: DcMotor | None = None
     physics_step: float = 1e-3
     reference: ReferenceSettings = field(default_factory=ReferenceSettings)
     effects: tuple[Effect, ...] = ()
@@ -215,7 +220,8 @@ def simulate(
     command = run.motion
     if run.driven and not run.free:
         command_end = float(world.chip_times(t[-1:]).max()) + 2 / run.sample_rate
-        run = replace(run, motion=drive(world, _spin(command), command_end, step=run.physics_step).motion)
+        driven = drive(world, _spin(command), command_end, step=run.physics_step, motor=run.motor)
+        run = replace(run, motion=driven.motion)
 
     force, body = _rigid_body(run, world, t, progress)
     spin = _nothing(len(t)) if run.free else _cube_spin(run, world, t)
@@ -253,11 +259,19 @@ def summarise(scenario: Scenario, recording: Recording) -> dict[str, Any]:
         "sample_rate_hz": scenario.sample_rate,
         "array": scenario.array.name,
         "channels": list(recording.channels),
-        "drive": "free body" if scenario.free else "driven" if scenario.driven else "prescribed",
+        "drive": _drive_name(scenario),
         "effects": [effect.name for effect in scenario.effects],
         "peak_rate_rad_s": float(np.linalg.norm(rates, axis=0).max()),
         "peak_reading_m_s2": float(np.nanmax(np.abs(recording.readings)) * lsb),
     }
+
+
+def _drive_name(scenario: Scenario) -> str:
+    if scenario.free:
+        return "free body"
+    if not scenario.driven:
+        return "prescribed"
+    return "driven" if scenario.motor is None else f"dcmotor, {scenario.motor.control}"
 
 
 def _rigid_body(

@@ -13,6 +13,7 @@ from gfimu.cli.output import JsonOption, print_json, print_paths, print_table
 
 if TYPE_CHECKING:
     from gfimu.calibration.result import Calibration
+    from gfimu.geometry.array import AccelerometerArray
 
 __all__ = ["register"]
 
@@ -28,12 +29,15 @@ def _convert(
         typer.Argument(
             metavar="SOURCE...",
             help="Recording: .csv, .parquet, a MIMU4444 stream, or with --map a foreign file, one per chip; "
-            "or a calibration (.json).",
+            "or a calibration (.json), or an array (a name or .toml).",
         ),
     ],
     target: Annotated[
         Path,
-        typer.Argument(help="File to write: .csv, .parquet, .mcap (ROS 2), .euroc (a folder); .yaml of a calibration."),
+        typer.Argument(
+            help="File to write: .csv, .parquet, .mcap (ROS 2), .euroc (a folder); .yaml of a calibration; .xml of an "
+            "array, for MuJoCo."
+        ),
     ],
     array: Annotated[
         str | None, typer.Option("--array", help="Array whose channels must be there; else every channel found.")
@@ -49,7 +53,13 @@ def _convert(
         ),
     ] = "",
     table: TableOption = None,
-    to: Annotated[str | None, typer.Option("--to", help="Of a calibration, the format: kalibr or ros.")] = None,
+    to: Annotated[
+        str | None,
+        typer.Option(
+            "--to",
+            help="Of a calibration, the format: kalibr or ros. Of an array: turntable, motor_turntable or free_cube.",
+        ),
+    ] = None,
     lsb_m_s2: Annotated[
         float | None,
         typer.Option("--lsb-m-s2", help="Of a calibration for counts: m/s² per count, as the sensor's driver has it."),
@@ -72,6 +82,8 @@ def _convert(
 
     For ROS 2: gfimu convert run.parquet run.mcap
 
+    An array as a MuJoCo model: gfimu convert mine.toml mine.xml --to motor_turntable
+
     A plain csv, no map written: gfimu convert log.csv run.csv --map-set time.column=ms --map-set time.unit=ms
     --map-set unit=g --map-set channels.a11=ax --map-set channels.a12=ay --map-set channels.a13=az
 
@@ -80,6 +92,7 @@ def _convert(
     One file per chip on a common clock: gfimu convert chip1.csv chip2.csv run.parquet --map klipper --array mine.toml
     """
     from gfimu.commands.convert import convert
+    from gfimu.geometry.array import AccelerometerArray
     from gfimu.recording import Recording
 
     recording = convert(
@@ -95,6 +108,9 @@ def _convert(
         chip=chip,
         noise=noise,
     )
+    if isinstance(recording, AccelerometerArray):
+        _print_array(recording, target, json=json)
+        return
     if not isinstance(recording, Recording):
         _print_calibration(recording, target, str(to), json=json)
         return
@@ -111,6 +127,15 @@ def _convert(
     else:
         print_table(", ".join(map(str, source)), ("quantity", "value"), _shown(figures))
         print_paths([("recording", target)])
+
+
+def _print_array(found: AccelerometerArray, target: Path, *, json: bool) -> None:
+    figures = {"array": found.name, "chips": len(found.chips), "channels": found.n_channels}
+    if json:
+        print_json(figures | {"files": {"model": target}})
+    else:
+        print_table(str(target), ("quantity", "value"), _shown(figures))
+        print_paths([("model", target)])
 
 
 def _print_calibration(found: Calibration, target: Path, to: str, *, json: bool) -> None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gfimu.commands.campaign_drive import DriveWork
 from gfimu.errors import InputError, unknown_name
 
 if TYPE_CHECKING:
@@ -108,6 +109,7 @@ KINDS: dict[str, Callable[[Case], Mapping[str, Any]]] = {
     "estimate": estimate_case,
     "diagnose": diagnose_case,
     "measure": measure_case,
+    "drive": DriveWork(),
 }
 """What a case does, by the plan's ``kind``."""
 
@@ -126,6 +128,8 @@ def check_factors(plan: PlanFile, first: Case, source: str) -> None:
             from gfimu.commands.campaign_worlds import check_world_factors
 
             check_world_factors(plan, first)
+        elif plan.kind == "drive":
+            DriveWork().check(first)
         else:
             _setting(first.values)
     except InputError as error:

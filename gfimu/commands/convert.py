@@ -23,7 +23,7 @@ __all__ = ["convert"]
 
 @writes(reads=("source", "array", "column_map", "noise"), target=EXPORT)
 def convert(
-    source: Recording | Calibration | str | Path | MappedFile | Sequence[str | Path],
+    source: Recording | Calibration | AccelerometerArray | str | Path | MappedFile | Sequence[str | Path],
     target: str | Path | None = None,
     *,
     array: AccelerometerArray | str | Path | None = None,
@@ -35,19 +35,20 @@ def convert(
     lsb_m_s2: float | None = None,
     chip: str | None = None,
     noise: RecordingNoise | Recording | str | Path | None = None,
-) -> Recording | Calibration:
+) -> Recording | Calibration | AccelerometerArray:
     """Read a recording in any format that is known, in m/s², and write it as CSV, Parquet, MCAP or EuRoC.
 
-    Or read a calibration and write it as Kalibr's or imu_calib's YAML.
+    Or read a calibration and write it as Kalibr's or imu_calib's YAML; or an array and write it as a MuJoCo model.
 
     Parameters
     ----------
-    source : Recording, Calibration, str, Path or MappedFile
-        A calibration, or its ``.json`` file; or a recording, or its file: CSV, Parquet, a MIMU4444 stream, or a
-        foreign file with its column map; one file per chip on a common clock, with a map.
+    source : Recording, Calibration, AccelerometerArray, str, Path or MappedFile
+        A calibration, or its ``.json`` file; an array, or its ``.toml`` file; or a recording, or its file: CSV,
+        Parquet, a MIMU4444 stream, or a foreign file with its column map; one file per chip on a common clock, with a
+        map.
     target : str or Path, optional
         Recording to write: ``.csv`` or ``.parquet``; ``.mcap`` with a topic of ``sensor_msgs/Imu`` per tri-axial chip;
-        ``.euroc``, a folder in the layout of EuRoC / ASL. Of a calibration: ``.yaml``.
+        ``.euroc``, a folder in the layout of EuRoC / ASL. Of a calibration: ``.yaml``. Of an array: ``.xml``.
     array : AccelerometerArray, str or Path, optional
         Array whose channels must be there; every channel found by default.
     column_map : ColumnMap, str or Path, optional
@@ -59,8 +60,9 @@ def convert(
         ``unordered`` (see `gfimu.recording.filtered`).
     table : str, optional
         With a map: the table, topic or member of a file that holds several.
-    to : {"kalibr", "ros"}, optional
-        Of a calibration, the format: `gfimu.exporting.kalibr`, `gfimu.exporting.ros`.
+    to : {"kalibr", "ros", "turntable", "motor_turntable", "free_cube"}, optional
+        Of a calibration, the format: `gfimu.exporting.kalibr`, `gfimu.exporting.ros`. Of an array, what carries it in
+        the MuJoCo model (`sim.mjcf_export`), by default the turntable.
     lsb_m_s2 : float, optional
         Of a calibration for raw counts: size of a count by which the sensor's driver makes m/s² of counts; by default
         that of the array's parts.
@@ -71,7 +73,7 @@ def convert(
 
     Returns
     -------
-    Recording or Calibration
+    Recording, Calibration or AccelerometerArray
         What was read.
 
     Raises
@@ -79,6 +81,7 @@ def convert(
     InputError
         If the source can't be read, or the target can't be written where it is asked for.
     """
+    from gfimu.commands.export_array import export_array
     from gfimu.commands.export_calibration import export_calibration
     from gfimu.commands.opened import as_array, by_map, files_by_map, name_of
     from gfimu.recording import Recording
@@ -87,6 +90,11 @@ def convert(
     from gfimu.recording.formats import open_recording
     from gfimu.recording.mapped import MappedFile
 
+    drawn = _array(source, target)
+    if drawn is not None:
+        if (lsb_m_s2, chip, noise) != (None, None, None):
+            raise InputError("--lsb-m-s2, --chip and --noise are for a calibration (.json, from gfimu calibrate)")
+        return export_array(drawn, target, to)
     drawing = None if array is None else as_array(array)
     calibration = _calibration(source)
     if calibration is not None:
@@ -136,6 +144,22 @@ def _write(recording: Recording, target: Path) -> None:
         recording.write(target)
 
 
+def _array(source: object, target: str | Path | None) -> AccelerometerArray | None:
+    """Return the array that is to be converted: one itself, or what is named where the target is a MuJoCo model."""
+    from gfimu.commands.opened import as_array
+    from gfimu.geometry.array import AccelerometerArray
+
+    if isinstance(source, list | tuple) and len(source) == 1:
+        source = source[0]
+    if isinstance(source, AccelerometerArray):
+        return source
+    if target is None or Path(target).suffix != ".xml":
+        return None
+    if not isinstance(source, str | Path) or Path(source).suffix not in {"", ".toml", ".xml"}:
+        raise InputError(f"{target}: a MuJoCo model is made of an array; give its name or .toml file")
+    return as_array(source)
+
+
 def _calibration(source: object) -> Calibration | None:
     """Return the calibration that is to be converted; None for a recording."""
     from gfimu.calibration.result import Calibration, load_calibration
@@ -148,7 +172,7 @@ def _calibration(source: object) -> Calibration | None:
 
 
 def _given(
-    source: Recording | Calibration | str | Path | MappedFile | Sequence[str | Path],
+    source: Recording | Calibration | AccelerometerArray | str | Path | MappedFile | Sequence[str | Path],
 ) -> list[Recording | str | Path | MappedFile]:
     """Return one source or several as a list."""
     return list(source) if isinstance(source, list | tuple) else [source]  # type: ignore[list-item]

@@ -104,7 +104,7 @@ class OutputFolder:
 Output = OutputFile | OutputFolder
 
 RECORDING = OutputFile("a recording", (".csv", ".parquet"))
-EXPORT = OutputFile("what is converted", (".csv", ".parquet", ".mcap", ".euroc", ".yaml", ".yml"))
+EXPORT = OutputFile("what is converted", (".csv", ".parquet", ".mcap", ".euroc", ".yaml", ".yml", ".xml"))
 ESTIMATE = OutputFile("an estimate", (".csv", ".parquet"))
 RERUN = OutputFile("a rerun recording", (".rrd",))
 TRACE = OutputFile("a trace", (".vcd", ".rrd"))

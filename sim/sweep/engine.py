@@ -18,6 +18,7 @@ from sim.sweep.dataset import Dataset
 from sim.sweep.design import Case, Design
 from sim.sweep.pace import running
 from sim.sweep.plan import PlanFile
+from sim.sweep.together import prepared
 from sim.sweep.workers import Workers
 
 __all__ = ["Work", "run_campaign"]
@@ -81,6 +82,7 @@ def run_batch(plan: PlanFile, work: Work, first: int, stop: int) -> Rows:
     """Run the cases of a batch in this process, with one thread of linear algebra, and return a row each."""
     design = Design(plan)
     with threadpool_limits(1):
+        work = prepared(work, [design[number] for number in range(first, stop)])
         return [_row(design[number], work) for number in range(first, stop)]
 
 

@@ -37,7 +37,7 @@ class PlanFile(Table, frozen=True):
         dict[str, Annotated[list[Value], msgspec.Meta(min_length=1)] | RangeTable],
         about("Factors by name: a list of values, or a table with low and high.", example={"scenario": ["paper_run"]}),
     ]
-    kind: Annotated[str, about("What a case does: estimate, diagnose or measure.")] = "estimate"
+    kind: Annotated[str, about("What a case does: estimate, diagnose, measure or drive.")] = "estimate"
     design: Annotated[
         Literal["grid", "random", "latin_hypercube", "sobol", "saltelli"],
         about(

@@ -2,6 +2,7 @@
 
 import json
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -96,3 +97,32 @@ def test_a_calibration_is_written_for_others(gfimu_command, tmp_path):
     assert same.code == 2
     asked = gfimu_command("convert", tmp_path / "cal.json", out, "--to", "ros", "--lsb-m-s2", "0.0383", "--json")
     assert json.loads(asked.stdout)["files"] == {"calibration": str(out)}
+
+
+def test_an_array_becomes_a_mujoco_model(gfimu_command, tmp_path, project_root):
+    array = tmp_path / "mine.toml"
+    array.write_bytes((project_root / "models" / "arrays" / "corners8.toml").read_bytes())
+    result = gfimu_command("convert", array, tmp_path / "mine.xml", "--to", "motor_turntable", "--json")
+    assert result.code == 0, result.stderr
+    assert json.loads(result.stdout)["channels"] == 24
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "mine.xml"))
+    assert [model.sensor(i).name for i in range(8)] == [f"a{chip}" for chip in range(1, 9)]
+    assert model.actuator(0).name == "motor"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["cube12", "x.xml", "--to", "shelf"], "unknown rig 'shelf'; valid: free_cube, motor_turntable, turntable"),
+        (["cal.json", "x.xml"], "x.xml: a MuJoCo model is made of an array; give its name or .toml file"),
+        (["cube13", "x.xml"], "cube13"),
+    ],
+)
+def test_what_becomes_no_model_is_one_line(gfimu_command, tmp_path, monkeypatch, arguments, message):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "cal.json").write_text("{}")
+    result = gfimu_command("convert", *arguments)
+    assert result.code == 2
+    assert message in result.stderr
+    assert len(result.stderr.strip().splitlines()) == 1
+    assert not (tmp_path / "x.xml").exists()

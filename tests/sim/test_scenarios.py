@@ -14,7 +14,7 @@ from sim.effects import make_effect
 from sim.scenarios import Scenario, simulate
 from sim.turntable import prescribed_readings
 
-SHIPPED = ["driven_run", "eccentric_mount", "paper_run", "rest", "speed_sweep", "tumble"]
+SHIPPED = ["driven_run", "eccentric_mount", "motor_run", "paper_run", "rest", "speed_sweep", "tumble"]
 PERFECT = "sensor.perfect=true"
 
 
@@ -231,7 +231,7 @@ def test_progress_reaches_one():
         (["sample_rate_hz=6400"], "at most 3200 Hz"),
         (["duration_s=0.005"], "fewer than two samples"),
         (["duration_s=nan"], "must be a finite number"),
-        (["drive.mode=pushed"], "must be one of driven, prescribed"),
+        (["drive.mode=pushed"], "must be one of dcmotor, driven, prescribed"),
         (["reference.tacho_noise_std_rad_s=-1"], "must be at least 0"),
         (["effect=[{name='tilt'}]"], "unknown effect 'tilt'; valid: angle_zero"),
         (["effect=[{name='table_tilt', parameters={z_rad=1}}]"], "unknown parameter 'z_rad'; valid: x_rad, y_rad"),

@@ -23,6 +23,11 @@ SUFFIXES = {
     "deg": "°",
     "s2": "s²",
     "rthz": "√Hz",
+    "ohm": "Ω",
+    "H": "H",
+    "A": "A",
+    "Nm": "N·m",
+    "kgm2": "kg·m²",
 }
 
 
@@ -97,7 +102,7 @@ def test_the_kind_of_a_motion_may_be_left_out_where_it_is_the_usual_one():
 
 def uncommented(text):
     """The template with every key in it that is commented out."""
-    return re.sub(r"^# (?=\w+ = |\[+\w+\]+)", "", text, flags=re.MULTILINE)
+    return re.sub(r"^# (?=\w+ = |\[+[\w.]+\]+)", "", text, flags=re.MULTILINE)
 
 
 @pytest.mark.parametrize("kind", FILE_KINDS)
