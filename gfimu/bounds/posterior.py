@@ -11,7 +11,6 @@ taken into account. The bound is local, see `gfimu.bounds.sample`.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from gfimu.bounds.sample import omega_products_jacobian, require_positive
@@ -101,7 +100,6 @@ def _readout(tables: ChannelTables, errors: SensorErrors) -> NDArray[np.float64]
     return np.hstack([np.zeros((d, 6)), white, -white @ explained])
 
 
-@njit(cache=True)
 def _transition(step, n):  # type: ignore[no-untyped-def]
     """F and G of x' = F x + G ε'."""
     move = np.eye(n)
@@ -115,7 +113,6 @@ def _transition(step, n):  # type: ignore[no-untyped-def]
     return move, enter
 
 
-@njit(cache=True)
 def _measurement(slope, readout, known, rest_std, n):  # type: ignore[no-untyped-def]
     """H of all measurements of a sample, scaled to unit noise: the null space, and ω = 0 at rest."""
     d = len(slope)
@@ -128,7 +125,6 @@ def _measurement(slope, readout, known, rest_std, n):  # type: ignore[no-untyped
     return rows
 
 
-@njit(cache=True)
 def _filter_bound(t, slopes, readout, alpha_noise, start, known, rest_std):  # type: ignore[no-untyped-def]
     n = len(start)
     result = np.empty((len(t), n, n))
@@ -147,7 +143,6 @@ def _filter_bound(t, slopes, readout, alpha_noise, start, known, rest_std):  # t
     return result
 
 
-@njit(cache=True)
 def _smoother_bound(t, slopes, readout, alpha_noise, known, rest_std, filtered):  # type: ignore[no-untyped-def]
     """Add the information of the later samples, carried back in time: P_s = (P⁻¹ + J)⁻¹ = (I + P J)⁻¹ P."""
     n = filtered.shape[1]
