@@ -11,7 +11,6 @@ taken into account. The bound is local, see `gfimu.bounds.sample`.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from gfimu.bounds.sample import omega_products_jacobian, require_positive
@@ -101,8 +100,7 @@ def _readout(tables: ChannelTables, errors: SensorErrors) -> NDArray[np.float64]
     return np.hstack([np.zeros((d, 6)), white, -white @ explained])
 
 
-@njit(cache=True)
-def _transition(step, n):  # type: ignore[no-untyped-def]
+def _transition(step: float, n: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """F and G of x' = F x + G ε'."""
     move = np.eye(n)
     enter = np.zeros((n, 3))
@@ -115,10 +113,11 @@ def _transition(step, n):  # type: ignore[no-untyped-def]
     return move, enter
 
 
-@njit(cache=True)
-def _measurement(slope, readout, known, rest_std, n):  # type: ignore[no-untyped-def]
+def _measurement(
+    slope: NDArray[np.float64], readout: NDArray[np.float64], known: bool, rest_std: float
+) -> NDArray[np.float64]:
     """H of all measurements of a sample, scaled to unit noise: the null space, and ω = 0 at rest."""
-    d = len(slope)
+    d, n = readout.shape
     rows = np.zeros((d + 3 if known else d, n))
     rows[:d] = readout
     rows[:d, :3] = slope
@@ -128,8 +127,16 @@ def _measurement(slope, readout, known, rest_std, n):  # type: ignore[no-untyped
     return rows
 
 
-@njit(cache=True)
-def _filter_bound(t, slopes, readout, alpha_noise, start, known, rest_std):  # type: ignore[no-untyped-def]
+def _filter_bound(
+    t: NDArray[np.float64],
+    slopes: NDArray[np.float64],
+    readout: NDArray[np.float64],
+    alpha_noise: NDArray[np.float64],
+    start: NDArray[np.float64],
+    known: NDArray[np.bool_],
+    rest_std: float,
+) -> NDArray[np.float64]:
+    """Covariance of the state given the samples so far, (n, s, s)."""
     n = len(start)
     result = np.empty((len(t), n, n))
     covariance = start.copy()
@@ -138,7 +145,7 @@ def _filter_bound(t, slopes, readout, alpha_noise, start, known, rest_std):  # t
         if k > 0:
             move, enter = _transition(t[k] - t[k - 1], n)
             covariance = move @ covariance @ move.T + enter @ alpha_noise @ enter.T
-        rows = _measurement(slopes[k], readout, known[k], rest_std, n)
+        rows = _measurement(slopes[k], readout, known[k], rest_std)
         gain = covariance @ rows.T
         total = rows @ gain + np.eye(len(rows))
         covariance = covariance - gain @ np.linalg.solve(total, gain.T)
@@ -147,14 +154,21 @@ def _filter_bound(t, slopes, readout, alpha_noise, start, known, rest_std):  # t
     return result
 
 
-@njit(cache=True)
-def _smoother_bound(t, slopes, readout, alpha_noise, known, rest_std, filtered):  # type: ignore[no-untyped-def]
+def _smoother_bound(
+    t: NDArray[np.float64],
+    slopes: NDArray[np.float64],
+    readout: NDArray[np.float64],
+    alpha_noise: NDArray[np.float64],
+    known: NDArray[np.bool_],
+    rest_std: float,
+    filtered: NDArray[np.float64],
+) -> None:
     """Add the information of the later samples, carried back in time: P_s = (P⁻¹ + J)⁻¹ = (I + P J)⁻¹ P."""
     n = filtered.shape[1]
     later = np.zeros((n, n))
     prior = np.linalg.inv(alpha_noise)
     for k in range(len(t) - 2, -1, -1):
-        rows = _measurement(slopes[k + 1], readout, known[k + 1], rest_std, n)
+        rows = _measurement(slopes[k + 1], readout, known[k + 1], rest_std)
         later = later + rows.T @ rows
         move, enter = _transition(t[k + 1] - t[k], n)
         seen = later @ enter

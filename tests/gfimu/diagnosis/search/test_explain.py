@@ -149,6 +149,7 @@ def test_a_set_far_behind_is_not_fitted(tilted, monkeypatch):
     gram[:size, :size], score = tilted.best.gram, np.append(tilted.best.score, [0.0, 0.0])
     best = replace(best, gram=gram, score=score, log_posterior=tilted.best.log_posterior - 1.0)
     fitted = []
+    monkeypatch.setattr("gfimu.diagnosis.search.explain.each_apart", lambda work, items: [work(one) for one in items])
     monkeypatch.setattr(Sets, "_roughly", lambda self, point: fitted.append(frozenset(c.name for c in point.causes)))
     for strong, expected in ((True, [frozenset({"table_tilt"})]), (False, [{"table_tilt"}, {"mount_tilt"}])):
         sets = Sets(tilted.stretches, best.point, Policy())
