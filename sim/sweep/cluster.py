@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import pickle
 import time
 import warnings
@@ -37,11 +38,15 @@ def open_cluster(address: str) -> Iterator[Workers]:
     """
     client = _client(address)
     executor = _ClusterExecutor(client)
+    log = logging.getLogger("distributed.client")
+    level = log.level
+    log.setLevel(logging.CRITICAL)  # a lost connection is one line of the campaign, not a traceback of Dask
     try:
         yield Workers(executor, executor.count, _deaths)
     finally:
         executor.shutdown(wait=False)
         client.close()
+        log.setLevel(level)
 
 
 class _ClusterExecutor(Executor):
