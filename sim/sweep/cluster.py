@@ -14,7 +14,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from gfimu.errors import InputError, RecordingWarning
-from sim.sweep.workers import Workers
+from sim.sweep.engine import Workers
 
 if TYPE_CHECKING:
     from distributed import Client
