@@ -40,6 +40,9 @@ if TYPE_CHECKING:
     from gfimu.commands import firmware as firmware
     from gfimu.commands.calibrate import calibrate as calibrate
     from gfimu.commands.campaign import campaign as campaign
+    from gfimu.commands.campaign_views import campaign_plot as campaign_plot
+    from gfimu.commands.campaign_views import campaign_status as campaign_status
+    from gfimu.commands.campaign_views import campaign_table as campaign_table
     from gfimu.commands.catalogue import catalogue as catalogue
     from gfimu.commands.catalogue import new as new
     from gfimu.commands.catalogue import show as show
@@ -123,6 +126,9 @@ _PUBLIC = {
     "calibrate_array": "gfimu.calibration.array_calibration",
     "centripetal_agreement": "gfimu.motion.estimate_summary",
     "campaign": "gfimu.commands.campaign",
+    "campaign_plot": "gfimu.commands.campaign_views",
+    "campaign_status": "gfimu.commands.campaign_views",
+    "campaign_table": "gfimu.commands.campaign_views",
     "catalogue": "gfimu.commands.catalogue",
     "certificate": "gfimu.commands.certificate",
     "check": "gfimu.commands.check",

@@ -8,9 +8,9 @@ table's profile is evaluated at the samples only.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numba import njit
@@ -28,11 +28,30 @@ from sim.motion import SpinMotion, SpinState, SplineSpin
 from sim.twin import Twin
 from sim.world import World
 
-__all__ = ["WorldFactory"]
+__all__ = ["MeasuredWorld", "WorldFactory"]
 
 Floats = NDArray[np.float64]
 
 _REACH = 4.0  # standard deviations to which the smoothing Gaussian is summed, as by SciPy
+
+
+@dataclass(frozen=True)
+class MeasuredWorld:
+    """A recording, and what is true of it.
+
+    Parameters
+    ----------
+    recording : Recording
+        What was measured.
+    motion : SpinState
+        Angle, rate and acceleration that the table was asked for, at the samples of the recording, each (n,).
+    ideal : ndarray, shape (n, c)
+        What the twin's own world, without the effects, reads in that motion without noise, m/s².
+    """
+
+    recording: Recording
+    motion: SpinState
+    ideal: Floats
 
 
 @dataclass(frozen=True)
@@ -55,6 +74,11 @@ class WorldFactory:
     twin: Twin
     setting: Measurement = field(default_factory=Measurement)
 
+    _NOT_OF_NOISE: ClassVar = (
+        *("_t", "_fine", "_stride", "_first", "_taps", "_world", "_geometry", "_quantum", "_white", "_shape"),
+        "_metadata",
+    )
+
     def __post_init__(self) -> None:
         if self.setting.encoder_step:
             raise InputError("the factory makes no encoder readings; use sim.campaign.measure")
@@ -74,11 +98,18 @@ class WorldFactory:
         Recording
             As that of `sim.campaign.measure`, of the same distribution.
         """
+        return self.world(rng, effects).recording
+
+    def world(self, rng: np.random.Generator, effects: Sequence[Effect] = ()) -> MeasuredWorld:
+        """Record a world as `measure` does, and return what is true of it too."""
         t, setting = self._t, self.setting
         spin = self._spin(rng)
         world = self.twin.world(effects) if effects else self._world
         temperature = temperature_course(rng, t)
         readings = forward.channels(world, spin, t, temperature, None if effects else self._geometry)
+        asked = spin.at(t)
+        motion = SpinState(asked.angle, asked.rate, asked.acceleration)
+        ideal = forward.channels(self._world, spin, t, temperature, self._geometry) if effects else readings.copy()
         white = self._white * world.noise_factor
         level = setting.bias_instability * level_factors(rng, readings.shape[1])
         if np.all(white > 0.0) and setting.bias_instability:
@@ -98,9 +129,20 @@ class WorldFactory:
         reference = {"tacho_rad_s": tacho, "temperature_degC": temperature}
         if world.data_steps:  # frames may be lost
             kept = np.isfinite(readings).any(axis=1)
-            t, readings = t[kept], readings[kept]
+            t, readings, ideal = t[kept], readings[kept], ideal[kept]
+            motion = SpinState(motion.angle[kept], motion.rate[kept], motion.acceleration[kept])
             reference = {name: column[kept] for name, column in reference.items()}
-        return Recording(t, readings, self.twin.array.channels, reference, self._metadata)
+        recording = Recording(t, readings, self.twin.array.channels, reference, self._metadata)
+        return MeasuredWorld(recording, motion, ideal)
+
+    def with_noise(self, bias_instability: float, tacho_noise: float) -> WorldFactory:
+        """Return the factory of the same worlds with other noise, m/s² and rad/s; what they share is not made again."""
+        setting = replace(self.setting, bias_instability=bias_instability, tacho_noise=tacho_noise)
+        if setting == self.setting:
+            return self
+        other = replace(self, setting=setting)
+        other.__dict__.update({name: getattr(self, name) for name in self._NOT_OF_NOISE})
+        return other
 
     def _spin(self, rng: np.random.Generator) -> SpinMotion:
         fine = self._fine

@@ -324,6 +324,15 @@ class Twin:
 
     def expected_noise(self, sample_rate: float) -> ExpectedNoise:
         """Return white noise and quantisation of the part at a sample rate, as the data sheet has them."""
+        if sample_rate not in self._noise:
+            self._noise[sample_rate] = self._noise_of_part(sample_rate)
+        return self._noise[sample_rate]
+
+    @cached_property
+    def _noise(self) -> dict[float, ExpectedNoise]:
+        return {}  # read once: it is asked for in every world that is simulated
+
+    def _noise_of_part(self, sample_rate: float) -> ExpectedNoise:
         part = PartFile.load(self.part, self.array.part_files, needs=() if self.full_resolution else ("range_g",))
         quantum = lsb = part.lsb_m_s2
         if not self.full_resolution:

@@ -11,6 +11,7 @@ import json
 import random
 from collections import Counter, defaultdict
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import foreign_world
@@ -26,9 +27,8 @@ from gfimu.recording import Recording
 from gfimu.units import STANDARD_GRAVITY
 from sim.study.outcome import draw_world, outcome_of, processor_time
 from sim.sweep.dataset import Dataset
-from sim.sweep.design import Design
 from sim.sweep.engine import run_campaign
-from sim.sweep.executors import open_executor
+from sim.sweep.executors import open_workers
 from sim.sweep.plan import PlanFile
 from sim.sweep.summary import failures
 
@@ -169,10 +169,10 @@ def main():
     plan = PlanFile({"world": worlds, "grammar": [options.grammar]}, kind="foreign", batch=1)
     dataset = Dataset.create(options.out, plan)
     run_campaign(
-        dataset, run_world, open_executor, options.workers, progress=lambda *counts: print(*counts, flush=True)
+        dataset, run_world, partial(open_workers, options.workers), progress=lambda *counts: print(*counts, flush=True)
     )
-    rows = dataset.read(list(Design(plan).batches()))
-    print(table([json.loads(row["outcome"]) for row in rows if not row["failure"]]))
+    rows = dataset.table()
+    print(table([json.loads(row["outcome"]) for row in rows.to_pylist() if not row["failure"]]))
     for reason, count in failures(rows).items():
         print(f"{count} failed: {reason}")
 

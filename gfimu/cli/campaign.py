@@ -1,38 +1,70 @@
-"""`gfimu campaign`: many simulated cases by a plan."""
+"""`gfimu campaign`: many simulated cases by a plan: run, status, table, plot."""
 
 from __future__ import annotations
 
+from difflib import get_close_matches
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
-from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, print_text, progress
-
-if TYPE_CHECKING:
-    from gfimu.commands.campaign import CampaignResult
+from gfimu.cli.campaign_views import (
+    ByOption,
+    duration_text,
+    plot,
+    print_failures,
+    print_groups,
+    status,
+    table,
+)
+from gfimu.cli.output import JsonOption, print_json, print_paths, progress
+from gfimu.errors import InputError
 
 __all__ = ["register"]
 
 
+class _Campaigns(TyperGroup):
+    """The commands; without the name of one, what follows is the plan that `run` takes."""
+
+    default = "run"
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        if args and args[0] not in {*self.commands, "--help"}:
+            meant = get_close_matches(args[0], self.commands, 1)
+            if meant and not Path(args[0]).exists():
+                raise InputError(f"{args[0]}: neither a plan nor a command; did you mean gfimu campaign {meant[0]}?")
+            args = [self.default, *args]
+        return super().parse_args(ctx, args)
+
+
 def register(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command(name="campaign")(_campaign)
+    """Add the commands."""
+    group = typer.Typer(
+        cls=_Campaigns,
+        help="Run many simulated cases by a plan into one dataset, and summarise it; a second call goes on where one "
+        "ended.\n\nExample: gfimu campaign plan.toml --out campaign\n\nThe word run may be left out.",
+        no_args_is_help=True,
+        subcommand_metavar="PLAN --out DIR | COMMAND [ARGS]...",
+    )
+    group.command(name="run")(_run)
+    group.command(name="status")(status)
+    group.command(name="table")(table)
+    group.command(name="plot")(plot)
+    app.add_typer(group, name="campaign")
 
 
-def _campaign(
+def _run(
     plan: Annotated[Path, typer.Argument(help="Plan (.toml), or the folder of a campaign, of which nothing is run.")],
     out: Annotated[
         Path | None, typer.Option("--out", help="Folder to write; one that was begun is gone on with.")
     ] = None,
-    by: Annotated[
-        list[str] | None, typer.Option("--by", metavar="FACTOR", help="Factor to group by; may be repeated.")
-    ] = None,
+    by: ByOption = None,
     workers: Annotated[int | None, typer.Option("--workers", help="Processes; by default one per processor.")] = None,
     cluster: Annotated[str, typer.Option("--cluster", help="Dask scheduler instead, such as tcp://host:8786.")] = "",
     json: JsonOption = False,
 ) -> None:
-    """Run many simulated cases by a plan into one dataset, and summarise it; a second call goes on where one ended.
+    """Run the cases of a plan that the folder lacks, and summarise them; or summarise a folder.
 
     Example: gfimu new plan --out plan.toml, then gfimu campaign plan.toml --out campaign
 
@@ -40,36 +72,30 @@ def _campaign(
     """
     from gfimu.commands.campaign import campaign
 
-    with progress(f"campaign {plan}", total=1.0) as done:
+    with progress(f"campaign {plan}", total=1.0, time_left=False) as done:
         found = campaign(
-            plan,
-            out=out,
-            by=by or [],
-            workers=workers,
-            cluster=cluster,
-            progress=lambda ready, cases: done(ready / cases),
+            plan, out=out, by=by or [], workers=workers, cluster=cluster, progress=_Shown(f"campaign {plan}", done)
         )
     if json:
         print_json(found.to_dict())
         return
-    _print(found)
+    print_groups(f"{found.folder}: {found.done} of {found.cases} cases", found.groups)
+    print_failures(found.failures)
     if out is not None:
         print_paths([("campaign", out)])
 
 
-def _print(found: CampaignResult) -> None:
-    factors = list(found.groups[0].values) if found.groups else []
-    rows = [
-        (
-            *(str(group.values[name]) for name in factors),
-            group.result,
-            str(group.cases),
-            f"{group.median:.4g}",
-            f"{group.low:.4g} … {group.high:.4g}",
-        )
-        for group in found.groups
-    ]
-    title = f"{found.folder}: {found.done} of {found.cases} cases"
-    print_table(title, (*factors, "result", "cases", "median or share", "5 … 95 %"), rows)
-    for reason, count in found.failures.items():
-        print_text(f"{count} failed: {reason}", style="yellow")
+class _Shown:
+    """Progress on the terminal: cases, their rate in this call, and the time left by that rate."""
+
+    def __init__(self, title: str, show: Any) -> None:
+        from sim.sweep.pace import Pace
+
+        self._title, self._show, self._pace = title, show, Pace()
+        self._before: int | None = None
+
+    def __call__(self, ready: int, cases: int) -> None:
+        self._before = ready if self._before is None else self._before
+        rate = self._pace.note(ready - self._before)
+        left = f", {rate:.3g}/s, {duration_text((cases - ready) / rate)} left" if rate else ""
+        self._show(ready / cases, f"{self._title}: {ready} of {cases}{left}")

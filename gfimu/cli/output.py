@@ -82,15 +82,18 @@ def print_paths(paths: Iterable[tuple[str, str | Path]]) -> None:
 
 
 @contextmanager
-def progress(description: str, total: float | None = None) -> Iterator[Any]:
-    """Show a progress bar on a terminal; yields a function called with the work done so far (0 to ``total``)."""
+def progress(description: str, total: float | None = None, *, time_left: bool = True) -> Iterator[Any]:
+    """Show a progress bar on a terminal; yields a function called with the work done so far (0 to ``total``).
+
+    Without ``time_left`` the bar shows none: where some of the work was done before, its rate is not that of this call.
+    """
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
     screen = console(stderr=True)
     with Progress(
         TextColumn("{task.description}", markup=False),
         BarColumn(),
-        TimeRemainingColumn(),
+        *([TimeRemainingColumn()] if time_left else []),
         console=screen,
         transient=True,
         disable=not screen.is_terminal,

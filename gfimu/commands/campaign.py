@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -85,14 +86,15 @@ def campaign(
     Raises
     ------
     InputError
-        If the plan is wrong, a folder is needed or holds another campaign, or Dask is not installed.
+        If the plan is wrong, a folder is needed or holds another campaign, Dask is not installed, or no scheduler
+        answers.
     """
     from gfimu.commands.campaign_cases import KINDS, check_factors
     from gfimu.errors import InputError
     from sim.sweep.dataset import Dataset
     from sim.sweep.design import Design
     from sim.sweep.engine import run_campaign
-    from sim.sweep.executors import open_executor, processors
+    from sim.sweep.executors import open_workers, processors
     from sim.sweep.plan import load_plan
     from sim.sweep.summary import failures, grouped
 
@@ -107,17 +109,12 @@ def campaign(
         check_factors(found, Design(found)[0], str(plan))
         if out is None:
             raise InputError(f"{plan}: give the folder of the campaign with --out")
+        opened = partial(open_workers, workers or processors(), cluster)
+        if cluster:
+            with opened():  # one that is not there is said before anything is written
+                pass
         dataset = Dataset.create(out, plan)
-        count = workers or processors()
-        run_campaign(
-            dataset,
-            KINDS[found.kind],
-            lambda number: open_executor(number, cluster),
-            count,
-            progress=progress,
-        )
-    design = Design(dataset.plan)
-    rows = dataset.read(list(design.batches()))
-    return CampaignResult(
-        dataset.folder, len(design), len(rows), failures(rows), tuple(grouped(rows, dataset.plan, list(by)))
-    )
+        run_campaign(dataset, KINDS[found.kind], opened, progress=progress)
+    table = dataset.table()
+    groups = tuple(grouped(table, dataset.plan, list(by)))
+    return CampaignResult(dataset.folder, len(Design(dataset.plan)), len(table), failures(table), groups)

@@ -1,4 +1,4 @@
-"""What a case of a campaign does: simulate and estimate, or hide an effect and diagnose."""
+"""What a case of a campaign does: simulate and estimate, hide an effect and diagnose, or measure a world."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from sim.sweep.design import Case
     from sim.sweep.plan import PlanFile, Value
 
-__all__ = ["KINDS", "check_factors", "diagnose_case", "estimate_case"]
+__all__ = ["KINDS", "check_factors", "diagnose_case", "estimate_case", "measure_case"]
 
 _SCENARIO = "paper_run"
 _CALIBRATIONS = ("none", "rest", "poses")
@@ -97,7 +97,18 @@ def diagnose_case(case: Case) -> Mapping[str, Any]:
     return {**brief(outcome), "share_of_excess_removed": outcome["share_of_excess_removed"]}
 
 
-KINDS: dict[str, Callable[[Case], Mapping[str, Any]]] = {"estimate": estimate_case, "diagnose": diagnose_case}
+def measure_case(case: Case) -> Mapping[str, float]:
+    """Measure a world and compare a linear solution with the truth (`gfimu.commands.campaign_worlds`)."""
+    from gfimu.commands import campaign_worlds
+
+    return campaign_worlds.measure_case(case)
+
+
+KINDS: dict[str, Callable[[Case], Mapping[str, Any]]] = {
+    "estimate": estimate_case,
+    "diagnose": diagnose_case,
+    "measure": measure_case,
+}
 """What a case does, by the plan's ``kind``."""
 
 
@@ -111,7 +122,12 @@ def check_factors(plan: PlanFile, first: Case, source: str) -> None:
                 raise unknown_name("factor of kind 'diagnose'", name, _OF_STUDY)
         return
     try:
-        _setting(first.values)
+        if plan.kind == "measure":
+            from gfimu.commands.campaign_worlds import check_world_factors
+
+            check_world_factors(plan, first)
+        else:
+            _setting(first.values)
     except InputError as error:
         raise InputError(f"{source}: [factors]: {error}") from None
 

@@ -270,6 +270,10 @@ class AccelerometerArray:
 
     def to_toml(self) -> str:
         """Return the text of the array file."""
+        return self._toml
+
+    @cached_property
+    def _toml(self) -> str:
         return tomli_w.dumps(self.to_dict())
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any
 
 from gfimu.errors import GfimuError, InputError
@@ -20,7 +21,7 @@ from sim.study.plan import study_plan, study_work
 from sim.study.report import summarise, write_report
 from sim.sweep.dataset import Dataset
 from sim.sweep.engine import run_campaign
-from sim.sweep.executors import open_executor
+from sim.sweep.executors import open_workers
 
 STORED = "docs/diagnosis-study.jsonl.xz"
 """Outcomes of the study page, seen from the project's root."""
@@ -49,8 +50,7 @@ def _run(options: argparse.Namespace) -> int:
     run_campaign(
         _PrintedDataset.create(options.out, plan),
         study_work,
-        lambda workers: open_executor(workers, options.cluster),
-        options.workers,
+        partial(open_workers, options.workers, options.cluster),
     )
     return 0
 

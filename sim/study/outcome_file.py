@@ -12,7 +12,6 @@ from gfimu.errors import InputError
 from gfimu.files.atomic_file import atomic_path
 from sim.study.cases import find_case
 from sim.sweep.dataset import Dataset
-from sim.sweep.design import Design
 
 __all__ = ["generator_name", "keep_outcomes", "outcome_of_row", "read_outcomes"]
 
@@ -38,7 +37,7 @@ def read_outcomes(path: str | Path) -> list[dict[str, Any]]:
         dataset = Dataset.open(file)
         if dataset.plan.kind != "study":
             raise InputError(f"{file}: is another campaign; give a folder of `python -m sim.study run`")
-        return [outcome_of_row(row) for row in dataset.read(list(Design(dataset.plan).batches()))]
+        return [outcome_of_row(row) for row in dataset.table().to_pylist()]
     if not file.exists():
         return []
     try:

@@ -16,12 +16,13 @@ import tomli_w
 
 from gfimu.errors import InputError
 from gfimu.files.atomic_file import atomic_path
+from sim.sweep.design import Design
 from sim.sweep.plan import PlanFile, load_plan
 
 __all__ = ["Dataset"]
 
 _PLAN = "plan.toml"
-_FORMAT = 1  # of rows; another one makes other names
+_FORMAT = 2  # of rows; another one makes other names
 
 
 @dataclass(frozen=True)
@@ -92,10 +93,33 @@ class Dataset:
         with atomic_path(self.shard(batch)) as part:
             pq.write_table(pa.table(columns), part)
 
-    def read(self, batches: Sequence[range]) -> list[dict[str, Any]]:
-        """Return the rows of all batches that are there, by number."""
-        rows: list[dict[str, Any]] = []
-        for batch in batches:
-            if self.shard(batch).exists():
-                rows += pq.read_table(self.shard(batch)).to_pylist()
-        return rows
+    def present(self) -> list[range]:
+        """Return the batches whose rows are there, in order; a file that is being written is not there yet."""
+        names = {entry.name for entry in self.folder.iterdir()}
+        return [batch for batch in Design(self.plan).batches() if self.shard(batch).name in names]
+
+    def table(self, columns: Sequence[str] | None = None) -> pa.Table:
+        """Return the rows that are there, in order, or some of their columns.
+
+        Raises
+        ------
+        InputError
+            If a file is damaged.
+        """
+        return pa.concat_tables(
+            [pa.table({"case": pa.array([], pa.int64())}), *(self._shard(batch, columns) for batch in self.present())],
+            promote_options="permissive",
+        )
+
+    def _shard(self, batch: range, columns: Sequence[str] | None) -> pa.Table:
+        path = self.shard(batch)
+        try:
+            found = pq.ParquetFile(path)
+            wanted = None if columns is None else [name for name in columns if name in found.schema_arrow.names]
+            table = found.read(wanted)
+        except (pa.ArrowInvalid, OSError) as error:
+            reason = str(error).partition("\n")[0]
+            raise InputError(f"{path}: damaged ({reason}); delete it and run the campaign again") from None
+        if len(table) != len(batch):
+            raise InputError(f"{path}: has {len(table)} rows, not {len(batch)}; delete it and run the campaign again")
+        return table

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import itertools
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,8 @@ from sim.sweep.plan import PlanFile, RangeTable, Value
 
 __all__ = ["Case", "Design"]
 
-_MOST_POINTS = 2_000_000  # combinations that are kept in memory
+_UNUSED_BITS = 11  # numerical: of 64; a seed of 53 bits is exact in every file, and millions of them differ
+_MOST_POINTS = 2_000_000  # numerical: of a design that is no grid, which are kept in memory
 
 
 @dataclass(frozen=True)
@@ -42,6 +43,10 @@ class Case:
 class Design:
     """Cases of a plan, in order; ``design[number]`` is one of them.
 
+    The design ``saltelli`` takes two points A and B of a Sobol sequence of twice the dimensions, and for each factor
+    the point A with that factor's value of B (Saltelli et al., Computer Physics Communications 181(2), 2010): from
+    these k + 2 combinations per base point follow first-order and total indices.
+
     Parameters
     ----------
     plan : PlanFile
@@ -51,39 +56,59 @@ class Design:
     plan: PlanFile
 
     def __len__(self) -> int:
-        return len(self._points) * self.plan.repeats
+        return self.points * self.plan.repeats
 
     def __getitem__(self, number: int) -> Case:
         point, repeat = divmod(number, self.plan.repeats)
         # Repeats of all points share their seeds, so that factors are compared on the same chips and noise.
-        (seed,) = np.random.SeedSequence([self.plan.seed, repeat]).generate_state(1)
-        return Case(number, self._values(self._points[point]), int(seed))
+        (seed,) = np.random.SeedSequence([self.plan.seed, repeat]).generate_state(1, np.uint64)
+        return Case(number, self._values(self._point(point)), int(seed) >> _UNUSED_BITS)
 
     def batches(self) -> Iterator[range]:
         """Yield the numbers of the cases that run together."""
         for first in range(0, len(self), self.plan.batch):
             yield range(first, min(first + self.plan.batch, len(self)))
 
+    @property
+    def points(self) -> int:
+        """Combinations, each with ``plan.repeats`` cases."""
+        if self.plan.design == "grid":
+            return math.prod(self._sizes)
+        base = self.plan.points or 0
+        return base * (len(self.plan.factors) + 2) if self.plan.design == "saltelli" else base
+
     @cached_property
-    def _points(self) -> NDArray[np.float64]:
-        """Coordinates of every combination, (n, k): the number of a choice, or a place in [0, 1] of a range."""
-        plan, factors = self.plan, self.plan.factors.values()
-        if plan.design == "grid":
-            axes = [
-                np.linspace(0.0, 1.0, one.levels or 2)
-                if isinstance(one, RangeTable)
-                else np.arange(len(one), dtype=float)
-                for one in factors
-            ]
-            count = int(np.prod([len(axis) for axis in axes], dtype=float))
-            _check_count(count)
-            return np.array(list(itertools.product(*axes)))
+    def _sizes(self) -> tuple[int, ...]:
+        """Values of each factor; of a range its levels, 0 without."""
+        return tuple(one.levels or 0 if isinstance(one, RangeTable) else len(one) for one in self.plan.factors.values())
+
+    @cached_property
+    def _cube(self) -> NDArray[np.float64]:
+        plan, dimensions = self.plan, len(self.plan.factors)
         count = plan.points or 0
-        _check_count(count)
-        unit = _unit_cube(plan.design, len(plan.factors), count, plan.seed)
-        sizes = [1 if isinstance(one, RangeTable) else len(one) for one in factors]
-        chosen = np.minimum(np.floor(unit * sizes), np.array(sizes) - 1.0)
-        return np.where([isinstance(one, RangeTable) for one in factors], unit, chosen)
+        if count > _MOST_POINTS:
+            raise InputError(
+                f"the plan has {count} points, at most {_MOST_POINTS}; use fewer points and more repeats, or several "
+                "plans with seeds of their own"
+            )
+        return _unit_cube(plan.design, 2 * dimensions if plan.design == "saltelli" else dimensions, count, plan.seed)
+
+    def _point(self, number: int) -> NDArray[np.float64]:
+        """Return the coordinates of a combination, (k,): the number of a choice, or a place in [0, 1] of a range."""
+        ranges = np.array([isinstance(one, RangeTable) for one in self.plan.factors.values()])
+        if self.plan.design == "grid":
+            places = np.array(np.unravel_index(number, self._sizes), dtype=float)
+            return np.where(ranges, places / np.maximum(np.array(self._sizes) - 1.0, 1.0), places)
+        if self.plan.design == "saltelli":
+            base, which = divmod(number, len(ranges) + 2)
+            first, second = np.split(self._cube[base], 2)
+            unit = second if which == 1 else first.copy()
+            if which > 1:
+                unit[which - 2] = second[which - 2]
+        else:
+            unit = self._cube[number]
+        sizes = np.where(ranges, 1, self._sizes)
+        return np.where(ranges, unit, np.minimum(np.floor(unit * sizes), sizes - 1.0))
 
     def _values(self, point: NDArray[np.float64]) -> dict[str, Value]:
         values: dict[str, Value] = {}
@@ -97,18 +122,12 @@ class Design:
         return values
 
 
+@lru_cache(maxsize=4)  # each batch of a campaign asks again
 def _unit_cube(design: str, dimensions: int, count: int, seed: int) -> NDArray[np.float64]:
     """Return points of the unit cube, (count, dimensions)."""
     rng = np.random.default_rng(np.random.SeedSequence([seed, count, dimensions]))
-    if design == "sobol":
+    if design in {"sobol", "saltelli"}:
         return np.asarray(qmc.Sobol(dimensions, rng=rng).random(count))
     if design == "latin_hypercube":
         return np.asarray(qmc.LatinHypercube(dimensions, rng=rng).random(count))
     return rng.random((count, dimensions))
-
-
-def _check_count(count: int) -> None:
-    if count > _MOST_POINTS:
-        raise InputError(
-            f"the plan has {count} combinations, at most {_MOST_POINTS}; use fewer points and more repeats"
-        )

@@ -1,34 +1,68 @@
-"""Run the batches of a campaign that its folder lacks: whatever is killed, nothing is lost and nothing runs twice."""
+"""Run the batches of a campaign that its folder lacks: whatever is killed, nothing is lost and nothing runs twice.
+
+A batch is always in exactly one place: waiting, held by the executor, put aside as a suspect, or yielded to be written.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
-from contextlib import AbstractContextManager
+from collections import Counter, deque
+from collections.abc import Callable, Generator, Iterator, Mapping
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
+from contextlib import AbstractContextManager, closing
+from dataclasses import dataclass
 from typing import Any
+
+from threadpoolctl import threadpool_limits
 
 from gfimu.errors import GfimuError
 from sim.sweep.dataset import Dataset
 from sim.sweep.design import Case, Design
+from sim.sweep.pace import running
 from sim.sweep.plan import PlanFile
 
-__all__ = ["Work", "run_campaign"]
+__all__ = ["Work", "Workers", "run_campaign"]
 
 Work = Callable[[Case], Mapping[str, Any]]
 """What a case does: it returns its results by name, with units in the names; a `GfimuError` is a failed case."""
 
-OpenExecutor = Callable[[int], AbstractContextManager[Executor]]
-"""Opens an executor of so many workers."""
 
-_TRIES = 3  # of a batch whose worker dies
-_AHEAD = 2  # batches per worker that wait in the pool
+@dataclass(frozen=True)
+class Workers:
+    """An executor, and what a campaign must know of the workers behind it.
+
+    An executor that can't go on raises `BrokenExecutor`, from ``count``, ``submit`` or a future; the campaign then
+    opens another one.
+
+    Parameters
+    ----------
+    executor : Executor
+        Runs the batches.
+    count : callable
+        Returns how many batches run at once; of a cluster that may change.
+    deaths : callable
+        Returns how many workers died under a batch, by the error of its future: 0 where it was lost for another
+        reason, None where the error says nothing of workers.
+    """
+
+    executor: Executor
+    count: Callable[[], int]
+    deaths: Callable[[BaseException], int | None]
+
+
+OpenWorkers = Callable[[], AbstractContextManager[Workers]]
+"""Opens the workers, which are closed when the campaign ends or the executor breaks."""
+
+Rows = list[dict[str, Any]]
+
+_TRIES = 3  # workers that may die under a batch before it is reported
+_AHEAD = 2  # batches per worker that the executor holds, so that none waits for the next
+_LOOK = 2.0  # numerical: s, after which workers that came or went are noticed though no batch ended
 
 
 def run_campaign(
     dataset: Dataset,
     work: Work,
-    open_executor: OpenExecutor,
-    workers: int,
+    open_workers: OpenWorkers,
     *,
     progress: Callable[[int, int], None] | None = None,
 ) -> int:
@@ -40,30 +74,38 @@ def run_campaign(
         The campaign's folder.
     work : callable
         What each case does; a function of a module, so that other processes can find it.
-    open_executor : callable
-        Opens an executor of a number of workers, which is closed when the campaign ends or a worker died.
-    workers : int
-        Worker processes.
+    open_workers : callable
+        Opens the workers, such as `sim.sweep.executors.open_pool` with its count.
     progress : callable, optional
-        Called with the number of cases that are there and of all cases.
+        Called with the number of cases that are there and of all cases, first before anything is run.
+
+    Raises
+    ------
+    GfimuError
+        If a worker can't run batches at all.
     """
     design = Design(dataset.plan)
     tell = progress or (lambda done, total: None)
-    missing = [batch for batch in design.batches() if not dataset.shard(batch).exists()]
+    present = set(dataset.present())
+    missing = [batch for batch in design.batches() if batch not in present]
     done = len(design) - sum(map(len, missing))
     tell(done, len(design))
     ran = 0
-    for batch, rows in _results(dataset.plan, work, missing, open_executor, workers):
-        dataset.write(batch, rows)
-        ran += len(batch)
-        tell(done + ran, len(design))
+    # Closed here whatever happens, so that an error or Ctrl-C ends the workers before it is reported.
+    with closing(_Batches(dataset.plan, work, missing).results(open_workers)) as results, running(dataset) as note:
+        for batch, rows in results:
+            dataset.write(batch, rows)
+            ran += len(batch)
+            note(ran)
+            tell(done + ran, len(design))
     return ran
 
 
-def run_batch(plan: PlanFile, work: Work, first: int, stop: int) -> list[dict[str, Any]]:
-    """Run the cases of a batch in this process and return a row each."""
+def run_batch(plan: PlanFile, work: Work, first: int, stop: int) -> Rows:
+    """Run the cases of a batch in this process, with one thread of linear algebra, and return a row each."""
     design = Design(plan)
-    return [_row(design[number], work) for number in range(first, stop)]
+    with threadpool_limits(1):
+        return [_row(design[number], work) for number in range(first, stop)]
 
 
 def _row(case: Case, work: Work) -> dict[str, Any]:
@@ -72,71 +114,81 @@ def _row(case: Case, work: Work) -> dict[str, Any]:
     try:
         return row | dict(work(case))
     except GfimuError as error:
-        return row | {"failure": str(error).splitlines()[0]}
+        return row | {"failure": _first_line(str(error))}
     except Exception as error:  # noqa: BLE001 - a failed case is a row, not the end of the campaign
-        return row | {"failure": f"{type(error).__name__}: {error}".splitlines()[0]}
+        return row | {"failure": _first_line(f"{type(error).__name__}: {error}")}
 
 
-def _results(
-    plan: PlanFile, work: Work, missing: list[range], open_executor: OpenExecutor, workers: int
-) -> Iterator[tuple[range, list[dict[str, Any]]]]:
-    """Yield batches with their rows as they come; one whose worker dies is tried again, alone.
+def _first_line(text: str) -> str:
+    return next(iter(text.splitlines()), "")
 
-    When a worker dies its pool ends, and any batch that it held may be the cause.
-    """
-    waiting, suspects, tries = list(missing), list[range](), dict[range, int]()
-    while waiting or suspects:
-        # Suspects run one at a time: the one that kills its worker again is the cause.
-        alone = bool(suspects)
-        queue = suspects[:1] if alone else waiting
-        held: dict[Future[list[dict[str, Any]]], range] = {}
-        try:
-            with open_executor(1 if alone else workers) as executor:
-                for _ in range(1 if alone else _AHEAD * workers):
-                    _submit(executor, plan, work, queue, held)
-                while held:
-                    finished, _ = wait(held, return_when=FIRST_COMPLETED)
+
+class _Batches:
+    """The batches of one call, each in exactly one place."""
+
+    def __init__(self, plan: PlanFile, work: Work, missing: list[range]) -> None:
+        self._plan, self._work = plan, work
+        self._waiting = deque(missing)
+        self._held: dict[Future[Rows], range] = {}
+        # A worker died under these, or under a batch beside them. They run alone when nothing else does: the one
+        # whose worker dies again is the cause.
+        self._suspects: deque[range] = deque()
+        self._deaths: Counter[range] = Counter()
+
+    def results(self, open_workers: OpenWorkers) -> Generator[tuple[range, Rows], None, None]:
+        """Yield batches with their rows as they come."""
+        while self._waiting or self._suspects:
+            with open_workers() as workers:
+                broken = False
+                while self._held or (not broken and (self._waiting or self._suspects)):
+                    broken = broken or not self._submitted(workers)
+                    finished, _ = wait(self._held, _LOOK, FIRST_COMPLETED)
                     for future in finished:
-                        rows = future.result()  # raises where the pool is broken
-                        batch = held.pop(future)
-                        if alone:
-                            suspects.remove(batch)
-                        yield batch, rows
-                        if not alone:
-                            _submit(executor, plan, work, queue, held)
-        except Exception as error:
-            if not _died(error):
-                raise
-            for batch in held.values():
-                tries[batch] = tries.get(batch, 0) + 1
-            suspects += [batch for batch in held.values() if batch not in suspects]
-            for batch in [batch for batch in suspects if tries[batch] >= _TRIES]:
-                suspects.remove(batch)
-                yield batch, run_lost(plan, batch)
+                        if future.cancelled() or future.exception() is not None:
+                            yield from self._lost(future, workers)
+                        else:
+                            yield self._held.pop(future), future.result()
 
+    def _submitted(self, workers: Workers) -> bool:
+        """Hand batches to the executor as far as it can use them; return whether it takes them."""
+        try:
+            while len(self._held) < _AHEAD * workers.count() and self._waiting:
+                self._submit(workers, self._waiting)
+            if self._suspects and not self._held:
+                self._submit(workers, self._suspects)
+        except BrokenExecutor:
+            return False
+        return True
 
-def _died(error: Exception) -> bool:
-    """Whether an error says that a worker died: that of a process pool, or Dask's after its own tries."""
-    return isinstance(error, BrokenExecutor) or type(error).__name__ == "KilledWorker"
-
-
-def _submit(
-    executor: Executor,
-    plan: PlanFile,
-    work: Work,
-    queue: list[range],
-    held: dict[Future[list[dict[str, Any]]], range],
-) -> None:
-    if queue:
+    def _submit(self, workers: Workers, queue: deque[range]) -> None:
         batch = queue[0]
-        # A pool that broke meanwhile refuses it: then the batch stays in the queue.
-        held[executor.submit(run_batch, plan, work, batch.start, batch.stop)] = batch
-        queue.pop(0)
+        # An executor that broke meanwhile refuses it: then the batch stays in its queue.
+        future = workers.executor.submit(run_batch, self._plan, self._work, batch.start, batch.stop)
+        self._held[future] = batch
+        queue.popleft()
 
+    def _lost(self, future: Future[Rows], workers: Workers) -> Iterator[tuple[range, Rows]]:
+        """Put a batch back whose rows did not come, or report it."""
+        error = CancelledError() if future.cancelled() else future.exception()
+        deaths = None if error is None else workers.deaths(error)
+        if deaths is None:
+            raise GfimuError(
+                f"a worker can't run a batch ({type(error).__name__}: {_first_line(str(error))}); "
+                "it needs the same gfimu as this process"
+            ) from error
+        batch = self._held.pop(future)
+        alone = self._deaths[batch] > 0
+        self._deaths[batch] += deaths
+        if alone and self._deaths[batch] >= _TRIES:
+            yield batch, self._rows_of_lost(batch)
+        elif self._deaths[batch]:
+            self._suspects.append(batch)
+        else:
+            self._waiting.appendleft(batch)
 
-def run_lost(plan: PlanFile, batch: range) -> list[dict[str, Any]]:
-    """Return the rows of a batch whose worker died each time."""
-    failure = f"the worker process died {_TRIES} times in this batch (out of memory?)"
-    design = Design(plan)
-    cases = [design[number] for number in batch]
-    return [{"case": case.number, "seed": case.seed, **case.values, "failure": failure} for case in cases]
+    def _rows_of_lost(self, batch: range) -> Rows:
+        """Return the rows of a batch whose worker died each time."""
+        failure = f"the worker process died {self._deaths[batch]} times in this batch (out of memory?)"
+        design = Design(self._plan)
+        cases = [design[number] for number in batch]
+        return [{"case": case.number, "seed": case.seed, **case.values, "failure": failure} for case in cases]

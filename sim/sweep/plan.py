@@ -37,14 +37,17 @@ class PlanFile(Table, frozen=True):
         dict[str, Annotated[list[Value], msgspec.Meta(min_length=1)] | RangeTable],
         about("Factors by name: a list of values, or a table with low and high.", example={"scenario": ["paper_run"]}),
     ]
-    kind: Annotated[str, about("What a case does: estimate or diagnose.")] = "estimate"
+    kind: Annotated[str, about("What a case does: estimate, diagnose or measure.")] = "estimate"
     design: Annotated[
-        Literal["grid", "random", "latin_hypercube", "sobol"],
-        about("All combinations, or points of the unit cube drawn or spread evenly (scipy.stats.qmc)."),
+        Literal["grid", "random", "latin_hypercube", "sobol", "saltelli"],
+        about(
+            "All combinations, or points of the unit cube drawn or spread evenly (scipy.stats.qmc); saltelli: for each "
+            "of the points as many combinations as factors and two more, for Sobol indices."
+        ),
     ] = "grid"
     points: Annotated[
         Annotated[int, msgspec.Meta(ge=1)] | None,
-        about("Combinations of a design that is no grid; a power of two for sobol."),
+        about("Combinations of a design that is no grid; a power of two for sobol and saltelli."),
     ] = None
     repeats: Annotated[int, about("Seeds per combination.", ge=1)] = 1
     seed: Annotated[int, about("Seed of everything left to chance.", ge=0)] = 0
@@ -65,13 +68,27 @@ def load_plan(path: str | Path) -> PlanFile:
     for name, factor in plan.factors.items():
         if isinstance(factor, RangeTable):
             _check_range(f"{path}: [factors] {name}", factor, grid=plan.design == "grid")
+        else:
+            _check_list(f"{path}: [factors] {name}", factor)
     if plan.design == "grid" and plan.points is not None:
         raise InputError(f"{path}: a grid has as many points as combinations; leave points out")
     if plan.design != "grid" and plan.points is None:
         raise InputError(f"{path}: design {plan.design!r} needs points = N")
-    if plan.design == "sobol" and plan.points is not None and plan.points & (plan.points - 1):
-        raise InputError(f"{path}: points = {plan.points}: a Sobol design is balanced for powers of two; use one")
+    if plan.design in {"sobol", "saltelli"} and plan.points is not None and plan.points & (plan.points - 1):
+        below = 1 << (plan.points.bit_length() - 1)
+        raise InputError(
+            f"{path}: points = {plan.points}: a Sobol sequence is even for powers of two; use {below} or {2 * below}"
+        )
     return plan
+
+
+def _check_list(where: str, factor: list[Value]) -> None:
+    # A column of the dataset holds values of one type.
+    if len({float if type(one) is int else type(one) for one in factor}) > 1:
+        raise InputError(f"{where}: {factor} mixes numbers, texts or booleans; give values of one type")
+    twice = [one for one in factor if factor.count(one) > 1]
+    if twice:
+        raise InputError(f"{where}: {twice[0]!r} is given twice; give each value once")
 
 
 def _check_range(where: str, factor: RangeTable, *, grid: bool) -> None:

@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+from numpy.typing import NDArray
 
 from gfimu.errors import unknown_name
 from sim.sweep.plan import PlanFile, RangeTable, Value
 
-__all__ = ["Group", "failures", "grouped"]
-
-Row = Mapping[str, Any]
+__all__ = ["Group", "failures", "grouped", "numbers", "result_names", "share_of", "varying"]
 
 _QUANTILES = (0.05, 0.5, 0.95)
 _NO_RESULT = {"case", "seed", "failure"}
+_BINS = 5  # of equal count, of a range that is grouped by
+_Z95 = 1.959964  # numerical: 97.5 % quantile of the normal distribution
 
 
 @dataclass(frozen=True)
@@ -27,7 +30,7 @@ class Group:
     Parameters
     ----------
     values : dict of str to value
-        The values, by factor.
+        The values, by factor; of a range the limits of a fifth of the cases, as text.
     result : str
         Name of the result, with its unit.
     cases : int
@@ -52,22 +55,45 @@ class Group:
         return asdict(self)
 
 
-def failures(rows: Sequence[Row]) -> dict[str, int]:
+def failures(table: pa.Table) -> dict[str, int]:
     """Return how many cases failed, by the reason, most frequent first."""
-    return dict(Counter(row["failure"] for row in rows if row["failure"]).most_common())
+    if "failure" not in table.column_names:
+        return {}
+    counts = {one["values"]: one["counts"] for one in table["failure"].value_counts().to_pylist() if one["values"]}
+    return dict(sorted(counts.items(), key=lambda item: -item[1]))
 
 
-def grouped(rows: Sequence[Row], plan: PlanFile, by: Sequence[str] = ()) -> list[Group]:
+def varying(plan: PlanFile) -> list[str]:
+    """Return the factors that have more than one value."""
+    return [name for name, one in plan.factors.items() if isinstance(one, RangeTable) or len(set(one)) > 1]
+
+
+def result_names(table: pa.Table, plan: PlanFile) -> list[str]:
+    """Return the results that are numbers, or true or false."""
+    return [
+        field.name
+        for field in table.schema
+        if field.name not in _NO_RESULT | set(plan.factors)
+        and (pa.types.is_integer(field.type) or pa.types.is_floating(field.type) or pa.types.is_boolean(field.type))
+    ]
+
+
+def numbers(table: pa.Table, name: str) -> NDArray[np.float64]:
+    """Return a column as numbers, (n,), true as 1; NaN where a case has none."""
+    return np.asarray(table[name].cast(pa.float64()).to_numpy())
+
+
+def grouped(table: pa.Table, plan: PlanFile, by: Sequence[str] = ()) -> list[Group]:
     """Group rows by factors and return the quantiles of every numeric result.
 
     Parameters
     ----------
-    rows : sequence of mapping
+    table : pyarrow.Table
         Rows of the dataset.
     plan : PlanFile
         The plan.
     by : sequence of str
-        Factors to group by; all that are lists of several values by default.
+        Factors to group by; all that are lists of several values by default. A range is cut into fifths of the cases.
 
     Raises
     ------
@@ -77,32 +103,62 @@ def grouped(rows: Sequence[Row], plan: PlanFile, by: Sequence[str] = ()) -> list
     for name in by:
         if name not in plan.factors:
             raise unknown_name("factor", name, plan.factors)
-    names = list(by) or [name for name, one in plan.factors.items() if not isinstance(one, RangeTable) and len(one) > 1]
-    groups: dict[tuple[Value, ...], list[Row]] = {}
-    for row in rows:
-        groups.setdefault(tuple(row[name] for name in names), []).append(row)
-    results = list(dict.fromkeys(key for row in rows for key in row if key not in _NO_RESULT | set(plan.factors)))
+    names = list(by) or [name for name in varying(plan) if not isinstance(plan.factors[name], RangeTable)]
+    if not len(table):
+        return []
+    members, values = _groups(table, plan, names)
+    failed = pc.not_equal(table["failure"], "").to_numpy()
     found = []
-    for values, members in groups.items():
-        failed = sum(bool(row["failure"]) for row in members)
-        for result in results:
-            numbers = [
-                row[result] for row in members if isinstance(row.get(result), float | int) and np.isfinite(row[result])
-            ]
-            if numbers:
-                low, median, high = _share(numbers) if isinstance(numbers[0], bool) else _quantiles(numbers)
-                named = dict(zip(names, values, strict=True))
-                found.append(Group(named, result, len(numbers), failed, low, median, high))
+    for rows, named in zip(members, values, strict=True):
+        for result in result_names(table, plan):
+            column = numbers(table, result)[rows]
+            column = column[np.isfinite(column)]
+            if len(column):
+                summary = share_of if pa.types.is_boolean(table.schema.field(result).type) else _quantiles
+                found.append(Group(named, result, len(column), int(failed[rows].sum()), *summary(column)))
     return found
 
 
-def _quantiles(numbers: Sequence[float]) -> tuple[float, float, float]:
-    low, median, high = np.quantile(numbers, _QUANTILES)
+def _groups(
+    table: pa.Table, plan: PlanFile, names: Sequence[str]
+) -> tuple[list[NDArray[np.intp]], list[dict[str, Value]]]:
+    """Return the rows of each group, and its values by factor."""
+    codes, labels = np.zeros((len(table), 0), dtype=int), []
+    for name in names:
+        factor = plan.factors[name]
+        one, label = (
+            _binned(numbers(table, name)) if isinstance(factor, RangeTable) else _coded(table[name], list(factor))
+        )
+        codes = np.column_stack([codes, one])
+        labels.append(label)
+    found, which = np.unique(codes, axis=0, return_inverse=True)
+    members = np.split(np.argsort(which.ravel(), kind="stable"), np.cumsum(np.bincount(which.ravel()))[:-1])
+    values = [{name: label[code] for name, label, code in zip(names, labels, one, strict=True)} for one in found]
+    return members, values
+
+
+def _coded(column: pa.ChunkedArray, factor: list[Value]) -> tuple[NDArray[np.intp], list[Value]]:
+    """Return the place of each row's value in the plan, (n,), and the values."""
+    encoded = column.combine_chunks().dictionary_encode()
+    places = np.array([factor.index(value) for value in encoded.dictionary.to_pylist()])
+    return places[np.asarray(encoded.indices)], factor
+
+
+def _binned(column: NDArray[np.float64]) -> tuple[NDArray[np.intp], list[Value]]:
+    """Return the number of each row's bin of equal count, (n,), and the limits of the bins as text."""
+    edges = np.unique(np.quantile(column, np.linspace(0.0, 1.0, _BINS + 1)))
+    which = np.clip(np.searchsorted(edges, column, side="right") - 1, 0, max(len(edges) - 2, 0))
+    limits = [f"{low:.3g} … {high:.3g}" for low, high in pairwise(edges)]
+    return which, [*limits] or [f"{edges[0]:.3g}"]
+
+
+def _quantiles(column: NDArray[np.float64]) -> tuple[float, float, float]:
+    low, median, high = np.quantile(column, _QUANTILES)
     return float(low), float(median), float(high)
 
 
-def _share(truths: Sequence[float]) -> tuple[float, float, float]:
+def share_of(truths: NDArray[np.float64]) -> tuple[float, float, float]:
     """Return Wilson's 95 % interval of a share, and the share between its limits."""
-    n, share, z = len(truths), float(np.mean(truths)), 1.959964
+    n, share, z = len(truths), float(np.mean(truths)), _Z95
     centre, half = share + z**2 / (2 * n), z * np.sqrt(share * (1 - share) / n + z**2 / (4 * n**2))
     return float((centre - half) / (1 + z**2 / n)), share, float((centre + half) / (1 + z**2 / n))

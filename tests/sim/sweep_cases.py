@@ -33,3 +33,15 @@ def always_dies(case):
         time.sleep(0.1)
         os.kill(os.getpid(), signal.SIGKILL)
     return quick(case)
+
+
+def counted(case):
+    """Leave a file per execution."""
+    Path(os.environ["GFIMU_TEST_MARKER"], f"{case.number}-{os.getpid()}-{time.monotonic_ns()}").touch()
+    return quick(case)
+
+
+def waits(case):
+    """Take a while, and leave a file per execution."""
+    time.sleep(0.05)
+    return counted(case)

@@ -90,3 +90,22 @@ def test_samples_between_the_profiles_grid_are_made_too(twin):
 def test_an_encoder_is_refused(twin):
     with pytest.raises(InputError, match="no encoder"):
         WorldFactory(twin, Measurement(encoder_step=0.01))
+
+
+def test_a_world_says_what_is_true_of_it(factory, twin):
+    effects = [make_effect("dropped_frames", {"share": 0.05}, twin.array), make_effect("table_tilt", {"x_rad": 0.02})]
+    made = factory.world(np.random.default_rng(7), effects)
+    spin = random_profile(np.random.default_rng(7), SETTING.duration)
+    t = made.recording.t_s
+    assert made.motion.rate == pytest.approx(spin.at(t).rate, abs=1e-6)
+    assert made.ideal == pytest.approx(forward.channels(twin.world(), spin, t), abs=2e-3)  # 0.2 with the tilt
+    assert factory.measure(np.random.default_rng(7), effects).readings == pytest.approx(made.recording.readings)
+
+
+def test_other_noise_is_that_of_a_factory_of_its_own(factory, twin):
+    setting = Measurement(duration=20.0, bias_instability=0.02, tacho_noise=0.5)
+    one = factory.with_noise(0.02, 0.5).measure(np.random.default_rng(3))
+    other = WorldFactory(twin, setting).measure(np.random.default_rng(3))
+    assert np.array_equal(one.readings, other.readings)
+    assert np.array_equal(one.reference["tacho_rad_s"], other.reference["tacho_rad_s"])
+    assert factory.with_noise(SETTING.bias_instability, SETTING.tacho_noise) is factory

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from concurrent.futures import BrokenExecutor, Future, ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import replace
 
 import numpy as np
@@ -21,6 +22,7 @@ from sim.study.gate import LONGEST, STRATA, choose_gate, gate_cases
 from sim.study.outcome import draw_world
 from sim.study.outcome_file import generator_name, read_outcomes
 from sim.sweep.dataset import Dataset
+from sim.sweep.engine import Workers
 from sim.sweep.plan import PlanFile
 
 
@@ -113,7 +115,13 @@ def test_an_effect_without_a_size_and_a_crash_have_no_fit_to_blame():
 
 def run(folder, monkeypatch, *options, executor=ThreadPoolExecutor):
     """Run the first two cases of a study, in threads of this process."""
-    monkeypatch.setattr(study, "open_executor", lambda workers, cluster: executor(workers))
+
+    @contextmanager
+    def opened(count, cluster):
+        with executor(count) as pool:
+            yield Workers(pool, lambda: count, lambda error: 1 if isinstance(error, BrokenExecutor) else None)
+
+    monkeypatch.setattr(study, "open_workers", opened)
     code = main(["run", *(options or ["nulls"]), "--first", "2", "--out", str(folder)])
     return code, read_outcomes(folder) if code == 0 else []
 

@@ -1,8 +1,9 @@
 """Campaigns: the cases of a plan, and that nothing is lost or run twice, whatever dies."""
 
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
+from functools import partial
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -12,9 +13,9 @@ from sweep_cases import always_dies, dies_once, quick
 from gfimu.errors import InputError
 from sim.sweep.dataset import Dataset
 from sim.sweep.design import Design
-from sim.sweep.engine import run_campaign
-from sim.sweep.executors import open_executor
+from sim.sweep.engine import Workers, run_campaign
 from sim.sweep.plan import load_plan
+from sim.sweep.pool import open_pool
 from sim.sweep.summary import failures, grouped
 
 GRID = """
@@ -46,15 +47,23 @@ def plan_file(folder, text):
     return path
 
 
+def died(error):
+    return 1 if isinstance(error, BrokenExecutor) else None
+
+
 @contextmanager
-def threads(count):
+def threads(count=2):
     with ThreadPoolExecutor(count) as pool:
-        yield pool
+        yield Workers(pool, lambda: count, died)
 
 
-def run(folder, plan, work=quick, opened=threads, workers=2):
+def pool():
+    return open_pool(2)
+
+
+def run(folder, plan, work=quick, opened=threads):
     dataset = Dataset.create(folder, plan)
-    return dataset, run_campaign(dataset, work, opened, workers)
+    return dataset, run_campaign(dataset, work, opened)
 
 
 def content(folder):
@@ -87,28 +96,28 @@ def test_a_campaign_that_goes_on_gives_the_same_bytes(tmp_path):
     plan = plan_file(tmp_path, GRID)
     _, ran = run(tmp_path / "whole", plan)
     assert ran == 18
-    part, _ = run(tmp_path / "part", plan, workers=1)
+    part, _ = run(tmp_path / "part", plan, opened=partial(threads, 1))
     shards = sorted((tmp_path / "part").glob("*.parquet"))
     for shard in shards[1:4]:
         shard.unlink()
-    ran_again = run_campaign(part, quick, threads, 2)
+    ran_again = run_campaign(part, quick, threads)
     assert ran_again == sum(min(4, 18 - 4 * number) for number in (1, 2, 3))
     assert content(tmp_path / "whole") == content(tmp_path / "part")
-    assert run_campaign(part, quick, threads, 2) == 0
+    assert run_campaign(part, quick, threads) == 0
 
 
 def test_a_failed_case_is_a_row(tmp_path):
     dataset, _ = run(tmp_path / "out", plan_file(tmp_path, "[factors]\nsize = [1, 3, 4]\n"))
-    rows = dataset.read(list(Design(dataset.plan).batches()))
-    assert [row["failure"] for row in rows] == ["", "size 3 is not made", "ZeroDivisionError: by nothing"]
-    assert failures(rows) == {"size 3 is not made": 1, "ZeroDivisionError: by nothing": 1}
+    table = dataset.table()
+    assert table["failure"].to_pylist() == ["", "size 3 is not made", "ZeroDivisionError: by nothing"]
+    assert failures(table) == {"size 3 is not made": 1, "ZeroDivisionError: by nothing": 1}
 
 
 def test_a_worker_that_dies_costs_nothing(tmp_path, monkeypatch):
     monkeypatch.setenv("GFIMU_TEST_MARKER", str(tmp_path / "marker"))
     plan = plan_file(tmp_path, GRID)
     run(tmp_path / "undisturbed", plan)
-    run(tmp_path / "disturbed", plan, dies_once, open_executor)
+    run(tmp_path / "disturbed", plan, dies_once, pool)
     assert (tmp_path / "marker").exists()
     assert content(tmp_path / "undisturbed") == content(tmp_path / "disturbed")
 
@@ -127,10 +136,10 @@ def test_a_batch_that_a_broken_pool_refuses_is_not_lost(tmp_path):
             return super().submit(*task)
 
     @contextmanager
-    def opened(count):
-        pools.append(Refusing(count))
-        with pools[-1] as pool:
-            yield pool
+    def opened():
+        pools.append(Refusing(2))
+        with pools[-1] as executor:
+            yield Workers(executor, lambda: 2, died)
 
     plan = plan_file(tmp_path, GRID)
     run(tmp_path / "undisturbed", plan)
@@ -139,18 +148,87 @@ def test_a_batch_that_a_broken_pool_refuses_is_not_lost(tmp_path):
     assert content(tmp_path / "undisturbed") == content(tmp_path / "disturbed")
 
 
+class Unreliable(Executor):
+    """Holds batches for a while, and at random breaks, loses or cancels them, or loses a worker under one of them."""
+
+    def __init__(self, rng, log):
+        self.rng, self.log, self.pending, self.broken = rng, log, [], False
+
+    def count(self):
+        for future, task in self.pending[: 1 + self.rng.integers(3)]:
+            self.finish(future, task)
+        return int(self.rng.integers(1, 4))
+
+    def submit(self, function, *values):
+        if self.broken or self.rng.random() < 0.05:
+            self.give_up()
+            raise BrokenExecutor("refused")
+        future = Future()
+        self.pending.append((future, (function, values)))
+        return future
+
+    def finish(self, future, task):
+        self.pending.remove((future, task))
+        chance, (function, values) = self.rng.random(), task
+        if chance < 0.08:
+            future.cancel()
+            future.set_running_or_notify_cancel()
+        elif chance < 0.15:
+            future.set_exception(WorkerDied())
+        elif chance < 0.2:
+            future.set_exception(BrokenExecutor("broke"))
+            self.give_up()
+        else:
+            self.log.append(values[2])  # first case of a batch whose rows are returned
+            future.set_result(function(*values))
+
+    def give_up(self):
+        self.broken = True
+        for future, _ in self.pending:
+            future.set_exception(BrokenExecutor("broke"))
+        self.pending.clear()
+
+
+class WorkerDied(Exception):
+    """As Dask reports it: of one batch alone."""
+
+
+def test_whatever_an_executor_does_each_batch_is_written_once(tmp_path, monkeypatch):
+    """Random losses at every place where an executor can lose a batch; rows that were returned are never made again."""
+    monkeypatch.setattr("sim.sweep.engine._LOOK", 1e-3)
+    monkeypatch.setattr("sim.sweep.engine._TRIES", 99)
+    plan = plan_file(tmp_path, GRID.replace("batch = 4", "batch = 1"))
+    undisturbed = content(run(tmp_path / "undisturbed", plan)[0].folder)
+    for seed in range(20):
+        rng, log, pools = np.random.default_rng(seed), [], []
+
+        @contextmanager
+        def opened(rng=rng, log=log, pools=pools):
+            pools.append(Unreliable(rng, log))
+            lost = (CancelledError, BrokenExecutor)
+            yield Workers(
+                pools[-1], pools[-1].count, lambda e: 1 if isinstance(e, WorkerDied) else 0 * isinstance(e, lost)
+            )
+
+        dataset, ran = run(tmp_path / str(seed), plan, opened=opened)
+        assert ran == 18
+        assert sorted(log) == list(range(18))
+        assert content(dataset.folder) == undisturbed
+
+
 def test_a_batch_that_kills_its_worker_each_time_is_reported(tmp_path):
-    dataset, ran = run(tmp_path / "out", plan_file(tmp_path, GRID), always_dies, open_executor)
+    dataset, ran = run(tmp_path / "out", plan_file(tmp_path, GRID), always_dies, pool)
     assert ran == 18
-    rows = dataset.read(list(Design(dataset.plan).batches()))
+    rows = dataset.table().to_pylist()
     assert [row["case"] for row in rows if row["failure"]] == [4, 5, 6, 7]
     assert "died 3 times" in rows[5]["failure"]
 
 
 def test_results_are_grouped_by_factors(tmp_path):
     dataset, _ = run(tmp_path / "out", plan_file(tmp_path, GRID))
-    rows = pq.ParquetDataset(sorted((tmp_path / "out").glob("*.parquet"))).read().to_pylist()
-    groups = grouped(rows, dataset.plan, ["size"])
+    table = pq.ParquetDataset(sorted((tmp_path / "out").glob("*.parquet"))).read()
+    rows = table.to_pylist()
+    groups = grouped(table, dataset.plan, ["size"])
     assert [(group.values, group.result, group.cases) for group in groups[:2]] == [
         ({"size": 1}, "result_m", 6),
         ({"size": 1}, "good", 6),
@@ -161,7 +239,7 @@ def test_results_are_grouped_by_factors(tmp_path):
     assert groups[1].median == pytest.approx(share)
     assert groups[1].low <= share <= groups[1].high
     with pytest.raises(InputError, match="unknown factor 'sise'"):
-        grouped(rows, dataset.plan, ["sise"])
+        grouped(table, dataset.plan, ["sise"])
 
 
 @pytest.mark.parametrize(
@@ -170,7 +248,7 @@ def test_results_are_grouped_by_factors(tmp_path):
         ("[factors]\n", r"\[factors\] is empty"),
         ("points = 3\n[factors]\na = [1]\n", "leave points out"),
         ('design = "random"\n[factors]\na = [1]\n', "needs points"),
-        ('design = "sobol"\npoints = 6\n[factors]\na = [1]\n', "powers of two"),
+        ('design = "sobol"\npoints = 6\n[factors]\na = [1]\n', "powers of two; use 4 or 8"),
         ("[factors.a]\nlow = 1.0\nhigh = 2.0\n", "levels"),
         ("[factors.a]\nlow = 2.0\nhigh = 1.0\nlevels = 2\n", "not below"),
         ('[factors.a]\nlow = -1.0\nhigh = 1.0\nlevels = 2\nscale = "log"\n', "no logarithm"),

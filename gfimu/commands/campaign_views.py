@@ -1,0 +1,182 @@
+"""Under `gfimu campaign status`, `table` and `plot`: what the folder of a campaign holds, also while it runs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from gfimu.files.outputs import OutputFile, writes
+
+if TYPE_CHECKING:
+    from sim.sweep.pace import Run
+    from sim.sweep.sensitivity import Sensitivity
+    from sim.sweep.summary import Group
+
+__all__ = ["CampaignStatus", "CampaignTable", "campaign_plot", "campaign_status", "campaign_table"]
+
+
+@dataclass(frozen=True)
+class CampaignStatus:
+    """How far a campaign is.
+
+    Parameters
+    ----------
+    folder : Path
+        Its folder.
+    cases, done : int
+        Cases of the plan, and those whose row is there.
+    failures : dict of str to int
+        How many cases failed, by the reason.
+    runs : tuple of Run
+        Processes that run it now.
+    """
+
+    folder: Path
+    cases: int
+    done: int
+    failures: dict[str, int]
+    runs: tuple[Run, ...]
+
+    @property
+    def rate_per_s(self) -> float:
+        """Cases per second of the processes that run it now; what was there before them does not count."""
+        return math.fsum(run.rate_per_s for run in self.runs)
+
+    @property
+    def left_s(self) -> float:
+        """Time until it is done, s; NaN where nothing runs it, or no batch has come yet."""
+        return (self.cases - self.done) / self.rate_per_s if self.rate_per_s else math.nan
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the content for JSON."""
+        return {
+            "folder": str(self.folder),
+            "cases": self.cases,
+            "done": self.done,
+            "failures": self.failures,
+            "runs": [{"host": run.host, "pid": run.pid, "ran": run.ran} for run in self.runs],
+            "rate_per_s": self.rate_per_s,
+            "left_s": self.left_s,
+        }
+
+
+@dataclass(frozen=True)
+class CampaignTable:
+    """Quantiles and sensitivities of a campaign.
+
+    Parameters
+    ----------
+    groups : tuple of Group
+        Quantiles of each result by the values of the factors.
+    sensitivities : tuple of Sensitivity
+        Share of each result's variance that each factor causes.
+    seed_shares : dict of str to float
+        Share of each result's variance that the seeds cause; empty without repeats.
+    """
+
+    groups: tuple[Group, ...]
+    sensitivities: tuple[Sensitivity, ...]
+    seed_shares: dict[str, float]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the content for JSON."""
+        return {
+            "groups": [group.to_dict() for group in self.groups],
+            "sensitivities": [one.to_dict() for one in self.sensitivities],
+            "seed_shares": self.seed_shares,
+        }
+
+
+@writes(reads=("folder",))
+def campaign_status(folder: str | Path) -> CampaignStatus:
+    """Say how far a campaign is, also while another process runs it.
+
+    Raises
+    ------
+    InputError
+        If the folder holds no campaign, or a file in it is damaged.
+    """
+    from sim.sweep.dataset import Dataset
+    from sim.sweep.design import Design
+    from sim.sweep.pace import runs
+    from sim.sweep.summary import failures
+
+    dataset = Dataset.open(folder)
+    running = tuple(runs(dataset))
+    table = dataset.table(["failure"])
+    return CampaignStatus(dataset.folder, len(Design(dataset.plan)), len(table), failures(table), running)
+
+
+@writes(reads=("folder",), csv=OutputFile("a table", (".csv",)))
+def campaign_table(folder: str | Path, *, by: Sequence[str] = (), csv: str | Path | None = None) -> CampaignTable:
+    """Return quantiles of each result by the values of factors, and which factors cause its variance.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Folder of the campaign.
+    by : sequence of str
+        Factors by whose values the results are grouped; all that are lists of values by default.
+    csv : str or Path, optional
+        File for the quantiles, one row per group and result.
+
+    Raises
+    ------
+    InputError
+        If the folder holds no campaign, a file in it is damaged, or there is no such factor.
+    """
+    from sim.sweep.dataset import Dataset
+    from sim.sweep.design import Design
+    from sim.sweep.sensitivity import seed_shares, sensitivities
+    from sim.sweep.summary import grouped
+
+    dataset = Dataset.open(folder)
+    table, design = dataset.table(), Design(dataset.plan)
+    found = CampaignTable(
+        tuple(grouped(table, dataset.plan, list(by))), tuple(sensitivities(table, design)), seed_shares(table, design)
+    )
+    if csv is not None:
+        _write_csv(csv, found.groups)
+    return found
+
+
+@writes(reads=("folder",), out=OutputFile("a picture", (".png", ".svg", ".html")))
+def campaign_plot(folder: str | Path, *, out: str | Path, result: Sequence[str] = ()) -> list[str]:
+    """Draw results against each factor, and which factors cause their variance; return the names of what is drawn.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Folder of the campaign.
+    out : str or Path
+        Picture to write; an ``.html`` page holds it with the counts and the reasons of failures.
+    result : sequence of str
+        Results to draw; the first four by default.
+
+    Raises
+    ------
+    InputError
+        If the folder holds no campaign or no result yet, a file in it is damaged, or there is no such result.
+    """
+    from sim.sweep.dataset import Dataset
+    from sim.sweep.design import Design
+    from sim.sweep.picture import campaign_picture
+
+    dataset = Dataset.open(folder)
+    return campaign_picture(out, dataset.folder, dataset.table(), Design(dataset.plan), list(result))
+
+
+def _write_csv(path: str | Path, groups: Sequence[Group]) -> None:
+    from csv import writer
+
+    from gfimu.files.atomic_file import atomic_path
+
+    factors = list(groups[0].values) if groups else []
+    with atomic_path(path) as part, Path(part).open("w", encoding="utf-8", newline="") as file:
+        lines = writer(file, lineterminator="\n")
+        lines.writerow([*factors, "result", "cases", "failed", "q05", "median_or_share", "q95"])
+        for one in groups:
+            lines.writerow([*one.values.values(), one.result, one.cases, one.failed, one.low, one.median, one.high])

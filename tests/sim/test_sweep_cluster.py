@@ -1,0 +1,129 @@
+"""Campaigns on a Dask cluster of several processes: whatever dies or leaves, nothing is lost and nothing runs twice."""
+
+import os
+import signal
+import sys
+import threading
+from collections import Counter
+from contextlib import contextmanager
+from functools import partial
+from types import ModuleType
+
+import pytest
+from sweep_cases import always_dies, counted, waits
+
+from gfimu.errors import GfimuError, InputError
+from sim.sweep.cluster import open_cluster
+from sim.sweep.dataset import Dataset
+from sim.sweep.engine import run_campaign
+from sim.sweep.pool import open_pool
+
+dask = pytest.importorskip("dask")
+distributed = pytest.importorskip("distributed")
+
+PLAN = """
+repeats = 12
+seed = 7
+batch = 2
+[factors]
+size = [1, 2, 5]
+"""
+
+
+@contextmanager
+def cluster(workers=2):
+    """A scheduler and worker processes; a worker that is killed is started again, as by a batch system."""
+    with distributed.LocalCluster(
+        n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=50
+    ) as found:
+        yield found
+
+
+@pytest.fixture
+def ran(tmp_path, monkeypatch):
+    """Run the plan, counting how often each case is run; returns folder content, and executions per case."""
+    plan, marks = tmp_path / "plan.toml", tmp_path / "marks"
+    plan.write_text(PLAN)
+    marks.mkdir()
+    monkeypatch.setenv("GFIMU_TEST_MARKER", str(marks))  # of workers that start from now on
+
+    def run(name, opened, work=counted, progress=None):
+        for mark in marks.iterdir():
+            mark.unlink()
+        dataset = Dataset.create(tmp_path / name, plan)
+        run_campaign(dataset, work, opened, progress=progress)
+        times = Counter(int(mark.name.partition("-")[0]) for mark in marks.iterdir())
+        content = {file.name: file.read_bytes() for file in sorted((tmp_path / name).iterdir())}
+        return content, [times[case] for case in range(36)], dataset
+
+    return run
+
+
+def after(cases, change):
+    """Progress that calls ``change`` once, in a thread of its own, when so many cases are done."""
+    begun = []
+
+    def progress(done, total):
+        if done >= cases and not begun:
+            begun.append(threading.Thread(target=change, daemon=True))
+            begun[0].start()
+
+    return progress
+
+
+def test_a_cluster_gives_the_bytes_of_the_pool_whoever_dies_or_leaves(ran):
+    """Several seconds, as processes start: a pool, a cluster, and a worker in place of each that ends."""
+    pool, once, _ = ran("pool", partial(open_pool, 2))
+    assert set(once) == {1}
+    with cluster() as found:
+        opened = partial(open_cluster, found.scheduler_address)
+        with distributed.Client(found, set_as_default=False) as client:
+            undisturbed, times, _ = ran("undisturbed", opened)
+            assert undisturbed == pool
+            assert set(times) == {1}
+
+            def kill():
+                (pid, *_) = client.run(os.getpid).values()
+                os.kill(pid, signal.SIGKILL)
+
+            killed, times, _ = ran("killed", opened, waits, after(6, kill))
+            assert killed == pool
+            assert min(times) == 1
+            assert sum(times) <= 36 + 2 * 2  # the batches that its worker held, at most
+
+            def leave():
+                (address, *_) = client.scheduler_info()["workers"]
+                client.retire_workers([address], close_workers=True)
+
+            left, times, _ = ran("left", opened, waits, after(6, leave))
+            assert left == pool
+            assert min(times) == 1
+            assert sum(times) <= 36 + 2 * 2
+
+
+def test_a_batch_that_kills_each_worker_of_a_cluster_is_reported_and_no_other_runs_again(ran):
+    with dask.config.set({"distributed.scheduler.allowed-failures": 0}), cluster() as found:
+        _, _, dataset = ran("out", partial(open_cluster, found.scheduler_address), always_dies)
+    rows = dataset.table().to_pylist()
+    assert [row["case"] for row in rows] == list(range(36))
+    assert [row["case"] for row in rows if row["failure"]] == [4, 5]
+    assert "died 3 times" in rows[5]["failure"]
+
+
+def test_a_lost_connection_ends_in_one_line_and_another_call_goes_on(ran):
+    with cluster(1) as found:
+        address = found.scheduler_address
+        with pytest.raises(InputError, match=rf"--cluster {address}: no Dask scheduler answers"):
+            ran("out", partial(open_cluster, address), waits, after(6, found.close))
+    _, times, dataset = ran("out", partial(open_pool, 1))
+    assert set(times) == {0, 1}
+    assert len(dataset.table()) == 36
+
+
+def test_work_that_no_worker_finds_is_one_line(ran, monkeypatch):
+    module = ModuleType("only_here")
+    exec("def work(case):\n    return {}", module.__dict__)
+    monkeypatch.setitem(sys.modules, "only_here", module)
+    with cluster(1) as found, pytest.raises(GfimuError, match=r"No module named 'only_here'.*same gfimu") as refused:
+        ran("out", partial(open_cluster, found.scheduler_address), module.work)
+    assert "\n" not in str(refused.value)
